@@ -1,0 +1,13 @@
+//! What a camera sees and where it stands.
+//!
+//! Camera frame: OpenCV's (x right, y down, z forward). Depth is z in metres, not ray length; 0 is invalid. The centre of
+//! the first pixel is (0, 0).
+
+mod error;
+mod images;
+mod model;
+
+pub use error::{Error, Result};
+pub use images::{ColorImage, DepthImage, Mask};
+pub use model::{Camera, Distortion};
+pub use trocar_geometry::Pose;

@@ -1,0 +1,1 @@
+//! Metrics, experiments and reports: what came out, beside what the paper says.

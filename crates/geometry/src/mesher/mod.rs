@@ -1,0 +1,14 @@
+//! Meshers: from a shape to a tetrahedral body.
+
+mod lattice;
+
+pub use lattice::LatticeMesher;
+
+use crate::{Result, SignedDistance, TetMesh};
+use glam::DVec3;
+
+/// Fills a shape with tetrahedra.
+pub trait Mesher {
+    /// Meshes the inside of `shape`, which lies within `bounds` [m]. One connected body, every element positive.
+    fn mesh(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh>;
+}

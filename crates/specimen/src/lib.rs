@@ -1,0 +1,17 @@
+//! Organs on disk: the folder that reconstruction writes and the cell reads.
+//!
+//! ```text
+//! specimen.toml     organs, materials, pins, provenance
+//! <organ>.msh       tetrahedral mesh, Gmsh 4.1, metres
+//! <organ>.ply       closed coloured surface, metres
+//! background.png    the composite (recordings only)
+//! report.html       what a person looks at (written by the report)
+//! ```
+
+mod error;
+mod organ;
+mod specimen;
+
+pub use error::{Error, Result};
+pub use organ::{End, Material, MaterialModel, Organ, OrganFacts, Pins};
+pub use specimen::{Provenance, Specimen};

@@ -1,0 +1,124 @@
+//! One organ: meshes, material, pins.
+
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use trocar_geometry::{TetMesh, TriMesh};
+
+/// Constitutive model by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MaterialModel {
+    /// Stable neo-Hookean (Smith, De Goes, Kim 2018); the default.
+    #[default]
+    StableNeoHookean,
+    /// St. Venant-Kirchhoff, the paper's.
+    StVenantKirchhoff,
+}
+
+/// Material of an organ.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Material {
+    /// Constitutive model.
+    #[serde(default)]
+    pub model: MaterialModel,
+    /// Young's modulus [Pa].
+    pub young_modulus_pa: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Density [kg/m3].
+    pub density_kg_m3: f64,
+}
+
+impl Default for Material {
+    /// 12 kPa, 0.45, 1200 kg/m3: the paper's appendix in the bimanual cell.
+    fn default() -> Self {
+        Self { model: MaterialModel::default(), young_modulus_pa: 12e3, poisson_ratio: 0.45, density_kg_m3: 1200.0 }
+    }
+}
+
+/// One of the two ends of a tubular organ.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum End {
+    /// s = 0.
+    Base,
+    /// s = 1.
+    Tip,
+}
+
+/// Which nodes of an organ are held where they were recorded (mesentery and ligaments are not seen by the camera).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "rule", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum Pins {
+    /// None.
+    None,
+    /// The lowest `share` of the nodes by height.
+    Band {
+        /// Share of all nodes, 0 to 1.
+        share: f64,
+    },
+    /// One end, and a band along the part next to it.
+    End {
+        /// Which end.
+        end: End,
+        /// Organ coordinate distance from that end within which every node is pinned.
+        length: f64,
+        /// Organ coordinate length of the part next to the end in which the lowest nodes are pinned too.
+        #[serde(default)]
+        band_length: f64,
+        /// Share of that part's nodes, lowest first.
+        #[serde(default)]
+        band_share: f64,
+    },
+}
+
+/// What was measured of an organ when it was made; kept in `specimen.toml` for people and reports.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OrganFacts {
+    /// Nodes of the tetrahedral mesh.
+    pub nodes: usize,
+    /// Tetrahedra.
+    pub tets: usize,
+    /// The surface closes.
+    pub watertight: bool,
+    /// Tetrahedra with volume at or below 0.
+    pub inverted: usize,
+    /// Smallest dihedral angle [degrees].
+    pub min_dihedral_deg: f64,
+    /// Median over elements of the smallest dihedral angle [degrees].
+    pub median_dihedral_deg: f64,
+    /// Median edge length [mm].
+    pub median_edge_mm: f64,
+    /// Volume [cm3].
+    pub volume_cm3: f64,
+    /// Median absolute depth error of the surface against the depth it was made from [mm]; recordings only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_error_median_mm: Option<f64>,
+    /// Median signed depth error, surface minus measured [mm]; recordings only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_error_signed_mm: Option<f64>,
+    /// Share of the organ's mask pixels the error was measured on; recordings only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covered: Option<f64>,
+}
+
+/// One organ of a specimen, meshes loaded.
+#[derive(Clone, Debug)]
+pub struct Organ {
+    /// Name; also the stem of its files. Lower-case letters, digits, `-` and `_`.
+    pub name: String,
+    /// Tetrahedral mesh in the recording frame [m].
+    pub body: TetMesh,
+    /// Closed surface with vertex colours in the recording frame [m].
+    pub surface: TriMesh,
+    /// Material.
+    pub material: Material,
+    /// Pins.
+    pub pins: Pins,
+    /// A point nearer to the organ's base (s = 0) than to its tip [m].
+    pub base: DVec3,
+    /// Measurements.
+    pub facts: OrganFacts,
+}
