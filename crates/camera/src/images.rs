@@ -1,7 +1,12 @@
 //! Colour, depth and mask images, and their files.
 
-use crate::Result;
+use crate::{Error, Result};
+use image::{DynamicImage, ImageDecoder, ImageReader};
+use std::io::Cursor;
 use std::path::Path;
+
+/// Images larger than this on a side are refused before their pixels are allocated.
+const MAX_SIDE: u32 = 16_384;
 
 /// An 8-bit sRGB image, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,19 +46,31 @@ impl ColorImage {
     pub fn new(width: usize, height: usize, color: [u8; 3]) -> Self {
         Self { width, height, pixels: vec![color; width * height] }
     }
+
     /// Reads a PNG or JPEG.
+    ///
+    /// # Errors
+    /// Names the file when it is missing, truncated or no image.
     pub fn read(path: &Path) -> Result<Self> {
-        let _ = path;
-        todo!()
+        let image = decode(path)?.into_rgb8();
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Ok(Self { width, height, pixels: image.pixels().map(|p| p.0).collect() })
     }
+
     /// Writes a PNG.
+    ///
+    /// # Errors
+    /// Names the file when it cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<()> {
-        let _ = path;
-        todo!()
+        write(path, &self.to_png()?)
     }
+
     /// The PNG file as bytes.
+    ///
+    /// # Errors
+    /// When the pixels are not as many as the size says.
     pub fn to_png(&self) -> Result<Vec<u8>> {
-        todo!()
+        encode(self.width, self.height, png::ColorType::Rgb, png::BitDepth::Eight, self.pixels.as_flattened())
     }
 }
 
@@ -62,15 +79,30 @@ impl DepthImage {
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, depth: vec![0.0; width * height] }
     }
+
     /// Reads a 16-bit greyscale PNG whose unit is `scale` metres.
+    ///
+    /// # Errors
+    /// Names the file when it is missing, truncated, or not 16-bit greyscale.
     pub fn read(path: &Path, scale: f64) -> Result<Self> {
-        let _ = (path, scale);
-        todo!()
+        let DynamicImage::ImageLuma16(image) = decode(path)? else {
+            return Err(wrong(path, "not a 16-bit greyscale image; depth is one 16-bit channel"));
+        };
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Ok(Self { width, height, depth: image.into_raw().into_iter().map(|d| (f64::from(d) * scale) as f32).collect() })
     }
-    /// Writes a 16-bit greyscale PNG whose unit is `scale` metres.
+
+    /// Writes a 16-bit greyscale PNG whose unit is `scale` metres; depths beyond its range become invalid.
+    ///
+    /// # Errors
+    /// Names the file when it cannot be written.
     pub fn write_png(&self, path: &Path, scale: f64) -> Result<()> {
-        let _ = (path, scale);
-        todo!()
+        let quantise = |d: &f32| {
+            let units = (f64::from(*d) / scale).round();
+            if units >= 1.0 && units <= f64::from(u16::MAX) { units as u16 } else { 0 }
+        };
+        let bytes: Vec<u8> = self.depth.iter().flat_map(|d| quantise(d).to_be_bytes()).collect();
+        write(path, &encode(self.width, self.height, png::ColorType::Grayscale, png::BitDepth::Sixteen, &bytes)?)
     }
 }
 
@@ -79,18 +111,110 @@ impl Mask {
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, set: vec![false; width * height] }
     }
+
     /// Number of pixels set.
     pub fn count(&self) -> usize {
         self.set.iter().filter(|s| **s).count()
     }
-    /// Reads an 8-bit image; pixels above half brightness (or with alpha and not transparent) are set.
+
+    /// Reads an image; pixels above half brightness that are not transparent are set.
+    ///
+    /// # Errors
+    /// Names the file when it is missing, truncated or no image.
     pub fn read(path: &Path) -> Result<Self> {
-        let _ = path;
-        todo!()
+        let image = decode(path)?.into_luma_alpha8();
+        let (width, height) = (image.width() as usize, image.height() as usize);
+        Ok(Self { width, height, set: image.pixels().map(|p| p.0[0] > 127 && p.0[1] > 127).collect() })
     }
+
     /// Writes an 8-bit greyscale PNG: 255 set, 0 not.
+    ///
+    /// # Errors
+    /// Names the file when it cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<()> {
-        let _ = path;
-        todo!()
+        let bytes: Vec<u8> = self.set.iter().map(|s| if *s { 255 } else { 0 }).collect();
+        write(path, &encode(self.width, self.height, png::ColorType::Grayscale, png::BitDepth::Eight, &bytes)?)
+    }
+}
+
+fn wrong(path: &Path, reason: impl ToString) -> Error {
+    Error::Image { path: path.to_owned(), reason: reason.to_string() }
+}
+
+/// Decodes by content, not by extension. The whole file is read first, so that a huge header in a small file is refused.
+fn decode(path: &Path) -> Result<DynamicImage> {
+    let bytes = std::fs::read(path).map_err(|e| wrong(path, e))?;
+    let unreadable =
+        |e: image::ImageError| wrong(path, format!("unreadable image ({e}); expected a whole PNG or JPEG"));
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| wrong(path, e))?;
+    reader.no_limits();
+    let decoder = reader.into_decoder().map_err(unreadable)?;
+    let (width, height) = decoder.dimensions();
+    if width > MAX_SIDE || height > MAX_SIDE {
+        return Err(wrong(path, format!("{width} x {height} pixels; at most {MAX_SIDE} on a side")));
+    }
+    DynamicImage::from_decoder(decoder).map_err(unreadable)
+}
+
+/// Fast compression: recordings are written once a frame and read soon after.
+fn encode(width: usize, height: usize, color: png::ColorType, depth: png::BitDepth, bytes: &[u8]) -> Result<Vec<u8>> {
+    let failed = |e: png::EncodingError| Error::Camera(format!("a {width} x {height} image cannot be written: {e}"));
+    let mut out = Vec::with_capacity(bytes.len() / 2);
+    let mut encoder = png::Encoder::new(&mut out, width as u32, height as u32);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.set_compression(png::Compression::Fast);
+    let mut writer = encoder.write_header().map_err(failed)?;
+    writer.write_image_data(bytes).map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(out)
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|e| wrong(path, e))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn gradient() -> ColorImage {
+        let mut image = ColorImage::new(7, 5, [0; 3]);
+        for (i, p) in image.pixels.iter_mut().enumerate() {
+            *p = [i as u8, (7 * i) as u8, 255 - i as u8];
+        }
+        image
+    }
+
+    #[test]
+    fn files_come_back_as_they_were() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("image.png");
+        gradient().write_png(&path).unwrap();
+        assert_eq!(ColorImage::read(&path).unwrap(), gradient());
+
+        let mut depth = DepthImage::new(3, 2);
+        depth.depth = vec![0.0, 0.25, 0.2504, 65.535, 70.0, 0.001];
+        depth.write_png(&path, 0.001).unwrap();
+        assert_eq!(DepthImage::read(&path, 0.001).unwrap().depth, [0.0, 0.25, 0.25, 65.535, 0.0, 0.001]);
+
+        let mut mask = Mask::new(3, 2);
+        mask.set[4] = true;
+        mask.write_png(&path).unwrap();
+        assert_eq!(Mask::read(&path).unwrap(), mask);
+    }
+
+    #[test]
+    fn bad_files_are_named() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("frame.png");
+        assert!(ColorImage::read(&path).unwrap_err().to_string().contains("frame.png"));
+        let png = gradient().to_png().unwrap();
+        for length in 0..png.len() - 12 {
+            std::fs::write(&path, &png[..length]).unwrap();
+            assert!(ColorImage::read(&path).is_err(), "{length} of {} bytes were taken for an image", png.len());
+        }
+        std::fs::write(&path, &png).unwrap();
+        assert!(DepthImage::read(&path, 0.001).unwrap_err().to_string().contains("16-bit"));
     }
 }

@@ -1,7 +1,7 @@
 //! The pinhole camera with OpenCV's lens distortion.
 
-use crate::Result;
-use glam::{DVec2, DVec3};
+use crate::{Error, Result};
+use glam::{DMat2, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A pinhole camera; lengths of the image in pixels.
@@ -25,9 +25,9 @@ pub struct Camera {
     pub distortion: Distortion,
 }
 
-/// OpenCV's rational distortion, coefficients in its order: k1 k2 p1 p2 k3 k4 k5 k6 (missing ones are 0).
+/// OpenCV's rational distortion, coefficients in its order: k1 k2 p1 p2 k3 k4 k5 k6 (4, 5 or 8 of them in a file).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(from = "Vec<f64>", into = "Vec<f64>")]
+#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Distortion(pub [f64; 8]);
 
 impl Distortion {
@@ -35,15 +35,53 @@ impl Distortion {
     pub fn is_none(&self) -> bool {
         self.0 == [0.0; 8]
     }
+
+    /// Where an ideal image point (x, y) = (X/Z, Y/Z) really lands (OpenCV documentation, "camera calibration").
+    fn apply(&self, p: DVec2) -> DVec2 {
+        let [k1, k2, p1, p2, k3, k4, k5, k6] = self.0;
+        let r2 = p.length_squared();
+        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
+        let xy = p.x * p.y;
+        DVec2::new(
+            p.x * radial + 2.0 * p1 * xy + p2 * (r2 + 2.0 * p.x * p.x),
+            p.y * radial + p1 * (r2 + 2.0 * p.y * p.y) + 2.0 * p2 * xy,
+        )
+    }
+
+    /// The ideal image point that lands at `q`, by Newton's method (a fixed-point iteration diverges on wide lenses). The
+    /// Jacobian is a central difference: its error only slows the last digit.
+    fn undo(&self, q: DVec2) -> DVec2 {
+        const ITERATIONS: usize = 20;
+        const H: f64 = 1e-6;
+        let mut p = q;
+        for _ in 0..ITERATIONS {
+            let residual = q - self.apply(p);
+            if residual.length_squared() < 1e-26 {
+                break;
+            }
+            let column = |d: DVec2| (self.apply(p + d) - self.apply(p - d)) / (2.0 * H);
+            let jacobian = DMat2::from_cols(column(DVec2::new(H, 0.0)), column(DVec2::new(0.0, H)));
+            p += jacobian.inverse() * residual;
+        }
+        p
+    }
 }
 
-impl From<Vec<f64>> for Distortion {
-    fn from(v: Vec<f64>) -> Self {
+impl TryFrom<Vec<f64>> for Distortion {
+    type Error = String;
+
+    fn try_from(v: Vec<f64>) -> std::result::Result<Self, String> {
+        if !matches!(v.len(), 0 | 4 | 5 | 8) {
+            return Err(format!(
+                "distortion has {} coefficients; OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]] has 4, 5 or 8",
+                v.len()
+            ));
+        }
         let mut k = [0.0; 8];
         for (k, v) in k.iter_mut().zip(v) {
             *k = v;
         }
-        Self(k)
+        Ok(Self(k))
     }
 }
 
@@ -54,25 +92,111 @@ impl From<Distortion> for Vec<f64> {
 }
 
 impl Camera {
-    /// The D405's depth stream at 848x480: 87 x 58 degrees, square pixels, centred.
+    /// The D405's depth stream at 848x480: 87 x 58 degrees (datasheet), square pixels, centred.
     pub fn d405() -> Self {
-        todo!()
+        let (width, height) = (848, 480);
+        let f = width as f64 / 2.0 / (87.0_f64.to_radians() / 2.0).tan();
+        Self {
+            width,
+            height,
+            fx: f,
+            fy: f,
+            cx: (width - 1) as f64 / 2.0,
+            cy: (height - 1) as f64 / 2.0,
+            distortion: Distortion::default(),
+        }
     }
 
     /// Refuses sizes of zero, focal lengths that are not positive, and numbers that are not finite.
     pub fn validate(&self) -> Result<()> {
-        todo!()
+        let refuse =
+            |field: &str, value: String, right: &str| Err(Error::Camera(format!("camera.{field} is {value}; {right}")));
+        if self.width == 0 || self.height == 0 || self.width > 65_536 || self.height > 65_536 {
+            return refuse("width x height", format!("{} x {}", self.width, self.height), "1 to 65536 pixels each");
+        }
+        for (name, f) in [("fx", self.fx), ("fy", self.fy)] {
+            if !(f.is_finite() && f > 0.0) {
+                return refuse(name, f.to_string(), "a focal length is a positive number of pixels");
+            }
+        }
+        for (name, c) in [("cx", self.cx), ("cy", self.cy)] {
+            if !c.is_finite() {
+                return refuse(name, c.to_string(), "a principal point is a finite number of pixels");
+            }
+        }
+        if self.distortion.0.iter().any(|k| !k.is_finite()) {
+            return refuse("distortion", format!("{:?}", self.distortion.0), "every coefficient is a finite number");
+        }
+        Ok(())
     }
 
     /// Pixel of a point in the camera frame [m]; `None` behind the camera.
     pub fn project(&self, p: DVec3) -> Option<DVec2> {
-        let _ = p;
-        todo!()
+        if p.z <= 0.0 {
+            return None;
+        }
+        let mut q = DVec2::new(p.x / p.z, p.y / p.z);
+        if !self.distortion.is_none() {
+            q = self.distortion.apply(q);
+        }
+        Some(DVec2::new(q.x * self.fx + self.cx, q.y * self.fy + self.cy))
     }
 
     /// Direction (x, y, 1) of the ray through pixel (u, v): multiplied by a depth it is the point in the camera frame.
     pub fn ray(&self, u: f64, v: f64) -> DVec3 {
-        let _ = (u, v);
-        todo!()
+        let mut q = DVec2::new((u - self.cx) / self.fx, (v - self.cy) / self.fy);
+        if !self.distortion.is_none() {
+            q = self.distortion.undo(q);
+        }
+        q.extend(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn distorted() -> Camera {
+        Camera {
+            distortion: Distortion([0.5479, -0.0210, -7.21e-5, 2.06e-5, -0.00265, 0.8897, 0.0861, -0.0139]),
+            ..Camera::d405()
+        }
+    }
+
+    #[test]
+    fn ray_undoes_project() {
+        for camera in [Camera::d405(), distorted()] {
+            for (u, v) in [(0.0, 0.0), (400.0, 100.0), (847.0, 479.0), (12.5, 470.25)] {
+                let pixel = camera.project(camera.ray(u, v) * 0.37).unwrap();
+                assert!((pixel - DVec2::new(u, v)).length() < 1e-8, "{pixel} for {u}, {v}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_field_of_view_is_the_data_sheets() {
+        let camera = Camera::d405();
+        let left = camera.ray(-0.5, camera.cy);
+        assert!((2.0 * (-left.x).atan().to_degrees() - 87.0).abs() < 1e-9);
+        let top = camera.ray(camera.cx, -0.5);
+        assert!(
+            (2.0 * (-top.y).atan().to_degrees() - 58.0).abs() < 2.0,
+            "848x480 is a little wider than the sheet's 16:9"
+        );
+    }
+
+    #[test]
+    fn nothing_is_seen_behind_the_camera() {
+        assert_eq!(Camera::d405().project(DVec3::new(0.0, 0.0, -1.0)), None);
+    }
+
+    #[test]
+    fn nonsense_is_refused_by_field() {
+        let mut camera = Camera::d405();
+        camera.fy = -1.0;
+        assert!(camera.validate().unwrap_err().to_string().contains("fy"));
+        camera = Camera { cx: f64::NAN, ..Camera::d405() };
+        assert!(camera.validate().unwrap_err().to_string().contains("cx"));
+        assert!(Distortion::try_from(vec![0.1; 6]).is_err());
     }
 }

@@ -1,6 +1,6 @@
 //! Rigid poses.
 
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A rigid pose: maps points of its own frame to the parent's, x_parent = rotation * x + translation.
@@ -33,9 +33,33 @@ impl Pose {
         Self { rotation, translation: -(rotation * self.translation) }
     }
 
-    /// A camera at `eye` that looks at `target`, with image "up" near `up` (camera y points away from it).
+    /// An OpenCV camera (x right, y down, z forward) at `eye` that looks at `target`, the image's top towards `up`. Where
+    /// `up` runs along the view, another is chosen.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3) -> Self {
-        let _ = (eye, target, up);
-        todo!()
+        let z = (target - eye).normalize_or(DVec3::Z);
+        let x = z.cross(up).try_normalize().unwrap_or_else(|| z.any_orthonormal_vector());
+        let y = z.cross(x);
+        Self { rotation: DQuat::from_mat3(&DMat3::from_cols(x, y, z)), translation: eye }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn look_at_puts_the_target_ahead_and_up_up() {
+        let pose = Pose::look_at(DVec3::new(1.0, 2.0, 3.0), DVec3::new(1.0, 5.0, 3.0), DVec3::Z);
+        let inverse = pose.inverse();
+        assert!((inverse.transform(DVec3::new(1.0, 5.0, 3.0)) - 3.0 * DVec3::Z).length() < 1e-12);
+        assert!(inverse.transform(DVec3::new(1.0, 5.0, 4.0)).y < 0.0, "up is towards negative image y");
+        assert!(inverse.transform(DVec3::new(2.0, 5.0, 3.0)).x > 0.0, "facing +y with z up, +x is to the right");
+    }
+
+    #[test]
+    fn inverse_undoes() {
+        let pose = Pose { rotation: DQuat::from_rotation_y(0.7), translation: DVec3::new(0.1, -0.2, 0.3) };
+        let p = DVec3::new(3.0, 2.0, -1.0);
+        assert!((pose.inverse().transform(pose.transform(p)) - p).length() < 1e-15);
     }
 }
