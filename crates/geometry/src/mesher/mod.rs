@@ -1,6 +1,7 @@
 //! Meshers: from a shape to a tetrahedral body.
 
 mod lattice;
+mod stencil;
 
 pub use lattice::LatticeMesher;
 
@@ -10,5 +11,8 @@ use glam::DVec3;
 /// Fills a shape with tetrahedra.
 pub trait Mesher {
     /// Meshes the inside of `shape`, which lies within `bounds` [m]. One connected body, every element positive.
+    ///
+    /// # Errors
+    /// When nothing of the shape is as large as an element.
     fn mesh(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh>;
 }
