@@ -3,6 +3,9 @@
 //! A closed surface ([`TriMesh`]) is seen as a signed distance ([`SignedDistance`]); a signed distance becomes a clean
 //! surface ([`isosurface`]) or a tetrahedral body ([`mesher::LatticeMesher`]). All lengths are metres, all geometry `f64`.
 
+// Units in brackets, such as [m], are not links.
+#![allow(rustdoc::broken_intra_doc_links)]
+
 mod axis;
 mod distance;
 mod error;
@@ -12,6 +15,8 @@ pub mod mesher;
 mod pose;
 mod quality;
 mod repair;
+#[cfg(test)]
+mod shapes;
 mod skin;
 mod smooth;
 mod tet_mesh;
@@ -22,7 +27,7 @@ pub mod io;
 pub use axis::OrganAxis;
 pub use distance::{MeshDistance, SignedDistance};
 pub use error::{Error, Result};
-pub use grid::{Grid, sample_distance};
+pub use grid::{Grid, sample_distance, sample_everywhere};
 pub use isosurface::isosurface;
 pub use mesher::{LatticeMesher, Mesher};
 pub use pose::Pose;

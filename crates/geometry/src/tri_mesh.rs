@@ -13,36 +13,63 @@ pub struct TriMesh {
     pub colors: Vec<[u8; 3]>,
 }
 
+/// One side of a triangle, keyed by its undirected edge.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct HalfEdge {
+    /// Smaller and larger vertex index of the edge.
+    pub edge: (u32, u32),
+    /// The triangle.
+    pub triangle: u32,
+    /// True when the triangle runs from the smaller to the larger index.
+    pub forward: bool,
+}
+
 impl TriMesh {
-    /// Corner positions of triangle `t` [m].
-    pub fn corners(&self, t: usize) -> [DVec3; 3] {
-        self.triangles[t].map(|i| self.vertices[i as usize])
-    }
-
-    /// Number of undirected edges that are not shared by exactly two triangles running along them in opposite directions.
-    pub fn open_edges(&self) -> usize {
-        // (low, high, direction) sorted: a closed edge is a run of one of each direction.
-        let mut edges: Vec<(u32, u32, bool)> = self
-            .triangles
-            .iter()
-            .flat_map(|t| [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])])
-            .map(|(a, b)| (a.min(b), a.max(b), a < b))
-            .collect();
-        edges.sort_unstable();
-        edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)).filter(|run| !(run.len() == 2 && run[0].2 != run[1].2)).count()
-    }
-
-    /// True when every edge is shared by exactly two triangles that run along it in opposite directions.
+    /// True when every edge is shared by exactly two triangles that run along it in opposite directions. False for a mesh
+    /// without triangles.
     pub fn is_watertight(&self) -> bool {
-        !self.triangles.is_empty() && self.open_edges() == 0
+        let sides = self.half_edges();
+        !sides.is_empty() && edge_groups(&sides).all(|group| group.len() == 2 && group[0].forward != group[1].forward)
     }
 
-    /// Enclosed volume [m3]; negative when the triangles face inward.
+    /// Number of edges that do not have exactly two triangles.
+    pub fn open_edges(&self) -> usize {
+        edge_groups(&self.half_edges()).filter(|group| group.len() != 2).count()
+    }
+
+    /// Number of distinct edges.
+    pub fn edge_count(&self) -> usize {
+        edge_groups(&self.half_edges()).count()
+    }
+
+    /// Enclosed volume [m3]; negative when the triangles face inward. By the divergence theorem, summed about the middle
+    /// of the bounding box; for a surface with holes it is the volume closed by cones from there.
     pub fn volume(&self) -> f64 {
-        // Seen from a vertex of its own, so that a far origin costs no digits.
-        let Some(origin) = self.vertices.first().copied() else { return 0.0 };
-        let cone = |[a, b, c]: [DVec3; 3]| (a - origin).dot((b - origin).cross(c - origin));
-        (0..self.triangles.len()).map(|t| cone(self.corners(t))).sum::<f64>() / 6.0
+        let centre = self.bounds().map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
+        (0..self.triangles.len()).map(|t| self.cone_volume(t, centre)).sum()
+    }
+
+    /// Surface area [m2].
+    pub fn area(&self) -> f64 {
+        (0..self.triangles.len()).map(|t| self.area_vector(t).length()).sum()
+    }
+
+    /// Area-weighted normal of triangle `t`: its length is the area [m2].
+    pub fn area_vector(&self, t: usize) -> DVec3 {
+        let [a, b, c] = self.corners(t);
+        0.5 * (b - a).cross(c - a)
+    }
+
+    /// Unit normal per vertex, weighted by triangle area; zero for a vertex without area around it.
+    pub fn vertex_normals(&self) -> Vec<DVec3> {
+        let mut normals = vec![DVec3::ZERO; self.vertices.len()];
+        for (t, triangle) in self.triangles.iter().enumerate() {
+            let n = self.area_vector(t);
+            for &v in triangle {
+                normals[v as usize] += n;
+            }
+        }
+        normals.into_iter().map(DVec3::normalize_or_zero).collect()
     }
 
     /// Smallest and largest coordinates [m]; `None` without vertices.
@@ -50,80 +77,120 @@ impl TriMesh {
         bounds(&self.vertices)
     }
 
-    /// Turns every triangle around.
-    pub fn flip(&mut self) {
-        for t in &mut self.triangles {
-            t.swap(1, 2);
-        }
+    /// Positions of the three corners of triangle `t` [m].
+    pub fn corners(&self, t: usize) -> [DVec3; 3] {
+        self.triangles[t].map(|v| self.vertices[v as usize])
     }
 
-    /// Component number of each triangle (components share vertices), and the number of components. Numbered by first triangle.
+    /// Component of each triangle and the number of components. Triangles that share an edge belong together; components
+    /// are numbered in the order of their first triangle.
     pub fn components(&self) -> (Vec<u32>, usize) {
-        let mut parent: Vec<u32> = (0..self.vertices.len() as u32).collect();
-        fn root(parent: &mut [u32], mut i: u32) -> u32 {
-            while parent[i as usize] != i {
-                parent[i as usize] = parent[parent[i as usize] as usize];
-                i = parent[i as usize];
-            }
-            i
-        }
-        for t in &self.triangles {
-            for k in 1..3 {
-                let (a, b) = (root(&mut parent, t[0]), root(&mut parent, t[k]));
+        let mut parent: Vec<u32> = (0..self.triangles.len() as u32).collect();
+        for group in edge_groups(&self.half_edges()) {
+            for pair in group.windows(2) {
+                let (a, b) = (find(&mut parent, pair[0].triangle), find(&mut parent, pair[1].triangle));
+                // The smaller root wins, so that a root is its component's first triangle.
                 parent[a.max(b) as usize] = a.min(b);
             }
         }
-        let mut number = vec![u32::MAX; self.vertices.len()];
+        let mut label = vec![0; parent.len()];
         let mut count = 0;
-        let mut of_triangle = Vec::with_capacity(self.triangles.len());
-        for t in &self.triangles {
-            let r = root(&mut parent, t[0]) as usize;
-            if number[r] == u32::MAX {
-                number[r] = count;
+        for t in 0..parent.len() as u32 {
+            let root = find(&mut parent, t);
+            if root == t {
+                label[t as usize] = count;
                 count += 1;
+            } else {
+                label[t as usize] = label[root as usize];
             }
-            of_triangle.push(number[r]);
         }
-        (of_triangle, count as usize)
+        (label, count as usize)
     }
 
-    /// The connected component that encloses the largest volume (by magnitude), without unused vertices.
+    /// The component that encloses the largest volume in absolute terms, with its vertices renumbered in order; empty for
+    /// an empty mesh.
     pub fn largest_component(&self) -> Self {
-        let (component, count) = self.components();
-        let Some(origin) = self.vertices.first().copied() else { return Self::default() };
-        let mut volume = vec![0.0; count];
-        for (t, k) in component.iter().enumerate() {
-            let [a, b, c] = self.corners(t);
-            volume[*k as usize] += (a - origin).dot((b - origin).cross(c - origin));
+        let (label, count) = self.components();
+        if count <= 1 {
+            return self.submesh(|_| true);
         }
-        let mut best = 0;
-        for k in 1..count {
-            if volume[k].abs() > volume[best].abs() {
-                best = k;
-            }
-        }
-        self.keep(|t| component[t] as usize == best)
+        let volumes = self.component_volumes(&label, count);
+        let largest = (1..count).fold(0, |best, c| if volumes[c].abs() > volumes[best].abs() { c } else { best });
+        self.submesh(|t| label[t] as usize == largest)
     }
 
-    /// The triangles chosen by index, without unused vertices.
-    pub(crate) fn keep(&self, chosen: impl Fn(usize) -> bool) -> Self {
-        let mut new_index = vec![u32::MAX; self.vertices.len()];
-        let mut out = Self::default();
-        for (_, triangle) in self.triangles.iter().enumerate().filter(|(t, _)| chosen(*t)) {
-            out.triangles.push(triangle.map(|i| {
-                let i = i as usize;
-                if new_index[i] == u32::MAX {
-                    new_index[i] = out.vertices.len() as u32;
-                    out.vertices.push(self.vertices[i]);
-                    if !self.colors.is_empty() {
-                        out.colors.push(self.colors[i]);
-                    }
-                }
-                new_index[i]
-            }));
+    /// Signed volume of each component [m3], about the component's own first vertex.
+    pub(crate) fn component_volumes(&self, label: &[u32], count: usize) -> Vec<f64> {
+        let mut volumes = vec![0.0; count];
+        let mut origin = vec![None; count];
+        for (t, &c) in label.iter().enumerate() {
+            let o = *origin[c as usize].get_or_insert(self.corners(t)[0]);
+            volumes[c as usize] += self.cone_volume(t, o);
         }
-        out
+        volumes
     }
+
+    /// The triangles that `keep` wants and the vertices they use, both in their old order.
+    pub(crate) fn submesh(&self, keep: impl Fn(usize) -> bool) -> Self {
+        let mut used = vec![false; self.vertices.len()];
+        let kept: Vec<[u32; 3]> =
+            self.triangles.iter().enumerate().filter(|&(t, _)| keep(t)).map(|(_, &triangle)| triangle).collect();
+        for &v in kept.iter().flatten() {
+            used[v as usize] = true;
+        }
+        let mut renumbered = vec![0; self.vertices.len()];
+        let mut result = Self::default();
+        for v in 0..self.vertices.len() {
+            if used[v] {
+                renumbered[v] = result.vertices.len() as u32;
+                result.vertices.push(self.vertices[v]);
+                if let Some(&color) = self.colors.get(v) {
+                    result.colors.push(color);
+                }
+            }
+        }
+        result.triangles = kept.into_iter().map(|t| t.map(|v| renumbered[v as usize])).collect();
+        result
+    }
+
+    /// Turns every triangle round.
+    pub fn flip(&mut self) {
+        for triangle in &mut self.triangles {
+            triangle.swap(1, 2);
+        }
+    }
+
+    /// All triangle sides, sorted by edge, then by triangle.
+    pub(crate) fn half_edges(&self) -> Vec<HalfEdge> {
+        let mut sides = Vec::with_capacity(3 * self.triangles.len());
+        for (t, &[a, b, c]) in self.triangles.iter().enumerate() {
+            for (from, to) in [(a, b), (b, c), (c, a)] {
+                let edge = (from.min(to), from.max(to));
+                sides.push(HalfEdge { edge, triangle: t as u32, forward: from < to });
+            }
+        }
+        sides.sort_unstable();
+        sides
+    }
+
+    fn cone_volume(&self, t: usize, apex: DVec3) -> f64 {
+        let [a, b, c] = self.corners(t).map(|v| v - apex);
+        a.dot(b.cross(c)) / 6.0
+    }
+}
+
+/// The sides in runs of the same edge.
+pub(crate) fn edge_groups(sorted: &[HalfEdge]) -> impl Iterator<Item = &[HalfEdge]> {
+    sorted.chunk_by(|a, b| a.edge == b.edge)
+}
+
+/// Root of `i` in a union-find forest, halving the path on the way.
+fn find(parent: &mut [u32], mut i: u32) -> u32 {
+    while parent[i as usize] != i {
+        parent[i as usize] = parent[parent[i as usize] as usize];
+        i = parent[i as usize];
+    }
+    i
 }
 
 /// Smallest and largest coordinates of some points; `None` without points.
@@ -132,21 +199,56 @@ pub(crate) fn bounds(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
     Some(points.iter().fold((first, first), |(lo, hi), p| (lo.min(*p), hi.max(*p))))
 }
 
-impl TriMesh {
-    /// Refuses vertices that are not finite and indices out of range, by number.
-    pub(crate) fn check(&self) -> crate::Result<()> {
-        let refuse = |reason: String| Err(crate::Error::Mesh(reason));
-        if let Some(i) = self.vertices.iter().position(|v| !v.is_finite()) {
-            return refuse(format!(
-                "vertex {i} of {} is {}; coordinates are finite numbers",
-                self.vertices.len(),
-                self.vertices[i]
-            ));
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shapes::{cube, icosphere};
+
+    #[test]
+    fn a_cube_has_its_volume_area_and_edges() {
+        let mut mesh = cube(DVec3::splat(10.0), 2.0);
+        assert!(mesh.is_watertight());
+        assert!((mesh.volume() - 8.0).abs() < 1e-12);
+        assert!((mesh.area() - 24.0).abs() < 1e-12);
+        assert_eq!((mesh.edge_count(), mesh.open_edges()), (18, 0));
+        assert_eq!(mesh.bounds(), Some((DVec3::splat(9.0), DVec3::splat(11.0))));
+        for (v, n) in mesh.vertices.iter().zip(mesh.vertex_normals()) {
+            assert!(n.dot(*v - DVec3::splat(10.0)) > 0.0);
         }
-        let n = self.vertices.len();
-        if let Some(t) = self.triangles.iter().position(|t| t.iter().any(|i| *i as usize >= n)) {
-            return refuse(format!("triangle {t} names vertices {:?}; there are {n}", self.triangles[t]));
-        }
-        Ok(())
+        mesh.flip();
+        assert!(mesh.is_watertight());
+        assert!((mesh.volume() + 8.0).abs() < 1e-12);
+        mesh.triangles.swap_remove(3);
+        assert!(!mesh.is_watertight());
+        assert_eq!(mesh.open_edges(), 3);
+    }
+
+    #[test]
+    fn one_turned_triangle_is_not_watertight() {
+        let mut mesh = cube(DVec3::ZERO, 1.0);
+        mesh.triangles[0].swap(0, 1);
+        assert!(!mesh.is_watertight());
+        assert_eq!(mesh.open_edges(), 0);
+    }
+
+    #[test]
+    fn nothing_is_not_watertight() {
+        let empty = TriMesh::default();
+        assert!(!empty.is_watertight());
+        assert_eq!(empty.volume(), 0.0);
+        assert!(empty.bounds().is_none());
+        assert_eq!(empty.largest_component(), empty);
+    }
+
+    #[test]
+    fn the_largest_component_is_the_one_with_most_volume() {
+        let small = icosphere(3, 0.3);
+        let large = cube(DVec3::splat(5.0), 2.0);
+        let mut both = small;
+        let offset = both.vertices.len() as u32;
+        both.vertices.extend(&large.vertices);
+        both.triangles.extend(large.triangles.iter().map(|t| t.map(|v| v + offset)));
+        assert_eq!(both.components().1, 2);
+        assert_eq!(both.largest_component(), large);
     }
 }

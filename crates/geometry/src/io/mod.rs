@@ -23,7 +23,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Metres in one of this unit.
+    /// Metres in one of the unit.
     pub fn metres(self) -> f64 {
         match self {
             Self::Millimetre => 1e-3,
@@ -33,22 +33,32 @@ impl Unit {
     }
 }
 
-/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours if there are any) or `.obj`, into metres.
+/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours if there are any) or `.obj`, into metres. The
+/// vertices are those of the file: in an STL file every triangle has its own (see [`repair`](crate::repair)).
 ///
 /// # Errors
-/// Names the file when it is missing, truncated, of another format, has vertices that are not finite, or has no triangle.
+/// [`Error::Io`] if the file cannot be read. [`Error::Parse`] for another extension, content that is damaged or cut short,
+/// an index out of range, a vertex that is not finite, or no triangles.
 pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let parse = match extension.as_str() {
         "stl" => stl::parse,
         "ply" => ply::parse,
         "obj" => obj::parse,
-        other => return Err(wrong(path, format!("'.{other}' is not a surface format; .stl, .ply and .obj are"))),
+        _ => return Err(bad(path, "not a known surface file; supported are .stl, .ply and .obj")),
     };
-    let mut mesh = parse(&read(path)?).map_err(|reason| wrong(path, reason))?;
-    mesh.check().map_err(|e| wrong(path, e.to_string()))?;
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    let mut mesh = parse(&bytes).map_err(|reason| bad(path, reason))?;
     if mesh.triangles.is_empty() {
-        return Err(wrong(path, "there is no triangle in it".to_owned()));
+        return Err(bad(path, "the file has no triangles"));
+    }
+    if let Some(v) = mesh.vertices.iter().position(|v| !v.is_finite()) {
+        return Err(bad(path, format!("vertex {v} is {}; coordinates must be finite", mesh.vertices[v])));
+    }
+    let count = mesh.vertices.len();
+    if let Some(t) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= count)) {
+        let reason = format!("triangle {t} uses vertices {:?}, but there are only {count}", mesh.triangles[t]);
+        return Err(bad(path, reason));
     }
     for v in &mut mesh.vertices {
         *v *= unit.metres();
@@ -56,14 +66,27 @@ pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
     Ok(mesh)
 }
 
-fn read(path: &Path) -> Result<Vec<u8>> {
-    std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })
+/// What a parser found, or why it could not: the path is added by its caller.
+type Parsed<T> = std::result::Result<T, String>;
+
+/// An [`Error::Parse`].
+fn bad(path: &Path, reason: impl Into<String>) -> Error {
+    Error::Parse { path: path.into(), reason: reason.into() }
 }
 
+/// Writes a whole file.
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.to_owned(), source })
+    std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.into(), source })
 }
 
-fn wrong(path: &Path, reason: String) -> Error {
-    Error::Parse { path: path.to_owned(), reason }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_are_no_surfaces_are_named() {
+        let message = read_surface(Path::new("organ.step"), Unit::Metre).unwrap_err().to_string();
+        assert!(message.contains("organ.step") && message.contains(".stl, .ply and .obj"), "{message}");
+        assert!(matches!(read_surface(Path::new("absent.stl"), Unit::Metre), Err(Error::Io { .. })));
+    }
 }
