@@ -1,8 +1,22 @@
 //! Filming a phantom.
 
-use crate::Result;
+use crate::anatomy::Anatomy;
+use crate::film::{RATE_HZ, shoot};
+use crate::still::{Fineness, Still};
+use crate::{Error, Result, instruments, noise, sensor};
+use rayon::prelude::*;
 use std::path::Path;
+use trocar_camera::Camera;
+use trocar_geometry::io::write_ply;
 use trocar_progress::Progress;
+use trocar_reconstruct::{RecordingInfo, RecordingWriter};
+
+/// The phantoms there are.
+const NAMES: [&str; 1] = ["phantom-a"];
+/// File names hold six digits.
+const MAX_FRAMES: usize = 1_000_000;
+/// Unit of the truth's depth image [m].
+const TRUTH_DEPTH_SCALE: f64 = 0.0001;
 
 /// How a phantom is filmed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,8 +27,93 @@ pub struct RecordOptions {
     pub seed: u64,
 }
 
-/// Records the phantom `name` (`phantom-a`) into the folder `dir`.
+/// Records the phantom `name` (`phantom-a`) into the folder `dir`, with its truth under `truth/`: the picture without
+/// instruments and noise, and the organs' surfaces in the camera's frame, in metres.
+///
+/// # Errors
+/// An unknown name, no frames, a folder that cannot be written, or an interruption; nothing is left behind then.
 pub fn record(name: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
-    let _ = (name, options, dir, progress);
-    todo!()
+    record_with(name, options, &Camera::d405(), Fineness { surface: 0.6e-3, bed: 0.8e-3 }, dir, progress)
+}
+
+/// [`record`] with a camera and a fineness of one's choice.
+pub(crate) fn record_with(
+    name: &str,
+    options: &RecordOptions,
+    camera: &Camera,
+    fineness: Fineness,
+    dir: &Path,
+    progress: &dyn Progress,
+) -> Result<()> {
+    if !NAMES.contains(&name) {
+        return Err(Error::Unknown(name.to_owned()));
+    }
+    let RecordOptions { frames, seed } = *options;
+    if frames == 0 || frames > MAX_FRAMES {
+        return Err(Error::Option(format!("frames is {frames}; a recording has 1 to {MAX_FRAMES} frames")));
+    }
+    progress.begin("anatomy", 1);
+    if progress.interrupted() {
+        return Err(Error::Interrupted);
+    }
+    let anatomy = Anatomy::new(seed);
+    let info = describe(name, seed, camera, &anatomy);
+    let writer = RecordingWriter::create(dir, &info)?;
+    let still = Still::new(&anatomy, camera, fineness);
+    for (index, organ) in anatomy.organs.iter().enumerate() {
+        writer.organ_mask(organ.name, &still.organ_mask(index))?;
+    }
+    write_truth(&writer.folder().join("truth"), &anatomy, &still)?;
+    progress.advance(1);
+    progress.end();
+
+    progress.begin("frames", frames as u64);
+    let instruments = instruments::pair(std::f64::consts::TAU * noise::unit(noise::key(&[seed, 3])));
+    (0..frames).into_par_iter().try_for_each(|index| {
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
+        let shot = shoot(&still, &instruments, camera, seed, index);
+        writer.frame(index, &shot.color, &shot.depth, Some(&shot.instruments))?;
+        progress.advance(1);
+        Ok(())
+    })?;
+    progress.end();
+    Ok(writer.finish()?)
+}
+
+/// Contents of `recording.toml`.
+fn describe(name: &str, seed: u64, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
+    let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
+    RecordingInfo {
+        name: name.to_owned(),
+        rate_hz: RATE_HZ,
+        depth_scale_m: sensor::DEPTH_SCALE,
+        up: [0.0, 0.0, -1.0],
+        depth_offset_px: [0.0; 2],
+        depth_max_m: None,
+        note: format!("synthetic, seed {seed}; the truth is in truth/; materials are the paper's"),
+        camera: *camera,
+        organs: anatomy.organs.iter().map(|o| Anatomy::info(o, pixel)).collect(),
+    }
+}
+
+fn write_truth(dir: &Path, anatomy: &Anatomy, still: &Still) -> Result<()> {
+    let io = |path: &Path| {
+        let path = path.to_owned();
+        move |source| trocar_reconstruct::Error::Io { path, source }
+    };
+    std::fs::create_dir_all(dir).map_err(io(dir))?;
+    still.frame.color.write_png(&dir.join("color.png"))?;
+    still.frame.depth.write_png(&dir.join("depth.png"), TRUTH_DEPTH_SCALE)?;
+    for (organ, surface) in anatomy.organs.iter().zip(&still.surfaces) {
+        write_ply(&dir.join(format!("{}.ply", organ.name)), surface)?;
+    }
+    let path = dir.join("truth.toml");
+    let text = format!(
+        "# What the camera would see without instruments and noise. Surfaces: camera frame, metres.\n\
+         color = \"color.png\"\ndepth = \"depth.png\"\ndepth_scale_m = {TRUTH_DEPTH_SCALE}\n"
+    );
+    std::fs::write(&path, text).map_err(io(&path))?;
+    Ok(())
 }

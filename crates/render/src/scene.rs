@@ -1,7 +1,11 @@
 //! What is rendered, and what comes of it.
 
+use crate::shade::{Lit, shade};
+use crate::srgb;
+use crate::trace::{Hit, Tracer};
 use glam::DVec3;
-use trocar_camera::{Camera, ColorImage, DepthImage, Pose};
+use rayon::prelude::*;
+use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
 use trocar_geometry::TriMesh;
 
 /// How an instance is shaded.
@@ -27,32 +31,218 @@ pub struct Instance {
 }
 
 /// Meshes and a light, with search trees built.
-pub struct Scene {}
+pub struct Scene {
+    tracer: Tracer,
+    /// Per triangle: its instance and its vertices in the arrays below.
+    triangles: Vec<(u32, [u32; 3])>,
+    looks: Vec<(u16, Shading)>,
+    positions: Vec<DVec3>,
+    normals: Vec<DVec3>,
+    /// Linear base colour per vertex.
+    albedo: Vec<[f32; 3]>,
+    /// Share of the surroundings each vertex sees; empty where it was not asked for.
+    open: Vec<f32>,
+    light: Option<DVec3>,
+    background: [u8; 3],
+}
 
 /// One rendered picture.
 #[derive(Clone, Debug)]
 pub struct Frame {
     /// Shaded colour.
     pub color: ColorImage,
-    /// Metric z depth [m]; 0 where nothing was hit.
+    /// Metric z depth in metres; 0 where nothing was hit.
     pub depth: DepthImage,
     /// Label of the instance hit, 0 where nothing was.
     pub labels: Vec<u16>,
-    /// Cosine between the surface normal and the ray at each hit, 0 where nothing was.
+    /// Cosine between the surface normal and the ray at each hit (1 head-on, of either side), 0 where nothing was.
     pub facing: Vec<f32>,
 }
 
+/// Pixels of `frame` that show `label`.
+pub fn label_mask(frame: &Frame, label: u16) -> Mask {
+    let set = frame.labels.iter().map(|l| *l == label).collect();
+    Mask { width: frame.color.width, height: frame.color.height, set }
+}
+
+/// A camera at its place, for one picture.
+struct View<'a> {
+    camera: &'a Camera,
+    pose: &'a Pose,
+}
+
+impl View<'_> {
+    /// Direction through a pixel in world coordinates, of z 1 in the camera: a hit's `t` is its depth.
+    fn direction(&self, u: f64, v: f64) -> DVec3 {
+        self.pose.rotation * self.camera.ray(u, v)
+    }
+}
+
 impl Scene {
-    /// Builds the scene. `light` is the direction towards the light; `None` puts it at the camera.
+    /// Builds the scene. `light` is the direction towards the light; `None` puts it at the camera. Triangles with a missing
+    /// or non-finite vertex are left out.
     pub fn new(instances: Vec<Instance>, light: Option<DVec3>, background: [u8; 3]) -> Self {
-        let _ = (instances, light, background);
-        todo!()
+        let mut scene = Self {
+            tracer: Tracer::new(&[]),
+            triangles: Vec::new(),
+            looks: Vec::new(),
+            positions: Vec::new(),
+            normals: Vec::new(),
+            albedo: Vec::new(),
+            open: Vec::new(),
+            light: light.and_then(DVec3::try_normalize),
+            background,
+        };
+        for (index, Instance { mesh, label, shading }) in instances.into_iter().enumerate() {
+            let first = scene.positions.len() as u32;
+            let usable = |t: &[u32; 3]| t.iter().all(|&v| mesh.vertices.get(v as usize).is_some_and(|p| p.is_finite()));
+            let mut normals = vec![DVec3::ZERO; mesh.vertices.len()];
+            for triangle in mesh.triangles.iter().filter(|t| usable(t)) {
+                let [a, b, c] = triangle.map(|v| mesh.vertices[v as usize]);
+                let area_normal = (b - a).cross(c - a);
+                for &v in triangle {
+                    normals[v as usize] += area_normal;
+                }
+                scene.triangles.push((index as u32, triangle.map(|v| first + v)));
+            }
+            scene.normals.extend(normals.into_iter().map(DVec3::normalize_or_zero));
+            if mesh.colors.len() == mesh.vertices.len() {
+                scene.albedo.extend(mesh.colors.iter().map(|c| srgb::to_linear(*c)));
+            } else {
+                scene.albedo.resize(scene.albedo.len() + mesh.vertices.len(), srgb::to_linear(shading.color));
+            }
+            scene.positions.extend(mesh.vertices);
+            scene.looks.push((label, shading));
+        }
+        let corners: Vec<_> = scene.triangles.iter().map(|(_, t)| t.map(|v| scene.positions[v as usize])).collect();
+        scene.tracer = Tracer::new(&corners);
+        scene
+    }
+
+    /// Darkens creases: `rays` rays a vertex look for anything closer than `reach` metres (ambient occlusion). Meant for
+    /// meshes that are fine against `reach`.
+    pub fn with_ambient_occlusion(mut self, rays: usize, reach: f64) -> Self {
+        const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
+        let seen = |index: usize| {
+            let normal = self.normals[index];
+            if normal == DVec3::ZERO || rays == 0 {
+                return 1.0;
+            }
+            let (x, y) = normal.any_orthonormal_pair();
+            let origin = self.positions[index] + normal * (0.02 * reach);
+            // A spiral over the cosine-weighted hemisphere, turned differently for each vertex so that no pattern shows.
+            let turn = index as f64 * 1.324_717_957_244_746;
+            let free = (0..rays).filter(|&k| {
+                let r2 = (k as f64 + 0.5) / rays as f64;
+                let (sin, cos) = (k as f64 * GOLDEN_ANGLE + turn).sin_cos();
+                let direction = (x * cos + y * sin) * r2.sqrt() + normal * (1.0 - r2).sqrt();
+                !self.tracer.blocked(origin, direction, reach)
+            });
+            free.count() as f32 / rays as f32
+        };
+        self.open = (0..self.positions.len()).into_par_iter().map(seen).collect();
+        self
     }
 
     /// Renders through `camera` standing at `pose` (camera to world); `samples` x `samples` rays a pixel for the colour
     /// (depth, labels and facing come from the pixel's centre).
     pub fn render(&self, camera: &Camera, pose: &Pose, samples: usize) -> Frame {
-        let _ = (camera, pose, samples);
-        todo!()
+        let (width, height) = (camera.width, camera.height);
+        let samples = samples.max(1);
+        let view = View { camera, pose };
+        let mut frame = Frame {
+            color: ColorImage::new(width, height, self.background),
+            depth: DepthImage::new(width, height),
+            labels: vec![0; width * height],
+            facing: vec![0.0; width * height],
+        };
+        if width == 0 {
+            return frame;
+        }
+        let rows = frame.color.pixels.par_chunks_mut(width).zip(frame.depth.depth.par_chunks_mut(width));
+        let rows = rows.zip(frame.labels.par_chunks_mut(width)).zip(frame.facing.par_chunks_mut(width));
+        rows.enumerate().for_each(|(v, (((color, depth), labels), facing))| {
+            for u in 0..width {
+                let direction = view.direction(u as f64, v as f64);
+                let centre = self.tracer.first(pose.translation, direction, f64::INFINITY);
+                if let Some(hit) = &centre {
+                    let (instance, _) = self.triangles[hit.triangle as usize];
+                    depth[u] = hit.t as f32;
+                    labels[u] = self.looks[instance as usize].0;
+                    facing[u] = self.flat_normal(hit).dot(direction.normalize()).abs() as f32;
+                }
+                color[u] = if samples == 1 {
+                    srgb::from_linear(self.light_of(&view, direction, centre))
+                } else {
+                    self.averaged(&view, u, v, samples)
+                };
+            }
+        });
+        frame
+    }
+
+    /// Colour of a pixel from a regular grid of rays over it.
+    fn averaged(&self, view: &View<'_>, u: usize, v: usize, samples: usize) -> [u8; 3] {
+        let offset = |i: usize| (i as f64 + 0.5) / samples as f64 - 0.5;
+        let mut sum = [0.0; 3];
+        for j in 0..samples {
+            for i in 0..samples {
+                let direction = view.direction(u as f64 + offset(i), v as f64 + offset(j));
+                let hit = self.tracer.first(view.pose.translation, direction, f64::INFINITY);
+                let light = self.light_of(view, direction, hit);
+                for k in 0..3 {
+                    // Clipped before it is averaged, or a highlight would keep its edge jagged.
+                    sum[k] += light[k].min(1.0);
+                }
+            }
+        }
+        srgb::from_linear(sum.map(|s| s / (samples * samples) as f32))
+    }
+
+    /// Unit normal of the triangle hit.
+    fn flat_normal(&self, hit: &Hit) -> DVec3 {
+        let [a, b, c] = self.triangles[hit.triangle as usize].1.map(|v| self.positions[v as usize]);
+        (b - a).cross(c - a).normalize_or_zero()
+    }
+
+    /// Linear light that comes back along `direction`.
+    fn light_of(&self, view: &View<'_>, direction: DVec3, hit: Option<Hit>) -> [f32; 3] {
+        let Some(hit) = hit else { return srgb::to_linear(self.background) };
+        let (instance, corners) = self.triangles[hit.triangle as usize];
+        let (_, shading) = self.looks[instance as usize];
+        let [a, b, c] = corners.map(|v| v as usize);
+        let weights = [1.0 - hit.u - hit.v, hit.u, hit.v];
+
+        let to_eye = -direction.normalize();
+        let flat = self.flat_normal(&hit);
+        let side = if flat.dot(to_eye) < 0.0 { -1.0 } else { 1.0 };
+        let smooth = weights[0] * self.normals[a] + weights[1] * self.normals[b] + weights[2] * self.normals[c];
+        let normal = side * smooth.try_normalize().unwrap_or(flat);
+        let point = view.pose.translation + direction * hit.t;
+        let to_light = self.light.unwrap_or(to_eye);
+        let shadowed = self.light.is_some_and(|light| {
+            // Off the surface by a fraction of the viewing distance, beyond the rounding of the hit.
+            let origin = point + side * flat * (1e-4 * (point - view.pose.translation).length());
+            self.tracer.blocked(origin, light, f64::INFINITY)
+        });
+        let w = weights.map(|w| w as f32);
+        let mixed = |of: &dyn Fn(usize) -> f32| w[0] * of(a) + w[1] * of(b) + w[2] * of(c);
+        let open = if self.open.is_empty() { 1.0 } else { mixed(&|i| self.open[i]) };
+        let albedo = [0, 1, 2].map(|k| mixed(&|i| self.albedo[i][k]));
+        let light = shade(&Lit { albedo, normal, to_eye, to_light, shadowed, open, gloss: shading.gloss });
+        if !shading.wireframe {
+            return light;
+        }
+        let line = self.edge_line(corners, weights, hit.t / view.camera.fx);
+        light.map(|l| l * (1.0 - 0.8 * line))
+    }
+
+    /// 1 on a triangle's edge, falling to 0 half a pixel away (each of two neighbours draws its half of the line).
+    fn edge_line(&self, corners: [u32; 3], weights: [f64; 3], pixel: f64) -> f32 {
+        let [a, b, c] = corners.map(|v| self.positions[v as usize]);
+        let double_area = (b - a).cross(c - a).length();
+        let opposite = [b - c, c - a, a - b].map(DVec3::length);
+        let nearest = (0..3).map(|k| weights[k] * double_area / opposite[k]).fold(f64::INFINITY, f64::min);
+        (1.5 - 1.5 * nearest / pixel).clamp(0.0, 1.0) as f32
     }
 }

@@ -1,0 +1,105 @@
+//! The looks of tissue: base colours, mottling, branching vessels, fat, painted per vertex.
+
+use crate::anatomy::Organ;
+use crate::bed::Bed;
+use crate::noise::{fractal, smooth};
+use glam::DVec3;
+use rayon::prelude::*;
+use trocar_geometry::TriMesh;
+
+const VEIN: DVec3 = DVec3::new(112.0, 28.0, 40.0);
+const FAT: DVec3 = DVec3::new(226.0, 176.0, 104.0);
+
+/// Fills in the colours of an organ's surface.
+pub(crate) fn organ(organ: &Organ, mesh: &mut TriMesh) {
+    mesh.colors = mesh.vertices.par_iter().map(|p| bytes(organ_color(organ, *p))).collect();
+}
+
+/// Fills in the colours of the bed.
+pub(crate) fn bed(bed: &Bed, mesh: &mut TriMesh) {
+    mesh.colors = mesh.vertices.par_iter().map(|p| bytes(bed_color(bed, *p))).collect();
+}
+
+fn bytes(color: DVec3) -> [u8; 3] {
+    color.to_array().map(|c| c.round().clamp(0.0, 255.0) as u8)
+}
+
+fn organ_color(organ: &Organ, p: DVec3) -> DVec3 {
+    let seed = organ.seed;
+    let local = organ.tube.local(p);
+    let along = local.s * organ.tube.length();
+    let (base, flush) = match organ.name {
+        "cecum" => (DVec3::new(158.0, 92.0, 88.0), DVec3::new(120.0, 70.0, 66.0)),
+        "bowel-1" => (DVec3::new(214.0, 134.0, 120.0), DVec3::new(196.0, 100.0, 92.0)),
+        "bowel-2" => (DVec3::new(206.0, 112.0, 104.0), DVec3::new(184.0, 84.0, 80.0)),
+        "bowel-3" => (DVec3::new(222.0, 152.0, 134.0), DVec3::new(206.0, 120.0, 106.0)),
+        "stomach" => (DVec3::new(226.0, 172.0, 156.0), DVec3::new(208.0, 138.0, 128.0)),
+        _ => (DVec3::new(236.0, 196.0, 146.0), DVec3::new(220.0, 150.0, 112.0)),
+    };
+    // Flushed patches, then fine mottling.
+    let patches = 0.5 + 0.7 * fractal(seed + 1, p / 9e-3, 3);
+    let mut color = base.lerp(flush, patches.clamp(0.0, 1.0));
+    color *= 1.0 + 0.09 * fractal(seed + 2, p / 2e-3, 2);
+    // Fat clings to the side that hangs on the mesentery.
+    let fat = fractal(seed + 3, p / 5e-3, 3) + 0.1 - 0.8 * local.angle.sin();
+    color = color.lerp(FAT, 0.8 * step(0.0, 0.25, fat));
+    let vessels = if organ.name == "cecum" || organ.name == "stomach" {
+        network(seed + 4, p, 11e-3, 0.95e-3).max(0.7 * network(seed + 5, p, 5e-3, 0.6e-3))
+    } else {
+        rungs(seed + 4, along, local.angle, p).max(0.55 * network(seed + 5, p, 5e-3, 0.5e-3))
+    };
+    color.lerp(VEIN, 0.7 * vessels)
+}
+
+fn bed_color(bed: &Bed, p: DVec3) -> DVec3 {
+    let seed = bed.seed;
+    let flat = p.with_z(0.0);
+    let meat = DVec3::new(138.0, 50.0, 46.0);
+    let film = DVec3::new(180.0, 88.0, 72.0);
+    let mut color = meat.lerp(film, (0.5 + 0.8 * fractal(seed + 31, flat / 0.018, 3)).clamp(0.0, 1.0));
+    // Lobules of fat with red seams between them.
+    let much = step(0.0, 0.6, fractal(seed + 32, flat / 0.04, 3));
+    let seam = bed.seams(p.x, p.y);
+    color = color.lerp(FAT * 0.86, 0.7 * much * step(0.03, 0.22, seam));
+    color *= 1.0 + 0.08 * fractal(seed + 33, flat / 2e-3, 2);
+    let vessels = network(seed + 34, flat, 0.030, 1.5e-3).max(0.7 * network(seed + 35, flat, 0.012, 0.8e-3));
+    color.lerp(VEIN, 0.7 * vessels)
+}
+
+/// 0 below `low`, 1 above `high`, smooth between.
+fn step(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+/// Branching lines: where warped noise of `size` [m] crosses zero, about `width` [m] wide and broken off here and there.
+fn network(seed: u64, p: DVec3, size: f64, width: f64) -> f64 {
+    let warp = |k: u64| fractal(seed.wrapping_add(100 + k), p / (0.6 * size), 2);
+    let q = p / size + 0.35 * DVec3::new(warp(0), warp(1), warp(2));
+    let field = |q: DVec3| smooth(seed, q);
+    // Distance to the zero crossing is the value over its slope.
+    let h = 0.02;
+    let value = field(q);
+    let slope =
+        DVec3::new(field(q + DVec3::X * h) - value, field(q + DVec3::Y * h) - value, field(q + DVec3::Z * h) - value)
+            / h;
+    let distance = value.abs() / slope.length().max(0.25) * size;
+    let wide = width * (0.55 + 0.45 * smooth(seed + 7, p / (1.7 * size)));
+    let present = step(-0.35, 0.1, smooth(seed + 8, p / (2.2 * size)));
+    present * (1.0 - step(0.4 * wide, wide, distance))
+}
+
+/// Vessels that climb around a bowel from its mesenteric side, fork and thin out.
+fn rungs(seed: u64, along: f64, angle: f64, p: DVec3) -> f64 {
+    // How far up the wall: 0 at the mesentery, 1 on top.
+    let up = 0.5 + 0.5 * angle.sin();
+    let phase = along / 5.5e-3 + 0.45 * fractal(seed, p / 4e-3, 3);
+    let fork = if up > 0.72 { 2.0 } else { 1.0 };
+    let to_line = |phase: f64| (phase - phase.round()).abs();
+    let spread = (fork - 1.0) * (0.25 - 0.8 * (up - 0.72)).max(0.0);
+    let distance = to_line(phase - spread).min(to_line(phase + spread)) * 5.5e-3;
+    let rung = smooth(seed + 9, DVec3::new(phase.round() * 1.7, 0.5, f64::from(angle.cos() > 0.0) * 3.0));
+    let reach = 0.75 + 0.35 * rung;
+    let width = 0.62e-3 * (1.3 - up);
+    (1.0 - step(0.5 * width, 1.6 * width, distance)) * (1.0 - step(reach - 0.15, reach, up))
+}

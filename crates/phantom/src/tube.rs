@@ -1,0 +1,202 @@
+//! A curved, tapered, elliptical tube with rounded ends, known by its signed distance.
+
+use crate::noise;
+use glam::DVec3;
+use trocar_geometry::SignedDistance;
+
+/// Points along a centreline.
+const POINTS: usize = 97;
+
+/// How an organ is built, independent of where it lies. Lengths in metres.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shape {
+    /// Length of the centreline.
+    pub length: f64,
+    /// Semi-axis of the cross-section along the bed.
+    pub across: f64,
+    /// Semi-axis of the cross-section away from the bed.
+    pub high: f64,
+    /// Radius at the tip over that at the base.
+    pub taper: f64,
+    /// How much wider the middle is.
+    pub bulge: f64,
+    /// Depth of the constrictions relative to the radius, and their distance.
+    pub folds: (f64, f64),
+    /// The heading's change per unit of organ coordinate at the base and at the tip [rad].
+    pub bends: [f64; 2],
+}
+
+/// A [`Shape`] laid down. Noise makes its wall uneven.
+#[derive(Clone, Debug)]
+pub(crate) struct Tube {
+    shape: Shape,
+    seed: u64,
+    line: Vec<DVec3>,
+    tangents: Vec<DVec3>,
+    centre: DVec3,
+    /// No point of the surface is farther from `centre`.
+    reach: f64,
+}
+
+/// A point in the tube's own terms.
+pub(crate) struct Local {
+    /// Organ coordinate, 0 at the base, 1 at the tip.
+    pub s: f64,
+    /// Angle around the centreline [rad], 0 to the side along the bed, pi/2 away from the bed.
+    pub angle: f64,
+    offset: DVec3,
+}
+
+impl Tube {
+    /// Lays `shape` down from `base` towards `heading` [rad] in the plane of x and y; `height` gives the centreline's z.
+    pub fn lay(shape: Shape, seed: u64, base: (f64, f64), heading: f64, height: impl Fn(f64, f64) -> f64) -> Self {
+        let step = 1.0 / (POINTS - 1) as f64;
+        let [k0, k1] = shape.bends;
+        let direction = |s: f64| {
+            let (sin, cos) = (heading + k0 * s + 0.5 * (k1 - k0) * s * s).sin_cos();
+            DVec3::new(cos, sin, 0.0)
+        };
+        let mut p = DVec3::new(base.0, base.1, 0.0);
+        let mut line = Vec::with_capacity(POINTS);
+        for i in 0..POINTS {
+            line.push(p.with_z(height(p.x, p.y)));
+            p += direction((i as f64 + 0.5) * step) * (step * shape.length);
+        }
+        let tangents = (0..POINTS)
+            .map(|i| (line[(i + 1).min(POINTS - 1)] - line[i.saturating_sub(1)]).normalize_or(DVec3::X))
+            .collect();
+        let centre = line.iter().sum::<DVec3>() / POINTS as f64;
+        let thickest = 1.3 * (1.0 + shape.bulge) * shape.across.max(shape.high);
+        let reach = line.iter().map(|p| (p - centre).length()).fold(0.0, f64::max) + thickest;
+        Self { shape, seed, line, tangents, centre, reach }
+    }
+
+    /// Point of the centreline at the base (s = 0).
+    pub fn base(&self) -> DVec3 {
+        self.line[0]
+    }
+
+    /// Point of the centreline at the tip (s = 1).
+    pub fn tip(&self) -> DVec3 {
+        self.line[POINTS - 1]
+    }
+
+    /// Length of the centreline [m].
+    pub fn length(&self) -> f64 {
+        self.shape.length
+    }
+
+    /// A box that holds the tube.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let margin = DVec3::splat(1.3 * (1.0 + self.shape.bulge) * self.shape.across.max(self.shape.high));
+        let low = self.line.iter().copied().fold(DVec3::MAX, DVec3::min);
+        let high = self.line.iter().copied().fold(DVec3::MIN, DVec3::max);
+        (low - margin, high + margin)
+    }
+
+    /// Points on the surface, about a tenth of the circumference apart.
+    pub fn samples(&self) -> Vec<DVec3> {
+        const AROUND: usize = 16;
+        let mut points = Vec::new();
+        for i in 0..POINTS {
+            let (across, up) = self.frame(i as f64 / (POINTS - 1) as f64);
+            let rounded = match i {
+                0 => [-1.0, -0.7, -0.35, 0.0].as_slice(),
+                i if i == POINTS - 1 => [0.0, 0.35, 0.7, 1.0].as_slice(),
+                _ => [0.0].as_slice(),
+            };
+            for &along in rounded {
+                let narrow = (1.0_f64 - along * along).sqrt();
+                let (a, b) = self.radii(i as f64 / (POINTS - 1) as f64);
+                for j in 0..AROUND {
+                    let (sin, cos) = (std::f64::consts::TAU * j as f64 / AROUND as f64).sin_cos();
+                    let aside = across * (a * cos * narrow) + up * (b * sin * narrow);
+                    points.push(self.line[i] + aside + self.tangents[i] * (along * a));
+                }
+            }
+        }
+        points
+    }
+
+    /// Where `p` is in the tube's own terms.
+    pub fn local(&self, p: DVec3) -> Local {
+        let nearest = (0..POINTS)
+            .map(|i| (i, p.distance_squared(self.line[i])))
+            .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best })
+            .0;
+        let on_segment = |i: usize| {
+            let (a, b) = (self.line[i], self.line[i + 1]);
+            let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
+            (i as f64 + t, a.lerp(b, t))
+        };
+        let before = on_segment(nearest.saturating_sub(1));
+        let after = on_segment(nearest.min(POINTS - 2));
+        let (at, foot) = if p.distance_squared(before.1) < p.distance_squared(after.1) { before } else { after };
+        // The polyline's corners would tear the wall; along its smoothed tangents there are none.
+        let (mut s, mut foot) = (at / (POINTS - 1) as f64, foot);
+        for _ in 0..3 {
+            s = (s + (p - foot).dot(self.tangent(s)) / self.shape.length).clamp(0.0, 1.0);
+            foot = self.point(s);
+        }
+        let (across, up) = self.frame(s);
+        let d = p - foot;
+        let offset = DVec3::new(d.dot(across), d.dot(up), d.dot(self.tangent(s)));
+        Local { s, angle: offset.y.atan2(offset.x), offset }
+    }
+
+    fn point(&self, s: f64) -> DVec3 {
+        let at = s * (POINTS - 1) as f64;
+        let i = (at as usize).min(POINTS - 2);
+        self.line[i].lerp(self.line[i + 1], at - i as f64)
+    }
+
+    fn tangent(&self, s: f64) -> DVec3 {
+        let at = (s * (POINTS - 1) as f64).clamp(0.0, (POINTS - 1) as f64);
+        let i = (at as usize).min(POINTS - 2);
+        self.tangents[i].lerp(self.tangents[i + 1], at - i as f64).normalize_or(DVec3::X)
+    }
+
+    /// Unit vectors across the tube along the bed, and away from the bed (towards negative z).
+    fn frame(&self, s: f64) -> (DVec3, DVec3) {
+        let t = self.tangent(s);
+        let across = DVec3::Z.cross(t).normalize_or(DVec3::Y);
+        (across, across.cross(t))
+    }
+
+    /// Semi-axes at organ coordinate s.
+    fn radii(&self, s: f64) -> (f64, f64) {
+        let Shape { length, across, high, taper, bulge, folds: (depth, distance), .. } = self.shape;
+        let uneven = 0.05 * noise::smooth(self.seed, DVec3::new(s * length / 0.012, 0.5, 0.5));
+        // Constrictions are narrow, what is between them is wide: the cosine to a high power.
+        let phase = s * length / distance + 0.6 * noise::smooth(self.seed + 1, DVec3::new(s * length / 0.02, 0.5, 0.5));
+        let fold = (std::f64::consts::PI * phase).cos().powi(6);
+        let r = (1.0 + (taper - 1.0) * s)
+            * (1.0 + bulge * (std::f64::consts::PI * s).sin() + uneven)
+            * (1.0 + 0.35 * depth - depth * fold);
+        (across * r, high * r)
+    }
+}
+
+impl SignedDistance for Tube {
+    /// The implicit function of the ellipse over the length of its gradient: exact to first order at the surface. Far away
+    /// the distance to a bounding sphere, which is less than the true one, will do.
+    fn distance(&self, p: DVec3) -> f64 {
+        let outside = (p - self.centre).length() - self.reach;
+        if outside > 0.01 {
+            return outside;
+        }
+        let Local { s, offset, .. } = self.local(p);
+        let (a, b) = self.radii(s);
+        let q = offset / DVec3::new(a, b, a);
+        let k0 = q.length();
+        let k1 = (q / DVec3::new(a, b, a)).length();
+        if k1 < 1e-9 || k0 < 1e-6 {
+            return -a.min(b);
+        }
+        // Where the wall runs obliquely to the centreline, the distance to it is shorter.
+        const H: f64 = 2e-3;
+        let slope = (self.radii(s + H).0 - self.radii(s - H).0) / (2.0 * H * self.shape.length);
+        let bumps = 0.2e-3 * noise::fractal(self.seed + 2, p / 5e-3, 2);
+        k0 * (k0 - 1.0) / k1 / (1.0 + slope * slope).sqrt() + bumps
+    }
+}
