@@ -5,6 +5,7 @@
 //! same map, which is exact (snap 0 to the bit) at activation.
 
 use crate::{Model, State};
+use glam::DVec3;
 use trocar_geometry::Pose;
 
 /// Pose of a tool at the beginning and the end of a frame.
@@ -16,6 +17,19 @@ pub struct ToolMotion {
     pub to: Pose,
 }
 
+impl ToolMotion {
+    /// The pose when `share` (0..=1) of the frame is over.
+    pub fn at(&self, share: f64) -> Pose {
+        if share >= 1.0 {
+            return self.to;
+        }
+        Pose {
+            rotation: self.from.rotation.slerp(self.to.rotation, share),
+            translation: self.from.translation.lerp(self.to.translation, share),
+        }
+    }
+}
+
 /// A set of nodes carried by a tool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grasp {
@@ -23,12 +37,31 @@ pub struct Grasp {
     pub body: usize,
     /// Its nodes.
     pub nodes: Vec<u32>,
+    /// Where each node was at activation [m].
+    pub(crate) captured: Vec<DVec3>,
+    /// Where the tool was.
+    pub(crate) tool: Pose,
 }
 
 impl Grasp {
     /// Captures `nodes` of `body` where they are now, with the tool at `tool`. Pinned nodes are left out.
     pub fn capture(model: &Model, state: &State, body: usize, nodes: &[u32], tool: &Pose) -> Self {
-        let _ = (model, state, body, nodes, tool);
-        todo!()
+        let free = |i: &u32| !model.bodies[body].pinned()[*i as usize];
+        let nodes: Vec<u32> = nodes.iter().copied().filter(free).collect();
+        let captured = nodes.iter().map(|i| state.position(model, body, *i as usize)).collect();
+        Self { body, nodes, captured, tool: *tool }
+    }
+
+    /// Where each held node is to be when the tool is at `tool`: (node, world position [m]).
+    pub fn prescribed(&self, tool: &Pose) -> impl Iterator<Item = (u32, DVec3)> {
+        let turn = tool.rotation * self.tool.rotation.inverse();
+        let shift = tool.translation - self.tool.translation;
+        let turned = tool.rotation != self.tool.rotation;
+        let (nodes, captured) = (self.nodes.iter(), self.captured.iter());
+        nodes.zip(captured).map(move |(i, x)| {
+            let arm = x - self.tool.translation;
+            let swing = if turned { turn * arm - arm } else { DVec3::ZERO };
+            (*i, x + (swing + shift))
+        })
     }
 }

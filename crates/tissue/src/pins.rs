@@ -4,6 +4,64 @@ use glam::DVec3;
 
 /// The lowest `share` (0..=1) of `nodes` along `up`; ties by index. round(share * n) indices, ascending.
 pub fn lowest_band(nodes: &[DVec3], up: DVec3, share: f64) -> Vec<u32> {
-    let _ = (nodes, up, share);
-    todo!()
+    let mut all: Vec<u32> = (0..nodes.len() as u32).collect();
+    lowest(&mut all, nodes, up, share)
+}
+
+/// One end of a tubular organ and a band along the part next to it.
+///
+/// `s` is the organ coordinate of each node. Every node within `length` of the base (or of the tip) is chosen, and of the nodes in the next
+/// `band_length` the lowest `band_share` along `up`. Ascending.
+pub fn end(
+    nodes: &[DVec3],
+    s: &[f64],
+    up: DVec3,
+    at_base: bool,
+    length: f64,
+    band_length: f64,
+    band_share: f64,
+) -> Vec<u32> {
+    let from_end = |i: u32| if at_base { s[i as usize] } else { 1.0 - s[i as usize] };
+    let all = 0..nodes.len() as u32;
+    let mut chosen: Vec<u32> = all.clone().filter(|i| from_end(*i) <= length).collect();
+    let mut next: Vec<u32> =
+        all.filter(|i| (length..length + band_length).contains(&from_end(*i)) && from_end(*i) > length).collect();
+    chosen.extend(lowest(&mut next, nodes, up, band_share));
+    chosen.sort_unstable();
+    chosen
+}
+
+fn lowest(candidates: &mut [u32], nodes: &[DVec3], up: DVec3, share: f64) -> Vec<u32> {
+    let height = |i: u32| nodes[i as usize].dot(up);
+    candidates.sort_by(|a, b| height(*a).total_cmp(&height(*b)).then(a.cmp(b)));
+    let count = (share.clamp(0.0, 1.0) * candidates.len() as f64).round() as usize;
+    let mut chosen = candidates[..count].to_vec();
+    chosen.sort_unstable();
+    chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn column() -> Vec<DVec3> {
+        (0..10).map(|i| DVec3::new(0.1 * i as f64, 0.0, -(i as f64))).collect()
+    }
+
+    #[test]
+    fn the_band_is_the_lowest_share() {
+        assert_eq!(lowest_band(&column(), DVec3::Z, 0.42), [6, 7, 8, 9]);
+        assert_eq!(lowest_band(&column(), -DVec3::Z, 0.2), [0, 1]);
+        assert!(lowest_band(&column(), DVec3::Z, 0.0).is_empty());
+        assert_eq!(lowest_band(&column(), DVec3::Z, 1.0).len(), 10);
+    }
+
+    #[test]
+    fn the_end_and_its_band_are_counted_along_the_organ() {
+        let s: Vec<f64> = (0..10).map(|i| i as f64 / 9.0).collect();
+        assert_eq!(end(&column(), &s, DVec3::Z, true, 0.25, 0.0, 0.0), [0, 1, 2]);
+        assert_eq!(end(&column(), &s, DVec3::Z, false, 0.25, 0.0, 0.0), [7, 8, 9]);
+        // Of nodes 3 to 6 the lower half (node 6 is the lowest).
+        assert_eq!(end(&column(), &s, DVec3::Z, true, 0.25, 0.45, 0.5), [0, 1, 2, 5, 6]);
+    }
 }

@@ -1,33 +1,97 @@
 //! What changes while stepping: plain data.
 
-use crate::Model;
-use glam::DVec3;
+use crate::{Body, Grasp, Model};
+use glam::{DVec3, Vec3A};
+use xxhash_rust::xxh3::Xxh3;
 
-/// Positions, velocities and grasps at one instant.
+/// Positions, velocities and grasp at one instant. Cloning it saves it; putting the clone back restores it exactly.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
     /// Simulated time [s].
     pub time: f64,
+    /// The grasp in force, if any. Setting it closes a grasp; taking it away opens it, and the nodes are free.
+    pub grasp: Option<Grasp>,
+    /// One for each body.
+    pub(crate) bodies: Vec<BodyState>,
+}
+
+/// A body's part of the state, vertices in the model's internal order, positions relative to the body's origin.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct BodyState {
+    /// Position [m].
+    pub x: Vec<Vec3A>,
+    /// Velocity [m/s].
+    pub v: Vec<Vec3A>,
+    /// Acceleration along gravity that the last substep showed, as a share of gravity, 0..=1: for the adaptive start.
+    pub falling: Vec<f32>,
 }
 
 impl State {
     /// The model at rest in its rest shape.
     pub fn new(model: &Model) -> Self {
-        let _ = model;
-        todo!()
+        let at_rest = |body: &Body| {
+            let mut x = vec![Vec3A::ZERO; body.len()];
+            for (node, p) in body.rest_positions().iter().enumerate() {
+                x[body.internal[node] as usize] = (p - body.origin).as_vec3a();
+            }
+            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()] }
+        };
+        Self { time: 0.0, grasp: None, bodies: model.bodies.iter().map(at_rest).collect() }
     }
+
     /// World position of a node [m].
     pub fn position(&self, model: &Model, body: usize, node: usize) -> DVec3 {
-        let _ = (model, body, node);
-        todo!()
+        let b = &model.bodies[body];
+        b.origin + self.bodies[body].x[b.internal[node] as usize].as_dvec3()
     }
+
     /// World positions of a body's nodes [m].
     pub fn positions(&self, model: &Model, body: usize) -> Vec<DVec3> {
-        let _ = (model, body);
-        todo!()
+        (0..model.bodies[body].len()).map(|node| self.position(model, body, node)).collect()
     }
+
+    /// Velocity of a node [m/s].
+    pub fn velocity(&self, model: &Model, body: usize, node: usize) -> DVec3 {
+        self.bodies[body].v[model.bodies[body].internal[node] as usize].as_dvec3()
+    }
+
+    /// Sets the velocity of a node [m/s]; a pinned or held node keeps none.
+    pub fn set_velocity(&mut self, model: &Model, body: usize, node: usize, velocity: DVec3) {
+        self.bodies[body].v[model.bodies[body].internal[node] as usize] = velocity.as_vec3a();
+    }
+
+    /// Mean position of some nodes of a body [m]; zero for none.
+    pub fn centroid(&self, model: &Model, body: usize, nodes: &[u32]) -> DVec3 {
+        let sum: DVec3 = nodes.iter().map(|i| self.position(model, body, *i as usize)).sum();
+        if nodes.is_empty() { DVec3::ZERO } else { sum / nodes.len() as f64 }
+    }
+
     /// Hash over every bit of the state.
     pub fn hash(&self) -> u64 {
-        todo!()
+        let mut hash = Xxh3::new();
+        hash.update(&self.time.to_bits().to_le_bytes());
+        for body in &self.bodies {
+            for vector in body.x.iter().chain(&body.v) {
+                for c in vector.to_array() {
+                    hash.update(&c.to_bits().to_le_bytes());
+                }
+            }
+            for f in &body.falling {
+                hash.update(&f.to_bits().to_le_bytes());
+            }
+        }
+        if let Some(grasp) = &self.grasp {
+            hash.update(&(grasp.body as u64).to_le_bytes());
+            for (node, x) in grasp.prescribed(&grasp.tool) {
+                hash.update(&node.to_le_bytes());
+                for c in x.to_array() {
+                    hash.update(&c.to_bits().to_le_bytes());
+                }
+            }
+            for c in grasp.tool.translation.to_array().into_iter().chain(grasp.tool.rotation.to_array()) {
+                hash.update(&c.to_bits().to_le_bytes());
+            }
+        }
+        hash.digest()
     }
 }

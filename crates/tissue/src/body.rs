@@ -1,0 +1,133 @@
+//! One deformable body, laid out for the sweeps.
+//!
+//! Vertices are renumbered by colour, so that the vertices of one colour are a range, and their positions are kept relative to the body's own
+//! origin: rounding of `f32` is then far below the sags that are measured. What a vertex needs of its elements and edges stands in
+//! one piece, in the order the sweeps read it.
+
+use crate::Material;
+use glam::{DVec3, Vec3A};
+use trocar_geometry::TetMesh;
+
+/// One deformable body.
+#[derive(Clone, Debug)]
+pub struct Body {
+    /// Name.
+    pub name: String,
+    /// Material.
+    pub material: Material,
+    /// Nodes whose mass was raised to a quarter of the median (SPEC T5).
+    pub raised_masses: usize,
+    /// Rest shape, original node order [m].
+    pub(crate) rest: TetMesh,
+    /// Whether each node is pinned, original order.
+    pub(crate) pinned: Vec<bool>,
+    pub(crate) median_edge: f64,
+    /// World position of the body's own origin [m].
+    pub(crate) origin: DVec3,
+    /// Internal number of each node.
+    pub(crate) internal: Vec<u32>,
+    /// First vertex of each colour, and the number of vertices.
+    pub(crate) color_start: Vec<u32>,
+    /// Elements by internal vertex numbers.
+    pub(crate) tets: Vec<[u32; 4]>,
+    /// Per vertex, internal order.
+    pub(crate) vertices: Vec<Vertex>,
+    /// Element corners, by vertex.
+    pub(crate) corners: Vec<Corner>,
+    /// Rest gradients of the three other corners' shape functions for each of `corners` [1/m]; empty for stable neo-Hookean tissue.
+    pub(crate) gradients: Vec<[Vec3A; 3]>,
+    /// Edges, by vertex.
+    pub(crate) edges: Vec<Edge>,
+    /// Rest volume of each element [m3], by `tets`.
+    pub(crate) volumes: Vec<f64>,
+}
+
+/// What a sweep needs to know of a vertex.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Vertex {
+    /// Mass [kg].
+    pub mass: f32,
+    pub pinned: bool,
+    /// First corner and edge of this vertex; the next vertex's are their ends.
+    pub corners: u32,
+    pub edges: u32,
+    /// Constant diagonal of the elastic block [N/m] (stable neo-Hookean's mu part).
+    pub laplacian: f32,
+    /// Stiffness of the support planes against this vertex [N/m].
+    pub contact_stiffness: f32,
+}
+
+/// A vertex as a corner of one element.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Corner {
+    /// The other three corners, oriented so that (b-a)x(c-a).(x-a)/6 is the element's volume.
+    pub others: [u32; 3],
+    /// 1 / (6 V0) [1/m3].
+    pub inverse_6v: f32,
+    /// V0 [m3].
+    pub volume: f32,
+}
+
+/// A vertex's edge to a neighbour.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Edge {
+    pub to: u32,
+    /// mu sum_t V0 m_i.m_j over the elements at the edge [N/m] (stable neo-Hookean's mu part); minus a spring's stiffness.
+    pub laplacian: f32,
+    /// Dashpot along the edge [N s/m].
+    pub damping: f32,
+    /// Rest length [m].
+    pub length: f32,
+}
+
+impl Body {
+    /// Number of nodes.
+    pub fn len(&self) -> usize {
+        self.internal.len()
+    }
+
+    /// True without nodes (a built body never is).
+    pub fn is_empty(&self) -> bool {
+        self.internal.is_empty()
+    }
+
+    /// Whether each node is pinned.
+    pub fn pinned(&self) -> &[bool] {
+        &self.pinned
+    }
+
+    /// Rest positions of the nodes [m].
+    pub fn rest_positions(&self) -> &[DVec3] {
+        &self.rest.vertices
+    }
+
+    /// Elements by node.
+    pub fn tets(&self) -> &[[u32; 4]] {
+        &self.rest.tets
+    }
+
+    /// Median edge length at rest [m].
+    pub fn median_edge(&self) -> f64 {
+        self.median_edge
+    }
+
+    /// Mass of a node [kg].
+    pub fn mass(&self, node: usize) -> f64 {
+        f64::from(self.vertices[self.internal[node] as usize].mass)
+    }
+
+    /// Number of colours of the sweeps.
+    pub fn colors(&self) -> usize {
+        self.color_start.len() - 1
+    }
+
+    pub(crate) fn corners_of(&self, vertex: usize) -> std::ops::Range<usize> {
+        let end = self.vertices.get(vertex + 1).map_or(self.corners.len(), |v| v.corners as usize);
+        self.vertices[vertex].corners as usize..end
+    }
+
+    pub(crate) fn edges_of(&self, vertex: usize) -> &[Edge] {
+        let end = self.vertices.get(vertex + 1).map_or(self.edges.len(), |v| v.edges as usize);
+        &self.edges[self.vertices[vertex].edges as usize..end]
+    }
+}

@@ -1,0 +1,43 @@
+//! Graph colouring: vertices of one colour share no element, so their steps do not see each other.
+
+/// Colours nodes greedily, most neighbours first (ties by index), each with the lowest colour none of its neighbours has.
+/// `neighbours[i]` lists the nodes that share an element with node i. Returns each node's colour and the number of colours.
+pub(crate) fn color(neighbours: &[Vec<u32>]) -> (Vec<u32>, usize) {
+    let mut order: Vec<u32> = (0..neighbours.len() as u32).collect();
+    order.sort_by_key(|i| (std::cmp::Reverse(neighbours[*i as usize].len()), *i));
+    let mut colors = vec![u32::MAX; neighbours.len()];
+    let mut taken: Vec<u32> = Vec::new();
+    let mut count = 0;
+    for i in order {
+        // `taken[c] == i` marks colour c as a neighbour's; nothing needs to be cleared between nodes.
+        for j in &neighbours[i as usize] {
+            if let Some(t) = taken.get_mut(colors[*j as usize] as usize) {
+                *t = i;
+            }
+        }
+        let free = taken.iter().position(|t| *t != i).unwrap_or(taken.len());
+        if free == taken.len() {
+            taken.push(u32::MAX);
+        }
+        colors[i as usize] = free as u32;
+        count = count.max(free + 1);
+    }
+    (colors, count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_differ() {
+        // A ring of 9 with chords.
+        let neighbours: Vec<Vec<u32>> =
+            (0..9u32).map(|i| vec![(i + 1) % 9, (i + 8) % 9, (i + 3) % 9, (i + 6) % 9]).collect();
+        let (colors, count) = color(&neighbours);
+        for (i, list) in neighbours.iter().enumerate() {
+            assert!(list.iter().all(|j| colors[*j as usize] != colors[i]));
+        }
+        assert!(count <= 5);
+    }
+}

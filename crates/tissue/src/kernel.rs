@@ -1,0 +1,117 @@
+//! Force and Hessian block of one vertex in one element: the innermost work of a sweep.
+
+use crate::body::{Body, Corner};
+use crate::{ConstitutiveModel, StableNeoHookean};
+use glam::{Mat3A, Vec3A};
+
+/// Negative gradient and Hessian block of an energy at one vertex.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Local {
+    /// Force [N].
+    pub force: Vec3A,
+    /// Hessian block [N/m], symmetric.
+    pub block: Mat3A,
+}
+
+impl Local {
+    /// Adds stiffness `k` along direction `g`: block += k g g'.
+    #[inline(always)]
+    pub fn add_outer(&mut self, k: f32, g: Vec3A) {
+        let kg = k * g;
+        self.block.x_axis += kg * g.x;
+        self.block.y_axis += kg * g.y;
+        self.block.z_axis += kg * g.z;
+    }
+
+    /// Adds the same stiffness in all directions.
+    #[inline(always)]
+    pub fn add_isotropic(&mut self, k: f32) {
+        self.block.x_axis.x += k;
+        self.block.y_axis.y += k;
+        self.block.z_axis.z += k;
+    }
+}
+
+/// Gradient of the element's volume ratio J with respect to the vertex [1/m]: a third of the area vector of the face opposite over the rest volume.
+/// J is affine in any single vertex: J = gradient.(x - a), a being any corner of that face.
+#[inline(always)]
+pub(crate) fn volume_gradient(corner: &Corner, [a, b, c]: [Vec3A; 3]) -> Vec3A {
+    (b - a).cross(c - a) * corner.inverse_6v
+}
+
+/// A material's part of the sweep.
+pub(crate) trait VertexElasticity: Sync {
+    /// Adds force and block of the vertex at `x` in one element. `k` is the corner's number in the body; `others` are the other three corners.
+    fn add(&self, body: &Body, k: usize, x: Vec3A, others: [Vec3A; 3], gradient: Vec3A, ratio: f32, local: &mut Local);
+}
+
+/// Volume part of [`StableNeoHookean`]: V0 lambda'/2 (J - alpha)^2. Its block V0 lambda' g g' is positive semidefinite as it is. The other part, mu/2 tr(F'F), is
+/// quadratic in the positions: a constant Laplacian along the edges, added by the sweep.
+pub(crate) struct VolumeTerm {
+    pub lambda: f32,
+    pub alpha: f32,
+}
+
+impl VertexElasticity for VolumeTerm {
+    #[inline(always)]
+    fn add(&self, body: &Body, k: usize, _: Vec3A, _: [Vec3A; 3], gradient: Vec3A, ratio: f32, local: &mut Local) {
+        let stiffness = body.corners[k].volume * self.lambda;
+        local.force -= stiffness * (ratio - self.alpha) * gradient;
+        local.add_outer(stiffness, gradient);
+    }
+}
+
+/// [`crate::StVenantKirchhoff`] with its block made positive semidefinite: the geometric stiffness m'Sm is dropped where it is negative.
+pub(crate) struct GreenStrain {
+    pub mu: f32,
+    pub lambda: f32,
+}
+
+impl VertexElasticity for GreenStrain {
+    #[inline(always)]
+    fn add(&self, body: &Body, k: usize, x: Vec3A, others: [Vec3A; 3], _: Vec3A, _: f32, local: &mut Local) {
+        // F = sum over corners of x_c m_c', and the four rest gradients m sum to zero.
+        let gradients = &body.gradients[k];
+        let mut f = Mat3A::ZERO;
+        for (other, m) in others.iter().zip(gradients) {
+            let edge = *other - x;
+            f.x_axis += edge * m.x;
+            f.y_axis += edge * m.y;
+            f.z_axis += edge * m.z;
+        }
+        let m = -(gradients[0] + gradients[1] + gradients[2]);
+        let volume = body.corners[k].volume;
+        let strain = (f.transpose() * f - Mat3A::IDENTITY) * 0.5;
+        let trace = strain.x_axis.x + strain.y_axis.y + strain.z_axis.z;
+        let sm = strain * m * (2.0 * self.mu) + m * (self.lambda * trace);
+        local.force -= volume * (f * sm);
+        let fm = f * m;
+        local.add_isotropic(volume * m.dot(sm).max(0.0));
+        local.add_outer(volume * (self.mu + self.lambda), fm);
+        let along = volume * self.mu * m.length_squared();
+        for column in [f.x_axis, f.y_axis, f.z_axis] {
+            local.add_outer(along, column);
+        }
+    }
+}
+
+/// The kernel of a body's material.
+pub(crate) enum Kernel {
+    StableNeoHookean(VolumeTerm),
+    StVenantKirchhoff(GreenStrain),
+}
+
+impl Kernel {
+    pub fn of(body: &Body) -> Self {
+        let (mu, lambda) = body.material.lame();
+        match body.material.model {
+            ConstitutiveModel::StableNeoHookean => {
+                let m = StableNeoHookean::new(mu, lambda);
+                Self::StableNeoHookean(VolumeTerm { lambda: m.lambda as f32, alpha: m.alpha as f32 })
+            }
+            ConstitutiveModel::StVenantKirchhoff => {
+                Self::StVenantKirchhoff(GreenStrain { mu: mu as f32, lambda: lambda as f32 })
+            }
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! Hyperelastic materials.
+//!
+//! Each model says its energy and stress in double precision, the plain textbook form that tests hold the fast kernels to; the kernels of
+//! the sweeps stand in [`crate::kernel`].
+
+mod st_venant_kirchhoff;
+mod stable_neo_hookean;
+
+pub use st_venant_kirchhoff::StVenantKirchhoff;
+pub use stable_neo_hookean::StableNeoHookean;
+
+use glam::DMat3;
+
+/// A hyperelastic material: a stored energy of the deformation gradient F.
+pub trait Hyperelastic {
+    /// Energy density at F [J/m3]; 0 and smallest at rest.
+    fn energy(&self, f: DMat3) -> f64;
+
+    /// First Piola-Kirchhoff stress P = dPsi/dF [Pa].
+    fn stress(&self, f: DMat3) -> DMat3;
+}
+
+/// Constitutive model by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum ConstitutiveModel {
+    /// Stable neo-Hookean; the default.
+    #[default]
+    StableNeoHookean,
+    /// St. Venant-Kirchhoff, the paper's.
+    StVenantKirchhoff,
+}
+
+/// Material of a body.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Material {
+    /// Constitutive model.
+    pub model: ConstitutiveModel,
+    /// Young's modulus [Pa].
+    pub young_modulus: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Density [kg/m3].
+    pub density: f64,
+    /// Viscosity against deformation rate [Pa s]; rigid motion is not damped.
+    pub viscosity: f64,
+}
+
+impl Material {
+    /// Lame's parameters (mu, lambda) [Pa]: mu = E/(2(1+nu)), lambda = E nu/((1+nu)(1-2nu)).
+    pub fn lame(&self) -> (f64, f64) {
+        let (e, nu) = (self.young_modulus, self.poisson_ratio);
+        (e / (2.0 * (1.0 + nu)), e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)))
+    }
+
+    /// The material's energy.
+    pub fn hyperelastic(&self) -> Box<dyn Hyperelastic> {
+        let (mu, lambda) = self.lame();
+        match self.model {
+            ConstitutiveModel::StableNeoHookean => Box::new(StableNeoHookean::new(mu, lambda)),
+            ConstitutiveModel::StVenantKirchhoff => Box::new(StVenantKirchhoff { mu, lambda }),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    const MODELS: [ConstitutiveModel; 2] = [ConstitutiveModel::StableNeoHookean, ConstitutiveModel::StVenantKirchhoff];
+
+    fn material(model: ConstitutiveModel) -> Material {
+        Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 0.0 }
+    }
+
+    /// Some deformation gradients: near rest, sheared, squeezed, stretched.
+    fn deformations() -> [DMat3; 4] {
+        let skew =
+            DMat3::from_cols(DVec3::new(1.1, 0.2, -0.1), DVec3::new(-0.3, 0.8, 0.25), DVec3::new(0.05, -0.2, 1.3));
+        [
+            DMat3::from_diagonal(DVec3::new(1.001, 0.999, 1.0)),
+            skew,
+            DMat3::from_diagonal(DVec3::new(0.4, 1.2, 1.1)) * skew,
+            DMat3::from_diagonal(DVec3::new(2.5, 0.7, 0.6)),
+        ]
+    }
+
+    #[test]
+    fn stress_is_the_derivative_of_the_energy() {
+        for model in MODELS {
+            let psi = material(model).hyperelastic();
+            for f in deformations() {
+                let stress = psi.stress(f);
+                for column in 0..3 {
+                    for row in 0..3 {
+                        let h = 1e-6;
+                        let moved = |by: f64| {
+                            let mut f = f;
+                            f.col_mut(column)[row] += by;
+                            psi.energy(f)
+                        };
+                        let difference = (moved(h) - moved(-h)) / (2.0 * h);
+                        assert!(
+                            (difference - stress.col(column)[row]).abs() < 1e-4 * (1.0 + difference.abs()),
+                            "{model:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rest_is_free_of_stress() {
+        for model in MODELS {
+            let stress = material(model).hyperelastic().stress(DMat3::IDENTITY);
+            assert!(stress.to_cols_array().iter().all(|s| s.abs() < 1e-9 * 12e3), "{model:?}");
+        }
+    }
+
+    /// A bar pulled by a small strain shows its Young's modulus and, sides left free, its Poisson ratio.
+    #[test]
+    fn small_strains_show_the_moduli() {
+        for model in MODELS {
+            let psi = material(model).hyperelastic();
+            let strain = 1e-5;
+            let stress =
+                psi.stress(DMat3::from_diagonal(DVec3::new(1.0 + strain, 1.0 - 0.45 * strain, 1.0 - 0.45 * strain)));
+            assert!(
+                (stress.x_axis.x / strain / 12e3 - 1.0).abs() < 1e-3,
+                "{model:?}: E = {}",
+                stress.x_axis.x / strain
+            );
+            assert!((stress.y_axis.y / stress.x_axis.x).abs() < 1e-3, "{model:?}: the sides are not free");
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Small scenes the tests share.
+#![allow(dead_code, reason = "each test binary uses its own part")]
+
+use glam::DVec3;
+use trocar_geometry::TetMesh;
+use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder};
+
+pub const FRAME: f64 = 1.0 / 60.0;
+pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+
+/// The appendix's material; `viscosity` 0.
+pub fn tissue(young_modulus: f64) -> Material {
+    Material {
+        model: ConstitutiveModel::StableNeoHookean,
+        young_modulus,
+        poisson_ratio: 0.45,
+        density: 1200.0,
+        viscosity: 0.0,
+    }
+}
+
+/// A box of `cells` cubes of edge `edge` [m], lower corner at the origin, six tetrahedra a cube around its main diagonal.
+pub fn block(cells: [usize; 3], edge: f64) -> TetMesh {
+    let [nx, ny, nz] = cells;
+    let index = |i: usize, j: usize, k: usize| ((k * (ny + 1) + j) * (nx + 1) + i) as u32;
+    let mut mesh = TetMesh::default();
+    for k in 0..=nz {
+        for j in 0..=ny {
+            for i in 0..=nx {
+                mesh.vertices.push(edge * DVec3::new(i as f64, j as f64, k as f64));
+            }
+        }
+    }
+    for k in 0..nz {
+        for j in 0..ny {
+            for i in 0..nx {
+                let corner = |c: usize| index(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2 & 1));
+                for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                    mesh.tets.push([corner(0), corner(a), corner(b), corner(7)]);
+                }
+            }
+        }
+    }
+    mesh
+}
+
+/// Nodes of `mesh` for which `chosen` holds.
+pub fn nodes(mesh: &TetMesh, chosen: impl Fn(DVec3) -> bool) -> Vec<u32> {
+    (0..mesh.vertices.len() as u32).filter(|i| chosen(mesh.vertices[*i as usize])).collect()
+}
+
+/// A model of one body under `gravity`.
+pub fn model(mesh: &TetMesh, material: Material, pinned: Vec<u32>, gravity: DVec3) -> Model {
+    let mut builder = ModelBuilder::new().gravity(gravity);
+    builder.body(BodyDescription { name: "block".into(), mesh, material, pinned }).unwrap();
+    builder.build().unwrap()
+}

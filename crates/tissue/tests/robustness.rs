@@ -1,0 +1,195 @@
+//! What must hold whatever happens: no inversion, pins that stay, exact grasps, the same bits.
+
+mod common;
+
+use common::{FRAME, GRAVITY, block, model, nodes, tissue};
+use glam::{DQuat, DVec3};
+use trocar_geometry::{Pose, TetMesh};
+use trocar_tissue::{
+    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper, ToolMotion,
+};
+
+fn lifted(height: f64) -> Pose {
+    Pose { translation: DVec3::Z * height, ..Pose::IDENTITY }
+}
+
+/// Grasps the top of a block pinned at its foot and moves it by `travel` in `frames` frames; returns the most elements inverted in any frame.
+fn drag(model: &Model, mesh: &TetMesh, top: f64, travel: f64, frames: usize) -> (usize, State) {
+    let mut state = State::new(model);
+    let mut stepper = Stepper::new(model, Schedule::default(), 0);
+    let held = nodes(mesh, |p| p.z > top);
+    state.grasp = Some(Grasp::capture(model, &state, 0, &held, &Pose::IDENTITY));
+    let mut worst = 0;
+    for k in 0..frames {
+        let at = |k: usize| lifted(travel * k as f64 / frames as f64);
+        let report = stepper.step(model, &mut state, FRAME, Some(&ToolMotion { from: at(k), to: at(k + 1) }));
+        assert_eq!(report.divergence, None);
+        assert!(report.min_volume_ratio > 0.0);
+        worst = worst.max(report.inverted);
+    }
+    (worst, state)
+}
+
+#[test]
+fn nothing_inverts_when_squeezed_or_pulled_hard() {
+    let mesh = block([4, 4, 6], 2e-3);
+    for young_modulus in [3e3, 12e3, 48e3] {
+        let model = model(&mesh, tissue(young_modulus), nodes(&mesh, |p| p.z == 0.0), GRAVITY);
+        // To a third of its height, and by two and a half times its height, each in half a second.
+        for travel in [-8e-3, 30e-3] {
+            let (worst, state) = drag(&model, &mesh, 11e-3, travel, 30);
+            assert_eq!(worst, 0, "{young_modulus} Pa, {travel} m");
+            for i in nodes(&mesh, |p| p.z == 0.0) {
+                assert_eq!(state.position(&model, 0, i as usize), State::new(&model).position(&model, 0, i as usize));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_tool_faster_than_the_tissue_is_followed_later() {
+    let mesh = block([4, 4, 6], 2e-3);
+    let model = model(&mesh, tissue(3e3), nodes(&mesh, |p| p.z == 0.0), GRAVITY);
+    // 10 mm down in one frame, through the pinned foot's neighbours if nothing held it.
+    let (worst, _) = drag(&model, &mesh, 11e-3, -10e-3, 1);
+    assert_eq!(worst, 0);
+}
+
+#[test]
+fn the_grasp_is_exact_when_it_closes() {
+    let mesh = block([3, 3, 3], 2e-3);
+    let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
+    let mut state = State::new(&model);
+    let mut stepper = Stepper::new(&model, Schedule::default(), 1);
+    for _ in 0..7 {
+        stepper.step(&model, &mut state, FRAME, None);
+    }
+    let tool = Pose {
+        rotation: DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.2),
+        translation: DVec3::new(0.11, -0.07, 0.31),
+    };
+    let grasp = Grasp::capture(&model, &state, 0, &[0, 5, 17], &tool);
+    for (node, x) in grasp.prescribed(&tool) {
+        assert_eq!(x, state.position(&model, 0, node as usize));
+    }
+    // Elsewhere it is the paper's equation (4).
+    let moved = Pose { rotation: DQuat::from_rotation_y(0.8) * tool.rotation, translation: DVec3::new(0.1, 0.0, 0.3) };
+    for (node, x) in grasp.prescribed(&moved) {
+        let offset = tool.inverse().transform(state.position(&model, 0, node as usize));
+        assert!((x - moved.transform(offset)).length() < 1e-15);
+    }
+}
+
+#[test]
+fn held_nodes_follow_the_tool_and_are_free_afterwards() {
+    let mesh = block([4, 4, 6], 2e-3);
+    let model = model(&mesh, Material { viscosity: 60.0, ..tissue(12e3) }, nodes(&mesh, |p| p.z == 0.0), DVec3::ZERO);
+    let (_, mut state) = drag(&model, &mesh, 11e-3, 4e-3, 30);
+    let top = nodes(&mesh, |p| p.z > 11e-3);
+    let rest = State::new(&model).centroid(&model, 0, &top);
+    assert!((state.centroid(&model, 0, &top) - rest - DVec3::Z * 4e-3).length() < 1e-7);
+    state.grasp = None;
+    let mut stepper = Stepper::new(&model, Schedule::default(), 1);
+    for _ in 0..120 {
+        stepper.step(&model, &mut state, FRAME, None);
+    }
+    assert!((state.centroid(&model, 0, &top) - rest).length() < 1e-5, "it springs back to its rest shape");
+}
+
+/// Two bodies, one large enough to be swept by many tasks.
+fn two_bodies() -> (Model, Vec<u32>) {
+    let (large, small) = (block([20, 20, 12], 1.5e-3), block([5, 4, 3], 2e-3));
+    let mut builder = ModelBuilder::new().gravity(GRAVITY);
+    let mut add = |name: &str, mesh: &TetMesh, material| {
+        let pinned = nodes(mesh, |p| p.z == 0.0);
+        builder.body(BodyDescription { name: name.into(), mesh, material, pinned }).unwrap();
+    };
+    add("large", &large, Material { viscosity: 60.0, ..tissue(12e3) });
+    add("small", &small, Material { model: ConstitutiveModel::StVenantKirchhoff, ..tissue(30e3) });
+    (builder.build().unwrap(), nodes(&large, |p| p.z > 16e-3 && p.x < 8e-3))
+}
+
+#[test]
+fn the_same_bits_for_any_run_and_any_number_of_threads() {
+    let (model, held) = two_bodies();
+    let run = |threads: usize| {
+        let mut state = State::new(&model);
+        state.grasp = Some(Grasp::capture(&model, &state, 0, &held, &Pose::IDENTITY));
+        let mut stepper = Stepper::new(&model, Schedule::default(), threads);
+        for k in 0..6 {
+            let motion = ToolMotion { from: lifted(5e-4 * k as f64), to: lifted(5e-4 * (k + 1) as f64) };
+            stepper.step(&model, &mut state, FRAME, Some(&motion));
+        }
+        state.hash()
+    };
+    let one = run(1);
+    for threads in [1, 2, 3, 8] {
+        assert_eq!(one, run(threads), "{threads} threads");
+    }
+}
+
+#[test]
+fn a_saved_state_goes_on_as_if_nothing_had_happened() {
+    let (model, _) = two_bodies();
+    let mut stepper = Stepper::new(&model, Schedule::default(), 2);
+    let mut state = State::new(&model);
+    for _ in 0..3 {
+        stepper.step(&model, &mut state, FRAME, None);
+    }
+    let saved = state.clone();
+    let mut go_on = |mut state: State| {
+        for _ in 0..3 {
+            stepper.step(&model, &mut state, FRAME, None);
+        }
+        state.hash()
+    };
+    let first = go_on(state);
+    assert_eq!(first, go_on(saved.clone()));
+    assert_ne!(first, saved.hash());
+}
+
+#[test]
+fn unusable_bodies_are_refused_by_name() {
+    let good = block([2, 2, 2], 2e-3);
+    let refuse = |mesh: &TetMesh, material: Material, pinned: Vec<u32>, words: &[&str]| {
+        let body = BodyDescription { name: "spleen".into(), mesh, material, pinned };
+        let said = ModelBuilder::new().body(body).unwrap_err().to_string();
+        assert!(words.iter().chain(&["spleen"]).all(|w| said.contains(w)), "{said}");
+    };
+    let fine = tissue(12e3);
+    refuse(&TetMesh::default(), fine, vec![], &["no element"]);
+    let mut flat = good.clone();
+    flat.vertices.iter_mut().for_each(|v| v.z = 0.0);
+    refuse(&flat, fine, vec![], &["element 0", "volume"]);
+    let mut turned = good.clone();
+    turned.tets[5].swap(0, 1);
+    refuse(&turned, fine, vec![], &["element 5"]);
+    let mut nan = good.clone();
+    nan.vertices[4].y = f64::NAN;
+    refuse(&nan, fine, vec![], &["node 4"]);
+    let mut lonely = good.clone();
+    lonely.vertices.push(DVec3::ONE);
+    refuse(&lonely, fine, vec![], &["node 27", "no element"]);
+    refuse(&good, Material { young_modulus: 12e12, ..fine }, vec![], &["Young", "unit"]);
+    refuse(&good, Material { poisson_ratio: 0.5, ..fine }, vec![], &["Poisson"]);
+    refuse(&good, Material { density: f64::NAN, ..fine }, vec![], &["density"]);
+    refuse(&good, fine, vec![99], &["node 99"]);
+    assert!(ModelBuilder::new().build().is_err());
+}
+
+#[test]
+fn light_nodes_are_raised_to_a_quarter_of_the_median() {
+    // A block with one corner cube collapsed towards its corner: its nodes carry little.
+    let mut mesh = block([4, 4, 4], 2e-3);
+    for v in &mut mesh.vertices {
+        if v.x < 3e-3 && v.y < 3e-3 && v.z < 3e-3 {
+            *v *= 0.05;
+        }
+    }
+    let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
+    let body = &model.bodies[0];
+    assert!(body.raised_masses > 0);
+    let mut masses: Vec<f64> = (0..body.len()).map(|i| body.mass(i)).collect();
+    masses.sort_by(f64::total_cmp);
+    assert!(masses[0] >= 0.249 * masses[masses.len() / 2]);
+}
