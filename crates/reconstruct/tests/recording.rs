@@ -141,7 +141,7 @@ fn mistakes_in_the_index_name_the_line() {
         ("1,0.0", "0,0.0", "indices ascend"),
         ("index,time_s", "index,time", "time"),
         ("depth/000001.png", "", "depth is empty"),
-        ("1,0.033333", "1,soon", "line 3: time_s: invalid float"),
+        ("1,0.033333", "1,soon", "line 3: column 2: invalid float"),
     ] {
         let (_root, dir) = recording();
         replace(&dir.join("frames.csv"), from, to);

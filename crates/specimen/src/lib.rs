@@ -8,6 +8,7 @@
 //! report.html       what a person looks at (written by the report)
 //! ```
 
+mod document;
 mod error;
 mod organ;
 mod specimen;

@@ -101,12 +101,11 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
 
 /// Line and column of a mistake that the CSV reader found.
 fn explain(error: &csv::Error) -> String {
-    const COLUMNS: [&str; 5] = ["index", "time_s", "color", "depth", "instruments"];
     match error.kind() {
         csv::ErrorKind::Deserialize { pos, err } => {
             let line = pos.as_ref().map_or(1, csv::Position::line);
-            let field = err.field().and_then(|f| COLUMNS.get(f as usize)).map_or(String::new(), |c| format!("{c}: "));
-            format!("line {line}: {field}{}; the columns are {}", err.kind(), COLUMNS.join(","))
+            let field = err.field().map_or(String::new(), |f| format!("column {}: ", f + 1));
+            format!("line {line}: {field}{}; the columns are index,time_s,color,depth,instruments", err.kind())
         }
         _ => error.to_string(),
     }
