@@ -12,6 +12,8 @@ pub mod mesher;
 mod pose;
 mod quality;
 mod repair;
+#[cfg(test)]
+mod shapes;
 mod skin;
 mod smooth;
 mod tet_mesh;
@@ -22,7 +24,7 @@ pub mod io;
 pub use axis::OrganAxis;
 pub use distance::{MeshDistance, SignedDistance};
 pub use error::{Error, Result};
-pub use grid::{Grid, sample_distance};
+pub use grid::{Grid, sample_distance, sample_everywhere};
 pub use isosurface::isosurface;
 pub use mesher::{LatticeMesher, Mesher};
 pub use pose::Pose;
