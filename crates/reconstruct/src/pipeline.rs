@@ -1,11 +1,20 @@
 //! The stages in their order.
 
-use crate::{Recording, Result};
-use std::path::Path;
-use trocar_camera::{ColorImage, DepthImage, Mask};
-use trocar_geometry::{RepairReport, io::Unit};
+use crate::body::{fill_with_tets, resample};
+use crate::check::check;
+use crate::closed_surface::closed_surface;
+use crate::colour::color_vertices;
+use crate::composite::{Composite, composite};
+use crate::front::front;
+use crate::outline::tidy;
+use crate::thickness::thickness;
+use crate::{Error, OrganInfo, Recording, Result};
+use glam::{DVec2, DVec3};
+use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_geometry::Pose;
 use trocar_progress::Progress;
-use trocar_specimen::Specimen;
+use trocar_specimen::{Organ, Provenance, Specimen};
+use xxhash_rust::xxh3::Xxh3;
 
 /// Settings of the reconstruction; one set serves every recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,20 +79,214 @@ pub struct Reconstruction {
     pub notes: Vec<String>,
 }
 
-/// Reconstructs every organ of a recording.
-pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
-    let _ = (recording, settings, progress);
-    todo!()
+impl Settings {
+    /// Refuses settings that make no sense.
+    ///
+    /// # Errors
+    /// Names the setting, its value and what would be right.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |reason: String| Err(Error::Setting(reason));
+        if self.stride == 0 {
+            return wrong("stride is 0; at least 1 frame".into());
+        }
+        if self.min_samples == 0 {
+            return wrong("min_samples is 0; at least 1 frame".into());
+        }
+        if !(1e-4..=0.1).contains(&self.finest_cell) {
+            return wrong(format!("finest_cell is {} m; 0.0001 to 0.1", self.finest_cell));
+        }
+        if self.max_tets < 100 {
+            return wrong(format!("max_tets is {}; at least 100", self.max_tets));
+        }
+        Ok(())
+    }
+
+    /// The settings as `name = value`, in the order of the struct.
+    pub(crate) fn list(&self) -> Vec<String> {
+        vec![
+            format!("window = {}", self.window),
+            format!("stride = {}", self.stride),
+            self.centre.map_or("centre = middle".into(), |c| format!("centre = {c}")),
+            format!("min_samples = {}", self.min_samples),
+            format!("finest_cell_m = {}", self.finest_cell),
+            format!("max_tets = {}", self.max_tets),
+        ]
+    }
 }
 
-/// Makes a one-organ specimen of a ready surface (a real organ model), repaired if need be; z is up. The organ is named
-/// after the file.
-pub fn from_surface(
-    path: &Path,
-    unit: Unit,
+/// Name and version for the provenance.
+pub(crate) fn program() -> String {
+    format!("trocar {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// Reconstructs every organ of a recording.
+///
+/// # Errors
+/// A setting out of range, a broken recording, an organ that cannot be closed or filled, or an interruption.
+pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
+    settings.validate()?;
+    if recording.info.organs.is_empty() {
+        return Err(Error::Recording {
+            path: recording.dir().join("recording.toml"),
+            reason: "no [[organ]]; name at least one, with a mask in masks/ or a polygon".into(),
+        });
+    }
+    // All masks first: a missing one should not be found after minutes of work.
+    let masks = (0..recording.info.organs.len()).map(|i| recording.organ_mask(i)).collect::<Result<Vec<_>>>()?;
+    let mut notes = recording.notes().to_vec();
+    let background = composite(recording, settings, progress)?;
+    if background.frames_used < settings.min_samples {
+        notes.push(format!("The window holds only {} frames.", background.frames_used));
+    }
+
+    let camera = recording.camera();
+    let (mut organs, mut views) = (Vec::new(), Vec::new());
+    progress.begin("organs", masks.len() as u64);
+    for (info, mask) in recording.info.organs.iter().zip(masks) {
+        let made = if progress.interrupted() {
+            Err(Error::Interrupted)
+        } else {
+            organ(info, mask, &background, &camera, recording.info.depth_scale_m, settings, &mut notes)
+        };
+        match made {
+            Ok((organ, view)) => {
+                organs.push(organ);
+                views.push(view);
+            }
+            Err(e) => {
+                progress.end();
+                return Err(e);
+            }
+        }
+        progress.advance(1);
+    }
+    progress.end();
+
+    let specimen = Specimen {
+        name: recording.info.name.clone(),
+        up: recording.info.up.into(),
+        placement: Pose::IDENTITY,
+        camera: Some(camera),
+        organs,
+        background: Some(background.color.clone()),
+        provenance: Provenance {
+            source: recording.info.name.clone(),
+            input_hash: format!("{:016x}", input_hash(recording, &background, &views)?),
+            program: program(),
+            settings: settings.list(),
+        },
+    };
+    Ok(Reconstruction {
+        specimen,
+        input: background.input,
+        instruments: background.instruments,
+        background: background.color,
+        depth: background.depth,
+        frames_used: background.frames_used,
+        recovered_share: background.recovered_share,
+        coverage: background.coverage,
+        depth_range_median: background.depth_range_median,
+        organs: views,
+        notes,
+    })
+}
+
+/// Reconstructs one organ.
+fn organ(
+    info: &OrganInfo,
+    mut mask: Mask,
+    background: &Composite,
+    camera: &Camera,
+    depth_scale: f64,
     settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<(Specimen, RepairReport)> {
-    let _ = (path, unit, settings, progress);
-    todo!()
+    notes: &mut Vec<String>,
+) -> Result<(Organ, OrganView)> {
+    let name = &info.name;
+    let tidied = tidy(&mut mask);
+    let pixels = mask.count();
+    if tidied.dropped > 0 {
+        notes.push(format!("{name}: {} mask pixels apart from its largest piece were dropped.", tidied.dropped));
+    }
+    if tidied.filled > 0 {
+        notes.push(format!("{name}: {} pixels of small holes in its mask were filled.", tidied.filled));
+    }
+    if tidied.on_border > 0 {
+        notes
+            .push(format!("{name}: it reaches the image's border and was closed there ({} pixels).", tidied.on_border));
+    }
+
+    let unmeasured = || Error::Organ {
+        organ: name.clone(),
+        reason: format!("no depth was measured inside its mask ({pixels} pixels); is the mask on the organ?"),
+    };
+    let mut measured: Vec<f64> = background
+        .depth
+        .depth
+        .iter()
+        .zip(&mask.set)
+        .filter(|(z, set)| **set && **z > 0.0)
+        .map(|(z, _)| f64::from(*z))
+        .collect();
+    measured.sort_by(f64::total_cmp);
+    let middle = *measured.get(measured.len() / 2).ok_or_else(unmeasured)?;
+    // Noise of the composite: the recording's unit, or what the window shows.
+    let noise = depth_scale.max(0.5 * background.depth_range_median);
+    // A first radius, from the mask at one depth, tells edges from outliers.
+    let flat = thickness(&vec![middle; mask.set.len()], &mask, camera).radius;
+    let front = front(&background.depth, &mask, camera, flat, noise).ok_or_else(unmeasured)?;
+    if front.outliers > 0 {
+        notes.push(format!("{name}: {} depths that are not the organ's were left out.", front.outliers));
+    }
+    if 10 * front.filled > pixels {
+        let share = 100.0 * front.filled as f64 / pixels as f64;
+        notes.push(format!("{name}: {share:.0}% of its pixels had no depth and were filled in."));
+    }
+
+    let back = thickness(&front.depth, &mask, camera);
+    let raw = closed_surface(&front.depth, &back.h, &mask, camera);
+    let mut surface = resample(name, &raw, back.radius)?;
+    color_vertices(&mut surface, &background.color, &background.colored, &mask, camera);
+    let (body, mut facts) = fill_with_tets(name, &surface, settings)?;
+    let check = check(&surface, &background.depth, &mask, camera).ok_or_else(unmeasured)?;
+    facts.depth_error_median_mm = Some(1e3 * check.median_absolute);
+    facts.depth_error_signed_mm = Some(1e3 * check.median_signed);
+    facts.covered = Some(check.covered);
+    let organ = Organ {
+        name: name.clone(),
+        body,
+        surface,
+        material: info.material,
+        pins: info.pins,
+        base: base(info, &mask, &front.depth, camera, middle),
+        facts,
+    };
+    Ok((organ, OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared }))
+}
+
+/// The organ's point at `base_px`, or at the mask's pixel nearest to it; by default the point that the image's centre shows
+/// at the organ's depth.
+fn base(info: &OrganInfo, mask: &Mask, front: &[f64], camera: &Camera, middle: f64) -> DVec3 {
+    let pixel = |i: usize| DVec2::new((i % mask.width) as f64, (i / mask.width) as f64);
+    let Some(at) = info.base_px.map(DVec2::from) else {
+        return camera.ray(0.5 * (mask.width as f64 - 1.0), 0.5 * (mask.height as f64 - 1.0)) * middle;
+    };
+    let nearest = (0..front.len())
+        .filter(|i| mask.set[*i])
+        .min_by(|a, b| pixel(*a).distance_squared(at).total_cmp(&pixel(*b).distance_squared(at)));
+    match nearest {
+        Some(i) => camera.ray(pixel(i).x, pixel(i).y) * front[i],
+        None => camera.ray(at.x, at.y) * middle,
+    }
+}
+
+/// Hash of everything the result depends on: `recording.toml`, the used frames, the masks.
+fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]) -> Result<u64> {
+    let path = recording.dir().join("recording.toml");
+    let mut hash = Xxh3::new();
+    hash.update(&std::fs::read(&path).map_err(|source| Error::Io { path, source })?);
+    hash.update(&background.hash.to_le_bytes());
+    for view in views {
+        hash.update(&view.mask.set.iter().map(|s| u8::from(*s)).collect::<Vec<u8>>());
+    }
+    Ok(hash.digest())
 }
