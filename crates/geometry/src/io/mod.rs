@@ -1,6 +1,14 @@
 //! Mesh files.
 
-use crate::{Error, Result, TetMesh, TriMesh};
+mod msh;
+mod obj;
+mod ply;
+mod stl;
+
+pub use msh::{read_msh, write_msh};
+pub use ply::write_ply;
+
+use crate::{Error, Result, TriMesh};
 use std::path::Path;
 
 /// Unit of the lengths in a file that does not say.
@@ -14,27 +22,71 @@ pub enum Unit {
     Metre,
 }
 
-/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours if there are any) or `.obj`, into metres.
+impl Unit {
+    /// Metres in one of the unit.
+    pub fn metres(self) -> f64 {
+        match self {
+            Self::Millimetre => 1e-3,
+            Self::Centimetre => 1e-2,
+            Self::Metre => 1.0,
+        }
+    }
+}
+
+/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours if there are any) or `.obj`, into metres. The
+/// vertices are those of the file: in an STL file every triangle has its own (see [`repair`](crate::repair)).
+///
+/// # Errors
+/// [`Error::Io`] if the file cannot be read. [`Error::Parse`] for another extension, content that is damaged or cut short,
+/// an index out of range, a vertex that is not finite, or no triangles.
 pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
-    let _ = (path, unit);
-    todo!()
+    let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let parse = match extension.as_str() {
+        "stl" => stl::parse,
+        "ply" => ply::parse,
+        "obj" => obj::parse,
+        _ => return Err(bad(path, "not a known surface file; supported are .stl, .ply and .obj")),
+    };
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    let mut mesh = parse(&bytes).map_err(|reason| bad(path, reason))?;
+    if mesh.triangles.is_empty() {
+        return Err(bad(path, "the file has no triangles"));
+    }
+    if let Some(v) = mesh.vertices.iter().position(|v| !v.is_finite()) {
+        return Err(bad(path, format!("vertex {v} is {}; coordinates must be finite", mesh.vertices[v])));
+    }
+    let count = mesh.vertices.len();
+    if let Some(t) = mesh.triangles.iter().position(|t| t.iter().any(|&v| v as usize >= count)) {
+        let reason = format!("triangle {t} uses vertices {:?}, but there are only {count}", mesh.triangles[t]);
+        return Err(bad(path, reason));
+    }
+    for v in &mut mesh.vertices {
+        *v *= unit.metres();
+    }
+    Ok(mesh)
 }
 
-/// Writes a binary little-endian `.ply` in metres, with vertex colours when the mesh has them.
-pub fn write_ply(path: &Path, mesh: &TriMesh) -> Result<()> {
-    let _ = (path, mesh);
-    todo!()
+/// What a parser found, or why it could not: the path is added by its caller.
+type Parsed<T> = std::result::Result<T, String>;
+
+/// An [`Error::Parse`].
+fn bad(path: &Path, reason: impl Into<String>) -> Error {
+    Error::Parse { path: path.into(), reason: reason.into() }
 }
 
-/// Reads the tetrahedra of a Gmsh `.msh` file (2.2 or 4.1, text or binary little-endian), in metres. Turns negative
-/// elements; refuses an element without volume.
-pub fn read_msh(path: &Path) -> Result<TetMesh> {
-    let _ = path;
-    todo!()
+/// Writes a whole file.
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.into(), source })
 }
 
-/// Writes a Gmsh 4.1 binary `.msh`, in metres.
-pub fn write_msh(path: &Path, mesh: &TetMesh) -> Result<()> {
-    let _ = (path, mesh);
-    Err(Error::Mesh("unwritten".into()))
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_that_are_no_surfaces_are_named() {
+        let message = read_surface(Path::new("organ.step"), Unit::Metre).unwrap_err().to_string();
+        assert!(message.contains("organ.step") && message.contains(".stl, .ply and .obj"), "{message}");
+        assert!(matches!(read_surface(Path::new("absent.stl"), Unit::Metre), Err(Error::Io { .. })));
+    }
 }
