@@ -12,7 +12,6 @@
 //! rim vertex lies midway between a pixel inside and one outside, so the outline has no half-pixel bias, and belongs to
 //! both sheets, so the surface closes. Along every ray the back is behind the front: the surface cannot cross itself.
 
-use glam::DVec3;
 use std::collections::BTreeMap;
 use trocar_camera::{Camera, Mask};
 use trocar_geometry::TriMesh;
@@ -96,6 +95,7 @@ fn polygons(inside: [bool; 4]) -> Vec<Vec<usize>> {
 mod tests {
     use super::*;
     use crate::thickness::thickness;
+    use glam::DVec3;
     use trocar_camera::Distortion;
 
     fn camera() -> Camera {

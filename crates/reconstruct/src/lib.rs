@@ -14,6 +14,7 @@ mod error;
 mod fill;
 mod from_surface;
 mod front;
+mod organ;
 mod outline;
 mod pipeline;
 pub mod recording;

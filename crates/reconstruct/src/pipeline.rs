@@ -1,16 +1,10 @@
 //! The stages in their order.
 
-use crate::body::{fill_with_tets, resample};
-use crate::check::check;
-use crate::closed_surface::closed_surface;
-use crate::colour::color_vertices;
+use crate::body::fill_with_tets;
 use crate::composite::{Composite, composite};
-use crate::front::front;
-use crate::outline::tidy;
-use crate::thickness::thickness;
+use crate::organ::{Closed, View, close};
 use crate::{Error, OrganInfo, Recording, Result};
-use glam::{DVec2, DVec3};
-use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_geometry::Pose;
 use trocar_progress::Progress;
 use trocar_specimen::{Organ, Provenance, Specimen};
@@ -139,14 +133,14 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         notes.push(format!("The window holds only {} frames.", background.frames_used));
     }
 
-    let camera = recording.camera();
+    let view = View { background: &background, camera: recording.camera(), depth_scale: recording.info.depth_scale_m };
     let (mut organs, mut views) = (Vec::new(), Vec::new());
     progress.begin("organs", masks.len() as u64);
     for (info, mask) in recording.info.organs.iter().zip(masks) {
         let made = if progress.interrupted() {
             Err(Error::Interrupted)
         } else {
-            organ(info, mask, &background, &camera, recording.info.depth_scale_m, settings, &mut notes)
+            close(info, mask, &view, &mut notes).and_then(|closed| with_body(info, closed, settings))
         };
         match made {
             Ok((organ, view)) => {
@@ -166,7 +160,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         name: recording.info.name.clone(),
         up: recording.info.up.into(),
         placement: Pose::IDENTITY,
-        camera: Some(camera),
+        camera: Some(view.camera),
         organs,
         background: Some(background.color.clone()),
         provenance: Provenance {
@@ -191,92 +185,16 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
     })
 }
 
-/// Reconstructs one organ.
-fn organ(
-    info: &OrganInfo,
-    mut mask: Mask,
-    background: &Composite,
-    camera: &Camera,
-    depth_scale: f64,
-    settings: &Settings,
-    notes: &mut Vec<String>,
-) -> Result<(Organ, OrganView)> {
-    let name = &info.name;
-    let tidied = tidy(&mut mask);
-    let pixels = mask.count();
-    if tidied.dropped > 0 {
-        notes.push(format!("{name}: {} mask pixels apart from its largest piece were dropped.", tidied.dropped));
-    }
-    if tidied.filled > 0 {
-        notes.push(format!("{name}: {} pixels of small holes in its mask were filled.", tidied.filled));
-    }
-    if tidied.on_border > 0 {
-        notes
-            .push(format!("{name}: it reaches the image's border and was closed there ({} pixels).", tidied.on_border));
-    }
-
-    let unmeasured = || Error::Organ {
-        organ: name.clone(),
-        reason: format!("no depth was measured inside its mask ({pixels} pixels); is the mask on the organ?"),
-    };
-    let mut measured: Vec<f64> = background
-        .depth
-        .depth
-        .iter()
-        .zip(&mask.set)
-        .filter(|(z, set)| **set && **z > 0.0)
-        .map(|(z, _)| f64::from(*z))
-        .collect();
-    measured.sort_by(f64::total_cmp);
-    let middle = *measured.get(measured.len() / 2).ok_or_else(unmeasured)?;
-    // Noise of the composite: the recording's unit, or what the window shows.
-    let noise = depth_scale.max(0.5 * background.depth_range_median);
-    // A first radius, from the mask at one depth, tells edges from outliers.
-    let flat = thickness(&vec![middle; mask.set.len()], &mask, camera).radius;
-    let front = front(&background.depth, &mask, camera, flat, noise).ok_or_else(unmeasured)?;
-    if front.outliers > 0 {
-        notes.push(format!("{name}: {} depths that are not the organ's were left out.", front.outliers));
-    }
-    if 10 * front.filled > pixels {
-        let share = 100.0 * front.filled as f64 / pixels as f64;
-        notes.push(format!("{name}: {share:.0}% of its pixels had no depth and were filled in."));
-    }
-
-    let back = thickness(&front.depth, &mask, camera);
-    let raw = closed_surface(&front.depth, &back.h, &mask, camera);
-    let mut surface = resample(name, &raw, back.radius)?;
-    color_vertices(&mut surface, &background.color, &background.colored, &mask, camera);
-    let (body, mut facts) = fill_with_tets(name, &surface, settings)?;
-    let check = check(&surface, &background.depth, &mask, camera).ok_or_else(unmeasured)?;
+/// The organ and what was seen of it, from its closed surface.
+fn with_body(info: &OrganInfo, closed: Closed, settings: &Settings) -> Result<(Organ, OrganView)> {
+    let Closed { surface, mask, base, check } = closed;
+    let (body, mut facts) = fill_with_tets(&info.name, &surface, settings)?;
     facts.depth_error_median_mm = Some(1e3 * check.median_absolute);
     facts.depth_error_signed_mm = Some(1e3 * check.median_signed);
     facts.covered = Some(check.covered);
-    let organ = Organ {
-        name: name.clone(),
-        body,
-        surface,
-        material: info.material,
-        pins: info.pins,
-        base: base(info, &mask, &front.depth, camera, middle),
-        facts,
-    };
-    Ok((organ, OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared }))
-}
-
-/// The organ's point at `base_px`, or at the mask's pixel nearest to it; by default the point that the image's centre shows
-/// at the organ's depth.
-fn base(info: &OrganInfo, mask: &Mask, front: &[f64], camera: &Camera, middle: f64) -> DVec3 {
-    let pixel = |i: usize| DVec2::new((i % mask.width) as f64, (i / mask.width) as f64);
-    let Some(at) = info.base_px.map(DVec2::from) else {
-        return camera.ray(0.5 * (mask.width as f64 - 1.0), 0.5 * (mask.height as f64 - 1.0)) * middle;
-    };
-    let nearest = (0..front.len())
-        .filter(|i| mask.set[*i])
-        .min_by(|a, b| pixel(*a).distance_squared(at).total_cmp(&pixel(*b).distance_squared(at)));
-    match nearest {
-        Some(i) => camera.ray(pixel(i).x, pixel(i).y) * front[i],
-        None => camera.ray(at.x, at.y) * middle,
-    }
+    let name = info.name.clone();
+    let view = OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared };
+    Ok((Organ { name, body, surface, material: info.material, pins: info.pins, base, facts }, view))
 }
 
 /// Hash of everything the result depends on: `recording.toml`, the used frames, the masks.
