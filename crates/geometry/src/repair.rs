@@ -84,7 +84,7 @@ pub fn repair(mesh: &TriMesh) -> Result<(TriMesh, RepairReport)> {
 /// Passes a watertight surface that encloses a volume.
 fn enclosing(mesh: TriMesh, diagonal: f64) -> Result<TriMesh> {
     let volume = mesh.volume();
-    if !mesh.is_watertight() || volume < NO_VOLUME * diagonal.powi(3) {
+    if volume.is_nan() || volume < NO_VOLUME * diagonal.powi(3) || !mesh.is_watertight() {
         return Err(Error::Mesh(format!(
             "the surface encloses no volume ({volume:.1e} m3 in a box with a diagonal of {diagonal:.3} m); it must be closed, \
              or nearly so, around a body"

@@ -239,7 +239,7 @@ mod tests {
     fn the_largest_component_is_the_one_with_most_volume() {
         let small = icosphere(3, 0.3);
         let large = cube(DVec3::splat(5.0), 2.0);
-        let mut both = small.clone();
+        let mut both = small;
         let offset = both.vertices.len() as u32;
         both.vertices.extend(&large.vertices);
         both.triangles.extend(large.triangles.iter().map(|t| t.map(|v| v + offset)));

@@ -1,5 +1,7 @@
 //! Damaged files of every format give an answer or an error, never a panic.
 
+#![allow(clippy::unwrap_used)]
+
 use proptest::prelude::*;
 use std::path::Path;
 use trocar_geometry::io::{Unit, read_msh, read_surface, write_msh, write_ply};

@@ -1,5 +1,7 @@
 //! Real organ surfaces, as published: each must come out watertight and with its volume.
 
+#![allow(clippy::unwrap_used, clippy::print_stdout)]
+
 use std::path::PathBuf;
 use trocar_geometry::io::{Unit, read_msh, read_surface, write_ply};
 use trocar_geometry::{MeshDistance, SignedDistance, isosurface, repair, sample_distance};

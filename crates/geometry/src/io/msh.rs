@@ -105,7 +105,7 @@ fn parse(bytes: &[u8]) -> Parsed<TetMesh> {
         source.skip_past(&section.replacen('$', "$End", 1))?;
     }
     match (seen_nodes, seen_elements) {
-        (true, true) => assemble(content),
+        (true, true) => assemble(&content),
         (false, _) => Err("the file has no section $Nodes".into()),
         (_, false) => Err("the file has no section $Elements".into()),
     }
@@ -220,7 +220,7 @@ fn read_element(
 }
 
 /// From tags to indices, and the checks that a body must pass.
-fn assemble(content: Content) -> Parsed<TetMesh> {
+fn assemble(content: &Content) -> Parsed<TetMesh> {
     if content.tets.is_empty() {
         return Err("the file has no tetrahedra".into());
     }
