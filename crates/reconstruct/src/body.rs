@@ -25,7 +25,7 @@ pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
     let grid = sample_distance(&MeshDistance::new(raw)?, bounds, spacing);
     let mut surface = isosurface(&grid, 0.0).largest_component();
     taubin(&mut surface, LAMBDA, MU, SMOOTHING_ITERATIONS);
-    if surface.triangles.is_empty() || !(surface.volume() > 0.0) {
+    if surface.triangles.is_empty() || surface.volume() <= 0.0 {
         return Err(wrong("its surface encloses no volume; is the mask only a few pixels wide?"));
     }
     if !surface.is_watertight() {

@@ -16,7 +16,7 @@ pub fn color_vertices(mesh: &mut TriMesh, image: &ColorImage, colored: &Mask, ma
         let i = queue[next];
         next += 1;
         let near = [
-            (i % w > 0).then(|| i - 1),
+            (!i.is_multiple_of(w)).then(|| i - 1),
             (i % w + 1 < w).then_some(i + 1),
             (i >= w).then(|| i - w),
             (i / w + 1 < h).then_some(i + w),

@@ -28,7 +28,7 @@ pub fn tidy(mask: &mut Mask) -> Tidied {
     }
     let area = mask.count();
     let (w, h) = (mask.width, mask.height);
-    let border = |i: &usize| i % w == 0 || i % w == w - 1 || i / w == 0 || i / w == h - 1;
+    let border = |i: &usize| i.is_multiple_of(w) || i % w == w - 1 || i / w == 0 || i / w == h - 1;
     for hole in self::pieces(mask, false) {
         if !hole.iter().any(border) && 50 * hole.len() < area {
             hole.iter().for_each(|&i| mask.set[i] = true);
@@ -54,7 +54,7 @@ fn pieces(mask: &Mask, value: bool) -> Vec<Vec<usize>> {
             let i = piece[next];
             next += 1;
             let near = [
-                (i % w > 0).then(|| i - 1),
+                (!i.is_multiple_of(w)).then(|| i - 1),
                 (i % w + 1 < w).then_some(i + 1),
                 (i >= w).then(|| i - w),
                 (i / w + 1 < h).then_some(i + w),

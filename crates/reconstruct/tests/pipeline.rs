@@ -1,4 +1,5 @@
 //! From a recording to organs, against the truth it was made from.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod common;
 

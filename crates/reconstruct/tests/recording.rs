@@ -1,4 +1,5 @@
 //! Recordings come back as written, and every bad input is one clear error.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod common;
 

@@ -67,7 +67,7 @@ impl Document {
         self.up = up.ok_or_else(|| format!("up is {:?}; a direction", self.up))?.into();
         let [w, x, y, z] = self.placement.rotation_wxyz;
         let length = DQuat::from_xyzw(x, y, z, w).length();
-        if !((length - 1.0).abs() < 1e-6) {
+        if !(1.0 - 1e-6..=1.0 + 1e-6).contains(&length) {
             return Err(format!("placement.rotation_wxyz has length {length}; a unit quaternion, scalar first"));
         }
         if self.placement.translation_m.iter().any(|t| !t.is_finite()) {

@@ -1,4 +1,5 @@
 //! A specimen comes back as written, and a spoiled one is one clear error.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use glam::{DQuat, DVec3};
 use std::fs;

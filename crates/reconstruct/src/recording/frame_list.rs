@@ -50,7 +50,8 @@ pub fn list_frames(dir: &Path) -> Result<FrameList> {
 }
 
 fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
-    let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(|e| wrong(path, e))?;
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(|e| wrong(path, e.to_string()))?;
     let (mut frames, mut missing) = (Vec::new(), Vec::new());
     let mut previous: Option<u64> = None;
     for (row, line) in reader.deserialize::<Row>().zip(2..) {
@@ -222,8 +223,8 @@ fn natural(name: &str) -> String {
     key
 }
 
-fn wrong(path: &Path, reason: impl ToString) -> Error {
-    Error::Recording { path: path.to_owned(), reason: reason.to_string() }
+fn wrong(path: &Path, reason: impl Into<String>) -> Error {
+    Error::Recording { path: path.to_owned(), reason: reason.into() }
 }
 
 #[cfg(test)]

@@ -91,11 +91,11 @@ impl RecordingInfo {
                 ));
             }
         }
-        if self.depth_offset_px.iter().any(|o| !(o.abs() <= 10_000.0)) {
+        if self.depth_offset_px.iter().any(|o| !(-10_000.0..=10_000.0).contains(o)) {
             return wrong(format!("depth_offset_px is {:?}; two numbers of pixels", self.depth_offset_px));
         }
         if let Some(max) = self.depth_max_m
-            && !(max > 0.0)
+            && (max.is_nan() || max <= 0.0)
         {
             return wrong(format!("depth_max_m is {max}; metres, above 0"));
         }

@@ -222,6 +222,6 @@ fn shade(depth: &DepthImage, camera: &Camera) -> ColorImage {
     image
 }
 
-fn wrong(path: &Path, reason: impl ToString) -> Error {
-    Error::Recording { path: path.to_owned(), reason: reason.to_string() }
+fn wrong(path: &Path, reason: impl Into<String>) -> Error {
+    Error::Recording { path: path.to_owned(), reason: reason.into() }
 }
