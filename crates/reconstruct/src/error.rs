@@ -32,6 +32,9 @@ pub enum Error {
         /// Why, and what would help.
         reason: String,
     },
+    /// A setting is out of range.
+    #[error("{0}")]
+    Setting(String),
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,

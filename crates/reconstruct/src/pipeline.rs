@@ -1,11 +1,14 @@
 //! The stages in their order.
 
-use crate::{Recording, Result};
-use std::path::Path;
+use crate::body::fill_with_tets;
+use crate::composite::{Composite, composite};
+use crate::organ::{Closed, View, close};
+use crate::{Error, OrganInfo, Recording, Result};
 use trocar_camera::{ColorImage, DepthImage, Mask};
-use trocar_geometry::{RepairReport, io::Unit};
+use trocar_geometry::Pose;
 use trocar_progress::Progress;
-use trocar_specimen::Specimen;
+use trocar_specimen::{Organ, Provenance, Specimen};
+use xxhash_rust::xxh3::Xxh3;
 
 /// Settings of the reconstruction; one set serves every recording.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,20 +73,138 @@ pub struct Reconstruction {
     pub notes: Vec<String>,
 }
 
-/// Reconstructs every organ of a recording.
-pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
-    let _ = (recording, settings, progress);
-    todo!()
+impl Settings {
+    /// Refuses settings that make no sense.
+    ///
+    /// # Errors
+    /// Names the setting, its value and what would be right.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |reason: String| Err(Error::Setting(reason));
+        if self.stride == 0 {
+            return wrong("stride is 0; at least 1 frame".into());
+        }
+        if self.min_samples == 0 {
+            return wrong("min_samples is 0; at least 1 frame".into());
+        }
+        if !(1e-4..=0.1).contains(&self.finest_cell) {
+            return wrong(format!("finest_cell is {} m; 0.0001 to 0.1", self.finest_cell));
+        }
+        if self.max_tets < 100 {
+            return wrong(format!("max_tets is {}; at least 100", self.max_tets));
+        }
+        Ok(())
+    }
+
+    /// The settings as `name = value`, in the order of the struct.
+    pub(crate) fn list(&self) -> Vec<String> {
+        vec![
+            format!("window = {}", self.window),
+            format!("stride = {}", self.stride),
+            self.centre.map_or("centre = middle".into(), |c| format!("centre = {c}")),
+            format!("min_samples = {}", self.min_samples),
+            format!("finest_cell_m = {}", self.finest_cell),
+            format!("max_tets = {}", self.max_tets),
+        ]
+    }
 }
 
-/// Makes a one-organ specimen of a ready surface (a real organ model), repaired if need be; z is up. The organ is named
-/// after the file.
-pub fn from_surface(
-    path: &Path,
-    unit: Unit,
-    settings: &Settings,
-    progress: &dyn Progress,
-) -> Result<(Specimen, RepairReport)> {
-    let _ = (path, unit, settings, progress);
-    todo!()
+/// Name and version for the provenance.
+pub(crate) fn program() -> String {
+    format!("trocar {}", env!("CARGO_PKG_VERSION"))
+}
+
+/// Reconstructs every organ of a recording.
+///
+/// # Errors
+/// A setting out of range, a broken recording, an organ that cannot be closed or filled, or an interruption.
+pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
+    settings.validate()?;
+    if recording.info.organs.is_empty() {
+        return Err(Error::Recording {
+            path: recording.dir().join("recording.toml"),
+            reason: "no [[organ]]; name at least one, with a mask in masks/ or a polygon".into(),
+        });
+    }
+    // All masks first: a missing one should not be found after minutes of work.
+    let masks = (0..recording.info.organs.len()).map(|i| recording.organ_mask(i)).collect::<Result<Vec<_>>>()?;
+    let mut notes = recording.notes().to_vec();
+    let background = composite(recording, settings, progress)?;
+    if background.frames_used < settings.min_samples {
+        notes.push(format!("The window holds only {} frames.", background.frames_used));
+    }
+
+    let view = View { background: &background, camera: recording.camera(), depth_scale: recording.info.depth_scale_m };
+    let (mut organs, mut views) = (Vec::new(), Vec::new());
+    progress.begin("organs", masks.len() as u64);
+    for (info, mask) in recording.info.organs.iter().zip(masks) {
+        let made = if progress.interrupted() {
+            Err(Error::Interrupted)
+        } else {
+            close(info, mask, &view, &mut notes).and_then(|closed| with_body(info, closed, settings))
+        };
+        match made {
+            Ok((organ, view)) => {
+                organs.push(organ);
+                views.push(view);
+            }
+            Err(e) => {
+                progress.end();
+                return Err(e);
+            }
+        }
+        progress.advance(1);
+    }
+    progress.end();
+
+    let specimen = Specimen {
+        name: recording.info.name.clone(),
+        up: recording.info.up.into(),
+        placement: Pose::IDENTITY,
+        camera: Some(view.camera),
+        organs,
+        background: Some(background.color.clone()),
+        provenance: Provenance {
+            source: recording.info.name.clone(),
+            input_hash: format!("{:016x}", input_hash(recording, &background, &views)?),
+            program: program(),
+            settings: settings.list(),
+        },
+    };
+    Ok(Reconstruction {
+        specimen,
+        input: background.input,
+        instruments: background.instruments,
+        background: background.color,
+        depth: background.depth,
+        frames_used: background.frames_used,
+        recovered_share: background.recovered_share,
+        coverage: background.coverage,
+        depth_range_median: background.depth_range_median,
+        organs: views,
+        notes,
+    })
+}
+
+/// The organ and what was seen of it, from its closed surface.
+fn with_body(info: &OrganInfo, closed: Closed, settings: &Settings) -> Result<(Organ, OrganView)> {
+    let Closed { surface, mask, base, check } = closed;
+    let (body, mut facts) = fill_with_tets(&info.name, &surface, settings)?;
+    facts.depth_error_median_mm = Some(1e3 * check.median_absolute);
+    facts.depth_error_signed_mm = Some(1e3 * check.median_signed);
+    facts.covered = Some(check.covered);
+    let name = info.name.clone();
+    let view = OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared };
+    Ok((Organ { name, body, surface, material: info.material, pins: info.pins, base, facts }, view))
+}
+
+/// Hash of everything the result depends on: `recording.toml`, the used frames, the masks.
+fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]) -> Result<u64> {
+    let path = recording.dir().join("recording.toml");
+    let mut hash = Xxh3::new();
+    hash.update(&std::fs::read(&path).map_err(|source| Error::Io { path, source })?);
+    hash.update(&background.hash.to_le_bytes());
+    for view in views {
+        hash.update(&view.mask.set.iter().map(|s| u8::from(*s)).collect::<Vec<u8>>());
+    }
+    Ok(hash.digest())
 }

@@ -8,10 +8,15 @@
 //! report.html       what a person looks at (written by the report)
 //! ```
 
+mod document;
 mod error;
 mod organ;
 mod specimen;
+mod staged;
+mod strict_toml;
 
 pub use error::{Error, Result};
-pub use organ::{End, Material, MaterialModel, Organ, OrganFacts, Pins};
+pub use organ::{End, Material, MaterialModel, Organ, OrganFacts, Pins, check_name};
 pub use specimen::{Provenance, Specimen};
+pub use staged::StagedFolder;
+pub use strict_toml::{nearest, read_toml};

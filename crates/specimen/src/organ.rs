@@ -122,3 +122,54 @@ pub struct Organ {
     /// Measurements.
     pub facts: OrganFacts,
 }
+
+/// Checks the name of an organ: lower-case letters, digits, `-` and `_`, starting with a letter or digit, 1 to 64 of them.
+///
+/// # Errors
+/// Says what is wrong with it.
+pub fn check_name(name: &str) -> Result<(), String> {
+    let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
+    if name.is_empty() || name.len() > 64 || !name.chars().all(legal) || name.starts_with(['-', '_']) {
+        return Err(format!("'{name}' is no organ name; lower-case letters, digits, '-' and '_', 1 to 64 of them"));
+    }
+    Ok(())
+}
+
+impl Material {
+    /// Checks the ranges in which the models are defined.
+    ///
+    /// # Errors
+    /// Says "field is value; what would be right".
+    pub fn validate(&self) -> Result<(), String> {
+        if !(1.0..=1e9).contains(&self.young_modulus_pa) {
+            return Err(format!("young_modulus_pa is {}; 1 to 1e9 Pa, soft tissue about 1e4", self.young_modulus_pa));
+        }
+        if !(0.0..=0.4999).contains(&self.poisson_ratio) {
+            return Err(format!("poisson_ratio is {}; 0 to 0.4999, soft tissue about 0.45", self.poisson_ratio));
+        }
+        if !(1.0..=30_000.0).contains(&self.density_kg_m3) {
+            return Err(format!("density_kg_m3 is {}; 1 to 30000 kg/m3, soft tissue about 1050", self.density_kg_m3));
+        }
+        Ok(())
+    }
+}
+
+impl Pins {
+    /// Checks that shares and organ coordinates lie in 0 to 1.
+    ///
+    /// # Errors
+    /// Says "field is value; what would be right".
+    pub fn validate(&self) -> Result<(), String> {
+        let fields: &[(&str, f64)] = match *self {
+            Self::None => &[],
+            Self::Band { share } => &[("share", share)],
+            Self::End { length, band_length, band_share, .. } => {
+                &[("length", length), ("band_length", band_length), ("band_share", band_share)]
+            }
+        };
+        match fields.iter().find(|(_, v)| !(0.0..=1.0).contains(v)) {
+            Some((name, v)) => Err(format!("{name} is {v}; 0 to 1")),
+            None => Ok(()),
+        }
+    }
+}

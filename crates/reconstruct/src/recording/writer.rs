@@ -1,27 +1,57 @@
 //! Writer of a recording folder.
 
-use super::RecordingInfo;
-use crate::Result;
-use std::path::Path;
+use super::{MARKER, RecordingInfo};
+use crate::{Error, Result};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 use trocar_camera::{ColorImage, DepthImage, Mask};
+use trocar_specimen::StagedFolder;
 
 /// Writes a recording folder: into a folder beside it first, moved into place by [`RecordingWriter::finish`].
-pub struct RecordingWriter {}
+pub struct RecordingWriter {
+    folder: StagedFolder,
+    rate_hz: f64,
+    depth_scale_m: f64,
+    /// Frames written so far, and whether each has an instrument mask.
+    frames: Mutex<BTreeMap<usize, bool>>,
+}
 
 impl RecordingWriter {
     /// Starts a recording at `dir`, which must not exist or be an earlier recording (one with a `recording.toml`), which is
-    /// replaced at the end.
+    /// replaced at the end. Parents are created.
+    ///
+    /// # Errors
+    /// When `info` would not be accepted by the reader, or `dir` is another kind of folder or cannot be written.
     pub fn create(dir: &Path, info: &RecordingInfo) -> Result<Self> {
-        let _ = (dir, info);
-        todo!()
+        let mut info = info.clone();
+        info.validate(&dir.join(MARKER))?;
+        let folder = StagedFolder::create(dir, MARKER)?;
+        for sub in ["color", "depth", "masks/instruments"] {
+            let path = folder.path().join(sub);
+            std::fs::create_dir_all(&path).map_err(|source| Error::Io { path, source })?;
+        }
+        let path = folder.path().join(MARKER);
+        let text = toml::to_string(&info)
+            .map_err(|e| Error::Recording { path: path.clone(), reason: format!("cannot be written: {e}") })?;
+        write(path, text.as_bytes())?;
+        Ok(Self {
+            folder,
+            rate_hz: info.rate_hz,
+            depth_scale_m: info.depth_scale_m,
+            frames: Mutex::new(BTreeMap::new()),
+        })
     }
 
     /// The folder being written, for files beyond the recording proper (the truth of a phantom).
     pub fn folder(&self) -> &Path {
-        todo!()
+        self.folder.path()
     }
 
     /// Writes frame `index`; frames may come in any order and from many threads.
+    ///
+    /// # Errors
+    /// When the frame was written before, or a file cannot be written.
     pub fn frame(
         &self,
         index: usize,
@@ -29,18 +59,64 @@ impl RecordingWriter {
         depth: &DepthImage,
         instruments: Option<&Mask>,
     ) -> Result<()> {
-        let _ = (index, color, depth, instruments);
-        todo!()
+        {
+            let mut frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner);
+            if frames.insert(index, instruments.is_some()).is_some() {
+                return Err(self.wrong(format!("frame {index} is written twice")));
+            }
+        }
+        color.write_png(&self.folder().join(color_file(index)))?;
+        depth.write_png(&self.folder().join(depth_file(index)), self.depth_scale_m)?;
+        if let Some(mask) = instruments {
+            mask.write_png(&self.folder().join(instruments_file(index)))?;
+        }
+        Ok(())
     }
 
     /// Writes the still mask of an organ.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
     pub fn organ_mask(&self, organ: &str, mask: &Mask) -> Result<()> {
-        let _ = (organ, mask);
-        todo!()
+        Ok(mask.write_png(&self.folder().join("masks").join(format!("{organ}.png")))?)
     }
 
     /// Writes the index and moves the folder into place. Dropped unfinished, the writer removes what it wrote.
+    ///
+    /// # Errors
+    /// When there is not a single frame, or the folder cannot be moved into place.
     pub fn finish(self) -> Result<()> {
-        todo!()
+        let frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        if frames.is_empty() {
+            return Err(self.wrong("a recording without frames".into()));
+        }
+        let mut index = String::from("index,time_s,color,depth,instruments\n");
+        for (i, instruments) in frames {
+            let mask = if instruments { instruments_file(i) } else { String::new() };
+            let time = i as f64 / self.rate_hz;
+            index.push_str(&format!("{i},{time:.6},{},{},{mask}\n", color_file(i), depth_file(i)));
+        }
+        write(self.folder().join("frames.csv"), index.as_bytes())?;
+        Ok(self.folder.commit()?)
     }
+
+    fn wrong(&self, reason: String) -> Error {
+        Error::Recording { path: self.folder().to_owned(), reason }
+    }
+}
+
+fn color_file(index: usize) -> String {
+    format!("color/{index:06}.png")
+}
+
+fn depth_file(index: usize) -> String {
+    format!("depth/{index:06}.png")
+}
+
+fn instruments_file(index: usize) -> String {
+    format!("masks/instruments/{index:06}.png")
+}
+
+fn write(path: PathBuf, bytes: &[u8]) -> Result<()> {
+    std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })
 }

@@ -1,0 +1,198 @@
+//! The background: per-pixel medians over a window of frames, instruments left out (paper section III, "Instrument
+//! removal").
+
+use crate::{Error, Recording, Result, Settings};
+use rayon::prelude::*;
+use trocar_camera::{ColorImage, DepthImage, Mask};
+use trocar_progress::Progress;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+
+/// What a window of frames says of the scene behind the instruments.
+pub struct Composite {
+    /// The centre frame's colour.
+    pub input: ColorImage,
+    /// The centre frame's instruments.
+    pub instruments: Mask,
+    /// Median colour; black where `colored` is not set.
+    pub color: ColorImage,
+    /// Pixels with enough samples of colour.
+    pub colored: Mask,
+    /// Median depth; 0 with too few samples [m].
+    pub depth: DepthImage,
+    /// Frames used.
+    pub frames_used: usize,
+    /// Share of the image under the centre frame's instruments that has depth here.
+    pub recovered_share: f64,
+    /// Share of the image with depth.
+    pub coverage: f64,
+    /// Median over pixels of the 10th to 90th percentile range of depth [m].
+    pub depth_range_median: f64,
+    /// Hash of the bytes of all used files.
+    pub hash: u64,
+}
+
+/// One frame, as small as it can be held: the whole window is in memory at once.
+struct Sample {
+    color: Vec<[u8; 3]>,
+    /// Depth in units of the recording; 0 is invalid.
+    depth: Vec<u16>,
+    instruments: Vec<bool>,
+    hash: u64,
+}
+
+/// The medians of one pixel.
+#[derive(Clone, Copy, Default)]
+struct Pixel {
+    color: Option<[u8; 3]>,
+    /// Median and inter-percentile range, in units of the recording.
+    depth: Option<(f64, f64)>,
+}
+
+/// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame.
+///
+/// # Errors
+/// A centre outside the recording, a broken frame, or an interruption.
+pub fn composite(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Composite> {
+    let scale = recording.info.depth_scale_m;
+    let centre = settings.centre.unwrap_or(recording.len() / 2);
+    let window = window(recording, settings, centre)?;
+    progress.begin("frames", window.len() as u64);
+    let read = |&index: &usize| {
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
+        let frame = recording.frame(index)?;
+        let sample = Sample {
+            depth: frame.depth.depth.iter().map(|z| (f64::from(*z) / scale).round() as u16).collect(),
+            color: frame.color.pixels,
+            instruments: frame.instruments.set,
+            hash: hash_files(recording.files(index))?,
+        };
+        progress.advance(1);
+        Ok(sample)
+    };
+    let samples = window.par_iter().map(read).collect::<Result<Vec<Sample>>>();
+    progress.end();
+    let samples = samples?;
+
+    let (width, height) = (recording.info.camera.width, recording.info.camera.height);
+    let needed = settings.min_samples.clamp(1, samples.len());
+    let mut pixels = vec![Pixel::default(); width * height];
+    pixels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
+        let mut values: [Vec<u16>; 4] = Default::default();
+        for (column, pixel) in out.iter_mut().enumerate() {
+            *pixel = medians(&samples, row * width + column, needed, &mut values);
+        }
+    });
+
+    let centre = recording.frame(centre)?;
+    let mut color = ColorImage::new(width, height, [0; 3]);
+    let (mut colored, mut depth) = (Mask::new(width, height), DepthImage::new(width, height));
+    let (mut ranges, mut recovered) = (Vec::new(), 0usize);
+    for (i, pixel) in pixels.iter().enumerate() {
+        if let Some(c) = pixel.color {
+            color.pixels[i] = c;
+            colored.set[i] = true;
+        }
+        if let Some((median, range)) = pixel.depth {
+            depth.depth[i] = (median * scale) as f32;
+            ranges.push(range * scale);
+            recovered += usize::from(centre.instruments.set[i]);
+        }
+    }
+    let all = (width * height) as f64;
+    let mut hash = Xxh3::new();
+    samples.iter().for_each(|s| hash.update(&s.hash.to_le_bytes()));
+    ranges.sort_by(f64::total_cmp);
+    Ok(Composite {
+        input: centre.color,
+        instruments: centre.instruments,
+        color,
+        colored,
+        depth,
+        frames_used: samples.len(),
+        recovered_share: recovered as f64 / all,
+        coverage: ranges.len() as f64 / all,
+        depth_range_median: ranges.get(ranges.len() / 2).copied().unwrap_or(0.0),
+        hash: hash.digest(),
+    })
+}
+
+/// Indices of the window's frames.
+fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<Vec<usize>> {
+    let wrong = |reason: String| Error::Recording { path: recording.dir().to_owned(), reason };
+    if centre >= recording.len() {
+        return Err(wrong(format!("the window's centre is frame {centre}; the recording has {}", recording.len())));
+    }
+    if settings.stride == 0 {
+        return Err(wrong("the window's stride is 0; at least 1".into()));
+    }
+    let first = centre - settings.window.min(centre) / settings.stride * settings.stride;
+    let last = centre.saturating_add(settings.window).min(recording.len() - 1);
+    Ok((first..=last).step_by(settings.stride).collect())
+}
+
+/// Median over V(u,v): colour over the frames in which the pixel is not masked, depth over those that also measured it.
+fn medians(samples: &[Sample], i: usize, needed: usize, values: &mut [Vec<u16>; 4]) -> Pixel {
+    values.iter_mut().for_each(Vec::clear);
+    for sample in samples.iter().filter(|s| !s.instruments[i]) {
+        for (v, c) in values.iter_mut().zip(sample.color[i]) {
+            v.push(u16::from(c));
+        }
+        if sample.depth[i] > 0 {
+            values[3].push(sample.depth[i]);
+        }
+    }
+    values.iter_mut().for_each(|v| v.sort_unstable());
+    let enough = |v: &[u16]| v.len() >= needed;
+    let [r, g, b, depth] = values;
+    Pixel {
+        color: enough(r).then(|| [&*r, g, b].map(|v| percentile(v, 0.5).round() as u8)),
+        depth: enough(depth).then(|| (percentile(depth, 0.5), percentile(depth, 0.9) - percentile(depth, 0.1))),
+    }
+}
+
+/// Percentile `p` (0..=1) of sorted values, linear between neighbours.
+fn percentile(sorted: &[u16], p: f64) -> f64 {
+    let at = p * (sorted.len() - 1) as f64;
+    let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
+    f64::from(low) + (f64::from(high) - f64::from(low)) * at.fract()
+}
+
+fn hash_files<'a>(files: impl Iterator<Item = &'a std::path::Path>) -> Result<u64> {
+    let mut hash = Xxh3::new();
+    for path in files {
+        let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        hash.update(&xxh3_64(&bytes).to_le_bytes());
+    }
+    Ok(hash.digest())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_leave_instruments_and_holes_out() {
+        let sample = |color: u8, depth: u16, masked: bool| Sample {
+            color: vec![[color; 3]],
+            depth: vec![depth],
+            instruments: vec![masked],
+            hash: 0,
+        };
+        let samples = [
+            sample(10, 100, false),
+            sample(20, 0, false),
+            sample(250, 50, true),
+            sample(30, 104, false),
+            sample(40, 102, false),
+        ];
+        let pixel = medians(&samples, 0, 3, &mut Default::default());
+        assert_eq!(pixel.color, Some([25; 3]));
+        let (median, range) = pixel.depth.unwrap();
+        assert_eq!(median, 102.0);
+        assert!((range - 3.2).abs() < 1e-12);
+        assert!(medians(&samples, 0, 4, &mut Default::default()).depth.is_none());
+        assert!(medians(&samples, 0, 4, &mut Default::default()).color.is_some());
+    }
+}

@@ -1,0 +1,253 @@
+//! Which files make a frame: from `frames.csv`, or by pairing the files of the folders.
+
+use crate::{Error, Result};
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use std::path::{Component, Path, PathBuf};
+
+/// The files of one frame.
+#[derive(Clone, Debug)]
+pub struct FrameFiles {
+    /// Colour; absent in a recording of depth alone.
+    pub color: Option<PathBuf>,
+    /// Depth.
+    pub depth: PathBuf,
+    /// Instrument mask; absent where the recording has none.
+    pub instruments: Option<PathBuf>,
+}
+
+/// Frames in recorded order, and what was dropped on the way.
+pub struct FrameList {
+    /// At least one frame.
+    pub frames: Vec<FrameFiles>,
+    /// A sentence for each thing the user should know.
+    pub notes: Vec<String>,
+}
+
+/// One line of `frames.csv`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Row {
+    index: u64,
+    time_s: f64,
+    color: String,
+    depth: String,
+    #[serde(default)]
+    instruments: String,
+}
+
+/// Lists the frames of the recording folder `dir`.
+///
+/// # Errors
+/// When there is no depth folder, no frame, or `frames.csv` is not what it should be.
+pub fn list_frames(dir: &Path) -> Result<FrameList> {
+    let index = dir.join("frames.csv");
+    let list = if index.is_file() { from_csv(dir, &index)? } else { from_folders(dir)? };
+    match list.frames.is_empty() {
+        true => Err(wrong(dir, "no frames; depth images belong into depth/, colour images into color/")),
+        false => Ok(list),
+    }
+}
+
+fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
+    let mut reader =
+        csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(|e| wrong(path, e.to_string()))?;
+    let (mut frames, mut missing) = (Vec::new(), Vec::new());
+    let mut previous: Option<u64> = None;
+    for (row, line) in reader.deserialize::<Row>().zip(2..) {
+        let row = row.map_err(|e| wrong(path, explain(&e)))?;
+        let at = |reason: String| wrong(path, format!("line {line}: {reason}"));
+        if !row.time_s.is_finite() {
+            return Err(at(format!("time_s is {}; seconds", row.time_s)));
+        }
+        if previous.is_some_and(|p| p >= row.index) {
+            return Err(at(format!("index is {} after {}; indices ascend", row.index, previous.unwrap_or(0))));
+        }
+        previous = Some(row.index);
+        let file = |column: &str, name: &str| match name {
+            "" => Ok(None),
+            _ if Path::new(name).components().all(|c| matches!(c, Component::Normal(_))) => Ok(Some(dir.join(name))),
+            _ => Err(at(format!("{column} is '{name}'; a path inside the recording folder, without '..'"))),
+        };
+        let color = file("color", &row.color)?;
+        let depth = file("depth", &row.depth)?.ok_or_else(|| at("depth is empty; a file of the folder".into()))?;
+        let instruments = file("instruments", &row.instruments)?;
+        let files = [color.as_ref(), Some(&depth), instruments.as_ref()];
+        let absent = files.into_iter().flatten().find(|f| !f.is_file()).cloned();
+        match absent {
+            Some(absent) => missing.push(absent),
+            None => frames.push(FrameFiles { color, depth, instruments }),
+        }
+    }
+    if frames.is_empty()
+        && let Some(first) = missing.first()
+    {
+        return Err(wrong(first, "no such file, and no frame of frames.csv has all of its files"));
+    }
+    let with_color = frames.iter().filter(|f| f.color.is_some()).count();
+    if with_color != 0 && with_color != frames.len() {
+        let reason = format!("{with_color} of {} frames have a color file; all of them or none should", frames.len());
+        return Err(wrong(path, reason));
+    }
+    let mut notes = Vec::new();
+    if let Some(first) = missing.first() {
+        let name = first.strip_prefix(dir).unwrap_or(first).display();
+        notes.push(format!(
+            "{} frames of frames.csv were dropped because a file is missing (first: {name}).",
+            missing.len()
+        ));
+    }
+    Ok(FrameList { frames, notes })
+}
+
+/// Line and column of a mistake that the CSV reader found.
+fn explain(error: &csv::Error) -> String {
+    match error.kind() {
+        csv::ErrorKind::Deserialize { pos, err } => {
+            let line = pos.as_ref().map_or(1, csv::Position::line);
+            let field = err.field().map_or(String::new(), |f| format!("column {}: ", f + 1));
+            format!("line {line}: {field}{}; the columns are index,time_s,color,depth,instruments", err.kind())
+        }
+        _ => error.to_string(),
+    }
+}
+
+fn from_folders(dir: &Path) -> Result<FrameList> {
+    let depth_dir = dir.join("depth");
+    if !depth_dir.is_dir() {
+        return Err(wrong(&depth_dir, "no such folder; depth images (16-bit PNG) belong there"));
+    }
+    let depth = images(&depth_dir)?;
+    let mut notes = Vec::new();
+    let color_dir = dir.join("color");
+    let mut frames: Vec<FrameFiles> = if color_dir.is_dir() {
+        let color = images(&color_dir)?;
+        if color.is_empty() {
+            return Err(wrong(&color_dir, "no PNG or JPEG in it; remove the folder if the recording has depth alone"));
+        }
+        pair(&color, &depth, &mut notes)
+    } else {
+        notes.push("The recording has no colour; a grey shading of its depth stands in for it.".into());
+        depth.into_iter().map(|depth| FrameFiles { color: None, depth, instruments: None }).collect()
+    };
+    attach_instruments(&dir.join("masks/instruments"), &mut frames, &mut notes)?;
+    Ok(FrameList { frames, notes })
+}
+
+/// Pairs files of equal stem; where no two are equal, in order.
+fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<FrameFiles> {
+    let by_stem: BTreeMap<String, &PathBuf> = depth.iter().map(|d| (stem(d), d)).collect();
+    let frame = |c: &PathBuf, d: &PathBuf| FrameFiles { color: Some(c.clone()), depth: d.clone(), instruments: None };
+    let mut frames: Vec<_> = color.iter().filter_map(|c| by_stem.get(&stem(c)).map(|d| frame(c, d))).collect();
+    let by_order = frames.is_empty();
+    if by_order {
+        frames = color.iter().zip(depth).map(|(c, d)| frame(c, d)).collect();
+    }
+    if frames.len() != color.len() || frames.len() != depth.len() {
+        notes.push(format!(
+            "{} colour and {} depth images were paired by {} into {} frames; the others were dropped.",
+            color.len(),
+            depth.len(),
+            if by_order { "order" } else { "name" },
+            frames.len()
+        ));
+    }
+    frames
+}
+
+/// Gives each frame the instrument mask of its stem; where no stem is equal and the counts are, in order.
+fn attach_instruments(dir: &Path, frames: &mut [FrameFiles], notes: &mut Vec<String>) -> Result<()> {
+    if !dir.is_dir() || frames.is_empty() {
+        return Ok(());
+    }
+    let masks = images(dir)?;
+    if masks.is_empty() {
+        return Ok(());
+    }
+    let by_stem: BTreeMap<String, &PathBuf> = masks.iter().map(|m| (stem(m), m)).collect();
+    for frame in frames.iter_mut() {
+        let found = frame.color.iter().chain([&frame.depth]).find_map(|f| by_stem.get(&stem(f)));
+        frame.instruments = found.map(|m| (*m).clone());
+    }
+    let mut without = frames.iter().filter(|f| f.instruments.is_none()).count();
+    if without == frames.len() {
+        if masks.len() != frames.len() {
+            let reason =
+                format!("{} masks for {} frames, and no mask has the name of a frame", masks.len(), frames.len());
+            return Err(wrong(dir, reason));
+        }
+        for (frame, mask) in frames.iter_mut().zip(masks) {
+            frame.instruments = Some(mask);
+        }
+        without = 0;
+    }
+    if without > 0 {
+        notes.push(format!("{without} frames have no instrument mask and were taken to show no instrument."));
+    }
+    Ok(())
+}
+
+/// The image files of a folder in natural order of their names (2 before 10).
+fn images(dir: &Path) -> Result<Vec<PathBuf>> {
+    let io = |source| Error::Io { path: dir.to_owned(), source };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(dir).map_err(io)? {
+        let path = entry.map_err(io)?.path();
+        let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
+        if path.is_file() && matches!(extension.as_deref(), Some("png" | "jpg" | "jpeg")) {
+            files.push(path);
+        }
+    }
+    files.sort_by_cached_key(|f| (natural(&stem(f)), f.clone()));
+    Ok(files)
+}
+
+fn stem(path: &Path) -> String {
+    path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// A key under which numbers sort by value: runs of digits are padded.
+fn natural(name: &str) -> String {
+    let (mut key, mut digits) = (String::new(), String::new());
+    for c in name.chars().chain(['\0']) {
+        if c.is_ascii_digit() {
+            digits.push(c);
+            continue;
+        }
+        if !digits.is_empty() {
+            key.push_str(&format!("{:0>24}", digits.trim_start_matches('0')));
+            digits.clear();
+        }
+        key.push(c);
+    }
+    key
+}
+
+fn wrong(path: &Path, reason: impl Into<String>) -> Error {
+    Error::Recording { path: path.to_owned(), reason: reason.into() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_sort_by_value() {
+        let mut names = ["frame10", "frame9", "frame009b", "a", "frame100"];
+        names.sort_by_key(|n| natural(n));
+        assert_eq!(names, ["a", "frame9", "frame009b", "frame10", "frame100"]);
+    }
+
+    #[test]
+    fn unequal_counts_pair_by_name_then_by_order() {
+        let files = |names: &[&str]| names.iter().map(PathBuf::from).collect::<Vec<_>>();
+        let mut notes = Vec::new();
+        let frames =
+            pair(&files(&["0.jpg", "2.jpg", "3.jpg"]), &files(&["0.png", "1.png", "2.png", "3.png"]), &mut notes);
+        assert_eq!(frames.iter().map(|f| stem(&f.depth)).collect::<Vec<_>>(), ["0", "2", "3"]);
+        assert!(notes[0].contains("by name"));
+        let frames = pair(&files(&["c0.jpg", "c1.jpg"]), &files(&["d0.png", "d1.png", "d2.png"]), &mut notes);
+        assert_eq!(frames.iter().map(|f| stem(&f.depth)).collect::<Vec<_>>(), ["d0", "d1"]);
+        assert!(notes[1].contains("by order"));
+    }
+}

@@ -1,0 +1,175 @@
+//! A folder that appears whole or not at all.
+
+use crate::{Error, Result};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// A folder written beside its target under a hidden name and moved into place by [`StagedFolder::commit`]. Dropped
+/// uncommitted, it removes itself and the parents it created.
+#[derive(Debug)]
+pub struct StagedFolder {
+    target: PathBuf,
+    stage: PathBuf,
+    /// Parents of the target that did not exist, outermost first.
+    created: Vec<PathBuf>,
+    committed: bool,
+}
+
+impl StagedFolder {
+    /// Stages `target`, which must not exist, be empty, or be an earlier folder of the same kind: one that holds a file
+    /// named `marker`. Nothing of an earlier folder is touched before the commit.
+    ///
+    /// # Errors
+    /// When `target` is something else, or its parent cannot be created or written to.
+    pub fn create(target: &Path, marker: &str) -> Result<Self> {
+        let target = match target.canonicalize() {
+            Ok(existing) => existing,
+            Err(_) => target.to_owned(),
+        };
+        let Some(name) = target.file_name().map(|n| n.to_string_lossy().into_owned()) else {
+            return Err(invalid(&target, "not the name of a folder that could be written"));
+        };
+        if target.exists() && !target.is_dir() {
+            return Err(invalid(&target, "a file of that name exists; name a new folder"));
+        }
+        if target.is_dir() && !target.join(marker).is_file() && !is_empty(&target)? {
+            return Err(invalid(
+                &target,
+                &format!("the folder exists and holds no {marker}, so it is not overwritten; name a new folder"),
+            ));
+        }
+        let parent = match target.parent() {
+            Some(p) if !p.as_os_str().is_empty() => p.to_owned(),
+            _ => PathBuf::from("."),
+        };
+        let mut created: Vec<PathBuf> =
+            parent.ancestors().take_while(|p| !p.as_os_str().is_empty() && !p.exists()).map(Path::to_owned).collect();
+        created.reverse();
+        fs::create_dir_all(&parent).map_err(io(&parent))?;
+        let base = format!(".{name}.partial-{}", std::process::id());
+        let mut stage = parent.join(&base);
+        // Two writers of one target in one process differ by a number.
+        for n in 1.. {
+            match fs::create_dir(&stage) {
+                Ok(()) => break,
+                Err(e) if e.kind() == std::io::ErrorKind::AlreadyExists => stage = parent.join(format!("{base}-{n}")),
+                Err(e) => {
+                    remove_empty(&created);
+                    return Err(io(&parent)(e));
+                }
+            }
+        }
+        Ok(Self { target, stage, created, committed: false })
+    }
+
+    /// Finds out whether `target` could be written, and leaves nothing behind; for a clear error before long work.
+    ///
+    /// # Errors
+    /// Those of [`StagedFolder::create`].
+    pub fn check(target: &Path, marker: &str) -> Result<()> {
+        Self::create(target, marker).map(drop)
+    }
+
+    /// The folder to write into.
+    pub fn path(&self) -> &Path {
+        &self.stage
+    }
+
+    /// Moves the folder into place. An earlier folder is moved aside first and deleted last, so that it survives a failure.
+    ///
+    /// # Errors
+    /// When the system refuses to move.
+    pub fn commit(mut self) -> Result<()> {
+        if self.target.exists() {
+            let aside = self.stage.with_extension("replaced");
+            fs::rename(&self.target, &aside).map_err(io(&self.target))?;
+            if let Err(e) = fs::rename(&self.stage, &self.target) {
+                // Put the earlier folder back; the first failure is the one to report.
+                let _ = fs::rename(&aside, &self.target);
+                return Err(io(&self.target)(e));
+            }
+            self.committed = true;
+            fs::remove_dir_all(&aside).map_err(io(&aside))?;
+        } else {
+            fs::rename(&self.stage, &self.target).map_err(io(&self.target))?;
+            self.committed = true;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for StagedFolder {
+    fn drop(&mut self) {
+        if !self.committed {
+            // A destructor cannot report; what stays is a hidden folder that says "partial".
+            let _ = fs::remove_dir_all(&self.stage);
+            remove_empty(&self.created);
+        }
+    }
+}
+
+fn remove_empty(created: &[PathBuf]) {
+    for parent in created.iter().rev() {
+        // Refuses folders that are in use by now.
+        let _ = fs::remove_dir(parent);
+    }
+}
+
+fn is_empty(dir: &Path) -> Result<bool> {
+    Ok(fs::read_dir(dir).map_err(io(dir))?.next().is_none())
+}
+
+fn io(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
+    |source| Error::Io { path: path.to_owned(), source }
+}
+
+fn invalid(path: &Path, reason: &str) -> Error {
+    Error::Invalid { path: path.to_owned(), reason: reason.to_owned() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn entries(dir: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn appears_whole_or_not_at_all() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("a/b/out");
+        let staged = StagedFolder::create(&target, "mark").unwrap();
+        fs::write(staged.path().join("mark"), "1").unwrap();
+        assert!(!target.exists());
+        drop(staged);
+        assert!(entries(root.path()).is_empty(), "a dropped folder and its parents are gone");
+
+        for content in ["1", "2"] {
+            let staged = StagedFolder::create(&target, "mark").unwrap();
+            fs::write(staged.path().join("mark"), content).unwrap();
+            staged.commit().unwrap();
+            assert_eq!(fs::read_to_string(target.join("mark")).unwrap(), content);
+            assert_eq!(entries(target.parent().unwrap()), ["out"]);
+        }
+    }
+
+    #[test]
+    fn refuses_what_is_not_its_own() {
+        let root = tempfile::tempdir().unwrap();
+        let target = root.path().join("precious");
+        fs::create_dir(&target).unwrap();
+        assert!(StagedFolder::check(&target, "mark").is_ok(), "an empty folder may be used");
+        fs::write(target.join("thesis.txt"), "x").unwrap();
+        assert!(StagedFolder::check(&target, "mark").unwrap_err().to_string().contains("precious"));
+        assert!(
+            StagedFolder::check(&target.join("thesis.txt"), "mark").unwrap_err().to_string().contains("thesis.txt")
+        );
+        assert!(StagedFolder::check(&target.join("thesis.txt/out"), "mark").is_err());
+        assert!(StagedFolder::check(Path::new("/"), "mark").is_err());
+        assert_eq!(entries(root.path()), ["precious"]);
+    }
+}

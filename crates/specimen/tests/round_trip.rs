@@ -1,0 +1,102 @@
+//! A specimen comes back as written, and a spoiled one is one clear error.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use glam::{DQuat, DVec3};
+use std::fs;
+use std::path::Path;
+use trocar_camera::{Camera, ColorImage};
+use trocar_geometry::{Pose, TetMesh, TriMesh};
+use trocar_specimen::{End, Material, MaterialModel, Organ, OrganFacts, Pins, Provenance, Specimen};
+
+fn specimen() -> Specimen {
+    let vertices = vec![DVec3::ZERO, DVec3::X * 0.01, DVec3::Y * 0.01, DVec3::Z * 0.01];
+    let organ = |name: &str, pins| Organ {
+        name: name.into(),
+        body: TetMesh { vertices: vertices.clone(), tets: vec![[0, 1, 2, 3]] },
+        surface: TriMesh {
+            vertices: vertices.clone(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+            colors: vec![[1, 2, 3], [4, 5, 6], [7, 8, 9], [200, 100, 50]],
+        },
+        material: Material { model: MaterialModel::StVenantKirchhoff, ..Material::default() },
+        pins,
+        base: DVec3::new(0.1, 1.0 / 3.0, -2e-7),
+        facts: OrganFacts { nodes: 4, tets: 1, depth_error_median_mm: Some(0.7), ..OrganFacts::default() },
+    };
+    Specimen {
+        name: "rabbit A".into(),
+        up: DVec3::NEG_Z,
+        placement: Pose { rotation: DQuat::from_rotation_x(0.3), translation: DVec3::new(0.1, 0.2, 0.3) },
+        camera: Some(Camera::d405()),
+        organs: vec![
+            organ("appendix", Pins::End { end: End::Tip, length: 0.2, band_length: 0.3, band_share: 0.42 }),
+            organ("bowel-1", Pins::None),
+        ],
+        background: Some(ColorImage::new(5, 4, [9, 8, 7])),
+        provenance: Provenance {
+            source: "phantom".into(),
+            input_hash: "0123".into(),
+            program: "0.1.0".into(),
+            settings: vec!["window = 90".into()],
+        },
+    }
+}
+
+fn failure(dir: &Path) -> String {
+    Specimen::read(dir).expect_err("a spoiled specimen was accepted").to_string()
+}
+
+#[test]
+fn comes_back_as_written() {
+    let root = tempfile::tempdir().unwrap();
+    let dir = root.path().join("specimen");
+    Specimen::check_writable(&dir).unwrap();
+    assert!(!dir.exists());
+    let written = specimen();
+    written.write(&dir).unwrap();
+    written.write(&dir).unwrap();
+    let read = Specimen::read(&dir).unwrap();
+    assert_eq!((read.name, read.up, read.camera), (written.name, written.up, written.camera));
+    assert_eq!((read.placement, read.background), (written.placement, written.background));
+    assert_eq!(read.provenance, written.provenance);
+    for (r, w) in read.organs.iter().zip(&written.organs) {
+        assert_eq!((&r.name, &r.body, r.material, r.pins), (&w.name, &w.body, w.material, w.pins));
+        assert_eq!((r.base, r.facts, &r.surface.colors), (w.base, w.facts, &w.surface.colors));
+        assert_eq!(r.surface.triangles, w.surface.triangles);
+        for (a, b) in r.surface.vertices.iter().zip(&w.surface.vertices) {
+            assert!((*a - *b).length() < 1e-8);
+        }
+    }
+    assert_eq!(read.organs.len(), 2);
+}
+
+#[test]
+fn mistakes_are_named() {
+    let root = tempfile::tempdir().unwrap();
+    let dir = root.path().join("specimen");
+    assert!(failure(&dir).contains("specimen.toml: no such file"));
+    specimen().write(&dir).unwrap();
+    let toml = dir.join("specimen.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    for (from, to, expected) in [
+        ("poisson_ratio", "poissons_ratio", "did you mean `poisson_ratio`?"),
+        ("poisson_ratio = 0.45", "poisson_ratio = 0.5", "organ 'appendix': material.poisson_ratio is 0.5"),
+        ("band_share = 0.42", "band_share = 1.42", "pins.band_share is 1.42"),
+        ("name = \"bowel-1\"", "name = \"appendix\"", "used twice"),
+        ("name = \"bowel-1\"", "name = \"bowel-2\"", "bowel-2.msh"),
+        ("st-venant-kirchhoff", "neo-hookean", "unknown variant `neo-hookean`"),
+    ] {
+        assert!(text.contains(from), "{from} is not in {text}");
+        fs::write(&toml, text.replacen(from, to, 1)).unwrap();
+        let error = failure(&dir);
+        assert!(error.contains(expected), "{to}: {error}");
+    }
+    fs::write(&toml, &text).unwrap();
+    fs::write(dir.join("appendix.msh"), "$MeshFormat").unwrap();
+    assert!(failure(&dir).contains("appendix.msh"));
+
+    let mut no_organs = specimen();
+    no_organs.organs.clear();
+    assert!(no_organs.write(&root.path().join("other")).unwrap_err().to_string().contains("no organ"));
+    assert!(!root.path().join("other").exists());
+}
