@@ -210,8 +210,7 @@ impl Frame<'_> {
         for _ in 0..self.schedule.iterations {
             substep.sweep(&mut state.x, &mut scratch.guess);
         }
-        let rest_of_kick = if flies { 0.5 * h * gravity } else { Vec3A::ZERO };
-        self.take_velocities(rest_of_kick, state, scratch);
+        self.take_velocities(state, scratch);
     }
 
     /// Where the sweeps would like to start from.
@@ -239,17 +238,20 @@ impl Frame<'_> {
         }
     }
 
-    fn take_velocities(&self, rest_of_kick: Vec3A, state: &mut BodyState, scratch: &Scratch) {
+    /// The velocity after the substep: v + h g + (x - y)/h. That is (x - x_start)/h for implicit Euler's predictor, and exact for the one of free
+    /// flight; but the rounding of positions far from the body's origin does not enter it.
+    fn take_velocities(&self, state: &mut BodyState, scratch: &Scratch) {
         let h = self.h as f32;
+        let gravity = self.gravity.as_vec3a();
         let strength = self.gravity.length_squared() as f32;
-        let direction = if strength > 0.0 { self.gravity.as_vec3a() / strength } else { Vec3A::ZERO };
+        let direction = if strength > 0.0 { gravity / strength } else { Vec3A::ZERO };
         for i in 0..state.x.len() {
             if scratch.fixed[i] {
                 state.v[i] = Vec3A::ZERO;
                 state.falling[i] = 0.0;
                 continue;
             }
-            let velocity = (state.x[i] - scratch.start[i]) / h + rest_of_kick;
+            let velocity = state.v[i] + h * gravity + (state.x[i] - scratch.predictor[i]) / h;
             state.falling[i] = ((velocity - state.v[i]) / h).dot(direction).clamp(0.0, 1.0);
             state.v[i] = velocity;
         }

@@ -28,7 +28,6 @@ fn free_fall() {
             let expected = GRAVITY.z * (1.0 + h) / 2.0;
             let drop = mean(&fall);
             assert!((drop / expected - 1.0).abs() < 1e-4, "{constitutive:?} {schedule:?}: {drop} for {expected}");
-            // Single nodes carry rounding: 5 m below its origin a position in f32 is good to 0.5 um, a speed to 0.2 mm/s.
             let speed = mean(&speed);
             assert!((speed / GRAVITY.z - 1.0).abs() < 1e-4, "{constitutive:?} {schedule:?}: {speed} m/s");
         }
