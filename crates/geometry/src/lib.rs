@@ -3,9 +3,6 @@
 //! A closed surface ([`TriMesh`]) is seen as a signed distance ([`SignedDistance`]); a signed distance becomes a clean
 //! surface ([`isosurface`]) or a tetrahedral body ([`mesher::LatticeMesher`]). All lengths are metres, all geometry `f64`.
 
-// Units in brackets, such as [m], are not links.
-#![allow(rustdoc::broken_intra_doc_links)]
-
 mod axis;
 mod distance;
 mod error;
