@@ -47,12 +47,12 @@ pub struct Specimen {
 const MARKER: &str = "specimen.toml";
 
 impl Specimen {
-    /// Finds out whether [`Specimen::write`] could write `dir`, and leaves nothing behind; call it before long work.
+    /// Stages the specimen folder `dir`, so that an unwritable place is found before long work; see [`StagedFolder::create`].
     ///
     /// # Errors
     /// When `dir` exists and is no specimen folder, or cannot be written.
-    pub fn check_writable(dir: &Path) -> Result<()> {
-        StagedFolder::check(dir, MARKER)
+    pub fn stage(dir: &Path) -> Result<StagedFolder> {
+        StagedFolder::create(dir, MARKER)
     }
 
     /// Writes the folder `dir`, which must not exist or be an earlier specimen folder (one with a `specimen.toml`), which is
@@ -61,12 +61,21 @@ impl Specimen {
     /// # Errors
     /// When `dir` is another kind of folder, a file cannot be written, or the specimen would not be read again.
     pub fn write(&self, dir: &Path) -> Result<()> {
-        let invalid = |reason: String| Error::Invalid { path: dir.join(MARKER), reason };
+        let folder = Self::stage(dir)?;
+        self.write_into(folder.path())?;
+        folder.commit()
+    }
+
+    /// Writes the specimen's files into a folder that is there.
+    ///
+    /// # Errors
+    /// When a file cannot be written, or the specimen would not be read again.
+    pub fn write_into(&self, folder: &Path) -> Result<()> {
+        let file = |name: &str| folder.join(name);
+        let invalid = |reason: String| Error::Invalid { path: file(MARKER), reason };
         let mut document = Document::of(self);
         document.validate().map_err(invalid)?;
         let text = toml::to_string(&document).map_err(|e| invalid(format!("cannot be written: {e}")))?;
-        let folder = StagedFolder::create(dir, MARKER)?;
-        let file = |name: &str| folder.path().join(name);
         for organ in &self.organs {
             write_msh(&file(&format!("{}.msh", organ.name)), &organ.body)?;
             write_ply(&file(&format!("{}.ply", organ.name)), &organ.surface)?;
@@ -75,8 +84,7 @@ impl Specimen {
             background.write_png(&file(BACKGROUND))?;
         }
         let path = file(MARKER);
-        std::fs::write(&path, text).map_err(|source| Error::Io { path, source })?;
-        folder.commit()
+        std::fs::write(&path, text).map_err(|source| Error::Io { path, source })
     }
 
     /// Reads and checks a specimen folder. Unknown keys are errors that name the nearest right key; meshes are checked.

@@ -1,2 +1,32 @@
-//! placeholder
-fn main() {}
+//! The command line: parses, calls, prints; no logic of its own.
+
+#![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is a command-line program")]
+
+mod bar;
+mod cli;
+mod commands;
+mod output;
+
+use clap::Parser;
+use std::process::ExitCode;
+
+/// Exit code of bad input, as clap uses it for bad arguments.
+const BAD_INPUT: u8 = 2;
+/// Exit code of a run the user stopped (128 + SIGINT).
+const INTERRUPTED: u8 = 130;
+
+fn main() -> ExitCode {
+    let cli = cli::Cli::parse();
+    let progress = bar::Bar::new(cli.quiet);
+    match commands::run(&cli, &progress) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(_) if progress.was_interrupted() => {
+            eprintln!("interrupted; nothing was left behind");
+            ExitCode::from(INTERRUPTED)
+        }
+        Err(error) => {
+            eprintln!("error: {error}");
+            ExitCode::from(BAD_INPUT)
+        }
+    }
+}

@@ -1,0 +1,73 @@
+//! Where a grasp may form: disjoint clusters of about 1 cm along an organ's axis (paper section IV-C).
+//!
+//! A cluster's index is a position on the organ, so that "where was it grasped" is a number.
+
+use crate::World;
+use glam::DVec3;
+
+/// Length of a cluster along the axis [m].
+const CLUSTER_LENGTH: f64 = 0.010;
+
+/// A cluster at least this many median edges long, so that a coarsely meshed large organ has nodes in every cluster.
+const CLUSTER_EDGES: f64 = 1.5;
+
+/// Nodes that are grasped together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Cluster {
+    /// Organ coordinate of its middle.
+    pub s: f64,
+    /// Its nodes, ascending; none of them pinned or next to a pinned node.
+    pub nodes: Vec<u32>,
+}
+
+/// The clusters of the free part of organ `organ`, from base to tip; parts without free nodes have none.
+///
+/// Nodes that share an element with a pinned one belong to no cluster: an element all of whose nodes are prescribed could
+/// not give way, and a rigid cluster tied directly to pinned tissue would invert it.
+pub fn clusters(world: &World, organ: usize) -> Vec<Cluster> {
+    let (axis, body) = (&world.axes[organ], &world.model.bodies[organ]);
+    let mut free: Vec<bool> = body.pinned().iter().map(|p| !p).collect();
+    for tet in body.tets() {
+        if tet.iter().any(|i| body.pinned()[*i as usize]) {
+            for i in tet {
+                free[*i as usize] = false;
+            }
+        }
+    }
+    let length = CLUSTER_LENGTH.max(CLUSTER_EDGES * body.median_edge());
+    let count = ((axis.length / length).round() as usize).max(1);
+    let mut clusters: Vec<Cluster> =
+        (0..count).map(|k| Cluster { s: (k as f64 + 0.5) / count as f64, nodes: Vec::new() }).collect();
+    for (i, s) in axis.s.iter().enumerate().filter(|(i, _)| free[*i]) {
+        let k = ((s * count as f64) as usize).min(count - 1);
+        clusters[k].nodes.push(i as u32);
+    }
+    clusters.retain(|c| !c.nodes.is_empty());
+    clusters
+}
+
+impl Cluster {
+    /// The part of the cluster that jaws coming from above can hold: its nodes within `reach` [m] of its highest region.
+    /// Slender organs are held whole; of a liver, jaws pinch the top.
+    pub fn within_reach(&self, world: &World, organ: usize, reach: f64) -> Self {
+        let position = |i: u32| world.state.position(&world.model, organ, i as usize);
+        let centroid = self.centroid(world, organ);
+        // Highest node, one straight above the centroid preferred over one at the side.
+        let score = |i: u32| {
+            let d = position(i) - centroid;
+            let height = d.dot(world.up);
+            height - 0.5 * (d - height * world.up).length()
+        };
+        let Some(top) = self.nodes.iter().copied().max_by(|a, b| score(*a).total_cmp(&score(*b))) else {
+            return self.clone();
+        };
+        let centre = position(top) - 0.5 * reach * world.up;
+        let nodes = self.nodes.iter().copied().filter(|i| (position(*i) - centre).length() <= reach).collect();
+        Self { s: self.s, nodes }
+    }
+
+    /// Centroid of the cluster's nodes now [m].
+    pub fn centroid(&self, world: &World, organ: usize) -> DVec3 {
+        world.state.centroid(&world.model, organ, &self.nodes)
+    }
+}

@@ -1,0 +1,80 @@
+//! What a grasp-lift is measured by. Words as in the specification: lift, follow ratio, slip, snap, held, settled.
+
+use serde::Serialize;
+
+/// What was measured in one frame.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Sample {
+    /// Time at the end of the frame [s].
+    pub time_s: f64,
+    /// Phase: settle, approach, close, lift, hold, lower, open.
+    pub phase: &'static str,
+    /// Rise of the jaw since activation [mm].
+    pub jaw_lift_mm: f64,
+    /// Rise of the grasped cluster's centroid since activation [mm].
+    pub tissue_lift_mm: f64,
+    /// Distance of the centroid in the jaw frame from where it was at activation [mm].
+    pub slip_mm: f64,
+    /// Largest node speed over all organs [m/s].
+    pub max_speed_m_s: f64,
+    /// Inverted elements over all organs.
+    pub inverted: usize,
+    /// Smallest element volume over its rest volume.
+    pub min_volume_ratio: f64,
+}
+
+/// A run in figures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Summary {
+    /// Organ grasped.
+    pub organ: String,
+    /// Organ coordinate of the grasped cluster.
+    pub at: f64,
+    /// Nodes held.
+    pub held_nodes: usize,
+    /// Rise of the cluster's centroid from activation to the end of the hold [mm].
+    pub lift_mm: f64,
+    /// Tissue lift over jaw lift.
+    pub follow_ratio: f64,
+    /// Slip at the end of the hold [mm].
+    pub slip_mm: f64,
+    /// Largest distance between where the constraint first prescribes a node and where it was [mm].
+    pub snap_mm: f64,
+    /// Largest motion of any node in the frame of activation [mm].
+    pub activation_step_mm: f64,
+    /// Follow ratio at least 0.80 and slip under 3 mm.
+    pub held: bool,
+    /// Inverted elements at rest, before the first step.
+    pub inverted_rest: usize,
+    /// Largest number of inverted elements in any frame.
+    pub inverted_peak: usize,
+    /// Smallest element volume over its rest volume in any frame.
+    pub min_volume_ratio: f64,
+    /// Largest node speed in any frame [m/s].
+    pub peak_speed_m_s: f64,
+    /// Largest node speed at the end of settling [m/s].
+    pub settled_speed_m_s: f64,
+    /// Settled: that speed is below 0.01 m/s.
+    pub settled: bool,
+    /// Largest motion of a pinned node over the run [mm].
+    pub pin_drift_mm: f64,
+    /// The run diverged.
+    pub diverged: bool,
+    /// Why, if it did.
+    pub divergence: Option<String>,
+    /// Simulated time [s].
+    pub simulated_s: f64,
+    /// Wall time of the stepping [s].
+    pub wall_s: f64,
+    /// Simulated over wall time.
+    pub real_time_factor: f64,
+    /// Hash of the final state, hexadecimal.
+    pub state_hash: String,
+}
+
+/// Least share of the jaw's lift that held tissue follows.
+pub(crate) const HELD_FOLLOW_RATIO: f64 = 0.80;
+/// Most slip of held tissue [mm].
+pub(crate) const HELD_SLIP_MM: f64 = 3.0;
+/// Node speed below which tissue is settled [m/s].
+pub(crate) const SETTLED_SPEED: f64 = 0.01;

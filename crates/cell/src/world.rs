@@ -1,0 +1,99 @@
+//! A specimen made ready to be stepped.
+
+use crate::Result;
+use glam::DVec3;
+use trocar_geometry::OrganAxis;
+use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
+use trocar_tissue::{
+    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, SupportPlane, pins,
+};
+
+/// Length of a frame [s].
+pub const FRAME: f64 = 1.0 / 60.0;
+
+/// Standard gravity [m/s2].
+const GRAVITY: f64 = 9.80665;
+
+/// Friction between tissue and what it lies on (paper section IV-C).
+const SUPPORT_FRICTION: f64 = 0.6;
+
+/// Viscosity of tissue over its Young's modulus [s]: the decay time of a strain. The paper damps its elements without saying
+/// how much; 5 ms lets an organ come to rest within a second and stays far below the second that a lift takes.
+const VISCOSITY_TIME: f64 = 5e-3;
+
+/// The organs of a specimen as bodies that gravity pulls and a plane supports.
+pub struct World {
+    /// What is constant.
+    pub model: Model,
+    /// What moves.
+    pub state: State,
+    /// Axis and organ coordinates of each organ, in the specimen's order.
+    pub axes: Vec<OrganAxis>,
+    /// Unit vector against gravity.
+    pub up: DVec3,
+    stepper: Stepper,
+}
+
+impl World {
+    /// Builds the world: one body an organ, its pins, gravity against `specimen.up`, and a plane under the lowest node.
+    ///
+    /// # Errors
+    /// When a mesh, a material or the pins of an organ cannot be simulated.
+    pub fn new(specimen: &Specimen, schedule: Schedule, threads: usize) -> Result<Self> {
+        let up = specimen.up.normalize();
+        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up);
+        if let Some(point) = lowest_node(specimen, up) {
+            builder = builder.support(SupportPlane { point, normal: up, friction: SUPPORT_FRICTION });
+        }
+        let mut axes = Vec::with_capacity(specimen.organs.len());
+        for organ in &specimen.organs {
+            let axis = OrganAxis::of(&organ.body, organ.base)?;
+            builder.body(BodyDescription {
+                name: organ.name.clone(),
+                mesh: &organ.body,
+                material: material(organ),
+                pinned: pinned_nodes(organ, &axis, up),
+            })?;
+            axes.push(axis);
+        }
+        let model = builder.build()?;
+        let state = State::new(&model);
+        let stepper = Stepper::new(&model, schedule, threads);
+        Ok(Self { model, state, axes, up, stepper })
+    }
+
+    /// Advances by one [`FRAME`]; `tool` is the motion of the tool that holds the grasp.
+    pub fn step(&mut self, tool: Option<&trocar_tissue::ToolMotion>) -> trocar_tissue::StepReport {
+        self.stepper.step(&self.model, &mut self.state, FRAME, tool)
+    }
+}
+
+fn lowest_node(specimen: &Specimen, up: DVec3) -> Option<DVec3> {
+    let nodes = specimen.organs.iter().flat_map(|o| o.body.vertices.iter().copied());
+    nodes.min_by(|a, b| a.dot(up).total_cmp(&b.dot(up)))
+}
+
+fn material(organ: &Organ) -> Material {
+    let m = organ.material;
+    Material {
+        model: match m.model {
+            MaterialModel::StableNeoHookean => ConstitutiveModel::StableNeoHookean,
+            MaterialModel::StVenantKirchhoff => ConstitutiveModel::StVenantKirchhoff,
+        },
+        young_modulus: m.young_modulus_pa,
+        poisson_ratio: m.poisson_ratio,
+        density: m.density_kg_m3,
+        viscosity: VISCOSITY_TIME * m.young_modulus_pa,
+    }
+}
+
+fn pinned_nodes(organ: &Organ, axis: &OrganAxis, up: DVec3) -> Vec<u32> {
+    let nodes = &organ.body.vertices;
+    match organ.pins {
+        Pins::None => Vec::new(),
+        Pins::Band { share } => pins::lowest_band(nodes, up, share),
+        Pins::End { end, length, band_length, band_share } => {
+            pins::end(nodes, &axis.s, up, end == End::Base, length, band_length, band_share)
+        }
+    }
+}

@@ -1,0 +1,65 @@
+//! What can go wrong while results and reports are made.
+
+use std::path::PathBuf;
+
+/// Result of this crate.
+pub type Result<T> = std::result::Result<T, Error>;
+
+/// A result or report that cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The parts of the input do not belong together (sizes or counts differ).
+    #[error("{0}")]
+    Mismatch(String),
+    /// The recording's truth does not fit the recording.
+    #[error("{path}: {reason}", path = path.display())]
+    Truth {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what would be right.
+        reason: String,
+    },
+    /// A moving picture was asked of a run that kept no snapshots.
+    #[error("the run kept no snapshots, so there is nothing to animate; set `snapshot_every` to 4 or so")]
+    NoSnapshots,
+    /// A plot could not be drawn.
+    #[error("plot '{plot}': {reason}")]
+    Plot {
+        /// Its title.
+        plot: String,
+        /// What the drawing library said.
+        reason: String,
+    },
+    /// A picture could not be encoded.
+    #[error("a picture cannot be encoded: {0}")]
+    Picture(#[from] image::ImageError),
+    /// The moving picture could not be encoded.
+    #[error("the moving picture cannot be encoded: {0}")]
+    Gif(#[from] gif::EncodingError),
+    /// An image or camera is unusable.
+    #[error(transparent)]
+    Camera(#[from] trocar_camera::Error),
+    /// A result cannot be written down.
+    #[error("the result cannot be written: {0}")]
+    Format(String),
+    /// A file cannot be written.
+    #[error("{path}: {source}", path = path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A phantom cannot be recorded.
+    #[error(transparent)]
+    Phantom(#[from] trocar_phantom::Error),
+    /// A recording or surface cannot be reconstructed.
+    #[error(transparent)]
+    Reconstruct(#[from] trocar_reconstruct::Error),
+    /// A specimen cannot be read or written.
+    #[error(transparent)]
+    Specimen(#[from] trocar_specimen::Error),
+    /// A task cannot be run.
+    #[error(transparent)]
+    Cell(#[from] trocar_cell::Error),
+}

@@ -1,0 +1,206 @@
+//! Rendered views of a specimen: where the camera stands, whole organs, cut-aways.
+
+use super::colors::{self, VIEW_GROUND};
+use glam::DVec3;
+use std::collections::BTreeMap;
+use trocar_camera::{Camera, ColorImage, Distortion, Pose};
+use trocar_geometry::TriMesh;
+use trocar_render::{Instance, Scene, Shading};
+use trocar_specimen::Specimen;
+
+/// A camera and where it stands.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    pub(super) camera: Camera,
+    /// Camera to world.
+    pub(super) pose: Pose,
+}
+
+impl View {
+    /// The nearest view along `-from` (a direction towards the eye) that shows all of `points` with a margin.
+    pub(super) fn framing(points: &[DVec3], from: DVec3, up: DVec3, (width, height): (usize, usize)) -> Self {
+        const HALF_ANGLE: f64 = 0.26;
+        const MARGIN: f64 = 1.08;
+        let f = width as f64 / 2.0 / HALF_ANGLE.tan();
+        let camera = Camera {
+            width,
+            height,
+            fx: f,
+            fy: f,
+            cx: (width - 1) as f64 / 2.0,
+            cy: (height - 1) as f64 / 2.0,
+            distortion: Distortion::default(),
+        };
+        let (tan_x, tan_y) = (width as f64 / 2.0 / f / MARGIN, height as f64 / 2.0 / f / MARGIN);
+        let from = from.normalize_or(DVec3::Z);
+        let turned = Pose::look_at(DVec3::ZERO, -from, up);
+        let local: Vec<DVec3> =
+            points.iter().filter(|p| p.is_finite()).map(|p| turned.inverse().transform(*p)).collect();
+        // Four planes through the eye bound what is seen; along x and along y the eye sits where the outermost ones meet.
+        let most = |f: &dyn Fn(&DVec3) -> f64| local.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
+        let (right, left) = (most(&|p| p.x - tan_x * p.z), most(&|p| -p.x - tan_x * p.z));
+        let (down, above) = (most(&|p| p.y - tan_y * p.z), most(&|p| -p.y - tan_y * p.z));
+        let z = -((right + left) / (2.0 * tan_x)).max((down + above) / (2.0 * tan_y));
+        let eye = DVec3::new((right - left) / 2.0, (down - above) / 2.0, z);
+        let eye = if eye.is_finite() { eye - 1e-3 * DVec3::Z } else { DVec3::ZERO };
+        Self { camera, pose: Pose { translation: turned.transform(eye), ..turned } }
+    }
+
+    /// A picture of `instances`, lit from above the viewer's left shoulder, anti-aliased, creases darkened.
+    pub(super) fn picture(&self, instances: Vec<Instance>, samples: usize) -> ColorImage {
+        let light = self.pose.rotation * DVec3::new(-0.45, -0.8, -0.9);
+        let wires = instances.iter().any(|i| i.shading.wireframe);
+        let scene = Scene::new(instances, Some(light), VIEW_GROUND);
+        let scene = if wires { scene } else { scene.with_ambient_occlusion(24, 0.012) };
+        scene.render(&self.camera, &self.pose, samples).color
+    }
+}
+
+/// Directions of a specimen that views are made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Directions {
+    /// Against gravity.
+    pub(super) up: DVec3,
+    /// Horizontal, towards who stands at the lower edge of the recorded image.
+    pub(super) front: DVec3,
+    /// Horizontal, to that person's right.
+    pub(super) right: DVec3,
+}
+
+impl Directions {
+    pub(super) fn of(specimen: &Specimen) -> Self {
+        let up = specimen.up.normalize_or(DVec3::Z);
+        // The recording frame is the camera's: y runs down the image. A ready surface has z up and is looked at from -y.
+        let towards = if specimen.camera.is_some() { DVec3::Y } else { DVec3::NEG_Y };
+        let flat = |d: DVec3| (d - up * d.dot(up)).try_normalize();
+        let front = flat(towards).or_else(|| flat(DVec3::Z)).unwrap_or_else(|| up.any_orthonormal_vector());
+        Self { up, front, right: front.cross(-up) }
+    }
+
+    /// Towards an eye that looks down on the organs from the front and a little from the right.
+    pub(super) fn oblique(&self) -> DVec3 {
+        0.72 * self.up + 0.75 * self.front + 0.35 * self.right
+    }
+
+    /// Towards an eye lower and from the other side.
+    pub(super) fn low(&self) -> DVec3 {
+        0.38 * self.up + 0.75 * self.front - 0.65 * self.right
+    }
+}
+
+/// The organs' coloured surfaces.
+pub(super) fn surfaces(specimen: &Specimen) -> Vec<Instance> {
+    let instance = |(i, organ): (usize, &trocar_specimen::Organ)| {
+        let shading = Shading { color: colors::organ(i), gloss: 0.35, wireframe: false };
+        Instance { mesh: organ.surface.clone(), label: label(i), shading }
+    };
+    specimen.organs.iter().enumerate().map(instance).collect()
+}
+
+/// Label of organ `index` in a scene.
+pub(super) fn label(index: usize) -> u16 {
+    u16::try_from(index + 1).unwrap_or(u16::MAX)
+}
+
+/// The tetrahedra of every organ as wires in its colour; `cut` removes the half of each organ on the side of that
+/// direction, along the plane through the middle of its nodes. Cut faces are lighter.
+pub(super) fn wires(specimen: &Specimen, nodes: &[Vec<DVec3>], cut: Option<DVec3>) -> Vec<Instance> {
+    let instance = |(i, (organ, nodes)): (usize, (&trocar_specimen::Organ, &Vec<DVec3>))| {
+        let color = colors::organ(i);
+        let keep = |tet: &[u32; 4]| {
+            let Some(normal) = cut else { return true };
+            let centre = nodes.iter().sum::<DVec3>() / nodes.len().max(1) as f64;
+            let middle = tet.iter().map(|&v| nodes[v as usize]).sum::<DVec3>() / 4.0;
+            (middle - centre).dot(normal) <= 0.0
+        };
+        let tets = &organ.body.tets;
+        let kept: Vec<bool> = tets.iter().map(keep).collect();
+        let mesh = shell(nodes, tets, &kept, color, colors::mix(color, [255; 3], 0.62));
+        Instance { mesh, label: label(i), shading: Shading { color, gloss: 0.0, wireframe: true } }
+    };
+    specimen.organs.iter().zip(nodes).enumerate().map(instance).collect()
+}
+
+/// Rest positions of every organ's nodes.
+pub(super) fn rest(specimen: &Specimen) -> Vec<Vec<DVec3>> {
+    specimen.organs.iter().map(|o| o.body.vertices.clone()).collect()
+}
+
+/// Outward faces of the kept elements: `skin` where the body ends, `inside` where a removed element was. Vertices are not
+/// shared between the two, so that each face has one colour.
+fn shell(nodes: &[DVec3], tets: &[[u32; 4]], kept: &[bool], skin: [u8; 3], inside: [u8; 3]) -> TriMesh {
+    // Faces by their sorted corners: the outward triangle of the kept element, kept and all elements there.
+    let mut faces: BTreeMap<[u32; 3], ([u32; 3], u32, u32)> = BTreeMap::new();
+    for (tet, kept) in tets.iter().zip(kept) {
+        let [a, b, c, d] = *tet;
+        for face in [[a, c, b], [a, b, d], [b, c, d], [c, a, d]] {
+            let mut key = face;
+            key.sort_unstable();
+            let entry = faces.entry(key).or_insert((face, 0, 0));
+            entry.2 += 1;
+            if *kept {
+                entry.0 = face;
+                entry.1 += 1;
+            }
+        }
+    }
+    let mut mesh = TriMesh::default();
+    let mut index: BTreeMap<(u32, bool), u32> = BTreeMap::new();
+    for (face, kept, all) in faces.into_values().filter(|f| f.1 == 1) {
+        let cut = all > kept;
+        let triangle = face.map(|node| {
+            *index.entry((node, cut)).or_insert_with(|| {
+                mesh.vertices.push(nodes[node as usize]);
+                mesh.colors.push(if cut { inside } else { skin });
+                (mesh.vertices.len() - 1) as u32
+            })
+        });
+        mesh.triangles.push(triangle);
+    }
+    mesh
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn framing_shows_everything_and_fills_the_picture() {
+        let points: Vec<DVec3> = (0..200)
+            .map(|i| {
+                let t = f64::from(i);
+                DVec3::new(0.08 * (1.3 * t).sin(), 0.03 * (0.7 * t).cos(), 0.3 + 0.02 * (2.1 * t).sin())
+            })
+            .collect();
+        for from in [DVec3::Z, DVec3::new(1.0, 0.4, 0.3), DVec3::new(-0.2, -1.0, 0.5)] {
+            let view = View::framing(&points, from, DVec3::Z, (480, 300));
+            let pixels: Vec<_> =
+                points.iter().map(|p| view.camera.project(view.pose.inverse().transform(*p)).unwrap()).collect();
+            let reach = |f: &dyn Fn(&glam::DVec2) -> f64| pixels.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
+            let (x1, x0, y1, y0) = (reach(&|p| p.x), -reach(&|p| -p.x), reach(&|p| p.y), -reach(&|p| -p.y));
+            assert!(x0 >= 0.0 && x1 < 480.0 && y0 >= 0.0 && y1 < 300.0, "{x0} {x1} {y0} {y1}");
+            assert!(x1 - x0 > 0.8 * 480.0 || y1 - y0 > 0.8 * 300.0, "small: {x0} {x1} {y0} {y1}");
+        }
+    }
+
+    #[test]
+    fn framing_nothing_is_still_a_view() {
+        let view = View::framing(&[], DVec3::Z, DVec3::Z, (48, 30));
+        assert!(view.pose.translation.is_finite());
+    }
+
+    #[test]
+    fn a_cut_face_is_the_face_to_the_removed_element() {
+        let nodes = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 1.0, 1.0)];
+        let tets = [[0, 1, 2, 3], [1, 4, 2, 3]];
+        let (skin, inside) = ([1; 3], [2; 3]);
+        let whole = shell(&nodes, &tets, &[true, true], skin, inside);
+        assert_eq!((whole.triangles.len(), whole.colors.contains(&inside)), (6, false));
+        let half = shell(&nodes, &tets, &[true, false], skin, inside);
+        assert_eq!(half.triangles.len(), 4);
+        let cut: Vec<_> = half.triangles.iter().filter(|t| half.colors[t[0] as usize] == inside).collect();
+        assert_eq!(cut.len(), 1);
+        let [a, b, c] = cut[0].map(|v| half.vertices[v as usize]);
+        assert!((b - a).cross(c - a).dot(DVec3::ONE) > 0.0, "outward is away from the kept element");
+    }
+}

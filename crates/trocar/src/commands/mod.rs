@@ -1,0 +1,20 @@
+//! One file a command.
+
+mod demo;
+mod reconstruct;
+mod record;
+mod simulate;
+
+use crate::cli::{Cli, Command};
+use trocar_evaluate::Result;
+use trocar_progress::Progress;
+
+/// Runs the command that was typed.
+pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
+    match &cli.command {
+        Command::Demo(arguments) => demo::run(arguments, cli.json, progress),
+        Command::Record(arguments) => record::run(arguments, cli.json, progress),
+        Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress),
+        Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress),
+    }
+}

@@ -1,0 +1,83 @@
+//! `trocar reconstruct`.
+
+use crate::cli::{Reconstruct, Units};
+use crate::output;
+use trocar_evaluate::{Reconstructed, Result, reconstruct_recording, reconstruct_surface};
+use trocar_geometry::io::Unit;
+use trocar_progress::Progress;
+use trocar_reconstruct::Settings;
+
+pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Result<()> {
+    let settings = Settings {
+        window: arguments.window,
+        stride: arguments.stride,
+        centre: arguments.centre,
+        ..Settings::default()
+    };
+    let reconstructed = match (&arguments.recording, &arguments.surface) {
+        (Some(recording), _) => reconstruct_recording(recording, &settings, &arguments.output, progress)?.0,
+        (None, Some(surface)) => {
+            let unit = match arguments.units {
+                Some(Units::Cm) => Unit::Centimetre,
+                Some(Units::M) => Unit::Metre,
+                Some(Units::Mm) | None => Unit::Millimetre,
+            };
+            reconstruct_surface(surface, unit, &settings, &arguments.output, progress)?
+        }
+        (None, None) => unreachable!("clap asks for one of the two"),
+    };
+    output::print(json, &reconstructed, text);
+    Ok(())
+}
+
+/// The specimen as a table for people.
+pub fn text(r: &Reconstructed) -> String {
+    let number = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{x:.2}"));
+    let rows: Vec<Vec<String>> = r
+        .organs
+        .iter()
+        .map(|o| {
+            vec![
+                o.organ.clone(),
+                o.facts.nodes.to_string(),
+                o.facts.tets.to_string(),
+                format!("{:.1}", o.facts.min_dihedral_deg),
+                format!("{:.2}", o.facts.median_edge_mm),
+                format!("{:.2}", o.facts.volume_cm3),
+                if o.facts.watertight { "yes" } else { "NO" }.to_owned(),
+                o.facts.inverted.to_string(),
+                number(o.facts.depth_error_median_mm),
+                number(o.facts.depth_error_signed_mm),
+                number(o.facts.covered),
+            ]
+        })
+        .collect();
+    let header = [
+        "organ",
+        "nodes",
+        "tets",
+        "min dih deg",
+        "edge mm",
+        "cm3",
+        "closed",
+        "inverted",
+        "|err| mm",
+        "err mm",
+        "covered",
+    ];
+    let mut out = output::table(&header, &rows);
+    if let Some(c) = &r.composite {
+        out += &format!(
+            "\ncomposite of {} frames: {:.1}% of the image recovered from under instruments, depth on {:.1}%, median depth range {:.2} mm",
+            c.frames_used,
+            100.0 * c.recovered_share,
+            100.0 * c.coverage,
+            c.depth_range_median_mm
+        );
+    }
+    for note in &r.notes {
+        out += &format!("\nnote: {note}");
+    }
+    out += &format!("\nspecimen {} in {:.1} s; report {}", r.specimen, r.seconds, r.report);
+    out
+}

@@ -1,0 +1,54 @@
+//! `trocar simulate`.
+
+use crate::cli::{ScheduleName, Simulate, Task};
+use crate::output;
+use trocar_cell::{GraspLift, Summary};
+use trocar_evaluate::{Result, SimulatedRun, simulate};
+use trocar_progress::Progress;
+use trocar_tissue::Schedule;
+
+pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<()> {
+    let Task::GraspLift = arguments.task;
+    let task = GraspLift {
+        organ: arguments.organ.clone(),
+        at: arguments.at,
+        lift: arguments.lift * 1e-3,
+        schedule: match arguments.schedule {
+            ScheduleName::Default => Schedule::default(),
+            ScheduleName::Paper => Schedule::PAPER,
+        },
+        threads: arguments.threads,
+        ..GraspLift::default()
+    };
+    let run = simulate(&arguments.specimen, &task, &arguments.output, progress)?;
+    output::print(json, &run, |r: &SimulatedRun| format!("{}\nreport {}", text(&r.summary), r.report));
+    Ok(())
+}
+
+/// A run in a few lines for people.
+pub fn text(s: &Summary) -> String {
+    format!(
+        "{} at s = {:.2}, {} nodes held: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm: {}\n\
+         settled at {:.4} m/s, peak {:.3} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}\n\
+         {:.1} s simulated in {:.1} s ({:.2}x real time), state {}",
+        s.organ,
+        s.at,
+        s.held_nodes,
+        s.lift_mm,
+        100.0 * s.follow_ratio,
+        s.slip_mm,
+        s.snap_mm,
+        if s.held { "held" } else { "NOT held" },
+        s.settled_speed_m_s,
+        s.peak_speed_m_s,
+        s.inverted_rest,
+        s.inverted_peak,
+        100.0 * s.min_volume_ratio,
+        s.pin_drift_mm,
+        s.divergence.as_deref().map_or("no divergence".to_owned(), |why| format!("DIVERGED: {why}")),
+        s.simulated_s,
+        s.wall_s,
+        s.real_time_factor,
+        s.state_hash
+    )
+}

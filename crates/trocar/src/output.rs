@@ -1,0 +1,36 @@
+//! What is printed: one JSON object for machines, or lines for people.
+
+use serde::Serialize;
+
+/// Prints `value` as JSON, or what `text` says for people.
+pub fn print<T: Serialize>(json: bool, value: &T, text: impl FnOnce(&T) -> String) {
+    if json {
+        match serde_json::to_string(value) {
+            Ok(line) => println!("{line}"),
+            Err(e) => eprintln!("error: the result cannot be written as JSON: {e}"),
+        }
+    } else {
+        println!("{}", text(value));
+    }
+}
+
+/// Rows with aligned columns: the first left, the others right.
+pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
+    let mut widths: Vec<usize> = header.iter().map(|h| h.chars().count()).collect();
+    for row in rows {
+        for (w, cell) in widths.iter_mut().zip(row) {
+            *w = (*w).max(cell.chars().count());
+        }
+    }
+    let line = |cells: &mut dyn Iterator<Item = &str>| {
+        let mut out = String::new();
+        for (k, (cell, w)) in cells.zip(&widths).enumerate() {
+            let pad = " ".repeat(w - cell.chars().count());
+            out += &if k == 0 { format!("  {cell}{pad}") } else { format!("  {pad}{cell}") };
+        }
+        out
+    };
+    let mut lines = vec![line(&mut header.iter().copied())];
+    lines.extend(rows.iter().map(|row| line(&mut row.iter().map(String::as_str))));
+    lines.join("\n")
+}
