@@ -4,6 +4,7 @@
 
 use crate::World;
 use glam::DVec3;
+use trocar_tissue::Body;
 
 /// Length of a cluster along the axis [m].
 const CLUSTER_LENGTH: f64 = 0.010;
@@ -11,12 +12,17 @@ const CLUSTER_LENGTH: f64 = 0.010;
 /// A cluster at least this many median edges long, so that a coarsely meshed large organ has nodes in every cluster.
 const CLUSTER_EDGES: f64 = 1.5;
 
+/// Nodes nearer to pinned tissue than this [m], or than this many median edges, are in no cluster while others are: a rigid cluster
+/// tied to pinned tissue by less would stretch what is between them beyond what tissue bears.
+const CLEARANCE: f64 = 0.005;
+const CLEARANCE_EDGES: f64 = 1.5;
+
 /// Nodes that are grasped together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
     /// Organ coordinate of its middle.
     pub s: f64,
-    /// Its nodes, ascending; none of them pinned or next to a pinned node.
+    /// Its nodes, ascending; none of them pinned or in one element with a pinned node.
     pub nodes: Vec<u32>,
 }
 
@@ -26,24 +32,42 @@ pub struct Cluster {
 /// not give way, and a rigid cluster tied directly to pinned tissue would invert it.
 pub fn clusters(world: &World, organ: usize) -> Vec<Cluster> {
     let (axis, body) = (&world.axes[organ], &world.model.bodies[organ]);
-    let mut free: Vec<bool> = body.pinned().iter().map(|p| !p).collect();
-    for tet in body.tets() {
-        if tet.iter().any(|i| body.pinned()[*i as usize]) {
-            for i in tet {
-                free[*i as usize] = false;
-            }
-        }
-    }
     let length = CLUSTER_LENGTH.max(CLUSTER_EDGES * body.median_edge());
     let count = ((axis.length / length).round() as usize).max(1);
     let mut clusters: Vec<Cluster> =
         (0..count).map(|k| Cluster { s: (k as f64 + 0.5) / count as f64, nodes: Vec::new() }).collect();
-    for (i, s) in axis.s.iter().enumerate().filter(|(i, _)| free[*i]) {
-        let k = ((s * count as f64) as usize).min(count - 1);
-        clusters[k].nodes.push(i as u32);
+    for i in not_beside_pins(body) {
+        let k = ((axis.s[i as usize] * count as f64) as usize).min(count - 1);
+        clusters[k].nodes.push(i);
+    }
+    let clearance = CLEARANCE.max(CLEARANCE_EDGES * body.median_edge());
+    for cluster in &mut clusters {
+        keep_clear(cluster, body, clearance);
     }
     clusters.retain(|c| !c.nodes.is_empty());
     clusters
+}
+
+/// Nodes that share no element with a pinned one, ascending.
+fn not_beside_pins(body: &Body) -> impl Iterator<Item = u32> + use<> {
+    let mut free: Vec<bool> = body.pinned().iter().map(|p| !p).collect();
+    for tet in body.tets() {
+        if tet.iter().any(|i| body.pinned()[*i as usize]) {
+            tet.iter().for_each(|i| free[*i as usize] = false);
+        }
+    }
+    (0..free.len() as u32).filter(move |i| free[*i as usize])
+}
+
+/// Leaves out the cluster's nodes within `clearance` [m] of pinned tissue at rest, unless that leaves none.
+fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
+    let rest = body.rest_positions();
+    let pinned: Vec<DVec3> = (0..rest.len()).filter(|i| body.pinned()[*i]).map(|i| rest[i]).collect();
+    let is_clear = |i: &u32| pinned.iter().all(|p| (rest[*i as usize] - p).length_squared() >= clearance * clearance);
+    let clear: Vec<u32> = cluster.nodes.iter().copied().filter(is_clear).collect();
+    if !clear.is_empty() {
+        cluster.nodes = clear;
+    }
 }
 
 impl Cluster {

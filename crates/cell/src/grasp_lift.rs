@@ -343,6 +343,7 @@ impl<'a> Run<'a> {
             min_volume_ratio: report.min_volume_ratio,
         };
         let summary = &mut self.summary;
+        summary.yielded_substeps += report.grasp_limited;
         summary.inverted_peak = summary.inverted_peak.max(sample.inverted);
         summary.min_volume_ratio = summary.min_volume_ratio.min(sample.min_volume_ratio);
         summary.peak_speed_m_s = summary.peak_speed_m_s.max(sample.max_speed_m_s);

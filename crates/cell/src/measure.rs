@@ -38,6 +38,8 @@ pub struct Summary {
     pub follow_ratio: f64,
     /// Slip at the end of the hold [mm].
     pub slip_mm: f64,
+    /// Substeps in which held nodes could not follow the jaws without inverting or overstretching an element: the grasp yields.
+    pub yielded_substeps: usize,
     /// Largest distance between where the constraint first prescribes a node and where it was [mm].
     pub snap_mm: f64,
     /// Largest motion of any node in the frame of activation [mm].

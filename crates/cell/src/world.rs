@@ -21,7 +21,7 @@ const SUPPORT_FRICTION: f64 = 0.6;
 /// how much; 5 ms lets an organ come to rest within a second and stays far below the second that a lift takes.
 const VISCOSITY_TIME: f64 = 5e-3;
 
-/// The organs of a specimen as bodies that gravity pulls and a plane supports.
+/// The organs of a specimen as bodies that gravity pulls and planes support.
 pub struct World {
     /// What is constant.
     pub model: Model,
@@ -35,16 +35,14 @@ pub struct World {
 }
 
 impl World {
-    /// Builds the world: one body an organ, its pins, gravity against `specimen.up`, and a plane under the lowest node.
+    /// Builds the world: one body an organ, its pins, gravity against `specimen.up`, and a plane under
+    /// its lowest node.
     ///
     /// # Errors
     /// When a mesh, a material or the pins of an organ cannot be simulated.
     pub fn new(specimen: &Specimen, schedule: Schedule, threads: usize) -> Result<Self> {
         let up = specimen.up.normalize();
         let mut builder = ModelBuilder::new().gravity(-GRAVITY * up);
-        if let Some(point) = lowest_node(specimen, up) {
-            builder = builder.support(SupportPlane { point, normal: up, friction: SUPPORT_FRICTION });
-        }
         let mut axes = Vec::with_capacity(specimen.organs.len());
         for organ in &specimen.organs {
             let axis = OrganAxis::of(&organ.body, organ.base)?;
@@ -53,6 +51,7 @@ impl World {
                 mesh: &organ.body,
                 material: material(organ),
                 pinned: pinned_nodes(organ, &axis, up),
+                supports: support_under(organ, up).into_iter().collect(),
             })?;
             axes.push(axis);
         }
@@ -68,9 +67,10 @@ impl World {
     }
 }
 
-fn lowest_node(specimen: &Specimen, up: DVec3) -> Option<DVec3> {
-    let nodes = specimen.organs.iter().flat_map(|o| o.body.vertices.iter().copied());
-    nodes.min_by(|a, b| a.dot(up).total_cmp(&b.dot(up)))
+/// A plane under the organ's lowest node: the bed it lay on when it was recorded.
+fn support_under(organ: &Organ, up: DVec3) -> Option<SupportPlane> {
+    let lowest = organ.body.vertices.iter().min_by(|a, b| a.dot(up).total_cmp(&b.dot(up)))?;
+    Some(SupportPlane { point: *lowest, normal: up, friction: SUPPORT_FRICTION })
 }
 
 fn material(organ: &Organ) -> Material {

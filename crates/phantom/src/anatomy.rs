@@ -86,9 +86,10 @@ impl Anatomy {
     /// Name of an organ and what the paper's materials and pins are for it. `pixel` projects into the image.
     pub fn info(organ: &Organ, pixel: impl Fn(DVec3) -> Option<[f64; 2]>) -> OrganInfo {
         let pins = if organ.name == "appendix" {
-            // The left arm grasps: the end on the right is held. 0.25 + 0.30 * 0.57 = 0.42 of the length, middle free.
+            // The left arm grasps: the end on the right is held, and most of the 30% next to it. 0.14 + 0.30 * 0.93 = 0.42 of the
+            // length; the free part begins before the middle.
             let end = if organ.tube.base().x > organ.tube.tip().x { End::Base } else { End::Tip };
-            Pins::End { end, length: 0.25, band_length: 0.30, band_share: 0.57 }
+            Pins::End { end, length: 0.14, band_length: 0.30, band_share: 0.93 }
         } else {
             Pins::Band { share: 0.42 }
         };

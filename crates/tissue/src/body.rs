@@ -4,7 +4,7 @@
 //! origin: rounding of `f32` is then far below the sags that are measured. What a vertex needs of its elements and edges stands in
 //! one piece, in the order the sweeps read it.
 
-use crate::Material;
+use crate::{Material, SupportPlane};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;
 
@@ -17,6 +17,8 @@ pub struct Body {
     pub material: Material,
     /// Nodes whose mass was raised to a quarter of the median (SPEC T5).
     pub raised_masses: usize,
+    /// Planes that support it.
+    pub supports: Vec<SupportPlane>,
     /// Rest shape, original node order [m].
     pub(crate) rest: TetMesh,
     /// Whether each node is pinned, original order.

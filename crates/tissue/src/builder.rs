@@ -17,6 +17,8 @@ pub struct BodyDescription<'a> {
     pub material: Material,
     /// Nodes that never move.
     pub pinned: Vec<u32>,
+    /// Planes that support it.
+    pub supports: Vec<SupportPlane>,
 }
 
 /// Share of the median mass below which a node's mass is raised (SPEC T5).
@@ -30,7 +32,6 @@ const CONTACT_STIFFNESS: f64 = 20.0;
 pub struct ModelBuilder {
     bodies: Vec<Body>,
     gravity: DVec3,
-    supports: Vec<SupportPlane>,
 }
 
 impl ModelBuilder {
@@ -45,17 +46,12 @@ impl ModelBuilder {
         self
     }
 
-    /// Adds a support plane.
-    pub fn support(mut self, plane: SupportPlane) -> Self {
-        self.supports.push(plane);
-        self
-    }
-
     /// Adds a body; returns its index.
     ///
     /// # Errors
     /// Refuses, naming the body and the element, node or parameter: zero or negative volumes, isolated nodes, numbers that are not finite, moduli
-    /// outside 10 Pa to 1 GPa, Poisson ratios outside 0 to 0.4999, densities outside 1 to 30,000 kg/m3, negative viscosities, pins out of range.
+    /// outside 10 Pa to 1 GPa, Poisson ratios outside 0 to 0.4999, densities outside 1 to 30,000 kg/m3, negative viscosities, pins out of range, planes without
+    /// a unit normal.
     pub fn body(&mut self, body: BodyDescription<'_>) -> Result<usize> {
         check(&body).map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
         self.bodies.push(lay_out(body));
@@ -65,7 +61,7 @@ impl ModelBuilder {
     /// Finishes the model.
     ///
     /// # Errors
-    /// Refuses a model without bodies, gravity that is not finite or above 100 m/s2, and planes without a unit normal.
+    /// Refuses a model without bodies, and gravity that is not finite or above 100 m/s2.
     pub fn build(self) -> Result<Model> {
         if self.bodies.is_empty() {
             return Err(Error::Model("a model needs a body".to_owned()));
@@ -73,14 +69,7 @@ impl ModelBuilder {
         if !(self.gravity.is_finite() && self.gravity.length() <= 100.0) {
             return Err(Error::Model(format!("gravity is {} m/s2; the earth's is 9.8", self.gravity)));
         }
-        for plane in &self.supports {
-            if !(plane.normal.is_normalized() && plane.point.is_finite() && plane.friction >= 0.0) {
-                return Err(Error::Model(format!(
-                    "{plane:?} is no plane: a point, a unit normal, friction of 0 or more"
-                )));
-            }
-        }
-        Ok(Model { bodies: self.bodies, gravity: self.gravity, supports: self.supports })
+        Ok(Model { bodies: self.bodies, gravity: self.gravity })
     }
 }
 
@@ -119,6 +108,11 @@ fn check(body: &BodyDescription<'_>) -> std::result::Result<(), String> {
     if let Some(i) = used.iter().position(|u| !u) {
         return Err(format!("node {i} belongs to no element"));
     }
+    for plane in &body.supports {
+        if !(plane.normal.is_normalized() && plane.point.is_finite() && plane.friction >= 0.0) {
+            return Err(format!("{plane:?} is no plane: a point, a unit normal, friction of 0 or more"));
+        }
+    }
     match body.pinned.iter().find(|i| **i as usize >= nodes) {
         Some(i) => Err(format!("node {i} is to be pinned; there are {nodes}")),
         None => Ok(()),
@@ -127,7 +121,7 @@ fn check(body: &BodyDescription<'_>) -> std::result::Result<(), String> {
 
 /// Lays a checked body out for the sweeps.
 fn lay_out(description: BodyDescription<'_>) -> Body {
-    let BodyDescription { name, mesh, material, pinned: pinned_nodes } = description;
+    let BodyDescription { name, mesh, material, pinned: pinned_nodes, supports } = description;
     let nodes = mesh.vertices.len();
     let mut pinned = vec![false; nodes];
     pinned_nodes.iter().for_each(|i| pinned[*i as usize] = true);
@@ -166,6 +160,7 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
 
     let mut body = Body {
         material,
+        supports,
         raised_masses,
         rest: mesh.clone(),
         pinned,

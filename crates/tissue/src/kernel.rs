@@ -45,19 +45,30 @@ pub(crate) trait VertexElasticity: Sync {
     fn add(&self, body: &Body, k: usize, x: Vec3A, others: [Vec3A; 3], gradient: Vec3A, ratio: f32, local: &mut Local);
 }
 
-/// Volume part of [`StableNeoHookean`]: V0 lambda'/2 (J - alpha)^2. Its block V0 lambda' g g' is positive semidefinite as it is. The other part, mu/2 tr(F'F), is
-/// quadratic in the positions: a constant Laplacian along the edges, added by the sweep.
+/// Volume part of [`StableNeoHookean`]: its block V0 psi''(J) g g' is positive semidefinite as it is. The other part, mu/2 tr(F'F), is quadratic in
+/// the positions: a constant Laplacian along the edges, added by the sweep.
 pub(crate) struct VolumeTerm {
-    pub lambda: f32,
-    pub alpha: f32,
+    material: StableNeoHookean,
+    lambda: f32,
+    alpha: f32,
 }
+
+/// Above this volume ratio the volume term is its plain quadratic.
+const PLAIN: f32 = 0.25;
 
 impl VertexElasticity for VolumeTerm {
     #[inline(always)]
     fn add(&self, body: &Body, k: usize, _: Vec3A, _: [Vec3A; 3], gradient: Vec3A, ratio: f32, local: &mut Local) {
-        let stiffness = body.corners[k].volume * self.lambda;
-        local.force -= stiffness * (ratio - self.alpha) * gradient;
-        local.add_outer(stiffness, gradient);
+        let volume = body.corners[k].volume;
+        let (slope, curvature) = if ratio > PLAIN {
+            (self.lambda * (ratio - self.alpha), self.lambda)
+        } else {
+            // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
+            let (_, slope, curvature) = self.material.volume_term(f64::from(ratio).max(1e-4));
+            (slope as f32, curvature as f32)
+        };
+        local.force -= volume * slope * gradient;
+        local.add_outer(volume * curvature, gradient);
     }
 }
 
@@ -106,8 +117,9 @@ impl Kernel {
         let (mu, lambda) = body.material.lame();
         match body.material.model {
             ConstitutiveModel::StableNeoHookean => {
-                let m = StableNeoHookean::new(mu, lambda);
-                Self::StableNeoHookean(VolumeTerm { lambda: m.lambda as f32, alpha: m.alpha as f32 })
+                let material = StableNeoHookean::new(mu, lambda);
+                let (lambda, alpha) = (material.lambda as f32, material.alpha as f32);
+                Self::StableNeoHookean(VolumeTerm { material, lambda, alpha })
             }
             ConstitutiveModel::StVenantKirchhoff => {
                 Self::StVenantKirchhoff(GreenStrain { mu: mu as f32, lambda: lambda as f32 })

@@ -10,11 +10,9 @@ pub struct Model {
     pub bodies: Vec<Body>,
     /// Gravitational acceleration [m/s2].
     pub gravity: DVec3,
-    /// Planes that support the bodies.
-    pub supports: Vec<SupportPlane>,
 }
 
-/// A one-sided plane that bodies rest on.
+/// A one-sided plane that a body rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupportPlane {
     /// A point of the plane [m].

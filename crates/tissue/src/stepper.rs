@@ -12,6 +12,9 @@ const SPEED_LIMIT: f64 = 20.0;
 /// An edge of more than this many rest lengths has diverged.
 const STRETCH_LIMIT: f32 = 10.0;
 
+/// Held nodes go no farther from their neighbours than this many rest lengths of the edge between them.
+const HELD_STRETCH: f32 = 7.0;
+
 /// How much of the guessed motion of free vertices, and of the prescribed motion of held ones, is tried at the beginning of a
 /// substep, until no element is squeezed too far by it.
 const START_SHARES: [(f32, f32); 8] =
@@ -58,7 +61,7 @@ pub struct StepReport {
     pub inverted: usize,
     /// Smallest ratio of an element's volume to its rest volume.
     pub min_volume_ratio: f64,
-    /// Substeps in which held nodes could not follow the tool without inverting an element; they catch up later.
+    /// Substeps in which held nodes could not follow the tool without inverting or overstretching an element; they catch up later.
     pub grasp_limited: usize,
     /// The event that ended the run, if any.
     pub divergence: Option<Divergence>,
@@ -96,7 +99,7 @@ impl Stepper {
         // Where no thread can be started, the calling thread does the work.
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok();
         let scratch = State::new(model).bodies.into_iter().zip(&model.bodies);
-        let scratch = scratch.map(|(before, body)| Scratch::new(before, body, &model.supports)).collect();
+        let scratch = scratch.map(|(before, body)| Scratch::new(before, body)).collect();
         Self { schedule, pool, scratch }
     }
 
@@ -138,7 +141,7 @@ impl StepReport {
 }
 
 impl Scratch {
-    fn new(before: BodyState, body: &Body, supports: &[SupportPlane]) -> Self {
+    fn new(before: BodyState, body: &Body) -> Self {
         let zeros = vec![Vec3A::ZERO; body.len()];
         let local = |plane: &SupportPlane| LocalPlane {
             point: (plane.point - body.origin).as_vec3a(),
@@ -151,7 +154,7 @@ impl Scratch {
             guess: zeros,
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
-            planes: supports.iter().map(local).collect(),
+            planes: body.supports.iter().map(local).collect(),
             before,
             report: StepReport::default(),
         }
@@ -288,11 +291,22 @@ fn start_sweeps(body: &Body, state: &mut BodyState, scratch: &mut Scratch) {
             let ratio = |x: &[Vec3A]| volume_ratio(tet, x, *volume as f32);
             is_squeezed(ratio(&state.x), ratio(&scratch.start))
         };
-        if !body.tets.iter().zip(&body.volumes).any(squeezed) {
+        if !body.tets.iter().zip(&body.volumes).any(squeezed) && !overstretches(body, &state.x, scratch) {
             scratch.report.grasp_limited += usize::from(held < 1.0);
             return;
         }
     }
+}
+
+/// Whether an edge at a held vertex is stretched too far, and further than at the substep's beginning.
+fn overstretches(body: &Body, x: &[Vec3A], scratch: &Scratch) -> bool {
+    let too_long = |i: usize, to: u32, length: f32| {
+        let (now, before) = (x[to as usize] - x[i], scratch.start[to as usize] - scratch.start[i]);
+        let now = now.length_squared();
+        now > (HELD_STRETCH * length).powi(2) && now > before.length_squared()
+    };
+    let held = (0..x.len()).filter(|i| scratch.held[*i]);
+    held.into_iter().any(|i| body.edges_of(i).iter().any(|e| too_long(i, e.to, e.length)))
 }
 
 #[inline(always)]

@@ -16,7 +16,7 @@ const CHUNK: usize = 192;
 /// A step leaves an element at least this share of the volume it has ...
 const KEPT_SHARE: f32 = 0.1;
 /// ... and at least this share of its rest volume, unless it has less already: then its volume does not fall.
-const FLOOR: f32 = 0.01;
+const FLOOR: f32 = 1e-3;
 
 /// Speed below which friction sticks [m/s].
 const STICK_SPEED: f32 = 1e-3;

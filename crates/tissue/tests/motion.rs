@@ -93,9 +93,11 @@ fn dashpots_do_not_brake_rotation() {
 fn the_plane_supports_and_holds() {
     let mesh = block([4, 4, 2], 3e-3);
     let plane = SupportPlane { point: DVec3::ZERO, normal: DVec3::Z, friction: 0.6 };
-    let mut builder = ModelBuilder::new().gravity(GRAVITY).support(plane);
+    let mut builder = ModelBuilder::new().gravity(GRAVITY);
     let material = Material { viscosity: 60.0, ..tissue(30e3) };
-    builder.body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![] }).unwrap();
+    builder
+        .body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![], supports: vec![plane] })
+        .unwrap();
     let model = builder.build().unwrap();
     let mut state = State::new(&model);
     // Ten sweeps do not carry the friction of the foot through the block, which then slides several times too far; the law itself is

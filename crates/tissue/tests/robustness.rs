@@ -102,7 +102,7 @@ fn two_bodies() -> (Model, Vec<u32>) {
     let mut builder = ModelBuilder::new().gravity(GRAVITY);
     let mut add = |name: &str, mesh: &TetMesh, material| {
         let pinned = nodes(mesh, |p| p.z == 0.0);
-        builder.body(BodyDescription { name: name.into(), mesh, material, pinned }).unwrap();
+        builder.body(BodyDescription { name: name.into(), mesh, material, pinned, supports: vec![] }).unwrap();
     };
     add("large", &large, Material { viscosity: 60.0, ..tissue(12e3) });
     add("small", &small, Material { model: ConstitutiveModel::StVenantKirchhoff, ..tissue(30e3) });
@@ -152,7 +152,7 @@ fn a_saved_state_goes_on_as_if_nothing_had_happened() {
 fn unusable_bodies_are_refused_by_name() {
     let good = block([2, 2, 2], 2e-3);
     let refuse = |mesh: &TetMesh, material: Material, pinned: Vec<u32>, words: &[&str]| {
-        let body = BodyDescription { name: "spleen".into(), mesh, material, pinned };
+        let body = BodyDescription { name: "spleen".into(), mesh, material, pinned, supports: vec![] };
         let said = ModelBuilder::new().body(body).unwrap_err().to_string();
         assert!(words.iter().chain(&["spleen"]).all(|w| said.contains(w)), "{said}");
     };

@@ -73,8 +73,8 @@ mod tests {
         Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 0.0 }
     }
 
-    /// Some deformation gradients: near rest, sheared, squeezed, stretched.
-    fn deformations() -> [DMat3; 4] {
+    /// Some deformation gradients: near rest, sheared, squeezed, stretched, squeezed into the volume barrier.
+    fn deformations() -> [DMat3; 5] {
         let skew =
             DMat3::from_cols(DVec3::new(1.1, 0.2, -0.1), DVec3::new(-0.3, 0.8, 0.25), DVec3::new(0.05, -0.2, 1.3));
         [
@@ -82,6 +82,7 @@ mod tests {
             skew,
             DMat3::from_diagonal(DVec3::new(0.4, 1.2, 1.1)) * skew,
             DMat3::from_diagonal(DVec3::new(2.5, 0.7, 0.6)),
+            DMat3::from_diagonal(DVec3::new(0.3, 0.4, 1.0)) * skew,
         ]
     }
 

@@ -6,7 +6,8 @@ use glam::DMat3;
 /// Psi = mu/2 (tr(F'F) - 3) + lambda'/2 (J - alpha)^2 - const, alpha = 1 + mu/lambda'.
 ///
 /// Smith, De Goes and Kim, "Stable neo-Hookean flesh simulation", 2018, without the logarithmic term, which only matters at the origin of F. It is finite for
-/// flat and inverted elements and pushes them back. Its linearisation at rest is 2 mu eps + (lambda' - mu) tr(eps) I, so lambda' = lambda + mu
+/// flat elements, though, and an element between a rigid grasp and pinned tissue can be pulled flat; below a fifth of its rest volume a barrier
+/// lambda'/20 ln(J/0.2)^2 is therefore added. Its linearisation at rest is 2 mu eps + (lambda' - mu) tr(eps) I, so lambda' = lambda + mu
 /// makes small strains obey Hooke's law with Lame's mu and lambda exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StableNeoHookean {
@@ -18,23 +19,40 @@ pub struct StableNeoHookean {
     pub alpha: f64,
 }
 
+/// Volume ratio below which the barrier acts, and its strength over lambda'.
+const BARRIER_BEGINS: f64 = 0.2;
+const BARRIER_STRENGTH: f64 = 0.1;
+
 impl StableNeoHookean {
     /// From Lame's parameters [Pa].
     pub fn new(mu: f64, lame_lambda: f64) -> Self {
         let lambda = lame_lambda + mu;
         Self { mu, lambda, alpha: 1.0 + mu / lambda }
     }
+
+    /// Energy density of the volume ratio J [J/m3], and its first and second derivatives; convex for J above 0.
+    pub fn volume_term(&self, j: f64) -> (f64, f64, f64) {
+        let d = j - self.alpha;
+        let (mut energy, mut slope, mut curvature) = (0.5 * self.lambda * d * d, self.lambda * d, self.lambda);
+        if j < BARRIER_BEGINS {
+            let strength = BARRIER_STRENGTH * self.lambda;
+            let log = (j / BARRIER_BEGINS).ln();
+            energy += 0.5 * strength * log * log;
+            slope += strength * log / j;
+            curvature += strength * (1.0 - log) / (j * j);
+        }
+        (energy, slope, curvature)
+    }
 }
 
 impl Hyperelastic for StableNeoHookean {
     fn energy(&self, f: DMat3) -> f64 {
         let trace = f.to_cols_array().iter().map(|x| x * x).sum::<f64>();
-        let volume = |j: f64| 0.5 * self.lambda * (j - self.alpha) * (j - self.alpha);
-        0.5 * self.mu * (trace - 3.0) + volume(f.determinant()) - volume(1.0)
+        0.5 * self.mu * (trace - 3.0) + self.volume_term(f.determinant()).0 - self.volume_term(1.0).0
     }
 
     fn stress(&self, f: DMat3) -> DMat3 {
-        f * self.mu + cofactor(f) * (self.lambda * (f.determinant() - self.alpha))
+        f * self.mu + cofactor(f) * self.volume_term(f.determinant()).1
     }
 }
 

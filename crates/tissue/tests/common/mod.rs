@@ -52,6 +52,6 @@ pub fn nodes(mesh: &TetMesh, chosen: impl Fn(DVec3) -> bool) -> Vec<u32> {
 /// A model of one body under `gravity`.
 pub fn model(mesh: &TetMesh, material: Material, pinned: Vec<u32>, gravity: DVec3) -> Model {
     let mut builder = ModelBuilder::new().gravity(gravity);
-    builder.body(BodyDescription { name: "block".into(), mesh, material, pinned }).unwrap();
+    builder.body(BodyDescription { name: "block".into(), mesh, material, pinned, supports: vec![] }).unwrap();
     builder.build().unwrap()
 }
