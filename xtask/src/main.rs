@@ -3,8 +3,11 @@
 
 use std::process::{Command, ExitCode};
 
+/// A check: its name, the arguments of cargo, environment variables.
+type Check = (&'static str, &'static [&'static str], &'static [(&'static str, &'static str)]);
+
 /// The checks in their order: cheap ones first. Everything is built in release mode, because the tests simulate.
-const TEST: &[(&str, &[&str], &[(&str, &str)])] = &[
+const TEST: &[Check] = &[
     ("formatting", &["fmt", "--all", "--check"], &[]),
     ("lints", &["clippy", "--workspace", "--all-targets", "--release", "--locked", "--", "-D", "warnings"], &[]),
     ("tests", &["test", "--workspace", "--release", "--locked"], &[]),

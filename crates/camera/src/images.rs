@@ -86,7 +86,7 @@ impl DepthImage {
     /// Names the file when it is missing, truncated, or not 16-bit greyscale.
     pub fn read(path: &Path, scale: f64) -> Result<Self> {
         let DynamicImage::ImageLuma16(image) = decode(path)? else {
-            return Err(wrong(path, "not a 16-bit greyscale image; depth is one 16-bit channel"));
+            return Err(wrong(path, &"not a 16-bit greyscale image; depth is one 16-bit channel"));
         };
         let (width, height) = (image.width() as usize, image.height() as usize);
         Ok(Self { width, height, depth: image.into_raw().into_iter().map(|d| (f64::from(d) * scale) as f32).collect() })
@@ -137,21 +137,21 @@ impl Mask {
     }
 }
 
-fn wrong(path: &Path, reason: impl ToString) -> Error {
+fn wrong(path: &Path, reason: &dyn std::fmt::Display) -> Error {
     Error::Image { path: path.to_owned(), reason: reason.to_string() }
 }
 
 /// Decodes by content, not by extension. The whole file is read first, so that a huge header in a small file is refused.
 fn decode(path: &Path) -> Result<DynamicImage> {
-    let bytes = std::fs::read(path).map_err(|e| wrong(path, e))?;
+    let bytes = std::fs::read(path).map_err(|e| wrong(path, &e))?;
     let unreadable =
-        |e: image::ImageError| wrong(path, format!("unreadable image ({e}); expected a whole PNG or JPEG"));
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| wrong(path, e))?;
+        |e: image::ImageError| wrong(path, &format!("unreadable image ({e}); expected a whole PNG or JPEG"));
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| wrong(path, &e))?;
     reader.no_limits();
     let decoder = reader.into_decoder().map_err(unreadable)?;
     let (width, height) = decoder.dimensions();
     if width > MAX_SIDE || height > MAX_SIDE {
-        return Err(wrong(path, format!("{width} x {height} pixels; at most {MAX_SIDE} on a side")));
+        return Err(wrong(path, &format!("{width} x {height} pixels; at most {MAX_SIDE} on a side")));
     }
     DynamicImage::from_decoder(decoder).map_err(unreadable)
 }
@@ -171,7 +171,7 @@ fn encode(width: usize, height: usize, color: png::ColorType, depth: png::BitDep
 }
 
 fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|e| wrong(path, e))
+    std::fs::write(path, bytes).map_err(|e| wrong(path, &e))
 }
 
 #[cfg(test)]

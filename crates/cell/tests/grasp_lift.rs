@@ -1,5 +1,7 @@
 //! The grasp-lift task on a small analytic tube.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
 use glam::DVec3;
 use trocar_cell::{GraspLift, GraspLiftRun};
 use trocar_geometry::{LatticeMesher, Mesher, SignedDistance, TetQuality};

@@ -39,10 +39,23 @@ pub(crate) fn volume_gradient(corner: &Corner, [a, b, c]: [Vec3A; 3]) -> Vec3A {
     (b - a).cross(c - a) * corner.inverse_6v
 }
 
+/// One element as a vertex sees it now.
+#[derive(Clone, Copy)]
+pub(crate) struct Seen {
+    /// The vertex [m].
+    pub x: Vec3A,
+    /// The other three corners [m].
+    pub others: [Vec3A; 3],
+    /// [`volume_gradient`] [1/m].
+    pub gradient: Vec3A,
+    /// Volume over rest volume.
+    pub ratio: f32,
+}
+
 /// A material's part of the sweep.
 pub(crate) trait VertexElasticity: Sync {
-    /// Adds force and block of the vertex at `x` in one element. `k` is the corner's number in the body; `others` are the other three corners.
-    fn add(&self, body: &Body, k: usize, x: Vec3A, others: [Vec3A; 3], gradient: Vec3A, ratio: f32, local: &mut Local);
+    /// Adds force and block of the vertex in one element; `k` is the corner's number in the body.
+    fn add(&self, body: &Body, k: usize, seen: &Seen, local: &mut Local);
 }
 
 /// Volume part of [`StableNeoHookean`]: its block V0 psi''(J) g g' is positive semidefinite as it is. The other part, mu/2 tr(F'F), is quadratic in
@@ -58,7 +71,7 @@ const PLAIN: f32 = 0.25;
 
 impl VertexElasticity for VolumeTerm {
     #[inline(always)]
-    fn add(&self, body: &Body, k: usize, _: Vec3A, _: [Vec3A; 3], gradient: Vec3A, ratio: f32, local: &mut Local) {
+    fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, .. }: &Seen, local: &mut Local) {
         let volume = body.corners[k].volume;
         let (slope, curvature) = if ratio > PLAIN {
             (self.lambda * (ratio - self.alpha), self.lambda)
@@ -80,7 +93,7 @@ pub(crate) struct GreenStrain {
 
 impl VertexElasticity for GreenStrain {
     #[inline(always)]
-    fn add(&self, body: &Body, k: usize, x: Vec3A, others: [Vec3A; 3], _: Vec3A, _: f32, local: &mut Local) {
+    fn add(&self, body: &Body, k: usize, &Seen { x, others, .. }: &Seen, local: &mut Local) {
         // F = sum over corners of x_c m_c', and the four rest gradients m sum to zero.
         let gradients = &body.gradients[k];
         let mut f = Mat3A::ZERO;

@@ -6,7 +6,7 @@
 //! falls below a floor, and no element is ever inverted.
 
 use crate::body::Body;
-use crate::kernel::{Kernel, Local, VertexElasticity, volume_gradient};
+use crate::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -94,31 +94,31 @@ impl Substep<'_> {
         let mut remembered = [(Vec3A::ZERO, 0.0f32); REMEMBERED];
         let corners = self.body.corners_of(i);
         for k in corners.clone() {
-            let (others, gradient, ratio) = self.corner(k, here, x);
+            let seen = self.corner(k, here, x);
             if let Some(slot) = remembered.get_mut(k - corners.start) {
-                *slot = (gradient, ratio);
+                *slot = (seen.gradient, seen.ratio);
             }
-            elasticity.add(self.body, k, here, others, gradient, ratio, &mut local);
+            elasticity.add(self.body, k, &seen, &mut local);
         }
         let step = solve(&local.block, local.force);
         let mut share = 1.0f32;
         for k in corners.clone() {
             let (gradient, ratio) = remembered.get(k - corners.start).copied().unwrap_or_else(|| {
-                let (_, gradient, ratio) = self.corner(k, here, x);
-                (gradient, ratio)
+                let seen = self.corner(k, here, x);
+                (seen.gradient, seen.ratio)
             });
             share = share.min(allowed_share(ratio, gradient.dot(step)));
         }
         here + share * step
     }
 
-    /// The other three corners of the vertex's element, the gradient of its volume ratio, and the ratio itself.
+    /// The vertex's element behind corner `k`.
     #[inline(always)]
-    fn corner(&self, k: usize, here: Vec3A, x: &[Vec3A]) -> ([Vec3A; 3], Vec3A, f32) {
+    fn corner(&self, k: usize, here: Vec3A, x: &[Vec3A]) -> Seen {
         let corner = &self.body.corners[k];
         let others = corner.others.map(|j| x[j as usize]);
         let gradient = volume_gradient(corner, others);
-        (others, gradient, gradient.dot(here - others[0]))
+        Seen { x: here, others, gradient, ratio: gradient.dot(here - others[0]) }
     }
 
     #[inline(always)]

@@ -1,5 +1,7 @@
 //! What must hold whatever happens: no inversion, pins that stay, exact grasps, the same bits.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
 mod common;
 
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};

@@ -1,5 +1,7 @@
 //! Bad input gives one clear line, exit code 2, and leaves nothing behind.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};

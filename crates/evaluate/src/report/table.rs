@@ -20,7 +20,7 @@ pub(super) fn count(n: usize) -> String {
     let digits = n.to_string();
     let mut out = String::new();
     for (i, c) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i) % 3 == 0 {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
             out.push('\u{202f}');
         }
         out.push(c);
@@ -114,10 +114,10 @@ fn sum_row(out: &mut String, specimen: &Specimen, beside_paper: bool, seen: bool
         && PAPER.iter().all(|p| specimen.organs.iter().any(|o| o.name == p.0))
         && specimen.organs.len() == 6;
     let paper = |value: usize| if all_known { format!("<small>{}</small>", count(value)) } else { String::new() };
-    let _ = write!(
+    let _ = writeln!(
         out,
         "<tr class=\"sum\"><td>together</td><td>{}{}</td><td>{}{}</td><td></td><td></td><td></td><td></td><td>{}</td>\
-         <td></td><td>{}</td>{}</tr>\n",
+         <td></td><td>{}</td>{}</tr>",
         count(facts().map(|f| f.nodes).sum()),
         paper(PAPER.iter().map(|p| p.1).sum()),
         count(facts().map(|f| f.tets).sum()),

@@ -100,7 +100,7 @@ fn bring_front(tet: [usize; 4], sides: &[Side; 4], side: Side) -> [usize; 4] {
 fn prism(mut v: [u32; 3], mut w: [u32; 3], mut diagonals: [bool; 3], out: &mut Vec<[u32; 4]>) {
     debug_assert!(diagonals.contains(&true) && diagonals.contains(&false), "a prism cannot be split around a circle");
     // Turn the prism until two diagonals meet at v[0].
-    while !(diagonals[0] && !diagonals[2]) {
+    while !diagonals[0] || diagonals[2] {
         v.rotate_left(1);
         w.rotate_left(1);
         diagonals.rotate_left(1);

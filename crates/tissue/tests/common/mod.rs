@@ -1,5 +1,5 @@
 //! Small scenes the tests share.
-#![allow(dead_code, reason = "each test binary uses its own part")]
+#![allow(dead_code, clippy::unwrap_used, reason = "each test binary uses its own part; helpers of tests may panic")]
 
 use glam::DVec3;
 use trocar_geometry::TetMesh;
