@@ -1,6 +1,6 @@
 //! Where along an organ a node lies: the organ coordinate s.
 
-use crate::tet_mesh::FACES;
+use crate::tet_mesh::adjacency::FACES;
 use crate::{Error, Result, TetMesh};
 use glam::DVec3;
 use std::cmp::Reverse;

@@ -32,5 +32,5 @@ pub use quality::TetQuality;
 pub use repair::{RepairReport, repair};
 pub use skin::Skin;
 pub use smooth::taubin;
-pub use tet_mesh::TetMesh;
+pub use tet_mesh::{CutAway, TetMesh};
 pub use tri_mesh::TriMesh;

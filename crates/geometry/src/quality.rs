@@ -1,8 +1,9 @@
 //! How good the elements of a tetrahedral mesh are.
 
 use crate::TetMesh;
-use crate::tet_mesh::EDGES;
+use crate::tet_mesh::adjacency::EDGES;
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// Element quality of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -27,45 +28,84 @@ impl TetQuality {
         if mesh.tets.is_empty() {
             return Self::default();
         }
-        let mut smallest = Vec::with_capacity(mesh.tets.len());
-        let mut largest: f64 = 0.0;
-        for t in 0..mesh.tets.len() {
-            let angles = dihedral_angles(mesh.corners(t));
-            smallest.push(angles.into_iter().fold(f64::INFINITY, f64::min).to_degrees());
-            largest = largest.max(angles.into_iter().fold(0.0, f64::max).to_degrees());
-        }
-        let length = |[i, j]: [u32; 2]| (mesh.vertices[i as usize] - mesh.vertices[j as usize]).length();
-        let mut lengths: Vec<f64> = mesh.edges().into_iter().map(length).collect();
+        let angles: Vec<[f64; 6]> =
+            (0..mesh.tets.len()).into_par_iter().map(|t| dihedral_angles(&mesh.corners(t))).collect();
+        let smallest: Vec<f64> = angles.iter().map(|six| six.iter().copied().fold(f64::INFINITY, f64::min)).collect();
+        let lengths =
+            mesh.edges().iter().map(|&[a, b]| mesh.vertices[a as usize].distance(mesh.vertices[b as usize])).collect();
         Self {
-            min_dihedral_deg: smallest.iter().copied().fold(f64::INFINITY, f64::min),
-            median_min_dihedral_deg: median(&mut smallest),
-            max_dihedral_deg: largest,
-            median_edge: median(&mut lengths),
+            min_dihedral_deg: smallest.iter().copied().fold(f64::INFINITY, f64::min).to_degrees(),
+            median_min_dihedral_deg: median(smallest).to_degrees(),
+            max_dihedral_deg: angles.iter().flatten().copied().fold(0.0, f64::max).to_degrees(),
+            median_edge: median(lengths),
             inverted: mesh.inverted(),
             volume: mesh.volume(),
         }
     }
 }
 
-/// The six dihedral angles of a tetrahedron [rad].
-fn dihedral_angles(x: [DVec3; 4]) -> [f64; 6] {
+/// The angles between the two faces at each of the [`EDGES`] [rad], 0..=pi.
+fn dihedral_angles(corners: &[DVec3; 4]) -> [f64; 6] {
     EDGES.map(|[i, j]| {
-        let [k, l] = match (i, j) {
-            (0, 1) => [2, 3],
-            (0, 2) => [1, 3],
-            (0, 3) => [1, 2],
-            (1, 2) => [0, 3],
-            (1, 3) => [0, 2],
-            _ => [0, 1],
-        };
-        // Angle between the two faces at the edge, from their normals.
-        let edge = x[j] - x[i];
-        let (m, n) = (edge.cross(x[k] - x[i]), edge.cross(x[l] - x[i]));
+        // The corners sum to 6; k and l are the two that are not on the edge.
+        let k = (0..4).find(|&k| k != i && k != j).unwrap_or(0);
+        let l = 6 - i - j - k;
+        let along = corners[j] - corners[i];
+        let m = along.cross(corners[k] - corners[i]);
+        let n = along.cross(corners[l] - corners[i]);
+        // atan2 keeps full precision near 0 and pi, where the arc cosine loses half the digits.
         m.cross(n).length().atan2(m.dot(n))
     })
 }
 
-fn median(values: &mut [f64]) -> f64 {
+/// Middle value, or mean of the two middle values; 0 without values.
+pub(crate) fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
     let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+    let even = values.len().is_multiple_of(2);
+    let (below, &mut upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    if even { 0.5 * (upper + below.iter().copied().fold(f64::NEG_INFINITY, f64::max)) } else { upper }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_regular_tet_and_a_corner_tet() {
+        let regular = TetMesh {
+            vertices: vec![
+                DVec3::new(1.0, 1.0, 1.0),
+                DVec3::new(1.0, -1.0, -1.0),
+                DVec3::new(-1.0, 1.0, -1.0),
+                DVec3::new(-1.0, -1.0, 1.0),
+            ],
+            tets: vec![[0, 1, 3, 2]],
+        };
+        let q = TetQuality::of(&regular);
+        let expected = (1.0f64 / 3.0).acos().to_degrees();
+        assert!((q.min_dihedral_deg - expected).abs() < 1e-10 && (q.max_dihedral_deg - expected).abs() < 1e-10);
+        assert!((q.median_edge - 8f64.sqrt()).abs() < 1e-12);
+        assert!((q.volume - 8.0 / 3.0).abs() < 1e-12 && q.inverted == 0);
+
+        let corner = TetMesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], tets: vec![[0, 1, 2, 3]] };
+        let q = TetQuality::of(&corner);
+        assert!((q.max_dihedral_deg - 90.0).abs() < 1e-10);
+        assert!((q.min_dihedral_deg - 2f64.sqrt().atan().to_degrees()).abs() < 1e-10);
+        assert!((q.median_edge - 0.5 * (1.0 + 2f64.sqrt())).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_sliver_is_seen_exactly_and_nothing_is_zero() {
+        // Four points of a square, one pair raised by h: the two flat angles are 2 atan(h) for unit half-diagonals.
+        let h = 1e-7;
+        let vertices = vec![DVec3::X, -DVec3::X, DVec3::new(0.0, -1.0, h), DVec3::new(0.0, 1.0, h)];
+        let q = TetQuality::of(&TetMesh { vertices, tets: vec![[0, 1, 3, 2]] });
+        // At edge (+x, +y): normals of the two faces there differ from +-z by h / 1 each, in the same plane.
+        assert!(q.min_dihedral_deg > 0.0 && q.min_dihedral_deg < 2e-5, "{}", q.min_dihedral_deg);
+        assert!(q.max_dihedral_deg > 179.99998);
+        assert_eq!(TetQuality::of(&TetMesh::default()), TetQuality::default());
+    }
 }

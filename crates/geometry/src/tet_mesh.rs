@@ -1,9 +1,13 @@
 //! Tetrahedral bodies.
 
-use crate::{TriMesh, tri_mesh};
-use glam::DVec3;
+pub(crate) mod adjacency;
 
-/// A tetrahedral mesh. Every element (a, b, c, d) has positive signed volume (b-a)x(c-a).(d-a)/6.
+use crate::TriMesh;
+use adjacency::{EDGES, FACES, NO_TET, face_neighbours};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A tetrahedral mesh. Every element [a, b, c, d] has positive signed volume (b-a)x(c-a).(d-a)/6.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
     /// Node positions [m].
@@ -12,16 +16,23 @@ pub struct TetMesh {
     pub tets: Vec<[u32; 4]>,
 }
 
-/// Faces of an element, outward, as corner numbers; face k is opposite corner k.
-pub(crate) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
-
-/// Edges of an element as corner numbers.
-pub(crate) const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+/// What remains visible of a body when part of it is cut away, see [`TetMesh::cut_away`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct CutAway {
+    /// Outward-facing surface of the elements that remain.
+    pub surface: TriMesh,
+    /// For each vertex of `surface`, the node it is.
+    pub nodes: Vec<u32>,
+    /// For each triangle of `surface`, the element it belongs to.
+    pub tets: Vec<u32>,
+    /// For each triangle of `surface`, true when it lay inside the body and the cut laid it bare.
+    pub bared: Vec<bool>,
+}
 
 impl TetMesh {
-    /// Corner positions of element `t` [m].
+    /// Positions of the four corners of element `t` [m].
     pub fn corners(&self, t: usize) -> [DVec3; 4] {
-        self.tets[t].map(|i| self.vertices[i as usize])
+        self.tets[t].map(|node| self.vertices[node as usize])
     }
 
     /// Signed volume of element `t` [m3].
@@ -35,124 +46,130 @@ impl TetMesh {
         (0..self.tets.len()).map(|t| self.tet_volume(t)).sum()
     }
 
-    /// Number of elements with signed volume at or below 0.
+    /// Number of elements with signed volume at or below 0 (or NaN).
     pub fn inverted(&self) -> usize {
-        (0..self.tets.len()).filter(|t| self.tet_volume(*t) <= 0.0).count()
+        (0..self.tets.len()).filter(|&t| !matches!(self.tet_volume(t), v if v > 0.0)).count()
     }
 
-    /// Smallest and largest coordinates [m]; `None` without nodes.
-    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
-        tri_mesh::bounds(&self.vertices)
+    /// Outward-facing boundary surface and, for each of its vertices, the node it is. Triangles follow the order of
+    /// their elements, vertices the order of the nodes.
+    pub fn boundary(&self) -> (TriMesh, Vec<u32>) {
+        let (faces, _) = self.open_faces(&face_neighbours(&self.tets), |_| true);
+        self.surface_of(faces)
     }
 
-    /// Every edge once, lower node first, ascending.
+    /// Surface of the elements whose centroid lies on the negative side of the plane through `point` [m] with normal
+    /// `normal` (any length): a look into the body.
+    pub fn cut_away(&self, point: DVec3, normal: DVec3) -> CutAway {
+        let neighbours = face_neighbours(&self.tets);
+        let keep: Vec<bool> = (0..self.tets.len())
+            .map(|t| (self.corners(t).iter().sum::<DVec3>() / 4.0 - point).dot(normal) < 0.0)
+            .collect();
+        let (faces, owners) = self.open_faces(&neighbours, |t| keep[t]);
+        let (surface, nodes) = self.surface_of(faces);
+        let bared = owners.iter().map(|&(t, f)| neighbours[t as usize][f] != NO_TET).collect();
+        CutAway { surface, nodes, tets: owners.into_iter().map(|(t, _)| t).collect(), bared }
+    }
+
+    /// Every edge once, as (smaller node, larger node), sorted.
     pub fn edges(&self) -> Vec<[u32; 2]> {
-        let mut edges: Vec<[u32; 2]> =
-            self.tets.iter().flat_map(|t| EDGES.map(|[i, j]| [t[i].min(t[j]), t[i].max(t[j])])).collect();
-        edges.sort_unstable();
+        let mut edges: Vec<[u32; 2]> = self
+            .tets
+            .par_iter()
+            .flat_map_iter(|tet| EDGES.iter().map(|&[a, b]| [tet[a].min(tet[b]), tet[a].max(tet[b])]))
+            .collect();
+        edges.par_sort_unstable();
         edges.dedup();
         edges
     }
 
-    /// Outward-facing boundary surface and, for each of its vertices, the node it is.
-    pub fn boundary(&self) -> (TriMesh, Vec<u32>) {
-        let (surface, nodes, _) = self.boundary_of(|_| true);
-        (surface, nodes)
+    /// Smallest and largest coordinates [m]; `None` without nodes.
+    pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
+        let first = *self.vertices.first()?;
+        Some(self.vertices.iter().fold((first, first), |(lo, hi), &p| (lo.min(p), hi.max(p))))
     }
 
-    /// Boundary of the elements whose middle lies on the side of the plane through `point` that `normal` points away from, and for each
-    /// triangle whether it is a cut face (an inner face of the whole body): for pictures of the inside.
-    pub fn cut_away(&self, point: DVec3, normal: DVec3) -> (TriMesh, Vec<bool>) {
-        let middle = |t: usize| self.corners(t).iter().sum::<DVec3>() / 4.0;
-        let (surface, _, inner) = self.boundary_of(|t| (middle(t) - point).dot(normal) < 0.0);
-        (surface, inner)
-    }
-
-    /// Boundary of some elements: surface, node of each vertex, and whether each triangle is an inner face of the whole body.
-    fn boundary_of(&self, chosen: impl Fn(usize) -> bool) -> (TriMesh, Vec<u32>, Vec<bool>) {
-        let faces = self.faces();
-        let mut mesh = TriMesh::default();
-        let (mut nodes, mut inner) = (Vec::new(), Vec::new());
-        let mut index = vec![u32::MAX; self.vertices.len()];
-        for run in faces.chunk_by(|a, b| a.key == b.key) {
-            let mut kept = run.iter().filter(|f| chosen(f.tet as usize));
-            let (Some(face), None) = (kept.next(), kept.next()) else { continue };
-            mesh.triangles.push(FACES[face.opposite as usize].map(|k| {
-                let node = self.tets[face.tet as usize][k];
-                if index[node as usize] == u32::MAX {
-                    index[node as usize] = nodes.len() as u32;
-                    nodes.push(node);
-                    mesh.vertices.push(self.vertices[node as usize]);
+    /// Faces, as nodes and as (element, face), between an element that is kept and none or one that is not.
+    fn open_faces(&self, neighbours: &[[u32; 4]], keep: impl Fn(usize) -> bool) -> (Vec<[u32; 3]>, Vec<(u32, usize)>) {
+        let mut faces = Vec::new();
+        let mut owners = Vec::new();
+        for (t, tet) in self.tets.iter().enumerate().filter(|&(t, _)| keep(t)) {
+            for (f, corners) in FACES.iter().enumerate() {
+                let across = neighbours[t][f];
+                if across == NO_TET || !keep(across as usize) {
+                    faces.push(corners.map(|corner| tet[corner]));
+                    owners.push((t as u32, f));
                 }
-                index[node as usize]
-            }));
-            inner.push(run.len() > 1);
+            }
         }
-        (mesh, nodes, inner)
+        (faces, owners)
     }
 
-    /// Every face of every element, sorted so that the two sides of an inner face are neighbours.
-    fn faces(&self) -> Vec<Face> {
-        let mut faces = Vec::with_capacity(4 * self.tets.len());
-        for (t, tet) in self.tets.iter().enumerate() {
-            for (k, corners) in FACES.iter().enumerate() {
-                let mut key = corners.map(|c| tet[c]);
-                key.sort_unstable();
-                faces.push(Face { key, tet: t as u32, opposite: k as u8 });
-            }
+    /// A surface of its own from triangles over the nodes.
+    fn surface_of(&self, mut triangles: Vec<[u32; 3]>) -> (TriMesh, Vec<u32>) {
+        let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
+        nodes.sort_unstable();
+        nodes.dedup();
+        let mut vertex_of = vec![0; self.vertices.len()];
+        for (vertex, &node) in nodes.iter().enumerate() {
+            vertex_of[node as usize] = vertex as u32;
         }
-        faces.sort_unstable();
-        faces
-    }
-
-    /// The largest part (by volume) whose elements are joined by faces, without unused nodes. The order of elements and nodes is kept.
-    pub fn largest_component(&self) -> Self {
-        let mut parent: Vec<u32> = (0..self.tets.len() as u32).collect();
-        fn root(parent: &mut [u32], mut i: u32) -> u32 {
-            while parent[i as usize] != i {
-                parent[i as usize] = parent[parent[i as usize] as usize];
-                i = parent[i as usize];
-            }
-            i
+        for corner in triangles.iter_mut().flatten() {
+            *corner = vertex_of[*corner as usize];
         }
-        for run in self.faces().chunk_by(|a, b| a.key == b.key) {
-            for other in &run[1..] {
-                let (a, b) = (root(&mut parent, run[0].tet), root(&mut parent, other.tet));
-                parent[a.max(b) as usize] = a.min(b);
-            }
-        }
-        let mut volume = vec![0.0; self.tets.len()];
-        for t in 0..self.tets.len() {
-            volume[root(&mut parent, t as u32) as usize] += self.tet_volume(t);
-        }
-        let mut best = 0;
-        for k in 0..volume.len() {
-            if volume[k] > volume[best] {
-                best = k;
-            }
-        }
-        let tets: Vec<[u32; 4]> = (0..self.tets.len())
-            .filter(|t| root(&mut parent, *t as u32) as usize == best)
-            .map(|t| self.tets[t])
-            .collect();
-        let mut used = vec![false; self.vertices.len()];
-        tets.iter().flatten().for_each(|i| used[*i as usize] = true);
-        let mut index = vec![0u32; self.vertices.len()];
-        let mut out = Self::default();
-        for (i, v) in self.vertices.iter().enumerate().filter(|(i, _)| used[*i]) {
-            index[i] = out.vertices.len() as u32;
-            out.vertices.push(*v);
-        }
-        out.tets = tets.into_iter().map(|t| t.map(|i| index[i as usize])).collect();
-        out
+        let vertices = nodes.iter().map(|&node| self.vertices[node as usize]).collect();
+        (TriMesh { vertices, triangles, colors: Vec::new() }, nodes)
     }
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Face {
-    /// Nodes, ascending.
-    key: [u32; 3],
-    tet: u32,
-    /// Corner of the element that is not on the face.
-    opposite: u8,
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A cube of edge 2 split into the six tets around its main diagonal.
+    fn cube() -> TetMesh {
+        let vertices = (0..8).map(|i| 2.0 * DVec3::new((i & 1) as f64, (i >> 1 & 1) as f64, (i >> 2) as f64)).collect();
+        let tets = vec![[0, 1, 3, 7], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7], [0, 4, 5, 7], [0, 5, 1, 7]];
+        TetMesh { vertices, tets }
+    }
+
+    fn surface_volume(surface: &TriMesh) -> f64 {
+        let v = |i: u32| surface.vertices[i as usize];
+        surface.triangles.iter().map(|t| v(t[0]).dot(v(t[1]).cross(v(t[2]))) / 6.0).sum()
+    }
+
+    #[test]
+    fn a_cube_has_its_volume_edges_and_boundary() {
+        let mesh = cube();
+        assert!((mesh.volume() - 8.0).abs() < 1e-12);
+        assert_eq!(mesh.inverted(), 0);
+        assert_eq!(mesh.edges().len(), 12 + 6 + 1);
+        assert_eq!(mesh.edges()[0], [0, 1]);
+        assert_eq!(mesh.bounds(), Some((DVec3::ZERO, DVec3::splat(2.0))));
+        let (surface, nodes) = mesh.boundary();
+        assert_eq!((surface.triangles.len(), nodes), (12, (0..8).collect()));
+        assert!((surface_volume(&surface) - 8.0).abs() < 1e-12, "triangles must face outward");
+    }
+
+    #[test]
+    fn swapping_two_corners_inverts() {
+        let mut mesh = cube();
+        mesh.tets[2].swap(0, 1);
+        assert_eq!(mesh.inverted(), 1);
+        mesh.vertices[7].x = f64::NAN;
+        assert_eq!(mesh.inverted(), 6);
+    }
+
+    #[test]
+    fn cutting_away_bares_the_inside() {
+        let mesh = cube();
+        // Keeps the three tets with x > y on average: one half of the cube, cut along the diagonal plane x = y.
+        let half = mesh.cut_away(DVec3::ZERO, DVec3::new(-1.0, 1.0, 0.0));
+        assert_eq!(half.bared.iter().filter(|&&b| b).count(), 2);
+        assert_eq!(half.surface.triangles.len(), 8);
+        assert!((surface_volume(&half.surface) - 4.0).abs() < 1e-12);
+        assert!(half.tets.iter().all(|&t| [0, 4, 5].contains(&t)));
+        assert_eq!(half.nodes.len(), half.surface.vertices.len());
+        assert!(mesh.cut_away(DVec3::splat(-1.0), DVec3::ONE).surface.triangles.is_empty());
+    }
 }

@@ -1,5 +1,8 @@
 //! Meshers: from a shape to a tetrahedral body.
 
+mod bcc;
+mod body;
+mod cuts;
 mod lattice;
 mod stencil;
 
@@ -11,8 +14,5 @@ use glam::DVec3;
 /// Fills a shape with tetrahedra.
 pub trait Mesher {
     /// Meshes the inside of `shape`, which lies within `bounds` [m]. One connected body, every element positive.
-    ///
-    /// # Errors
-    /// When nothing of the shape is as large as an element.
     fn mesh(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh>;
 }

@@ -1,114 +1,153 @@
-//! What is left of a lattice tetrahedron inside the surface.
+//! How a lattice tet that crosses the surface is filled.
 //!
-//! Corners are inside (-), on the surface (0) or outside (+). An edge from - to + has a cut point. What remains is nothing, the whole element,
-//! a smaller tetrahedron, a pyramid, or a prism with triangular ends; the last two have quadrilateral sides that lie on faces of the lattice, and
-//! both elements at such a face must cut it along the same diagonal. Labelle and Shewchuk 2007, section 3.2.
+//! The part of the tet on the inside is a tet, a pyramid or a triangular prism over its inside corners, its corners on
+//! the surface and the cut points of its edges. Pyramids and prisms have quadrilateral faces which a neighbour shares;
+//! both must split them along the same diagonal, so the choice depends on nothing but the face.
 
-/// Side of the surface a corner is on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+use super::bcc::Point;
+
+/// Where a corner of the tet lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Side {
-    /// Negative distance.
     Inside,
-    /// On the surface.
     Surface,
-    /// Positive distance.
     Outside,
 }
 
-/// What the stencils ask of the lattice.
-pub(super) trait Lattice {
-    /// Side of a lattice point.
-    fn side(&self, point: usize) -> Side;
-    /// Mesh node of a lattice point that is kept.
-    fn node(&mut self, point: usize) -> u32;
-    /// Mesh node of the cut point on the edge between an inside and an outside point.
-    fn cut(&mut self, inside: usize, outside: usize) -> u32;
-    /// On the face (p, q, outside): whether the quadrilateral p, q, cut(q), cut(p) is split from p to cut(q), not from q to cut(p).
-    fn splits_from_first(&self, p: usize, q: usize, outside: usize) -> bool;
-    /// Whether the diagonal (a, b) is shorter than (c, d).
-    fn shorter(&self, ab: (u32, u32), cd: (u32, u32)) -> bool;
+/// A corner of a tet of the filling.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Corner {
+    /// A corner of the lattice tet, 0..4.
+    Point(usize),
+    /// The cut point on the edge from an inside to an outside corner.
+    Cut(usize, usize),
 }
 
-/// Even permutations that bring corner k to the front.
-const FRONT: [[usize; 4]; 4] = [[0, 1, 2, 3], [1, 0, 3, 2], [2, 3, 0, 1], [3, 2, 1, 0]];
+/// Fills the inside of a positive lattice tet, whose long edges are (0, 1) and (2, 3), with positive tets.
+pub(super) fn fill(points: &[Point; 4], sides: &[Side; 4], mut emit: impl FnMut([Corner; 4])) {
+    use Corner::{Cut, Point};
+    let mut corners = [[0; 4]; 3];
+    let mut counts = [0; 3];
+    for (i, &side) in sides.iter().enumerate() {
+        let kind = side as usize;
+        corners[kind][counts[kind]] = i;
+        counts[kind] += 1;
+    }
+    let [inside, surface, outside] = corners;
+    let mut emit = |tet: [Corner; 4]| emit(positive(points, tet));
+    match counts {
+        [0, ..] => {}
+        [_, _, 0] => emit([0, 1, 2, 3].map(Point)),
+        [1, zeros, _] => {
+            // The inside corner, the surface corners, and a cut point for each outside corner.
+            let a = inside[0];
+            let rest = [0, 1, 2].map(|i| if i < zeros { Point(surface[i]) } else { Cut(a, outside[i - zeros]) });
+            emit([Point(a), rest[0], rest[1], rest[2]]);
+        }
+        [2, 1, _] => {
+            let ([a, b], c) = ([inside[0], inside[1]], outside[0]);
+            let apex = Point(surface[0]);
+            // Quadrilateral a, b, bc, ac with the diagonal at a or at b.
+            let (at, other) = if diagonal_at_first(points, a, b, c) { (a, b) } else { (b, a) };
+            emit([apex, Point(at), Point(other), Cut(other, c)]);
+            emit([apex, Point(at), Cut(other, c), Cut(at, c)]);
+        }
+        [2, ..] => {
+            let ([a, b], [c, d]) = ([inside[0], inside[1]], [outside[0], outside[1]]);
+            let (first, second) = (diagonal_at_first(points, a, b, c), diagonal_at_first(points, a, b, d));
+            // The third quadrilateral is the surface itself. The rules above always leave one diagonal at `a` and one at
+            // `b`, and only this choice of the third does not run the three in a cycle, which nothing can fill.
+            prism([Point(a), Cut(a, c), Cut(a, d)], [Point(b), Cut(b, c), Cut(b, d)], [first, second, second], emit);
+        }
+        [_, ..] => {
+            let ([a, b, c], d) = ([inside[0], inside[1], inside[2]], outside[0]);
+            let diagonals = [(a, b), (a, c), (b, c)].map(|(i, j)| diagonal_at_first(points, i, j, d));
+            prism([a, b, c].map(Point), [a, b, c].map(|i| Cut(i, d)), diagonals, emit);
+        }
+    }
+}
 
-/// Adds what remains of the positive element `tet` (lattice points) to `out`, positively oriented.
-pub(super) fn fill(lattice: &mut impl Lattice, tet: [usize; 4], out: &mut Vec<[u32; 4]>) {
-    let sides = tet.map(|p| lattice.side(p));
-    let count = |side| sides.iter().filter(|s| **s == side).count();
-    match (count(Side::Inside), count(Side::Outside)) {
-        (0, _) => {}
-        (_, 0) => out.push(tet.map(|p| lattice.node(p))),
-        (1, _) => {
-            let [a, others @ ..] = bring_front(tet, &sides, Side::Inside);
-            let mut corner = |p| match lattice.side(p) {
-                Side::Outside => lattice.cut(a, p),
-                _ => lattice.node(p),
+/// Whether the quadrilateral a, b, cut(b, c), cut(a, c) of inside corners a and b and outside corner c is split by the
+/// diagonal from a (else by the one from b).
+///
+/// Every lattice triangle has one long and two short edges. When a cut edge is the long one, the diagonal ends at its cut
+/// point. When both are short, the parity rule of Labelle and Shewchuk (2007), section 3.2, decides: a and b, two
+/// neighbours along an axis, differ in whether an even number of their coordinates exceed those of c.
+fn diagonal_at_first(points: &[Point; 4], a: usize, b: usize, c: usize) -> bool {
+    let long = |i: usize, j: usize| i / 2 == j / 2;
+    if long(a, b) { (0..3).filter(|&axis| points[a][axis] > points[c][axis]).count() % 2 == 0 } else { long(b, c) }
+}
+
+/// Splits a prism with the triangles `a` and `b` into three tets. `diagonals` says for the quadrilaterals over (0, 1),
+/// (0, 2) and (1, 2) whether the diagonal starts at the first of the two in `a` (and ends at the second in `b`).
+fn prism(a: [Corner; 3], b: [Corner; 3], diagonals: [bool; 3], mut emit: impl FnMut([Corner; 4])) {
+    // How many diagonals start at each corner of `a`. Without a cycle these are 2, 1 and 0.
+    let starts = [
+        usize::from(diagonals[0]) + usize::from(diagonals[1]),
+        usize::from(!diagonals[0]) + usize::from(diagonals[2]),
+        usize::from(!diagonals[1]) + usize::from(!diagonals[2]),
+    ];
+    let mut order = [0, 1, 2];
+    order.sort_unstable_by_key(|&i| std::cmp::Reverse(starts[i]));
+    let [u, v, w] = order;
+    emit([a[u], b[u], b[v], b[w]]);
+    emit([a[u], a[v], b[v], b[w]]);
+    emit([a[u], a[v], a[w], b[w]]);
+}
+
+/// Orders the corners so that the tet is positive. The sign is that of the unmoved lattice with cut points half way,
+/// whole numbers throughout: moves and cuts within their limits never turn a tet over.
+fn positive(points: &[Point; 4], mut tet: [Corner; 4]) -> [Corner; 4] {
+    let twice = |corner: Corner| match corner {
+        Corner::Point(i) => points[i].map(|c| 2 * c),
+        Corner::Cut(i, j) => [0, 1, 2].map(|axis| points[i][axis] + points[j][axis]),
+    };
+    let origin = twice(tet[0]);
+    let [b, c, d] = [1, 2, 3].map(|k| {
+        let p = twice(tet[k]);
+        [0, 1, 2].map(|axis| p[axis] - origin[axis])
+    });
+    let determinant =
+        b[0] * (c[1] * d[2] - c[2] * d[1]) + b[1] * (c[2] * d[0] - c[0] * d[2]) + b[2] * (c[0] * d[1] - c[1] * d[0]);
+    if determinant < 0 {
+        tet.swap(2, 3);
+    }
+    tet
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// With every cut half way, each of the 81 patterns must fill exactly the volume that is inside.
+    #[test]
+    fn every_pattern_fills_its_volume() {
+        let points: [Point; 4] = [[1, 1, 1], [3, 1, 1], [2, 0, 0], [2, 2, 0]];
+        let sides = [Side::Inside, Side::Surface, Side::Outside];
+        let at = |corner: Corner| match corner {
+            Corner::Point(i) => glam::IVec3::from(points[i]).as_dvec3(),
+            Corner::Cut(i, j) => (glam::IVec3::from(points[i]) + glam::IVec3::from(points[j])).as_dvec3() / 2.0,
+        };
+        for pattern in 0..81usize {
+            let sides = [1, 3, 9, 27].map(|d| sides[pattern / d % 3]);
+            let mut share = 0.0;
+            fill(&points, &sides, |tet| {
+                let [a, b, c, d] = tet.map(at);
+                let volume = (b - a).cross(c - a).dot(d - a);
+                assert!(volume > 1e-9, "{sides:?}: {tet:?}");
+                share += volume / 4.0;
+            });
+            let count = |side| sides.iter().filter(|&&s| s == side).count();
+            // The tet scaled by 1/2 at a corner has 1/8 of the volume; each corner on the surface halves a side less.
+            let expected = match (count(Side::Inside), count(Side::Surface), count(Side::Outside)) {
+                (0, ..) => 0.0,
+                (_, _, 0) => 1.0,
+                (1, zeros, _) => 0.125 * f64::from(1 << zeros),
+                (2, 1, _) => 0.75,
+                (2, ..) => 0.5,
+                _ => 0.875,
             };
-            let [b, c, d] = others.map(&mut corner);
-            out.push([lattice.node(a), b, c, d]);
+            assert!((share - expected).abs() < 1e-12, "{sides:?}: {share} instead of {expected}");
         }
-        (2, 1) => {
-            // A pyramid: the surface corner z over the quadrilateral a, b, cut(b), cut(a).
-            let [z, mut others @ ..] = bring_front(tet, &sides, Side::Surface);
-            while lattice.side(others[2]) != Side::Outside {
-                others.rotate_left(1);
-            }
-            let [a, b, d] = others;
-            let first = lattice.splits_from_first(a, b, d);
-            let (na, nb, nz) = (lattice.node(a), lattice.node(b), lattice.node(z));
-            let (ca, cb) = (lattice.cut(a, d), lattice.cut(b, d));
-            if first {
-                out.extend([[nz, na, nb, cb], [nz, na, cb, ca]]);
-            } else {
-                out.extend([[nz, na, nb, ca], [nz, nb, cb, ca]]);
-            }
-        }
-        (2, _) => {
-            let mut t = bring_front(tet, &sides, Side::Inside);
-            while lattice.side(t[1]) != Side::Inside {
-                t = [t[0], t[2], t[3], t[1]];
-            }
-            let [a, b, c, d] = t;
-            let on_abc = lattice.splits_from_first(a, b, c);
-            let on_abd = !lattice.splits_from_first(a, b, d);
-            let bottom = [lattice.node(a), lattice.cut(a, c), lattice.cut(a, d)];
-            let top = [lattice.node(b), lattice.cut(b, c), lattice.cut(b, d)];
-            // The third side lies on the surface: free, unless the other two leave only one choice.
-            let on_surface =
-                if on_abc == on_abd { !on_abc } else { lattice.shorter((bottom[1], top[2]), (bottom[2], top[1])) };
-            prism(bottom, top, [on_abc, on_surface, on_abd], out);
-        }
-        _ => {
-            let [d, a, c, b] = bring_front(tet, &sides, Side::Outside);
-            let diagonals = [(a, b), (b, c), (c, a)].map(|(p, q)| lattice.splits_from_first(p, q, d));
-            let bottom = [a, b, c].map(|p| lattice.node(p));
-            let top = [a, b, c].map(|p| lattice.cut(p, d));
-            prism(bottom, top, diagonals, out);
-        }
-    }
-}
-
-/// The element's corners, evenly permuted so that the first is on `side`.
-fn bring_front(tet: [usize; 4], sides: &[Side; 4], side: Side) -> [usize; 4] {
-    let k = sides.iter().position(|s| *s == side).unwrap_or(0);
-    FRONT[k].map(|k| tet[k])
-}
-
-/// Splits the prism between triangle `v` and triangle `w` (which lies on the positive side of `v`) into three tetrahedra. Side k, between
-/// corners k and k+1, is split along v(k)-w(k+1) if `diagonals[k]`, else along v(k+1)-w(k); not all three may be the same.
-fn prism(mut v: [u32; 3], mut w: [u32; 3], mut diagonals: [bool; 3], out: &mut Vec<[u32; 4]>) {
-    debug_assert!(diagonals.contains(&true) && diagonals.contains(&false), "a prism cannot be split around a circle");
-    // Turn the prism until two diagonals meet at v[0].
-    while !diagonals[0] || diagonals[2] {
-        v.rotate_left(1);
-        w.rotate_left(1);
-        diagonals.rotate_left(1);
-    }
-    out.push([w[0], w[2], w[1], v[0]]);
-    if diagonals[1] {
-        out.extend([[v[0], v[1], v[2], w[2]], [v[0], v[1], w[2], w[1]]]);
-    } else {
-        out.extend([[v[0], v[1], v[2], w[1]], [v[0], w[1], v[2], w[2]]]);
     }
 }

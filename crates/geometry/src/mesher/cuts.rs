@@ -1,0 +1,165 @@
+//! Where the lattice's edges cross the surface, and the lattice points that move onto it.
+
+use super::bcc::{LONG_STEPS, Lattice, Point, STEPS, reverse, step_between};
+use crate::{Error, Result, SignedDistance};
+use glam::DVec3;
+use rayon::prelude::*;
+
+/// A lattice point is moved onto a cut point nearer than this share of the edge's length. The values are those of
+/// Labelle and Shewchuk (2007), table 1, for which every dihedral angle lies between 10.78 and 164.74 degrees.
+const SNAP_LONG: f64 = 0.24999;
+const SNAP_SHORT: f64 = 0.41189;
+/// A cut point is found when the distance there is below this share of a cell.
+const ON_SURFACE: f64 = 1e-4;
+
+/// One crossing of an edge from an inside point to an outside point.
+struct Cut {
+    /// Slot of the inside end, and the step from there to the outside end.
+    inside: u32,
+    step: u8,
+    outside: u32,
+    /// Share of the edge from the inside end to the crossing.
+    share: f64,
+    /// False once an end of the edge has moved onto the surface.
+    alive: bool,
+}
+
+/// The cut points of a lattice and the points that have moved.
+pub(super) struct Cuts {
+    /// Ordered by inside end, then step.
+    cuts: Vec<Cut>,
+    /// Slot and new position of each moved point, ordered by slot.
+    moved: Vec<(u32, DVec3)>,
+}
+
+impl Cuts {
+    /// Finds every crossing.
+    pub(super) fn find(lattice: &Lattice, shape: &dyn SignedDistance) -> Result<Self> {
+        let found: Vec<Vec<Cut>> = lattice
+            .stored_blocks()
+            .map(|slots| {
+                let mut cuts = Vec::new();
+                for inside in slots.filter(|&slot| lattice.values[slot as usize] < 0.0) {
+                    let p = lattice.point(inside);
+                    for step in 0..STEPS.len() {
+                        let q = Lattice::neighbour(p, step);
+                        // A point without a slot may be a field that jumps; it is reported below.
+                        let outside = lattice.slot(q).unwrap_or(u32::MAX);
+                        if lattice.values.get(outside as usize).is_none_or(|&value| value > 0.0) {
+                            let share = crossing(lattice, shape, inside, outside, step);
+                            cuts.push(Cut { inside, step: step as u8, outside, share, alive: true });
+                        }
+                    }
+                }
+                cuts
+            })
+            .collect();
+        let cuts: Vec<Cut> = found.into_iter().flatten().collect();
+        if let Some(cut) = cuts.iter().find(|cut| cut.share.is_nan()) {
+            let at = lattice.position(lattice.point(cut.inside));
+            return Err(Error::Mesh(if cut.outside == u32::MAX {
+                format!(
+                    "the shape has an inside at {at} m, beyond its bounds or where its signed distance promised \
+                     none; widen the bounds, or use a field that changes no faster than the position"
+                )
+            } else {
+                format!("the signed distance near {at} m is not a number")
+            }));
+        }
+        Ok(Self { cuts, moved: Vec::new() })
+    }
+
+    /// Moves each lattice point that has a cut point too close by onto the closest one. It is then on the surface
+    /// (value 0), and the cut points on its edges vanish. Points are visited in the order of their slots.
+    pub(super) fn warp(&mut self, lattice: &mut Lattice) {
+        let mut touched: Vec<u32> = self.cuts.iter().flat_map(|cut| [cut.inside, cut.outside]).collect();
+        touched.sort_unstable();
+        touched.dedup();
+        for slot in touched {
+            let p = lattice.point(slot);
+            let here: Vec<usize> = (0..STEPS.len()).filter_map(|step| self.index_at(lattice, slot, p, step)).collect();
+            let mut closest: Option<(f64, usize)> = None;
+            for &index in here.iter().filter(|&&index| self.cuts[index].alive) {
+                let cut = &self.cuts[index];
+                let share = if cut.inside == slot { cut.share } else { 1.0 - cut.share };
+                let snap = if usize::from(cut.step) < LONG_STEPS { SNAP_LONG } else { SNAP_SHORT };
+                let distance = share * lattice.step_length(usize::from(cut.step));
+                if share < snap && closest.is_none_or(|(least, _)| distance < least) {
+                    closest = Some((distance, index));
+                }
+            }
+            if let Some((_, index)) = closest {
+                self.moved.push((slot, self.position(lattice, index)));
+                lattice.values[slot as usize] = 0.0;
+                for index in here {
+                    self.cuts[index].alive = false;
+                }
+            }
+        }
+    }
+
+    /// Number of the cut point on the edge from the inside point `p` to the outside point `q`.
+    pub(super) fn between(&self, lattice: &Lattice, p: Point, q: Point) -> Option<usize> {
+        self.index(lattice.slot(p)?, step_between(p, q))
+    }
+
+    /// Position of a cut point [m].
+    pub(super) fn position(&self, lattice: &Lattice, index: usize) -> DVec3 {
+        let Cut { inside, outside, share, .. } = self.cuts[index];
+        lattice.position(lattice.point(inside)).lerp(lattice.position(lattice.point(outside)), share)
+    }
+
+    /// Position of a lattice point after the warp [m].
+    pub(super) fn position_of_point(&self, lattice: &Lattice, slot: u32) -> DVec3 {
+        match self.moved.binary_search_by_key(&slot, |&(slot, _)| slot) {
+            Ok(found) => self.moved[found].1,
+            Err(_) => lattice.position(lattice.point(slot)),
+        }
+    }
+
+    /// Number of cut points, dead ones included.
+    pub(super) fn len(&self) -> usize {
+        self.cuts.len()
+    }
+
+    /// The cut on the edge that leaves `p` by `step`, whichever end is inside.
+    fn index_at(&self, lattice: &Lattice, slot: u32, p: Point, step: usize) -> Option<usize> {
+        self.index(slot, step).or_else(|| self.index(lattice.slot(Lattice::neighbour(p, step))?, reverse(step)))
+    }
+
+    fn index(&self, inside: u32, step: usize) -> Option<usize> {
+        self.cuts.binary_search_by_key(&(inside, step as u8), |cut| (cut.inside, cut.step)).ok()
+    }
+}
+
+/// Share of the way from the inside point to the outside point where the field is zero, by the Illinois variant of
+/// regula falsi. NaN when the field is, or when the outside point has no slot.
+fn crossing(lattice: &Lattice, shape: &dyn SignedDistance, inside: u32, outside: u32, step: usize) -> f64 {
+    let Some(&value_outside) = lattice.values.get(outside as usize) else { return f64::NAN };
+    let start = lattice.point(inside);
+    let (p, q) = (lattice.position(start), lattice.position(Lattice::neighbour(start, step)));
+    let (mut low, mut high) = (0.0, 1.0);
+    let (mut at_low, mut at_high) = (lattice.values[inside as usize], value_outside);
+    let mut last_low: Option<bool> = None;
+    let mut share = 0.5;
+    // Superlinear for a distance; halving an end's weight whenever it stays put bounds the rest.
+    for _ in 0..50 {
+        share = low + (high - low) * at_low / (at_low - at_high);
+        let value = shape.distance(p.lerp(q, share));
+        if value.is_nan() {
+            return f64::NAN;
+        }
+        if value.abs() <= ON_SURFACE * lattice.cell || high - low < ON_SURFACE * 0.1 {
+            break;
+        }
+        if value < 0.0 {
+            (low, at_low) = (share, value);
+            at_high *= if last_low == Some(true) { 0.5 } else { 1.0 };
+        } else {
+            (high, at_high) = (share, value);
+            at_low *= if last_low == Some(false) { 0.5 } else { 1.0 };
+        }
+        last_low = Some(value < 0.0);
+    }
+    share
+}
