@@ -88,28 +88,45 @@ impl Substep<'_> {
         if self.fixed[i] {
             return here;
         }
-        let mut local = self.inertia(i, here);
-        self.add_edges(i, here, x, &mut local);
-        self.add_supports(i, here, &mut local);
         let mut remembered = [(Vec3A::ZERO, 0.0f32); REMEMBERED];
-        let corners = self.body.corners_of(i);
-        for k in corners.clone() {
-            let seen = self.corner(k, here, x);
-            if let Some(slot) = remembered.get_mut(k - corners.start) {
-                *slot = (seen.gradient, seen.ratio);
-            }
-            elasticity.add(self.body, k, &seen, &mut local);
-        }
+        let local = self.local(elasticity, i, x, &mut remembered);
         let step = solve(&local.block, local.force);
+        let corners = self.body.corners_of(i);
+        let first = corners.start;
         let mut share = 1.0f32;
-        for k in corners.clone() {
-            let (gradient, ratio) = remembered.get(k - corners.start).copied().unwrap_or_else(|| {
+        for k in corners {
+            let (gradient, ratio) = remembered.get(k - first).copied().unwrap_or_else(|| {
                 let seen = self.corner(k, here, x);
                 (seen.gradient, seen.ratio)
             });
             share = share.min(allowed_share(ratio, gradient.dot(step)));
         }
         here + share * step
+    }
+
+    /// Force and block of vertex `i`; `remembered` takes the volume gradients and ratios of its first elements.
+    #[inline(always)]
+    fn local<E: VertexElasticity>(
+        &self,
+        elasticity: &E,
+        i: usize,
+        x: &[Vec3A],
+        remembered: &mut [(Vec3A, f32)],
+    ) -> Local {
+        let here = x[i];
+        let mut local = self.inertia(i, here);
+        self.add_edges(i, here, x, &mut local);
+        self.add_supports(i, here, &mut local);
+        let corners = self.body.corners_of(i);
+        let first = corners.start;
+        for k in corners {
+            let seen = self.corner(k, here, x);
+            if let Some(slot) = remembered.get_mut(k - first) {
+                *slot = (seen.gradient, seen.ratio);
+            }
+            elasticity.add(self.body, k, &seen, &mut local);
+        }
+        local
     }
 
     /// The vertex's element behind corner `k`.
@@ -193,4 +210,140 @@ fn solve(block: &Mat3A, force: Vec3A) -> Vec3A {
     // Symmetric: the columns of the cofactor matrix are its rows.
     let inverse_determinant = 1.0 / a.dot(bc);
     Vec3A::new(bc.dot(force), ca.dot(force), ab.dot(force)) * inverse_determinant
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{BodyDescription, ConstitutiveModel, Material, ModelBuilder, SupportPlane};
+    use glam::{DMat3, DVec3, Vec3};
+    use trocar_geometry::TetMesh;
+
+    /// Five elements around one inner node, in no special position.
+    fn mesh() -> TetMesh {
+        let p = |x: f64, y: f64, z: f64| 1e-3 * DVec3::new(x, y, z);
+        let mut mesh = TetMesh {
+            vertices: vec![
+                p(0.1, 0.2, 0.1),
+                p(2.0, 0.0, -1.0),
+                p(-1.5, 1.8, -1.1),
+                p(-1.2, -1.9, -0.9),
+                p(0.2, 0.1, 2.1),
+                p(0.1, 0.0, -2.2),
+            ],
+            tets: vec![[0, 1, 2, 4], [0, 2, 3, 4], [0, 3, 1, 4], [0, 2, 1, 5], [0, 3, 2, 5], [0, 1, 3, 5]],
+        };
+        for t in 0..mesh.tets.len() {
+            if mesh.tet_volume(t) < 0.0 {
+                mesh.tets[t].swap(2, 3);
+            }
+        }
+        mesh
+    }
+
+    /// A deterministic number in -1..1.
+    fn noise(k: usize) -> f64 {
+        ((k as f64 * 12.9898).sin() * 43758.5453).fract()
+    }
+
+    /// Energy of the substep's incremental potential in double precision, from the textbook forms.
+    fn energy(substep: &Substep<'_>, x: &[DVec3]) -> f64 {
+        let body = substep.body;
+        let psi = body.material.hyperelastic();
+        let gradient = |v: [DVec3; 4]| DMat3::from_cols(v[1] - v[0], v[2] - v[0], v[3] - v[0]);
+        let mut sum = 0.0;
+        for (t, tet) in body.tets.iter().enumerate() {
+            let f = gradient(tet.map(|i| x[i as usize])) * gradient(body.rest.corners(t)).inverse();
+            sum += body.volumes[t] * psi.energy(f);
+        }
+        let h = f64::from(substep.h);
+        for (i, vertex) in body.vertices.iter().enumerate() {
+            sum += 0.5 * f64::from(vertex.mass) / (h * h) * (x[i] - substep.predictor[i].as_dvec3()).length_squared();
+            for edge in body.edges_of(i) {
+                // Each edge is met twice; the dashpot works along its direction at the beginning.
+                let j = edge.to as usize;
+                let start = |k: usize| substep.start[k].as_dvec3();
+                let direction = (start(j) - start(i)).normalize();
+                let stretching = direction.dot((x[i] - start(i)) - (x[j] - start(j)));
+                sum += 0.5 * 0.5 * f64::from(edge.damping) / h * stretching * stretching;
+            }
+            for plane in substep.planes {
+                let height = (x[i] - plane.point.as_dvec3()).dot(plane.normal.as_dvec3()).min(0.0);
+                sum += 0.5 * f64::from(vertex.contact_stiffness) * height * height;
+            }
+        }
+        sum
+    }
+
+    /// The kernels' forces are the negative gradient of the energy, and their blocks its second derivative (for St. Venant-Kirchhoff in a
+    /// stretched state, where nothing of it is dropped).
+    #[test]
+    fn forces_and_blocks_are_the_energys_derivatives() {
+        let mesh = mesh();
+        for (model, stretch) in [
+            (ConstitutiveModel::StableNeoHookean, 1.0),
+            (ConstitutiveModel::StableNeoHookean, 0.45),
+            (ConstitutiveModel::StVenantKirchhoff, 1.4),
+        ] {
+            let material =
+                Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 60.0 };
+            let plane = SupportPlane { point: DVec3::ZERO, normal: DVec3::Z, friction: 0.0 };
+            let body =
+                BodyDescription { name: "star".into(), mesh: &mesh, material, pinned: vec![], supports: vec![plane] };
+            let mut builder = ModelBuilder::new();
+            builder.body(body).unwrap();
+            let built = builder.build().unwrap();
+            let body = &built.bodies[0];
+            let rest: Vec<DVec3> = (0..6)
+                .map(|i| mesh.vertices[body.internal.iter().position(|k| *k == i).unwrap()] - body.origin)
+                .collect();
+            let moved = |k: usize, by: f64| by * DVec3::new(noise(k), noise(k + 50), noise(k + 100));
+            let x: Vec<DVec3> = rest.iter().enumerate().map(|(i, p)| stretch * p + moved(i, 1e-4)).collect();
+            let to_f32 = |x: &[DVec3]| -> Vec<Vec3A> { x.iter().map(|p| p.as_vec3a()).collect() };
+            let predictor: Vec<DVec3> = x.iter().enumerate().map(|(i, p)| p + moved(i + 7, 1e-4)).collect();
+            let plane = LocalPlane { point: Vec3A::ZERO, normal: Vec3A::Z, friction: 0.0 };
+            let substep = Substep {
+                body,
+                h: 1.0 / 480.0,
+                start: &to_f32(&rest),
+                predictor: &to_f32(&predictor),
+                fixed: &[false; 6],
+                planes: &[plane],
+            };
+            let at: Vec<DVec3> = to_f32(&x).iter().map(|p| p.as_dvec3()).collect();
+            for i in 0..6 {
+                let mut memory = [(Vec3A::ZERO, 0.0); REMEMBERED];
+                let local = match Kernel::of(body) {
+                    Kernel::StableNeoHookean(term) => substep.local(&term, i, &to_f32(&x), &mut memory),
+                    Kernel::StVenantKirchhoff(term) => substep.local(&term, i, &to_f32(&x), &mut memory),
+                };
+                let d = 1e-7;
+                let shifted = |steps: DVec3| {
+                    let mut x = at.clone();
+                    x[i] += d * steps;
+                    energy(&substep, &x)
+                };
+                let scale = f64::from(local.force.length()).max(1e-3);
+                let stiffness = f64::from(local.block.x_axis.length());
+                for (row, a) in [DVec3::X, DVec3::Y, DVec3::Z].into_iter().enumerate() {
+                    let force = -(shifted(a) - shifted(-a)) / (2.0 * d);
+                    let (said, model) = (f64::from(local.force.to_array()[row]), body.material.model);
+                    assert!(
+                        (said - force).abs() < 2e-3 * scale,
+                        "{model:?} node {i}: {said} N, {force} N by differences"
+                    );
+                    for (column, b) in [Vec3::X, Vec3::Y, Vec3::Z].into_iter().enumerate() {
+                        let b = b.as_dvec3();
+                        let second =
+                            (shifted(a + b) - shifted(a - b) - shifted(b - a) + shifted(-a - b)) / (4.0 * d * d);
+                        let said = f64::from(local.block.col(column).to_array()[row]);
+                        assert!(
+                            (said - second).abs() < 0.01 * stiffness,
+                            "{model:?} node {i}: {said} N/m, {second} by differences"
+                        );
+                    }
+                }
+            }
+        }
+    }
 }

@@ -69,9 +69,9 @@ pub struct Record {
 
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
-#[group(id = "input", required = true, multiple = false, args = ["recording", "surface"])]
 pub struct Reconstruct {
     /// Recording folder.
+    #[arg(required_unless_present = "surface", conflicts_with = "surface")]
     pub recording: Option<PathBuf>,
     /// A ready surface instead of a recording: .stl, .ply or .obj.
     #[arg(long, requires = "units")]
