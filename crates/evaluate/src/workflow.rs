@@ -17,7 +17,7 @@ pub const REPORT: &str = "report.html";
 const RUN_MARKER: &str = "result.json";
 
 /// Frames between snapshots of a run's moving picture.
-const SNAPSHOT_EVERY: usize = 6;
+const SNAPSHOT_EVERY: usize = 8;
 
 /// A specimen that was made, in figures.
 #[derive(Clone, Debug, Serialize)]

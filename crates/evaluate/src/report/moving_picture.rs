@@ -5,7 +5,6 @@ use super::views::{self, Directions, View};
 use crate::{Error, Result};
 use color_quant::NeuQuant;
 use glam::DVec3;
-use std::collections::BTreeMap;
 use trocar_cell::{GraspLiftRun, Snapshot};
 use trocar_geometry::Skin;
 use trocar_render::{Instance, Scene, Shading};
@@ -175,11 +174,15 @@ impl<'a> Lift<'a> {
         let mut bytes = Vec::new();
         let mut encoder = gif::Encoder::new(&mut bytes, width, height, &palette.rgb)?;
         encoder.set_repeat(gif::Repeat::Infinite)?;
-        let mut nearest = BTreeMap::new();
+        // Colours that agree in their upper six bits share a palette entry: the search is slow, the difference unseen.
+        let mut nearest: Vec<Option<u8>> = vec![None; 1 << 18];
         let mut before: Option<Vec<u8>> = None;
         for (i, frame) in frames.iter().enumerate() {
-            let indices: Vec<u8> =
-                frame.pixels.iter().map(|p| *nearest.entry(*p).or_insert_with(|| palette.index(*p))).collect();
+            let indices: Vec<u8> = frame
+                .pixels
+                .iter()
+                .map(|p| *nearest[upper_bits(*p)].get_or_insert_with(|| palette.index(*p)))
+                .collect();
             let buffer: Vec<u8> = match &before {
                 Some(before) => indices.iter().zip(before).map(|(a, b)| if a == b { UNCHANGED } else { *a }).collect(),
                 None => indices.clone(),
@@ -224,6 +227,11 @@ impl Palette {
     fn index(&self, [r, g, b]: [u8; 3]) -> u8 {
         self.quantizer.index_of(&[r, g, b, 255]).min(usize::from(UNCHANGED) - 1) as u8
     }
+}
+
+/// The upper six bits of each channel as one number.
+fn upper_bits([r, g, b]: [u8; 3]) -> usize {
+    usize::from(r >> 2) << 12 | usize::from(g >> 2) << 6 | usize::from(b >> 2)
 }
 
 /// Phase of the sample nearest to a time.

@@ -169,7 +169,7 @@ figure svg{display:block;width:100%;height:auto}
 figure svg text{font-family:system-ui,-apple-system,"Segoe UI",Roboto,"Helvetica Neue",Arial,sans-serif}
 figcaption{margin-top:8px;font-size:.86rem;line-height:1.42;color:var(--soft)}
 figcaption b{color:var(--ink);font-weight:600}
-.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(155px,1fr));gap:12px;margin:0 0 22px}
+.cards{display:grid;grid-template-columns:repeat(auto-fit,minmax(215px,1fr));gap:12px;margin:0 0 22px}
 .card{background:var(--card);border:1px solid var(--line);border-radius:8px;padding:12px 14px;display:flex;flex-direction:column;break-inside:avoid}
 .card .name{font-size:.78rem;color:var(--soft)}
 .card .value{font-size:1.45rem;font-weight:640;line-height:1.3;font-variant-numeric:tabular-nums;overflow-wrap:anywhere}
@@ -184,8 +184,8 @@ figcaption b{color:var(--ink);font-weight:600}
 .bar>span{display:flex;justify-content:space-between;font-variant-numeric:tabular-nums}
 .legend i,.bar i{-webkit-print-color-adjust:exact;print-color-adjust:exact}
 .wide{overflow-x:auto;margin:0 0 12px}
-table{border-collapse:collapse;width:100%;font-size:.86rem;font-variant-numeric:tabular-nums}
-th,td{padding:7px 9px;text-align:right;border-bottom:1px solid var(--line);vertical-align:top;white-space:nowrap}
+table{border-collapse:collapse;width:100%;font-size:.82rem;font-variant-numeric:tabular-nums}
+th,td{padding:7px 6px;text-align:right;border-bottom:1px solid var(--line);vertical-align:top;white-space:nowrap}
 th{font-weight:600;color:var(--soft);vertical-align:bottom;border-bottom:1.5px solid var(--ink);line-height:1.25;white-space:normal}
 th:first-child,td:first-child{text-align:left}
 td:first-child{font-weight:600}

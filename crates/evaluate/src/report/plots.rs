@@ -81,8 +81,8 @@ impl Plot<'_> {
         let mut chart = ChartBuilder::on(&root)
             .margin_top(top)
             .margin_right(14)
-            .x_label_area_size(42)
-            .y_label_area_size(56)
+            .x_label_area_size(46)
+            .y_label_area_size(60)
             .build_cartesian_2d(x0..x1, y0..y1)
             .map_err(|e| e.to_string())?;
         for (i, band) in self.bands.iter().enumerate().filter(|(_, b)| b.to > b.from) {
@@ -95,7 +95,7 @@ impl Plot<'_> {
             let (right, y) = chart.backend_coord(&(b, y1));
             // About 6 pixels a letter: a name that does not fit its band is left out.
             if right - left > 6 * band.name.len() as i32 {
-                let style = text(11).pos(Pos::new(HPos::Center, VPos::Bottom));
+                let style = text(12).pos(Pos::new(HPos::Center, VPos::Bottom));
                 let label = Text::new(band.name.clone(), ((left + right) / 2, y - 5), style);
                 root.draw(&label).map_err(|e| e.to_string())?;
             }
@@ -114,8 +114,8 @@ impl Plot<'_> {
             .y_label_formatter(&tick)
             .x_desc(self.x)
             .y_desc(self.y)
-            .label_style(text(12))
-            .axis_desc_style(text(13))
+            .label_style(text(14))
+            .axis_desc_style(text(15))
             .draw()
             .map_err(|e| e.to_string())?;
         for limit in &self.limits {

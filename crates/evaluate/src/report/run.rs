@@ -16,7 +16,9 @@ const TISSUE: [u8; 3] = [16, 150, 140];
 
 /// Views of the organs and their table.
 pub(super) fn bodies(s: &Specimen, beside_paper: bool) -> Result<String> {
-    let points: Vec<DVec3> = s.organs.iter().flat_map(|o| o.surface.vertices.iter().copied()).collect();
+    // The bodies too: a lattice may stand out a little beyond its surface.
+    let points: Vec<DVec3> =
+        s.organs.iter().flat_map(|o| o.surface.vertices.iter().chain(&o.body.vertices).copied()).collect();
     let d = Directions::of(s);
     let size = (800, 520);
     let oblique = View::framing(&points, d.oblique(), d.up, size);
@@ -83,10 +85,7 @@ pub(super) fn sections(s: &Specimen, run: &GraspLiftRun) -> Result<(String, Stri
             Columns::Two,
             &[
                 page::figure(&before, &format!("<b>Elements before,</b> at {} s.", fixed(first.time_s, 2))),
-                page::figure(
-                    &after,
-                    "<b>Elements at the top.</b> Stretched, none turned inside out where the count says 0.",
-                ),
+                page::figure(&after, "<b>Elements at the top</b> of the lift."),
             ],
         );
     } else {
