@@ -1,6 +1,9 @@
 //! A fine surface carried by a coarse tetrahedral body.
 
-use crate::{TetMesh, TetQuality, TriMesh};
+mod box_grid;
+
+use crate::{TetMesh, TriMesh};
+use box_grid::BoxGrid;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
@@ -11,110 +14,197 @@ pub struct Skin {
     pub bindings: Vec<(u32, [f64; 4])>,
 }
 
+/// A vertex this little outside an element, as a weight, still counts as inside.
+const ROUNDING: f64 = 1e-9;
+/// No weight lies further than this below 0 or above 1. A vertex far outside the body would swing with every strain of
+/// one element; it is bound nearer to the body instead, and rests there.
+const MOST_EXTRAPOLATED: f64 = 3.0;
+
 impl Skin {
-    /// Binds each vertex of `surface` to `body` in the rest shape: to the element that holds it, or for a vertex outside the body to the
-    /// element among the nearest that it is least outside of.
+    /// Binds each vertex of `surface` to `body` in the rest shape: to the element that holds it, else to the one whose
+    /// boundary triangle is nearest, with extrapolating weights.
+    ///
+    /// Vertices farther from the body than about an element's height are moved towards it, so that no weight leaves
+    /// -3..=4. Without any element of positive volume nothing is bound.
     pub fn bind(surface: &TriMesh, body: &TetMesh) -> Self {
-        let buckets = Buckets::new(body);
-        let bindings = surface.vertices.par_iter().map(|p| buckets.binding(body, *p)).collect();
-        Self { bindings }
+        let around = |points: &[DVec3]| {
+            points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)))
+        };
+        let frames: Vec<Frame> = (0..body.tets.len()).into_par_iter().map(|t| Frame::of(&body.corners(t))).collect();
+        let boxes: Vec<_> = (0..body.tets.len()).map(|t| around(&body.corners(t))).collect();
+        // A plane that has the whole body on its negative side leaves the whole boundary, each triangle with its element.
+        let outside = body.cut_away(body.bounds().map_or(DVec3::ZERO, |(_, hi)| hi + DVec3::ONE), DVec3::ONE);
+        let triangles: Vec<[DVec3; 3]> =
+            outside.surface.triangles.iter().map(|t| t.map(|i| outside.surface.vertices[i as usize])).collect();
+        let triangle_boxes: Vec<_> = triangles.iter().map(|triangle| around(triangle)).collect();
+        let (Some(elements), Some(shell)) = (BoxGrid::new(&boxes), BoxGrid::new(&triangle_boxes)) else {
+            return Self { bindings: Vec::new() };
+        };
+        let bind = |&p: &DVec3| {
+            let mut inside: Option<(f64, u32, [f64; 4])> = None;
+            for &t in elements.at(p) {
+                let weights = frames[t as usize].weights(p);
+                let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
+                if least >= -ROUNDING && inside.is_none_or(|(best, ..)| least > best) {
+                    inside = Some((least, t, weights));
+                }
+            }
+            if let Some((_, t, weights)) = inside {
+                return (t, weights);
+            }
+            let to = |k: u32| closest_on_triangle(p, &triangles[k as usize]);
+            match shell.nearest(p, |k| to(k).distance(p)) {
+                Some(k) => {
+                    let frame = &frames[outside.tets[k as usize] as usize];
+                    (outside.tets[k as usize], limited(frame.weights(to(k)), frame.weights(p)))
+                }
+                // Only a vertex that is not a number has no nearest triangle.
+                None => (0, [f64::NAN; 4]),
+            }
+        };
+        Self { bindings: surface.vertices.par_iter().map(bind).collect() }
     }
 
     /// Surface vertex positions when the body's nodes are at `nodes` [m], written to `out`.
+    ///
+    /// `nodes` has one entry for each node of `body`, the mesh that the skin was bound to; `out` one for each vertex.
+    /// Follows every affine motion of the body exactly, and allocates nothing.
     pub fn deform(&self, body: &TetMesh, nodes: &[DVec3], out: &mut [DVec3]) {
-        for (p, (t, weights)) in out.iter_mut().zip(&self.bindings) {
-            *p = body.tets[*t as usize].iter().zip(weights).map(|(i, w)| nodes[*i as usize] * *w).sum();
+        for (vertex, &(t, weights)) in out.iter_mut().zip(&self.bindings) {
+            let [a, b, c, d] = body.tets[t as usize].map(|node| nodes[node as usize]);
+            *vertex = weights[0] * a + weights[1] * b + weights[2] * c + weights[3] * d;
         }
     }
 }
 
-/// Elements by the grid cells their bounding boxes touch, sorted by cell.
-struct Buckets {
+/// Barycentric coordinates of an element.
+struct Frame {
     origin: DVec3,
-    cell: f64,
-    dims: [i64; 3],
-    tets: Vec<(i64, u32)>,
+    /// Rows are the gradients of the last three weights [1/m].
+    gradients: DMat3,
 }
 
-/// Cells searched around a vertex, at most; beyond, the nearest element by its middle is taken.
-const RINGS: i64 = 4;
-
-impl Buckets {
-    fn new(body: &TetMesh) -> Self {
-        let (lo, hi) = body.bounds().unwrap_or_default();
-        let cell = (2.0 * TetQuality::of(body).median_edge).max(f64::MIN_POSITIVE);
-        let dims = ((hi - lo) / cell).to_array().map(|n| n as i64 + 1);
-        let mut buckets = Self { origin: lo, cell, dims, tets: Vec::new() };
-        for t in 0..body.tets.len() {
-            let x = body.corners(t);
-            let low = buckets.cell_of(x.iter().copied().reduce(DVec3::min).unwrap_or_default());
-            let high = buckets.cell_of(x.iter().copied().reduce(DVec3::max).unwrap_or_default());
-            for k in low[2]..=high[2] {
-                for j in low[1]..=high[1] {
-                    for i in low[0]..=high[0] {
-                        let number = buckets.number([i, j, k]);
-                        buckets.tets.push((number, t as u32));
-                    }
-                }
-            }
-        }
-        buckets.tets.sort_unstable();
-        buckets
+impl Frame {
+    fn of(&[a, b, c, d]: &[DVec3; 4]) -> Self {
+        Self { origin: a, gradients: DMat3::from_cols(b - a, c - a, d - a).inverse() }
     }
 
-    fn cell_of(&self, p: DVec3) -> [i64; 3] {
-        let c = ((p - self.origin) / self.cell).floor();
-        [0, 1, 2].map(|d| (c[d] as i64).clamp(0, self.dims[d] - 1))
-    }
-
-    fn number(&self, [i, j, k]: [i64; 3]) -> i64 {
-        (k * self.dims[1] + j) * self.dims[0] + i
-    }
-
-    fn binding(&self, body: &TetMesh, p: DVec3) -> (u32, [f64; 4]) {
-        let centre = self.cell_of(p);
-        let mut best: Option<(f64, u32, [f64; 4])> = None;
-        for ring in 0..=RINGS {
-            let had_one = best.is_some();
-            for k in centre[2] - ring..=centre[2] + ring {
-                for j in centre[1] - ring..=centre[1] + ring {
-                    for i in centre[0] - ring..=centre[0] + ring {
-                        let c = [i, j, k];
-                        let on_ring = (0..3).any(|d| (c[d] - centre[d]).abs() == ring);
-                        if on_ring && (0..3).all(|d| (0..self.dims[d]).contains(&c[d])) {
-                            self.search(body, p, self.number(c), &mut best);
-                        }
-                    }
-                }
-            }
-            // An element that holds the point ends the search; one that does not asks for one ring more.
-            if best.is_some_and(|b| b.0 >= 0.0) || had_one {
-                break;
-            }
-        }
-        let nearest_middle = || {
-            let middle = |t: usize| body.corners(t).iter().sum::<DVec3>() / 4.0;
-            let by_distance =
-                |a: &usize, b: &usize| (middle(*a) - p).length_squared().total_cmp(&(middle(*b) - p).length_squared());
-            (0..body.tets.len()).min_by(by_distance).unwrap_or(0) as u32
-        };
-        best.map_or_else(|| (nearest_middle(), [0.25; 4]), |(_, t, weights)| (t, weights))
-    }
-
-    fn search(&self, body: &TetMesh, p: DVec3, cell: i64, best: &mut Option<(f64, u32, [f64; 4])>) {
-        let start = self.tets.partition_point(|b| b.0 < cell);
-        for (_, t) in self.tets[start..].iter().take_while(|b| b.0 == cell) {
-            let weights = barycentric(body.corners(*t as usize), p);
-            let least = weights.into_iter().fold(f64::INFINITY, f64::min);
-            if best.is_none_or(|b| least > b.0) {
-                *best = Some((least, *t, weights));
-            }
-        }
+    fn weights(&self, p: DVec3) -> [f64; 4] {
+        let w = self.gradients * (p - self.origin);
+        [1.0 - w.x - w.y - w.z, w.x, w.y, w.z]
     }
 }
 
-/// Barycentric weights of `p` in a tetrahedron.
-fn barycentric([a, b, c, d]: [DVec3; 4], p: DVec3) -> [f64; 4] {
-    let w = DMat3::from_cols(b - a, c - a, d - a).inverse() * (p - a);
-    [1.0 - w.x - w.y - w.z, w.x, w.y, w.z]
+/// The weights on the way from `near` (a point of the element) to `wanted` that are as far along as the limit allows.
+fn limited(near: [f64; 4], wanted: [f64; 4]) -> [f64; 4] {
+    let mut share: f64 = 1.0;
+    for (from, to) in near.into_iter().zip(wanted) {
+        let limit = if to > from { 1.0 + MOST_EXTRAPOLATED } else { -MOST_EXTRAPOLATED };
+        if !(-MOST_EXTRAPOLATED..=1.0 + MOST_EXTRAPOLATED).contains(&to) {
+            share = share.min((limit - from) / (to - from));
+        }
+    }
+    [0, 1, 2, 3].map(|i| near[i] + share * (wanted[i] - near[i]))
+}
+
+/// The point of a triangle nearest to `p`: its foot in the plane where that lies inside, else the best of the edges.
+fn closest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
+    let normal = (b - a).cross(c - a);
+    let foot = p - normal * ((p - a).dot(normal) / normal.length_squared());
+    let within = |u: DVec3, v: DVec3| (v - u).cross(foot - u).dot(normal) >= 0.0;
+    if within(a, b) && within(b, c) && within(c, a) {
+        return foot;
+    }
+    let on_edge = |u: DVec3, v: DVec3| u.lerp(v, ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0));
+    let [first, second, third] = [on_edge(a, b), on_edge(b, c), on_edge(c, a)];
+    let nearer = |u: DVec3, v: DVec3| if v.distance_squared(p) < u.distance_squared(p) { v } else { u };
+    nearer(nearer(first, second), third)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{LatticeMesher, Mesher, SignedDistance};
+
+    struct Ball;
+    impl SignedDistance for Ball {
+        fn distance(&self, p: DVec3) -> f64 {
+            p.length() - 0.03
+        }
+    }
+
+    fn body(cell: f64) -> TetMesh {
+        LatticeMesher { cell }.mesh(&Ball, (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
+    }
+
+    /// Points evenly over a sphere, as a surface without triangles.
+    fn sphere(radius: f64, count: usize) -> TriMesh {
+        let vertices = (0..count)
+            .map(|i| {
+                let z = 1.0 - (2.0 * i as f64 + 1.0) / count as f64;
+                let turn = 2.399963229728653 * i as f64;
+                radius * DVec3::new((1.0 - z * z).sqrt() * turn.cos(), (1.0 - z * z).sqrt() * turn.sin(), z)
+            })
+            .collect();
+        TriMesh { vertices, ..TriMesh::default() }
+    }
+
+    #[test]
+    fn affine_motions_are_followed_exactly() {
+        let body = body(0.006);
+        // Deep inside, just inside, on and just outside the surface.
+        for radius in [0.004, 0.0295, 0.03, 0.0305] {
+            let surface = sphere(radius, 2000);
+            let skin = Skin::bind(&surface, &body);
+            let map =
+                DMat3::from_cols(DVec3::new(1.1, 0.2, -0.3), DVec3::new(0.0, 0.7, 0.4), DVec3::new(-0.2, 0.1, 1.3));
+            let moved = |p: DVec3| map * p + DVec3::new(0.5, -2.0, 0.1);
+            let nodes: Vec<DVec3> = body.vertices.iter().map(|&p| moved(p)).collect();
+            let mut out = vec![DVec3::ZERO; surface.vertices.len()];
+            skin.deform(&body, &nodes, &mut out);
+            let worst = surface.vertices.iter().zip(&out).map(|(&p, &q)| moved(p).distance(q)).fold(0.0, f64::max);
+            assert!(worst < 1e-12, "radius {radius}: {worst}");
+            for (_, weights) in &skin.bindings {
+                assert!((weights.iter().sum::<f64>() - 1.0).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
+    fn inside_points_are_bound_to_the_element_that_holds_them() {
+        let body = body(0.004);
+        let skin = Skin::bind(&sphere(0.02, 3000), &body);
+        assert!(skin.bindings.iter().all(|(_, w)| w.iter().all(|&w| w >= -1e-9)));
+    }
+
+    #[test]
+    fn outside_points_are_bound_to_the_nearest_boundary_and_stay_bounded() {
+        let body = body(0.006);
+        let (surface, _) = body.boundary();
+        for radius in [0.0304, 0.035, 0.3] {
+            let points = sphere(radius, 200);
+            let skin = Skin::bind(&points, &body);
+            for (p, (t, weights)) in points.vertices.iter().zip(&skin.bindings) {
+                let nearest = |triangle: &[u32; 3]| {
+                    closest_on_triangle(*p, &triangle.map(|i| surface.vertices[i as usize])).distance(*p)
+                };
+                let truth = surface.triangles.iter().map(nearest).fold(f64::INFINITY, f64::min);
+                let [a, b, c, d] = body.corners(*t as usize);
+                let found = [[b, c, d], [a, d, c], [a, b, d], [a, c, b]]
+                    .iter()
+                    .map(|triangle| closest_on_triangle(*p, triangle).distance(*p))
+                    .fold(f64::INFINITY, f64::min);
+                assert!((found - truth).abs() < 1e-12, "radius {radius}: {found} instead of {truth}");
+                assert!(weights.iter().all(|w| (-3.0 - 1e-9..=4.0 + 1e-9).contains(w)));
+            }
+        }
+    }
+
+    #[test]
+    fn an_empty_body_binds_nothing_and_deforms_nothing() {
+        let skin = Skin::bind(&sphere(1.0, 5), &TetMesh::default());
+        let mut out = vec![DVec3::ONE; 5];
+        skin.deform(&TetMesh::default(), &[], &mut out);
+        assert_eq!(out, vec![DVec3::ONE; 5]);
+    }
 }

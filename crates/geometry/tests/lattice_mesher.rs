@@ -176,9 +176,15 @@ fn the_cell_follows_the_budget() {
     let volume = 4.0 / 3.0 * PI * 0.05f64.powi(3);
     assert_eq!(LatticeMesher::for_volume(volume, 0.01, 1_000_000).cell, 0.01);
     let mesher = LatticeMesher::for_volume(volume, 0.0001, 50_000);
+    let evaluations = std::sync::atomic::AtomicUsize::new(0);
     let started = Instant::now();
-    let mesh = mesher.mesh(&Shape(|p| p.length() - 0.05), cube(0.05)).unwrap();
-    println!("{} tets in {:.0} ms", mesh.tets.len(), started.elapsed().as_secs_f64() * 1e3);
+    let counting = Shape(|p: DVec3| {
+        evaluations.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        p.length() - 0.05
+    });
+    let mesh = mesher.mesh(&counting, cube(0.05)).unwrap();
+    let (tets, took) = (mesh.tets.len(), started.elapsed().as_secs_f64() * 1e3);
+    println!("{tets} tets in {took:.0} ms and {evaluations:?} evaluations of the field");
     assert!((45_000..65_000).contains(&mesh.tets.len()));
 }
 
