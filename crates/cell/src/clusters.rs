@@ -17,6 +17,10 @@ const CLUSTER_EDGES: f64 = 1.5;
 const CLEARANCE: f64 = 0.005;
 const CLEARANCE_EDGES: f64 = 1.5;
 
+const CLEARANCE_HALVINGS: u32 = 3;
+/// As many clear nodes are enough for a cluster.
+const FEWEST_CLEAR: usize = 12;
+
 /// Nodes that are grasped together.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cluster {
@@ -59,14 +63,22 @@ fn not_beside_pins(body: &Body) -> impl Iterator<Item = u32> + use<> {
     (0..free.len() as u32).filter(move |i| free[*i as usize])
 }
 
-/// Leaves out the cluster's nodes within `clearance` [m] of pinned tissue at rest, unless that leaves none.
+/// Leaves out the cluster's nodes within `clearance` [m] of pinned tissue at rest, or within half of that, and so on, as long as too few are left.
 fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
     let rest = body.rest_positions();
     let pinned: Vec<DVec3> = (0..rest.len()).filter(|i| body.pinned()[*i]).map(|i| rest[i]).collect();
-    let is_clear = |i: &u32| pinned.iter().all(|p| (rest[*i as usize] - p).length_squared() >= clearance * clearance);
-    let clear: Vec<u32> = cluster.nodes.iter().copied().filter(is_clear).collect();
-    if !clear.is_empty() {
-        cluster.nodes = clear;
+    let gap = |i: u32| {
+        let to = |p: &DVec3| (rest[i as usize] - p).length_squared();
+        pinned.iter().map(to).fold(f64::INFINITY, f64::min).sqrt()
+    };
+    let gaps: Vec<(u32, f64)> = cluster.nodes.iter().map(|i| (*i, gap(*i))).collect();
+    for halvings in 0..=CLEARANCE_HALVINGS {
+        let least = clearance / f64::from(1u32 << halvings);
+        let clear: Vec<u32> = gaps.iter().filter(|(_, gap)| *gap >= least).map(|(i, _)| *i).collect();
+        if clear.len() >= FEWEST_CLEAR {
+            cluster.nodes = clear;
+            return;
+        }
     }
 }
 

@@ -18,6 +18,14 @@ const REACH: f64 = 0.009;
 /// ... or within this many median edges on a coarse mesh.
 const REACH_EDGES: f64 = 1.5;
 
+/// Organs that have not come to rest after the settling phase are calmed for at most this many frames ...
+const CALM_FRAMES: usize = 300;
+/// ... until they have been slow, undisturbed, for this many.
+const CALM_FOR: usize = 12;
+
+/// Fewest nodes the jaws take hold of, where there are as many.
+const FEWEST_HELD: usize = 8;
+
 /// How the task is run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GraspLift {
@@ -135,6 +143,9 @@ impl GraspLift {
                     return Ok(run.finish());
                 }
             }
+            if phase == Phase::Settle {
+                run.calm(progress)?;
+            }
             run.leave(phase);
         }
         progress.end();
@@ -219,6 +230,31 @@ impl<'a> Run<'a> {
         })
     }
 
+    /// Takes the swing out of organs that still move when the settling phase is over: a large soft organ swings for many seconds. Kinetic damping
+    /// (Cundall 1976): everything is stopped whenever the kinetic energy has passed a peak, until nothing moves fast for a while by itself.
+    fn calm(&mut self, progress: &dyn Progress) -> Result<()> {
+        let (mut energy, mut undisturbed) = (self.world.state.kinetic_energy(&self.world.model), CALM_FOR);
+        for _ in 0..CALM_FRAMES {
+            let is_slow = self.samples.last().is_some_and(|s| s.max_speed_m_s < SETTLED_SPEED);
+            if (is_slow && undisturbed >= CALM_FOR) || self.summary.diverged {
+                break;
+            }
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
+            }
+            self.step(Phase::Settle, 1.0);
+            undisturbed += 1;
+            let now = self.world.state.kinetic_energy(&self.world.model);
+            // Once slow, it is left alone to show that it stays so.
+            if now < energy && !self.samples.last().is_some_and(|s| s.max_speed_m_s < SETTLED_SPEED) {
+                self.world.state.stop();
+                undisturbed = 0;
+            }
+            energy = if undisturbed == 0 { 0.0 } else { now };
+        }
+        Ok(())
+    }
+
     /// What happens at the instant a phase begins.
     fn enter(&mut self, phase: Phase) -> Result<()> {
         match phase {
@@ -285,10 +321,13 @@ impl<'a> Run<'a> {
 
     fn choose_target(&self) -> Result<Target> {
         let (world, organ) = (&self.world, self.organ);
-        let all = clusters(world, organ);
-        let nearest = all.iter().min_by(|a, b| (a.s - self.task.at).abs().total_cmp(&(b.s - self.task.at).abs()));
         let reach = REACH.max(REACH_EDGES * world.model.bodies[organ].median_edge());
-        let cluster = nearest.map(|c| c.within_reach(world, organ, reach)).filter(|c| !c.nodes.is_empty());
+        let mut within: Vec<Cluster> =
+            clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
+        // Nearest first; of equally near ones the first.
+        within.sort_by(|a, b| (a.s - self.task.at).abs().total_cmp(&(b.s - self.task.at).abs()));
+        let enough = within.iter().position(|c| c.nodes.len() >= FEWEST_HELD).unwrap_or(0);
+        let cluster = within.into_iter().nth(enough).filter(|c| !c.nodes.is_empty());
         let Some(cluster) = cluster else {
             return Err(Error::Option(format!(
                 "organ '{}' has no free node to grasp: all are pinned or next to a pinned one; pin fewer",

@@ -17,9 +17,9 @@ const GRAVITY: f64 = 9.80665;
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
 
-/// Viscosity of tissue over its Young's modulus [s]: the decay time of a strain. The paper damps its elements without saying
-/// how much; 5 ms lets an organ come to rest within a second and stays far below the second that a lift takes.
-const VISCOSITY_TIME: f64 = 5e-3;
+/// Viscosity of tissue over its Young's modulus [s]: the decay time of a strain along an edge. The paper damps its elements without saying how much; this lets
+/// specimen A come to rest within a second and stays far below the second that a lift takes.
+const VISCOSITY_TIME: f64 = 0.02;
 
 /// The organs of a specimen as bodies that gravity pulls and planes support.
 pub struct World {

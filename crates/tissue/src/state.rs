@@ -60,6 +60,22 @@ impl State {
         self.bodies[body].v[model.bodies[body].internal[node] as usize] = velocity.as_vec3a();
     }
 
+    /// Kinetic energy of all bodies [J].
+    pub fn kinetic_energy(&self, model: &Model) -> f64 {
+        let of = |(body, state): (&Body, &BodyState)| -> f64 {
+            let vertices = body.vertices.iter().zip(&state.v);
+            vertices.map(|(vertex, v)| 0.5 * f64::from(vertex.mass) * f64::from(v.length_squared())).sum()
+        };
+        model.bodies.iter().zip(&self.bodies).map(of).sum()
+    }
+
+    /// Stops every node where it is.
+    pub fn stop(&mut self) {
+        for body in &mut self.bodies {
+            body.v.fill(Vec3A::ZERO);
+        }
+    }
+
     /// Mean position of some nodes of a body [m]; zero for none.
     pub fn centroid(&self, model: &Model, body: usize, nodes: &[u32]) -> DVec3 {
         let sum: DVec3 = nodes.iter().map(|i| self.position(model, body, *i as usize)).sum();
