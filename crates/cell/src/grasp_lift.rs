@@ -4,7 +4,8 @@
 //! them is captured at its live pose (paper section IV-C, equation 4).
 
 use crate::measure::{HELD_FOLLOW_RATIO, HELD_SLIP_MM, SETTLED_SPEED};
-use crate::{Cluster, Error, FRAME, Gripper, Result, Sample, Summary, World, clusters, gripper};
+use crate::target::Target;
+use crate::{Error, FRAME, Gripper, Result, Sample, Summary, World, gripper};
 use glam::DVec3;
 use std::time::Instant;
 use trocar_progress::Progress;
@@ -13,18 +14,10 @@ use trocar_tissue::{Grasp, Schedule, ToolMotion};
 
 /// Height from which the gripper approaches [m].
 const APPROACH_HEIGHT: f64 = 0.03;
-/// Jaws hold nodes within this distance of the middle of what they pinch [m] (half a cluster and the blades' reach) ...
-const REACH: f64 = 0.009;
-/// ... or within this many median edges on a coarse mesh.
-const REACH_EDGES: f64 = 1.5;
-
 /// Organs that have not come to rest after the settling phase are calmed for at most this many frames ...
 const CALM_FRAMES: usize = 300;
 /// ... until they have been slow, undisturbed, for this many.
 const CALM_FOR: usize = 12;
-
-/// Fewest nodes the jaws take hold of, where there are as many.
-const FEWEST_HELD: usize = 8;
 
 /// How the task is run.
 #[derive(Clone, Debug, PartialEq)]
@@ -166,15 +159,6 @@ impl GraspLift {
     }
 }
 
-/// What the gripper takes hold of, decided once the organs have settled.
-struct Target {
-    cluster: Cluster,
-    /// Gripper over the cluster, jaws open.
-    open: Gripper,
-    /// Angle at which the blades touch the tissue.
-    closed_angle: f64,
-}
-
 /// What was true when the jaws closed.
 struct Activation {
     centroid: DVec3,
@@ -258,7 +242,7 @@ impl<'a> Run<'a> {
     /// What happens at the instant a phase begins.
     fn enter(&mut self, phase: Phase) -> Result<()> {
         match phase {
-            Phase::Approach => self.target = Some(self.choose_target()?),
+            Phase::Approach => self.target = Some(Target::choose(&self.world, self.organ, self.task.at)?),
             Phase::Lift => self.activate(),
             Phase::Open => self.world.state.grasp = None,
             _ => {}
@@ -317,29 +301,6 @@ impl<'a> Run<'a> {
         gripper.pose.translation += height * self.world.up;
         gripper.jaw_angle = target.closed_angle + (target.open.jaw_angle - target.closed_angle) * opening;
         gripper
-    }
-
-    fn choose_target(&self) -> Result<Target> {
-        let (world, organ) = (&self.world, self.organ);
-        let reach = REACH.max(REACH_EDGES * world.model.bodies[organ].median_edge());
-        let mut within: Vec<Cluster> =
-            clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
-        // Nearest first; of equally near ones the first.
-        within.sort_by(|a, b| (a.s - self.task.at).abs().total_cmp(&(b.s - self.task.at).abs()));
-        let enough = within.iter().position(|c| c.nodes.len() >= FEWEST_HELD).unwrap_or(0);
-        let cluster = within.into_iter().nth(enough).filter(|c| !c.nodes.is_empty());
-        let Some(cluster) = cluster else {
-            return Err(Error::Option(format!(
-                "organ '{}' has no free node to grasp: all are pinned or next to a pinned one; pin fewer",
-                self.summary.organ
-            )));
-        };
-        let axis = &world.axes[organ];
-        let along = axis.point_at((cluster.s + 0.05).min(1.0)) - axis.point_at((cluster.s - 0.05).max(0.0));
-        let open = Gripper::over(cluster.centroid(world, organ), world.up, along, gripper::MAX_ANGLE);
-        let jaw = open.pose.inverse();
-        let half_width = cluster.nodes.iter().map(|i| jaw.transform(self.node(*i)).y.abs()).fold(0.0, f64::max);
-        Ok(Target { cluster, open, closed_angle: Gripper::angle_for(half_width) })
     }
 
     /// Closes the grasp: the nodes in the jaws are captured where they are.
@@ -412,10 +373,6 @@ impl<'a> Run<'a> {
         summary.real_time_factor = summary.simulated_s / summary.wall_s;
         summary.state_hash = format!("{:016x}", self.world.state.hash());
         GraspLiftRun { summary: self.summary, samples: self.samples, snapshots: self.snapshots }
-    }
-
-    fn node(&self, i: u32) -> DVec3 {
-        self.world.state.position(&self.world.model, self.organ, i as usize)
     }
 
     /// Largest distance [mm] that any node chosen by (organ, node) has moved since `then`.

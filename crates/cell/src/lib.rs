@@ -7,6 +7,7 @@ mod error;
 mod grasp_lift;
 mod gripper;
 mod measure;
+mod target;
 mod world;
 
 pub use clusters::{Cluster, clusters};

@@ -1,0 +1,50 @@
+//! What the gripper takes hold of.
+
+use crate::{Cluster, Error, Gripper, Result, World, clusters, gripper};
+
+/// Jaws hold nodes within this distance of the middle of what they pinch [m] (half a cluster and the blades' reach) ...
+const REACH: f64 = 0.009;
+/// ... or within this many median edges on a coarse mesh.
+const REACH_EDGES: f64 = 1.5;
+
+/// Fewest nodes the jaws take hold of, where there are as many.
+const FEWEST_HELD: usize = 8;
+
+/// A cluster and the gripper over it, decided once the organs have settled.
+pub(crate) struct Target {
+    /// The nodes to take hold of.
+    pub cluster: Cluster,
+    /// Gripper over the cluster, jaws open.
+    pub open: Gripper,
+    /// Angle at which the blades touch the tissue [rad].
+    pub closed_angle: f64,
+}
+
+impl Target {
+    /// Chooses the cluster of organ `organ` nearest to organ coordinate `at` of which jaws from above reach enough nodes.
+    ///
+    /// # Errors
+    /// When the organ has no free node.
+    pub fn choose(world: &World, organ: usize, at: f64) -> Result<Self> {
+        let body = &world.model.bodies[organ];
+        let reach = REACH.max(REACH_EDGES * body.median_edge());
+        let mut within: Vec<Cluster> =
+            clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
+        // A stable sort: of equally near ones the first.
+        within.sort_by(|a, b| (a.s - at).abs().total_cmp(&(b.s - at).abs()));
+        let enough = within.iter().position(|c| c.nodes.len() >= FEWEST_HELD).unwrap_or(0);
+        let Some(cluster) = within.into_iter().nth(enough) else {
+            return Err(Error::Option(format!(
+                "organ '{}' has no free node to grasp: all are pinned or next to a pinned one; pin fewer",
+                body.name
+            )));
+        };
+        let axis = &world.axes[organ];
+        let along = axis.point_at((cluster.s + 0.05).min(1.0)) - axis.point_at((cluster.s - 0.05).max(0.0));
+        let open = Gripper::over(cluster.centroid(world, organ), world.up, along, gripper::MAX_ANGLE);
+        let jaw = open.pose.inverse();
+        let across = |i: &u32| jaw.transform(world.state.position(&world.model, organ, *i as usize)).y.abs();
+        let half_width = cluster.nodes.iter().map(across).fold(0.0, f64::max);
+        Ok(Self { cluster, open, closed_angle: Gripper::angle_for(half_width) })
+    }
+}
