@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use trocar_geometry::{SignedDistance, TriMesh};
 
 /// Depth of the bed where nothing bends it [m].
-const DEPTH: f64 = 0.207;
+const DEPTH: f64 = 0.150;
 /// Space left between an organ and the bed under it [m].
 const SPACE: f64 = 0.3e-3;
 /// How high the bed climbs where it meets an organ, and how far from it it begins to [m].

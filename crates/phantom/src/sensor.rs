@@ -56,12 +56,12 @@ pub(crate) fn expose(color: &mut ColorImage, depth: &mut DepthImage, facing: &[f
     }
 }
 
-/// Brightness at a pixel relative to the lamp's at 0.2 m: the lamp sits at the lens, its light fades with distance and
+/// Brightness at a pixel relative to the lamp's at 0.15 m: the lamp sits at the lens, its light fades with distance and
 /// towards the corners.
 pub(crate) fn lamp(camera: &Camera, u: f64, v: f64, depth: f32) -> f32 {
     let (x, y) = ((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
     let off_axis2 = (x * x + y * y) as f32;
-    let near = if depth > 0.0 { (0.2 / depth).clamp(0.5, 1.5) } else { 1.0 };
+    let near = if depth > 0.0 { (0.15 / depth).clamp(0.5, 1.5) } else { 1.0 };
     near / (1.0 + 0.9 * off_axis2)
 }
 
