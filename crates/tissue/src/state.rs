@@ -26,6 +26,15 @@ pub(crate) struct BodyState {
     pub falling: Vec<f32>,
 }
 
+impl BodyState {
+    /// Takes over another state of the same body without allocating.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.x.copy_from_slice(&other.x);
+        self.v.copy_from_slice(&other.v);
+        self.falling.copy_from_slice(&other.falling);
+    }
+}
+
 impl State {
     /// The model at rest in its rest shape.
     pub fn new(model: &Model) -> Self {

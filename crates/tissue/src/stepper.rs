@@ -175,7 +175,7 @@ impl Frame<'_> {
     /// Advances one body by the frame.
     fn advance(&self, index: usize, body: &Body, state: &mut BodyState, scratch: &mut Scratch) {
         scratch.report = StepReport::default();
-        scratch.before.clone_from(state);
+        scratch.before.copy_from(state);
         let grasp = self.grasp.filter(|g| g.body == index);
         mark_fixed(body, grasp, scratch);
         for substep in 1..=self.schedule.substeps {
@@ -183,7 +183,7 @@ impl Frame<'_> {
         }
         measure(index, body, state, &mut scratch.report);
         if matches!(scratch.report.divergence, Some(Divergence::NonFinite { .. })) {
-            state.clone_from(&scratch.before);
+            state.copy_from(&scratch.before);
         }
     }
 

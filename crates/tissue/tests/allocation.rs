@@ -1,0 +1,54 @@
+//! Stepping allocates nothing.
+
+mod common;
+
+use common::{FRAME, GRAVITY, block, model, nodes, tissue};
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use trocar_geometry::Pose;
+use trocar_tissue::{Grasp, Material, Schedule, State, Stepper, ToolMotion};
+
+/// The system's allocator, counting.
+struct Counting;
+
+static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
+
+#[allow(unsafe_code, reason = "an allocator cannot be written without")]
+// SAFETY: every call is handed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller's promises are handed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        // SAFETY: the pointer came from `alloc` above, that is, from the system.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static ALLOCATOR: Counting = Counting;
+
+#[test]
+fn stepping_allocates_nothing() {
+    const FRAMES: usize = 40;
+    // Large enough for several tasks a colour.
+    let mesh = block([16, 16, 10], 2e-3);
+    let material = Material { viscosity: 60.0, ..tissue(12e3) };
+    let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
+    let mut state = State::new(&model);
+    let held = nodes(&mesh, |p| p.z > 19e-3 && p.x < 10e-3);
+    state.grasp = Some(Grasp::capture(&model, &state, 0, &held, &Pose::IDENTITY));
+    let mut stepper = Stepper::new(&model, Schedule::default(), 2);
+    let still = ToolMotion { from: Pose::IDENTITY, to: Pose::IDENTITY };
+    stepper.step(&model, &mut state, FRAME, Some(&still));
+    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    for _ in 0..FRAMES {
+        stepper.step(&model, &mut state, FRAME, Some(&still));
+    }
+    let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
+    // The thread pool's queue takes a new block now and then, once in dozens of frames; our own code would show in every frame.
+    assert!(during < FRAMES / 4, "{during} allocations in {FRAMES} frames");
+}
