@@ -28,6 +28,8 @@ pub struct Cluster {
     pub s: f64,
     /// Its nodes, ascending; none of them pinned or in one element with a pinned node.
     pub nodes: Vec<u32>,
+    /// Whether pinned tissue is far enough away for the cluster to be lifted freely.
+    pub clear: bool,
 }
 
 /// The clusters of the free part of organ `organ`, from base to tip; parts without free nodes have none.
@@ -39,7 +41,7 @@ pub fn clusters(world: &World, organ: usize) -> Vec<Cluster> {
     let length = CLUSTER_LENGTH.max(CLUSTER_EDGES * body.median_edge());
     let count = ((axis.length / length).round() as usize).max(1);
     let mut clusters: Vec<Cluster> =
-        (0..count).map(|k| Cluster { s: (k as f64 + 0.5) / count as f64, nodes: Vec::new() }).collect();
+        (0..count).map(|k| Cluster { s: (k as f64 + 0.5) / count as f64, nodes: Vec::new(), clear: false }).collect();
     for i in not_beside_pins(body) {
         let k = ((axis.s[i as usize] * count as f64) as usize).min(count - 1);
         clusters[k].nodes.push(i);
@@ -77,6 +79,7 @@ fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
         let clear: Vec<u32> = gaps.iter().filter(|(_, gap)| *gap >= least).map(|(i, _)| *i).collect();
         if clear.len() >= FEWEST_CLEAR {
             cluster.nodes = clear;
+            cluster.clear = halvings == 0;
             return;
         }
     }
@@ -99,7 +102,7 @@ impl Cluster {
         };
         let centre = position(top) - 0.5 * reach * world.up;
         let nodes = self.nodes.iter().copied().filter(|i| (position(*i) - centre).length() <= reach).collect();
-        Self { s: self.s, nodes }
+        Self { s: self.s, nodes, clear: self.clear }
     }
 
     /// Centroid of the cluster's nodes now [m].

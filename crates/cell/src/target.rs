@@ -10,6 +10,9 @@ const REACH_EDGES: f64 = 1.5;
 /// Fewest nodes the jaws take hold of, where there are as many.
 const FEWEST_HELD: usize = 8;
 
+/// A cluster clear of pins is preferred to one that is not, even if it is this much farther along the organ.
+const WORTH_GOING: f64 = 0.1;
+
 /// A cluster and the gripper over it, decided once the organs have settled.
 pub(crate) struct Target {
     /// The nodes to take hold of.
@@ -21,7 +24,7 @@ pub(crate) struct Target {
 }
 
 impl Target {
-    /// Chooses the cluster of organ `organ` nearest to organ coordinate `at` of which jaws from above reach enough nodes.
+    /// Chooses the cluster of organ `organ` nearest to organ coordinate `at`, clear of pins if one is near, of which jaws from above reach enough nodes.
     ///
     /// # Errors
     /// When the organ has no free node.
@@ -30,8 +33,10 @@ impl Target {
         let reach = REACH.max(REACH_EDGES * body.median_edge());
         let mut within: Vec<Cluster> =
             clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
-        // A stable sort: of equally near ones the first.
-        within.sort_by(|a, b| (a.s - at).abs().total_cmp(&(b.s - at).abs()));
+        let distance = |c: &Cluster| (c.s - at).abs();
+        // A stable sort: of equally near ones the first. One clear of pins is worth going a little farther for.
+        let rank = |c: &Cluster| distance(c) + if c.clear { 0.0 } else { WORTH_GOING };
+        within.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
         let enough = within.iter().position(|c| c.nodes.len() >= FEWEST_HELD).unwrap_or(0);
         let Some(cluster) = within.into_iter().nth(enough) else {
             return Err(Error::Option(format!(
