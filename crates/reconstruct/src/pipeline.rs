@@ -29,7 +29,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { window: 90, stride: 2, centre: None, min_samples: 3, finest_cell: 1.9e-3, max_tets: 50_000 }
+        Self { window: 90, stride: 2, centre: None, min_samples: 3, finest_cell: 2.2e-3, max_tets: 50_000 }
     }
 }
 
