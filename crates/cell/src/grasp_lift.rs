@@ -19,6 +19,9 @@ const CALM_FRAMES: usize = 300;
 /// ... until they have been slow, undisturbed, for this many.
 const CALM_FOR: usize = 12;
 
+/// More worker threads than any machine has cores.
+const MOST_THREADS: usize = 1024;
+
 /// How the task is run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GraspLift {
@@ -154,6 +157,12 @@ impl GraspLift {
         }
         if !(self.lift > 0.0 && self.lift <= 0.1) {
             return Err(Error::Option(format!("--lift is {} mm; more than 0 and at most 100 mm", self.lift * 1e3)));
+        }
+        if self.threads > MOST_THREADS {
+            return Err(Error::Option(format!(
+                "--threads is {}; at most {MOST_THREADS}, and 0 for all there are",
+                self.threads
+            )));
         }
         Ok(())
     }

@@ -104,7 +104,7 @@ fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
         }
         None => "organs are 2 mm to 2 m long".into(),
     };
-    let reason = format!("the surface is {extent:.3e} m long, which is no organ; {advice}");
+    let reason = format!("the surface is {extent:.3} m long, which is no organ; {advice}");
     Err(Error::Recording { path: path.to_owned(), reason })
 }
 

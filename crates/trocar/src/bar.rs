@@ -13,7 +13,7 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// Takes over Ctrl-C: long work then stops at its next frame and cleans up.
+    /// Takes over Ctrl-C (and the request to terminate): long work then stops at its next frame and cleans up.
     pub fn new(quiet: bool) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let handler = Arc::clone(&stop);
