@@ -137,6 +137,18 @@ impl Mask {
     }
 }
 
+/// The pixels left, right, above and below pixel `i` (row by row) of a `width` x `height` image, as far as there are any.
+pub fn pixel_neighbours(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
+    let (u, v) = (i % width, i / width);
+    let near = [
+        (u > 0).then(|| i - 1),
+        (u + 1 < width).then_some(i + 1),
+        (v > 0).then(|| i - width),
+        (v + 1 < height).then_some(i + width),
+    ];
+    near.into_iter().flatten()
+}
+
 fn wrong(path: &Path, reason: &dyn std::fmt::Display) -> Error {
     Error::Image { path: path.to_owned(), reason: reason.to_string() }
 }

@@ -8,6 +8,6 @@ mod images;
 mod model;
 
 pub use error::{Error, Result};
-pub use images::{ColorImage, DepthImage, Mask};
+pub use images::{ColorImage, DepthImage, Mask, pixel_neighbours};
 pub use model::{Camera, Distortion};
 pub use trocar_geometry::Pose;

@@ -92,19 +92,23 @@ impl From<Distortion> for Vec<f64> {
 }
 
 impl Camera {
-    /// The D405's depth stream at 848x480: 87 x 58 degrees (datasheet), square pixels, centred.
-    pub fn d405() -> Self {
-        let (width, height) = (848, 480);
-        let f = width as f64 / 2.0 / (87.0_f64.to_radians() / 2.0).tan();
+    /// A camera with square pixels that sees `width_rad` from left to right, the principal point in the middle, no distortion.
+    pub fn centred(width: usize, height: usize, width_rad: f64) -> Self {
+        let f = width as f64 / 2.0 / (width_rad / 2.0).tan();
         Self {
             width,
             height,
             fx: f,
             fy: f,
-            cx: (width - 1) as f64 / 2.0,
-            cy: (height - 1) as f64 / 2.0,
+            cx: (width as f64 - 1.0) / 2.0,
+            cy: (height as f64 - 1.0) / 2.0,
             distortion: Distortion::default(),
         }
+    }
+
+    /// The D405's depth stream at 848x480: 87 x 58 degrees (datasheet), square pixels, centred.
+    pub fn d405() -> Self {
+        Self::centred(848, 480, 87.0_f64.to_radians())
     }
 
     /// Refuses sizes of zero, focal lengths that are not positive, and numbers that are not finite.

@@ -1,6 +1,6 @@
 //! Vertex colours, by projection into the photograph.
 
-use trocar_camera::{Camera, ColorImage, Mask};
+use trocar_camera::{Camera, ColorImage, Mask, pixel_neighbours};
 use trocar_geometry::TriMesh;
 
 /// Colours the vertices of `mesh` with the pixels they project to; the unseen back takes the colour seen in front of it.
@@ -15,13 +15,7 @@ pub fn color_vertices(mesh: &mut TriMesh, image: &ColorImage, colored: &Mask, ma
     while next < queue.len() {
         let i = queue[next];
         next += 1;
-        let near = [
-            (!i.is_multiple_of(w)).then(|| i - 1),
-            (i % w + 1 < w).then_some(i + 1),
-            (i >= w).then(|| i - w),
-            (i / w + 1 < h).then_some(i + w),
-        ];
-        for j in near.into_iter().flatten() {
+        for j in pixel_neighbours(i, w, h) {
             if source[j] == usize::MAX {
                 source[j] = source[i];
                 queue.push(j);

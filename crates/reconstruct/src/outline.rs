@@ -1,6 +1,6 @@
 //! Making a still mask fit for closing: one piece without pinholes.
 
-use trocar_camera::Mask;
+use trocar_camera::{Mask, pixel_neighbours};
 
 /// What [`tidy`] changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -53,13 +53,7 @@ fn pieces(mask: &Mask, value: bool) -> Vec<Vec<usize>> {
         while next < piece.len() {
             let i = piece[next];
             next += 1;
-            let near = [
-                (!i.is_multiple_of(w)).then(|| i - 1),
-                (i % w + 1 < w).then_some(i + 1),
-                (i >= w).then(|| i - w),
-                (i / w + 1 < h).then_some(i + w),
-            ];
-            for j in near.into_iter().flatten() {
+            for j in pixel_neighbours(i, w, h) {
                 if !seen[j] && mask.set[j] == value {
                     seen[j] = true;
                     piece.push(j);

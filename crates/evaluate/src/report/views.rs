@@ -3,8 +3,8 @@
 use super::colors::{self, VIEW_GROUND};
 use glam::DVec3;
 use std::collections::BTreeMap;
-use trocar_camera::{Camera, ColorImage, Distortion, Pose};
-use trocar_geometry::TriMesh;
+use trocar_camera::{Camera, ColorImage, Pose};
+use trocar_geometry::{TetMesh, TriMesh};
 use trocar_render::{Instance, Scene, Shading};
 use trocar_specimen::Specimen;
 
@@ -21,16 +21,8 @@ impl View {
     pub(super) fn framing(points: &[DVec3], from: DVec3, up: DVec3, (width, height): (usize, usize)) -> Self {
         const HALF_ANGLE: f64 = 0.26;
         const MARGIN: f64 = 1.08;
-        let f = width as f64 / 2.0 / HALF_ANGLE.tan();
-        let camera = Camera {
-            width,
-            height,
-            fx: f,
-            fy: f,
-            cx: (width - 1) as f64 / 2.0,
-            cy: (height - 1) as f64 / 2.0,
-            distortion: Distortion::default(),
-        };
+        let camera = Camera::centred(width, height, 2.0 * HALF_ANGLE);
+        let f = camera.fx;
         let (tan_x, tan_y) = (width as f64 / 2.0 / f / MARGIN, height as f64 / 2.0 / f / MARGIN);
         let from = from.normalize_or(DVec3::Z);
         let turned = Pose::look_at(DVec3::ZERO, -from, up);
@@ -107,15 +99,8 @@ pub(super) fn label(index: usize) -> u16 {
 pub(super) fn wires(specimen: &Specimen, nodes: &[Vec<DVec3>], cut: Option<DVec3>) -> Vec<Instance> {
     let instance = |(i, (organ, nodes)): (usize, (&trocar_specimen::Organ, &Vec<DVec3>))| {
         let color = colors::organ(i);
-        let keep = |tet: &[u32; 4]| {
-            let Some(normal) = cut else { return true };
-            let centre = nodes.iter().sum::<DVec3>() / nodes.len().max(1) as f64;
-            let middle = tet.iter().map(|&v| nodes[v as usize]).sum::<DVec3>() / 4.0;
-            (middle - centre).dot(normal) <= 0.0
-        };
-        let tets = &organ.body.tets;
-        let kept: Vec<bool> = tets.iter().map(keep).collect();
-        let mesh = shell(nodes, tets, &kept, color, colors::mix(color, [255; 3], 0.62));
+        let body = TetMesh { vertices: nodes.clone(), tets: organ.body.tets.clone() };
+        let mesh = shell(&body, cut, color, colors::mix(color, [255; 3], 0.62));
         Instance { mesh, label: label(i), shading: Shading { color, gloss: 0.0, wireframe: true } }
     };
     specimen.organs.iter().zip(nodes).enumerate().map(instance).collect()
@@ -126,36 +111,26 @@ pub(super) fn rest(specimen: &Specimen) -> Vec<Vec<DVec3>> {
     specimen.organs.iter().map(|o| o.body.vertices.clone()).collect()
 }
 
-/// Outward faces of the kept elements: `skin` where the body ends, `inside` where a removed element was. Vertices are not
-/// shared between the two, so that each face has one colour.
-fn shell(nodes: &[DVec3], tets: &[[u32; 4]], kept: &[bool], skin: [u8; 3], inside: [u8; 3]) -> TriMesh {
-    // Faces by their sorted corners: the outward triangle of the kept element, kept and all elements there.
-    let mut faces: BTreeMap<[u32; 3], ([u32; 3], u32, u32)> = BTreeMap::new();
-    for (tet, kept) in tets.iter().zip(kept) {
-        let [a, b, c, d] = *tet;
-        for face in [[a, c, b], [a, b, d], [b, c, d], [c, a, d]] {
-            let mut key = face;
-            key.sort_unstable();
-            let entry = faces.entry(key).or_insert((face, 0, 0));
-            entry.2 += 1;
-            if *kept {
-                entry.0 = face;
-                entry.1 += 1;
-            }
-        }
-    }
+/// Surface of what a cut through the middle of the nodes leaves of a body: `skin` where the body ends, `inside` where the cut laid it bare. Vertices
+/// are not shared between the two, so that each face has one colour.
+fn shell(body: &TetMesh, cut: Option<DVec3>, skin: [u8; 3], inside: [u8; 3]) -> TriMesh {
+    let Some(normal) = cut else {
+        let mut surface = body.boundary().0;
+        surface.colors = vec![skin; surface.vertices.len()];
+        return surface;
+    };
+    let centre = body.vertices.iter().sum::<DVec3>() / body.vertices.len().max(1) as f64;
+    let half = body.cut_away(centre, normal);
     let mut mesh = TriMesh::default();
     let mut index: BTreeMap<(u32, bool), u32> = BTreeMap::new();
-    for (face, kept, all) in faces.into_values().filter(|f| f.1 == 1) {
-        let cut = all > kept;
-        let triangle = face.map(|node| {
-            *index.entry((node, cut)).or_insert_with(|| {
-                mesh.vertices.push(nodes[node as usize]);
-                mesh.colors.push(if cut { inside } else { skin });
+    for (triangle, bared) in half.surface.triangles.iter().zip(half.bared) {
+        mesh.triangles.push(triangle.map(|vertex| {
+            *index.entry((vertex, bared)).or_insert_with(|| {
+                mesh.vertices.push(half.surface.vertices[vertex as usize]);
+                mesh.colors.push(if bared { inside } else { skin });
                 (mesh.vertices.len() - 1) as u32
             })
-        });
-        mesh.triangles.push(triangle);
+        }));
     }
     mesh
 }
@@ -191,12 +166,12 @@ mod tests {
 
     #[test]
     fn a_cut_face_is_the_face_to_the_removed_element() {
-        let nodes = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 1.0, 1.0)];
-        let tets = [[0, 1, 2, 3], [1, 4, 2, 3]];
+        let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 1.0, 1.0)];
+        let body = TetMesh { vertices, tets: vec![[0, 1, 2, 3], [1, 4, 2, 3]] };
         let (skin, inside) = ([1; 3], [2; 3]);
-        let whole = shell(&nodes, &tets, &[true, true], skin, inside);
+        let whole = shell(&body, None, skin, inside);
         assert_eq!((whole.triangles.len(), whole.colors.contains(&inside)), (6, false));
-        let half = shell(&nodes, &tets, &[true, false], skin, inside);
+        let half = shell(&body, Some(DVec3::ONE), skin, inside);
         assert_eq!(half.triangles.len(), 4);
         let cut: Vec<_> = half.triangles.iter().filter(|t| half.colors[t[0] as usize] == inside).collect();
         assert_eq!(cut.len(), 1);
