@@ -39,6 +39,17 @@ pub enum Error {
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),
+    /// The output would replace or change the input.
+    #[error("the output {output} and the input {input} lie in one another; name a folder beside it", output = output.display(), input = input.display())]
+    Overlap {
+        /// The input.
+        input: PathBuf,
+        /// The output.
+        output: PathBuf,
+    },
+    /// The user asked to stop.
+    #[error("interrupted")]
+    Interrupted,
     /// A result cannot be written down.
     #[error("the result cannot be written: {0}")]
     Format(String),

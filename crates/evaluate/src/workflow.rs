@@ -80,11 +80,12 @@ pub fn reconstruct_recording(
     progress: &dyn Progress,
 ) -> Result<(Reconstructed, Reconstruction)> {
     let clock = Instant::now();
+    refuse_overlap(recording, output)?;
     let staged = Specimen::stage(output)?;
     let reconstruction = trocar_reconstruct::reconstruct(&Recording::open(recording)?, settings, progress)?;
     let truth = recording.join("truth");
     let html = report::reconstruction(&reconstruction, truth.is_dir().then_some(truth.as_path()))?;
-    finish(staged, &reconstruction.specimen, &html)?;
+    finish(staged, &reconstruction.specimen, &html, progress)?;
     let r = &reconstruction;
     let composite = CompositeFigures {
         frames_used: r.frames_used,
@@ -107,9 +108,10 @@ pub fn reconstruct_surface(
     progress: &dyn Progress,
 ) -> Result<Reconstructed> {
     let clock = Instant::now();
+    refuse_overlap(surface, output)?;
     let staged = Specimen::stage(output)?;
     let (specimen, repair) = trocar_reconstruct::from_surface(surface, unit, settings, progress)?;
-    finish(staged, &specimen, &report::surface(&specimen, &repair)?)?;
+    finish(staged, &specimen, &report::surface(&specimen, &repair)?, progress)?;
     let mut notes = Vec::new();
     if repair.rebuilt {
         notes.push(format!(
@@ -125,6 +127,7 @@ pub fn reconstruct_surface(
 /// # Errors
 /// One line that names the file, organ or option; `output` is then left as it was.
 pub fn simulate(specimen: &Path, task: &GraspLift, output: &Path, progress: &dyn Progress) -> Result<SimulatedRun> {
+    refuse_overlap(specimen, output)?;
     let run = simulate_specimen(&Specimen::read(specimen)?, task, None, output, progress)?;
     Ok(SimulatedRun { summary: run.summary, report: output.join(REPORT).display().to_string() })
 }
@@ -139,11 +142,17 @@ pub(crate) fn simulate_specimen(
 ) -> Result<GraspLiftRun> {
     let staged = StagedFolder::create(output, RUN_MARKER)?;
     let run = GraspLift { snapshot_every: SNAPSHOT_EVERY, ..task.clone() }.run(specimen, progress)?;
-    write_run(staged, specimen, &run, before)?;
+    write_run(staged, specimen, &run, before, progress)?;
     Ok(run)
 }
 
-fn write_run(staged: StagedFolder, specimen: &Specimen, run: &GraspLiftRun, before: Option<&str>) -> Result<()> {
+fn write_run(
+    staged: StagedFolder,
+    specimen: &Specimen,
+    run: &GraspLiftRun,
+    before: Option<&str>,
+    progress: &dyn Progress,
+) -> Result<()> {
     let folder = staged.path();
     let write = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
@@ -157,14 +166,37 @@ fn write_run(staged: StagedFolder, specimen: &Specimen, run: &GraspLiftRun, befo
     }
     write("channels.csv", &table.into_inner().map_err(|e| Error::Format(e.to_string()))?)?;
     write(REPORT, report::grasp_lift(specimen, run, before)?.as_bytes())?;
+    stop_if_asked(progress)?;
     Ok(staged.commit()?)
 }
 
-fn finish(staged: StagedFolder, specimen: &Specimen, html: &str) -> Result<()> {
+fn finish(staged: StagedFolder, specimen: &Specimen, html: &str, progress: &dyn Progress) -> Result<()> {
+    stop_if_asked(progress)?;
     specimen.write_into(staged.path())?;
     let path = staged.path().join(REPORT);
     std::fs::write(&path, html).map_err(|source| Error::Io { path, source })?;
     Ok(staged.commit()?)
+}
+
+/// A report is made without looking up; a request to stop that came meanwhile is honoured before anything is put in place.
+fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
+    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// Refuses an output that holds the input, is it, or lies in it: the input would be replaced or changed.
+fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
+    // An output that is not there yet is where its nearest existing parent is.
+    let placed = |path: &Path| {
+        let existing = path.ancestors().find(|p| p.exists()).unwrap_or(Path::new("."));
+        let rest = path.strip_prefix(existing).unwrap_or(Path::new(""));
+        let root = if existing.as_os_str().is_empty() { Path::new(".") } else { existing };
+        root.canonicalize().map_or_else(|_| path.to_owned(), |root| root.join(rest))
+    };
+    let (from, to) = (placed(input), placed(output));
+    if from.starts_with(&to) || (input.is_dir() && to.starts_with(&from)) {
+        return Err(Error::Overlap { input: input.to_owned(), output: output.to_owned() });
+    }
+    Ok(())
 }
 
 fn figures(

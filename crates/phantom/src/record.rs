@@ -52,6 +52,12 @@ pub(crate) fn record_with(
     if frames == 0 || frames > MAX_FRAMES {
         return Err(Error::Option(format!("frames is {frames}; a recording has 1 to {MAX_FRAMES} frames")));
     }
+    if dir.join("recording.toml").exists() && !dir.join("truth").is_dir() {
+        return Err(Error::Option(format!(
+            "{}: a recording that no phantom made lies there, so it is not overwritten; name a new folder",
+            dir.display()
+        )));
+    }
     progress.begin("anatomy", 1);
     if progress.interrupted() {
         return Err(Error::Interrupted);

@@ -75,7 +75,8 @@ impl StagedFolder {
         &self.stage
     }
 
-    /// Moves the folder into place. An earlier folder is moved aside first and deleted last, so that it survives a failure.
+    /// Moves the folder into place. An earlier folder is moved aside first and deleted last, so that it survives a failure; what lies in it that the
+    /// new one has nothing of that name for (a user's notes, runs) is kept.
     ///
     /// # Errors
     /// When the system refuses to move.
@@ -89,6 +90,7 @@ impl StagedFolder {
                 return Err(io(&self.target)(e));
             }
             self.committed = true;
+            keep_foreign(&aside, &self.target)?;
             fs::remove_dir_all(&aside).map_err(io(&aside))?;
         } else {
             fs::rename(&self.stage, &self.target).map_err(io(&self.target))?;
@@ -106,6 +108,18 @@ impl Drop for StagedFolder {
             remove_empty(&self.created);
         }
     }
+}
+
+/// Moves what `old` holds and `new` does not into `new`.
+fn keep_foreign(old: &Path, new: &Path) -> Result<()> {
+    for entry in fs::read_dir(old).map_err(io(old))? {
+        let name = entry.map_err(io(old))?.file_name();
+        let place = new.join(&name);
+        if !place.exists() {
+            fs::rename(old.join(&name), &place).map_err(io(&place))?;
+        }
+    }
+    Ok(())
 }
 
 fn remove_empty(created: &[PathBuf]) {

@@ -50,7 +50,7 @@ impl ModelBuilder {
     ///
     /// # Errors
     /// Refuses, naming the body and the element, node or parameter: zero or negative volumes, isolated nodes, numbers that are not finite, moduli
-    /// outside 10 Pa to 1 GPa, Poisson ratios outside 0 to 0.4999, densities outside 1 to 30,000 kg/m3, negative viscosities, pins out of range, planes without
+    /// outside 1 Pa to 1 GPa, Poisson ratios outside 0 to 0.4999, densities outside 1 to 30,000 kg/m3, negative viscosities, pins out of range, planes without
     /// a unit normal.
     pub fn body(&mut self, body: BodyDescription<'_>) -> Result<usize> {
         check(&body).map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
@@ -82,7 +82,7 @@ fn check(body: &BodyDescription<'_>) -> std::result::Result<(), String> {
             Err(format!("{name} is {value} {unit}; {least} to {most} {unit} make sense (is the unit right?)"))
         }
     };
-    within("Young's modulus", m.young_modulus, 10.0, 1e9, "Pa")?;
+    within("Young's modulus", m.young_modulus, 1.0, 1e9, "Pa")?;
     within("Poisson's ratio", m.poisson_ratio, 0.0, 0.4999, "")?;
     within("density", m.density, 1.0, 30e3, "kg/m3")?;
     within("viscosity", m.viscosity, 0.0, 1e9, "Pa s")?;

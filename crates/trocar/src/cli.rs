@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// Trocar: recordings of a surgical field become organs that deform, and policies are scored in them.
 #[derive(Debug, Parser)]
-#[command(version, about, max_term_width = 110)]
+#[command(version, max_term_width = 110)]
 pub struct Cli {
     /// What to do.
     #[command(subcommand)]
@@ -116,10 +116,10 @@ pub struct Simulate {
     #[arg(long)]
     pub organ: Option<String>,
     /// Where along the organ, 0 (base) to 1 (tip).
-    #[arg(long, default_value_t = 0.5)]
+    #[arg(long, default_value_t = 0.5, allow_negative_numbers = true)]
     pub at: f64,
     /// Lift of the jaws [mm].
-    #[arg(long, default_value_t = 15.0)]
+    #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
     pub lift: f64,
     /// How a frame is cut into substeps and sweeps.
     #[arg(long, value_enum, default_value_t = ScheduleName::Default)]

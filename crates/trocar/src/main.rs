@@ -1,6 +1,6 @@
 //! The command line: parses, calls, prints; no logic of its own.
 
-#![allow(clippy::print_stdout, clippy::print_stderr, reason = "this is a command-line program")]
+#![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
 mod bar;
 mod cli;
@@ -21,7 +21,7 @@ fn main() -> ExitCode {
     match commands::run(&cli, &progress) {
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if progress.was_interrupted() => {
-            eprintln!("interrupted; nothing was left behind");
+            eprintln!("interrupted; nothing half-written was left behind");
             ExitCode::from(INTERRUPTED)
         }
         Err(error) => {

@@ -1,16 +1,22 @@
 //! What is printed: one JSON object for machines, or lines for people.
 
 use serde::Serialize;
+use std::io::{ErrorKind, Write};
 
 /// Prints `value` as JSON, or what `text` says for people.
 pub fn print<T: Serialize>(json: bool, value: &T, text: impl FnOnce(&T) -> String) {
-    if json {
+    let line = if json {
         match serde_json::to_string(value) {
-            Ok(line) => println!("{line}"),
-            Err(e) => eprintln!("error: the result cannot be written as JSON: {e}"),
+            Ok(line) => line,
+            Err(e) => return eprintln!("error: the result cannot be written as JSON: {e}"),
         }
     } else {
-        println!("{}", text(value));
+        text(value)
+    };
+    match writeln!(std::io::stdout(), "{line}") {
+        // Nobody reads on: that is theirs to decide.
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => eprintln!("error: standard output: {e}"),
+        _ => {}
     }
 }
 

@@ -122,6 +122,26 @@ fn an_unwritable_output_is_refused_and_nothing_is_overwritten() {
     assert_eq!(fs::read_to_string(&file).unwrap(), "precious");
 }
 
+#[test]
+fn the_input_is_never_replaced() {
+    let fixture = Fixture::new();
+    let home = fixture.dir.path();
+    let (recording, inside) = (fixture.file(""), fixture.file("specimen"));
+    for output in [home, recording.as_path(), inside.as_path()] {
+        let result = trocar(&["reconstruct", recording.to_str().unwrap(), "-o", output.to_str().unwrap()]);
+        let said = String::from_utf8_lossy(&result.stderr);
+        assert_eq!(result.status.code(), Some(2), "{said}");
+        assert!(said.contains("lie in one another"), "{said}");
+    }
+    assert!(fixture.file("recording.toml").is_file() && !inside.exists());
+    // A recording with no truth is somebody's own.
+    fs::remove_dir_all(fixture.file("truth")).unwrap();
+    let result = trocar(&["record", "phantom-a", "--frames", "1", "-o", recording.to_str().unwrap()]);
+    assert_eq!(result.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&result.stderr).contains("no phantom made"));
+    assert!(fixture.file("color/000002.png").is_file());
+}
+
 /// A greyscale PNG of one value, 16-bit or 8-bit.
 fn gray_png(width: usize, height: usize, deep: bool) -> Vec<u8> {
     let dir = tempfile::tempdir().unwrap();
