@@ -139,10 +139,13 @@ impl GraspLift {
                     return Ok(run.finish());
                 }
             }
+            run.leave(phase);
             if phase == Phase::Settle {
                 run.calm(progress)?;
+                if run.summary.diverged {
+                    break;
+                }
             }
-            run.leave(phase);
         }
         progress.end();
         Ok(run.finish())
@@ -226,25 +229,31 @@ impl<'a> Run<'a> {
     /// Takes the swing out of organs that still move when the settling phase is over: a large soft organ swings for many seconds. Kinetic damping
     /// (Cundall 1976): everything is stopped whenever the kinetic energy has passed a peak, until nothing moves fast for a while by itself.
     fn calm(&mut self, progress: &dyn Progress) -> Result<()> {
-        let (mut energy, mut undisturbed) = (self.world.state.kinetic_energy(&self.world.model), CALM_FOR);
+        let mut energy = self.world.state.kinetic_energy(&self.world.model);
+        // Frames in a row that were slow without having been stopped.
+        let mut slow_for = if self.summary.settled { CALM_FOR } else { 0 };
         for _ in 0..CALM_FRAMES {
-            let is_slow = self.samples.last().is_some_and(|s| s.max_speed_m_s < SETTLED_SPEED);
-            if (is_slow && undisturbed >= CALM_FOR) || self.summary.diverged {
+            if slow_for >= CALM_FOR || self.summary.diverged {
                 break;
             }
             if progress.interrupted() {
                 return Err(Error::Interrupted);
             }
             self.step(Phase::Settle, 1.0);
-            undisturbed += 1;
+            self.summary.calmed_s += FRAME;
             let now = self.world.state.kinetic_energy(&self.world.model);
-            // Once slow, it is left alone to show that it stays so.
-            if now < energy && !self.samples.last().is_some_and(|s| s.max_speed_m_s < SETTLED_SPEED) {
+            if self.samples.last().is_some_and(|s| s.max_speed_m_s < SETTLED_SPEED) {
+                // Slow: left alone, to show that it stays so.
+                slow_for += 1;
+                energy = now;
+            } else if now < energy {
                 self.world.state.stop();
-                undisturbed = 0;
+                (slow_for, energy) = (0, 0.0);
+            } else {
+                (slow_for, energy) = (0, now);
             }
-            energy = if undisturbed == 0 { 0.0 } else { now };
         }
+        self.summary.resting_speed_m_s = self.samples.last().map_or(0.0, |s| s.max_speed_m_s);
         Ok(())
     }
 

@@ -54,10 +54,14 @@ pub struct Summary {
     pub min_volume_ratio: f64,
     /// Largest node speed in any frame [m/s].
     pub peak_speed_m_s: f64,
-    /// Largest node speed at the end of settling [m/s].
+    /// Largest node speed one second after release, before anything is calmed [m/s].
     pub settled_speed_m_s: f64,
-    /// Settled: that speed is below 0.01 m/s.
+    /// Settled by itself: that speed is below 0.01 m/s.
     pub settled: bool,
+    /// How long organs that had not settled were calmed by kinetic damping before the grasp [s].
+    pub calmed_s: f64,
+    /// Largest node speed when the gripper sets out [m/s].
+    pub resting_speed_m_s: f64,
     /// Largest motion of a pinned node over the run [mm].
     pub pin_drift_mm: f64,
     /// The run diverged.

@@ -243,6 +243,8 @@ fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
             peak_speed_m_s: 0.02,
             settled_speed_m_s: 2e-5,
             settled: true,
+            calmed_s: 0.0,
+            resting_speed_m_s: 1e-5,
             yielded_substeps: 0,
             pin_drift_mm: 0.0,
             diverged: false,

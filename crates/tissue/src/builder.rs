@@ -100,7 +100,7 @@ fn check(body: &BodyDescription<'_>) -> std::result::Result<(), String> {
         }
         let volume = mesh.tet_volume(t);
         // Below the smallest volume whose reciprocal the f32 kernels can hold there is no element either.
-        if volume <= 1e-24 {
+        if !(volume > 1e-24 && volume.is_finite()) {
             return Err(format!("element {t} has a volume of {volume:.3e} m3; it must be positive"));
         }
         tet.iter().for_each(|i| used[*i as usize] = true);

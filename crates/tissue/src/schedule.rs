@@ -22,7 +22,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// The paper's: 8 substeps of 10 sweeps from the inertial predictor.
+    /// The paper's substeps, sweeps and start (8 of 10 from the inertial predictor), with our inversion guard.
     pub const PAPER: Self = Self { substeps: 8, iterations: 10, start: Start::Inertial };
 }
 

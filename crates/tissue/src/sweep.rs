@@ -22,7 +22,7 @@ const FLOOR: f32 = 1e-3;
 const STICK_SPEED: f32 = 1e-3;
 
 /// Corners whose volume gradients are remembered between the force and the guard.
-const REMEMBERED: usize = 64;
+const REMEMBERED: usize = 32;
 
 /// A support plane in a body's frame.
 #[derive(Clone, Copy, Debug)]

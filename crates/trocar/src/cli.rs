@@ -144,6 +144,6 @@ pub enum Task {
 pub enum ScheduleName {
     /// 8 substeps of 10 sweeps from the adaptive start.
     Default,
-    /// 8 substeps of 10 sweeps from the inertial predictor, to the paper's letter.
+    /// 8 substeps of 10 sweeps from the inertial predictor: the paper's, with our inversion guard.
     Paper,
 }

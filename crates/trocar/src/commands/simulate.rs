@@ -29,7 +29,7 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
 pub fn text(s: &Summary) -> String {
     format!(
         "{} at s = {:.2}, {} nodes held: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm: {}\n\
-         settled at {:.4} m/s, peak {:.3} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}\n\
+         {:.4} m/s after 1 s, calmed for {:.2} s to {:.4} m/s, peak {:.3} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}\n\
          {:.1} s simulated in {:.1} s ({:.2}x real time), state {}",
         s.organ,
         s.at,
@@ -40,6 +40,8 @@ pub fn text(s: &Summary) -> String {
         s.snap_mm,
         if s.held { "held" } else { "NOT held" },
         s.settled_speed_m_s,
+        s.calmed_s,
+        s.resting_speed_m_s,
         s.peak_speed_m_s,
         s.inverted_rest,
         s.inverted_peak,
