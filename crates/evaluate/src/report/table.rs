@@ -147,7 +147,7 @@ pub(super) fn plain(head: &[&str], rows: &[Vec<String>]) -> String {
 /// Every figure of a run with what it means.
 pub(super) fn summary(s: &Summary) -> String {
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
-    let rows: [(&str, String, &str); 18] = [
+    let rows: [(&str, String, &str); 20] = [
         ("Organ", format!("{}, s = {}", s.organ, fixed(s.at, 2)), "grasped at this organ coordinate, 0 base to 1 tip"),
         ("Nodes held", count(s.held_nodes), "tissue nodes inside the jaws at activation"),
         ("Held", yes(s.held), "follow ratio at least 0.80 and slip under 3 mm"),
@@ -172,7 +172,9 @@ pub(super) fn summary(s: &Summary) -> String {
         ("Inverted, peak", count(s.inverted_peak), "elements, most in any frame"),
         ("Volume ratio, smallest", fixed(s.min_volume_ratio, 3), "element volume over its rest volume"),
         ("Speed, peak", format!("{} m/s", fixed(s.peak_speed_m_s, 3)), "of any node in any frame"),
-        ("Speed, settled", format!("{:.1e} m/s", s.settled_speed_m_s), "of any node at the end of settling"),
+        ("Speed, settled", format!("{:.1e} m/s", s.settled_speed_m_s), "of any node one second after release"),
+        ("Calmed", format!("{:.2} s", s.calmed_s), "kinetic damping of organs that had not settled by then"),
+        ("Speed, at rest", format!("{:.1e} m/s", s.resting_speed_m_s), "of any node when the gripper sets out"),
         ("Pin drift", format!("{:.1e} mm", s.pin_drift_mm), "largest motion of a pinned node"),
         (
             "Diverged",
