@@ -187,10 +187,9 @@ fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
 fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
     // An output that is not there yet is where its nearest existing parent is.
     let placed = |path: &Path| {
-        let existing = path.ancestors().find(|p| p.exists()).unwrap_or(Path::new("."));
-        let rest = path.strip_prefix(existing).unwrap_or(Path::new(""));
-        let root = if existing.as_os_str().is_empty() { Path::new(".") } else { existing };
-        root.canonicalize().map_or_else(|_| path.to_owned(), |root| root.join(rest))
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let root = path.ancestors().find_map(|p| Some((p, p.canonicalize().ok()?)));
+        root.map_or_else(|| path.clone(), |(p, real)| real.join(path.strip_prefix(p).unwrap_or(Path::new(""))))
     };
     let (from, to) = (placed(input), placed(output));
     if from.starts_with(&to) || (input.is_dir() && to.starts_with(&from)) {

@@ -134,6 +134,14 @@ fn the_input_is_never_replaced() {
         assert!(said.contains("lie in one another"), "{said}");
     }
     assert!(fixture.file("recording.toml").is_file() && !inside.exists());
+    // Beside it is fine, named from where the user stands too.
+    let beside = Command::new(env!("CARGO_BIN_EXE_trocar"))
+        .args(["reconstruct", "recording", "-o", "specimen", "--quiet"])
+        .current_dir(home)
+        .output()
+        .unwrap();
+    assert!(beside.status.success(), "{}", String::from_utf8_lossy(&beside.stderr));
+    assert!(home.join("specimen/specimen.toml").is_file());
     // A recording with no truth is somebody's own.
     fs::remove_dir_all(fixture.file("truth")).unwrap();
     let result = trocar(&["record", "phantom-a", "--frames", "1", "-o", recording.to_str().unwrap()]);
