@@ -52,9 +52,17 @@ impl ColorImage {
     /// # Errors
     /// Names the file when it is missing, truncated or no image.
     pub fn read(path: &Path) -> Result<Self> {
-        let image = decode(path)?.into_rgb8();
+        Self::decode(&load(path)?, path)
+    }
+
+    /// Decodes the bytes of a PNG or JPEG; `path` is the file that errors name.
+    ///
+    /// # Errors
+    /// Names the file when it is truncated or no image.
+    pub fn decode(bytes: &[u8], path: &Path) -> Result<Self> {
+        let image = decode(bytes, path)?.into_rgb8();
         let (width, height) = (image.width() as usize, image.height() as usize);
-        Ok(Self { width, height, pixels: image.pixels().map(|p| p.0).collect() })
+        Ok(Self { width, height, pixels: image.as_raw().as_chunks().0.to_vec() })
     }
 
     /// Writes a PNG.
@@ -85,7 +93,15 @@ impl DepthImage {
     /// # Errors
     /// Names the file when it is missing, truncated, or not 16-bit greyscale.
     pub fn read(path: &Path, scale: f64) -> Result<Self> {
-        let DynamicImage::ImageLuma16(image) = decode(path)? else {
+        Self::decode(&load(path)?, path, scale)
+    }
+
+    /// Decodes the bytes of a 16-bit greyscale PNG whose unit is `scale` metres; `path` is the file that errors name.
+    ///
+    /// # Errors
+    /// Names the file when it is truncated, or not 16-bit greyscale.
+    pub fn decode(bytes: &[u8], path: &Path, scale: f64) -> Result<Self> {
+        let DynamicImage::ImageLuma16(image) = decode(bytes, path)? else {
             return Err(wrong(path, &"not a 16-bit greyscale image; depth is one 16-bit channel"));
         };
         let (width, height) = (image.width() as usize, image.height() as usize);
@@ -122,7 +138,15 @@ impl Mask {
     /// # Errors
     /// Names the file when it is missing, truncated or no image.
     pub fn read(path: &Path) -> Result<Self> {
-        let image = decode(path)?.into_luma_alpha8();
+        Self::decode(&load(path)?, path)
+    }
+
+    /// Decodes the bytes of an image, as [`Mask::read`] does; `path` is the file that errors name.
+    ///
+    /// # Errors
+    /// Names the file when it is truncated or no image.
+    pub fn decode(bytes: &[u8], path: &Path) -> Result<Self> {
+        let image = decode(bytes, path)?.into_luma_alpha8();
         let (width, height) = (image.width() as usize, image.height() as usize);
         Ok(Self { width, height, set: image.pixels().map(|p| p.0[0] > 127 && p.0[1] > 127).collect() })
     }
@@ -153,9 +177,12 @@ fn wrong(path: &Path, reason: &dyn std::fmt::Display) -> Error {
     Error::Image { path: path.to_owned(), reason: reason.to_string() }
 }
 
-/// Decodes by content, not by extension. The whole file is read first, so that a huge header in a small file is refused.
-fn decode(path: &Path) -> Result<DynamicImage> {
-    let bytes = std::fs::read(path).map_err(|e| wrong(path, &e))?;
+fn load(path: &Path) -> Result<Vec<u8>> {
+    std::fs::read(path).map_err(|e| wrong(path, &e))
+}
+
+/// Decodes by content, not by extension.
+fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     let unreadable =
         |e: image::ImageError| wrong(path, &format!("unreadable image ({e}); expected a whole PNG or JPEG"));
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| wrong(path, &e))?;

@@ -6,8 +6,10 @@
 mod error;
 mod images;
 mod model;
+mod raster;
 
 pub use error::{Error, Result};
 pub use images::{ColorImage, DepthImage, Mask, pixel_neighbours};
 pub use model::{Camera, Distortion};
+pub use raster::draw_triangle;
 pub use trocar_geometry::Pose;

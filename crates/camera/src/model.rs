@@ -119,13 +119,13 @@ impl Camera {
             return refuse("width x height", format!("{} x {}", self.width, self.height), "1 to 65536 pixels each");
         }
         for (name, f) in [("fx", self.fx), ("fy", self.fy)] {
-            if !(f.is_finite() && f > 0.0) {
-                return refuse(name, f.to_string(), "a focal length is a positive number of pixels");
+            if !(1e-3..=1e7).contains(&f) {
+                return refuse(name, format!("{f:?}"), "a focal length is a positive number of pixels (0.001 to 1e7)");
             }
         }
         for (name, c) in [("cx", self.cx), ("cy", self.cy)] {
-            if !c.is_finite() {
-                return refuse(name, c.to_string(), "a principal point is a finite number of pixels");
+            if c.is_nan() || c.abs() > 1e6 {
+                return refuse(name, c.to_string(), "a principal point is a number of pixels (-1e6 to 1e6)");
             }
         }
         if self.distortion.0.iter().any(|k| !k.is_finite()) {

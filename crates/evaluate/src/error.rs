@@ -67,6 +67,9 @@ pub enum Error {
     /// A recording or surface cannot be reconstructed.
     #[error(transparent)]
     Reconstruct(#[from] trocar_reconstruct::Error),
+    /// A recording is unusable.
+    #[error(transparent)]
+    Recording(#[from] trocar_recording::Error),
     /// A specimen cannot be read or written.
     #[error(transparent)]
     Specimen(#[from] trocar_specimen::Error),

@@ -7,7 +7,8 @@ use std::time::Instant;
 use trocar_cell::{GraspLift, GraspLiftRun, Summary};
 use trocar_geometry::io::Unit;
 use trocar_progress::Progress;
-use trocar_reconstruct::{Reconstruction, Recording, Settings};
+use trocar_reconstruct::{Reconstruction, Settings};
+use trocar_recording::Recording;
 use trocar_specimen::{OrganFacts, Specimen, StagedFolder};
 
 /// The report's name in every folder.

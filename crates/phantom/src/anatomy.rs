@@ -5,7 +5,7 @@ use crate::noise;
 use crate::tube::{Shape, Tube};
 use glam::DVec3;
 use trocar_geometry::SignedDistance;
-use trocar_reconstruct::OrganInfo;
+use trocar_recording::OrganInfo;
 use trocar_specimen::{End, Material, Pins};
 
 /// Distance at which two organs touch [m].
@@ -96,6 +96,8 @@ impl Anatomy {
         OrganInfo {
             name: organ.name.to_owned(),
             polygon: Vec::new(),
+            points: Vec::new(),
+            points_outside: Vec::new(),
             base_px: pixel(organ.tube.base()),
             material: Material { young_modulus_pa: organ.young_modulus, ..Material::default() },
             pins,

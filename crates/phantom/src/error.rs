@@ -17,7 +17,7 @@ pub enum Error {
     Interrupted,
     /// The recording cannot be written.
     #[error(transparent)]
-    Recording(#[from] trocar_reconstruct::Error),
+    Recording(#[from] trocar_recording::Error),
     /// An image cannot be written.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),

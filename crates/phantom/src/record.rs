@@ -9,7 +9,7 @@ use std::path::Path;
 use trocar_camera::Camera;
 use trocar_geometry::io::write_ply;
 use trocar_progress::Progress;
-use trocar_reconstruct::{RecordingInfo, RecordingWriter};
+use trocar_recording::{InstrumentRule, RecordingInfo, RecordingWriter};
 
 /// The phantoms there are.
 const NAMES: [&str; 1] = ["phantom-a"];
@@ -93,13 +93,17 @@ fn describe(name: &str, seed: u64, camera: &Camera, anatomy: &Anatomy) -> Record
     let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
     RecordingInfo {
         name: name.to_owned(),
-        rate_hz: RATE_HZ,
-        depth_scale_m: sensor::DEPTH_SCALE,
+        rate_hz: Some(RATE_HZ),
+        depth_scale_m: Some(sensor::DEPTH_SCALE),
         up: [0.0, 0.0, -1.0],
         depth_offset_px: [0.0; 2],
         depth_max_m: None,
         note: format!("synthetic, seed {seed}; the truth is in truth/; materials are the paper's"),
-        camera: *camera,
+        camera: Some(*camera),
+        instruments: InstrumentRule::Masks,
+        source: None,
+        depth_camera: None,
+        depth_to_color: None,
         organs: anatomy.organs.iter().map(|o| Anatomy::info(o, pixel)).collect(),
     }
 }
@@ -107,7 +111,7 @@ fn describe(name: &str, seed: u64, camera: &Camera, anatomy: &Anatomy) -> Record
 fn write_truth(dir: &Path, anatomy: &Anatomy, still: &Still) -> Result<()> {
     let io = |path: &Path| {
         let path = path.to_owned();
-        move |source| trocar_reconstruct::Error::Io { path, source }
+        move |source| trocar_recording::Error::Io { path, source }
     };
     std::fs::create_dir_all(dir).map_err(io(dir))?;
     still.frame.color.write_png(&dir.join("color.png"))?;

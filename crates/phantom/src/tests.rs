@@ -4,7 +4,7 @@ use crate::anatomy::Anatomy;
 use crate::film::shoot;
 use crate::instruments;
 use crate::still::{Fineness, Still};
-use trocar_camera::Camera;
+use trocar_camera::{Camera, Mask};
 
 const COARSE: Fineness = Fineness { surface: 1.2e-3, bed: 2e-3 };
 
@@ -118,12 +118,13 @@ fn a_recording_is_whole_and_replays() {
     };
     let folder = write("a");
     let again = write("b");
-    let recording = trocar_reconstruct::Recording::open(&folder).unwrap();
+    let recording = trocar_recording::Recording::open(&folder).unwrap();
     assert_eq!(recording.len(), 3);
     let names: Vec<&str> = recording.info.organs.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["cecum", "bowel-1", "bowel-2", "bowel-3", "stomach", "appendix"]);
     for (index, organ) in recording.info.organs.iter().enumerate() {
-        let mask = recording.organ_mask(index).unwrap();
+        let name = &recording.info.organs[index].name;
+        let mask = Mask::read(&folder.join(format!("masks/{name}.png"))).unwrap();
         let [u, v] = organ.base_px.unwrap();
         assert!(mask.set[v.round() as usize * mask.width + u.round() as usize], "{}'s base is in its mask", organ.name);
         let surface = folder.join(format!("truth/{}.ply", organ.name));

@@ -1,7 +1,7 @@
 //! The reconstructed surface against the depth it was made from.
 
 use glam::DVec3;
-use trocar_camera::{Camera, DepthImage, Mask};
+use trocar_camera::{Camera, DepthImage, Mask, draw_triangle};
 use trocar_geometry::TriMesh;
 
 /// Depth errors of a surface.
@@ -50,28 +50,7 @@ fn render_depth(surface: &TriMesh, camera: &Camera) -> Vec<f64> {
         surface.vertices.iter().map(|p| Some(camera.project(*p)?.extend(1.0 / p.z))).collect();
     for triangle in &surface.triangles {
         let [Some(a), Some(b), Some(c)] = triangle.map(|v| projected[v as usize]) else { continue };
-        let edge = |p: DVec3, q: DVec3, u: f64, v: f64| (q.x - p.x) * (v - p.y) - (q.y - p.y) * (u - p.x);
-        let area = edge(a, b, c.x, c.y);
-        if area == 0.0 {
-            continue;
-        }
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        let range = |low: f64, high: f64, size: usize| {
-            let last = high.floor().min(size as f64 - 1.0);
-            if last < 0.0 || low > last { 0..0 } else { low.ceil().max(0.0) as usize..last as usize + 1 }
-        };
-        for v in range(low.y, high.y, h) {
-            for u in range(low.x, high.x, w) {
-                let (x, y) = (u as f64, v as f64);
-                let (wa, wb) = (edge(b, c, x, y) / area, edge(c, a, x, y) / area);
-                let wc = 1.0 - wa - wb;
-                if wa.min(wb).min(wc) >= -1e-9 {
-                    let z = 1.0 / (wa * a.z + wb * b.z + wc * c.z);
-                    let nearest = &mut depth[v * w + u];
-                    *nearest = nearest.min(z);
-                }
-            }
-        }
+        draw_triangle([a, b, c], w, h, |i, z| depth[i] = depth[i].min(z));
     }
     depth
 }

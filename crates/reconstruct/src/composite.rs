@@ -1,11 +1,12 @@
 //! The background: per-pixel medians over a window of frames, instruments left out (paper section III, "Instrument
 //! removal").
 
-use crate::{Error, Recording, Result, Settings};
+use crate::{Error, Result, Settings};
 use rayon::prelude::*;
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_progress::Progress;
-use xxhash_rust::xxh3::{Xxh3, xxh3_64};
+use trocar_recording::{Packet, Recording, RgbdFrame};
+use xxhash_rust::xxh3::Xxh3;
 
 /// What a window of frames says of the scene behind the instruments.
 pub struct Composite {
@@ -33,6 +34,7 @@ pub struct Composite {
 
 /// One frame, as small as it can be held: the whole window is in memory at once.
 struct Sample {
+    frame: usize,
     color: Vec<[u8; 3]>,
     /// Depth in units of the recording; 0 is invalid.
     depth: Vec<u16>,
@@ -48,34 +50,21 @@ struct Pixel {
     depth: Option<(f64, f64)>,
 }
 
-/// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame.
+/// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame. Broken frames are left out with a note.
 ///
 /// # Errors
-/// A centre outside the recording, a broken frame, or an interruption.
-pub fn composite(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Composite> {
-    let scale = recording.info.depth_scale_m;
+/// A centre outside the recording, too few whole frames, or an interruption.
+pub fn composite(
+    recording: &Recording,
+    settings: &Settings,
+    notes: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Composite> {
+    let scale = recording.depth_scale();
     let centre = settings.centre.unwrap_or(recording.len() / 2);
-    let window = window(recording, settings, centre)?;
-    progress.begin("frames", window.len() as u64);
-    let read = |&index: &usize| {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
-        let frame = recording.frame(index)?;
-        let sample = Sample {
-            depth: frame.depth.depth.iter().map(|z| (f64::from(*z) / scale).round() as u16).collect(),
-            color: frame.color.pixels,
-            instruments: frame.instruments.set,
-            hash: hash_files(recording.files(index))?,
-        };
-        progress.advance(1);
-        Ok(sample)
-    };
-    let samples = window.par_iter().map(read).collect::<Result<Vec<Sample>>>();
-    progress.end();
-    let samples = samples?;
+    let samples = read_window(recording, &window(recording, settings, centre)?, settings, notes, progress)?;
 
-    let (width, height) = (recording.info.camera.width, recording.info.camera.height);
+    let (width, height) = (recording.camera().width, recording.camera().height);
     let needed = settings.min_samples.clamp(1, samples.len());
     let mut pixels = vec![Pixel::default(); width * height];
     pixels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
@@ -85,7 +74,12 @@ pub fn composite(recording: &Recording, settings: &Settings, progress: &dyn Prog
         }
     });
 
-    let centre = recording.frame(centre)?;
+    let mut hash = Xxh3::new();
+    samples.iter().for_each(|s| hash.update(&s.hash.to_le_bytes()));
+    let frames_used = samples.len();
+    let Some(centre) = samples.into_iter().min_by_key(|s| s.frame.abs_diff(centre)) else {
+        return Err(Error::Setting("the window holds no frame".into()));
+    };
     let mut color = ColorImage::new(width, height, [0; 3]);
     let (mut colored, mut depth) = (Mask::new(width, height), DepthImage::new(width, height));
     let (mut ranges, mut recovered) = (Vec::new(), 0usize);
@@ -97,20 +91,18 @@ pub fn composite(recording: &Recording, settings: &Settings, progress: &dyn Prog
         if let Some((median, range)) = pixel.depth {
             depth.depth[i] = (median * scale) as f32;
             ranges.push(range * scale);
-            recovered += usize::from(centre.instruments.set[i]);
+            recovered += usize::from(centre.instruments[i]);
         }
     }
     let all = (width * height) as f64;
-    let mut hash = Xxh3::new();
-    samples.iter().for_each(|s| hash.update(&s.hash.to_le_bytes()));
     ranges.sort_by(f64::total_cmp);
     Ok(Composite {
-        input: centre.color,
-        instruments: centre.instruments,
+        input: ColorImage { width, height, pixels: centre.color },
+        instruments: Mask { width, height, set: centre.instruments },
         color,
         colored,
         depth,
-        frames_used: samples.len(),
+        frames_used,
         recovered_share: recovered as f64 / all,
         coverage: ranges.len() as f64 / all,
         depth_range_median: ranges.get(ranges.len() / 2).copied().unwrap_or(0.0),
@@ -118,9 +110,60 @@ pub fn composite(recording: &Recording, settings: &Settings, progress: &dyn Prog
     })
 }
 
+/// Reads and decodes the frames of `window`, in its order.
+fn read_window(
+    recording: &Recording,
+    window: &[usize],
+    settings: &Settings,
+    notes: &mut Vec<String>,
+    progress: &dyn Progress,
+) -> Result<Vec<Sample>> {
+    let scale = recording.depth_scale();
+    progress.begin("frames", window.len() as u64);
+    let read = |packet: Packet| {
+        if progress.interrupted() {
+            return (packet.frame, Err(Error::Interrupted));
+        }
+        let sample = packet.parts.and_then(|parts| {
+            let RgbdFrame { color, depth, instruments } = recording.decode(packet.frame, &parts)?;
+            Ok(Sample {
+                frame: packet.frame,
+                depth: depth.depth.iter().map(|z| (f64::from(*z) / scale).round() as u16).collect(),
+                color: color.pixels,
+                instruments: instruments.set,
+                hash: parts.hash(),
+            })
+        });
+        progress.advance(1);
+        (packet.frame, sample.map_err(Error::from))
+    };
+    // One thread reads while the others decode; what is read is decoded at once, so no more than a packet a thread waits.
+    let mut read: Vec<(usize, Result<Sample>)> = recording.packets(window).par_bridge().map(read).collect();
+    progress.end();
+    if progress.interrupted() {
+        return Err(Error::Interrupted);
+    }
+    read.sort_by_key(|(frame, _)| *frame);
+    let (mut samples, mut broken) = (Vec::with_capacity(read.len()), Vec::new());
+    for (_, sample) in read {
+        match sample {
+            Ok(sample) => samples.push(sample),
+            Err(e) => broken.push(e),
+        }
+    }
+    let count = broken.len();
+    if let Some(first) = broken.into_iter().next() {
+        if samples.len() < settings.min_samples.min(window.len()) {
+            return Err(first);
+        }
+        notes.push(format!("{count} of {} frames are broken and were left out (first: {first}).", window.len()));
+    }
+    Ok(samples)
+}
+
 /// Indices of the window's frames.
 fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<Vec<usize>> {
-    let wrong = |reason: String| Error::Recording { path: recording.dir().to_owned(), reason };
+    let wrong = |reason: String| Error::Input { path: recording.dir().to_owned(), reason };
     if centre >= recording.len() {
         return Err(wrong(format!("the window's centre is frame {centre}; the recording has {}", recording.len())));
     }
@@ -159,15 +202,6 @@ fn percentile(sorted: &[u16], p: f64) -> f64 {
     f64::from(low) + (f64::from(high) - f64::from(low)) * at.fract()
 }
 
-fn hash_files<'a>(files: impl Iterator<Item = &'a std::path::Path>) -> Result<u64> {
-    let mut hash = Xxh3::new();
-    for path in files {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        hash.update(&xxh3_64(&bytes).to_le_bytes());
-    }
-    Ok(hash.digest())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -175,6 +209,7 @@ mod tests {
     #[test]
     fn medians_leave_instruments_and_holes_out() {
         let sample = |color: u8, depth: u16, masked: bool| Sample {
+            frame: 0,
             color: vec![[color; 3]],
             depth: vec![depth],
             instruments: vec![masked],

@@ -16,9 +16,9 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
-    /// The recording is not what it should be.
+    /// The recording, or the surface in its place, is not what it should be.
     #[error("{path}: {reason}", path = path.display())]
-    Recording {
+    Input {
         /// File or folder.
         path: PathBuf,
         /// Field or frame, what is wrong, what would be right.
@@ -38,6 +38,9 @@ pub enum Error {
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// The recording is unusable.
+    #[error(transparent)]
+    Recording(#[from] trocar_recording::Error),
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),

@@ -38,7 +38,7 @@ fn make(path: &Path, unit: Unit, settings: &Settings, progress: &dyn Progress) -
     let raw = read_surface(path, unit)?;
     check_size(path, &raw, unit)?;
     step()?;
-    let named = |e: trocar_geometry::Error| Error::Recording { path: path.to_owned(), reason: e.to_string() };
+    let named = |e: trocar_geometry::Error| Error::Input { path: path.to_owned(), reason: e.to_string() };
     let (mut surface, report) = repair(&raw).map_err(named)?;
     if surface.colors.len() != surface.vertices.len() {
         surface.colors = vec![crate::TISSUE_COLOR; surface.vertices.len()];
@@ -79,7 +79,7 @@ fn make(path: &Path, unit: Unit, settings: &Settings, progress: &dyn Progress) -
 /// Refuses what is too large or too small for an organ: nearly always the wrong unit.
 fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
     let Some((low, high)) = surface.bounds() else {
-        return Err(Error::Recording { path: path.to_owned(), reason: "no vertices".into() });
+        return Err(Error::Input { path: path.to_owned(), reason: "no vertices".into() });
     };
     let metres = |unit: Unit| match unit {
         Unit::Millimetre => 1e-3,
@@ -105,7 +105,7 @@ fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
         None => "organs are 2 mm to 2 m long".into(),
     };
     let reason = format!("the surface is {extent:.3} m long, which is no organ; {advice}");
-    Err(Error::Recording { path: path.to_owned(), reason })
+    Err(Error::Input { path: path.to_owned(), reason })
 }
 
 /// The file's stem in the letters an organ's name may have.

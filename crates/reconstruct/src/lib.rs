@@ -14,16 +14,16 @@ mod error;
 mod fill;
 mod from_surface;
 mod front;
+mod masks;
 mod organ;
 mod outline;
 mod pipeline;
-pub mod recording;
+mod polygon;
 mod thickness;
 
 pub use error::{Error, Result};
 pub use from_surface::from_surface;
 pub use pipeline::{OrganView, Reconstruction, Settings, reconstruct};
-pub use recording::{OrganInfo, Recording, RecordingInfo, RecordingWriter};
 
 /// Colour of tissue that no photograph shows.
 const TISSUE_COLOR: [u8; 3] = [150, 60, 55];

@@ -8,10 +8,11 @@ use crate::composite::Composite;
 use crate::front::front;
 use crate::outline::tidy;
 use crate::thickness::thickness;
-use crate::{Error, OrganInfo, Result};
+use crate::{Error, Result};
 use glam::{DVec2, DVec3};
 use trocar_camera::{Camera, Mask};
 use trocar_geometry::TriMesh;
+use trocar_recording::OrganInfo;
 
 /// What all organs of a recording are made from.
 pub struct View<'a> {
@@ -137,6 +138,8 @@ mod tests {
         let info = OrganInfo {
             name: "organ".into(),
             polygon: vec![],
+            points: vec![],
+            points_outside: vec![],
             base_px: None,
             material: Material::default(),
             pins: Pins::None,

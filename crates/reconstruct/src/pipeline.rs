@@ -2,11 +2,13 @@
 
 use crate::body::fill_with_tets;
 use crate::composite::{Composite, composite};
+use crate::masks::organ_mask;
 use crate::organ::{Closed, View, close};
-use crate::{Error, OrganInfo, Recording, Result};
+use crate::{Error, Result};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_geometry::Pose;
 use trocar_progress::Progress;
+use trocar_recording::{OrganInfo, Recording};
 use trocar_specimen::{Organ, Provenance, Specimen};
 use xxhash_rust::xxh3::Xxh3;
 
@@ -120,20 +122,20 @@ pub(crate) fn program() -> String {
 pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
     settings.validate()?;
     if recording.info.organs.is_empty() {
-        return Err(Error::Recording {
-            path: recording.dir().join("recording.toml"),
+        return Err(Error::Input {
+            path: recording.toml().to_owned(),
             reason: "no [[organ]]; name at least one, with a mask in masks/ or a polygon".into(),
         });
     }
     // All masks first: a missing one should not be found after minutes of work.
-    let masks = (0..recording.info.organs.len()).map(|i| recording.organ_mask(i)).collect::<Result<Vec<_>>>()?;
+    let masks = recording.info.organs.iter().map(|organ| organ_mask(recording, organ)).collect::<Result<Vec<_>>>()?;
     let mut notes = recording.notes().to_vec();
-    let background = composite(recording, settings, progress)?;
+    let background = composite(recording, settings, &mut notes, progress)?;
     if background.frames_used < settings.min_samples {
         notes.push(format!("The window holds only {} frames.", background.frames_used));
     }
 
-    let view = View { background: &background, camera: recording.camera(), depth_scale: recording.info.depth_scale_m };
+    let view = View { background: &background, camera: recording.camera(), depth_scale: recording.depth_scale() };
     let (mut organs, mut views) = (Vec::new(), Vec::new());
     progress.begin("organs", masks.len() as u64);
     for (info, mask) in recording.info.organs.iter().zip(masks) {
@@ -199,7 +201,7 @@ fn with_body(info: &OrganInfo, closed: Closed, settings: &Settings) -> Result<(O
 
 /// Hash of everything the result depends on: `recording.toml`, the used frames, the masks.
 fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]) -> Result<u64> {
-    let path = recording.dir().join("recording.toml");
+    let path = recording.toml().to_owned();
     let mut hash = Xxh3::new();
     hash.update(&std::fs::read(&path).map_err(|source| Error::Io { path, source })?);
     hash.update(&background.hash.to_le_bytes());

@@ -1,6 +1,7 @@
 //! From a recording to organs, against the truth it was made from.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[path = "../../recording/tests/common/mod.rs"]
 mod common;
 
 use common::{CENTRE, RADIUS, info, write};
@@ -8,7 +9,8 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_geometry::io::Unit;
 use trocar_progress::{Progress, Silent};
-use trocar_reconstruct::{Recording, Settings, from_surface, reconstruct};
+use trocar_reconstruct::{Settings, from_surface, reconstruct};
+use trocar_recording::Recording;
 use trocar_specimen::Specimen;
 
 #[test]
@@ -20,7 +22,7 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     let made = reconstruct(&recording, &Settings::default(), &Silent).unwrap();
 
     // The composite: no trace of the bar, which covered an eighth of the image.
-    let (color, depth, mask) = common::scene(&recording.info.camera);
+    let (color, depth, mask) = common::scene(&recording.camera());
     assert_eq!(made.background, color);
     assert_eq!(made.frames_used, 12, "stride 2");
     assert_eq!(made.coverage, 1.0);

@@ -1,5 +1,6 @@
 //! Which files make a frame: from `frames.csv`, or by pairing the files of the folders.
 
+use crate::pairing::Pairing;
 use crate::{Error, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
@@ -54,12 +55,14 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
         csv::ReaderBuilder::new().trim(csv::Trim::All).from_path(path).map_err(|e| wrong(path, e.to_string()))?;
     let (mut frames, mut missing) = (Vec::new(), Vec::new());
     let mut previous: Option<u64> = None;
+    let mut last_time = f64::NEG_INFINITY;
     for (row, line) in reader.deserialize::<Row>().zip(2..) {
         let row = row.map_err(|e| wrong(path, explain(&e)))?;
         let at = |reason: String| wrong(path, format!("line {line}: {reason}"));
-        if !row.time_s.is_finite() {
-            return Err(at(format!("time_s is {}; seconds", row.time_s)));
+        if !row.time_s.is_finite() || row.time_s < last_time {
+            return Err(at(format!("time_s is {}; seconds, not before the line above", row.time_s)));
         }
+        last_time = row.time_s;
         if previous.is_some_and(|p| p >= row.index) {
             return Err(at(format!("index is {} after {}; indices ascend", row.index, previous.unwrap_or(0))));
         }
@@ -79,10 +82,11 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
             None => frames.push(FrameFiles { color, depth, instruments }),
         }
     }
-    if frames.is_empty()
-        && let Some(first) = missing.first()
-    {
-        return Err(wrong(first, "no such file, and no frame of frames.csv has all of its files"));
+    if frames.is_empty() {
+        return Err(match missing.first() {
+            Some(first) => wrong(first, "no such file, and no frame of frames.csv has all of its files"),
+            None => wrong(path, "no frames: no line below the header; remove it to pair the files by name"),
+        });
     }
     let with_color = frames.iter().filter(|f| f.color.is_some()).count();
     if with_color != 0 && with_color != frames.len() {
@@ -119,8 +123,8 @@ fn from_folders(dir: &Path) -> Result<FrameList> {
     }
     let depth = images(&depth_dir)?;
     let mut notes = Vec::new();
-    let color_dir = dir.join("color");
-    let mut frames: Vec<FrameFiles> = if color_dir.is_dir() {
+    let color_dir = ["color", "rgb"].map(|name| dir.join(name)).into_iter().find(|d| d.is_dir());
+    let mut frames: Vec<FrameFiles> = if let Some(color_dir) = color_dir {
         let color = images(&color_dir)?;
         if color.is_empty() {
             return Err(wrong(&color_dir, "no PNG or JPEG in it; remove the folder if the recording has depth alone"));
@@ -134,25 +138,47 @@ fn from_folders(dir: &Path) -> Result<FrameList> {
     Ok(FrameList { frames, notes })
 }
 
-/// Pairs files of equal stem; where no two are equal, in order.
+/// Pairs files of equal stem; where no two are equal, by the times in their names; where there are none, in order.
 fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<FrameFiles> {
     let by_stem: BTreeMap<String, &PathBuf> = depth.iter().map(|d| (stem(d), d)).collect();
     let frame = |c: &PathBuf, d: &PathBuf| FrameFiles { color: Some(c.clone()), depth: d.clone(), instruments: None };
     let mut frames: Vec<_> = color.iter().filter_map(|c| by_stem.get(&stem(c)).map(|d| frame(c, d))).collect();
-    let by_order = frames.is_empty();
-    if by_order {
-        frames = color.iter().zip(depth).map(|(c, d)| frame(c, d)).collect();
+    if !frames.is_empty() {
+        if frames.len() != color.len() || frames.len() != depth.len() {
+            notes.push(format!(
+                "{} colour and {} depth images were paired by name into {} frames; the others were dropped.",
+                color.len(),
+                depth.len(),
+                frames.len()
+            ));
+        }
+        return frames;
     }
-    if frames.len() != color.len() || frames.len() != depth.len() {
-        notes.push(format!(
-            "{} colour and {} depth images were paired by {} into {} frames; the others were dropped.",
-            color.len(),
-            depth.len(),
-            if by_order { "order" } else { "name" },
-            frames.len()
-        ));
+    if let (Some(color_times), Some(depth_times)) = (times(color), times(depth)) {
+        let pairing = Pairing::by_time(&color_times, &depth_times);
+        notes.extend(pairing.notes());
+        return pairing.pairs.iter().map(|&(c, d)| frame(&color[c], &depth[d])).collect();
     }
+    frames = color.iter().zip(depth).map(|(c, d)| frame(c, d)).collect();
+    notes.push(format!(
+        "No colour and depth image have the same name or a time in it, so {} colour and {} depth images were paired by order \
+         into {} frames.",
+        color.len(),
+        depth.len(),
+        frames.len()
+    ));
     frames
+}
+
+/// Times in the names of all files [s]: the last number of the name, which has a decimal point, as the tools of RealSense
+/// and the TUM benchmark write them.
+fn times(files: &[PathBuf]) -> Option<Vec<f64>> {
+    let time = |file: &PathBuf| {
+        let stem = stem(file);
+        let number = stem.rsplit(|c: char| !c.is_ascii_digit() && c != '.').find(|part| !part.is_empty())?;
+        number.contains('.').then(|| number.parse().ok())?
+    };
+    files.iter().map(time).collect()
 }
 
 /// Gives each frame the instrument mask of its stem; where no stem is equal and the counts are, in order.
@@ -189,10 +215,9 @@ fn attach_instruments(dir: &Path, frames: &mut [FrameFiles], notes: &mut Vec<Str
 
 /// The image files of a folder in natural order of their names (2 before 10).
 fn images(dir: &Path) -> Result<Vec<PathBuf>> {
-    let io = |source| Error::Io { path: dir.to_owned(), source };
     let mut files = Vec::new();
-    for entry in std::fs::read_dir(dir).map_err(io)? {
-        let path = entry.map_err(io)?.path();
+    for entry in std::fs::read_dir(dir).map_err(Error::io(dir))? {
+        let path = entry.map_err(Error::io(dir))?.path();
         let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
         if path.is_file() && matches!(extension.as_deref(), Some("png" | "jpg" | "jpeg")) {
             files.push(path);
@@ -224,7 +249,7 @@ fn natural(name: &str) -> String {
 }
 
 fn wrong(path: &Path, reason: impl Into<String>) -> Error {
-    Error::Recording { path: path.to_owned(), reason: reason.into() }
+    Error::wrong(path, reason)
 }
 
 #[cfg(test)]
@@ -249,5 +274,11 @@ mod tests {
         let frames = pair(&files(&["c0.jpg", "c1.jpg"]), &files(&["d0.png", "d1.png", "d2.png"]), &mut notes);
         assert_eq!(frames.iter().map(|f| stem(&f.depth)).collect::<Vec<_>>(), ["d0", "d1"]);
         assert!(notes[1].contains("by order"));
+        let frames = pair(
+            &files(&["c_7.01.jpg", "c_7.04.jpg"]),
+            &files(&["d_7.03.png", "d_7.06.png", "d_7.00.png"]),
+            &mut notes,
+        );
+        assert_eq!(frames.iter().map(|f| stem(&f.depth)).collect::<Vec<_>>(), ["d_7.00", "d_7.03"]);
     }
 }

@@ -3,7 +3,7 @@
 use super::{MARKER, RecordingInfo};
 use crate::{Error, Result};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_specimen::StagedFolder;
@@ -25,22 +25,21 @@ impl RecordingWriter {
     /// When `info` would not be accepted by the reader, or `dir` is another kind of folder or cannot be written.
     pub fn create(dir: &Path, info: &RecordingInfo) -> Result<Self> {
         let mut info = info.clone();
-        info.validate(&dir.join(MARKER))?;
+        let marker = dir.join(MARKER);
+        info.validate(&marker)?;
+        let (Some(rate_hz), Some(depth_scale_m), None) = (info.rate_hz, info.depth_scale_m, &info.source) else {
+            let reason = "a recording is written with rate_hz and depth_scale_m, and without [source]";
+            return Err(Error::wrong(&marker, reason));
+        };
         let folder = StagedFolder::create(dir, MARKER)?;
         for sub in ["color", "depth", "masks/instruments"] {
             let path = folder.path().join(sub);
-            std::fs::create_dir_all(&path).map_err(|source| Error::Io { path, source })?;
+            std::fs::create_dir_all(&path).map_err(Error::io(&path))?;
         }
         let path = folder.path().join(MARKER);
-        let text = toml::to_string(&info)
-            .map_err(|e| Error::Recording { path: path.clone(), reason: format!("cannot be written: {e}") })?;
-        write(path, text.as_bytes())?;
-        Ok(Self {
-            folder,
-            rate_hz: info.rate_hz,
-            depth_scale_m: info.depth_scale_m,
-            frames: Mutex::new(BTreeMap::new()),
-        })
+        let text = toml::to_string(&info).map_err(|e| Error::wrong(&path, format!("cannot be written: {e}")))?;
+        write(&path, text.as_bytes())?;
+        Ok(Self { folder, rate_hz, depth_scale_m, frames: Mutex::new(BTreeMap::new()) })
     }
 
     /// The folder being written, for files beyond the recording proper (the truth of a phantom).
@@ -96,12 +95,12 @@ impl RecordingWriter {
             let time = i as f64 / self.rate_hz;
             index.push_str(&format!("{i},{time:.6},{},{},{mask}\n", color_file(i), depth_file(i)));
         }
-        write(self.folder().join("frames.csv"), index.as_bytes())?;
+        write(&self.folder().join("frames.csv"), index.as_bytes())?;
         Ok(self.folder.commit()?)
     }
 
     fn wrong(&self, reason: String) -> Error {
-        Error::Recording { path: self.folder().to_owned(), reason }
+        Error::wrong(self.folder(), reason)
     }
 }
 
@@ -117,6 +116,6 @@ fn instruments_file(index: usize) -> String {
     format!("masks/instruments/{index:06}.png")
 }
 
-fn write(path: PathBuf, bytes: &[u8]) -> Result<()> {
-    std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).map_err(Error::io(path))
 }

@@ -7,7 +7,7 @@ use common::{info, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_camera::{ColorImage, DepthImage, Mask};
-use trocar_reconstruct::{Recording, RecordingWriter};
+use trocar_recording::{Recording, RecordingWriter};
 
 /// A fresh recording of three frames for a test to spoil.
 fn recording() -> (tempfile::TempDir, PathBuf) {
@@ -19,13 +19,10 @@ fn recording() -> (tempfile::TempDir, PathBuf) {
 
 /// Opens and decodes everything; the error's text.
 fn failure(dir: &Path) -> String {
-    let everything = || -> trocar_reconstruct::Result<()> {
+    let everything = || -> trocar_recording::Result<()> {
         let recording = Recording::open(dir)?;
         for i in 0..recording.len() {
             recording.frame(i)?;
-        }
-        for organ in 0..recording.info.organs.len() {
-            recording.organ_mask(organ)?;
         }
         Ok(())
     };
@@ -45,12 +42,12 @@ fn comes_back_as_written() {
     assert_eq!(recording.info, info());
     assert_eq!(recording.len(), 3);
     let frame = recording.frame(1).unwrap();
-    let (color, depth, mask) = common::scene(&recording.info.camera);
+    let (color, depth, mask) = common::scene(&recording.camera());
     let i = 60 * 160 + 80;
     assert_eq!(frame.color.pixels[i], color.pixels[i]);
     assert!((frame.depth.depth[i] - depth.depth[i]).abs() <= 0.5001e-3);
     assert!(frame.instruments.count() > 0);
-    assert_eq!(recording.organ_mask(0).unwrap(), mask);
+    assert_eq!(Mask::read(&dir.join("masks/ball.png")).unwrap(), mask);
     let csv = fs::read_to_string(dir.join("frames.csv")).unwrap();
     assert!(csv.lines().nth(2).unwrap().starts_with("1,0.033333,color/000001.png,depth/000001.png,masks/"), "{csv}");
 }
@@ -114,7 +111,11 @@ fn mistakes_in_the_toml_name_the_field() {
         ("up = [0.0, 0.0, -1.0]", "up = [0.0, 0.0, 0.0]", "up is"),
         ("name = \"ball\"", "name = \"../ball\"", "organ[0].name"),
         ("name = \"ball\"", "name = \"ball\"\npolygon = [[1.0, 2.0], [3.0, 4.0]]", "polygon has 2 points"),
-        ("name = \"ball\"", "name = \"ball\"\npolygon = [[-9.0, -9.0], [-8.0, -9.0], [-9.0, -8.0]]", "covers no pixel"),
+        ("fx = 200.0", "fx = 1e300", "camera.fx is 1e300"),
+        ("cx = 79.5", "cx = 1e9", "camera.cx is 1000000000"),
+        ("up = [", "depth_scale = 0.001\nup = [", "did you mean `depth_scale_m`?"),
+        ("depth_scale_m = 0.001\n", "", "missing field `depth_scale_m`"),
+        ("rate_hz = 30.0", "instruments = \"steel\"", "unknown variant `steel`"),
         ("name = \"ball\"", "name = \"ball\"\nbase_px = [160.0, 2.0]", "base_px"),
         ("poisson_ratio = 0.45", "poisson_ratio = 0.5", "material.poisson_ratio is 0.5"),
         ("share = 0.42", "share = 42.0", "pins.share is 42"),
@@ -167,10 +168,7 @@ fn spoiled_images_are_named() {
     let (_root, dir) = recording();
     DepthImage::new(80, 60).write_png(&dir.join("depth/000001.png"), 0.001).unwrap();
     let error = failure(&dir);
-    assert!(
-        ["depth/000001.png", "color/000001.png", "80 x 60", "160 x 120"].iter().all(|s| error.contains(s)),
-        "{error}"
-    );
+    assert!(["depth/000001.png", "80 x 60", "160 x 120"].iter().all(|s| error.contains(s)), "{error}");
 
     let (_root, dir) = recording();
     ColorImage::new(160, 120, [0; 3]).write_png(&dir.join("depth/000001.png")).unwrap();
@@ -196,17 +194,57 @@ fn missing_parts_are_named() {
     let (_root, dir) = recording();
     fs::write(dir.join("frames.csv"), "index,time_s,color,depth,instruments\n").unwrap();
     assert!(failure(&dir).contains("no frames"));
+}
 
+#[test]
+fn a_broken_frame_is_not_a_broken_recording() {
     let (_root, dir) = recording();
-    let mask = dir.join("masks/ball.png");
-    Mask::new(160, 120).write_png(&mask).unwrap();
-    let error = failure(&dir);
-    assert!(error.contains("organ 'ball'") && error.contains("no pixel"), "{error}");
-    Mask::new(16, 12).write_png(&mask).unwrap();
-    let error = failure(&dir);
-    assert!(error.contains("ball.png") && error.contains("16 x 12"), "{error}");
-    fs::remove_file(&mask).unwrap();
-    assert!(failure(&dir).contains("no mask"));
+    fs::write(dir.join("depth/000000.png"), b"not an image").unwrap();
+    let recording = Recording::open(&dir).unwrap();
+    let frames: Vec<_> = recording.packets(&[0, 1, 2]).map(|p| (p.frame, p.parts.is_ok())).collect();
+    assert_eq!(frames, [(0, true), (1, true), (2, true)], "what it holds shows only when it is decoded");
+    assert!(recording.frame(0).unwrap_err().to_string().contains("depth/000000.png"));
+    assert!(recording.frame(2).is_ok());
+}
+
+#[test]
+fn times_in_file_names_pair_streams_of_unequal_length() {
+    let (_root, dir) = recording();
+    fs::remove_file(dir.join("frames.csv")).unwrap();
+    fs::remove_dir_all(dir.join("masks/instruments")).unwrap();
+    for (i, (color, depth)) in [(12.004, 12.0), (12.037, 12.066), (12.070, 12.1)].into_iter().enumerate() {
+        for (folder, time) in [("color", color), ("depth", depth)] {
+            let name = format!("{folder}_{time:.4}.png");
+            fs::rename(dir.join(format!("{folder}/{i:06}.png")), dir.join(folder).join(name)).unwrap();
+        }
+    }
+    let recording = Recording::open(&dir).unwrap();
+    assert_eq!(recording.len(), 2);
+    assert!(recording.frame_name(1).ends_with("depth_12.0660.png"), "{}", recording.frame_name(1));
+    assert!(recording.notes()[0].contains("1 colour and 1 depth"), "{:?}", recording.notes());
+}
+
+#[test]
+fn depth_of_another_camera_is_registered() {
+    let (_root, dir) = recording();
+    let toml = dir.join("recording.toml");
+    let text = fs::read_to_string(&toml).unwrap();
+    // The same camera, 20 mm to the left of the colour camera: at 0.3 m and 200 px that is 13.3 px.
+    let motion = "[depth_to_color]\nrotation = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\ntranslation_m = [-0.02, 0, 0]\n";
+    let camera = "[depth_camera]\nwidth = 160\nheight = 120\nfx = 200.0\nfy = 200.0\ncx = 79.5\ncy = 59.5\n";
+    let (head, organs) = text.split_once("[[organ]]").unwrap();
+    fs::write(&toml, format!("{head}{camera}{motion}\n[[organ]]{organs}")).unwrap();
+    let plain = DepthImage::read(&dir.join("depth/000000.png"), 0.001).unwrap();
+    let moved = Recording::open(&dir).unwrap().frame(0).unwrap().depth;
+    assert!((plain.depth[10 * 160 + 100] - 0.3).abs() < 1e-6);
+    assert!((0..120).all(|v| moved.depth[v * 160 + 159] == 0.0), "colour sees farther right than depth does");
+    assert!((moved.depth[10 * 160 + 100 - 13] - 0.3).abs() < 1e-6);
+
+    fs::write(&toml, format!("{head}{camera}\n[[organ]]{organs}")).unwrap();
+    assert!(failure(&dir).contains("depth_camera needs depth_to_color"));
+    let skewed = motion.replace("[1, 0, 0]", "[1, 0.2, 0]");
+    fs::write(&toml, format!("{head}{camera}{skewed}\n[[organ]]{organs}")).unwrap();
+    assert!(failure(&dir).contains("rotation is no rotation"));
 }
 
 #[test]
@@ -216,13 +254,13 @@ fn an_unfinished_recording_leaves_nothing() {
     write(&dir, &info(), 1);
     let before = fs::read(dir.join("frames.csv")).unwrap();
     let writer = RecordingWriter::create(&dir, &info()).unwrap();
-    let (color, depth, _) = common::scene(&info().camera);
+    let (color, depth, _) = common::scene(&info().camera.unwrap());
     writer.frame(5, &color, &depth, None).unwrap();
     assert!(writer.frame(5, &color, &depth, None).is_err(), "a frame is written once");
     drop(writer);
     assert_eq!(fs::read_dir(root.path()).unwrap().count(), 1);
     assert_eq!(fs::read(dir.join("frames.csv")).unwrap(), before);
     let mut bad = info();
-    bad.depth_scale_m = 0.0;
+    bad.depth_scale_m = Some(0.0);
     assert!(RecordingWriter::create(&dir, &bad).err().unwrap().to_string().contains("depth_scale_m"));
 }

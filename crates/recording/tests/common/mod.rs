@@ -1,10 +1,11 @@
 //! A small recording of a sphere on a bed, seen from above, with a bar that moves across it.
 #![allow(dead_code)]
+#![allow(clippy::unwrap_used, reason = "a test's helper")]
 
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
-use trocar_reconstruct::{OrganInfo, RecordingInfo, RecordingWriter};
+use trocar_recording::{InstrumentRule, OrganInfo, RecordingInfo, RecordingWriter};
 use trocar_specimen::{Material, Pins};
 
 pub const BED: f64 = 0.30;
@@ -14,13 +15,17 @@ pub const RADIUS: f64 = 0.025;
 pub fn info() -> RecordingInfo {
     RecordingInfo {
         name: "sphere".into(),
-        rate_hz: 30.0,
-        depth_scale_m: 0.001,
+        rate_hz: Some(30.0),
+        depth_scale_m: Some(0.001),
         up: [0.0, 0.0, -1.0],
         depth_offset_px: [0.0; 2],
         depth_max_m: None,
+        instruments: InstrumentRule::Masks,
         note: String::new(),
-        camera: Camera {
+        source: None,
+        depth_camera: None,
+        depth_to_color: None,
+        camera: Some(Camera {
             width: 160,
             height: 120,
             fx: 200.0,
@@ -28,10 +33,12 @@ pub fn info() -> RecordingInfo {
             cx: 79.5,
             cy: 59.5,
             distortion: Distortion::default(),
-        },
+        }),
         organs: vec![OrganInfo {
             name: "ball".into(),
             polygon: vec![],
+            points: vec![],
+            points_outside: vec![],
             base_px: None,
             material: Material::default(),
             pins: Pins::Band { share: 0.42 },
@@ -64,7 +71,7 @@ pub fn scene(camera: &Camera) -> (ColorImage, DepthImage, Mask) {
 
 /// Writes `frames` frames. The bar covers a third of the frames at each column it passes; depth under it is a hole.
 pub fn write(dir: &Path, info: &RecordingInfo, frames: usize) {
-    let (color, depth, mask) = scene(&info.camera);
+    let (color, depth, mask) = scene(&info.camera.unwrap());
     let writer = RecordingWriter::create(dir, info).unwrap();
     let w = color.width;
     for f in (0..frames).rev() {

@@ -1,0 +1,276 @@
+//! `recording.toml`.
+
+use crate::{Error, Result};
+use glam::{DMat3, DVec3};
+use serde::{Deserialize, Serialize};
+use std::path::{Component, Path};
+use trocar_camera::Camera;
+use trocar_specimen::{Material, Pins};
+
+/// What is known of a recording. What a bag or MCAP file says itself (cameras, depth scale) may be left out and, where it is
+/// given, overrules the file.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RecordingInfo {
+    /// Name of the recording.
+    pub name: String,
+    /// Frames per second; only said of folders.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rate_hz: Option<f64>,
+    /// Metres per unit of the depth images.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_scale_m: Option<f64>,
+    /// Unit vector against gravity in the camera frame; a camera that looks straight down has [0, 0, -1].
+    pub up: [f64; 3],
+    /// Added to a depth pixel (u, v) to reach the colour pixel it belongs to, for depth that is not registered and whose
+    /// camera is not known [px].
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub depth_offset_px: [f64; 2],
+    /// Depth beyond this is treated as invalid [m]; no limit by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_max_m: Option<f64>,
+    /// How instruments are found: by the masks, where there are any, by default.
+    #[serde(default, skip_serializing_if = "InstrumentRule::is_masks")]
+    pub instruments: InstrumentRule,
+    /// Where the numbers come from, and what of them is an estimate.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub note: String,
+    /// Where the frames are; the folders of images by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<SourceInfo>,
+    /// The camera of the colour images, on whose pixels everything ends up. For depth that is registered, or alone, its camera.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub camera: Option<Camera>,
+    /// The camera of the depth images where it is another; depth is then registered to colour.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_camera: Option<Camera>,
+    /// From the depth camera's frame to the colour camera's; together with `depth_camera`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_to_color: Option<DepthToColor>,
+    /// The organs to reconstruct.
+    #[serde(default, rename = "organ")]
+    pub organs: Vec<OrganInfo>,
+}
+
+/// A rigid motion: p_color = rotation p_depth + translation.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DepthToColor {
+    /// Rows of the rotation matrix.
+    pub rotation: [[f64; 3]; 3],
+    /// Translation [m].
+    pub translation_m: [f64; 3],
+}
+
+/// A log file that holds the frames.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SourceInfo {
+    /// A `.bag` or `.mcap` file; relative to the folder of this file.
+    pub file: String,
+    /// Topic of the colour images; found by its name by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub color_topic: Option<String>,
+    /// Topic of the depth images; found by its name by default.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub depth_topic: Option<String>,
+}
+
+/// How the pixels that instruments cover are found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum InstrumentRule {
+    /// The masks in `masks/instruments/`; none where there are none.
+    #[default]
+    Masks,
+    /// Metal by its appearance, in every frame.
+    Metal,
+    /// No instruments.
+    None,
+}
+
+impl InstrumentRule {
+    fn is_masks(&self) -> bool {
+        *self == Self::Masks
+    }
+}
+
+fn is_zero(offset: &[f64; 2]) -> bool {
+    *offset == [0.0; 2]
+}
+
+impl DepthToColor {
+    /// The rotation as a matrix.
+    pub fn matrix(&self) -> DMat3 {
+        DMat3::from_cols_array_2d(&self.rotation).transpose()
+    }
+
+    fn validate(&self) -> std::result::Result<(), String> {
+        let m = self.matrix();
+        let off = (m * m.transpose() - DMat3::IDENTITY).to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+        // Calibrations are printed with four digits or more.
+        if off.is_nan() || off > 5e-3 || m.determinant() < 0.0 {
+            return Err("depth_to_color.rotation is no rotation; three rows of an orthonormal matrix".into());
+        }
+        if self.translation_m.iter().any(|t| !(t.abs() <= 10.0)) {
+            return Err(format!("depth_to_color.translation_m is {:?}; metres", self.translation_m));
+        }
+        Ok(())
+    }
+}
+
+/// One organ of a recording.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OrganInfo {
+    /// Name; its mask is `masks/<name>.png` unless `polygon` or `points` is given.
+    pub name: String,
+    /// Outline in colour-image pixels [u, v], instead of a mask file.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub polygon: Vec<[f64; 2]>,
+    /// Colour-image pixels [u, v] on the organ, from which a segmenter finds its mask.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points: Vec<[f64; 2]>,
+    /// Colour-image pixels [u, v] beside the organ, for the segmenter.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points_outside: Vec<[f64; 2]>,
+    /// Pixel near the organ's base (organ coordinate 0); by default the end nearer the image's centre.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base_px: Option<[f64; 2]>,
+    /// Material; the default material when absent.
+    #[serde(default)]
+    pub material: Material,
+    /// Pins; the lowest 42% of the nodes when absent.
+    #[serde(default = "default_pins")]
+    pub pins: Pins,
+}
+
+/// The paper's share of pinned nodes (section IV-B, about 42%).
+fn default_pins() -> Pins {
+    Pins::Band { share: 0.42 }
+}
+
+impl RecordingInfo {
+    /// Checks every field and normalises `up`. `path` is the file the errors name.
+    ///
+    /// # Errors
+    /// Names the field, its value and what would be right.
+    pub fn validate(&mut self, path: &Path) -> Result<()> {
+        let wrong = |reason: String| Err(Error::wrong(path, reason));
+        if let Some(rate) = self.rate_hz
+            && !(rate > 0.0 && rate <= 10_000.0)
+        {
+            return wrong(format!("rate_hz is {rate}; frames per second, above 0"));
+        }
+        if let Some(scale) = self.depth_scale_m
+            && !(1e-6..=0.1).contains(&scale)
+        {
+            return wrong(format!(
+                "depth_scale_m is {scale}; metres per unit of the depth images, 0.001 for millimetres (1e-6 to 0.1)"
+            ));
+        }
+        self.validate_cameras().or_else(wrong)?;
+        self.validate_source().or_else(wrong)?;
+        let up = DVec3::from(self.up);
+        match up.try_normalize() {
+            // A unit vector stays as it is, to the last bit.
+            Some(unit) if (up.length() - 1.0).abs() > 1e-9 => self.up = unit.into(),
+            Some(_) => {}
+            None => {
+                return wrong(format!(
+                    "up is {:?}; a direction, such as [0, 0, -1] for a camera that looks down",
+                    self.up
+                ));
+            }
+        }
+        if self.depth_offset_px.iter().any(|o| !(-10_000.0..=10_000.0).contains(o)) {
+            return wrong(format!("depth_offset_px is {:?}; two numbers of pixels", self.depth_offset_px));
+        }
+        if let Some(max) = self.depth_max_m
+            && (max.is_nan() || max <= 0.0)
+        {
+            return wrong(format!("depth_max_m is {max}; metres, above 0"));
+        }
+        for (i, organ) in self.organs.iter().enumerate() {
+            if let Err(reason) = trocar_specimen::check_name(&organ.name) {
+                return wrong(format!("organ[{i}].name: {reason}"));
+            }
+            if organ.name == "instruments" {
+                return wrong(format!(
+                    "organ[{i}].name is 'instruments', which names the instrument masks; choose another"
+                ));
+            }
+            if self.organs[..i].iter().any(|o| o.name == organ.name) {
+                return wrong(format!("organ[{i}].name is '{}' a second time; names are unique", organ.name));
+            }
+            organ
+                .validate(self.camera.as_ref())
+                .or_else(|reason| wrong(format!("organ '{}': {reason}", organ.name)))?;
+        }
+        Ok(())
+    }
+
+    fn validate_cameras(&self) -> std::result::Result<(), String> {
+        for (name, camera) in [("camera", &self.camera), ("depth_camera", &self.depth_camera)] {
+            if let Some(camera) = camera {
+                camera.validate().map_err(|e| e.to_string().replacen("camera", name, 1))?;
+            }
+        }
+        match (&self.depth_camera, &self.depth_to_color) {
+            (Some(_), Some(motion)) => motion.validate()?,
+            (Some(_), None) => return Err("depth_camera needs depth_to_color beside it: where it stands".into()),
+            (None, Some(_)) => return Err("depth_to_color needs depth_camera beside it".into()),
+            (None, None) => {}
+        }
+        if self.depth_camera.is_some() && self.depth_offset_px != [0.0; 2] {
+            return Err("depth_offset_px and depth_camera are two ways to say the same; leave one out".into());
+        }
+        Ok(())
+    }
+
+    fn validate_source(&self) -> std::result::Result<(), String> {
+        let Some(source) = &self.source else {
+            // A folder of images says nothing of itself.
+            let missing = [
+                (
+                    "depth_scale_m",
+                    self.depth_scale_m.is_none(),
+                    "metres per unit of the depth images, 0.001 for millimetres",
+                ),
+                ("[camera]", self.camera.is_none(), "width, height, fx, fy, cx, cy of the images"),
+            ];
+            return match missing.into_iter().find(|m| m.1) {
+                Some((name, _, what)) => Err(format!("missing field `{name}`: {what}")),
+                None => Ok(()),
+            };
+        };
+        let inside = Path::new(&source.file).components().all(|c| matches!(c, Component::Normal(_)));
+        if source.file.is_empty() || !inside {
+            return Err(format!("source.file is '{}'; a .bag or .mcap file in this folder, without '..'", source.file));
+        }
+        Ok(())
+    }
+}
+
+impl OrganInfo {
+    fn validate(&self, camera: Option<&Camera>) -> std::result::Result<(), String> {
+        let n = self.polygon.len();
+        if n == 1 || n == 2 {
+            return Err(format!("polygon has {n} points; an outline has at least 3"));
+        }
+        if self.polygon.iter().flatten().any(|c| !c.is_finite()) {
+            return Err("polygon has a coordinate that is not a finite number".into());
+        }
+        if self.points.iter().chain(&self.points_outside).flatten().any(|c| !c.is_finite()) {
+            return Err("points has a coordinate that is not a finite number".into());
+        }
+        if let (Some([u, v]), Some(camera)) = (self.base_px, camera) {
+            let (w, h) = (camera.width as f64, camera.height as f64);
+            if !((0.0..w).contains(&u) && (0.0..h).contains(&v)) {
+                return Err(format!("base_px is [{u}, {v}]; a pixel of the {w} x {h} image"));
+            }
+        }
+        self.material.validate().map_err(|r| format!("material.{r}"))?;
+        self.pins.validate().map_err(|r| format!("pins.{r}"))
+    }
+}
