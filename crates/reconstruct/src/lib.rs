@@ -1,9 +1,10 @@
 //! From a fixed-view RGB-D recording to watertight, tetrahedral organs (paper section III).
 //!
 //! ```text
-//! Recording -> composite -> outline -> front (fill) -> thickness -> closed_surface -> body -> check -> Specimen
+//! Recording -> composite -> masks -> outline -> front (fill) -> thickness -> closed_surface -> resample -> body -> check -> Specimen
 //! ```
 
+mod binary_grid;
 mod body;
 mod check;
 mod closed_surface;
@@ -19,11 +20,15 @@ mod organ;
 mod outline;
 mod pipeline;
 mod polygon;
+mod resample;
+mod settings;
 mod thickness;
 
 pub use error::{Error, Result};
 pub use from_surface::from_surface;
-pub use pipeline::{OrganView, Reconstruction, Settings, reconstruct};
+pub use pipeline::{OrganView, Reconstruction, reconstruct};
+pub use settings::{MesherRule, Settings, SurfaceRule};
+pub use thickness::modelled_volume;
 
 /// Colour of tissue that no photograph shows.
 const TISSUE_COLOR: [u8; 3] = [150, 60, 55];

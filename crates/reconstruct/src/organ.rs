@@ -1,14 +1,15 @@
 //! One organ, from its mask in the composite to its closed surface.
 
-use crate::body::resample;
+use crate::binary_grid::binary_grid;
 use crate::check::{DepthCheck, check};
 use crate::closed_surface::closed_surface;
 use crate::colour::color_vertices;
 use crate::composite::Composite;
 use crate::front::front;
 use crate::outline::tidy;
+use crate::resample::{self, resample};
 use crate::thickness::thickness;
-use crate::{Error, Result};
+use crate::{Error, Result, SurfaceRule};
 use glam::{DVec2, DVec3};
 use trocar_camera::{Camera, Mask};
 use trocar_geometry::TriMesh;
@@ -22,6 +23,8 @@ pub struct View<'a> {
     pub camera: Camera,
     /// Unit of the recording's depth [m].
     pub depth_scale: f64,
+    /// How surfaces are made.
+    pub surface: SurfaceRule,
 }
 
 /// An organ before it is filled with tetrahedra.
@@ -41,7 +44,7 @@ pub struct Closed {
 /// # Errors
 /// When no depth was measured inside the mask, or nothing closed comes out.
 pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<String>) -> Result<Closed> {
-    let View { background, ref camera, depth_scale } = *view;
+    let View { background, ref camera, depth_scale, surface: rule } = *view;
     let name = &info.name;
     let tidied = tidy(&mut mask);
     let pixels = mask.count();
@@ -79,7 +82,12 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
 
     let back = thickness(&front.depth, &mask, camera);
     let raw = closed_surface(&front.depth, &back.h, &mask, camera);
-    let mut surface = resample(name, &raw, back.radius)?;
+    let mut surface = match (rule, raw.bounds()) {
+        (SurfaceRule::BinaryGrid, Some(bounds)) => {
+            resample::tidy(name, &binary_grid(&front.depth, &back.h, &mask, camera, bounds))?
+        }
+        _ => resample(name, &raw, back.radius)?,
+    };
     color_vertices(&mut surface, &background.color, &background.colored, &mask, camera);
     let check = check(&surface, &background.depth, &mask, camera).ok_or_else(unmeasured)?;
     let base = base(info.base_px, &mask, &front.depth, camera, middle);
@@ -144,7 +152,8 @@ mod tests {
             material: Material::default(),
             pins: Pins::None,
         };
-        let view = View { background: &background, camera, depth_scale: 1e-3 };
+        let surface = SurfaceRule::SignedDistance;
+        let view = View { background: &background, camera, depth_scale: 1e-3, surface };
         close(&info, mask, &view, &mut Vec::new()).unwrap()
     }
 

@@ -4,36 +4,13 @@ use crate::body::fill_with_tets;
 use crate::composite::{Composite, composite};
 use crate::masks::organ_mask;
 use crate::organ::{Closed, View, close};
-use crate::{Error, Result};
+use crate::{Error, Result, Settings};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_geometry::Pose;
 use trocar_progress::Progress;
 use trocar_recording::{OrganInfo, Recording};
 use trocar_specimen::{Organ, Provenance, Specimen};
 use xxhash_rust::xxh3::Xxh3;
-
-/// Settings of the reconstruction; one set serves every recording.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Settings {
-    /// Frames on each side of the window's centre (paper: 90).
-    pub window: usize,
-    /// Every how many frames of the window are used (paper: 2).
-    pub stride: usize,
-    /// Frame at the window's centre; the middle of the recording by default.
-    pub centre: Option<usize>,
-    /// Fewest samples a pixel needs (paper: 3); a recording of fewer frames needs as many as it has.
-    pub min_samples: usize,
-    /// Edge of the finest lattice cell [m].
-    pub finest_cell: f64,
-    /// About how many tetrahedra a body may have: larger organs get larger cells.
-    pub max_tets: usize,
-}
-
-impl Default for Settings {
-    fn default() -> Self {
-        Self { window: 90, stride: 2, centre: None, min_samples: 3, finest_cell: 2.2e-3, max_tets: 50_000 }
-    }
-}
 
 /// What the camera saw of one organ, for the report.
 #[derive(Clone, Debug)]
@@ -75,41 +52,6 @@ pub struct Reconstruction {
     pub notes: Vec<String>,
 }
 
-impl Settings {
-    /// Refuses settings that make no sense.
-    ///
-    /// # Errors
-    /// Names the setting, its value and what would be right.
-    pub fn validate(&self) -> Result<()> {
-        let wrong = |reason: String| Err(Error::Setting(reason));
-        if self.stride == 0 {
-            return wrong("stride is 0; at least 1 frame".into());
-        }
-        if self.min_samples == 0 {
-            return wrong("min_samples is 0; at least 1 frame".into());
-        }
-        if !(1e-4..=0.1).contains(&self.finest_cell) {
-            return wrong(format!("finest_cell is {} m; 0.0001 to 0.1", self.finest_cell));
-        }
-        if self.max_tets < 100 {
-            return wrong(format!("max_tets is {}; at least 100", self.max_tets));
-        }
-        Ok(())
-    }
-
-    /// The settings as `name = value`, in the order of the struct.
-    pub(crate) fn list(&self) -> Vec<String> {
-        vec![
-            format!("window = {}", self.window),
-            format!("stride = {}", self.stride),
-            self.centre.map_or("centre = middle".into(), |c| format!("centre = {c}")),
-            format!("min_samples = {}", self.min_samples),
-            format!("finest_cell_m = {}", self.finest_cell),
-            format!("max_tets = {}", self.max_tets),
-        ]
-    }
-}
-
 /// Name and version for the provenance.
 pub(crate) fn program() -> String {
     format!("trocar {}", env!("CARGO_PKG_VERSION"))
@@ -135,7 +77,12 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         notes.push(format!("The window holds only {} frames.", background.frames_used));
     }
 
-    let view = View { background: &background, camera: recording.camera(), depth_scale: recording.depth_scale() };
+    let view = View {
+        background: &background,
+        camera: recording.camera(),
+        depth_scale: recording.depth_scale(),
+        surface: settings.surface,
+    };
     let (mut organs, mut views) = (Vec::new(), Vec::new());
     progress.begin("organs", masks.len() as u64);
     for (info, mask) in recording.info.organs.iter().zip(masks) {

@@ -39,6 +39,14 @@ pub fn thickness(front: &[f64], mask: &Mask, camera: &Camera) -> Thickness {
     Thickness { h, radius }
 }
 
+/// Volume between `front` and the back that [`thickness`] models behind it [m3]: what a reconstruction of an organ whose front
+/// is known exactly should enclose. Each pixel is a frustum between its front and back depth. `front` is a depth a pixel [m].
+pub fn modelled_volume(front: &[f64], mask: &Mask, camera: &Camera) -> f64 {
+    let back = thickness(front, mask, camera);
+    let frustum = |i: usize| ((front[i] + back.h[i]).powi(3) - front[i].powi(3)) / (3.0 * camera.fx * camera.fy);
+    (0..front.len()).filter(|i| mask.set[*i]).map(frustum).sum()
+}
+
 /// Percentile `p` (0..=1) of sorted values, linear between neighbours; 0 without values.
 fn percentile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };

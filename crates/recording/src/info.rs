@@ -112,7 +112,7 @@ impl DepthToColor {
         if off.is_nan() || off > 5e-3 || m.determinant() < 0.0 {
             return Err("depth_to_color.rotation is no rotation; three rows of an orthonormal matrix".into());
         }
-        if self.translation_m.iter().any(|t| !(t.abs() <= 10.0)) {
+        if self.translation_m.iter().any(|t| t.is_nan() || t.abs() > 10.0) {
             return Err(format!("depth_to_color.translation_m is {:?}; metres", self.translation_m));
         }
         Ok(())

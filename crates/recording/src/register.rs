@@ -140,7 +140,7 @@ mod tests {
         let still = Registration { depth: camera, color: camera, rotation: DMat3::IDENTITY, translation: DVec3::ZERO };
         let unmoved = still.apply(&depth);
         for i in 0..40 * 30 {
-            assert!((unmoved.depth[i] - depth.depth[i]).abs() < 1e-6, "pixel {i}: {}", unmoved.depth[i])
+            assert!((unmoved.depth[i] - depth.depth[i]).abs() < 1e-6, "pixel {i}: {}", unmoved.depth[i]);
         }
         // 20 mm at 0.4 m and 40 px are 2 px, at 0.8 m 1 px: the near block covers what the far plane would show.
         let moved = Registration { translation: DVec3::new(0.02, 0.0, 0.0), ..still }.apply(&depth);

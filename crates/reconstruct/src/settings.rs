@@ -1,0 +1,109 @@
+//! The choices of a reconstruction; one set serves every recording.
+
+use crate::{Error, Result};
+
+/// Settings of the reconstruction.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Settings {
+    /// Frames on each side of the window's centre (paper: 90).
+    pub window: usize,
+    /// Every how many frames of the window are used (paper: 2).
+    pub stride: usize,
+    /// Frame at the window's centre; the middle of the recording by default.
+    pub centre: Option<usize>,
+    /// Fewest samples a pixel needs (paper: 3); a recording of fewer frames needs as many as it has.
+    pub min_samples: usize,
+    /// How the surface is made from front and back.
+    pub surface: SurfaceRule,
+    /// What fills it with tetrahedra.
+    pub mesher: MesherRule,
+    /// Edge of the elements at the surface [m]; by default `finest_cell`, or larger so that there are no more than `max_tets`.
+    pub element_size: Option<f64>,
+    /// Edge of the finest lattice cell where no `element_size` is given [m].
+    pub finest_cell: f64,
+    /// About how many tetrahedra a body may have where no `element_size` is given.
+    pub max_tets: usize,
+}
+
+/// How a surface is made from front and back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SurfaceRule {
+    /// From a signed distance: no outward bias.
+    #[default]
+    SignedDistance,
+    /// From a binary occupancy grid, as the paper does.
+    BinaryGrid,
+}
+
+/// What fills a surface with tetrahedra.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum MesherRule {
+    /// Isosurface stuffing: no slivers.
+    #[default]
+    Lattice,
+    /// The TetGen program at the paper's settings.
+    Tetgen,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            window: 90,
+            stride: 2,
+            centre: None,
+            min_samples: 3,
+            surface: SurfaceRule::default(),
+            mesher: MesherRule::default(),
+            element_size: None,
+            finest_cell: 2.2e-3,
+            max_tets: 50_000,
+        }
+    }
+}
+
+impl Settings {
+    /// Refuses settings that make no sense.
+    ///
+    /// # Errors
+    /// Names the setting, its value and what would be right.
+    pub fn validate(&self) -> Result<()> {
+        let wrong = |reason: String| Err(Error::Setting(reason));
+        if self.stride == 0 {
+            return wrong("stride is 0; at least 1 frame".into());
+        }
+        if self.min_samples == 0 {
+            return wrong("min_samples is 0; at least 1 frame".into());
+        }
+        for (name, length) in [("finest cell", Some(self.finest_cell)), ("element size", self.element_size)] {
+            if let Some(length) = length
+                && !(1e-4..=0.1).contains(&length)
+            {
+                return wrong(format!("the {name} is {} mm; 0.1 to 100 mm", 1e3 * length));
+            }
+        }
+        if self.max_tets < 100 {
+            return wrong(format!("max_tets is {}; at least 100", self.max_tets));
+        }
+        Ok(())
+    }
+
+    /// The settings as `name = value`, in the order of the struct.
+    pub(crate) fn list(&self) -> Vec<String> {
+        let mut list = vec![
+            format!("window = {}", self.window),
+            format!("stride = {}", self.stride),
+            self.centre.map_or("centre = middle".into(), |c| format!("centre = {c}")),
+            format!("min_samples = {}", self.min_samples),
+            format!("surface = {:?}", self.surface),
+            format!("mesher = {:?}", self.mesher),
+        ];
+        match self.element_size {
+            Some(size) => list.push(format!("element_size_m = {size}")),
+            None => {
+                list.push(format!("finest_cell_m = {}", self.finest_cell));
+                list.push(format!("max_tets = {}", self.max_tets));
+            }
+        }
+        list
+    }
+}
