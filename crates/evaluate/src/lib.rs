@@ -2,11 +2,16 @@
 
 mod demo;
 mod error;
+mod experiment;
+mod paper;
 pub mod report;
+mod truth;
 mod workflow;
 
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
+pub use experiment::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
+pub use truth::TruthFigures;
 pub use workflow::{
     CompositeFigures, OrganRow, Reconstructed, SimulatedRun, reconstruct_recording, reconstruct_surface, simulate,
 };

@@ -1,5 +1,6 @@
 //! The commands' work from folder to folder: read, run, write the result and its report.
 
+use crate::truth::{Truth, TruthFigures};
 use crate::{Error, Result, report};
 use serde::Serialize;
 use std::path::Path;
@@ -58,6 +59,25 @@ pub struct CompositeFigures {
     pub coverage: f64,
     /// Median over pixels of the inter-percentile (10 to 90) range of depth [mm].
     pub depth_range_median_mm: f64,
+    /// Its errors against the truth, where the recording has one.
+    pub truth: Option<TruthFigures>,
+}
+
+impl CompositeFigures {
+    /// The figures of `r`, made from the recording in folder `recording`.
+    ///
+    /// # Errors
+    /// Names the file of the truth that is unreadable or of another size.
+    pub(crate) fn of(r: &Reconstruction, recording: &Path) -> Result<Self> {
+        let truth = Truth::read(r, &recording.join("truth"))?;
+        Ok(Self {
+            frames_used: r.frames_used,
+            recovered_share: r.recovered_share,
+            coverage: r.coverage,
+            depth_range_median_mm: r.depth_range_median * 1e3,
+            truth: truth.and_then(|truth| truth.figures(r)),
+        })
+    }
 }
 
 /// A run that was made, in figures.
@@ -87,13 +107,8 @@ pub fn reconstruct_recording(
     let truth = recording.join("truth");
     let html = report::reconstruction(&reconstruction, truth.is_dir().then_some(truth.as_path()))?;
     finish(staged, &reconstruction.specimen, &html, progress)?;
+    let composite = CompositeFigures::of(&reconstruction, recording)?;
     let r = &reconstruction;
-    let composite = CompositeFigures {
-        frames_used: r.frames_used,
-        recovered_share: r.recovered_share,
-        coverage: r.coverage,
-        depth_range_median_mm: r.depth_range_median * 1e3,
-    };
     Ok((figures(&r.specimen, Some(composite), r.notes.clone(), output, clock), reconstruction))
 }
 
@@ -185,7 +200,7 @@ fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
 }
 
 /// Refuses an output that holds the input, is it, or lies in it: the input would be replaced or changed.
-fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
+pub(crate) fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
     // An output that is not there yet is where its nearest existing parent is.
     let placed = |path: &Path| {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());

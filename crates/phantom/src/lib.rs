@@ -16,4 +16,4 @@ mod tube;
 mod tests;
 
 pub use error::{Error, Result};
-pub use record::{RecordOptions, record};
+pub use record::{NAMES, RecordOptions, describe, record};

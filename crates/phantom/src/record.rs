@@ -12,7 +12,7 @@ use trocar_progress::Progress;
 use trocar_recording::{InstrumentRule, RecordingInfo, RecordingWriter};
 
 /// The phantoms there are.
-const NAMES: [&str; 1] = ["phantom-a"];
+pub const NAMES: [&str; 1] = ["phantom-a"];
 /// File names hold six digits.
 const MAX_FRAMES: usize = 1_000_000;
 /// Unit of the truth's depth image [m].
@@ -34,6 +34,17 @@ pub struct RecordOptions {
 /// An unknown name, no frames, a folder that cannot be written, or an interruption; nothing is left behind then.
 pub fn record(name: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
     record_with(name, options, &Camera::d405(), Fineness { surface: 0.6e-3, bed: 0.8e-3 }, dir, progress)
+}
+
+/// What [`record`] writes into `recording.toml` for these options.
+///
+/// # Errors
+/// An unknown name.
+pub fn describe(name: &str, options: &RecordOptions) -> Result<RecordingInfo> {
+    if !NAMES.contains(&name) {
+        return Err(Error::Unknown(name.to_owned()));
+    }
+    Ok(info(name, options.seed, &Camera::d405(), &Anatomy::new(options.seed)))
 }
 
 /// [`record`] with a camera and a fineness of one's choice.
@@ -63,7 +74,7 @@ pub(crate) fn record_with(
         return Err(Error::Interrupted);
     }
     let anatomy = Anatomy::new(seed);
-    let info = describe(name, seed, camera, &anatomy);
+    let info = info(name, seed, camera, &anatomy);
     let writer = RecordingWriter::create(dir, &info)?;
     let still = Still::new(&anatomy, camera, fineness);
     for (index, organ) in anatomy.organs.iter().enumerate() {
@@ -89,7 +100,7 @@ pub(crate) fn record_with(
 }
 
 /// Contents of `recording.toml`.
-fn describe(name: &str, seed: u64, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
+fn info(name: &str, seed: u64, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
     let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
     RecordingInfo {
         name: name.to_owned(),

@@ -24,6 +24,7 @@ mod resample;
 mod settings;
 mod thickness;
 
+pub use check::{DepthCheck, check as depth_error};
 pub use error::{Error, Result};
 pub use from_surface::from_surface;
 pub use pipeline::{OrganView, Reconstruction, reconstruct};

@@ -29,6 +29,8 @@ pub enum Command {
     Reconstruct(Reconstruct),
     /// Run a scripted task on a specimen without a window.
     Simulate(Simulate),
+    /// Make a table or figure of the paper anew, beside the paper's numbers.
+    Experiment(Experiment),
 }
 
 /// Arguments of `demo`.
@@ -91,6 +93,68 @@ pub struct Reconstruct {
     /// Every how many frames of the window are used.
     #[arg(long, default_value_t = 2)]
     pub stride: usize,
+    /// Make the surface from a binary grid of 1.5 mm, as the paper does, for comparison.
+    #[arg(long)]
+    pub binary_grid: bool,
+    /// What fills the surface with tetrahedra.
+    #[arg(long, value_enum, default_value_t = MesherName::Lattice)]
+    pub mesher: MesherName,
+    /// Edge of the elements at the surface [mm]; by default 2.2, or larger where an organ would get more than 50,000.
+    #[arg(long, allow_negative_numbers = true)]
+    pub element_size: Option<f64>,
+}
+
+/// Arguments of `experiment`.
+#[derive(Debug, Args)]
+pub struct Experiment {
+    /// Which one.
+    #[command(subcommand)]
+    pub name: ExperimentName,
+}
+
+/// Experiments by name.
+#[derive(Debug, Subcommand)]
+pub enum ExperimentName {
+    /// Table I and Fig. 6(a): every phantom recorded, reconstructed and measured against its truth.
+    Reconstruction(ReconstructionExperiment),
+}
+
+/// Arguments of `experiment reconstruction`.
+#[derive(Debug, Args)]
+pub struct ReconstructionExperiment {
+    /// Folder for recordings, specimens and the report; finished recordings in it are used again.
+    #[arg(short, long, default_value = "trocar-experiment/reconstruction")]
+    pub output: PathBuf,
+    /// Phantoms; all by default.
+    #[arg(long = "phantom")]
+    pub phantoms: Vec<String>,
+    /// Frames of each recording (the composite's window holds 181; the paper recorded 1,790).
+    #[arg(long, default_value_t = 181)]
+    pub frames: usize,
+    /// Seed of the anatomies and of the camera's noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// What fills the surfaces with tetrahedra.
+    #[arg(long, value_enum, default_value_t = MesherName::Lattice)]
+    pub mesher: MesherName,
+}
+
+/// Meshers by name.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum MesherName {
+    /// Isosurface stuffing: no slivers, fine at the surface, coarse inside.
+    Lattice,
+    /// The TetGen program at the paper's settings (Debian: apt install tetgen).
+    Tetgen,
+}
+
+impl From<MesherName> for trocar_reconstruct::MesherRule {
+    fn from(name: MesherName) -> Self {
+        match name {
+            MesherName::Lattice => Self::Lattice,
+            MesherName::Tetgen => Self::Tetgen,
+        }
+    }
 }
 
 /// Unit of lengths in a surface file.

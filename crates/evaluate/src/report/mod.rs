@@ -9,12 +9,14 @@ mod moving_picture;
 mod overlays;
 mod page;
 mod plots;
+mod reconstruction_experiment;
 mod run;
 mod seen;
 mod table;
 mod truth;
 mod views;
 
+use crate::experiment::ReconstructionResult;
 use crate::{Error, Result};
 use moving_picture::Lift;
 use std::path::Path;
@@ -52,6 +54,16 @@ pub fn reconstruction_sections(r: &Reconstruction) -> Result<String> {
         + &run::bodies(specimen, true)?
         + &seen::depth_errors(r)?
         + &notes(&r.notes))
+}
+
+/// The page of the reconstruction experiment; `made` are the reconstructions of its phantoms in their order.
+///
+/// # Errors
+/// Images of differing sizes, a picture that cannot be encoded.
+pub(crate) fn reconstruction_experiment(result: &ReconstructionResult, made: &[Reconstruction]) -> Result<String> {
+    made.iter().try_for_each(seen::check_sizes)?;
+    let subtitle = format!("{} organs of {} phantoms, one set of settings", result.organs.len(), made.len());
+    Ok(page::page("Reconstruction", &subtitle, &reconstruction_experiment::body(result, made)?))
 }
 
 /// The page of a specimen made from a ready surface.

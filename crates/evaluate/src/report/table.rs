@@ -1,19 +1,10 @@
 //! Tables: organs beside the paper's Table I, and the summary of a run.
 
 use super::{colors, page};
+use crate::paper::{PaperOrgan, TABLE_I, table_i};
 use std::fmt::Write;
 use trocar_cell::Summary;
 use trocar_specimen::{Organ, Specimen};
-
-/// Table I of the paper: nodes, tetrahedra, Young's modulus [kPa], by the phantom's organ names.
-const PAPER: [(&str, usize, usize, f64); 6] = [
-    ("cecum", 3893, 14914, 30.0),
-    ("bowel-1", 2242, 8211, 30.0),
-    ("bowel-2", 853, 3024, 15.0),
-    ("bowel-3", 1744, 6328, 15.0),
-    ("stomach", 967, 3407, 30.0),
-    ("appendix", 2263, 8072, 12.0),
-];
 
 /// A count with thin spaces between thousands.
 pub(super) fn count(n: usize) -> String {
@@ -59,7 +50,8 @@ pub(super) fn organs(specimen: &Specimen, beside_paper: bool) -> String {
     }
     out.push_str("</tr></thead><tbody>\n");
     for (i, organ) in specimen.organs.iter().enumerate() {
-        organ_row(&mut out, i, organ, beside_paper, seen);
+        let paper = if beside_paper { table_i(&specimen.name, &organ.name) } else { None };
+        organ_row(&mut out, i, organ, paper, seen);
     }
     if specimen.organs.len() > 1 {
         sum_row(&mut out, specimen, beside_paper, seen);
@@ -68,9 +60,8 @@ pub(super) fn organs(specimen: &Specimen, beside_paper: bool) -> String {
     out
 }
 
-fn organ_row(out: &mut String, index: usize, organ: &Organ, beside_paper: bool, seen: bool) {
+fn organ_row(out: &mut String, index: usize, organ: &Organ, paper: Option<&PaperOrgan>, seen: bool) {
     let facts = &organ.facts;
-    let paper = PAPER.iter().find(|p| beside_paper && p.0 == organ.name);
     let small = |text: Option<String>| text.map_or(String::new(), |t| format!("<small>{t}</small>"));
     let verdict = |good: bool| if good { "" } else { " class=\"bad\"" };
     let _ = write!(
@@ -81,11 +72,11 @@ fn organ_row(out: &mut String, index: usize, organ: &Organ, beside_paper: bool, 
         page::escape(&organ.name),
         small(paper.map(|_| "paper".to_owned())),
         count(facts.nodes),
-        small(paper.map(|p| count(p.1))),
+        small(paper.map(|p| count(p.nodes))),
         count(facts.tets),
-        small(paper.map(|p| count(p.2))),
+        small(paper.map(|p| count(p.tets))),
         fixed(organ.material.young_modulus_pa / 1e3, 0),
-        small(paper.map(|p| fixed(p.3, 0))),
+        small(paper.map(|p| fixed(p.young_modulus_kpa, 0))),
         fixed(facts.min_dihedral_deg, 1),
         fixed(facts.median_dihedral_deg, 1),
         fixed(facts.median_edge_mm, 2),
@@ -110,18 +101,19 @@ fn organ_row(out: &mut String, index: usize, organ: &Organ, beside_paper: bool, 
 
 fn sum_row(out: &mut String, specimen: &Specimen, beside_paper: bool, seen: bool) {
     let facts = || specimen.organs.iter().map(|o| &o.facts);
+    let known = || TABLE_I.iter().filter(|p| p.phantom == specimen.name);
     let all_known = beside_paper
-        && PAPER.iter().all(|p| specimen.organs.iter().any(|o| o.name == p.0))
-        && specimen.organs.len() == 6;
+        && known().count() == specimen.organs.len()
+        && known().all(|p| specimen.organs.iter().any(|o| o.name == p.organ));
     let paper = |value: usize| if all_known { format!("<small>{}</small>", count(value)) } else { String::new() };
     let _ = writeln!(
         out,
         "<tr class=\"sum\"><td>together</td><td>{}{}</td><td>{}{}</td><td></td><td></td><td></td><td></td><td>{}</td>\
          <td></td><td>{}</td>{}</tr>",
         count(facts().map(|f| f.nodes).sum()),
-        paper(PAPER.iter().map(|p| p.1).sum()),
+        paper(known().map(|p| p.nodes).sum()),
         count(facts().map(|f| f.tets).sum()),
-        paper(PAPER.iter().map(|p| p.2).sum()),
+        paper(known().map(|p| p.tets).sum()),
         fixed(facts().map(|f| f.volume_cm3).sum(), 1),
         count(facts().map(|f| f.inverted).sum()),
         if seen { "<td></td><td></td><td></td>" } else { "" },

@@ -1,6 +1,7 @@
 //! One file a command.
 
 mod demo;
+mod experiment;
 mod reconstruct;
 mod record;
 mod simulate;
@@ -15,6 +16,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Demo(arguments) => demo::run(arguments, cli.json, progress),
         Command::Record(arguments) => record::run(arguments, cli.json, progress),
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress),
+        Command::Experiment(arguments) => experiment::run(arguments, cli.json, progress),
         Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress),
     }
 }

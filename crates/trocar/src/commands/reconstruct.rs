@@ -5,13 +5,16 @@ use crate::output;
 use trocar_evaluate::{Reconstructed, Result, reconstruct_recording, reconstruct_surface};
 use trocar_geometry::io::Unit;
 use trocar_progress::Progress;
-use trocar_reconstruct::Settings;
+use trocar_reconstruct::{Settings, SurfaceRule};
 
 pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Result<()> {
     let settings = Settings {
         window: arguments.window,
         stride: arguments.stride,
         centre: arguments.centre,
+        surface: if arguments.binary_grid { SurfaceRule::BinaryGrid } else { SurfaceRule::SignedDistance },
+        mesher: arguments.mesher.into(),
+        element_size: arguments.element_size.map(|mm| 1e-3 * mm),
         ..Settings::default()
     };
     let reconstructed = match (&arguments.recording, &arguments.surface) {
@@ -74,6 +77,14 @@ pub fn text(r: &Reconstructed) -> String {
             100.0 * c.coverage,
             c.depth_range_median_mm
         );
+        if let Some(t) = &c.truth {
+            out += &format!(
+                "\nagainst the truth: depth error {:.2} mm (median; 95% below {:.2}), {:.2} mm under the instruments",
+                t.depth_error_median_mm,
+                t.depth_error_p95_mm,
+                t.under_instruments_median_mm.unwrap_or(f64::NAN)
+            );
+        }
     }
     for note in &r.notes {
         out += &format!("\nnote: {note}");

@@ -1,0 +1,95 @@
+//! `trocar experiment`.
+
+use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
+use crate::output;
+use trocar_evaluate::{ReconstructionResult, Result};
+use trocar_phantom::RecordOptions;
+use trocar_progress::Progress;
+use trocar_reconstruct::Settings;
+
+pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Result<()> {
+    match &arguments.name {
+        ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
+    }
+}
+
+fn reconstruction(arguments: &ReconstructionExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
+    let named = &arguments.phantoms;
+    let experiment = trocar_evaluate::ReconstructionExperiment {
+        phantoms: if named.is_empty() {
+            trocar_phantom::NAMES.iter().map(|n| (*n).to_owned()).collect()
+        } else {
+            named.clone()
+        },
+        record: RecordOptions { frames: arguments.frames, seed: arguments.seed },
+        settings: Settings { mesher: arguments.mesher.into(), ..Settings::default() },
+    };
+    let result = experiment.run(&arguments.output, progress)?;
+    output::print(json, &result, text);
+    Ok(())
+}
+
+fn text(r: &ReconstructionResult) -> String {
+    let header = [
+        "organ",
+        "nodes",
+        "(paper)",
+        "tets",
+        "(paper)",
+        "min dih deg",
+        "closed",
+        "inverted",
+        "|err| mm",
+        "err mm",
+        "binary grid",
+        "covered",
+        "cm3",
+        "off model",
+        "off truth",
+    ];
+    let paper = |n: Option<usize>| n.map_or(String::new(), |n| format!("({n})"));
+    let rows: Vec<Vec<String>> = r
+        .organs
+        .iter()
+        .map(|o| {
+            vec![
+                format!("{} {}", o.phantom.trim_start_matches("phantom-").to_uppercase(), o.organ),
+                o.nodes.to_string(),
+                paper(o.paper_nodes),
+                o.tets.to_string(),
+                paper(o.paper_tets),
+                format!("{:.1}", o.min_dihedral_deg),
+                if o.watertight { "yes" } else { "NO" }.to_owned(),
+                o.inverted.to_string(),
+                format!("{:.2}", o.depth_error_median_mm),
+                format!("{:.2}", o.signed_error_median_mm),
+                o.binary_grid_signed_error_mm.map_or("-".into(), |e| format!("{e:.2}")),
+                format!("{:.2}", o.covered),
+                format!("{:.2}", o.volume_cm3),
+                format!("{:+.1}%", 100.0 * o.volume_error),
+                format!("{:+.0}%", 100.0 * o.volume_error_truth),
+            ]
+        })
+        .collect();
+    let mut out = output::table(&header, &rows);
+    for p in &r.phantoms {
+        let c = &p.composite;
+        out += &format!(
+            "\n{}: {} frames, {:.1}% recovered from under instruments, depth on {:.1}%, median range {:.2} mm",
+            p.phantom,
+            c.frames_used,
+            100.0 * c.recovered_share,
+            100.0 * c.coverage,
+            c.depth_range_median_mm
+        );
+        if let Some(t) = &c.truth {
+            out += &format!(
+                "; composite against truth {:.2} mm, {:.2} mm under instruments",
+                t.depth_error_median_mm,
+                t.under_instruments_median_mm.unwrap_or(f64::NAN)
+            );
+        }
+        out += &format!("; {:.1} s", p.seconds);
+    }
+    out + &format!("\nall of it in {:.0} s; report {}", r.seconds, r.report)
+}
