@@ -59,6 +59,12 @@ pub struct CompositeFigures {
     pub coverage: f64,
     /// Median over pixels of the inter-percentile (10 to 90) range of depth [mm].
     pub depth_range_median_mm: f64,
+    /// Wall time of reading and decoding the frames [s].
+    pub frames_s: f64,
+    /// Time that all threads together spent decoding images [s].
+    pub decoding_cpu_s: f64,
+    /// Wall time of the medians [s].
+    pub medians_s: f64,
     /// Its errors against the truth, where the recording has one.
     pub truth: Option<TruthFigures>,
 }
@@ -75,6 +81,9 @@ impl CompositeFigures {
             recovered_share: r.recovered_share,
             coverage: r.coverage,
             depth_range_median_mm: r.depth_range_median * 1e3,
+            frames_s: r.times.frames,
+            decoding_cpu_s: r.times.decoding,
+            medians_s: r.times.medians,
             truth: truth.and_then(|truth| truth.figures(r)),
         })
     }

@@ -8,7 +8,7 @@ use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
 use trocar_cell::{GraspLiftRun, Gripper, Phase, Sample, Snapshot, Summary};
 use trocar_evaluate::report;
 use trocar_geometry::{Pose, RepairReport, TetMesh, TetQuality, TriMesh};
-use trocar_reconstruct::{OrganView, Reconstruction};
+use trocar_reconstruct::{CompositeTimes, OrganView, Reconstruction};
 use trocar_render::{Instance, Scene, Shading};
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
@@ -180,6 +180,7 @@ fn reconstruction() -> Reconstruction {
         recovered_share: 0.034,
         coverage: 0.903,
         depth_range_median: 0.0019,
+        times: CompositeTimes::default(),
         organs,
         notes: vec![format!("frame 12 of {HOSTILE} dropped")],
     }

@@ -3,6 +3,8 @@
 
 use crate::{Error, Result, Settings};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Instant;
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_progress::Progress;
 use trocar_recording::{Packet, Recording, RgbdFrame};
@@ -28,8 +30,21 @@ pub struct Composite {
     pub coverage: f64,
     /// Median over pixels of the 10th to 90th percentile range of depth [m].
     pub depth_range_median: f64,
-    /// Hash of the bytes of all used files.
+    /// Hash of the bytes of all used frames.
     pub hash: u64,
+    /// Where the time went.
+    pub times: CompositeTimes,
+}
+
+/// Where a composite's time went.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct CompositeTimes {
+    /// Wall time of reading and decoding the frames [s].
+    pub frames: f64,
+    /// Time of all threads together spent decoding images [s].
+    pub decoding: f64,
+    /// Wall time of the medians [s].
+    pub medians: f64,
 }
 
 /// One frame, as small as it can be held: the whole window is in memory at once.
@@ -62,7 +77,10 @@ pub fn composite(
 ) -> Result<Composite> {
     let scale = recording.depth_scale();
     let centre = settings.centre.unwrap_or(recording.len() / 2);
-    let samples = read_window(recording, &window(recording, settings, centre)?, settings, notes, progress)?;
+    let mut times = CompositeTimes::default();
+    let window = window(recording, settings, centre)?;
+    let samples = read_window(recording, &window, settings, &mut times, notes, progress)?;
+    let clock = Instant::now();
 
     let (width, height) = (recording.camera().width, recording.camera().height);
     let needed = settings.min_samples.clamp(1, samples.len());
@@ -74,6 +92,7 @@ pub fn composite(
         }
     });
 
+    times.medians = clock.elapsed().as_secs_f64();
     let mut hash = Xxh3::new();
     samples.iter().for_each(|s| hash.update(&s.hash.to_le_bytes()));
     let frames_used = samples.len();
@@ -107,6 +126,7 @@ pub fn composite(
         coverage: ranges.len() as f64 / all,
         depth_range_median: ranges.get(ranges.len() / 2).copied().unwrap_or(0.0),
         hash: hash.digest(),
+        times,
     })
 }
 
@@ -115,17 +135,22 @@ fn read_window(
     recording: &Recording,
     window: &[usize],
     settings: &Settings,
+    times: &mut CompositeTimes,
     notes: &mut Vec<String>,
     progress: &dyn Progress,
 ) -> Result<Vec<Sample>> {
     let scale = recording.depth_scale();
+    let clock = Instant::now();
+    let decoding = AtomicU64::new(0);
     progress.begin("frames", window.len() as u64);
     let read = |packet: Packet| {
         if progress.interrupted() {
             return (packet.frame, Err(Error::Interrupted));
         }
         let sample = packet.parts.and_then(|parts| {
+            let clock = Instant::now();
             let RgbdFrame { color, depth, instruments } = recording.decode(packet.frame, &parts)?;
+            decoding.fetch_add(clock.elapsed().as_nanos() as u64, Ordering::Relaxed);
             Ok(Sample {
                 frame: packet.frame,
                 depth: depth.depth.iter().map(|z| (f64::from(*z) / scale).round() as u16).collect(),
@@ -143,6 +168,8 @@ fn read_window(
     if progress.interrupted() {
         return Err(Error::Interrupted);
     }
+    times.frames = clock.elapsed().as_secs_f64();
+    times.decoding = 1e-9 * decoding.into_inner() as f64;
     read.sort_by_key(|(frame, _)| *frame);
     let (mut samples, mut broken) = (Vec::with_capacity(read.len()), Vec::new());
     for (_, sample) in read {

@@ -113,6 +113,7 @@ fn base(base_px: Option<[f64; 2]>, mask: &Mask, front: &[f64], camera: &Camera, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::composite::CompositeTimes;
     use trocar_camera::{ColorImage, DepthImage};
     use trocar_specimen::{Material, Pins};
 
@@ -142,6 +143,7 @@ mod tests {
             coverage: 1.0,
             depth_range_median: 0.0,
             hash: 0,
+            times: CompositeTimes::default(),
         };
         let info = OrganInfo {
             name: "organ".into(),

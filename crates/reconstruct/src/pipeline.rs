@@ -1,7 +1,7 @@
 //! The stages in their order.
 
 use crate::body::fill_with_tets;
-use crate::composite::{Composite, composite};
+use crate::composite::{Composite, CompositeTimes, composite};
 use crate::masks::organ_mask;
 use crate::organ::{Closed, View, close};
 use crate::{Error, Result, Settings};
@@ -46,6 +46,8 @@ pub struct Reconstruction {
     pub coverage: f64,
     /// Median over pixels of the range between the 10th and 90th percentile of depth [m].
     pub depth_range_median: f64,
+    /// Where the composite's time went.
+    pub times: CompositeTimes,
     /// Per organ, in the specimen's order.
     pub organs: Vec<OrganView>,
     /// Things the user should know (dropped frames, filled holes, clipped organs), a sentence each.
@@ -129,6 +131,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         recovered_share: background.recovered_share,
         coverage: background.coverage,
         depth_range_median: background.depth_range_median,
+        times: background.times,
         organs: views,
         notes,
     })
