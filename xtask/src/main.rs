@@ -1,6 +1,10 @@
 //! The project's own commands. `cargo xtask test` is what continuous integration runs and what a contributor runs before
 //! sending a change.
 
+#![allow(clippy::print_stderr, reason = "this is a command-line program")]
+
+mod tools;
+
 use std::process::{Command, ExitCode};
 
 /// A check: its name, the arguments of cargo, environment variables.
@@ -14,28 +18,72 @@ const TEST: &[Check] = &[
     ("docs", &["doc", "--workspace", "--no-deps", "--release", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")]),
 ];
 
-#[allow(clippy::print_stderr, reason = "this is a command-line program")]
+const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests and docs, warnings as errors
+       cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
+       cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
+
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if arguments != ["test"] {
-        eprintln!("usage: cargo xtask test    formatting, lints, tests and docs, warnings as errors");
-        return ExitCode::from(2);
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match words.as_slice() {
+        ["test"] => {
+            tools::fetch();
+            test()
+        }
+        ["tools"] => {
+            tools::fetch();
+            ExitCode::SUCCESS
+        }
+        ["fuzz"] => fuzz(1_000_000),
+        ["fuzz", cases] => match cases.parse() {
+            Ok(cases) => fuzz(cases),
+            Err(_) => usage(),
+        },
+        _ => usage(),
     }
-    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+}
+
+fn usage() -> ExitCode {
+    eprintln!("{USAGE}");
+    ExitCode::from(2)
+}
+
+fn test() -> ExitCode {
     for (name, arguments, variables) in TEST {
         eprintln!("\n== {name}: cargo {}", arguments.join(" "));
-        match Command::new(&cargo).args(*arguments).envs(variables.iter().copied()).status() {
-            Ok(status) if status.success() => {}
-            Ok(status) => {
-                eprintln!("\n{name} failed ({status})");
-                return ExitCode::FAILURE;
-            }
-            Err(e) => {
-                eprintln!("\n{cargo} could not be started: {e}");
-                return ExitCode::FAILURE;
-            }
+        if !cargo(arguments, variables) {
+            eprintln!("\n{name} failed");
+            return ExitCode::FAILURE;
         }
     }
     eprintln!("\nformatting, lints, tests and docs are in order");
     ExitCode::SUCCESS
+}
+
+/// Runs the tests named `damage_never_panics` of all crates; each takes its share of the cases.
+fn fuzz(cases: usize) -> ExitCode {
+    /// Crates with such a test.
+    const CRATES: [&str; 4] = ["trocar-geometry", "trocar-messages", "trocar-recording", "trocar-specimen"];
+    let share = cases.div_ceil(CRATES.len()).to_string();
+    for name in CRATES {
+        eprintln!("\n== {name}: {share} cases");
+        let arguments = ["test", "--release", "--locked", "-p", name, "--tests", "damage_never_panics"];
+        if !cargo(&arguments, &[("TROCAR_FUZZ_CASES", &share)]) {
+            eprintln!("\n{name} failed");
+            return ExitCode::FAILURE;
+        }
+    }
+    ExitCode::SUCCESS
+}
+
+/// Runs cargo; says whether it went well.
+fn cargo(arguments: &[&str], variables: &[(&str, &str)]) -> bool {
+    let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_owned());
+    match Command::new(&cargo).args(arguments).envs(variables.iter().copied()).status() {
+        Ok(status) => status.success(),
+        Err(e) => {
+            eprintln!("\n{cargo} could not be started: {e}");
+            false
+        }
+    }
 }

@@ -8,6 +8,9 @@ use std::path::Path;
 /// Images larger than this on a side are refused before their pixels are allocated.
 const MAX_SIDE: u32 = 16_384;
 
+/// Bytes of pixels that a byte of a file may hold at most: 1032 by deflate.
+const MAX_PACKING: u64 = 1040;
+
 /// An 8-bit sRGB image, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorImage {
@@ -174,7 +177,9 @@ pub fn pixel_neighbours(i: usize, width: usize, height: usize) -> impl Iterator<
 }
 
 fn wrong(path: &Path, reason: &dyn std::fmt::Display) -> Error {
-    Error::Image { path: path.to_owned(), reason: reason.to_string() }
+    // Some decoders break their messages into lines; ours are one.
+    let reason = reason.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+    Error::Image { path: path.to_owned(), reason: reason.replace(" )", ")") }
 }
 
 fn load(path: &Path) -> Result<Vec<u8>> {
@@ -191,6 +196,13 @@ fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     let (width, height) = decoder.dimensions();
     if width > MAX_SIDE || height > MAX_SIDE {
         return Err(wrong(path, &format!("{width} x {height} pixels; at most {MAX_SIDE} on a side")));
+    }
+    // No image format packs more tightly than deflate can: what claims to is broken, and is refused before its pixels are allocated.
+    if decoder.total_bytes() > MAX_PACKING * bytes.len() as u64 {
+        return Err(wrong(
+            path,
+            &format!("{width} x {height} pixels do not fit into its {} bytes; it is cut or broken", bytes.len()),
+        ));
     }
     DynamicImage::from_decoder(decoder).map_err(unreadable)
 }

@@ -69,9 +69,10 @@ pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
 /// What a parser found, or why it could not: the path is added by its caller.
 type Parsed<T> = std::result::Result<T, String>;
 
-/// An [`Error::Parse`].
+/// An [`Error::Parse`]. Some parsers break their messages into lines; ours are one.
 fn bad(path: &Path, reason: impl Into<String>) -> Error {
-    Error::Parse { path: path.into(), reason: reason.into() }
+    let reason: String = reason.into();
+    Error::Parse { path: path.into(), reason: reason.split_whitespace().collect::<Vec<_>>().join(" ") }
 }
 
 /// Writes a whole file.

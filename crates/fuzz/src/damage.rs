@@ -1,0 +1,81 @@
+//! The ways in which a file is damaged.
+
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::Rng;
+
+/// Numbers that readers trip over, as text.
+const WORDS: [&str; 12] = [
+    "-1",
+    "0",
+    "nan",
+    "inf",
+    "1e308",
+    "-1e-308",
+    "4294967295",
+    "4294967296",
+    "18446744073709551615",
+    "9999999",
+    "",
+    "\u{feff}",
+];
+
+/// A damaged copy of `good`; what is spliced in comes from it or another of the `seeds`.
+pub fn damage(good: &[u8], seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) -> Vec<u8> {
+    let mut bytes = good.to_vec();
+    for _ in 0..1 + below(rng, 4) {
+        once(&mut bytes, seeds, rng);
+    }
+    bytes
+}
+
+fn once(bytes: &mut Vec<u8>, seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) {
+    let at = below(rng, bytes.len() + 1);
+    let here = |bytes: &Vec<u8>, length: usize| at..(at + length).min(bytes.len());
+    match below(rng, 9) {
+        // Cut short.
+        0 => bytes.truncate(at),
+        // One bit.
+        1 => here(bytes, 1).for_each(|i| bytes[i] ^= 1 << below(rng, 8)),
+        // One byte.
+        2 => here(bytes, 1).for_each(|i| bytes[i] = rng.next_u32() as u8),
+        // A number of 1, 2, 4 or 8 bytes at an extreme, in either order of bytes.
+        3 | 4 => {
+            let size = 1 << below(rng, 4);
+            let value = [0, 1, u64::MAX, u64::MAX >> 1, u64::MAX >> (64 - 8 * size), 1 << 31, 1 << 24][below(rng, 7)];
+            let value =
+                if below(rng, 2) == 0 { value.to_le_bytes() } else { value.rotate_left(64 - 8 * size).to_be_bytes() };
+            for (i, v) in here(bytes, size as usize).zip(value) {
+                bytes[i] = v;
+            }
+        }
+        // A stretch away.
+        5 => {
+            let length = below(rng, 64);
+            bytes.drain(here(bytes, length));
+        }
+        // A stretch twice.
+        6 => {
+            let length = below(rng, 64);
+            let copy = bytes[here(bytes, length)].to_vec();
+            bytes.splice(at..at, copy);
+        }
+        // A stretch of another file.
+        7 => {
+            let other = &seeds[below(rng, seeds.len())].1;
+            let from = below(rng, other.len() + 1);
+            let copy = other[from..(from + below(rng, 256)).min(other.len())].to_vec();
+            bytes.splice(at..at, copy);
+        }
+        // A word in place of the one that stands here.
+        _ => {
+            let end = (at..bytes.len()).find(|i| bytes[*i].is_ascii_whitespace()).unwrap_or(bytes.len());
+            let word = WORDS[below(rng, WORDS.len())];
+            bytes.splice(at.min(end)..end.min(at + 24), word.bytes());
+        }
+    }
+}
+
+/// A number from 0 to `n` - 1; 0 for 0.
+fn below(rng: &mut Pcg64Mcg, n: usize) -> usize {
+    (rng.next_u64() % n.max(1) as u64) as usize
+}

@@ -1,0 +1,56 @@
+//! The system's allocator, which knows the most that was allocated at a time.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// An allocator that counts. Threads are counted together.
+#[derive(Debug)]
+pub struct Peak {
+    now: AtomicUsize,
+    most: AtomicUsize,
+    start: AtomicUsize,
+}
+
+/// To be installed by a test binary: `#[global_allocator] static ALLOCATOR: &Peak = &PEAK;`
+pub static PEAK: Peak = Peak { now: AtomicUsize::new(0), most: AtomicUsize::new(0), start: AtomicUsize::new(0) };
+
+impl Peak {
+    /// Counts from here on.
+    pub fn start(&self) {
+        let now = self.now.load(Ordering::Relaxed);
+        self.start.store(now, Ordering::Relaxed);
+        self.most.store(now, Ordering::Relaxed);
+    }
+
+    /// The most bytes that were allocated at a time since [`Peak::start`], beyond those of then.
+    pub fn since_start(&self) -> usize {
+        self.most.load(Ordering::Relaxed).saturating_sub(self.start.load(Ordering::Relaxed))
+    }
+
+    fn grew(&self, by: usize) {
+        let now = self.now.fetch_add(by, Ordering::Relaxed) + by;
+        self.most.fetch_max(now, Ordering::Relaxed);
+    }
+}
+
+#[allow(unsafe_code, reason = "an allocator cannot be written without")]
+// SAFETY: every call is handed on to the system's allocator unchanged.
+unsafe impl GlobalAlloc for &Peak {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        self.grew(layout.size());
+        // SAFETY: the caller's promises are handed on.
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
+        self.grew(layout.size());
+        // SAFETY: the caller's promises are handed on.
+        unsafe { System.alloc_zeroed(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        self.now.fetch_sub(layout.size(), Ordering::Relaxed);
+        // SAFETY: the pointer came from `alloc`, that is, from the system.
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}

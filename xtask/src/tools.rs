@@ -1,0 +1,44 @@
+//! What some tests compare with and is not part of the project: ONNX Runtime's library, the TetGen program. Without them these
+//! tests are skipped, and say so.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// A Python environment of the project's own, beside what cargo builds.
+const ENVIRONMENT: &str = "target/tools";
+/// Python packages and their versions.
+const PACKAGES: [&str; 1] = ["onnxruntime>=1.23"];
+
+/// Fetches what is missing. A machine without network or Python is no error.
+pub fn fetch() {
+    let python = Path::new(ENVIRONMENT).join("bin/python");
+    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime"]));
+    if !import() {
+        eprintln!("== tools: {} into {ENVIRONMENT}", PACKAGES.join(" "));
+        let made = quiet(Command::new("python3").args(["-m", "venv", ENVIRONMENT]))
+            && quiet(Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(PACKAGES));
+        if !made || !import() {
+            eprintln!("   not to be had (python3 with venv and network is needed); the tests that need it are skipped");
+        }
+    }
+    // It ends with an error however it is asked for its help; that it starts is enough.
+    if Command::new("tetgen").arg("-h").stdout(Stdio::null()).stderr(Stdio::null()).status().is_err() {
+        eprintln!("== tools: tetgen (apt)");
+        let install = |sudo: bool| {
+            let mut command = if sudo { Command::new("sudo") } else { Command::new("apt-get") };
+            if sudo {
+                command.args(["-n", "apt-get"]);
+            }
+            quiet(command.args(["install", "-y", "-q", "tetgen"]))
+        };
+        if !install(false) && !install(true) {
+            eprintln!("   not to be had without root; the tests that need it are skipped");
+        }
+    }
+}
+
+/// Runs a command without a word of it; says whether it could be started and went well.
+fn quiet(command: &mut Command) -> bool {
+    let status = command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::null()).status();
+    status.is_ok_and(|s| s.success())
+}
