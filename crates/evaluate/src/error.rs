@@ -19,6 +19,14 @@ pub enum Error {
         /// What is wrong and what would be right.
         reason: String,
     },
+    /// A file is in the way.
+    #[error("{path} {reason}", path = path.display())]
+    Exists {
+        /// The file.
+        path: PathBuf,
+        /// Why it stays.
+        reason: String,
+    },
     /// A moving picture was asked of a run that kept no snapshots.
     #[error("the run kept no snapshots, so there is nothing to animate; set `snapshot_every` to 4 or so")]
     NoSnapshots,

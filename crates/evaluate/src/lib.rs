@@ -3,6 +3,7 @@
 mod demo;
 mod error;
 mod experiment;
+mod inspect;
 mod paper;
 pub mod report;
 mod truth;
@@ -11,6 +12,7 @@ mod workflow;
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
+pub use inspect::{Inspection, inspect};
 pub use truth::TruthFigures;
 pub use workflow::{
     CompositeFigures, OrganRow, Reconstructed, SimulatedRun, reconstruct_recording, reconstruct_surface, simulate,

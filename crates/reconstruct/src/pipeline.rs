@@ -68,7 +68,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
     if recording.info.organs.is_empty() {
         return Err(Error::Input {
             path: recording.toml().to_owned(),
-            reason: "no [[organ]]; name at least one, with a mask in masks/ or a polygon".into(),
+            reason: "no [[organ]]; name at least one, with a mask in masks/, a polygon or points (`trocar inspect` writes a template)".into(),
         });
     }
     // All masks first: a missing one should not be found after minutes of work.
@@ -149,11 +149,11 @@ fn with_body(info: &OrganInfo, closed: Closed, settings: &Settings) -> Result<(O
     Ok((Organ { name, body, surface, material: info.material, pins: info.pins, base, facts }, view))
 }
 
-/// Hash of everything the result depends on: `recording.toml`, the used frames, the masks.
+/// Hash of everything the result depends on: what is known of the recording, the used frames, the masks.
 fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]) -> Result<u64> {
-    let path = recording.toml().to_owned();
     let mut hash = Xxh3::new();
-    hash.update(&std::fs::read(&path).map_err(|source| Error::Io { path, source })?);
+    let said = toml::to_string(&recording.info).map_err(|e| Error::Setting(format!("the recording's facts: {e}")))?;
+    hash.update(said.as_bytes());
     hash.update(&background.hash.to_le_bytes());
     for view in views {
         hash.update(&view.mask.set.iter().map(|s| u8::from(*s)).collect::<Vec<u8>>());

@@ -24,6 +24,9 @@ pub enum Error {
         /// Field or frame, what is wrong, what would be right.
         reason: String,
     },
+    /// A bag or MCAP file is unusable.
+    #[error(transparent)]
+    Messages(#[from] trocar_messages::Error),
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),

@@ -63,7 +63,7 @@ pub struct DepthToColor {
 }
 
 /// A log file that holds the frames.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SourceInfo {
     /// A `.bag` or `.mcap` file; relative to the folder of this file.
@@ -151,6 +151,27 @@ fn default_pins() -> Pins {
 }
 
 impl RecordingInfo {
+    /// What is taken for granted of the log file `path` about which nothing is said: its camera looks straight down.
+    pub fn of_log(path: &Path) -> Self {
+        Self {
+            name: path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),
+            rate_hz: None,
+            depth_scale_m: None,
+            up: [0.0, 0.0, -1.0],
+            depth_offset_px: [0.0; 2],
+            depth_max_m: None,
+            instruments: InstrumentRule::default(),
+            note: String::new(),
+            source: path
+                .file_name()
+                .map(|n| SourceInfo { file: n.to_string_lossy().into_owned(), ..SourceInfo::default() }),
+            camera: None,
+            depth_camera: None,
+            depth_to_color: None,
+            organs: Vec::new(),
+        }
+    }
+
     /// Checks every field and normalises `up`. `path` is the file the errors name.
     ///
     /// # Errors

@@ -17,6 +17,7 @@ mod error;
 mod folder;
 mod frame_list;
 mod info;
+mod log;
 mod pairing;
 mod recording;
 mod register;

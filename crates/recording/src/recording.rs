@@ -1,10 +1,12 @@
 //! A recording opened for reading: frames stream from their source and come out registered, on one camera's pixels.
 
 use crate::folder::Folder;
+use crate::log::{Log, LogCameras};
 use crate::register::Registration;
 use crate::shade::shade;
 use crate::source::{FrameSource, Images, Packet, Parts};
-use crate::{Error, MARKER, RecordingInfo, Result};
+use crate::{DepthToColor, Error, MARKER, RecordingInfo, Result, SourceInfo};
+use glam::DMat3;
 use std::path::{Path, PathBuf};
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
 use trocar_specimen::read_toml;
@@ -38,42 +40,54 @@ pub struct RgbdFrame {
 }
 
 impl Recording {
-    /// Opens a folder with a `recording.toml`, and checks that its parts fit together (at least one whole frame, sizes).
+    /// Opens a recording and checks that its parts fit together (at least one whole frame, sizes). `path` is a folder with a
+    /// `recording.toml`, or a `.bag` or `.mcap` file, about which a `.toml` of the same name beside it may say more.
     ///
     /// # Errors
     /// Names the file, field or frame that is missing or wrong.
     pub fn open(path: &Path) -> Result<Self> {
-        let toml = path.join(MARKER);
-        if !path.is_dir() {
-            return Err(Error::wrong(path, "no such folder; a recording is a folder with a recording.toml"));
+        let log = path.is_file().then(|| path.file_name().map(|n| n.to_string_lossy().into_owned())).flatten();
+        let toml = if log.is_some() { path.with_extension("toml") } else { path.join(MARKER) };
+        let mut info = match (&log, toml.is_file()) {
+            (_, true) => read_toml(&toml)?,
+            (Some(_), false) => RecordingInfo::of_log(path),
+            (None, false) if !path.is_dir() => {
+                let reason =
+                    "no such file or folder; a recording is a folder with a recording.toml, a .bag or an .mcap file";
+                return Err(Error::wrong(path, reason));
+            }
+            (None, false) => {
+                return Err(Error::wrong(&toml, "no such file; a recording is a folder with a recording.toml"));
+            }
+        };
+        if let Some(file) = log {
+            let named = info.source.get_or_insert_with(|| SourceInfo { file: file.clone(), ..SourceInfo::default() });
+            if named.file != file {
+                return Err(Error::wrong(
+                    &toml,
+                    format!("source.file is '{}', but it stands beside {file}", named.file),
+                ));
+            }
         }
-        if !toml.is_file() {
-            return Err(Error::wrong(&toml, "no such file; a recording is a folder with a recording.toml"));
-        }
-        let mut info: RecordingInfo = read_toml(&toml)?;
         info.validate(&toml)?;
-        let (Some(camera), Some(depth_scale_m)) = (info.camera, info.depth_scale_m) else {
-            return Err(Error::wrong(&toml, "[camera] and depth_scale_m are needed"));
+        let dir = toml.parent().unwrap_or(Path::new("."));
+        let (source, said): (Box<dyn FrameSource>, LogCameras) = match (&info.source, info.depth_scale_m) {
+            (Some(log), scale) => {
+                let (log, said) = Log::open(dir, log, scale)?;
+                (Box::new(log), said)
+            }
+            (None, Some(scale)) => {
+                let said = LogCameras { depth_scale_m: scale, ..LogCameras::default() };
+                (Box::new(Folder::open(dir, scale)?), said)
+            }
+            (None, None) => {
+                return Err(Error::wrong(&toml, "depth_scale_m is needed: metres per unit of the depth images"));
+            }
         };
-        let source = Folder::open(path, depth_scale_m)?;
-        let registration = match (info.depth_camera, info.depth_to_color) {
-            (Some(depth), Some(motion)) => Some(Registration {
-                depth,
-                color: camera,
-                rotation: motion.matrix(),
-                translation: motion.translation_m.into(),
-            }),
-            _ => None,
-        };
-        let mut recording = Self {
-            notes: source.notes().to_vec(),
-            source: Box::new(source),
-            camera,
-            depth_scale_m,
-            registration,
-            toml,
-            info,
-        };
+        let depth_scale_m = said.depth_scale_m;
+        let (camera, registration) = cameras(&info, &said).map_err(|reason| Error::wrong(&toml, reason))?;
+        let mut recording =
+            Self { notes: source.notes().to_vec(), source, camera, depth_scale_m, registration, toml, info };
         let [du, dv] = recording.offset();
         recording.camera.cx += du as f64;
         recording.camera.cy += dv as f64;
@@ -106,6 +120,16 @@ impl Recording {
     /// What was dropped or replaced while the frames were listed, a sentence each.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// What the recording's log holds, a line a topic; empty for a folder of images.
+    pub fn describe(&self) -> Vec<String> {
+        self.source.describe()
+    }
+
+    /// How depth comes onto the colour camera's pixels, where its own camera is another.
+    pub fn registration(&self) -> Option<&Registration> {
+        self.registration.as_ref()
     }
 
     /// The camera of the frames as they are returned: colour's; without colour, the depth's.
@@ -164,7 +188,7 @@ impl Recording {
         if (depth.width, depth.height) != (depth_camera.width, depth_camera.height) {
             let field = if self.registration.is_some() { "depth_camera" } else { "camera" };
             return Err(wrong(format!(
-                "{} x {} pixels, but recording.toml says {field}.width x {field}.height = {} x {}",
+                "{} x {} pixels, but recording.toml or its log says {field}.width x {field}.height = {} x {}",
                 depth.width, depth.height, depth_camera.width, depth_camera.height
             )));
         }
@@ -211,6 +235,36 @@ impl Recording {
             }
         }
         out
+    }
+}
+
+/// The camera of the frames, and how depth gets there, from what the user says and else from what the log `said`.
+fn cameras(info: &RecordingInfo, said: &LogCameras) -> std::result::Result<(Camera, Option<Registration>), String> {
+    let missing = "the log says nothing of its colour camera; a [camera] with width, height, fx, fy, cx, cy is needed";
+    let color = info.camera.or(said.color).ok_or(missing)?;
+    let Some(depth) = info.depth_camera.or(said.depth) else { return Ok((color, None)) };
+    let same_place = |m: &DepthToColor| {
+        let turned = (m.matrix() - DMat3::IDENTITY).to_cols_array().into_iter().map(f64::abs).fold(0.0, f64::max);
+        turned < 1e-6 && m.translation_m.iter().all(|t| t.abs() < 1e-6)
+    };
+    match info.depth_to_color.or(said.depth_to_color) {
+        Some(motion) if depth != color || !same_place(&motion) => Ok((
+            color,
+            Some(Registration {
+                depth,
+                color,
+                rotation: motion.matrix(),
+                translation: motion.translation_m.into(),
+            }),
+        )),
+        Some(_) => Ok((color, None)),
+        // Depth aligned to colour has colour's camera, give or take how many digits were written.
+        None if (depth.width, depth.height) == (color.width, color.height) && (depth.fx / color.fx - 1.0).abs() < 0.01 => {
+            Ok((color, None))
+        }
+        None => Err("the log's depth camera is not its colour camera, and it does not say where they stand; \
+                     [depth_to_color] with rotation and translation_m is needed, or the topic of depth aligned to colour"
+            .into()),
     }
 }
 

@@ -54,6 +54,11 @@ pub trait FrameSource: Send + Sync + std::fmt::Debug {
 
     /// What was dropped or replaced while the frames were listed, a sentence each.
     fn notes(&self) -> &[String];
+
+    /// What the source holds, a line each: the topics of a log.
+    fn describe(&self) -> Vec<String> {
+        Vec::new()
+    }
 }
 
 impl Parts {

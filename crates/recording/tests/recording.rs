@@ -90,7 +90,7 @@ fn moves_depth_onto_colour() {
 #[test]
 fn a_missing_or_foreign_folder_is_named() {
     let root = tempfile::tempdir().unwrap();
-    assert!(failure(&root.path().join("nowhere")).contains("nowhere: no such folder"));
+    assert!(failure(&root.path().join("nowhere")).contains("nowhere: no such file or folder"));
     assert!(failure(root.path()).contains("recording.toml: no such file"));
     fs::write(root.path().join("thesis"), "x").unwrap();
     let error = RecordingWriter::create(root.path(), &info()).err().unwrap().to_string();

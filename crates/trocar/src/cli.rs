@@ -25,6 +25,8 @@ pub enum Command {
     Demo(Demo),
     /// Make a recording with known truth: a procedural anatomy filmed by a simulated depth camera.
     Record(Record),
+    /// Say what a recording holds, and write the file in which to say more of it.
+    Inspect(Inspect),
     /// Turn an RGB-D recording, or a ready surface, into watertight tetrahedral organs.
     Reconstruct(Reconstruct),
     /// Run a scripted task on a specimen without a window.
@@ -69,10 +71,20 @@ pub struct Record {
     pub seed: u64,
 }
 
+/// Arguments of `inspect`.
+#[derive(Debug, Args)]
+pub struct Inspect {
+    /// Recording: a folder with a recording.toml, a .bag or an .mcap file.
+    pub recording: PathBuf,
+    /// Write a .toml to fill in, and a still, beside a .bag or .mcap file.
+    #[arg(long)]
+    pub template: bool,
+}
+
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Reconstruct {
-    /// Recording folder.
+    /// Recording: a folder with a recording.toml, or a .bag or .mcap file with a .toml of the same name beside it.
     #[arg(required_unless_present = "surface", conflicts_with = "surface")]
     pub recording: Option<PathBuf>,
     /// A ready surface instead of a recording: .stl, .ply or .obj.

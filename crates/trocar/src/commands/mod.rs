@@ -2,6 +2,7 @@
 
 mod demo;
 mod experiment;
+mod inspect;
 mod reconstruct;
 mod record;
 mod simulate;
@@ -14,6 +15,7 @@ use trocar_progress::Progress;
 pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
     match &cli.command {
         Command::Demo(arguments) => demo::run(arguments, cli.json, progress),
+        Command::Inspect(arguments) => inspect::run(arguments, cli.json),
         Command::Record(arguments) => record::run(arguments, cli.json, progress),
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress),
         Command::Experiment(arguments) => experiment::run(arguments, cli.json, progress),

@@ -1,0 +1,214 @@
+//! ROS 1 bags, format 2.0 (<http://wiki.ros.org/Bags/Format/2.0>).
+//!
+//! A bag is a row of records: a header of named fields, then data. Chunks hold the messages; after each come the indices of
+//! its messages, one a connection; at the end, descriptions of connections and chunks. The file is walked from chunk to
+//! chunk without reading their content, which finds every index; the end is only needed to go on behind damage.
+
+use crate::Encoding;
+use crate::chunk::{Chunk, Compression};
+use crate::error::Parsed;
+use crate::log::{Connection, Draft, Kind, Log, Record};
+use crate::reader::Reader;
+use crate::source::Source;
+
+/// First bytes of the file.
+pub(crate) const MAGIC: &[u8] = b"#ROSBAG V2.0\n";
+
+const MESSAGE: u8 = 2;
+const BAG_HEADER: u8 = 3;
+const INDEX: u8 = 4;
+const CHUNK: u8 = 5;
+const CHUNK_INFO: u8 = 6;
+const CONNECTION: u8 = 7;
+
+/// Enough for the header of any record but a hostile one.
+const FIRST_READ: u64 = 4096;
+/// Headers are a few short fields.
+const MAX_HEADER: u64 = 1 << 16;
+
+/// A record in the file: what its header says, and where its data lies.
+struct Walked {
+    header: Vec<u8>,
+    data_at: u64,
+    data_len: u64,
+}
+
+impl Walked {
+    /// The record at `at`, without its data.
+    fn read(source: &Source, at: u64) -> Parsed<Self> {
+        let mut bytes = source.up_to(at, FIRST_READ)?;
+        let header_len = u64::from(Reader::packed(&bytes).u32()?);
+        if header_len > MAX_HEADER {
+            return Err(format!("a record's header of {header_len} bytes; at most {MAX_HEADER} are read"));
+        }
+        if header_len + 8 > bytes.len() as u64 {
+            bytes = source.read(at, header_len + 8)?;
+        }
+        let mut reader = Reader::packed(&bytes);
+        let header = reader.counted()?.to_vec();
+        let data_len = u64::from(reader.u32()?);
+        Ok(Self { header, data_at: at + 8 + header_len, data_len })
+    }
+
+    fn end(&self) -> u64 {
+        self.data_at + self.data_len
+    }
+
+    fn data(&self, source: &Source) -> Parsed<Vec<u8>> {
+        source.read(self.data_at, self.data_len)
+    }
+}
+
+/// A field of a record's header.
+fn field<'a>(header: &'a [u8], name: &str) -> Parsed<Reader<'a>> {
+    let mut reader = Reader::packed(header);
+    while reader.left() > 0 {
+        let field = reader.counted()?;
+        if let Some(value) = field.strip_prefix(name.as_bytes()).and_then(|rest| rest.strip_prefix(b"=")) {
+            return Ok(Reader::packed(value));
+        }
+    }
+    Err(format!("a record without the field '{name}'"))
+}
+
+/// A text field of a record's header.
+fn text<'a>(header: &'a [u8], name: &str) -> Parsed<&'a str> {
+    let mut value = field(header, name)?;
+    std::str::from_utf8(value.take(value.left())?).map_err(|_| format!("the field '{name}' is not UTF-8"))
+}
+
+/// Two numbers: seconds, nanoseconds.
+fn time(reader: &mut Reader<'_>) -> Parsed<u64> {
+    Ok(u64::from(reader.u32()?) * 1_000_000_000 + u64::from(reader.u32()?))
+}
+
+/// Parses the record at the start of a chunk's content.
+fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
+    let mut reader = Reader::packed(bytes);
+    let header = reader.counted()?;
+    let data = reader.counted()?;
+    let record = match field(header, "op")?.u8()? {
+        MESSAGE => Record::Message(field(header, "conn")?.u32()?, time(&mut field(header, "time")?)?, data),
+        CONNECTION => connection(header, data)?,
+        _ => Record::Other,
+    };
+    Ok((record, reader.at()))
+}
+
+/// A connection: its topic is in the record's header, its type among fields of the same form in the data.
+fn connection<'a>(header: &[u8], data: &[u8]) -> Parsed<Record<'a>> {
+    let connection = Connection {
+        topic: text(header, "topic")?.to_owned(),
+        kind: Kind::Name(text(data, "type")?.to_owned()),
+        encoding: Encoding::Ros1,
+    };
+    Ok(Record::Connection(field(header, "conn")?.u32()?, connection))
+}
+
+/// Opens a bag.
+pub(crate) fn open(source: Source) -> Parsed<Log> {
+    let mut draft = Draft::new(source, parse);
+    let first = Walked::read(draft.source(), MAGIC.len() as u64)?;
+    if field(&first.header, "op")?.u8()? != BAG_HEADER {
+        return Err("the first record is not the bag's header".into());
+    }
+    if text(&first.header, "encryptor").is_ok_and(|e| !e.is_empty()) {
+        return Err("the bag is encrypted; decrypt it first".into());
+    }
+    let len = draft.source().len();
+    let index_at = field(&first.header, "index_pos")?.u64()?;
+    let mut chunk_ats = Vec::new();
+    let end = if index_at >= first.end() && index_at < len {
+        if let Err(reason) = read_end(&mut draft, index_at, &mut chunk_ats) {
+            draft.problem(format!("the index at the end is damaged: {reason}"));
+        }
+        index_at
+    } else {
+        draft.problem("no index at the end: the recorder did not finish, or the file was cut".into());
+        len
+    };
+    chunk_ats.sort_unstable();
+    let mut at = first.end();
+    while at < end {
+        match step(&mut draft, at, end) {
+            Ok(next) => at = next,
+            Err(reason) => match draft.damage(at, end, &reason, &chunk_ats) {
+                Some(resume) => at = resume,
+                None => break,
+            },
+        }
+    }
+    Ok(draft.finish())
+}
+
+/// The index section: connections, and where the chunks are.
+fn read_end(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Parsed<()> {
+    while at < draft.source().len() {
+        let walked = Walked::read(draft.source(), at)?;
+        match field(&walked.header, "op")?.u8()? {
+            CONNECTION => {
+                let data = walked.data(draft.source())?;
+                draft.record(connection(&walked.header, &data)?);
+            }
+            CHUNK_INFO => chunk_ats.push(field(&walked.header, "chunk_pos")?.u64()?),
+            _ => {}
+        }
+        at = walked.end();
+    }
+    Ok(())
+}
+
+/// Takes in the record at `at` and gives the place of the next.
+fn step(draft: &mut Draft, at: u64, end: u64) -> Parsed<u64> {
+    let walked = Walked::read(draft.source(), at)?;
+    let op = field(&walked.header, "op")?.u8()?;
+    if walked.end() > end {
+        // What is there of a cut chunk can be used if it is not compressed.
+        if op == CHUNK && text(&walked.header, "compression")? == "none" && end == draft.source().len() {
+            let len = end - walked.data_at.min(end);
+            draft.chunk(Chunk { at: walked.data_at, len, size: None, compression: Compression::None, crc: 0 });
+        }
+        return Err(format!("a record there says it ends at byte {}", walked.end()));
+    }
+    match op {
+        CHUNK => {
+            let size = u64::from(field(&walked.header, "size")?.u32()?);
+            let compression = match text(&walked.header, "compression")? {
+                "none" => Compression::None,
+                "bz2" => Compression::Bzip2,
+                "lz4" => Compression::Lz4,
+                other => return Err(format!("a chunk is compressed with '{other}'; known are none, bz2 and lz4")),
+            };
+            let size = (compression != Compression::None).then_some(size);
+            draft.chunk(Chunk { at: walked.data_at, len: walked.data_len, size, compression, crc: 0 });
+            if walked.data_len == 0 {
+                // The chunk a killed recorder was writing: its length was to be filled in later, its messages follow.
+                draft.index(0, &[])?;
+            }
+        }
+        INDEX => {
+            let connection = field(&walked.header, "conn")?.u32()?;
+            let data = walked.data(draft.source())?;
+            let mut reader = Reader::packed(&data);
+            let mut entries = Vec::with_capacity(data.len() / 12);
+            while reader.left() > 0 {
+                entries.push((time(&mut reader)?, reader.u32()?));
+            }
+            draft.index(connection, &entries)?;
+        }
+        CONNECTION => {
+            let data = walked.data(draft.source())?;
+            draft.record(connection(&walked.header, &data)?);
+        }
+        MESSAGE => {
+            let connection = field(&walked.header, "conn")?.u32()?;
+            let time = time(&mut field(&walked.header, "time")?)?;
+            let len = walked.end() - at;
+            draft.chunk(Chunk { at, len, size: None, compression: Compression::None, crc: 0 });
+            draft.index(connection, &[(time, 0)])?;
+        }
+        BAG_HEADER | CHUNK_INFO => {}
+        other => return Err(format!("a record of unknown kind {other}")),
+    }
+    Ok(walked.end())
+}

@@ -1,0 +1,78 @@
+//! A chunk: the unit in which both formats compress and write messages.
+
+use crate::error::Parsed;
+use crate::source::Source;
+use std::io::Read;
+
+/// A chunk larger than this is refused; recorders write chunks of about a megabyte, or one message.
+const MAX_CHUNK: u64 = 1 << 30;
+/// A compressed chunk may grow freely up to this size ...
+const FREE_GROWTH: u64 = 16 << 20;
+/// ... and to this many times its compressed size: blank images shrink a lot, but a chunk of 16 MB is not all blank.
+const MAX_GROWTH: u64 = 1024;
+/// Largest window of a Zstandard chunk, the memory its decoder takes; level 22 asks for 128 MiB, the default for 2.
+const MAX_WINDOW: u64 = 128 << 20;
+
+/// How a chunk is compressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Compression {
+    None,
+    Bzip2,
+    Lz4,
+    Zstd,
+}
+
+/// Where a chunk lies in the file.
+#[derive(Clone, Debug)]
+pub(crate) struct Chunk {
+    /// First byte of its content, after the record's header.
+    pub at: u64,
+    /// Bytes of content in the file.
+    pub len: u64,
+    /// Bytes of content when decompressed; `None`: as many as come.
+    pub size: Option<u64>,
+    pub compression: Compression,
+    /// CRC32 of the decompressed content; 0 when the writer gave none.
+    pub crc: u32,
+}
+
+impl Chunk {
+    /// The chunk's content, decompressed and checked.
+    pub fn load(&self, source: &Source) -> Parsed<Vec<u8>> {
+        let size = self.size.unwrap_or(self.len);
+        if size.max(self.len) > MAX_CHUNK {
+            return Err(format!("a chunk of {size} bytes; at most {MAX_CHUNK} are read"));
+        }
+        if size > FREE_GROWTH && size / MAX_GROWTH > self.len {
+            return Err(format!("a chunk of {} bytes says it grows to {size}; that is no recording", self.len));
+        }
+        let bytes = source.read(self.at, self.len)?;
+        let bytes = match self.compression {
+            Compression::None => Ok(bytes),
+            Compression::Bzip2 => grow(bzip2::read::BzDecoder::new(&bytes[..]), size),
+            Compression::Lz4 => grow(lz4_flex::frame::FrameDecoder::new(&bytes[..]), size),
+            Compression::Zstd => {
+                let window = size.next_power_of_two().clamp(8 << 20, MAX_WINDOW);
+                ruzstd::decoding::StreamingDecoder::new_with_max_window_size(&bytes[..], window)
+                    .map_err(|e| e.to_string())
+                    .and_then(|decoder| grow(decoder, size))
+            }
+        }
+        .map_err(|e| format!("the {:?} chunk at byte {} is damaged ({e})", self.compression, self.at))?;
+        if self.crc != 0 && crc32fast::hash(&bytes) != self.crc {
+            return Err(format!("the chunk at byte {} is damaged (its checksum does not fit)", self.at));
+        }
+        Ok(bytes)
+    }
+}
+
+/// Decompresses exactly `size` bytes; memory is taken as they come, for the size is only what the file says.
+fn grow(decoder: impl Read, size: u64) -> Parsed<Vec<u8>> {
+    let mut bytes = Vec::new();
+    decoder.take(size + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    if bytes.len() as u64 != size {
+        let more = if bytes.len() as u64 > size { " or more" } else { "" };
+        return Err(format!("{} bytes{more} came out instead of {size}", bytes.len()));
+    }
+    Ok(bytes)
+}

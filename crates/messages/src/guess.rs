@@ -1,0 +1,151 @@
+//! Which topics of a log are the colour and the depth camera.
+//!
+//! A RealSense bag says so. Otherwise the first message of every image topic is decoded, which tells colour from depth, and
+//! names decide between several: depth aligned to colour before other depth, "color" or "rgb" before other images, and
+//! uncompressed before compressed images of the same camera. Infrared images are left out.
+
+use crate::image::Image;
+use crate::{Error, MessageLog, Result, Topic, decode_image, read_one, realsense};
+
+/// Indices of the topics of an RGB-D recording.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Guess {
+    /// Colour images.
+    pub color: usize,
+    /// Depth images.
+    pub depth: usize,
+    /// Calibration of the colour camera.
+    pub color_info: Option<usize>,
+    /// Calibration of the depth camera; that of colour when depth is aligned to it.
+    pub depth_info: Option<usize>,
+    /// Metres a unit of depth (RealSense); without, units are millimetres (REP 118).
+    pub depth_units: Option<usize>,
+    /// Transform into the colour stream's frame (RealSense).
+    pub color_transform: Option<usize>,
+    /// Transform into the depth stream's frame (RealSense).
+    pub depth_transform: Option<usize>,
+    /// All topics of transforms between named frames.
+    pub transforms: Vec<usize>,
+}
+
+/// Guesses the topics of an RGB-D recording. Where the user names one, it is that.
+///
+/// # Errors
+/// [`Error::Choice`] when there is no colour or no depth, several that are as good, or none of the given name; it lists the
+/// topics.
+pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> Result<Guess> {
+    let topics = log.topics();
+    let transforms = (0..topics.len()).filter(|&t| is_transforms(&topics[t])).collect();
+    let unnamed = color.is_none() && depth.is_none();
+    if let Some(found) = realsense::find(topics).filter(|_| unnamed) {
+        return Ok(Guess {
+            color: found.color,
+            depth: found.depth,
+            color_info: found.color_info,
+            depth_info: found.depth_info,
+            depth_units: found.depth_units,
+            color_transform: found.color_transform,
+            depth_transform: found.depth_transform,
+            transforms,
+        });
+    }
+    let images: Vec<(usize, bool)> = (0..topics.len()).filter_map(|t| Some((t, is_depth(log, t)?))).collect();
+    let best = |depth: bool| {
+        let of_kind: Vec<usize> = images.iter().filter(|i| i.1 == depth).map(|i| i.0).collect();
+        let rank = |&t: &usize| rank(&topics[t], depth);
+        let top = of_kind.iter().map(rank).max();
+        of_kind.iter().copied().filter(|t| Some(rank(t)) == top).collect::<Vec<usize>>()
+    };
+    let named = |name: &str| {
+        let found = topics.iter().position(|t| t.name == name);
+        found.ok_or_else(|| choice(log, &format!("no topic '{name}'")))
+    };
+    let one = |what: &str, depth: bool, name: Option<&str>| match (name, &best(depth)[..]) {
+        (Some(name), _) => named(name),
+        (None, [t]) => Ok(*t),
+        (None, []) => Err(choice(log, &format!("no {what} images"))),
+        (None, _) => Err(choice(log, &format!("several topics with {what} images"))),
+    };
+    let (color, depth) = (one("colour", false, color)?, one("depth", true, depth)?);
+    let color_info = info(topics, color);
+    let depth_info = info(topics, depth).or_else(|| color_info.filter(|_| is_aligned(&topics[depth].name)));
+    Ok(Guess {
+        color,
+        depth,
+        color_info,
+        depth_info,
+        depth_units: None,
+        color_transform: None,
+        depth_transform: None,
+        transforms,
+    })
+}
+
+fn is_transforms(topic: &Topic) -> bool {
+    const KINDS: [&str; 5] = [
+        "tf2_msgs/TFMessage",
+        "tf/tfMessage",
+        "geometry_msgs/TransformStamped",
+        "foxglove.FrameTransform",
+        "foxglove.FrameTransforms",
+    ];
+    KINDS.contains(&topic.kind.as_str())
+}
+
+/// A topic's name without the image transport.
+fn camera(name: &str) -> &str {
+    ["/compressed", "/compressedDepth"].iter().find_map(|suffix| name.strip_suffix(suffix)).unwrap_or(name)
+}
+
+/// Whether the images of a topic are depth images; `None` if they are no images, or infrared.
+fn is_depth(log: &dyn MessageLog, t: usize) -> Option<bool> {
+    const KINDS: [&str; 4] =
+        ["sensor_msgs/Image", "sensor_msgs/CompressedImage", "foxglove.RawImage", "foxglove.CompressedImage"];
+    let topic = &log.topics()[t];
+    let name = camera(&topic.name).to_ascii_lowercase();
+    if !KINDS.contains(&topic.kind.as_str()) || name.contains("infra") || name.split('/').any(|part| part == "ir") {
+        return None;
+    }
+    match read_one(log, t, 0).and_then(|bytes| decode_image(topic, &bytes)) {
+        Ok(image) => Some(matches!(image.image, Image::Depth(_))),
+        Err(_) => Some(name.contains("depth")),
+    }
+}
+
+fn is_aligned(name: &str) -> bool {
+    let name = name.to_ascii_lowercase();
+    name.contains("aligned") || name.contains("registered") || name.contains("depth_to_color")
+}
+
+/// The better the higher.
+fn rank(topic: &Topic, depth: bool) -> (u8, u8) {
+    let name = camera(&topic.name).to_ascii_lowercase();
+    let named = if depth {
+        u8::from(name.contains("depth")) + 2 * u8::from(is_aligned(&name))
+    } else if ["color", "colour", "rgb"].iter().any(|c| name.contains(c)) {
+        2
+    } else {
+        u8::from(name.contains("image"))
+    };
+    (named, u8::from(!topic.kind.ends_with("CompressedImage")))
+}
+
+/// The calibration that shares the most leading parts of its name with an image topic; at least one, and only one.
+fn info(topics: &[Topic], image: usize) -> Option<usize> {
+    let parts = |t: usize| topics[t].name.split('/').filter(|p| !p.is_empty());
+    let shared = |t: usize| parts(t).zip(parts(image)).take_while(|(a, b)| a == b).count();
+    let kinds = ["sensor_msgs/CameraInfo", "foxglove.CameraCalibration"];
+    let infos: Vec<usize> = (0..topics.len()).filter(|&t| kinds.contains(&topics[t].kind.as_str())).collect();
+    let most = infos.iter().map(|&t| shared(t)).max().filter(|&n| n > 0)?;
+    let mut best = infos.into_iter().filter(|&t| shared(t) == most);
+    let first = best.next();
+    first.filter(|_| best.next().is_none())
+}
+
+fn choice(log: &dyn MessageLog, what: &str) -> Error {
+    let list: Vec<String> =
+        log.topics().iter().map(|t| format!("{} ({}, {} messages)", t.name, t.kind, t.count)).collect();
+    let list =
+        if list.is_empty() { "there are no topics".into() } else { format!("the topics are {}", list.join(", ")) };
+    Error::Choice { path: log.path().to_owned(), reason: format!("{what}; name the topics to use; {list}") }
+}

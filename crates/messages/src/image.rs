@@ -1,0 +1,232 @@
+//! Images as they come: `sensor_msgs/Image`, `foxglove.RawImage`, and what the compressed ones unpack to.
+//!
+//! Encodings are those of `sensor_msgs/image_encodings.h`, foxglove's and librealsense's names for the same; depth as in ROS
+//! REP 118. YCbCr is BT.601 with limited range, as OpenCV and librealsense convert it.
+
+use crate::error::{Parsed, Result};
+use crate::ros::{self, fields, of_topic, unknown};
+use crate::{Encoding, Topic, compressed, foxglove};
+use std::borrow::Cow;
+use trocar_camera::{ColorImage, DepthImage};
+
+/// Images larger than this on a side are refused.
+pub(crate) const MAX_SIDE: u32 = 16_384;
+
+/// An image with the header of its message.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StampedImage {
+    /// When it was taken, by its own clock [ns]; the log time is when it was written.
+    pub stamp: u64,
+    /// The frame its camera is in; RealSense bags write "0" or "1" here.
+    pub frame: String,
+    /// The pixels.
+    pub image: Image,
+    /// Metres a unit of depth, which newer librealsense appends to its depth images.
+    pub depth_unit: Option<f32>,
+}
+
+/// Colour or depth.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Image {
+    /// An 8-bit image; grey ones have three equal channels.
+    Color(ColorImage),
+    /// A depth image, or any other 16-bit or floating-point image of one channel.
+    Depth(RawDepth),
+}
+
+/// A depth image as it was recorded; 0 is invalid.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RawDepth {
+    /// Width [px].
+    pub width: usize,
+    /// Height [px].
+    pub height: usize,
+    /// One value a pixel, row by row.
+    pub values: DepthValues,
+}
+
+/// Values of a depth image.
+#[derive(Clone, Debug, PartialEq)]
+pub enum DepthValues {
+    /// Whole units: millimetres by REP 118, whatever the sensor's option says for RealSense.
+    Units(Vec<u16>),
+    /// Metres; what the message has as NaN, infinite or negative is 0 here.
+    Metres(Vec<f32>),
+}
+
+impl RawDepth {
+    /// The image in metres, where `unit` [m] is the unit of [`DepthValues::Units`].
+    pub fn to_metres(&self, unit: f64) -> DepthImage {
+        let depth = match &self.values {
+            DepthValues::Units(units) => units.iter().map(|&d| (f64::from(d) * unit) as f32).collect(),
+            DepthValues::Metres(metres) => metres.clone(),
+        };
+        DepthImage { width: self.width, height: self.height, depth }
+    }
+}
+
+/// An uncompressed image before its pixels are looked at.
+pub(crate) struct Raw<'a> {
+    pub stamp: u64,
+    pub frame: String,
+    pub width: u32,
+    pub height: u32,
+    pub encoding: String,
+    pub big_endian: bool,
+    /// Bytes from row to row.
+    pub step: u32,
+    pub data: Cow<'a, [u8]>,
+}
+
+/// A compressed image before it is unpacked.
+pub(crate) struct Packed<'a> {
+    pub stamp: u64,
+    pub frame: String,
+    pub format: String,
+    pub data: Cow<'a, [u8]>,
+}
+
+/// Decodes an image: `sensor_msgs/Image` or `CompressedImage` (ROS 1, ROS 2), `foxglove.RawImage` or `CompressedImage`
+/// (protobuf, JSON).
+///
+/// # Errors
+/// [`Error::Message`](crate::Error::Message) for another type, an unknown pixel encoding or compression, more than 16384
+/// pixels on a side, or data that do not fit the size.
+pub fn decode_image(topic: &Topic, bytes: &[u8]) -> Result<StampedImage> {
+    let parsed = match (topic.kind.as_str(), &topic.encoding) {
+        ("sensor_msgs/Image", _) => from_ros(topic, bytes),
+        ("sensor_msgs/CompressedImage", _) => packed_from_ros(topic, bytes).and_then(|p| unpacked(&p)),
+        ("foxglove.RawImage", Encoding::Protobuf) => foxglove::raw_image(bytes).and_then(|r| plain(&r)),
+        ("foxglove.RawImage", Encoding::Json) => foxglove::raw_image_json(bytes).and_then(|r| plain(&r)),
+        ("foxglove.CompressedImage", Encoding::Protobuf) => {
+            foxglove::compressed_image(bytes).and_then(|p| unpacked(&p))
+        }
+        ("foxglove.CompressedImage", Encoding::Json) => {
+            foxglove::compressed_image_json(bytes).and_then(|p| unpacked(&p))
+        }
+        _ => Err(unknown(topic)),
+    };
+    of_topic(topic, parsed)
+}
+
+fn from_ros(topic: &Topic, bytes: &[u8]) -> Parsed<StampedImage> {
+    let mut f = fields(topic, bytes)?;
+    let header = ros::header(topic, &mut f)?;
+    let (height, width) = (f.u32()?, f.u32()?);
+    let encoding = f.text()?.to_owned();
+    let (big_endian, step) = (f.u8()? != 0, f.u32()?);
+    let data = Cow::Borrowed(f.counted()?);
+    let mut image =
+        plain(&Raw { stamp: header.stamp, frame: header.frame, width, height, encoding, big_endian, step, data })?;
+    // librealsense 2.51 and later: version "1" in place of the frame's name, then the unit behind the data.
+    if topic.encoding == Encoding::Ros1 && image.frame == "1" && matches!(image.image, Image::Depth(_)) && f.left() == 4
+    {
+        image.depth_unit = Some(f.f32()?).filter(|u| u.is_finite() && *u > 0.0);
+    }
+    Ok(image)
+}
+
+fn packed_from_ros<'a>(topic: &Topic, bytes: &'a [u8]) -> Parsed<Packed<'a>> {
+    let mut f = fields(topic, bytes)?;
+    let header = ros::header(topic, &mut f)?;
+    let format = f.text()?.to_owned();
+    Ok(Packed { stamp: header.stamp, frame: header.frame, format, data: Cow::Borrowed(f.counted()?) })
+}
+
+fn unpacked(packed: &Packed<'_>) -> Parsed<StampedImage> {
+    let image = compressed::decode(&packed.format, &packed.data)?;
+    Ok(StampedImage { stamp: packed.stamp, frame: packed.frame.clone(), image, depth_unit: None })
+}
+
+fn plain(raw: &Raw<'_>) -> Parsed<StampedImage> {
+    Ok(StampedImage { stamp: raw.stamp, frame: raw.frame.clone(), image: pixels(raw)?, depth_unit: None })
+}
+
+/// Names of pixel encodings and their bytes a pixel.
+fn layout(encoding: &str) -> Option<(Layout, usize)> {
+    Some(match encoding.to_ascii_lowercase().as_str() {
+        "rgb8" => (Layout::Rgb, 3),
+        "bgr8" | "8uc3" => (Layout::Bgr, 3),
+        "rgba8" => (Layout::Rgb, 4),
+        "bgra8" | "8uc4" => (Layout::Bgr, 4),
+        "mono8" | "8uc1" => (Layout::Grey, 1),
+        "yuv422" | "uyvy" => (Layout::Uyvy, 2),
+        "yuv422_yuy2" | "yuy2" | "yuyv" => (Layout::Yuyv, 2),
+        "16uc1" | "mono16" | "z16" => (Layout::Units, 2),
+        "32fc1" => (Layout::Metres, 4),
+        _ => return None,
+    })
+}
+
+#[derive(Clone, Copy, PartialEq)]
+enum Layout {
+    Rgb,
+    Bgr,
+    Grey,
+    Uyvy,
+    Yuyv,
+    Units,
+    Metres,
+}
+
+/// The pixels of an uncompressed image.
+fn pixels(raw: &Raw<'_>) -> Parsed<Image> {
+    let Raw { width, height, step, .. } = *raw;
+    let Some((layout, pixel_len)) = layout(&raw.encoding) else {
+        return Err(format!(
+            "encoding is '{}'; known are rgb8, bgr8, rgba8, bgra8, mono8, 8UC1, 8UC3, 8UC4, yuv422, yuyv, 16UC1, mono16, z16, 32FC1",
+            raw.encoding
+        ));
+    };
+    if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
+        return Err(format!("an image of {width} x {height} pixels; 1 to {MAX_SIDE} on a side are read"));
+    }
+    let (width, height) = (width as usize, height as usize);
+    let row_len = width * pixel_len;
+    if matches!(layout, Layout::Uyvy | Layout::Yuyv) && !width.is_multiple_of(2) {
+        return Err(format!("width is {width}; '{}' has pairs of pixels", raw.encoding));
+    }
+    // Some writers leave the step out.
+    let step = if step == 0 { row_len } else { step as usize };
+    let needed = step * (height - 1) + row_len;
+    if step < row_len || raw.data.len() < needed {
+        return Err(format!(
+            "{} bytes in rows of {step} for {width} x {height} pixels of '{}'; expected {needed} in rows of at least {row_len}",
+            raw.data.len(),
+            raw.encoding
+        ));
+    }
+    let rows = raw.data.chunks(step).take(height).map(|row| &row[..row_len]);
+    let color = |pixels| Image::Color(ColorImage { width, height, pixels });
+    let depth = |values| Image::Depth(RawDepth { width, height, values });
+    Ok(match layout {
+        Layout::Rgb => color(rows.flat_map(|r| r.chunks_exact(pixel_len).map(|p| [p[0], p[1], p[2]])).collect()),
+        Layout::Bgr => color(rows.flat_map(|r| r.chunks_exact(pixel_len).map(|p| [p[2], p[1], p[0]])).collect()),
+        Layout::Grey => color(rows.flat_map(|r| r.iter().map(|&g| [g; 3])).collect()),
+        Layout::Uyvy => {
+            color(rows.flat_map(|r| r.as_chunks().0.iter().flat_map(|&[u, a, v, b]| pair(a, b, u, v))).collect())
+        }
+        Layout::Yuyv => {
+            color(rows.flat_map(|r| r.as_chunks().0.iter().flat_map(|&[a, u, b, v]| pair(a, b, u, v))).collect())
+        }
+        Layout::Units => {
+            let unit = if raw.big_endian { u16::from_be_bytes } else { u16::from_le_bytes };
+            depth(DepthValues::Units(rows.flat_map(|r| r.as_chunks().0.iter().map(|&b| unit(b))).collect()))
+        }
+        Layout::Metres => {
+            let metres = if raw.big_endian { f32::from_be_bytes } else { f32::from_le_bytes };
+            let valid = |d: f32| if d.is_finite() && d > 0.0 { d } else { 0.0 };
+            depth(DepthValues::Metres(rows.flat_map(|r| r.as_chunks().0.iter().map(|&b| valid(metres(b)))).collect()))
+        }
+    })
+}
+
+/// Two pixels of a YCbCr 4:2:2 image (ITU-R BT.601, limited range, in 8-bit fixed point).
+fn pair(first: u8, second: u8, u: u8, v: u8) -> [[u8; 3]; 2] {
+    let (d, e) = (i32::from(u) - 128, i32::from(v) - 128);
+    let part = |sum: i32| ((sum + 128) >> 8).clamp(0, 255) as u8;
+    [first, second].map(|y| {
+        let c = 298 * (i32::from(y) - 16);
+        [part(c + 409 * e), part(c - 100 * d - 208 * e), part(c + 516 * d)]
+    })
+}

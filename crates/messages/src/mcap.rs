@@ -1,0 +1,207 @@
+//! MCAP files (<https://mcap.dev/spec>).
+//!
+//! A row of records: a byte for the kind, a length, content. Chunks hold schemas, channels and messages; after each come the
+//! indices of its messages, one a channel; at the end is a summary. As with bags, the file is walked from chunk to chunk, and
+//! the summary is only needed for the channels and to go on behind damage.
+
+use crate::Encoding;
+use crate::chunk::{Chunk, Compression};
+use crate::error::Parsed;
+use crate::log::{Connection, Draft, Kind, Log, Record};
+use crate::reader::Reader;
+use crate::source::Source;
+
+/// First bytes of the file, and the last.
+pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+
+const FOOTER: u8 = 2;
+const SCHEMA: u8 = 3;
+const CHANNEL: u8 = 4;
+const MESSAGE: u8 = 5;
+const CHUNK: u8 = 6;
+const MESSAGE_INDEX: u8 = 7;
+const CHUNK_INDEX: u8 = 8;
+const DATA_END: u8 = 15;
+
+/// Kind and length of a record.
+const RECORD_HEADER: u64 = 9;
+/// The footer record and the magic behind it.
+const FILE_END: u64 = RECORD_HEADER + 20 + MAGIC.len() as u64;
+/// The part of a chunk before its content; the name of the compression is short.
+const CHUNK_HEADER: u64 = 256;
+
+/// Parses the record at the start of a chunk's content.
+fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
+    let mut reader = Reader::packed(bytes);
+    let kind = reader.u8()?;
+    let len = reader.u64()?;
+    let content = reader.take(usize::try_from(len).unwrap_or(usize::MAX))?;
+    Ok((record(kind, content)?, reader.at()))
+}
+
+/// A record's content as far as it matters inside a chunk.
+fn record(kind: u8, content: &[u8]) -> Parsed<Record<'_>> {
+    let mut reader = Reader::packed(content);
+    Ok(match kind {
+        SCHEMA => Record::Schema(reader.u16()?, reader.text()?.to_owned()),
+        CHANNEL => {
+            let (id, schema) = (reader.u16()?, reader.u16()?);
+            let topic = reader.text()?.to_owned();
+            let encoding = match reader.text()? {
+                "ros1" => Encoding::Ros1,
+                "cdr" => Encoding::Cdr,
+                "protobuf" => Encoding::Protobuf,
+                "json" => Encoding::Json,
+                other => Encoding::Other(other.to_owned()),
+            };
+            Record::Connection(id.into(), Connection { topic, kind: Kind::Schema(schema), encoding })
+        }
+        MESSAGE => {
+            let channel = reader.u16()?;
+            let (_sequence, log_time, _publish_time) = (reader.u32()?, reader.u64()?, reader.u64()?);
+            Record::Message(channel.into(), log_time, reader.take(reader.left())?)
+        }
+        _ => Record::Other,
+    })
+}
+
+/// Kind, first byte and length of the content of the record at `at`.
+fn walk(source: &Source, at: u64) -> Parsed<(u8, u64, u64)> {
+    let bytes = source.read(at, RECORD_HEADER)?;
+    let mut reader = Reader::packed(&bytes);
+    Ok((reader.u8()?, at + RECORD_HEADER, reader.u64()?))
+}
+
+/// Opens an MCAP file.
+pub(crate) fn open(source: Source) -> Log {
+    let mut draft = Draft::new(source, parse);
+    let len = draft.source().len();
+    let mut chunk_ats = Vec::new();
+    match summary_at(draft.source()) {
+        Ok(0) => {}
+        Ok(at) => {
+            if let Err(reason) = read_summary(&mut draft, at, &mut chunk_ats) {
+                draft.problem(format!("the summary at byte {at} is damaged: {reason}"));
+            }
+        }
+        Err(reason) => draft.problem(reason),
+    }
+    chunk_ats.sort_unstable();
+    let mut at = MAGIC.len() as u64;
+    while at < len {
+        match step(&mut draft, at) {
+            Ok(Some(next)) => at = next,
+            Ok(None) => break,
+            Err(reason) => match draft.damage(at, len, &reason, &chunk_ats) {
+                Some(resume) => at = resume,
+                None => break,
+            },
+        }
+    }
+    draft.finish()
+}
+
+/// Where the summary begins; 0 when there is none.
+fn summary_at(source: &Source) -> Parsed<u64> {
+    let missing = || "no footer: the recorder did not finish, or the file was cut".to_string();
+    let at = source.len().checked_sub(FILE_END).ok_or_else(missing)?;
+    let bytes = source.read(at, FILE_END)?;
+    let mut reader = Reader::packed(&bytes);
+    if !bytes.ends_with(MAGIC) || reader.u8()? != FOOTER || reader.u64()? != 20 {
+        return Err(missing());
+    }
+    let summary = reader.u64()?;
+    if summary >= at || (summary > 0 && summary < MAGIC.len() as u64) {
+        return Err(format!("the footer is damaged: it says that the summary begins at byte {summary}"));
+    }
+    Ok(summary)
+}
+
+/// The summary: schemas, channels, and where the chunks are.
+fn read_summary(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Parsed<()> {
+    loop {
+        let (kind, content_at, content_len) = walk(draft.source(), at)?;
+        match kind {
+            FOOTER => return Ok(()),
+            SCHEMA | CHANNEL => {
+                let content = draft.source().read(content_at, content_len)?;
+                draft.record(record(kind, &content)?);
+            }
+            CHUNK_INDEX => {
+                let content = draft.source().read(content_at, content_len)?;
+                let mut reader = Reader::packed(&content);
+                let (_start, _end) = (reader.u64()?, reader.u64()?);
+                chunk_ats.push(reader.u64()?);
+            }
+            _ => {}
+        }
+        at = content_at.checked_add(content_len).ok_or("a record without end")?;
+    }
+}
+
+/// Takes in the record at `at` and gives the place of the next; `None` after the last with messages.
+fn step(draft: &mut Draft, at: u64) -> Parsed<Option<u64>> {
+    let (kind, content_at, content_len) = walk(draft.source(), at)?;
+    let len = draft.source().len();
+    let end = content_at.checked_add(content_len).filter(|&end| end <= len);
+    match kind {
+        0 => return Err("a record of kind 0".into()),
+        DATA_END | FOOTER => return Ok(None),
+        CHUNK => {
+            let bytes = draft.source().up_to(content_at, CHUNK_HEADER)?;
+            let mut reader = Reader::packed(&bytes);
+            let (_start, _end, size, crc) = (reader.u64()?, reader.u64()?, reader.u64()?, reader.u32()?);
+            let compression = match reader.text()? {
+                "" => Compression::None,
+                "lz4" => Compression::Lz4,
+                "zstd" => Compression::Zstd,
+                other => return Err(format!("a chunk is compressed with '{other}'; known are none, lz4 and zstd")),
+            };
+            let records_len = reader.u64()?;
+            let chunk_at = content_at + reader.at() as u64;
+            let whole = end.filter(|&end| chunk_at.checked_add(records_len).is_some_and(|e| e <= end));
+            let Some(end) = whole else {
+                // What is there of a cut chunk can be used if it is not compressed.
+                if compression == Compression::None && end.is_none() {
+                    draft.chunk(Chunk { at: chunk_at, len: len - chunk_at, size: None, compression, crc: 0 });
+                }
+                return Err(format!("a chunk there says that its {records_len} bytes begin at byte {chunk_at}"));
+            };
+            let size = (compression != Compression::None).then_some(size);
+            draft.chunk(Chunk { at: chunk_at, len: records_len, size, compression, crc });
+            return Ok(Some(end));
+        }
+        _ => {}
+    }
+    let end = end.ok_or_else(|| format!("a record there says that it is {content_len} bytes long"))?;
+    match kind {
+        MESSAGE_INDEX => {
+            let content = draft.source().read(content_at, content_len)?;
+            let mut reader = Reader::packed(&content);
+            let channel = reader.u16()?;
+            let mut reader = Reader::packed(reader.counted()?);
+            let mut entries = Vec::with_capacity(reader.left() / 16);
+            while reader.left() > 0 {
+                let time = reader.u64()?;
+                let offset = reader.u64()?;
+                let offset =
+                    u32::try_from(offset).map_err(|_| format!("an index points to byte {offset} of a chunk"))?;
+                entries.push((time, offset));
+            }
+            draft.index(channel.into(), &entries)?;
+        }
+        SCHEMA | CHANNEL => {
+            let content = draft.source().read(content_at, content_len)?;
+            draft.record(record(kind, &content)?);
+        }
+        MESSAGE => {
+            let head = draft.source().read(content_at, content_len.min(22))?;
+            if let Record::Message(channel, time, _) = record(kind, &head)? {
+                draft.chunk(Chunk { at, len: end - at, size: None, compression: Compression::None, crc: 0 });
+                draft.index(channel, &[(time, 0)])?;
+            }
+        }
+        _ => {}
+    }
+    Ok(Some(end))
+}
