@@ -1,0 +1,40 @@
+//! A small specimen.
+
+use glam::{DQuat, DVec3};
+use trocar_camera::{Camera, ColorImage};
+use trocar_geometry::{Pose, TetMesh, TriMesh};
+use trocar_specimen::{End, Material, MaterialModel, Organ, OrganFacts, Pins, Provenance, Specimen};
+
+pub fn specimen() -> Specimen {
+    let vertices = vec![DVec3::ZERO, DVec3::X * 0.01, DVec3::Y * 0.01, DVec3::Z * 0.01];
+    let organ = |name: &str, pins| Organ {
+        name: name.into(),
+        body: TetMesh { vertices: vertices.clone(), tets: vec![[0, 1, 2, 3]] },
+        surface: TriMesh {
+            vertices: vertices.clone(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
+            colors: vec![[1, 2, 3], [4, 5, 6], [7, 8, 9], [200, 100, 50]],
+        },
+        material: Material { model: MaterialModel::StVenantKirchhoff, ..Material::default() },
+        pins,
+        base: DVec3::new(0.1, 1.0 / 3.0, -2e-7),
+        facts: OrganFacts { nodes: 4, tets: 1, depth_error_median_mm: Some(0.7), ..OrganFacts::default() },
+    };
+    Specimen {
+        name: "rabbit A".into(),
+        up: DVec3::NEG_Z,
+        placement: Pose { rotation: DQuat::from_rotation_x(0.3), translation: DVec3::new(0.1, 0.2, 0.3) },
+        camera: Some(Camera::d405()),
+        organs: vec![
+            organ("appendix", Pins::End { end: End::Tip, length: 0.2, band_length: 0.3, band_share: 0.42 }),
+            organ("bowel-1", Pins::None),
+        ],
+        background: Some(ColorImage::new(5, 4, [9, 8, 7])),
+        provenance: Provenance {
+            source: "phantom".into(),
+            input_hash: "0123".into(),
+            program: "0.1.0".into(),
+            settings: vec!["window = 90".into()],
+        },
+    }
+}
