@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 use std::time::Instant;
-use trocar_geometry::{Error, LatticeMesher, Mesher, SignedDistance, TetMesh, TetQuality};
+use trocar_geometry::{Error, LatticeMesher, SignedDistance, TetMesh, TetQuality};
 
 /// A shape given by a closure.
 struct Shape<F: Fn(DVec3) -> f64 + Sync>(F);
@@ -117,7 +117,7 @@ fn every_shape_gives_a_sound_body() {
         for cell in [0.0031, 0.0019] {
             let mesher = LatticeMesher { cell };
             let started = Instant::now();
-            let mesh = mesher.mesh(shape.as_ref(), (-half, half)).unwrap();
+            let mesh = mesher.mesh_shape(shape.as_ref(), (-half, half)).unwrap();
             let took = started.elapsed();
             let quality = TetQuality::of(&mesh);
             let touching = check_conforming(&mesh);
@@ -150,7 +150,7 @@ fn the_volume_of_a_sphere_converges_at_second_order() {
     let radius = 0.03;
     let truth = 4.0 / 3.0 * PI * radius * radius * radius;
     let errors = [0.006, 0.003, 0.0015].map(|cell| {
-        let mesh = LatticeMesher { cell }.mesh(&Shape(|p| p.length() - radius), cube(radius)).unwrap();
+        let mesh = LatticeMesher { cell }.mesh_shape(&Shape(|p| p.length() - radius), cube(radius)).unwrap();
         (truth - mesh.volume()) / truth
     });
     println!("relative volume errors {errors:?}");
@@ -166,7 +166,7 @@ fn the_same_mesh_whatever_the_threads() {
     let half = DVec3::splat(0.03);
     let mesh = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| LatticeMesher { cell: 0.002 }.mesh(&Shape(|p| p.length() - 0.03), (-half, half)).unwrap())
+        pool.install(|| LatticeMesher { cell: 0.002 }.mesh_shape(&Shape(|p| p.length() - 0.03), (-half, half)).unwrap())
     };
     assert_eq!(mesh(1), mesh(4));
 }
@@ -182,7 +182,7 @@ fn the_cell_follows_the_budget() {
         evaluations.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         p.length() - 0.05
     });
-    let mesh = mesher.mesh(&counting, cube(0.05)).unwrap();
+    let mesh = mesher.mesh_shape(&counting, cube(0.05)).unwrap();
     let (tets, took) = (mesh.tets.len(), started.elapsed().as_secs_f64() * 1e3);
     println!("{tets} tets in {took:.0} ms and {evaluations:?} evaluations of the field");
     assert!((45_000..65_000).contains(&mesh.tets.len()));
@@ -191,7 +191,7 @@ fn the_cell_follows_the_budget() {
 #[test]
 fn only_the_largest_part_stays() {
     let two = Shape(|p| (p.length() - 0.02).min((p - DVec3::X * 0.05).length() - 0.01));
-    let mesh = LatticeMesher { cell: 0.002 }.mesh(&two, (DVec3::splat(-0.02), DVec3::new(0.06, 0.02, 0.02))).unwrap();
+    let mesh = LatticeMesher { cell: 0.002 }.mesh_shape(&two, (DVec3::splat(-0.02), DVec3::new(0.06, 0.02, 0.02))).unwrap();
     let (_, hi) = mesh.bounds().unwrap();
     assert!(hi.x < 0.0201);
 }
@@ -199,7 +199,7 @@ fn only_the_largest_part_stays() {
 #[test]
 fn unusable_input_is_refused_in_words() {
     let ball = |r: f64| Shape(move |p: DVec3| p.length() - r);
-    let refusal = |shape: &dyn SignedDistance, bounds, cell| match (LatticeMesher { cell }).mesh(shape, bounds) {
+    let refusal = |shape: &dyn SignedDistance, bounds, cell| match (LatticeMesher { cell }).mesh_shape(shape, bounds) {
         Err(Error::Mesh(words)) => words,
         other => panic!("accepted: {other:?}"),
     };

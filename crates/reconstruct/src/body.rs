@@ -40,9 +40,8 @@ pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
 /// When the mesher fails or leaves an element without volume.
 pub fn fill_with_tets(organ: &str, surface: &TriMesh, settings: &Settings) -> Result<(TetMesh, OrganFacts)> {
     let wrong = |reason: String| Error::Organ { organ: organ.to_owned(), reason };
-    let bounds = surface.bounds().ok_or_else(|| wrong("its surface is empty".into()))?;
     let mesher = LatticeMesher::for_volume(surface.volume(), settings.finest_cell, settings.max_tets);
-    let body = mesher.mesh(&MeshDistance::new(surface)?, bounds).map_err(|e| {
+    let body = mesher.mesh(surface).map_err(|e| {
         wrong(format!("no tetrahedra could be made: {e} (cells of {:.2} mm; smaller ones may help)", 1e3 * mesher.cell))
     })?;
     let quality = TetQuality::of(&body);

@@ -7,7 +7,7 @@ use super::bcc::{Lattice, Point};
 use super::body::largest_body;
 use super::cuts::Cuts;
 use super::stencil::{Corner, Side, fill};
-use crate::{Error, Result, SignedDistance, TetMesh};
+use crate::{Error, MeshDistance, Result, SignedDistance, TetMesh, TriMesh};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -25,16 +25,16 @@ impl LatticeMesher {
     pub fn for_volume(volume: f64, finest: f64, max_tets: usize) -> Self {
         Self { cell: finest.max((12.0 * volume / max_tets.max(1) as f64).cbrt()) }
     }
-}
 
-impl Mesher for LatticeMesher {
-    /// Fills `shape` with tets of about `cell`, nodes on its surface.
+    /// Fills `shape`, which lies within `bounds` [m], with tets of about `cell`, nodes on its surface.
     ///
     /// The field must be continuous and change no faster than 1.25 times the distance moved: its sign is taken as known
     /// where it is that far from 0. Only the largest connected part is kept; where it would touch itself along an edge,
-    /// it is parted there. Refuses a field that is not finite, a shape that reaches beyond `bounds`, and a shape too thin
-    /// for the cell to hold one tet.
-    fn mesh(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh> {
+    /// it is parted there.
+    ///
+    /// # Errors
+    /// A field that is not finite, a shape that reaches beyond `bounds`, and a shape too thin for the cell to hold one tet.
+    pub fn mesh_shape(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh> {
         let mut lattice = Lattice::sample(shape, bounds, self.cell)?;
         let mut cuts = Cuts::find(&lattice, shape)?;
         cuts.warp(&mut lattice);
@@ -48,6 +48,19 @@ impl Mesher for LatticeMesher {
             )));
         }
         Ok(body)
+    }
+}
+
+impl Mesher for LatticeMesher {
+    /// As [`LatticeMesher::mesh_shape`], of the surface's signed distance: cracks and stray triangles do no harm.
+    fn mesh(&self, surface: &TriMesh) -> Result<TetMesh> {
+        let shape = MeshDistance::new(surface)?;
+        let bounds = surface.bounds().ok_or_else(|| Error::Mesh("the surface has no vertices".into()))?;
+        self.mesh_shape(&shape, bounds)
+    }
+
+    fn describe(&self) -> String {
+        format!("isosurface stuffing, lattice cells of {:.3} mm", 1e3 * self.cell)
     }
 }
 
