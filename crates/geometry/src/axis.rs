@@ -319,7 +319,7 @@ mod tests {
     }
 
     fn mesh(cell: f64, half: DVec3, f: impl Fn(DVec3) -> f64 + Sync) -> TetMesh {
-        LatticeMesher { cell }.mesh_shape(&Shape(f), (-half, half)).unwrap()
+        LatticeMesher::uniform(cell).mesh_shape(&Shape(f), (-half, half)).unwrap()
     }
 
     /// A cylinder along x, 80 mm long and 12 mm thick, with flat ends.

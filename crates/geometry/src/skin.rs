@@ -134,7 +134,7 @@ mod tests {
     }
 
     fn body(cell: f64) -> TetMesh {
-        LatticeMesher { cell }.mesh_shape(&Ball, (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
+        LatticeMesher::uniform(cell).mesh_shape(&Ball, (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
     }
 
     /// Points evenly over a sphere, as a surface without triangles.

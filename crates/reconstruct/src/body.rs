@@ -1,9 +1,7 @@
 //! From a closed surface to a clean one and to the tetrahedra that fill it.
 
 use crate::{Error, Result, Settings};
-use trocar_geometry::{
-    LatticeMesher, MeshDistance, Mesher, TetMesh, TetQuality, TriMesh, isosurface, sample_distance, taubin,
-};
+use trocar_geometry::{LatticeMesher, MeshDistance, TetMesh, TetQuality, TriMesh, isosurface, sample_distance, taubin};
 use trocar_specimen::OrganFacts;
 
 /// Taubin's smoothing as in the paper.
@@ -40,10 +38,8 @@ pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
 /// When the mesher fails or leaves an element without volume.
 pub fn fill_with_tets(organ: &str, surface: &TriMesh, settings: &Settings) -> Result<(TetMesh, OrganFacts)> {
     let wrong = |reason: String| Error::Organ { organ: organ.to_owned(), reason };
-    let mesher = LatticeMesher::for_volume(surface.volume(), settings.finest_cell, settings.max_tets);
-    let body = mesher.mesh(surface).map_err(|e| {
-        wrong(format!("no tetrahedra could be made: {e} (cells of {:.2} mm; smaller ones may help)", 1e3 * mesher.cell))
-    })?;
+    let (_, body) = LatticeMesher::fit(surface, settings.finest_cell, settings.max_tets)
+        .map_err(|e| wrong(format!("no tetrahedra could be made: {e}")))?;
     let quality = TetQuality::of(&body);
     if quality.inverted > 0 {
         return Err(wrong(format!("{} of {} tetrahedra have no positive volume", quality.inverted, body.tets.len())));

@@ -3,7 +3,9 @@
 mod bcc;
 mod body;
 mod cuts;
+mod fill;
 mod lattice;
+mod octree;
 mod stencil;
 
 pub use lattice::LatticeMesher;
