@@ -7,8 +7,10 @@ mod fill;
 mod lattice;
 mod octree;
 mod stencil;
+mod tetgen;
 
 pub use lattice::LatticeMesher;
+pub use tetgen::TetgenMesher;
 
 use crate::{Result, TetMesh, TriMesh};
 
