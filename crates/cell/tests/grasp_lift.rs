@@ -4,7 +4,7 @@
 
 use glam::DVec3;
 use trocar_cell::{GraspLift, GraspLiftRun};
-use trocar_geometry::{LatticeMesher, Mesher, SignedDistance, TetQuality};
+use trocar_geometry::{LatticeMesher, SignedDistance, TetQuality};
 use trocar_progress::Silent;
 use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
@@ -23,7 +23,7 @@ impl SignedDistance for Tube {
 /// The tube as a specimen under a camera that looks straight down.
 fn specimen(pins: Pins) -> Specimen {
     let half = DVec3::new(HALF_LENGTH, RADIUS, RADIUS);
-    let body = LatticeMesher { cell: 2.2e-3 }.mesh(&Tube, (-half, half)).unwrap();
+    let body = LatticeMesher::uniform(2.2e-3).mesh_shape(&Tube, (-half, half)).unwrap();
     let quality = TetQuality::of(&body);
     let surface = body.boundary().0;
     Specimen {

@@ -308,7 +308,7 @@ fn distances(mesh: &TetMesh, field: &Stiffness, start: usize) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LatticeMesher, Mesher, SignedDistance};
+    use crate::{LatticeMesher, SignedDistance};
     use std::f64::consts::PI;
 
     struct Shape<F: Fn(DVec3) -> f64 + Sync>(F);
@@ -319,7 +319,7 @@ mod tests {
     }
 
     fn mesh(cell: f64, half: DVec3, f: impl Fn(DVec3) -> f64 + Sync) -> TetMesh {
-        LatticeMesher { cell }.mesh(&Shape(f), (-half, half)).unwrap()
+        LatticeMesher::uniform(cell).mesh_shape(&Shape(f), (-half, half)).unwrap()
     }
 
     /// A cylinder along x, 80 mm long and 12 mm thick, with flat ends.

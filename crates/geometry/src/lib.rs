@@ -26,7 +26,7 @@ pub use distance::{MeshDistance, SignedDistance};
 pub use error::{Error, Result};
 pub use grid::{Grid, sample_distance, sample_everywhere};
 pub use isosurface::isosurface;
-pub use mesher::{LatticeMesher, Mesher};
+pub use mesher::{LatticeMesher, Mesher, TetgenMesher};
 pub use pose::Pose;
 pub use quality::TetQuality;
 pub use repair::{RepairReport, repair};

@@ -45,7 +45,7 @@ impl TetQuality {
 }
 
 /// The angles between the two faces at each of the [`EDGES`] [rad], 0..=pi.
-fn dihedral_angles(corners: &[DVec3; 4]) -> [f64; 6] {
+pub(crate) fn dihedral_angles(corners: &[DVec3; 4]) -> [f64; 6] {
     EDGES.map(|[i, j]| {
         // The corners sum to 6; k and l are the two that are not on the edge.
         let k = (0..4).find(|&k| k != i && k != j).unwrap_or(0);

@@ -124,7 +124,7 @@ fn closest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{LatticeMesher, Mesher, SignedDistance};
+    use crate::{LatticeMesher, SignedDistance};
 
     struct Ball;
     impl SignedDistance for Ball {
@@ -134,7 +134,7 @@ mod tests {
     }
 
     fn body(cell: f64) -> TetMesh {
-        LatticeMesher { cell }.mesh(&Ball, (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
+        LatticeMesher::uniform(cell).mesh_shape(&Ball, (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
     }
 
     /// Points evenly over a sphere, as a surface without triangles.

@@ -1,18 +1,12 @@
 //! The lattice mesher on shapes whose distance is known in closed form.
 
+mod common;
+
+use common::{Shape, check_conforming};
 use glam::{DVec2, DVec3};
 use std::f64::consts::PI;
 use std::time::Instant;
-use trocar_geometry::{Error, LatticeMesher, Mesher, SignedDistance, TetMesh, TetQuality};
-
-/// A shape given by a closure.
-struct Shape<F: Fn(DVec3) -> f64 + Sync>(F);
-
-impl<F: Fn(DVec3) -> f64 + Sync> SignedDistance for Shape<F> {
-    fn distance(&self, p: DVec3) -> f64 {
-        (self.0)(p)
-    }
-}
+use trocar_geometry::{Error, LatticeMesher, SignedDistance, TetQuality};
 
 fn boxed(
     name: &'static str,
@@ -66,58 +60,13 @@ fn shapes() -> Vec<(&'static str, DVec3, Box<dyn SignedDistance>)> {
     ]
 }
 
-/// Panics unless the tets conform and their boundary is a closed surface every edge of which has two triangles that run
-/// along it in opposite directions. Returns the number of boundary nodes where the surface touches itself.
-fn check_conforming(mesh: &TetMesh) -> usize {
-    let mut faces: Vec<[u32; 3]> = Vec::new();
-    for &[a, b, c, d] in &mesh.tets {
-        for mut face in [[a, b, c], [a, b, d], [a, c, d], [b, c, d]] {
-            face.sort_unstable();
-            faces.push(face);
-        }
-    }
-    faces.sort_unstable();
-    assert!(faces.chunk_by(|a, b| a == b).all(|same| same.len() <= 2), "a face of three tets");
-    let open = faces.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).count();
-    let (surface, nodes) = mesh.boundary();
-    assert_eq!(surface.triangles.len(), open);
-    assert_eq!(surface.vertices.len(), nodes.len());
-
-    let mut edges: Vec<[u32; 2]> = surface.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]).collect();
-    edges.sort_unstable();
-    assert!(edges.windows(2).all(|w| w[0] != w[1]), "an edge with two triangles in the same direction");
-    assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()), "an open edge");
-
-    // Walk around each vertex; a triangle not reached means a second fan.
-    let mut next = std::collections::BTreeMap::new();
-    for &[a, b, c] in &surface.triangles {
-        for (centre, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {
-            next.insert((centre, from), to);
-        }
-    }
-    let mut touching = 0;
-    for v in 0..surface.vertices.len() as u32 {
-        let spokes: Vec<u32> = next.range((v, 0)..=(v, u32::MAX)).map(|(&(_, from), _)| from).collect();
-        let (mut at, mut length) = (spokes[0], 0);
-        loop {
-            at = next[&(v, at)];
-            length += 1;
-            if at == spokes[0] {
-                break;
-            }
-        }
-        touching += usize::from(length != spokes.len());
-    }
-    touching
-}
-
 #[test]
 fn every_shape_gives_a_sound_body() {
     for (name, half, shape) in shapes() {
         for cell in [0.0031, 0.0019] {
-            let mesher = LatticeMesher { cell };
+            let mesher = LatticeMesher::uniform(cell);
             let started = Instant::now();
-            let mesh = mesher.mesh(shape.as_ref(), (-half, half)).unwrap();
+            let mesh = mesher.mesh_shape(shape.as_ref(), (-half, half)).unwrap();
             let took = started.elapsed();
             let quality = TetQuality::of(&mesh);
             let touching = check_conforming(&mesh);
@@ -150,7 +99,7 @@ fn the_volume_of_a_sphere_converges_at_second_order() {
     let radius = 0.03;
     let truth = 4.0 / 3.0 * PI * radius * radius * radius;
     let errors = [0.006, 0.003, 0.0015].map(|cell| {
-        let mesh = LatticeMesher { cell }.mesh(&Shape(|p| p.length() - radius), cube(radius)).unwrap();
+        let mesh = LatticeMesher::uniform(cell).mesh_shape(&Shape(|p| p.length() - radius), cube(radius)).unwrap();
         (truth - mesh.volume()) / truth
     });
     println!("relative volume errors {errors:?}");
@@ -166,32 +115,16 @@ fn the_same_mesh_whatever_the_threads() {
     let half = DVec3::splat(0.03);
     let mesh = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| LatticeMesher { cell: 0.002 }.mesh(&Shape(|p| p.length() - 0.03), (-half, half)).unwrap())
+        pool.install(|| LatticeMesher::uniform(0.002).mesh_shape(&Shape(|p| p.length() - 0.03), (-half, half)).unwrap())
     };
     assert_eq!(mesh(1), mesh(4));
 }
 
 #[test]
-fn the_cell_follows_the_budget() {
-    let volume = 4.0 / 3.0 * PI * 0.05f64.powi(3);
-    assert_eq!(LatticeMesher::for_volume(volume, 0.01, 1_000_000).cell, 0.01);
-    let mesher = LatticeMesher::for_volume(volume, 0.0001, 50_000);
-    let evaluations = std::sync::atomic::AtomicUsize::new(0);
-    let started = Instant::now();
-    let counting = Shape(|p: DVec3| {
-        evaluations.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        p.length() - 0.05
-    });
-    let mesh = mesher.mesh(&counting, cube(0.05)).unwrap();
-    let (tets, took) = (mesh.tets.len(), started.elapsed().as_secs_f64() * 1e3);
-    println!("{tets} tets in {took:.0} ms and {evaluations:?} evaluations of the field");
-    assert!((45_000..65_000).contains(&mesh.tets.len()));
-}
-
-#[test]
 fn only_the_largest_part_stays() {
     let two = Shape(|p| (p.length() - 0.02).min((p - DVec3::X * 0.05).length() - 0.01));
-    let mesh = LatticeMesher { cell: 0.002 }.mesh(&two, (DVec3::splat(-0.02), DVec3::new(0.06, 0.02, 0.02))).unwrap();
+    let mesh =
+        LatticeMesher::uniform(0.002).mesh_shape(&two, (DVec3::splat(-0.02), DVec3::new(0.06, 0.02, 0.02))).unwrap();
     let (_, hi) = mesh.bounds().unwrap();
     assert!(hi.x < 0.0201);
 }
@@ -199,10 +132,11 @@ fn only_the_largest_part_stays() {
 #[test]
 fn unusable_input_is_refused_in_words() {
     let ball = |r: f64| Shape(move |p: DVec3| p.length() - r);
-    let refusal = |shape: &dyn SignedDistance, bounds, cell| match (LatticeMesher { cell }).mesh(shape, bounds) {
-        Err(Error::Mesh(words)) => words,
-        other => panic!("accepted: {other:?}"),
-    };
+    let refusal =
+        |shape: &dyn SignedDistance, bounds, cell| match LatticeMesher::uniform(cell).mesh_shape(shape, bounds) {
+            Err(Error::Mesh(words)) => words,
+            other => panic!("accepted: {other:?}"),
+        };
     let unit = cube(1.0);
     assert!(refusal(&ball(1.0), unit, 0.0).contains("positive length"));
     assert!(refusal(&ball(1.0), unit, f64::NAN).contains("positive length"));

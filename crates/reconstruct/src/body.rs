@@ -1,7 +1,7 @@
 //! The tetrahedra that fill a closed surface, measured.
 
-use crate::{Error, Result, Settings};
-use trocar_geometry::{LatticeMesher, MeshDistance, Mesher, TetMesh, TetQuality, TriMesh};
+use crate::{Error, MesherRule, Result, Settings};
+use trocar_geometry::{LatticeMesher, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh};
 use trocar_specimen::OrganFacts;
 
 /// Fills a closed surface with tetrahedra and measures the result.
@@ -10,11 +10,7 @@ use trocar_specimen::OrganFacts;
 /// When the mesher fails or leaves an element without volume.
 pub fn fill_with_tets(organ: &str, surface: &TriMesh, settings: &Settings) -> Result<(TetMesh, OrganFacts)> {
     let wrong = |reason: String| Error::Organ { organ: organ.to_owned(), reason };
-    let bounds = surface.bounds().ok_or_else(|| wrong("its surface is empty".into()))?;
-    let mesher = LatticeMesher::for_volume(surface.volume(), settings.finest_cell, settings.max_tets);
-    let body = mesher.mesh(&MeshDistance::new(surface)?, bounds).map_err(|e| {
-        wrong(format!("no tetrahedra could be made: {e} (cells of {:.2} mm; smaller ones may help)", 1e3 * mesher.cell))
-    })?;
+    let body = fill(surface, settings).map_err(|e| wrong(format!("no tetrahedra could be made: {e}")))?;
     let quality = TetQuality::of(&body);
     if quality.inverted > 0 {
         return Err(wrong(format!("{} of {} tetrahedra have no positive volume", quality.inverted, body.tets.len())));
@@ -31,4 +27,14 @@ pub fn fill_with_tets(organ: &str, surface: &TriMesh, settings: &Settings) -> Re
         ..OrganFacts::default()
     };
     Ok((body, facts))
+}
+
+fn fill(surface: &TriMesh, settings: &Settings) -> trocar_geometry::Result<TetMesh> {
+    match (settings.mesher, settings.element_size) {
+        (MesherRule::Tetgen, _) => TetgenMesher::default().mesh(surface),
+        (MesherRule::Lattice, Some(cell)) => LatticeMesher::graded(cell).mesh(surface),
+        (MesherRule::Lattice, None) => {
+            Ok(LatticeMesher::fit(surface, settings.finest_cell, settings.max_tets)?.1)
+        }
+    }
 }

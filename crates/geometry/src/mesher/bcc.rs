@@ -1,4 +1,4 @@
-//! A body-centred cubic lattice that holds a signed distance at its points, stored only where the shape is.
+//! A body-centred cubic lattice that holds a signed distance at its points, stored only near the surface.
 //!
 //! A point is named by its coordinates in half cells: all three even at the corners of the cubic cells, all three odd at
 //! their centres.
@@ -47,27 +47,47 @@ pub(super) fn step_between(p: Point, q: Point) -> usize {
 }
 
 /// Cells along the edge of a block, the unit of storage.
-const BLOCK: usize = 8;
+pub(super) const BLOCK: usize = 8;
 /// Points of a block: the lower corner and the centre of each of its cells.
-const BLOCK_POINTS: usize = 2 * BLOCK * BLOCK * BLOCK;
+pub(super) const BLOCK_POINTS: usize = 2 * BLOCK * BLOCK * BLOCK;
+/// Blocks along the edge of a tile, the unit in which the space is searched for the surface.
+const TILE: usize = 8;
 /// Cells of slack between the shape's bounds and the lattice's rim.
 const MARGIN: f64 = 2.0;
 /// Most blocks the lattice may span, stored or not.
-const MAX_BLOCKS: f64 = (1 << 26) as f64;
+const MAX_BLOCKS: f64 = (1 << 23) as f64;
 /// A distance changes no faster than the position. Estimates of a distance may; this much steeper is still handled.
 const STEEPEST: f64 = 1.25;
-/// Marks a block that is not stored, because it lies outside the shape with all its neighbours.
+/// Cells around a block in which the surface must not lie for the block to count as wholly inside or outside. Then none
+/// of its points is moved, and none has a neighbour on the other side.
+const CLEAR: f64 = 2.0;
+
+/// What a block is, in the table of blocks; smaller numbers are those of stored blocks.
 const OUTSIDE: u32 = u32::MAX;
+const INSIDE: u32 = u32::MAX - 1;
+const UNKNOWN: u32 = u32::MAX - 2;
+
+/// What is known at a lattice point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum At {
+    /// It lies in a block far outside the surface, or beyond the lattice.
+    Outside,
+    /// It lies in a block far inside the surface.
+    Inside,
+    /// It has a value.
+    Slot(u32),
+}
 
 /// Signed distances at the points of a body-centred cubic lattice. A *slot* is the storage index of a point.
 pub(super) struct Lattice {
     origin: DVec3,
     /// Edge of the cubic cell [m].
     pub(super) cell: f64,
-    blocks: [usize; 3],
-    /// Which stored block each block is, or `OUTSIDE`.
+    /// Blocks along each axis.
+    pub(super) blocks: [usize; 3],
+    /// Which stored block each block is, or `OUTSIDE` or `INSIDE`.
     stored: Vec<u32>,
-    /// Which block each stored one is.
+    /// Which block each stored one is, ascending.
     block_of: Vec<u32>,
     /// The field at each slot [m]. Where the shape is far, only the sign is right.
     pub(super) values: Vec<f64>,
@@ -85,38 +105,35 @@ impl Lattice {
         }
         let cells = ((hi - lo) / cell).ceil() + 2.0 * MARGIN;
         let blocks = (cells / BLOCK as f64).ceil();
-        if blocks.element_product() > MAX_BLOCKS {
+        let too_fine = || {
             let size = hi - lo;
-            return Err(Error::Mesh(format!(
-                "a cell of {cell} m is too fine for a shape of {size} m; use a larger one"
-            )));
+            Error::Mesh(format!("a cell of {cell} m is too fine for a shape of {size} m; use a larger one"))
+        };
+        if blocks.element_product() > MAX_BLOCKS {
+            return Err(too_fine());
         }
         let origin = 0.5 * (lo + hi) - 0.5 * cell * BLOCK as f64 * blocks;
         let blocks = blocks.to_array().map(|n| n as usize);
         let mut lattice = Self { origin, cell, blocks, stored: Vec::new(), block_of: Vec::new(), values: Vec::new() };
-
-        let sampled: Vec<Option<Vec<f64>>> =
-            (0..blocks.iter().product()).into_par_iter().map(|block| lattice.sample_block(shape, block)).collect();
-        for (block, values) in sampled.into_iter().enumerate() {
-            match values {
-                Some(values) => {
-                    lattice.stored.push(lattice.block_of.len() as u32);
-                    lattice.block_of.push(block as u32);
-                    lattice.values.extend(values);
-                }
-                None => lattice.stored.push(OUTSIDE),
-            }
-        }
+        lattice.classify(shape);
         // Cut points are numbered after the slots, at most 14 of them to a slot.
-        if lattice.values.len() > (u32::MAX / 16) as usize {
-            return Err(Error::Mesh(format!("a cell of {cell} m gives too many lattice points; use a larger one")));
+        if lattice.block_of.len() > (u32::MAX / 16) as usize / BLOCK_POINTS {
+            return Err(too_fine());
         }
-        match lattice.values.iter().position(|v| !v.is_finite()) {
-            Some(slot) => Err(Error::Mesh(format!(
+        let mut values = vec![0.0; lattice.block_of.len() * BLOCK_POINTS];
+        values.par_chunks_mut(BLOCK_POINTS).zip(&lattice.block_of).for_each(|(values, &block)| {
+            lattice.sample_cube(shape, lattice.first_cell(block as usize), [0; 3], BLOCK, values);
+        });
+        lattice.values = values;
+        if let Some(slot) = lattice.values.iter().position(|v| !v.is_finite()) {
+            return Err(Error::Mesh(format!(
                 "the signed distance at {} m is {}; it must be finite",
                 lattice.position(lattice.point(slot as u32)),
                 lattice.values[slot]
-            ))),
+            )));
+        }
+        match lattice.jump() {
+            Some(at) => Err(jumps(at)),
             None => Ok(lattice),
         }
     }
@@ -139,18 +156,56 @@ impl Lattice {
         [x, y, z].map_with(first, |inside, first| (2 * (first + inside) + local % 2) as i32)
     }
 
-    /// The slot of a point; `None` when it is far outside the shape or outside the lattice.
-    pub(super) fn slot(&self, p: Point) -> Option<u32> {
+    /// What is known at a point.
+    pub(super) fn at(&self, p: Point) -> At {
         let cell = p.map(|c| (c >> 1) as usize);
         // A negative coordinate has become a huge one.
         if (0..3).any(|a| cell[a] >= self.blocks[a] * BLOCK) {
-            return None;
+            return At::Outside;
         }
-        let [bx, by, bz] = cell.map(|c| c / BLOCK);
-        let [x, y, z] = cell.map(|c| c % BLOCK);
-        let stored = self.stored[(bz * self.blocks[1] + by) * self.blocks[0] + bx];
-        let local = 2 * ((z * BLOCK + y) * BLOCK + x) + (p[0] & 1) as usize;
-        (stored != OUTSIDE).then(|| stored * BLOCK_POINTS as u32 + local as u32)
+        match self.stored[self.block(cell)] {
+            OUTSIDE => At::Outside,
+            INSIDE => At::Inside,
+            stored => At::Slot(stored * BLOCK_POINTS as u32 + Self::local(p) as u32),
+        }
+    }
+
+    /// The slot of a point; `None` when it is far from the surface or beyond the lattice.
+    pub(super) fn slot(&self, p: Point) -> Option<u32> {
+        match self.at(p) {
+            At::Slot(slot) => Some(slot),
+            _ => None,
+        }
+    }
+
+    /// Number of a point within its block.
+    pub(super) fn local(p: Point) -> usize {
+        let [x, y, z] = p.map(|c| (c >> 1) as usize % BLOCK);
+        2 * ((z * BLOCK + y) * BLOCK + x) + (p[0] & 1) as usize
+    }
+
+    /// Number of the block that holds a cell.
+    pub(super) fn block(&self, cell: [usize; 3]) -> usize {
+        let [x, y, z] = cell.map(|c| c / BLOCK);
+        (z * self.blocks[1] + y) * self.blocks[0] + x
+    }
+
+    /// What is known of a block: its points have slots, or it lies inside or outside as a whole.
+    pub(super) fn block_at(&self, block: usize) -> At {
+        match self.stored[block] {
+            OUTSIDE => At::Outside,
+            INSIDE => At::Inside,
+            stored => At::Slot(stored * BLOCK_POINTS as u32),
+        }
+    }
+
+    /// Whether a point is strictly inside: with a negative value, or far inside.
+    pub(super) fn is_inside(&self, p: Point) -> bool {
+        match self.at(p) {
+            At::Outside => false,
+            At::Inside => true,
+            At::Slot(slot) => self.values[slot as usize] < 0.0,
+        }
     }
 
     /// The point after a step.
@@ -164,21 +219,80 @@ impl Lattice {
         (0..self.block_of.len() as u32).into_par_iter().map(move |b| b * points..(b + 1) * points)
     }
 
-    fn first_cell(&self, block: usize) -> [usize; 3] {
+    /// The lower cell of a block.
+    pub(super) fn first_cell(&self, block: usize) -> [usize; 3] {
         let [nx, ny, _] = self.blocks;
         [block % nx, block / nx % ny, block / nx / ny].map(|b| b * BLOCK)
     }
 
-    /// Values of a block; `None` when it is outside, so far that no neighbour of its points is inside.
-    fn sample_block(&self, shape: &dyn SignedDistance, block: usize) -> Option<Vec<f64>> {
-        let first = self.first_cell(block);
-        let (distance, reach) = self.probe(shape, first, BLOCK);
-        if distance > reach + 2.0 * STEEPEST * self.cell {
-            return None;
+    /// Fills the table of blocks.
+    fn classify(&mut self, shape: &dyn SignedDistance) {
+        let tiles = self.blocks.map(|n| n.div_ceil(TILE));
+        let found: Vec<Vec<(usize, u32)>> = (0..tiles.iter().product())
+            .into_par_iter()
+            .map(|tile: usize| {
+                let first = [tile % tiles[0], tile / tiles[0] % tiles[1], tile / tiles[0] / tiles[1]];
+                let mut known = Vec::new();
+                self.classify_cube(shape, first.map(|t| t * TILE), TILE, &mut known);
+                known
+            })
+            .collect();
+        self.stored = vec![UNKNOWN; self.blocks.iter().product()];
+        for (block, kind) in found.into_iter().flatten() {
+            self.stored[block] = kind;
         }
-        let mut values = vec![0.0; BLOCK_POINTS];
-        self.sample_cube(shape, first, [0; 3], BLOCK, &mut values);
-        Some(values)
+        for (block, kind) in self.stored.iter_mut().enumerate().filter(|(_, kind)| **kind == UNKNOWN) {
+            *kind = self.block_of.len() as u32;
+            self.block_of.push(block as u32);
+        }
+    }
+
+    /// Lists the blocks of the cube of `size` blocks at block `first` that are wholly inside or outside.
+    fn classify_cube(&self, shape: &dyn SignedDistance, first: [usize; 3], size: usize, known: &mut Vec<(usize, u32)>) {
+        if (0..3).any(|a| first[a] >= self.blocks[a]) {
+            return;
+        }
+        let (distance, reach) = self.probe(shape, first.map(|b| b * BLOCK), size * BLOCK);
+        if distance.abs() > reach + CLEAR * STEEPEST * self.cell {
+            let kind = if distance > 0.0 { OUTSIDE } else { INSIDE };
+            let ends = first.map_with(self.blocks, |b, n| (b + size).min(n));
+            for z in first[2]..ends[2] {
+                for y in first[1]..ends[1] {
+                    let row = (z * self.blocks[1] + y) * self.blocks[0];
+                    known.extend((first[0]..ends[0]).map(|x| (row + x, kind)));
+                }
+            }
+        } else if size > 1 {
+            for octant in 0..8 {
+                let offset = [octant & 1, octant >> 1 & 1, octant >> 2].map(|bit| bit * (size / 2));
+                self.classify_cube(shape, first.map_with(offset, |a, b| a + b), size / 2, known);
+            }
+        }
+    }
+
+    /// A place where the inside of the shape meets blocks that are outside, or the rim, without a surface between: the
+    /// field jumps or the bounds are too narrow.
+    fn jump(&self) -> Option<DVec3> {
+        (0..self.stored.len()).into_par_iter().filter(|&block| self.stored[block] != OUTSIDE).find_map_first(|block| {
+            let first = self.first_cell(block);
+            let position = |p: Point| self.position(p);
+            if self.stored[block] == INSIDE {
+                let clash = (0..27).any(|n: i32| {
+                    let offset = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
+                    self.at(first.map_with(offset, |c, o| 2 * (c as i32 + o * BLOCK as i32))) == At::Outside
+                });
+                return clash.then(|| position(first.map(|c| (2 * c + BLOCK) as i32)));
+            }
+            let slots = self.stored[block] * BLOCK_POINTS as u32;
+            let rim = |c: i32| c % (2 * BLOCK as i32) < 2 || c % (2 * BLOCK as i32) > 2 * BLOCK as i32 - 3;
+            (slots..slots + BLOCK_POINTS as u32).map(|slot| (slot, self.point(slot))).find_map(|(slot, p)| {
+                let inside = self.values[slot as usize] < 0.0;
+                let wrong = if inside { At::Outside } else { At::Inside };
+                let clash = p.iter().any(|&c| rim(c))
+                    && (0..STEPS.len()).any(|step| self.at(Self::neighbour(p, step)) == wrong);
+                clash.then(|| position(p))
+            })
+        })
     }
 
     /// Fills the cube of `size` cells at `inner` (in cells, from the block's `first` cell) into the block's values:
@@ -227,8 +341,16 @@ impl Lattice {
     }
 }
 
+/// The complaint about a field whose sign changes where it promised none.
+pub(super) fn jumps(at: DVec3) -> Error {
+    Error::Mesh(format!(
+        "the shape has an inside at {at} m, beyond its bounds or where its signed distance promised none; widen the \
+         bounds, or use a field that changes no faster than the position"
+    ))
+}
+
 /// Component by component combination of two triples.
-trait MapWith<T: Copy> {
+pub(super) trait MapWith<T: Copy> {
     fn map_with<B: Copy, R>(self, other: [B; 3], f: impl Fn(T, B) -> R) -> [R; 3];
 }
 
@@ -270,13 +392,16 @@ mod tests {
             let truth = ball.distance(lattice.position(p));
             let value = lattice.values[slot as usize];
             assert!(value.signum() == truth.signum() && value.abs() <= truth.abs() + 1e-12);
-            if truth < 0.0 {
-                for step in 0..STEPS.len() {
-                    assert!(lattice.slot(Lattice::neighbour(p, step)).is_some());
-                }
+            for step in 0..STEPS.len() {
+                let sides = lattice.at(Lattice::neighbour(p, step));
+                assert!(sides != if truth < 0.0 { At::Outside } else { At::Inside });
             }
         }
-        assert_eq!(lattice.slot([-1, 5, 5]), None);
+        assert_eq!(lattice.at([-1, 5, 5]), At::Outside);
+        // The middle of the ball is known without a value.
+        let middle = lattice.blocks.map(|n| (n * BLOCK) as i32);
+        assert_eq!(lattice.at(middle), At::Inside);
+        assert!(lattice.is_inside(middle) && !lattice.is_inside([0; 3]));
     }
 
     #[test]

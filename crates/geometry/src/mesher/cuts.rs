@@ -1,6 +1,6 @@
 //! Where the lattice's edges cross the surface, and the lattice points that move onto it.
 
-use super::bcc::{LONG_STEPS, Lattice, Point, STEPS, reverse, step_between};
+use super::bcc::{BLOCK_POINTS, LONG_STEPS, Lattice, Point, STEPS, reverse, step_between};
 use crate::{Error, Result, SignedDistance};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -28,6 +28,8 @@ struct Cut {
 pub(super) struct Cuts {
     /// Ordered by inside end, then step.
     cuts: Vec<Cut>,
+    /// First cut of each stored block, and the number of cuts.
+    starts: Vec<u32>,
     /// Slot and new position of each moved point, ordered by slot.
     moved: Vec<(u32, DVec3)>,
 }
@@ -43,9 +45,9 @@ impl Cuts {
                     let p = lattice.point(inside);
                     for step in 0..STEPS.len() {
                         let q = Lattice::neighbour(p, step);
-                        // A point without a slot may be a field that jumps; it is reported below.
-                        let outside = lattice.slot(q).unwrap_or(u32::MAX);
-                        if lattice.values.get(outside as usize).is_none_or(|&value| value > 0.0) {
+                        // A point without a slot is far inside.
+                        let Some(outside) = lattice.slot(q) else { continue };
+                        if lattice.values[outside as usize] > 0.0 {
                             let share = crossing(lattice, shape, inside, outside, step);
                             cuts.push(Cut { inside, step: step as u8, outside, share, alive: true });
                         }
@@ -54,19 +56,17 @@ impl Cuts {
                 cuts
             })
             .collect();
+        let mut starts = vec![0];
+        starts.extend(found.iter().scan(0, |sum, cuts| {
+            *sum += cuts.len() as u32;
+            Some(*sum)
+        }));
         let cuts: Vec<Cut> = found.into_iter().flatten().collect();
         if let Some(cut) = cuts.iter().find(|cut| cut.share.is_nan()) {
             let at = lattice.position(lattice.point(cut.inside));
-            return Err(Error::Mesh(if cut.outside == u32::MAX {
-                format!(
-                    "the shape has an inside at {at} m, beyond its bounds or where its signed distance promised \
-                     none; widen the bounds, or use a field that changes no faster than the position"
-                )
-            } else {
-                format!("the signed distance near {at} m is not a number")
-            }));
+            return Err(Error::Mesh(format!("the signed distance near {at} m is not a number")));
         }
-        Ok(Self { cuts, moved: Vec::new() })
+        Ok(Self { cuts, starts, moved: Vec::new() })
     }
 
     /// Moves each lattice point that has a cut point too close by onto the closest one. It is then on the surface
@@ -128,18 +128,20 @@ impl Cuts {
     }
 
     fn index(&self, inside: u32, step: usize) -> Option<usize> {
-        self.cuts.binary_search_by_key(&(inside, step as u8), |cut| (cut.inside, cut.step)).ok()
+        let block = inside as usize / BLOCK_POINTS;
+        let (start, end) = (self.starts[block] as usize, self.starts[block + 1] as usize);
+        let found = self.cuts[start..end].binary_search_by_key(&(inside, step as u8), |cut| (cut.inside, cut.step));
+        found.ok().map(|at| start + at)
     }
 }
 
 /// Share of the way from the inside point to the outside point where the field is zero, by the Illinois variant of
-/// regula falsi. NaN when the field is, or when the outside point has no slot.
+/// regula falsi. NaN when the field is.
 fn crossing(lattice: &Lattice, shape: &dyn SignedDistance, inside: u32, outside: u32, step: usize) -> f64 {
-    let Some(&value_outside) = lattice.values.get(outside as usize) else { return f64::NAN };
     let start = lattice.point(inside);
     let (p, q) = (lattice.position(start), lattice.position(Lattice::neighbour(start, step)));
     let (mut low, mut high) = (0.0, 1.0);
-    let (mut at_low, mut at_high) = (lattice.values[inside as usize], value_outside);
+    let (mut at_low, mut at_high) = (lattice.values[inside as usize], lattice.values[outside as usize]);
     let mut last_low: Option<bool> = None;
     let mut share = 0.5;
     // Superlinear for a distance; halving an end's weight whenever it stays put bounds the rest.

@@ -1,44 +1,102 @@
-//! Isosurface stuffing on a body-centred cubic lattice.
+//! Isosurface stuffing on a body-centred cubic lattice, graded inside.
 //!
 //! Labelle and Shewchuk, "Isosurface stuffing: fast tetrahedral meshes with good dihedral angles", SIGGRAPH 2007.
 
 use super::Mesher;
-use super::bcc::{Lattice, Point};
+use super::bcc::Lattice;
 use super::body::largest_body;
 use super::cuts::Cuts;
-use super::stencil::{Corner, Side, fill};
-use crate::{Error, Result, SignedDistance, TetMesh};
+use super::fill::Filling;
+use crate::{Error, MeshDistance, Result, SignedDistance, TetMesh, TriMesh};
 use glam::DVec3;
-use rayon::prelude::*;
+
+/// Largest cell that is chosen, in volume over area: the radius of a long tube.
+const THICKEST: f64 = 2.0;
 
 /// The default mesher: no slivers by construction. Every dihedral angle lies between 10.78 and 164.74 degrees.
-#[derive(Clone, Copy, Debug)]
+///
+/// The elements at the surface have the finest size, `cell`. Away from it they grow by factors of two, up to `coarsest`
+/// times that size; these inner elements have angles between 45 and 120 degrees. The surface does not depend on `coarsest`.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LatticeMesher {
-    /// Edge of the lattice's cubic cell [m]; the tets' edges are this long and 0.87 times this long.
+    /// Edge of the lattice's finest cubic cell [m]; the tets' edges there are this long and 0.87 times this long.
     pub cell: f64,
+    /// Edge of the largest cube inside, in cells; rounded down to a power of two. 1 gives a uniform lattice.
+    pub coarsest: u32,
 }
 
 impl LatticeMesher {
-    /// Chooses the cell for a body of `volume` [m3]: `finest` [m], or larger so that about `max_tets` elements fill it.
-    ///
-    /// A cubic cell holds 12 tets. Those at the surface are split further, so a small or thin body gets more.
-    pub fn for_volume(volume: f64, finest: f64, max_tets: usize) -> Self {
-        Self { cell: finest.max((12.0 * volume / max_tets.max(1) as f64).cbrt()) }
-    }
-}
+    /// As coarse inside as [`LatticeMesher::graded`] lets it become.
+    pub const COARSEST: u32 = 8;
 
-impl Mesher for LatticeMesher {
-    /// Fills `shape` with tets of about `cell`, nodes on its surface.
+    /// Cells of `cell` [m] at the surface, growing to [`LatticeMesher::COARSEST`] times that inside.
+    pub fn graded(cell: f64) -> Self {
+        Self { cell, coarsest: Self::COARSEST }
+    }
+
+    /// Cells of `cell` [m] everywhere.
+    pub fn uniform(cell: f64) -> Self {
+        Self { cell, coarsest: 1 }
+    }
+
+    /// A graded lattice for the body inside `surface`: cells of `finest` [m], or larger so that about `max_tets` elements
+    /// are to be expected (within some 5 % for an organ; thin bodies get up to 15 % fewer). Never so large that a body as
+    /// thin as this would fall apart, whatever the budget. See also [`LatticeMesher::fit`].
+    pub fn for_body(surface: &TriMesh, finest: f64, max_tets: usize) -> Self {
+        let (area, volume) = (surface.area(), surface.volume().abs());
+        if !(area > 0.0 && volume > 0.0 && area.is_finite() && volume.is_finite()) {
+            return Self::graded(finest);
+        }
+        // The count falls as the cell grows: halve the bracket, in the logarithm, until it is as tight as it gets.
+        let budget = max_tets.max(1) as f64;
+        let (mut low, mut high) = (1e-9 * volume / area, THICKEST * volume / area);
+        for _ in 0..100 {
+            let middle = (low * high).sqrt();
+            *(if expected_tets(area, volume, middle) > budget { &mut low } else { &mut high }) = middle;
+        }
+        Self::graded(finest.max(high))
+    }
+
+    /// Fills `surface` with cells of `finest` [m], or larger so that there are not more than `max_tets` elements and a
+    /// tenth: starts at [`LatticeMesher::for_body`] and, where that gives more, fills again with larger cells, at most
+    /// twice. Gives the mesher that made the mesh, and the mesh.
+    ///
+    /// # Errors
+    /// As [`LatticeMesher::mesh`](Mesher::mesh).
+    pub fn fit(surface: &TriMesh, finest: f64, max_tets: usize) -> Result<(Self, TetMesh)> {
+        let shape = MeshDistance::new(surface)?;
+        let bounds = bounds(surface)?;
+        let mut mesher = Self::for_body(surface, finest, max_tets);
+        let mut body = mesher.mesh_shape(&shape, bounds)?;
+        for _ in 0..2 {
+            let excess = body.tets.len() as f64 / max_tets.max(1) as f64;
+            if excess <= 1.1 {
+                break;
+            }
+            // The count goes with the cell's power of -2 to -3.
+            let cell = (mesher.cell * excess.sqrt()).min(THICKEST * surface.volume().abs() / surface.area());
+            if cell <= mesher.cell {
+                break;
+            }
+            mesher.cell = cell;
+            body = mesher.mesh_shape(&shape, bounds)?;
+        }
+        Ok((mesher, body))
+    }
+
+    /// Fills `shape`, which lies within `bounds` [m], nodes on its surface.
     ///
     /// The field must be continuous and change no faster than 1.25 times the distance moved: its sign is taken as known
     /// where it is that far from 0. Only the largest connected part is kept; where it would touch itself along an edge,
-    /// it is parted there. Refuses a field that is not finite, a shape that reaches beyond `bounds`, and a shape too thin
-    /// for the cell to hold one tet.
-    fn mesh(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh> {
+    /// it is parted there.
+    ///
+    /// # Errors
+    /// A field that is not finite, a shape that reaches beyond `bounds`, and a shape too thin for the cell to hold one tet.
+    pub fn mesh_shape(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh> {
         let mut lattice = Lattice::sample(shape, bounds, self.cell)?;
         let mut cuts = Cuts::find(&lattice, shape)?;
         cuts.warp(&mut lattice);
-        let body = largest_body(stuff(&lattice, &cuts));
+        let body = largest_body(Filling::new(&lattice, &cuts, self.coarsest)?.tets()?);
         if body.tets.is_empty() {
             let size = bounds.1 - bounds.0;
             return Err(Error::Mesh(format!(
@@ -51,74 +109,33 @@ impl Mesher for LatticeMesher {
     }
 }
 
-/// The filling of every lattice tet, nodes numbered in the order of their first use.
-fn stuff(lattice: &Lattice, cuts: &Cuts) -> TetMesh {
-    // Lattice points are named by slot, cut points by their number after the last slot.
-    let slots = lattice.values.len();
-    let filled: Vec<Vec<[u32; 4]>> = lattice
-        .stored_blocks()
-        .map(|block| {
-            let mut tets = Vec::new();
-            for centre in block.map(|slot| lattice.point(slot)).filter(|p| p[0] % 2 != 0) {
-                for axis in 0..3 {
-                    stuff_face(lattice, cuts, centre, axis, &mut tets);
-                }
-            }
-            tets
-        })
-        .collect();
-    let mut mesh = TetMesh { vertices: Vec::new(), tets: filled.into_iter().flatten().collect() };
-    let mut number = vec![u32::MAX; slots + cuts.len()];
-    for node in mesh.tets.iter_mut().flatten() {
-        let name = *node as usize;
-        if number[name] == u32::MAX {
-            number[name] = mesh.vertices.len() as u32;
-            mesh.vertices.push(if name < slots {
-                cuts.position_of_point(lattice, *node)
-            } else {
-                cuts.position(lattice, name - slots)
-            });
-        }
-        *node = number[name];
+impl Mesher for LatticeMesher {
+    /// As [`LatticeMesher::mesh_shape`], of the surface's signed distance: cracks and stray triangles do no harm.
+    fn mesh(&self, surface: &TriMesh) -> Result<TetMesh> {
+        let shape = MeshDistance::new(surface)?;
+        self.mesh_shape(&shape, bounds(surface)?)
     }
-    mesh
+
+    fn describe(&self) -> String {
+        let mm = 1e3 * self.cell;
+        if self.coarsest < 2 {
+            format!("isosurface stuffing, uniform lattice of {mm:.3} mm cells")
+        } else {
+            let times = 1u32 << self.coarsest.ilog2();
+            format!("isosurface stuffing, lattice of {mm:.3} mm cells, up to {times} times larger inside")
+        }
+    }
 }
 
-/// Fills the four lattice tets between a cell centre and the next one along `axis`: those over the edges of the face
-/// between the two cells.
-fn stuff_face(lattice: &Lattice, cuts: &Cuts, centre: Point, axis: usize, tets: &mut Vec<[u32; 4]>) {
-    let towards = |along: i32, u: i32, v: i32| {
-        let mut p = centre;
-        p[axis] += along;
-        p[(axis + 1) % 3] += u;
-        p[(axis + 2) % 3] += v;
-        p
-    };
-    // Counter-clockwise around the axis, which makes (centre, next, rim[i], rim[i + 1]) positive.
-    let points = [centre, towards(2, 0, 0), towards(1, -1, -1), towards(1, 1, -1), towards(1, 1, 1), towards(1, -1, 1)];
-    let slots = points.map(|p| lattice.slot(p));
-    let sides = slots.map(|slot| match slot.map_or(1.0, |slot| lattice.values[slot as usize]) {
-        value if value < 0.0 => Side::Inside,
-        value if value > 0.0 => Side::Outside,
-        _ => Side::Surface,
-    });
-    if !sides.contains(&Side::Inside) {
-        return;
-    }
-    for i in 0..4 {
-        let of = [0, 1, 2 + i, 2 + (i + 1) % 4];
-        let corners = of.map(|k| points[k]);
-        fill(&corners, &of.map(|k| sides[k]), |tet| {
-            // Inside and surface corners have a slot, and every edge from inside to outside a cut.
-            let name = |corner| match corner {
-                Corner::Point(k) => slots[of[k]],
-                Corner::Cut(k, l) => {
-                    cuts.between(lattice, corners[k], corners[l]).map(|cut| (lattice.values.len() + cut) as u32)
-                }
-            };
-            if let [Some(a), Some(b), Some(c), Some(d)] = tet.map(name) {
-                tets.push([a, b, c, d]);
-            }
-        });
-    }
+/// How many elements a graded lattice with cells of `cell` [m] has in a body of `area` [m2] and `volume` [m3].
+///
+/// With the body's thickness t = volume / (area cell), a cell's worth of surface (area / cell^2) has 37.5 t / (t + 1.6)
+/// elements: as many as fit into a thin body, and a fixed number in a thick one. Fitted to seven organs (liver, stomach,
+/// spleen, kidney, duodenum, bladder, gallbladder) at t from 0.8 to 12; from t = 1.5 on it is within 5 %.
+fn expected_tets(area: f64, volume: f64, cell: f64) -> f64 {
+    37.5 * area / (cell * cell) * volume / (volume + 1.6 * area * cell)
+}
+
+fn bounds(surface: &TriMesh) -> Result<(DVec3, DVec3)> {
+    surface.bounds().ok_or_else(|| Error::Mesh("the surface has no vertices".into()))
 }

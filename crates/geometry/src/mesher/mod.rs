@@ -3,16 +3,25 @@
 mod bcc;
 mod body;
 mod cuts;
+mod fill;
 mod lattice;
+mod octree;
 mod stencil;
+mod tetgen;
 
 pub use lattice::LatticeMesher;
+pub use tetgen::TetgenMesher;
 
-use crate::{Result, SignedDistance, TetMesh};
-use glam::DVec3;
+use crate::{Result, TetMesh, TriMesh};
 
-/// Fills a shape with tetrahedra.
-pub trait Mesher {
-    /// Meshes the inside of `shape`, which lies within `bounds` [m]. One connected body, every element positive.
-    fn mesh(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh>;
+/// Fills a closed surface with tetrahedra.
+pub trait Mesher: Sync {
+    /// Fills the closed, outward `surface` [m] with tets: one connected body, every element positive.
+    ///
+    /// # Errors
+    /// A surface that cannot be filled, in one line that says why.
+    fn mesh(&self, surface: &TriMesh) -> Result<TetMesh>;
+
+    /// Name and settings, for people and for the record of where a mesh came from.
+    fn describe(&self) -> String;
 }

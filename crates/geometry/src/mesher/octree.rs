@@ -1,0 +1,158 @@
+//! Which cubes of cells the graded lattice takes as one leaf.
+//!
+//! Leaves have edges of 1, 2, 4, ... cells and are aligned with their size. Leaves that share a face, an edge or a corner
+//! differ by at most a factor of two. A tet of the lattice that has a corner on the surface or outside belongs to cells of
+//! the finest size only, so that the bounds on the angles of a uniform lattice hold there.
+
+use super::bcc::{At, BLOCK, Lattice, Point};
+use rayon::prelude::*;
+
+/// Deepest tree: leaves of 2^20 cells, more than any lattice has along an axis.
+const DEEPEST: u32 = 20;
+
+/// The leaves over a lattice.
+pub(super) struct Octree {
+    /// For each level from 1 on, the cubes of 2^level cells that are not divided further.
+    whole: Vec<Bits>,
+}
+
+impl Octree {
+    /// The coarsest tree with leaves of at most `coarsest` cells. `lattice` is warped.
+    pub(super) fn over(lattice: &Lattice, coarsest: u32) -> Self {
+        let mut whole: Vec<Bits> = Vec::new();
+        let most = coarsest.max(1).ilog2().min(DEEPEST);
+        for level in 1..=most {
+            let dims = lattice.blocks.map(|n| (n * BLOCK) >> level);
+            let bits = match whole.last() {
+                None => Bits::fill(dims, |pair| may_double(lattice, pair)),
+                // A leaf needs its eight parts to be whole, and those around it, so that none is smaller than half.
+                Some(finer) => Bits::fill(dims, |cube| {
+                    let low = cube.map(|c| 2 * c as i32 - 1);
+                    (0..4).all(|z| (0..4).all(|y| (0..4).all(|x| finer.get([low[0] + x, low[1] + y, low[2] + z]))))
+                }),
+            };
+            if !bits.any() {
+                break;
+            }
+            whole.push(bits);
+        }
+        Self { whole }
+    }
+
+    /// Level of the leaf that holds a cell: it has an edge of 2^level cells. 0 outside the lattice.
+    pub(super) fn level(&self, cell: [i32; 3]) -> u32 {
+        let mut level = 0;
+        for bits in &self.whole {
+            if !bits.get(cell.map(|c| c >> (level + 1))) {
+                break;
+            }
+            level += 1;
+        }
+        level
+    }
+}
+
+/// Whether the eight cells of a pair of cells along each axis may be one leaf: no tet of theirs has a corner that is not
+/// inside.
+fn may_double(lattice: &Lattice, pair: [usize; 3]) -> bool {
+    let first = pair.map(|c| 2 * c);
+    match lattice.block_at(lattice.block(first)) {
+        At::Outside => false,
+        At::Inside => true,
+        At::Slot(_) => {
+            // In half cells: the pair reaches from 0 to 4.
+            let first: Point = first.map(|c| 2 * c as i32);
+            let inside = |x: i32, y: i32, z: i32| lattice.is_inside([first[0] + x, first[1] + y, first[2] + z]);
+            let corners = [0, 2, 4];
+            let centres = [1, 3];
+            corners.iter().all(|&z| corners.iter().all(|&y| corners.iter().all(|&x| inside(x, y, z))))
+                && centres.iter().all(|&u| {
+                    centres.iter().all(|&v| {
+                        // Within, and across the six faces.
+                        [-1, 1, 3, 5].iter().all(|&w| inside(w, u, v) && inside(u, w, v) && inside(u, v, w))
+                    })
+                })
+        }
+    }
+}
+
+/// A set of cubes of a regular grid.
+struct Bits {
+    dims: [usize; 3],
+    words: Vec<u64>,
+}
+
+impl Bits {
+    /// The cubes for which `holds` does.
+    fn fill(dims: [usize; 3], holds: impl Fn([usize; 3]) -> bool + Sync) -> Self {
+        let count: usize = dims.iter().product();
+        let words = (0..count.div_ceil(64))
+            .into_par_iter()
+            .map(|word| {
+                let all = 64 * word..count.min(64 * word + 64);
+                all.fold(0, |bits, n| {
+                    let at = [n % dims[0], n / dims[0] % dims[1], n / dims[0] / dims[1]];
+                    bits | u64::from(holds(at)) << (n % 64)
+                })
+            })
+            .collect();
+        Self { dims, words }
+    }
+
+    /// Whether a cube is in the set; none outside the grid is.
+    fn get(&self, at: [i32; 3]) -> bool {
+        // A negative coordinate becomes a huge one.
+        let [x, y, z] = at.map(|c| c as usize);
+        let [nx, ny, nz] = self.dims;
+        let n = (z.wrapping_mul(ny).wrapping_add(y)).wrapping_mul(nx).wrapping_add(x);
+        x < nx && y < ny && z < nz && self.words[n / 64] >> (n % 64) & 1 == 1
+    }
+
+    fn any(&self) -> bool {
+        self.words.iter().any(|&word| word != 0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::SignedDistance;
+    use glam::DVec3;
+
+    struct Ball;
+    impl SignedDistance for Ball {
+        fn distance(&self, p: DVec3) -> f64 {
+            p.length() - 1.0
+        }
+    }
+
+    #[test]
+    fn leaves_are_balanced_and_the_surface_is_finest() {
+        let lattice = Lattice::sample(&Ball, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).unwrap();
+        let tree = Octree::over(&lattice, 1 << 30);
+        let n = lattice.blocks.map(|n| (n * BLOCK) as i32);
+        let mut cells = [0usize; 8];
+        for z in 0..n[2] {
+            for y in 0..n[1] {
+                for x in 0..n[0] {
+                    let level = tree.level([x, y, z]);
+                    cells[level as usize] += 1;
+                    for near in [[x + 1, y, z], [x, y + 1, z], [x, y, z + 1], [x + 1, y + 1, z], [x + 1, y + 1, z + 1]]
+                    {
+                        assert!(tree.level(near).abs_diff(level) <= 1);
+                    }
+                    if level > 0 {
+                        for corner in 0..8 {
+                            let at = [x + (corner & 1), y + (corner >> 1 & 1), z + (corner >> 2)].map(|c| 2 * c);
+                            assert!(lattice.is_inside(at));
+                        }
+                    }
+                }
+            }
+        }
+        println!("cells by level: {cells:?}");
+        assert!(cells[1] > 0 && cells[2] > 0 && cells[3] > 0);
+        let limited = Octree::over(&lattice, 3);
+        assert!(limited.whole.len() == 1 && Octree::over(&lattice, 1).whole.is_empty());
+    }
+}
