@@ -69,6 +69,9 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
+    /// A mesh is unusable.
+    #[error(transparent)]
+    Geometry(#[from] trocar_geometry::Error),
     /// A phantom cannot be recorded.
     #[error(transparent)]
     Phantom(#[from] trocar_phantom::Error),

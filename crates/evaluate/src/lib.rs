@@ -1,5 +1,6 @@
 //! The commands' work from folder to folder, and the reports: what came out, beside what the paper says.
 
+mod bench;
 mod demo;
 mod error;
 mod experiment;
@@ -9,6 +10,7 @@ pub mod report;
 mod truth;
 mod workflow;
 
+pub use bench::{MeshingBench, MeshingResult, MeshingRow};
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};

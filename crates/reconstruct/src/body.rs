@@ -33,8 +33,6 @@ fn fill(surface: &TriMesh, settings: &Settings) -> trocar_geometry::Result<TetMe
     match (settings.mesher, settings.element_size) {
         (MesherRule::Tetgen, _) => TetgenMesher::default().mesh(surface),
         (MesherRule::Lattice, Some(cell)) => LatticeMesher::graded(cell).mesh(surface),
-        (MesherRule::Lattice, None) => {
-            Ok(LatticeMesher::fit(surface, settings.finest_cell, settings.max_tets)?.1)
-        }
+        (MesherRule::Lattice, None) => Ok(LatticeMesher::fit(surface, settings.finest_cell, settings.max_tets)?.1),
     }
 }

@@ -33,6 +33,8 @@ pub enum Command {
     Simulate(Simulate),
     /// Make a table or figure of the paper anew, beside the paper's numbers.
     Experiment(Experiment),
+    /// Measure what something costs.
+    Bench(Bench),
 }
 
 /// Arguments of `demo`.
@@ -151,6 +153,40 @@ pub struct ReconstructionExperiment {
     pub mesher: MesherName,
 }
 
+/// Arguments of `bench`.
+#[derive(Debug, Args)]
+pub struct Bench {
+    /// Which one.
+    #[command(subcommand)]
+    pub name: BenchName,
+}
+
+/// Benchmarks by name.
+#[derive(Debug, Subcommand)]
+pub enum BenchName {
+    /// The lattice mesher from ten thousand to a million elements, and beside TetGen and fTetWild.
+    Meshing(MeshingBench),
+}
+
+/// Arguments of `bench meshing`.
+#[derive(Debug, Args)]
+pub struct MeshingBench {
+    /// Closed surfaces (.stl, .ply, .obj); an ellipsoid of a liver's size by default. The first is the one meshed finer and finer.
+    pub surfaces: Vec<PathBuf>,
+    /// Unit of the surface files.
+    #[arg(long, value_enum, default_value_t = Units::Mm)]
+    pub units: Units,
+    /// Numbers of elements to aim at.
+    #[arg(long, value_delimiter = ',', default_values_t = [10_000, 30_000, 100_000, 300_000, 1_000_000])]
+    pub sizes: Vec<usize>,
+    /// Python that has the package pytetwild.
+    #[arg(long, default_value = "python3")]
+    pub python: PathBuf,
+    /// Folder for the report.
+    #[arg(short, long, default_value = "trocar-bench/meshing")]
+    pub output: PathBuf,
+}
+
 /// Meshers by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum MesherName {
@@ -178,6 +214,16 @@ pub enum Units {
     Cm,
     /// Metres.
     M,
+}
+
+impl From<Units> for trocar_geometry::io::Unit {
+    fn from(units: Units) -> Self {
+        match units {
+            Units::Mm => Self::Millimetre,
+            Units::Cm => Self::Centimetre,
+            Units::M => Self::Metre,
+        }
+    }
 }
 
 /// Arguments of `simulate`.

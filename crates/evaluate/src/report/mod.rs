@@ -5,6 +5,7 @@
 
 mod colors;
 mod figures;
+mod meshing;
 mod moving_picture;
 mod overlays;
 mod page;
@@ -16,6 +17,7 @@ mod table;
 mod truth;
 mod views;
 
+use crate::bench::MeshingResult;
 use crate::experiment::ReconstructionResult;
 use crate::{Error, Result};
 use moving_picture::Lift;
@@ -64,6 +66,14 @@ pub(crate) fn reconstruction_experiment(result: &ReconstructionResult, made: &[R
     made.iter().try_for_each(seen::check_sizes)?;
     let subtitle = format!("{} organs of {} phantoms, one set of settings", result.organs.len(), made.len());
     Ok(page::page("Reconstruction", &subtitle, &reconstruction_experiment::body(result, made)?))
+}
+
+/// The page of the meshing benchmark.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn meshing(result: &MeshingResult) -> Result<String> {
+    Ok(page::page("Meshing", "From closed surfaces to tetrahedra", &meshing::body(result)?))
 }
 
 /// The page of a specimen made from a ready surface.

@@ -1,5 +1,6 @@
 //! One file a command.
 
+mod bench;
 mod demo;
 mod experiment;
 mod inspect;
@@ -14,6 +15,7 @@ use trocar_progress::Progress;
 /// Runs the command that was typed.
 pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
     match &cli.command {
+        Command::Bench(arguments) => bench::run(arguments, cli.json, progress),
         Command::Demo(arguments) => demo::run(arguments, cli.json, progress),
         Command::Inspect(arguments) => inspect::run(arguments, cli.json),
         Command::Record(arguments) => record::run(arguments, cli.json, progress),

@@ -1,6 +1,6 @@
 //! `trocar reconstruct`.
 
-use crate::cli::{Reconstruct, Units};
+use crate::cli::Reconstruct;
 use crate::output;
 use trocar_evaluate::{Reconstructed, Result, reconstruct_recording, reconstruct_surface};
 use trocar_geometry::io::Unit;
@@ -20,11 +20,8 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
     let reconstructed = match (&arguments.recording, &arguments.surface) {
         (Some(recording), _) => reconstruct_recording(recording, &settings, &arguments.output, progress)?.0,
         (None, Some(surface)) => {
-            let unit = match arguments.units {
-                Some(Units::Cm) => Unit::Centimetre,
-                Some(Units::M) => Unit::Metre,
-                Some(Units::Mm) | None => Unit::Millimetre,
-            };
+            // clap asks for the unit where there is a surface.
+            let unit = arguments.units.map_or(Unit::Millimetre, Unit::from);
             reconstruct_surface(surface, unit, &settings, &arguments.output, progress)?
         }
         (None, None) => unreachable!("clap asks for one of the two"),
