@@ -19,6 +19,24 @@ const WORDS: [&str; 12] = [
     "\u{feff}",
 ];
 
+/// Whole numbers that readers trip over as lengths and counts.
+const EXTREMES: [u64; 14] = [
+    0,
+    1,
+    4,
+    0x7f,
+    0x80,
+    0xffff,
+    1 << 24,
+    0x7fff_ffff,
+    0x8000_0000,
+    0xffff_ffff,
+    1 << 40,
+    u64::MAX >> 1,
+    u64::MAX - 8,
+    u64::MAX,
+];
+
 /// A damaged copy of `good`; what is spliced in comes from it or another of the `seeds`.
 pub fn damage(good: &[u8], seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) -> Vec<u8> {
     let mut bytes = good.to_vec();
@@ -41,7 +59,7 @@ fn once(bytes: &mut Vec<u8>, seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) {
         // A number of 1, 2, 4 or 8 bytes at an extreme, in either order of bytes.
         3 | 4 => {
             let size = 1 << below(rng, 4);
-            let value = [0, 1, u64::MAX, u64::MAX >> 1, u64::MAX >> (64 - 8 * size), 1 << 31, 1 << 24][below(rng, 7)];
+            let value = EXTREMES[below(rng, EXTREMES.len())];
             let value =
                 if below(rng, 2) == 0 { value.to_le_bytes() } else { value.rotate_left(64 - 8 * size).to_be_bytes() };
             for (i, v) in here(bytes, size as usize).zip(value) {

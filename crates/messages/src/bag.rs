@@ -7,7 +7,7 @@
 use crate::Encoding;
 use crate::chunk::{Chunk, Compression};
 use crate::error::Parsed;
-use crate::log::{Connection, Draft, Kind, Log, Record};
+use crate::log::{Connection, Draft, Kind, Log, Record, next_after};
 use crate::reader::Reader;
 use crate::source::Source;
 
@@ -25,6 +25,8 @@ const CONNECTION: u8 = 7;
 const FIRST_READ: u64 = 4096;
 /// Headers are a few short fields.
 const MAX_HEADER: u64 = 1 << 16;
+/// A connection's description holds the definition of its message, some kilobytes.
+const MAX_DESCRIPTION: u64 = 1 << 20;
 
 /// A record in the file: what its header says, and where its data lies.
 struct Walked {
@@ -54,8 +56,15 @@ impl Walked {
         self.data_at + self.data_len
     }
 
-    fn data(&self, source: &Source) -> Parsed<Vec<u8>> {
-        source.read(self.data_at, self.data_len)
+    /// The description of a connection.
+    fn connection(&self, source: &Source) -> Parsed<Record<'static>> {
+        if self.data_len > MAX_DESCRIPTION {
+            return Err(format!(
+                "a connection described in {} bytes; at most {MAX_DESCRIPTION} are read",
+                self.data_len
+            ));
+        }
+        connection(&self.header, &source.read(self.data_at, self.data_len)?)
     }
 }
 
@@ -124,13 +133,16 @@ pub(crate) fn open(source: Source) -> Parsed<Log> {
         }
         index_at
     } else {
-        draft.problem("no index at the end: the recorder did not finish, or the file was cut".into());
+        // A finished bag without messages ends where its index would begin.
+        if index_at != len || field(&first.header, "chunk_count")?.u32()? > 0 {
+            draft.problem("no index at the end: the recorder did not finish, or the file was cut".into());
+        }
         len
     };
     chunk_ats.sort_unstable();
     let mut at = first.end();
     while at < end {
-        match step(&mut draft, at, end) {
+        match step(&mut draft, at, end, &chunk_ats) {
             Ok(next) => at = next,
             Err(reason) => match draft.damage(at, end, &reason, &chunk_ats) {
                 Some(resume) => at = resume,
@@ -147,8 +159,8 @@ fn read_end(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Parsed<
         let walked = Walked::read(draft.source(), at)?;
         match field(&walked.header, "op")?.u8()? {
             CONNECTION => {
-                let data = walked.data(draft.source())?;
-                draft.record(connection(&walked.header, &data)?);
+                let record = walked.connection(draft.source())?;
+                draft.record(record);
             }
             CHUNK_INFO => chunk_ats.push(field(&walked.header, "chunk_pos")?.u64()?),
             _ => {}
@@ -159,14 +171,13 @@ fn read_end(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Parsed<
 }
 
 /// Takes in the record at `at` and gives the place of the next.
-fn step(draft: &mut Draft, at: u64, end: u64) -> Parsed<u64> {
+fn step(draft: &mut Draft, at: u64, end: u64, chunk_ats: &[u64]) -> Parsed<u64> {
     let walked = Walked::read(draft.source(), at)?;
     let op = field(&walked.header, "op")?.u8()?;
     if walked.end() > end {
-        // What is there of a cut chunk can be used if it is not compressed.
-        if op == CHUNK && text(&walked.header, "compression")? == "none" && end == draft.source().len() {
-            let len = end - walked.data_at.min(end);
-            draft.chunk(Chunk { at: walked.data_at, len, size: None, compression: Compression::None, crc: 0 });
+        // The chunk was cut, or its length is damaged. What is there can be used if it is not compressed.
+        if op == CHUNK && text(&walked.header, "compression")? == "none" {
+            draft.cut_chunk(walked.data_at, next_after(chunk_ats, at).unwrap_or(end));
         }
         return Err(format!("a record there says it ends at byte {}", walked.end()));
     }
@@ -188,7 +199,10 @@ fn step(draft: &mut Draft, at: u64, end: u64) -> Parsed<u64> {
         }
         INDEX => {
             let connection = field(&walked.header, "conn")?.u32()?;
-            let data = walked.data(draft.source())?;
+            if !walked.data_len.is_multiple_of(12) {
+                return Err(format!("an index of {} bytes; an entry has 12", walked.data_len));
+            }
+            let data = draft.source().read(walked.data_at, walked.data_len)?;
             let mut reader = Reader::packed(&data);
             let mut entries = Vec::with_capacity(data.len() / 12);
             while reader.left() > 0 {
@@ -197,8 +211,8 @@ fn step(draft: &mut Draft, at: u64, end: u64) -> Parsed<u64> {
             draft.index(connection, &entries)?;
         }
         CONNECTION => {
-            let data = walked.data(draft.source())?;
-            draft.record(connection(&walked.header, &data)?);
+            let record = walked.connection(draft.source())?;
+            draft.record(record);
         }
         MESSAGE => {
             let connection = field(&walked.header, "conn")?.u32()?;

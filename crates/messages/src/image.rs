@@ -118,7 +118,7 @@ fn from_ros(topic: &Topic, bytes: &[u8]) -> Parsed<StampedImage> {
     let data = Cow::Borrowed(f.counted()?);
     let mut image =
         plain(&Raw { stamp: header.stamp, frame: header.frame, width, height, encoding, big_endian, step, data })?;
-    // librealsense 2.51 and later: version "1" in place of the frame's name, then the unit behind the data.
+    // Newer librealsense: version "1" in place of the frame's name, then the unit behind the data.
     if topic.encoding == Encoding::Ros1 && image.frame == "1" && matches!(image.image, Image::Depth(_)) && f.left() == 4
     {
         image.depth_unit = Some(f.f32()?).filter(|u| u.is_finite() && *u > 0.0);

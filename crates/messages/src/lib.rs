@@ -16,9 +16,9 @@
 //! (<https://docs.foxglove.dev/docs/sdk/schemas>), depth images as in ROS REP 118, and librealsense's `ros_file_format.h` for
 //! the topics of its bags.
 //!
-//! The records of both files are parsed here. Crate `rosbag` 0.6 maps the whole file, allocates what a chunk's header
-//! claims and panics on odd lengths; crate `mcap` 0.26 wants the file mapped or whole, and its readers stop at the first
-//! damaged chunk. Decompression, images and JSON are left to crates; all are pure Rust.
+//! The records of both files are parsed here: they are few, and one walk and one chunk reader serve both, so that damage costs
+//! the messages it hits and no others. Crate `rosbag` 0.6 maps the whole file, which needs `unsafe`, and allocates what a
+//! chunk's header claims. Decompression, images and JSON are left to crates; all are pure Rust.
 
 mod bag;
 mod calibration;

@@ -1,6 +1,6 @@
 //! A log file as both formats share it: chunks, and where in them each topic's messages lie.
 
-use crate::chunk::Chunk;
+use crate::chunk::{Chunk, Compression};
 use crate::error::{Error, Parsed, Result};
 use crate::source::Source;
 use crate::{Encoding, Message, MessageLog, Topic};
@@ -11,7 +11,11 @@ use std::path::Path;
 const MAX_PROBLEMS: usize = 50;
 
 /// A file with more damaged places than this is not read to its end: trying each costs time.
-const MAX_DAMAGES: usize = 1000;
+const MAX_DAMAGES: usize = 200;
+/// Opening decompresses chunks without an index up to this many bytes, which are a second's work ...
+const FREE_GROWTH: u64 = 64 << 20;
+/// ... and up to this many times the file's size: LZ4 cannot shrink more, and no recording does as a whole.
+const MAX_GROWTH: u64 = 256;
 
 /// A record inside a chunk.
 pub(crate) enum Record<'a> {
@@ -71,6 +75,8 @@ pub(crate) struct Draft {
     schemas: BTreeMap<u16, String>,
     problems: Vec<String>,
     damages: usize,
+    /// Bytes of the chunks read through.
+    grown: u64,
 }
 
 impl Draft {
@@ -85,6 +91,7 @@ impl Draft {
             schemas: BTreeMap::new(),
             problems: Vec::new(),
             damages: 0,
+            grown: 0,
         }
     }
 
@@ -104,6 +111,12 @@ impl Draft {
         self.chunks.push(chunk);
     }
 
+    /// Adds an uncompressed chunk whose length is unknown: as much of it as lies before `end`.
+    pub fn cut_chunk(&mut self, at: u64, end: u64) {
+        let len = end.saturating_sub(at);
+        self.chunk(Chunk { at, len, size: None, compression: Compression::None, crc: 0 });
+    }
+
     /// Messages of the last chunk: log time, offset in it. The chunk has an index now.
     pub fn index(&mut self, connection: u32, entries: &[(u64, u32)]) -> Parsed<()> {
         let last = self.chunks.len().checked_sub(1).ok_or("an index comes before the first chunk")?;
@@ -121,8 +134,7 @@ impl Draft {
     pub fn damage(&mut self, at: u64, end: u64, reason: &str, chunk_ats: &[u64]) -> Option<u64> {
         self.unindexed.extend(self.chunks.len().checked_sub(1));
         self.damages += 1;
-        let next = chunk_ats.get(chunk_ats.partition_point(|&c| c <= at)).copied();
-        let next = next.filter(|&c| c < end && self.damages < MAX_DAMAGES);
+        let next = next_after(chunk_ats, at).filter(|&c| c < end && self.damages < MAX_DAMAGES);
         let lost = next.unwrap_or(end) - at;
         self.problem(format!("{lost} bytes at byte {at} of {} are lost: {reason}", self.source.len()));
         next
@@ -146,6 +158,12 @@ impl Draft {
 
     /// Reads through chunk `c`: its descriptions, and its messages too if it has no index. Returns how many those are.
     fn read_through(&mut self, c: usize) -> usize {
+        self.grown = self.grown.saturating_add(self.chunks[c].size.unwrap_or(self.chunks[c].len));
+        let may = FREE_GROWTH + MAX_GROWTH.saturating_mul(self.source.len());
+        if self.grown > may {
+            self.problem(format!("chunk {c} is not read through: the chunks grow to more than {may} bytes"));
+            return 0;
+        }
         let bytes = match self.chunks[c].load(&self.source) {
             Ok(bytes) => bytes,
             Err(reason) => {
@@ -246,6 +264,11 @@ impl Draft {
     }
 }
 
+/// The first of the ascending places that is behind `at`.
+pub(crate) fn next_after(places: &[u64], at: u64) -> Option<u64> {
+    places.get(places.partition_point(|&p| p <= at)).copied()
+}
+
 /// One form for a type's name: ROS 2 says `sensor_msgs/msg/Image`, ROS 1 `sensor_msgs/Image`.
 fn normalised(kind: &str) -> String {
     kind.replacen("/msg/", "/", 1)
@@ -260,7 +283,7 @@ pub(crate) struct Log {
     times: Vec<Vec<u64>>,
     /// A topic's messages: chunk, offset in it.
     places: Vec<Vec<(u32, u32)>>,
-    /// The connections that feed a topic.
+    /// The connections that feed a topic, ascending.
     connections: Vec<Vec<u32>>,
     problems: Vec<String>,
 }
@@ -317,7 +340,9 @@ impl Messages<'_> {
             || format!("the index points to byte {offset} of chunk {chunk}, where there is no such message");
         let record = bytes.get(offset as usize..).ok_or_else(misplaced)?;
         match (self.log.parse)(record)?.0 {
-            Record::Message(connection, _, content) if self.log.connections[topic].contains(&connection) => {
+            Record::Message(connection, _, content)
+                if self.log.connections[topic].binary_search(&connection).is_ok() =>
+            {
                 Ok(content.to_vec())
             }
             _ => Err(misplaced()),

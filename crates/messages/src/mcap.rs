@@ -7,7 +7,7 @@
 use crate::Encoding;
 use crate::chunk::{Chunk, Compression};
 use crate::error::Parsed;
-use crate::log::{Connection, Draft, Kind, Log, Record};
+use crate::log::{Connection, Draft, Kind, Log, Record, next_after};
 use crate::reader::Reader;
 use crate::source::Source;
 
@@ -29,6 +29,8 @@ const RECORD_HEADER: u64 = 9;
 const FILE_END: u64 = RECORD_HEADER + 20 + MAGIC.len() as u64;
 /// The part of a chunk before its content; the name of the compression is short.
 const CHUNK_HEADER: u64 = 256;
+/// The part of a schema or channel that matters: numbers and names at its beginning.
+const NAMES: u64 = 1 << 16;
 
 /// Parses the record at the start of a chunk's content.
 fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
@@ -89,7 +91,7 @@ pub(crate) fn open(source: Source) -> Log {
     chunk_ats.sort_unstable();
     let mut at = MAGIC.len() as u64;
     while at < len {
-        match step(&mut draft, at) {
+        match step(&mut draft, at, &chunk_ats) {
             Ok(Some(next)) => at = next,
             Ok(None) => break,
             Err(reason) => match draft.damage(at, len, &reason, &chunk_ats) {
@@ -124,7 +126,7 @@ fn read_summary(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Par
         match kind {
             FOOTER => return Ok(()),
             SCHEMA | CHANNEL => {
-                let content = draft.source().read(content_at, content_len)?;
+                let content = draft.source().up_to(content_at, content_len.min(NAMES))?;
                 draft.record(record(kind, &content)?);
             }
             CHUNK_INDEX => {
@@ -140,7 +142,7 @@ fn read_summary(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Par
 }
 
 /// Takes in the record at `at` and gives the place of the next; `None` after the last with messages.
-fn step(draft: &mut Draft, at: u64) -> Parsed<Option<u64>> {
+fn step(draft: &mut Draft, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>> {
     let (kind, content_at, content_len) = walk(draft.source(), at)?;
     let len = draft.source().len();
     let end = content_at.checked_add(content_len).filter(|&end| end <= len);
@@ -161,9 +163,9 @@ fn step(draft: &mut Draft, at: u64) -> Parsed<Option<u64>> {
             let chunk_at = content_at + reader.at() as u64;
             let whole = end.filter(|&end| chunk_at.checked_add(records_len).is_some_and(|e| e <= end));
             let Some(end) = whole else {
-                // What is there of a cut chunk can be used if it is not compressed.
-                if compression == Compression::None && end.is_none() {
-                    draft.chunk(Chunk { at: chunk_at, len: len - chunk_at, size: None, compression, crc: 0 });
+                // The chunk was cut, or its length is damaged. What is there can be used if it is not compressed.
+                if compression == Compression::None {
+                    draft.cut_chunk(chunk_at, next_after(chunk_ats, at).unwrap_or(len));
                 }
                 return Err(format!("a chunk there says that its {records_len} bytes begin at byte {chunk_at}"));
             };
@@ -191,7 +193,7 @@ fn step(draft: &mut Draft, at: u64) -> Parsed<Option<u64>> {
             draft.index(channel.into(), &entries)?;
         }
         SCHEMA | CHANNEL => {
-            let content = draft.source().read(content_at, content_len)?;
+            let content = draft.source().up_to(content_at, content_len.min(NAMES))?;
             draft.record(record(kind, &content)?);
         }
         MESSAGE => {

@@ -31,12 +31,12 @@ impl Mesher for PytetwildMesher {
         write(&file("vertices"), vertices)?;
         write(&file("triangles"), triangles)?;
         let run = Command::new(&self.python).args(["-c", SCRIPT]).arg(folder.path()).output();
-        let absent = format!("needs {} with the package pytetwild (pip install pytetwild)", self.python.display());
-        let output = run.map_err(|_| wrong(absent.clone()))?;
+        let output = run.map_err(|e| wrong(format!("{} cannot be started: {e}", self.python.display())))?;
         if !output.status.success() {
             let text = String::from_utf8_lossy(&output.stderr);
-            let last = text.lines().last().unwrap_or("no message").to_owned();
-            return Err(wrong(if text.contains("ModuleNotFoundError") { absent } else { last }));
+            let last = text.lines().last().unwrap_or("no message");
+            let hint = if last.contains("No module") { "; needed: pip install pytetwild pyvista" } else { "" };
+            return Err(wrong(format!("{last}{hint}")));
         }
         let read = |name: &str| {
             let path = file(name);
