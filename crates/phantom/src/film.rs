@@ -1,7 +1,8 @@
 //! Single frames: the still picture with the instruments before it, as the sensor gives it.
 
 use crate::instruments::Instrument;
-use crate::sensor;
+use crate::sensor::{self, Sensor};
+use crate::stereo;
 use crate::still::Still;
 use glam::DVec2;
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
@@ -23,8 +24,18 @@ pub(crate) struct Shot {
     pub instruments: Mask,
 }
 
+/// How a recording is filmed.
+#[derive(Clone, Copy)]
+pub(crate) struct Take<'a> {
+    pub instruments: &'a [Instrument],
+    pub camera: &'a Camera,
+    pub sensor: Sensor,
+    pub seed: u64,
+}
+
 /// Films frame `index`.
-pub(crate) fn shoot(still: &Still, instruments: &[Instrument], camera: &Camera, seed: u64, index: usize) -> Shot {
+pub(crate) fn shoot(still: &Still, take: &Take<'_>, index: usize) -> Shot {
+    let Take { instruments, camera, sensor, seed } = *take;
     let mut color = still.frame.color.clone();
     let mut depth = still.frame.depth.clone();
     let mut facing = still.frame.facing.clone();
@@ -32,8 +43,11 @@ pub(crate) fn shoot(still: &Still, instruments: &[Instrument], camera: &Camera, 
     for instrument in instruments {
         let mesh = instrument.mesh(index as f64 / RATE_HZ);
         if let Some(window) = Window::around(&mesh, camera) {
-            window.draw(mesh, camera, &mut color, &mut depth, &mut facing, &mut mask);
+            window.draw(mesh, camera, still.lit_at, &mut color, &mut depth, &mut facing, &mut mask);
         }
+    }
+    if sensor == Sensor::Stereo {
+        stereo::bend(&mut depth, seed, index);
     }
     sensor::expose(&mut color, &mut depth, &facing, seed, index);
     Shot { color, depth, instruments: sensor::dilate(&mask, MASK_GROWTH) }
@@ -92,6 +106,7 @@ impl Window {
         &self,
         mesh: TriMesh,
         camera: &Camera,
+        lit_at: f32,
         color: &mut ColorImage,
         depth: &mut DepthImage,
         facing: &mut [f32],
@@ -115,7 +130,7 @@ impl Window {
                     if before(z) {
                         hits += 1;
                         let light = srgb::to_linear(fine.color.pixels[at]);
-                        let lamp = sensor::lamp(camera, x as f64, y as f64, z);
+                        let lamp = sensor::lamp(camera, x as f64, y as f64, z, lit_at);
                         sum = [0, 1, 2].map(|c| sum[c] + light[c] * lamp);
                     }
                 }
@@ -147,11 +162,11 @@ mod tests {
             let mut color = ColorImage::new(camera.width, camera.height, [0; 3]);
             let mut depth = DepthImage::new(camera.width, camera.height);
             let mut mask = Mask::new(camera.width, camera.height);
-            window.draw(mesh, &camera, &mut color, &mut depth, &mut vec![0.0; 424 * 240], &mut mask);
+            window.draw(mesh, &camera, 0.15, &mut color, &mut depth, &mut vec![0.0; 424 * 240], &mut mask);
             (color, mask)
         };
         for frame in (0..180).step_by(20) {
-            for instrument in instruments::pair(0.7) {
+            for instrument in instruments::pair(&crate::phantom_a::PLAN.reach, 0.7) {
                 let mesh = instrument.mesh(frame as f64 / RATE_HZ);
                 let window = Window::around(&mesh, &camera).unwrap();
                 let whole = Window { u: 0, v: 0, width: camera.width, height: camera.height };

@@ -1,7 +1,9 @@
 //! Filming a phantom.
 
 use crate::anatomy::Anatomy;
-use crate::film::{RATE_HZ, shoot};
+use crate::film::{RATE_HZ, Take, shoot};
+use crate::plan::{Organ, Plan};
+use crate::sensor::Sensor;
 use crate::still::{Fineness, Still};
 use crate::{Error, Result, instruments, noise, sensor};
 use rayon::prelude::*;
@@ -9,10 +11,8 @@ use std::path::Path;
 use trocar_camera::Camera;
 use trocar_geometry::io::write_ply;
 use trocar_progress::Progress;
-use trocar_reconstruct::{RecordingInfo, RecordingWriter};
+use trocar_reconstruct::{OrganInfo, RecordingInfo, RecordingWriter};
 
-/// The phantoms there are.
-const NAMES: [&str; 1] = ["phantom-a"];
 /// File names hold six digits.
 const MAX_FRAMES: usize = 1_000_000;
 /// Unit of the truth's depth image [m].
@@ -23,32 +23,43 @@ const TRUTH_DEPTH_SCALE: f64 = 0.0001;
 pub struct RecordOptions {
     /// Frames to record at 30 Hz (paper: 60 s).
     pub frames: usize,
-    /// Seed of the anatomy and of the noise.
+    /// Seed of the anatomy, of the instruments' motion and of the noise: the same seed gives the same files.
     pub seed: u64,
+    /// What kind of noise depth has.
+    pub sensor: Sensor,
 }
 
-/// Records the phantom `name` (`phantom-a`) into the folder `dir`, with its truth under `truth/`: the picture without
-/// instruments and noise, and the organs' surfaces in the camera's frame, in metres.
+impl Default for RecordOptions {
+    /// The paper's 60 s, seed 1, plain noise.
+    fn default() -> Self {
+        Self { frames: 1800, seed: 1, sensor: Sensor::Plain }
+    }
+}
+
+/// Records the phantom `name` (one of [`NAMES`](crate::NAMES)) into the folder `dir`, with its truth under `truth/`: the
+/// picture without instruments and noise, and the organs' surfaces in the camera's frame, in metres.
+///
+/// The organs' masks are the truth too: the pixels in which the picture without instruments shows the organ. On an organ's
+/// mask `truth/depth.png` is therefore that organ's own front, in 0.1 mm; where another organ lies on top, the mask is the
+/// other's.
 ///
 /// # Errors
 /// An unknown name, no frames, a folder that cannot be written, or an interruption; nothing is left behind then.
 pub fn record(name: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
-    record_with(name, options, &Camera::d405(), Fineness { surface: 0.6e-3, bed: 0.8e-3 }, dir, progress)
+    let plan = Plan::named(name)?;
+    record_with(plan, options, &Camera::d405(), plan.fineness, dir, progress)
 }
 
 /// [`record`] with a camera and a fineness of one's choice.
 pub(crate) fn record_with(
-    name: &str,
+    plan: &Plan,
     options: &RecordOptions,
     camera: &Camera,
     fineness: Fineness,
     dir: &Path,
     progress: &dyn Progress,
 ) -> Result<()> {
-    if !NAMES.contains(&name) {
-        return Err(Error::Unknown(name.to_owned()));
-    }
-    let RecordOptions { frames, seed } = *options;
+    let RecordOptions { frames, seed, sensor } = *options;
     if frames == 0 || frames > MAX_FRAMES {
         return Err(Error::Option(format!("frames is {frames}; a recording has 1 to {MAX_FRAMES} frames")));
     }
@@ -62,10 +73,10 @@ pub(crate) fn record_with(
     if progress.interrupted() {
         return Err(Error::Interrupted);
     }
-    let anatomy = Anatomy::new(seed);
-    let info = describe(name, seed, camera, &anatomy);
+    let anatomy = Anatomy::new(plan, seed);
+    let info = describe(plan, seed, camera, &anatomy);
     let writer = RecordingWriter::create(dir, &info)?;
-    let still = Still::new(&anatomy, camera, fineness);
+    let still = Still::new(plan, &anatomy, camera, fineness);
     for (index, organ) in anatomy.organs.iter().enumerate() {
         writer.organ_mask(organ.name, &still.organ_mask(index))?;
     }
@@ -74,12 +85,13 @@ pub(crate) fn record_with(
     progress.end();
 
     progress.begin("frames", frames as u64);
-    let instruments = instruments::pair(std::f64::consts::TAU * noise::unit(noise::key(&[seed, 3])));
+    let instruments = instruments::pair(&plan.reach, std::f64::consts::TAU * noise::unit(noise::key(&[seed, 3])));
+    let take = Take { instruments: &instruments, camera, sensor, seed };
     (0..frames).into_par_iter().try_for_each(|index| {
         if progress.interrupted() {
             return Err(Error::Interrupted);
         }
-        let shot = shoot(&still, &instruments, camera, seed, index);
+        let shot = shoot(&still, &take, index);
         writer.frame(index, &shot.color, &shot.depth, Some(&shot.instruments))?;
         progress.advance(1);
         Ok(())
@@ -89,10 +101,17 @@ pub(crate) fn record_with(
 }
 
 /// Contents of `recording.toml`.
-fn describe(name: &str, seed: u64, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
+fn describe(plan: &Plan, seed: u64, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
     let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
+    let organ = |o: &Organ| OrganInfo {
+        name: o.name.to_owned(),
+        polygon: Vec::new(),
+        base_px: pixel(o.body.base()),
+        material: o.material(plan),
+        pins: o.pins(),
+    };
     RecordingInfo {
-        name: name.to_owned(),
+        name: plan.name.to_owned(),
         rate_hz: RATE_HZ,
         depth_scale_m: sensor::DEPTH_SCALE,
         up: [0.0, 0.0, -1.0],
@@ -100,7 +119,7 @@ fn describe(name: &str, seed: u64, camera: &Camera, anatomy: &Anatomy) -> Record
         depth_max_m: None,
         note: format!("synthetic, seed {seed}; the truth is in truth/; materials are the paper's"),
         camera: *camera,
-        organs: anatomy.organs.iter().map(|o| Anatomy::info(o, pixel)).collect(),
+        organs: anatomy.organs.iter().map(organ).collect(),
     }
 }
 
