@@ -77,6 +77,19 @@ mod tests {
     }
 
     #[test]
+    fn the_camera_sees_where_each_organ_begins() {
+        every(|_, anatomy, which| {
+            for organ in &anatomy.organs {
+                let base = organ.body.base();
+                let first = (0..4000)
+                    .map(|i| base * (0.5 + 0.5 * f64::from(i) / 4000.0))
+                    .find_map(|p| anatomy.organs.iter().find(|o| o.body.distance(p) < 0.0).map(|o| o.name));
+                assert_eq!(first, Some(organ.name), "{which}: the base of {} is hidden", organ.name);
+            }
+        });
+    }
+
+    #[test]
     fn organs_rest_on_the_bed() {
         for plan in PLANS {
             let anatomy = Anatomy::new(plan, 0);

@@ -9,7 +9,7 @@ use crate::tube::{Shape, Tube};
 use glam::DVec3;
 
 /// Distance at which two organs touch [m].
-pub(crate) const TOUCH: f64 = 0.2e-3;
+const TOUCH: f64 = 0.2e-3;
 /// How far above the bed an organ's centreline runs, relative to its height: the rest sinks in.
 const LIFT: f64 = 0.45;
 
@@ -33,12 +33,12 @@ pub(crate) enum Form {
     Coil(Coil),
 }
 
-/// A bowel folded into a mass: runs side by side and one across them. Its base is the middle of its first run's end.
+/// A bowel folded into a mass: two layers of runs side by side and a loop across them. It begins at the end of its first run.
 #[derive(Clone, Copy)]
 pub(crate) struct Coil {
-    /// Number of runs in the lower layer.
+    /// Number of runs in the lower layer, at least two; the upper has one less.
     pub runs: usize,
-    /// Length of the longest run [m]; those at the sides are shorter.
+    /// Length of the lower layer's middle [m]; runs at the sides and above are shorter.
     pub width: f64,
     pub radius: f64,
     /// Distance between runs [m].
@@ -133,35 +133,39 @@ impl Coil {
             folds: (0.10, 0.0095),
             seed: noise::key(&[seed, 70 + k]),
         };
-        let middle = 0.5 * (runs as f64 - 1.0);
-        for run in 0..runs {
-            let row = run as f64 - middle;
-            let half = 0.5 * width * (1.0 - 0.24 * (row / middle.max(1.0)).powi(2) + 0.07 * vary(run as u64));
-            let shift = 0.06 * width * vary(10 + run as u64);
+        // Two layers, the upper in the furrows of the lower.
+        let layers = (0..runs).map(|row| (row, runs, 0.0)).chain((0..runs - 1).map(|row| (row, runs - 1, 1.45)));
+        for (k, (row, rows, level)) in layers.enumerate() {
+            let k = k as u64;
+            let middle = 0.5 * (rows as f64 - 1.0);
+            let y = (row as f64 - middle) * pitch;
+            let outward = 2.0 * y / (pitch * runs as f64);
+            let half = 0.5 * (width - level * radius) * (1.0 - 0.35 * outward * outward + 0.07 * vary(k));
+            let shift = 0.05 * width * vary(10 + k);
             // To and fro, so that the loops follow each other; each end turns towards the neighbour it goes over into.
-            let forward = if run % 2 == 0 { 1.0 } else { -1.0 };
+            let forward = if row % 2 == 0 { 1.0 } else { -1.0 };
             let line = (0..POINTS)
                 .map(|i| {
                     let t = 2.0 * i as f64 / (POINTS - 1) as f64 - 1.0;
-                    let bow = 0.10 * pitch * vary(30 + run as u64) * (1.0 - t * t);
-                    let after = 0.45 * pitch * ((t - 0.62).max(0.0) / 0.38).powi(2);
-                    let before = 0.45 * pitch * ((-t - 0.62).max(0.0) / 0.38).powi(2);
-                    let turn = if run + 1 < runs { after } else { 0.0 } - if run > 0 { before } else { 0.0 };
-                    let wave = 0.10 * (3.0 * t + vary(40 + run as u64)).sin();
-                    place(forward * t * half + shift, row * pitch + bow + turn, wave)
+                    let bow = 0.10 * pitch * vary(30 + k) * (1.0 - t * t);
+                    let turning = |t: f64| 0.45 * pitch * ((t - 0.62).max(0.0) / 0.38).powi(2);
+                    let after = if row + 1 < rows { turning(t) } else { 0.0 };
+                    let before = if row > 0 { turning(-t) } else { 0.0 };
+                    let wave = 0.10 * (3.0 * t + vary(40 + k)).sin();
+                    place(forward * t * half + shift, y + bow + after - before, level + wave)
                 })
                 .collect();
-            parts.push(strand(line, run as u64));
+            parts.push(strand(line, k));
         }
         // A loop that has slipped on top of the others.
         let line = (0..2 * POINTS)
             .map(|i| {
                 let t = 2.0 * i as f64 / (2 * POINTS - 1) as f64 - 1.0;
-                let (x, y) = (0.30 * width * (2.6 * t).sin(), 0.36 * pitch * runs as f64 * t);
-                place(x, y, 1.15 + 0.1 * (1.0 - t * t))
+                let (x, y) = (0.26 * width * (2.4 * t).sin(), 0.22 * pitch * runs as f64 * t);
+                place(x, y, 2.55 - 0.5 * t * t)
             })
             .collect();
-        parts.push(strand(line, runs as u64));
+        parts.push(strand(line, 20));
         let ends = match (parts.first(), parts.last()) {
             (Some(Part::Strand { line: first, .. }), Some(Part::Strand { line: last, .. })) => {
                 [first[2], last[2 * POINTS - 1]]

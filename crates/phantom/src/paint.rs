@@ -62,13 +62,13 @@ fn bowel_color(organ: &Organ, p: DVec3, [base, flush]: [DVec3; 2], vessels: Vess
 
 fn liver_color(organ: &Organ, p: DVec3) -> DVec3 {
     let seed = organ.seed;
-    let dark = DVec3::new(96.0, 34.0, 30.0);
-    let warm = DVec3::new(132.0, 54.0, 42.0);
+    let dark = DVec3::new(80.0, 32.0, 28.0);
+    let warm = DVec3::new(114.0, 52.0, 41.0);
     let mut color = dark.lerp(warm, (0.5 + 0.6 * fractal(seed + 1, p / 35e-3, 3)).clamp(0.0, 1.0));
     color *= 1.0 + 0.07 * fractal(seed + 2, p / 5e-3, 2);
     // A pig's lobules show through the capsule: paler septa around them.
-    let septum = 1.0 - step(0.0, 0.22, smooth(seed + 3, p / 5.5e-3).abs());
-    color = color.lerp(DVec3::new(158.0, 84.0, 66.0), 0.20 * septum);
+    let septum = 1.0 - step(0.0, 0.22, fractal(seed + 3, p / 6e-3, 2).abs());
+    color = color.lerp(DVec3::new(158.0, 84.0, 66.0), 0.2 * septum);
     let vessels = network(seed + 4, p, 45e-3, 2.4e-3).max(0.6 * network(seed + 5, p, 20e-3, 1.6e-3));
     color = color.lerp(DVec3::new(66.0, 18.0, 24.0), 0.5 * vessels);
     // Connective tissue where the gallbladder is attached.
@@ -82,15 +82,15 @@ fn liver_color(organ: &Organ, p: DVec3) -> DVec3 {
 
 fn gallbladder_color(organ: &Organ, p: DVec3) -> DVec3 {
     let seed = organ.seed;
-    let bile = DVec3::new(78.0, 104.0, 52.0);
-    let wall = DVec3::new(136.0, 146.0, 84.0);
+    let bile = DVec3::new(72.0, 92.0, 54.0);
+    let wall = DVec3::new(134.0, 138.0, 86.0);
     let mut color = bile.lerp(wall, (0.45 + 0.7 * fractal(seed + 1, p / 22e-3, 3)).clamp(0.0, 1.0));
     color *= 1.0 + 0.06 * fractal(seed + 2, p / 5e-3, 2);
     // The neck is paler, and some fat clings to it.
     let s = organ.body.local(p).s;
     let fat = fractal(seed + 3, p / 12e-3, 3) + 0.25 - 1.6 * s;
     color = color.lerp(FAT, 0.7 * step(0.0, 0.3, fat));
-    let vessels = network(seed + 4, p, 20e-3, 1.8e-3).max(0.7 * network(seed + 5, p, 10e-3, 1.2e-3));
+    let vessels = network(seed + 4, p, 28e-3, 2.2e-3).max(0.5 * network(seed + 5, p, 14e-3, 1.8e-3));
     color.lerp(VEIN, 0.55 * vessels)
 }
 

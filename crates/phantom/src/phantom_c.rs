@@ -8,7 +8,7 @@ use crate::blend::{Blend, Part, Recipe};
 use crate::body::Body;
 use crate::instruments::{Reach, Sweep};
 use crate::noise;
-use crate::pack::{TOUCH, shape};
+use crate::pack::shape;
 use crate::plan::{Look, Organ, PinRule, Plan};
 use crate::still::Fineness;
 use crate::tube::Tube;
@@ -47,7 +47,7 @@ pub(crate) const PLAN: Plan = Plan {
             },
         ],
     },
-    fineness: Fineness { surface: 1.2e-3, bed: 2.0e-3 },
+    fineness: Fineness { surface: 1.0e-3, bed: 2.0e-3 },
     lit_at: 0.40,
     crease: 30e-3,
 };
@@ -62,16 +62,19 @@ struct Lobe {
 /// Four lobes that come from the middle at the top.
 #[rustfmt::skip]
 const LOBES: [Lobe; 5] = [
-    Lobe { at: (4.0, -26.0), heading_deg: 2.0, radii: (84.0, 40.0, 23.0) },
-    Lobe { at: (-66.0, 10.0), heading_deg: 128.0, radii: (70.0, 41.0, 18.0) },
-    Lobe { at: (-22.0, 30.0), heading_deg: 100.0, radii: (64.0, 31.0, 20.0) },
-    Lobe { at: (36.0, 28.0), heading_deg: 72.0, radii: (64.0, 32.0, 20.0) },
-    Lobe { at: (78.0, 0.0), heading_deg: 38.0, radii: (68.0, 42.0, 20.0) },
+    Lobe { at: (4.0, -26.0), heading_deg: 2.0, radii: (76.0, 35.0, 23.0) },
+    Lobe { at: (-74.0, 12.0), heading_deg: 133.0, radii: (68.0, 36.0, 18.0) },
+    Lobe { at: (-25.0, 32.0), heading_deg: 103.0, radii: (64.0, 29.0, 20.0) },
+    Lobe { at: (40.0, 30.0), heading_deg: 73.0, radii: (64.0, 30.0, 20.0) },
+    Lobe { at: (86.0, 4.0), heading_deg: 41.0, radii: (66.0, 38.0, 20.0) },
 ];
 /// The thickest lobe's semi-axis [mm]; the bed gives way to a quarter of it.
 const THICK: f64 = 23.0;
 /// Where the neck of the gallbladder is [mm], before scaling.
 const NECK: (f64, f64) = (9.0, -12.0);
+
+/// Space between the gallbladder and the liver [m].
+const FOSSA: f64 = 0.4e-3;
 
 fn organs(seed: u64, bed: &Bed) -> Vec<Organ> {
     let seeds = [0, 1].map(|index| noise::key(&[seed, 2, index]));
@@ -123,7 +126,7 @@ fn liver(seed: u64, scale: f64, bed: &Bed, gallbladder: Option<Tube>) -> Blend {
         bumps: [(2.2e-3, 40e-3), (0.25e-3, 9e-3)],
         seed: noise::key(&[seed, 90]),
         ends: [DVec3::new(-30.0, -30.0, 0.0), DVec3::new(-100.0, 45.0, 0.0)].map(|p| (p * mm).with_z(middle)),
-        groove: gallbladder.map(|tube| (tube, TOUCH)),
+        groove: gallbladder.map(|tube| (tube, FOSSA)),
         sampling: 5e-3,
     })
 }
@@ -131,12 +134,12 @@ fn liver(seed: u64, scale: f64, bed: &Bed, gallbladder: Option<Tube>) -> Blend {
 /// The gallbladder: half sunk into the liver's face at its neck, its fundus over the liver's edge.
 fn gallbladder(seed: u64, scale: f64, liver: &Blend, bed: &Bed) -> Tube {
     let vary = |k: u64, by: f64| by * (2.0 * noise::unit(noise::key(&[seed, k])) - 1.0);
-    let shape = shape(80.0, 8.3, 7.9, 1.7, 0.42, (0.02, 30.0), [0.35 + vary(0, 0.1), -0.5 + vary(1, 0.1)]);
+    let shape = shape(76.0, 6.4, 6.1, 2.2, 0.34, (0.02, 30.0), [0.35 + vary(0, 0.1), -0.5 + vary(1, 0.1)]);
     let neck = (NECK.0 * scale * 1e-3, NECK.1 * scale * 1e-3);
     let heading = (84.0 + vary(2, 4.0)).to_radians();
     let (sin, cos) = heading.sin_cos();
     let start = face(liver, neck.0, neck.1, bed) + 1.5e-3;
-    let end = bed.smooth_height(neck.0 + shape.length * cos, neck.1 + shape.length * sin) - 19e-3;
+    let end = bed.smooth_height(neck.0 + shape.length * cos, neck.1 + shape.length * sin) - 20e-3;
     Tube::lay(shape, seed, neck, heading, |x, y| {
         let along = ((x - neck.0) * cos + (y - neck.1) * sin) / shape.length;
         start + (end - start) * along.clamp(0.0, 1.0).powi(2)

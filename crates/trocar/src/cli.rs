@@ -54,7 +54,8 @@ pub struct Demo {
 /// Arguments of `record`.
 #[derive(Debug, Args)]
 pub struct Record {
-    /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix).
+    /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix), phantom-b (rabbit: bowel bloc, small
+    /// bowel, appendix, cecum, stomach), phantom-c (pig: liver, gallbladder).
     pub phantom: String,
     /// Recording folder to write.
     #[arg(short, long)]
