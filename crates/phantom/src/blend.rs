@@ -4,6 +4,8 @@ use crate::body::Local;
 use crate::noise;
 use crate::tube::Tube;
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+use std::sync::OnceLock;
 use trocar_geometry::{SignedDistance, isosurface, sample_distance};
 
 /// One of the parts.
@@ -40,7 +42,8 @@ pub(crate) struct Blend {
     recipe: Recipe,
     /// A ball around each part, as long as the parts.
     balls: Vec<(DVec3, f64)>,
-    samples: Vec<DVec3>,
+    /// Points on the surface, once somebody has asked for them.
+    samples: OnceLock<Vec<DVec3>>,
 }
 
 /// Width over which a groove's rim is rounded [m].
@@ -49,10 +52,7 @@ const RIM: f64 = 4e-3;
 impl Blend {
     pub fn new(recipe: Recipe) -> Self {
         let balls = recipe.parts.iter().map(Part::ball).collect();
-        let mut made = Self { recipe, balls, samples: Vec::new() };
-        let rough = isosurface(&sample_distance(&made, made.bounds(), made.recipe.sampling), 0.0);
-        made.samples = rough.vertices.into_iter().map(|p| made.onto(p)).collect();
-        made
+        Self { recipe, balls, samples: OnceLock::new() }
     }
 
     pub fn base(&self) -> DVec3 {
@@ -82,7 +82,10 @@ impl Blend {
 
     /// Points on the surface.
     pub fn samples(&self) -> &[DVec3] {
-        &self.samples
+        self.samples.get_or_init(|| {
+            let rough = isosurface(&sample_distance(self, self.bounds(), self.recipe.sampling), 0.0);
+            rough.vertices.into_par_iter().map(|p| self.onto(p)).collect()
+        })
     }
 
     /// What lies in the groove.

@@ -80,10 +80,10 @@ fn organs(seed: u64, bed: &Bed) -> Vec<Organ> {
     let seeds = [0, 1].map(|index| noise::key(&[seed, 2, index]));
     let mut scale = 1.0;
     // The volume is that of the parts but for bumps and fossa, which do not scale: a few rounds settle it.
-    for _ in 0..4 {
+    for _ in 0..3 {
         let gallbladder = gallbladder(seeds[1], scale, &liver(seeds[0], scale, bed, None), bed);
         let carved = Body::Blend(liver(seeds[0], scale, bed, Some(gallbladder)));
-        scale *= (LIVER / carved.volume(3e-3)).cbrt();
+        scale *= (LIVER / carved.volume(4e-3)).cbrt();
     }
     let gallbladder = gallbladder(seeds[1], scale, &liver(seeds[0], scale, bed, None), bed);
     let liver = liver(seeds[0], scale, bed, Some(gallbladder.clone()));

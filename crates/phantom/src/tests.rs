@@ -77,20 +77,20 @@ fn every_organ_pixel_is_seen_through_the_instruments_motion() {
         let arms = instruments::pair(&plan.reach, 1.0);
         let take = Take { instruments: &arms, camera: &camera, sensor: Sensor::Plain, seed: 0 };
         let mut free = vec![0; camera.width * camera.height];
-        for index in (0..180).step_by(2) {
+        for index in (0..180).step_by(3) {
             let shot = shoot(&still, &take, index);
             for (f, covered) in free.iter_mut().zip(&shot.instruments.set) {
                 *f += usize::from(!covered);
             }
         }
-        let covered_sometimes = free.iter().filter(|f| **f < 90).count();
+        let covered_sometimes = free.iter().filter(|f| **f < 60).count();
         assert!(covered_sometimes > free.len() / 4, "{}: the instruments move over much of the picture", plan.name);
         for (organ, name) in plan.listed.iter().enumerate() {
             let mask = still.organ_mask(organ);
             assert!(mask.count() > 50, "{name} shows in {} pixels", mask.count());
             let under: Vec<usize> = mask.set.iter().zip(&free).filter(|(m, _)| **m).map(|(_, f)| *f).collect();
             let least = under.iter().min().unwrap();
-            assert!(*least >= 3, "{}: a pixel of {name} is free in {least} frames only", plan.name);
+            assert!(*least >= 2, "{}: a pixel of {name} is free in {least} frames only", plan.name);
         }
     }
 }
@@ -124,9 +124,9 @@ fn recorded_depth_is_the_truth_within_its_noise() {
 fn true_depth_on_an_organs_mask_is_that_organs_front() {
     use trocar_geometry::SignedDistance;
     let camera = small();
-    for plan in PLANS {
+    for plan in [&phantom_b::PLAN, &phantom_c::PLAN] {
         let anatomy = Anatomy::new(plan, 2);
-        let still = Still::new(plan, &anatomy, &camera, plan.fineness);
+        let still = Still::new(plan, &anatomy, &camera, Fineness { surface: plan.fineness.surface, ..coarse(plan) });
         for (index, organ) in anatomy.organs.iter().enumerate() {
             let mask = still.organ_mask(index);
             let mut off = Vec::new();
