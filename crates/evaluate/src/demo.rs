@@ -47,7 +47,7 @@ impl Demo {
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<DemoResult> {
         let clock = Instant::now();
         let [recording, specimen, run] = ["recording", "specimen", "run"].map(|name| output.join(name));
-        let options = RecordOptions { frames: self.frames, seed: self.seed };
+        let options = RecordOptions { frames: self.frames, seed: self.seed, ..RecordOptions::default() };
         trocar_phantom::record("phantom-a", &options, &recording, progress)?;
         let (reconstructed, reconstruction) =
             reconstruct_recording(&recording, &Settings::default(), &specimen, progress)?;

@@ -1,13 +1,11 @@
 //! The mesentery that the organs lie on: a height field.
 
+use crate::body::Body;
 use crate::noise;
-use crate::tube::Tube;
 use glam::DVec3;
 use rayon::prelude::*;
 use trocar_geometry::{SignedDistance, TriMesh};
 
-/// Depth of the bed where nothing bends it [m].
-const DEPTH: f64 = 0.150;
 /// Space left between an organ and the bed under it [m].
 const SPACE: f64 = 0.3e-3;
 /// How high the bed climbs where it meets an organ, and how far from it it begins to [m].
@@ -16,46 +14,76 @@ const CLIMB_REACH: f64 = 2.5e-3;
 /// Half the bed's extent along x and y [m]: more than the camera sees.
 const EXTENT: (f64, f64) = (0.225, 0.130);
 
+/// What a bed is like.
+#[derive(Clone, Copy)]
+pub(crate) struct BedPlan {
+    /// Depth where nothing bends it [m].
+    pub depth: f64,
+    /// Size of everything on it and of itself, relative to [`Self::MESENTERY`].
+    pub scale: f64,
+    /// Colour of its two layers, and how much fat lies on them (0 to 1).
+    pub meat: DVec3,
+    pub film: DVec3,
+    pub fat: f64,
+}
+
+impl BedPlan {
+    /// A rabbit's, seen from 15 cm.
+    pub const MESENTERY: Self = Self {
+        depth: 0.150,
+        scale: 1.0,
+        meat: DVec3::new(138.0, 50.0, 46.0),
+        film: DVec3::new(180.0, 88.0, 72.0),
+        fat: 1.0,
+    };
+}
+
 /// A gently undulating sheet that gives way under organs.
 pub(crate) struct Bed {
+    pub plan: BedPlan,
     pub seed: u64,
-    organs: Vec<Tube>,
+    organs: Vec<Body>,
 }
 
 impl Bed {
-    pub fn new(seed: u64) -> Self {
-        Self { seed, organs: Vec::new() }
+    pub fn new(plan: BedPlan, seed: u64) -> Self {
+        Self { plan, seed, organs: Vec::new() }
     }
 
     /// Lets `organs` press their shape into the bed.
-    pub fn imprint(&mut self, organs: Vec<Tube>) {
+    pub fn imprint(&mut self, organs: Vec<Body>) {
         self.organs = organs;
     }
 
     /// Depth of the bed without its lobules and imprints: what organs are laid along [m].
     pub fn smooth_height(&self, x: f64, y: f64) -> f64 {
-        let waves = 3.5e-3 * noise::smooth(self.seed, DVec3::new(x / 0.055, y / 0.055, 0.5));
+        let scale = self.plan.scale;
+        let wide = 0.055 * scale;
+        let waves = 3.5e-3 * scale * noise::smooth(self.seed, DVec3::new(x / wide, y / wide, 0.5));
         // The abdominal wall rises around the field.
-        let out = ((x / 0.19).powi(2) + (y / 0.125).powi(2)).sqrt();
+        let out = ((x / (0.19 * scale)).powi(2) + (y / (0.125 * scale)).powi(2)).sqrt();
         let t = ((out - 0.45) / 0.75).clamp(0.0, 1.0);
-        DEPTH + waves - 0.030 * t * t * (3.0 - 2.0 * t)
+        self.plan.depth + waves - 0.030 * scale * t * t * (3.0 - 2.0 * t)
     }
 
     /// Distance from the seams between the bed's lobules, in no unit: 0 on a seam.
     pub fn seams(&self, x: f64, y: f64) -> f64 {
-        noise::fractal(self.seed + 10, DVec3::new(x / 0.012, y / 0.012, 0.5), 2).abs()
+        let wide = 0.012 * self.plan.scale;
+        noise::fractal(self.seed + 10, DVec3::new(x / wide, y / wide, 0.5), 2).abs()
     }
 
     /// Depth of the bed [m].
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let smooth = self.smooth_height(x, y);
         let lobes = self.seams(x, y);
-        let folds = noise::fractal(self.seed + 20, DVec3::new(x / 0.035, y / 0.06, 0.5), 2).abs();
-        let lobe = 1.4e-3 * (lobes.min(0.5) - 0.2);
-        let mut p = DVec3::new(x, y, smooth - lobe - 4e-3 * (folds - 0.3).max(0.0));
+        let scale = self.plan.scale;
+        let across = DVec3::new(x / (0.035 * scale), y / (0.06 * scale), 0.5);
+        let folds = noise::fractal(self.seed + 20, across, 2).abs();
+        let lobe = 1.4e-3 * scale * (lobes.min(0.5) - 0.2);
+        let mut p = DVec3::new(x, y, smooth - lobe - 4e-3 * scale * (folds - 0.3).max(0.0));
         // The sheet climbs a little towards an organ: there it is attached.
         let beside = self.organs.iter().map(|o| o.distance(p)).fold(f64::INFINITY, f64::min);
-        p.z -= CLIMB * (-beside.max(0.0) / CLIMB_REACH).exp();
+        p.z -= CLIMB * scale * (-beside.max(0.0) / (CLIMB_REACH * scale)).exp();
         // Down until clear of every organ; each step is at least a little, so a column through an organ gets below it.
         for _ in 0..400 {
             let nearest = self.organs.iter().map(|o| o.distance(p)).fold(f64::INFINITY, f64::min);
@@ -69,12 +97,13 @@ impl Bed {
 
     /// The sheet as a mesh with triangles of `spacing` [m], facing the camera.
     pub fn mesh(&self, spacing: f64) -> TriMesh {
-        let columns = (2.0 * EXTENT.0 / spacing).ceil() as usize + 1;
-        let rows = (2.0 * EXTENT.1 / spacing).ceil() as usize + 1;
+        let extent = (EXTENT.0 * self.plan.scale, EXTENT.1 * self.plan.scale);
+        let columns = (2.0 * extent.0 / spacing).ceil() as usize + 1;
+        let rows = (2.0 * extent.1 / spacing).ceil() as usize + 1;
         let vertices = (0..rows * columns)
             .into_par_iter()
             .map(|i| {
-                let (x, y) = ((i % columns) as f64 * spacing - EXTENT.0, (i / columns) as f64 * spacing - EXTENT.1);
+                let (x, y) = ((i % columns) as f64 * spacing - extent.0, (i / columns) as f64 * spacing - extent.1);
                 DVec3::new(x, y, self.height(x, y))
             })
             .collect();

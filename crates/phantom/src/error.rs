@@ -7,8 +7,15 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// There is no phantom of that name.
-    #[error("unknown phantom '{0}'; known: phantom-a")]
-    Unknown(String),
+    #[error("unknown phantom '{name}'; did you mean '{nearest}'? Known: {known}")]
+    Unknown {
+        /// What was asked for.
+        name: String,
+        /// The phantom whose name is most like it.
+        nearest: &'static str,
+        /// All names.
+        known: String,
+    },
     /// An option is out of range.
     #[error("{0}")]
     Option(String),

@@ -1,7 +1,8 @@
 //! Single frames: the still picture with the instruments before it, as the sensor gives it.
 
 use crate::instruments::Instrument;
-use crate::sensor;
+use crate::sensor::{self, Sensor};
+use crate::stereo;
 use crate::still::Still;
 use glam::DVec2;
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
@@ -23,20 +24,45 @@ pub(crate) struct Shot {
     pub instruments: Mask,
 }
 
+/// How a recording is filmed.
+#[derive(Clone, Copy)]
+pub(crate) struct Take<'a> {
+    pub instruments: &'a [Instrument],
+    pub camera: &'a Camera,
+    pub sensor: Sensor,
+    pub seed: u64,
+}
+
 /// Films frame `index`.
-pub(crate) fn shoot(still: &Still, instruments: &[Instrument], camera: &Camera, seed: u64, index: usize) -> Shot {
-    let mut color = still.frame.color.clone();
-    let mut depth = still.frame.depth.clone();
-    let mut facing = still.frame.facing.clone();
-    let mut mask = Mask::new(camera.width, camera.height);
+pub(crate) fn shoot(still: &Still, take: &Take<'_>, index: usize) -> Shot {
+    let Take { instruments, camera, sensor, seed } = *take;
+    let mut canvas = Canvas {
+        color: still.frame.color.clone(),
+        depth: still.frame.depth.clone(),
+        facing: still.frame.facing.clone(),
+        instruments: Mask::new(camera.width, camera.height),
+    };
     for instrument in instruments {
         let mesh = instrument.mesh(index as f64 / RATE_HZ);
         if let Some(window) = Window::around(&mesh, camera) {
-            window.draw(mesh, camera, &mut color, &mut depth, &mut facing, &mut mask);
+            window.draw(mesh, camera, still.lit_at, &mut canvas);
         }
     }
+    let Canvas { mut color, mut depth, facing, instruments } = canvas;
+    if sensor == Sensor::Stereo {
+        stereo::bend(&mut depth, seed, index);
+    }
     sensor::expose(&mut color, &mut depth, &facing, seed, index);
-    Shot { color, depth, instruments: sensor::dilate(&mask, MASK_GROWTH) }
+    Shot { color, depth, instruments: sensor::dilate(&instruments, MASK_GROWTH) }
+}
+
+/// What has been drawn so far.
+struct Canvas {
+    color: ColorImage,
+    depth: DepthImage,
+    /// Cosine of view and surface at each pixel.
+    facing: Vec<f32>,
+    instruments: Mask,
 }
 
 /// The part of the image that an instrument can cover; nothing else needs rays.
@@ -88,15 +114,8 @@ impl Window {
     }
 
     /// Draws the instrument before what is there. Its rim is blended by the share of rays that hit.
-    fn draw(
-        &self,
-        mesh: TriMesh,
-        camera: &Camera,
-        color: &mut ColorImage,
-        depth: &mut DepthImage,
-        facing: &mut [f32],
-        mask: &mut Mask,
-    ) {
+    fn draw(&self, mesh: TriMesh, camera: &Camera, lit_at: f32, canvas: &mut Canvas) {
+        let Canvas { color, depth, facing, instruments } = canvas;
         let shading = Shading { color: [160; 3], gloss: 0.8, wireframe: false };
         let scene = Scene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]);
         let centres = scene.render(&self.camera(camera, 1), &Pose::IDENTITY, 1);
@@ -115,7 +134,7 @@ impl Window {
                     if before(z) {
                         hits += 1;
                         let light = srgb::to_linear(fine.color.pixels[at]);
-                        let lamp = sensor::lamp(camera, x as f64, y as f64, z);
+                        let lamp = sensor::lamp(camera, x as f64, y as f64, z, lit_at);
                         sum = [0, 1, 2].map(|c| sum[c] + light[c] * lamp);
                     }
                 }
@@ -128,7 +147,7 @@ impl Window {
                 if before(z) {
                     depth.depth[i] = z;
                     facing[i] = centres.facing[v * self.width + u];
-                    mask.set[i] = true;
+                    instruments.set[i] = true;
                 }
             }
         }
@@ -144,14 +163,17 @@ mod tests {
     fn nothing_of_an_instrument_is_cut_off_by_its_window() {
         let camera = Camera { width: 424, height: 240, fx: 223.4, fy: 223.4, cx: 211.5, cy: 119.5, ..Camera::d405() };
         let masked = |window: &Window, mesh: TriMesh| {
-            let mut color = ColorImage::new(camera.width, camera.height, [0; 3]);
-            let mut depth = DepthImage::new(camera.width, camera.height);
-            let mut mask = Mask::new(camera.width, camera.height);
-            window.draw(mesh, &camera, &mut color, &mut depth, &mut vec![0.0; 424 * 240], &mut mask);
-            (color, mask)
+            let mut canvas = Canvas {
+                color: ColorImage::new(camera.width, camera.height, [0; 3]),
+                depth: DepthImage::new(camera.width, camera.height),
+                facing: vec![0.0; camera.width * camera.height],
+                instruments: Mask::new(camera.width, camera.height),
+            };
+            window.draw(mesh, &camera, 0.15, &mut canvas);
+            (canvas.color, canvas.instruments)
         };
         for frame in (0..180).step_by(20) {
-            for instrument in instruments::pair(0.7) {
+            for instrument in instruments::pair(&crate::phantom_a::PLAN.reach, 0.7) {
                 let mesh = instrument.mesh(frame as f64 / RATE_HZ);
                 let window = Window::around(&mesh, &camera).unwrap();
                 let whole = Window { u: 0, v: 0, width: camera.width, height: camera.height };

@@ -1,8 +1,27 @@
-//! Two laparoscopic instruments that move over the organs: 5 mm shafts with a jaw.
+//! Two laparoscopic instruments that move over the organs: shafts of 5 mm, or more, with a jaw.
 
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
 use trocar_geometry::TriMesh;
+
+/// How large the instruments are and where they move.
+#[derive(Clone, Copy)]
+pub(crate) struct Reach {
+    /// Size relative to instruments with 5 mm shafts.
+    pub scale: f64,
+    /// The left and the right one.
+    pub sweeps: [Sweep; 2],
+}
+
+/// Where an instrument moves, in the camera frame [m].
+#[derive(Clone, Copy)]
+pub(crate) struct Sweep {
+    /// Where the shaft passes the abdominal wall, outside the picture.
+    pub port: DVec3,
+    /// Middle and amplitudes of the tip's motion.
+    pub centre: DVec3,
+    pub amplitude: DVec3,
+}
 
 const SIDES: usize = 28;
 const SHAFT_RADIUS: f64 = 2.5e-3;
@@ -10,29 +29,26 @@ const JAW_LENGTH: f64 = 15e-3;
 
 /// One instrument and how it moves.
 pub(crate) struct Instrument {
-    /// Where the shaft passes the abdominal wall, in the camera frame, outside the picture [m].
-    port: DVec3,
-    /// Middle of the tip's motion [m], its amplitudes [m], periods [s] and phases [rad].
-    centre: DVec3,
-    amplitude: DVec3,
+    scale: f64,
+    sweep: Sweep,
+    /// Periods [s] and phases [rad] of the tip's motion.
     period: DVec3,
     phase: DVec3,
 }
 
 /// The left and the right instrument; `phase` shifts their motion [rad].
-pub(crate) fn pair(phase: f64) -> [Instrument; 2] {
+pub(crate) fn pair(reach: &Reach, phase: f64) -> [Instrument; 2] {
+    let Reach { scale, sweeps: [left, right] } = *reach;
     [
         Instrument {
-            port: DVec3::new(-0.30, 0.015, 0.055),
-            centre: DVec3::new(-0.022, 0.004, 0.168),
-            amplitude: DVec3::new(0.034, 0.036, 0.005),
+            scale,
+            sweep: left,
             period: DVec3::new(5.3, 3.1, 2.3),
             phase: DVec3::new(phase, 0.4 + 2.0 * phase, 0.0),
         },
         Instrument {
-            port: DVec3::new(0.30, -0.020, 0.055),
-            centre: DVec3::new(0.030, -0.002, 0.168),
-            amplitude: DVec3::new(0.032, 0.036, 0.005),
+            scale,
+            sweep: right,
             period: DVec3::new(4.7, 3.7, 2.9),
             phase: DVec3::new(1.3 + phase, 2.0 - phase, 1.0),
         },
@@ -48,8 +64,9 @@ impl Instrument {
             swing(self.period.y, self.phase.y),
             swing(self.period.z, self.phase.z),
         );
-        let tip = self.centre + self.amplitude * offset;
-        let x = (tip - self.port).normalize();
+        let Sweep { port, centre, amplitude } = self.sweep;
+        let tip = centre + amplitude * offset;
+        let x = (tip - port).normalize();
         let roll = 0.5 * swing(self.period.x * 1.7, 0.0);
         let y = DVec3::Z.cross(x).normalize();
         let (y, z) = (y * roll.cos() + x.cross(y) * roll.sin(), x.cross(y) * roll.cos() - y * roll.sin());
@@ -58,7 +75,7 @@ impl Instrument {
 
         let mut mesh = TriMesh::default();
         let hinge = -JAW_LENGTH;
-        let reach = (tip - self.port).length() + 0.01;
+        let reach = (tip - port).length() / self.scale + 0.01;
         let round = |x: f64, r: f64| (DVec3::new(x, 0.0, 0.0), r, r);
         let dark = [58, 58, 64];
         let steel = [172, 176, 184];
@@ -87,7 +104,7 @@ impl Instrument {
             loft(&mut mesh, &rings, steel);
         }
         for v in &mut mesh.vertices {
-            *v = tip + turn * *v;
+            *v = tip + turn * (*v * self.scale);
         }
         mesh
     }
@@ -128,12 +145,12 @@ mod tests {
     use super::*;
 
     fn instrument_length(instrument: &Instrument) -> f64 {
-        (instrument.centre - instrument.port).length()
+        (instrument.sweep.centre - instrument.sweep.port).length()
     }
 
     #[test]
     fn surfaces_face_outward() {
-        for instrument in pair(0.3) {
+        for instrument in pair(&crate::phantom_a::PLAN.reach, 0.3) {
             let mesh = instrument.mesh(1.0);
             let volume: f64 = mesh
                 .triangles

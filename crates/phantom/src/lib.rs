@@ -2,13 +2,21 @@
 
 mod anatomy;
 mod bed;
+mod blend;
+mod body;
 mod error;
 mod film;
 mod instruments;
 mod noise;
+mod pack;
 mod paint;
+mod phantom_a;
+mod phantom_b;
+mod phantom_c;
+mod plan;
 mod record;
 mod sensor;
+mod stereo;
 mod still;
 mod tube;
 
@@ -16,4 +24,6 @@ mod tube;
 mod tests;
 
 pub use error::{Error, Result};
-pub use record::{NAMES, RecordOptions, describe, record};
+pub use plan::NAMES;
+pub use record::{RecordOptions, describe, record};
+pub use sensor::Sensor;

@@ -1,11 +1,12 @@
 //! The looks of tissue: base colours, mottling, branching vessels, fat, painted per vertex.
 
-use crate::anatomy::Organ;
-use crate::bed::Bed;
+use crate::bed::{Bed, BedPlan};
+use crate::body::Body;
 use crate::noise::{fractal, smooth};
+use crate::plan::{Look, Organ, Vessels};
 use glam::DVec3;
 use rayon::prelude::*;
-use trocar_geometry::TriMesh;
+use trocar_geometry::{SignedDistance, TriMesh};
 
 const VEIN: DVec3 = DVec3::new(112.0, 28.0, 40.0);
 const FAT: DVec3 = DVec3::new(226.0, 176.0, 104.0);
@@ -24,18 +25,27 @@ fn bytes(color: DVec3) -> [u8; 3] {
     color.to_array().map(|c| c.round().clamp(0.0, 255.0) as u8)
 }
 
+/// Strength of the highlights on an organ.
+pub(crate) fn gloss(look: Look) -> f32 {
+    match look {
+        Look::Bowel { .. } => 0.4,
+        Look::Liver => 0.5,
+        Look::Gallbladder => 0.45,
+    }
+}
+
 fn organ_color(organ: &Organ, p: DVec3) -> DVec3 {
+    match organ.look {
+        Look::Bowel { base, flush, vessels } => bowel_color(organ, p, [base, flush], vessels),
+        Look::Liver => liver_color(organ, p),
+        Look::Gallbladder => gallbladder_color(organ, p),
+    }
+}
+
+fn bowel_color(organ: &Organ, p: DVec3, [base, flush]: [DVec3; 2], vessels: Vessels) -> DVec3 {
     let seed = organ.seed;
-    let local = organ.tube.local(p);
-    let along = local.s * organ.tube.length();
-    let (base, flush) = match organ.name {
-        "cecum" => (DVec3::new(158.0, 92.0, 88.0), DVec3::new(120.0, 70.0, 66.0)),
-        "bowel-1" => (DVec3::new(214.0, 134.0, 120.0), DVec3::new(196.0, 100.0, 92.0)),
-        "bowel-2" => (DVec3::new(206.0, 112.0, 104.0), DVec3::new(184.0, 84.0, 80.0)),
-        "bowel-3" => (DVec3::new(222.0, 152.0, 134.0), DVec3::new(206.0, 120.0, 106.0)),
-        "stomach" => (DVec3::new(226.0, 172.0, 156.0), DVec3::new(208.0, 138.0, 128.0)),
-        _ => (DVec3::new(236.0, 196.0, 146.0), DVec3::new(220.0, 150.0, 112.0)),
-    };
+    let local = organ.body.local(p);
+    let along = local.s * organ.body.length();
     // Flushed patches, then fine mottling.
     let patches = 0.5 + 0.7 * fractal(seed + 1, p / 9e-3, 3);
     let mut color = base.lerp(flush, patches.clamp(0.0, 1.0));
@@ -43,26 +53,59 @@ fn organ_color(organ: &Organ, p: DVec3) -> DVec3 {
     // Fat clings to the side that hangs on the mesentery.
     let fat = fractal(seed + 3, p / 5e-3, 3) + 0.1 - 0.8 * local.angle.sin();
     color = color.lerp(FAT, 0.8 * step(0.0, 0.25, fat));
-    let vessels = if organ.name == "cecum" || organ.name == "stomach" {
-        network(seed + 4, p, 11e-3, 0.95e-3).max(0.7 * network(seed + 5, p, 5e-3, 0.6e-3))
-    } else {
-        rungs(seed + 4, along, local.angle, p).max(0.55 * network(seed + 5, p, 5e-3, 0.5e-3))
+    let vessels = match vessels {
+        Vessels::Network => network(seed + 4, p, 11e-3, 0.95e-3).max(0.7 * network(seed + 5, p, 5e-3, 0.6e-3)),
+        Vessels::Rungs => rungs(seed + 4, along, local.angle, p).max(0.55 * network(seed + 5, p, 5e-3, 0.5e-3)),
     };
     color.lerp(VEIN, 0.7 * vessels)
+}
+
+fn liver_color(organ: &Organ, p: DVec3) -> DVec3 {
+    let seed = organ.seed;
+    let dark = DVec3::new(80.0, 32.0, 28.0);
+    let warm = DVec3::new(114.0, 52.0, 41.0);
+    let mut color = dark.lerp(warm, (0.5 + 0.6 * fractal(seed + 1, p / 35e-3, 3)).clamp(0.0, 1.0));
+    color *= 1.0 + 0.07 * fractal(seed + 2, p / 5e-3, 2);
+    // A pig's lobules show through the capsule: paler septa around them.
+    let septum = 1.0 - step(0.0, 0.22, fractal(seed + 3, p / 6e-3, 2).abs());
+    color = color.lerp(DVec3::new(158.0, 84.0, 66.0), 0.2 * septum);
+    let vessels = network(seed + 4, p, 45e-3, 2.4e-3).max(0.6 * network(seed + 5, p, 20e-3, 1.6e-3));
+    color = color.lerp(DVec3::new(66.0, 18.0, 24.0), 0.5 * vessels);
+    // Connective tissue where the gallbladder is attached.
+    let beside = match &organ.body {
+        Body::Blend(blend) => blend.groove().map_or(f64::INFINITY, |tube| tube.distance(p)),
+        Body::Tube(_) => f64::INFINITY,
+    };
+    let ragged = 4e-3 * (1.0 + 0.7 * fractal(seed + 6, p / 8e-3, 2));
+    color.lerp(DVec3::new(186.0, 134.0, 104.0), 0.6 * (1.0 - step(0.3 * ragged, ragged, beside)))
+}
+
+fn gallbladder_color(organ: &Organ, p: DVec3) -> DVec3 {
+    let seed = organ.seed;
+    let bile = DVec3::new(72.0, 92.0, 54.0);
+    let wall = DVec3::new(134.0, 138.0, 86.0);
+    let mut color = bile.lerp(wall, (0.45 + 0.7 * fractal(seed + 1, p / 22e-3, 3)).clamp(0.0, 1.0));
+    color *= 1.0 + 0.06 * fractal(seed + 2, p / 5e-3, 2);
+    // The neck is paler, and some fat clings to it.
+    let s = organ.body.local(p).s;
+    let fat = fractal(seed + 3, p / 12e-3, 3) + 0.25 - 1.6 * s;
+    color = color.lerp(FAT, 0.7 * step(0.0, 0.3, fat));
+    let vessels = network(seed + 4, p, 28e-3, 2.2e-3).max(0.5 * network(seed + 5, p, 14e-3, 1.8e-3));
+    color.lerp(VEIN, 0.55 * vessels)
 }
 
 fn bed_color(bed: &Bed, p: DVec3) -> DVec3 {
     let seed = bed.seed;
     let flat = p.with_z(0.0);
-    let meat = DVec3::new(138.0, 50.0, 46.0);
-    let film = DVec3::new(180.0, 88.0, 72.0);
-    let mut color = meat.lerp(film, (0.5 + 0.8 * fractal(seed + 31, flat / 0.018, 3)).clamp(0.0, 1.0));
+    let BedPlan { meat, film, fat, scale, .. } = bed.plan;
+    let mut color = meat.lerp(film, (0.5 + 0.8 * fractal(seed + 31, flat / (0.018 * scale), 3)).clamp(0.0, 1.0));
     // Lobules of fat with red seams between them.
-    let much = step(0.0, 0.6, fractal(seed + 32, flat / 0.04, 3));
+    let much = step(0.0, 0.6, fractal(seed + 32, flat / (0.04 * scale), 3));
     let seam = bed.seams(p.x, p.y);
-    color = color.lerp(FAT * 0.86, 0.7 * much * step(0.03, 0.22, seam));
-    color *= 1.0 + 0.08 * fractal(seed + 33, flat / 2e-3, 2);
-    let vessels = network(seed + 34, flat, 0.030, 1.5e-3).max(0.7 * network(seed + 35, flat, 0.012, 0.8e-3));
+    color = color.lerp(FAT * 0.86, 0.7 * fat * much * step(0.03, 0.22, seam));
+    color *= 1.0 + 0.08 * fractal(seed + 33, flat / (2e-3 * scale), 2);
+    let large = network(seed + 34, flat, 0.030 * scale, 1.5e-3 * scale);
+    let vessels = large.max(0.7 * network(seed + 35, flat, 0.012 * scale, 0.8e-3 * scale));
     color.lerp(VEIN, 0.7 * vessels)
 }
 

@@ -4,6 +4,17 @@ use crate::noise::{key, normal, scramble, unit};
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
 use trocar_render::srgb;
 
+/// What kind of depth camera films.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sensor {
+    /// Noise of its own at every pixel and frame, holes at edges and on steep surfaces, whole millimetres.
+    #[default]
+    Plain,
+    /// The same, and what stereo matching adds: an error that neighbouring pixels and following frames share, and
+    /// foreground that spills over its silhouette.
+    Stereo,
+}
+
 /// Unit of recorded depth [m].
 pub(crate) const DEPTH_SCALE: f64 = 0.001;
 /// Standard deviation of depth at 0.2 m [m]; stereo's grows with the square of the distance.
@@ -56,12 +67,12 @@ pub(crate) fn expose(color: &mut ColorImage, depth: &mut DepthImage, facing: &[f
     }
 }
 
-/// Brightness at a pixel relative to the lamp's at 0.15 m: the lamp sits at the lens, its light fades with distance and
+/// Brightness at a pixel relative to the lamp's at the depth `lit_at` [m]: the lamp sits at the lens, its light fades with distance and
 /// towards the corners.
-pub(crate) fn lamp(camera: &Camera, u: f64, v: f64, depth: f32) -> f32 {
+pub(crate) fn lamp(camera: &Camera, u: f64, v: f64, depth: f32, lit_at: f32) -> f32 {
     let (x, y) = ((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
     let off_axis2 = (x * x + y * y) as f32;
-    let near = if depth > 0.0 { (0.15 / depth).clamp(0.5, 1.5) } else { 1.0 };
+    let near = if depth > 0.0 { (lit_at / depth).clamp(0.5, 1.5) } else { 1.0 };
     near / (1.0 + 0.9 * off_axis2)
 }
 

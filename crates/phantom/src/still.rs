@@ -1,6 +1,7 @@
 //! The anatomy without instruments, rendered once: the truth every frame starts from.
 
 use crate::anatomy::Anatomy;
+use crate::plan::Plan;
 use crate::{paint, sensor};
 use trocar_camera::{Camera, Mask, Pose};
 use trocar_geometry::{TriMesh, isosurface, sample_distance};
@@ -19,16 +20,18 @@ pub(crate) struct Still {
     pub surfaces: Vec<TriMesh>,
     /// Labels are 1 + the organ's index; the bed's is one more than the last.
     pub frame: Frame,
+    /// Depth at which the lamp is as bright as the colours mean [m].
+    pub lit_at: f32,
 }
 
 impl Still {
-    pub fn new(anatomy: &Anatomy, camera: &Camera, fineness: Fineness) -> Self {
+    pub fn new(plan: &Plan, anatomy: &Anatomy, camera: &Camera, fineness: Fineness) -> Self {
         let mut surfaces = Vec::new();
         let mut instances = Vec::new();
         for organ in &anatomy.organs {
-            let mut mesh = isosurface(&sample_distance(&organ.tube, organ.tube.bounds(), fineness.surface), 0.0);
+            let mut mesh = isosurface(&sample_distance(&organ.body, organ.body.bounds(), fineness.surface), 0.0);
             paint::organ(organ, &mut mesh);
-            let shading = Shading { color: [200, 120, 110], gloss: 0.4, wireframe: false };
+            let shading = Shading { color: [200, 120, 110], gloss: paint::gloss(organ.look), wireframe: false };
             instances.push(Instance { mesh: mesh.clone(), label: instances.len() as u16 + 1, shading });
             surfaces.push(mesh);
         }
@@ -37,13 +40,13 @@ impl Still {
         let shading = Shading { color: [180, 90, 80], gloss: 0.12, wireframe: false };
         instances.push(Instance { mesh: bed, label: instances.len() as u16 + 1, shading });
 
-        let scene = Scene::new(instances, None, [0; 3]).with_ambient_occlusion(20, 12e-3);
+        let scene = Scene::new(instances, None, [0; 3]).with_ambient_occlusion(20, plan.crease);
         let mut frame = scene.render(camera, &Pose::IDENTITY, 2);
         for (i, color) in frame.color.pixels.iter_mut().enumerate() {
             let (u, v) = ((i % camera.width) as f64, (i / camera.width) as f64);
-            *color = sensor::lit(*color, sensor::lamp(camera, u, v, frame.depth.depth[i]));
+            *color = sensor::lit(*color, sensor::lamp(camera, u, v, frame.depth.depth[i], plan.lit_at));
         }
-        Self { surfaces, frame }
+        Self { surfaces, frame, lit_at: plan.lit_at }
     }
 
     /// Pixels that show organ `index`.

@@ -1,12 +1,23 @@
 //! Whole frames, checked against the truth they were made from.
 
 use crate::anatomy::Anatomy;
-use crate::film::shoot;
-use crate::instruments;
+use crate::film::{Take, shoot};
+use crate::plan::Plan;
+use crate::sensor::Sensor;
 use crate::still::{Fineness, Still};
+use crate::{instruments, phantom_a, phantom_b, phantom_c};
 use trocar_camera::{Camera, Mask};
 
-const COARSE: Fineness = Fineness { surface: 1.2e-3, bed: 2e-3 };
+const PLANS: [&Plan; 3] = [&phantom_a::PLAN, &phantom_b::PLAN, &phantom_c::PLAN];
+
+/// Half as fine as what is recorded.
+fn coarse(plan: &Plan) -> Fineness {
+    Fineness { surface: 2.0 * plan.fineness.surface, bed: 2.5 * plan.fineness.bed }
+}
+
+fn still(plan: &Plan, seed: u64, camera: &Camera) -> Still {
+    Still::new(plan, &Anatomy::new(plan, seed), camera, coarse(plan))
+}
 
 /// The D405 with a quarter of the pixels a side.
 fn small() -> Camera {
@@ -22,61 +33,75 @@ fn small() -> Camera {
     }
 }
 
-/// Pictures to look at: `cargo test --release -p trocar-phantom -- --ignored look`, written to `$LOOK`.
+/// Pictures to look at: `cargo test --release -p trocar-phantom -- --ignored look`, written to `$LOOK`; `$SEED`, `$STEREO`.
 #[test]
 #[ignore = "for people"]
 fn look() {
     let Some(dir) = std::env::var_os("LOOK").map(std::path::PathBuf::from) else { return };
     let seed = std::env::var("SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(0);
+    let sensor = if std::env::var_os("STEREO").is_some() { Sensor::Stereo } else { Sensor::Plain };
     let camera = Camera::d405();
-    let start = std::time::Instant::now();
-    let anatomy = Anatomy::new(seed);
-    println!("anatomy {:.2} s", start.elapsed().as_secs_f64());
-    let still = Still::new(&anatomy, &camera, Fineness { surface: 0.6e-3, bed: 0.8e-3 });
-    println!("still {:.2} s", start.elapsed().as_secs_f64());
-    still.frame.color.write_png(&dir.join("still.png")).unwrap();
-    let arms = instruments::pair(0.0);
-    let start = std::time::Instant::now();
-    for index in [0, 40, 75] {
-        let shot = shoot(&still, &arms, &camera, seed, index);
-        shot.color.write_png(&dir.join(format!("frame{index}.png"))).unwrap();
-        let mut picture = shot.color;
-        for (p, d) in picture.pixels.iter_mut().zip(&shot.depth.depth) {
-            let t = ((f64::from(*d) - 0.12) / 0.10 * 255.0).clamp(0.0, 255.0) as u8;
-            *p = if *d == 0.0 { [0, 0, 0] } else { [255 - t, (t.wrapping_mul(8)) / 2 + 60, t] };
+    for plan in PLANS {
+        let start = std::time::Instant::now();
+        let anatomy = Anatomy::new(plan, seed);
+        println!("{}: anatomy {:.2} s", plan.name, start.elapsed().as_secs_f64());
+        let still = Still::new(plan, &anatomy, &camera, plan.fineness);
+        println!("still {:.2} s", start.elapsed().as_secs_f64());
+        for (organ, surface) in anatomy.organs.iter().zip(&still.surfaces) {
+            println!("  {}: {:.2} cm3, {:.1} cm2", organ.name, surface.volume() * 1e6, surface.area() * 1e4);
         }
-        picture.write_png(&dir.join(format!("depth{index}.png"))).unwrap();
+        still.frame.color.write_png(&dir.join(format!("{}-still.png", plan.name))).unwrap();
+        let arms = instruments::pair(&plan.reach, 0.0);
+        let take = Take { instruments: &arms, camera: &camera, sensor, seed };
+        let start = std::time::Instant::now();
+        let (near, far) = (f64::from(plan.lit_at) - 0.05, f64::from(plan.lit_at) + 0.02);
+        for index in [0, 40, 75] {
+            let shot = shoot(&still, &take, index);
+            shot.color.write_png(&dir.join(format!("{}-frame{index}.png", plan.name))).unwrap();
+            let mut picture = shot.color;
+            for (p, d) in picture.pixels.iter_mut().zip(&shot.depth.depth) {
+                let t = ((f64::from(*d) - near) / (far - near) * 255.0).clamp(0.0, 255.0) as u8;
+                *p = if *d == 0.0 { [0, 0, 0] } else { [255 - t, (t.wrapping_mul(8)) / 2 + 60, t] };
+            }
+            picture.write_png(&dir.join(format!("{}-depth{index}.png", plan.name))).unwrap();
+        }
+        println!("3 frames {:.2} s", start.elapsed().as_secs_f64());
     }
-    println!("3 frames {:.2} s", start.elapsed().as_secs_f64());
 }
 
 #[test]
 fn every_organ_pixel_is_seen_through_the_instruments_motion() {
     let camera = small();
-    let still = Still::new(&Anatomy::new(0), &camera, COARSE);
-    let arms = instruments::pair(1.0);
-    let mut free = vec![0; camera.width * camera.height];
-    for index in (0..180).step_by(2) {
-        let shot = shoot(&still, &arms, &camera, 0, index);
-        for (f, covered) in free.iter_mut().zip(&shot.instruments.set) {
-            *f += usize::from(!covered);
+    for plan in PLANS {
+        let still = still(plan, 0, &camera);
+        let arms = instruments::pair(&plan.reach, 1.0);
+        let take = Take { instruments: &arms, camera: &camera, sensor: Sensor::Plain, seed: 0 };
+        let mut free = vec![0; camera.width * camera.height];
+        for index in (0..180).step_by(3) {
+            let shot = shoot(&still, &take, index);
+            for (f, covered) in free.iter_mut().zip(&shot.instruments.set) {
+                *f += usize::from(!covered);
+            }
         }
-    }
-    let covered_sometimes = free.iter().filter(|f| **f < 90).count();
-    assert!(covered_sometimes > free.len() / 4, "the instruments move over much of the picture");
-    for organ in 0..6 {
-        let mask = still.organ_mask(organ);
-        assert!(mask.count() > 50, "organ {organ} shows in {} pixels", mask.count());
-        let least = mask.set.iter().zip(&free).filter(|(m, _)| **m).map(|(_, f)| *f).min().unwrap();
-        assert!(least >= 3, "a pixel of organ {organ} is free in {least} frames only");
+        let covered_sometimes = free.iter().filter(|f| **f < 60).count();
+        assert!(covered_sometimes > free.len() / 4, "{}: the instruments move over much of the picture", plan.name);
+        for (organ, name) in plan.listed.iter().enumerate() {
+            let mask = still.organ_mask(organ);
+            assert!(mask.count() > 50, "{name} shows in {} pixels", mask.count());
+            let under: Vec<usize> = mask.set.iter().zip(&free).filter(|(m, _)| **m).map(|(_, f)| *f).collect();
+            let least = under.iter().min().unwrap();
+            assert!(*least >= 2, "{}: a pixel of {name} is free in {least} frames only", plan.name);
+        }
     }
 }
 
 #[test]
 fn recorded_depth_is_the_truth_within_its_noise() {
     let camera = small();
-    let still = Still::new(&Anatomy::new(1), &camera, COARSE);
-    let shot = shoot(&still, &instruments::pair(0.0), &camera, 1, 17);
+    let still = still(&phantom_a::PLAN, 1, &camera);
+    let arms = instruments::pair(&phantom_a::PLAN.reach, 0.0);
+    let take = Take { instruments: &arms, camera: &camera, sensor: Sensor::Plain, seed: 1 };
+    let shot = shoot(&still, &take, 17);
     let (mut valid, mut free) = (0, 0);
     for i in 0..camera.width * camera.height {
         if shot.instruments.set[i] {
@@ -96,24 +121,66 @@ fn recorded_depth_is_the_truth_within_its_noise() {
 }
 
 #[test]
+fn true_depth_on_an_organs_mask_is_that_organs_front() {
+    use trocar_geometry::SignedDistance;
+    let camera = small();
+    for plan in [&phantom_b::PLAN, &phantom_c::PLAN] {
+        let anatomy = Anatomy::new(plan, 2);
+        let still = Still::new(plan, &anatomy, &camera, Fineness { surface: plan.fineness.surface, ..coarse(plan) });
+        for (index, organ) in anatomy.organs.iter().enumerate() {
+            let mask = still.organ_mask(index);
+            let mut off = Vec::new();
+            for i in (0..mask.set.len()).filter(|i| mask.set[*i]) {
+                let ray = camera.ray((i % camera.width) as f64, (i / camera.width) as f64);
+                let z = f64::from(still.frame.depth.depth[i]);
+                off.push(organ.body.distance(ray * z).abs());
+            }
+            off.sort_by(f64::total_cmp);
+            // The surface is a mesh: the bottom of a crease may lie between its vertices.
+            let (most, all) = (off[off.len() * 199 / 200], off[off.len() - 1]);
+            assert!(most < 0.3e-3 && all < 0.6e-3, "{}: {most} m off, {all} m at most", organ.name);
+            assert!(off[off.len() / 2] < 0.05e-3, "{}: {} m off in the median", organ.name, off[off.len() / 2]);
+        }
+    }
+}
+
+#[test]
+fn stereo_changes_depth_only_and_brings_it_forward_at_silhouettes() {
+    let camera = small();
+    let still = still(&phantom_c::PLAN, 1, &camera);
+    let shot = |sensor| shoot(&still, &Take { instruments: &[], camera: &camera, sensor, seed: 1 }, 5);
+    let (plain, stereo) = (shot(Sensor::Plain), shot(Sensor::Stereo));
+    assert!(plain.color == stereo.color && plain.depth != stereo.depth);
+    let pairs = plain.depth.depth.iter().zip(&stereo.depth.depth).filter(|(p, s)| **p > 0.0 && **s > 0.0);
+    let forward = pairs.clone().filter(|(p, s)| *p - *s > 8e-3).count();
+    let back = pairs.filter(|(p, s)| *s - *p > 8e-3).count();
+    assert!(forward > 20 && back == 0, "{forward} pixels come forward, {back} go back");
+}
+
+#[test]
 fn one_thread_and_many_film_the_same() {
-    let film = || {
-        let still = Still::new(&Anatomy::new(2), &small(), COARSE);
-        let shot = shoot(&still, &instruments::pair(0.5), &small(), 2, 31);
-        (still.surfaces, shot.color, shot.depth, shot.instruments)
-    };
-    let on = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(film);
-    assert!(on(1) == on(2));
+    for (plan, sensor) in [(&phantom_a::PLAN, Sensor::Plain), (&phantom_b::PLAN, Sensor::Stereo)] {
+        let film = || {
+            let still = still(plan, 2, &small());
+            let arms = instruments::pair(&plan.reach, 0.5);
+            let take = Take { instruments: &arms, camera: &small(), sensor, seed: 2 };
+            let shot = shoot(&still, &take, 31);
+            (still.surfaces, shot.color, shot.depth, shot.instruments)
+        };
+        let on = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(film);
+        assert!(on(1) == on(2));
+    }
 }
 
 #[test]
 fn a_recording_is_whole_and_replays() {
     use crate::record::{RecordOptions, record_with};
     let dir = tempfile::tempdir().unwrap();
+    let plan = &phantom_a::PLAN;
     let write = |name: &str| {
         let to = dir.path().join(name);
-        let options = RecordOptions { frames: 3, seed: 4 };
-        record_with("phantom-a", &options, &small(), COARSE, &to, &trocar_progress::Silent).unwrap();
+        let options = RecordOptions { frames: 3, seed: 4, ..RecordOptions::default() };
+        record_with(plan, &options, &small(), coarse(plan), &to, &trocar_progress::Silent).unwrap();
         to
     };
     let folder = write("a");
@@ -122,9 +189,8 @@ fn a_recording_is_whole_and_replays() {
     assert_eq!(recording.len(), 3);
     let names: Vec<&str> = recording.info.organs.iter().map(|o| o.name.as_str()).collect();
     assert_eq!(names, ["cecum", "bowel-1", "bowel-2", "bowel-3", "stomach", "appendix"]);
-    for (index, organ) in recording.info.organs.iter().enumerate() {
-        let name = &recording.info.organs[index].name;
-        let mask = Mask::read(&folder.join(format!("masks/{name}.png"))).unwrap();
+    for organ in &recording.info.organs {
+        let mask = Mask::read(&folder.join(format!("masks/{}.png", organ.name))).unwrap();
         let [u, v] = organ.base_px.unwrap();
         assert!(mask.set[v.round() as usize * mask.width + u.round() as usize], "{}'s base is in its mask", organ.name);
         let surface = folder.join(format!("truth/{}.ply", organ.name));
@@ -153,13 +219,13 @@ fn bad_requests_are_refused_and_leave_nothing() {
     }
     let dir = tempfile::tempdir().unwrap();
     let to = dir.path().join("out");
-    let options = RecordOptions { frames: 2, seed: 0 };
+    let options = RecordOptions { frames: 2, ..RecordOptions::default() };
     let silent = &trocar_progress::Silent;
-    let unknown = record("phantom-z", &options, &to, silent).unwrap_err().to_string();
-    assert!(unknown.contains("phantom-z") && unknown.contains("phantom-a"), "{unknown}");
+    let unknown = record("fantom-c", &options, &to, silent).unwrap_err().to_string();
+    assert_eq!(unknown, "unknown phantom 'fantom-c'; did you mean 'phantom-c'? Known: phantom-a, phantom-b, phantom-c");
     let none = record("phantom-a", &RecordOptions { frames: 0, ..options }, &to, silent).unwrap_err().to_string();
     assert!(none.contains("frames is 0"), "{none}");
-    let stopped = crate::record::record_with("phantom-a", &options, &small(), COARSE, &to, &Stop);
+    let stopped = crate::record::record_with(PLANS[0], &options, &small(), coarse(PLANS[0]), &to, &Stop);
     assert!(matches!(stopped, Err(Error::Interrupted)));
     assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
 }
@@ -170,7 +236,7 @@ fn bad_requests_are_refused_and_leave_nothing() {
 fn speed() {
     let dir = tempfile::tempdir().unwrap();
     let start = std::time::Instant::now();
-    let options = crate::RecordOptions { frames: 90, seed: 0 };
+    let options = crate::RecordOptions { frames: 90, ..crate::RecordOptions::default() };
     crate::record("phantom-a", &options, &dir.path().join("a"), &trocar_progress::Silent).unwrap();
     for mesh in ["cecum", "appendix"] {
         let mesh = dir.path().join(format!("a/truth/{mesh}.ply"));

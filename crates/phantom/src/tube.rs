@@ -26,6 +26,13 @@ pub(crate) struct Shape {
     pub bends: [f64; 2],
 }
 
+impl Shape {
+    /// No radius is larger [m].
+    fn thickest(&self) -> f64 {
+        1.3 * (1.0 + self.bulge) * self.across.max(self.high) * self.taper.max(1.0)
+    }
+}
+
 /// A [`Shape`] laid down. Noise makes its wall uneven.
 #[derive(Clone, Debug)]
 pub(crate) struct Tube {
@@ -66,7 +73,7 @@ impl Tube {
             .map(|i| (line[(i + 1).min(POINTS - 1)] - line[i.saturating_sub(1)]).normalize_or(DVec3::X))
             .collect();
         let centre = line.iter().sum::<DVec3>() / POINTS as f64;
-        let thickest = 1.3 * (1.0 + shape.bulge) * shape.across.max(shape.high);
+        let thickest = shape.thickest();
         let reach = line.iter().map(|p| (p - centre).length()).fold(0.0, f64::max) + thickest;
         Self { shape, seed, line, tangents, centre, reach }
     }
@@ -88,7 +95,7 @@ impl Tube {
 
     /// A box that holds the tube.
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        let margin = DVec3::splat(1.3 * (1.0 + self.shape.bulge) * self.shape.across.max(self.shape.high));
+        let margin = DVec3::splat(self.shape.thickest());
         let low = self.line.iter().copied().fold(DVec3::MAX, DVec3::min);
         let high = self.line.iter().copied().fold(DVec3::MIN, DVec3::max);
         (low - margin, high + margin)

@@ -60,7 +60,8 @@ pub struct Demo {
 /// Arguments of `record`.
 #[derive(Debug, Args)]
 pub struct Record {
-    /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix).
+    /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix), phantom-b (rabbit: bowel bloc, small
+    /// bowel, appendix, cecum, stomach), phantom-c (pig: liver, gallbladder).
     pub phantom: String,
     /// Recording folder to write.
     #[arg(short, long)]
@@ -71,6 +72,27 @@ pub struct Record {
     /// Seed of the anatomy and of the camera's noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// What kind of noise depth has.
+    #[arg(long, value_enum, default_value_t = SensorName::Plain)]
+    pub sensor: SensorName,
+}
+
+/// Kinds of depth noise by name.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum SensorName {
+    /// Independent from pixel to pixel and frame to frame.
+    Plain,
+    /// Like stereo matching's too: smooth over several pixels, slow to change, silhouettes fattened.
+    Stereo,
+}
+
+impl From<SensorName> for trocar_phantom::Sensor {
+    fn from(name: SensorName) -> Self {
+        match name {
+            SensorName::Plain => Self::Plain,
+            SensorName::Stereo => Self::Stereo,
+        }
+    }
 }
 
 /// Arguments of `inspect`.
@@ -148,6 +170,9 @@ pub struct ReconstructionExperiment {
     /// Seed of the anatomies and of the camera's noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
+    /// What kind of noise depth has.
+    #[arg(long, value_enum, default_value_t = SensorName::Plain)]
+    pub sensor: SensorName,
     /// What fills the surfaces with tetrahedra.
     #[arg(long, value_enum, default_value_t = MesherName::Lattice)]
     pub mesher: MesherName,

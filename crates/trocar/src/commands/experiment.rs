@@ -21,7 +21,7 @@ fn reconstruction(arguments: &ReconstructionExperiment, json: bool, progress: &d
         } else {
             named.clone()
         },
-        record: RecordOptions { frames: arguments.frames, seed: arguments.seed },
+        record: RecordOptions { frames: arguments.frames, seed: arguments.seed, sensor: arguments.sensor.into() },
         settings: Settings { mesher: arguments.mesher.into(), ..Settings::default() },
     };
     let result = experiment.run(&arguments.output, progress)?;

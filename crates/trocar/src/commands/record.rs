@@ -16,7 +16,7 @@ struct Recorded {
 
 pub fn run(arguments: &Record, json: bool, progress: &dyn Progress) -> Result<()> {
     let clock = Instant::now();
-    let options = RecordOptions { frames: arguments.frames, seed: arguments.seed };
+    let options = RecordOptions { frames: arguments.frames, seed: arguments.seed, sensor: arguments.sensor.into() };
     trocar_phantom::record(&arguments.phantom, &options, &arguments.output, progress)?;
     let recorded = Recorded {
         recording: arguments.output.display().to_string(),
