@@ -14,8 +14,12 @@ pub struct TetQuality {
     pub median_min_dihedral_deg: f64,
     /// Largest dihedral angle over all elements [degrees].
     pub max_dihedral_deg: f64,
+    /// Largest ratio of an element's circumradius to its shortest edge; infinite for a flat element.
+    pub max_radius_edge: f64,
     /// Median edge length [m].
     pub median_edge: f64,
+    /// Length that 95 % of the edges do not exceed [m].
+    pub p95_edge: f64,
     /// Elements with signed volume at or below 0.
     pub inverted: usize,
     /// Volume [m3].
@@ -31,13 +35,18 @@ impl TetQuality {
         let angles: Vec<[f64; 6]> =
             (0..mesh.tets.len()).into_par_iter().map(|t| dihedral_angles(&mesh.corners(t))).collect();
         let smallest: Vec<f64> = angles.iter().map(|six| six.iter().copied().fold(f64::INFINITY, f64::min)).collect();
-        let lengths =
+        let mut lengths: Vec<f64> =
             mesh.edges().iter().map(|&[a, b]| mesh.vertices[a as usize].distance(mesh.vertices[b as usize])).collect();
+        let rank = lengths.len() * 95 / 100;
+        let p95_edge = *lengths.select_nth_unstable_by(rank, f64::total_cmp).1;
+        let ratios: Vec<f64> = (0..mesh.tets.len()).into_par_iter().map(|t| radius_edge(&mesh.corners(t))).collect();
         Self {
             min_dihedral_deg: smallest.iter().copied().fold(f64::INFINITY, f64::min).to_degrees(),
             median_min_dihedral_deg: median(smallest).to_degrees(),
             max_dihedral_deg: angles.iter().flatten().copied().fold(0.0, f64::max).to_degrees(),
+            max_radius_edge: ratios.iter().copied().fold(0.0, f64::max),
             median_edge: median(lengths),
+            p95_edge,
             inverted: mesh.inverted(),
             volume: mesh.volume(),
         }
@@ -56,6 +65,17 @@ pub(crate) fn dihedral_angles(corners: &[DVec3; 4]) -> [f64; 6] {
         // atan2 keeps full precision near 0 and pi, where the arc cosine loses half the digits.
         m.cross(n).length().atan2(m.dot(n))
     })
+}
+
+/// Circumradius over shortest edge: sqrt(6) / 4 for a regular tet. The circumcentre c, from one corner, solves
+/// u.c = u.u / 2 for the edges u from there.
+fn radius_edge(corners: &[DVec3; 4]) -> f64 {
+    let [u, v, w] = [1, 2, 3].map(|i| corners[i] - corners[0]);
+    let sum = u.length_squared() * v.cross(w) + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v);
+    let radius = sum.length() / (2.0 * u.dot(v.cross(w)).abs());
+    let shortest = EDGES.iter().map(|&[i, j]| corners[i].distance_squared(corners[j])).fold(f64::INFINITY, f64::min);
+    let ratio = radius / shortest.sqrt();
+    if ratio.is_nan() { f64::INFINITY } else { ratio }
 }
 
 /// Middle value, or mean of the two middle values; 0 without values.
@@ -89,12 +109,14 @@ mod tests {
         assert!((q.min_dihedral_deg - expected).abs() < 1e-10 && (q.max_dihedral_deg - expected).abs() < 1e-10);
         assert!((q.median_edge - 8f64.sqrt()).abs() < 1e-12);
         assert!((q.volume - 8.0 / 3.0).abs() < 1e-12 && q.inverted == 0);
+        assert!((q.max_radius_edge - 6f64.sqrt() / 4.0).abs() < 1e-12 && (q.p95_edge - q.median_edge).abs() < 1e-12);
 
         let corner = TetMesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], tets: vec![[0, 1, 2, 3]] };
         let q = TetQuality::of(&corner);
         assert!((q.max_dihedral_deg - 90.0).abs() < 1e-10);
         assert!((q.min_dihedral_deg - 2f64.sqrt().atan().to_degrees()).abs() < 1e-10);
         assert!((q.median_edge - 0.5 * (1.0 + 2f64.sqrt())).abs() < 1e-12);
+        assert!((q.max_radius_edge - 0.75f64.sqrt()).abs() < 1e-12 && (q.p95_edge - 2f64.sqrt()).abs() < 1e-12);
     }
 
     #[test]

@@ -95,7 +95,7 @@ fn every_shape_is_sound_and_keeps_its_surface() {
         check(&name, &uniform);
         let surface = surface_of(&uniform);
         let mut counts = vec![uniform.tets.len()];
-        for coarsest in [2, 7, 64] {
+        for coarsest in [2, 64] {
             let graded = mesh(coarsest);
             let quality = check(&name, &graded);
             assert!(surface_of(&graded) == surface, "{name}: the surface depends on the grading");
@@ -103,8 +103,8 @@ fn every_shape_is_sound_and_keeps_its_surface() {
             assert!(graded.tets.len() <= *counts.last().unwrap());
             counts.push(graded.tets.len());
         }
-        println!("{name:>16}: tets with leaves of at most 1, 2, 4 and 64 cells {counts:?}");
-        most = most.max(counts[0] as f64 / counts[3] as f64);
+        println!("{name:>16}: tets with leaves of at most 1, 2 and 64 cells {counts:?}");
+        most = most.max(counts[0] as f64 / counts[2] as f64);
     }
     assert!(most > 2.5, "no shape became much lighter: {most}");
 }
@@ -132,9 +132,18 @@ fn the_cost_follows_the_surface() {
             LatticeMesher { cell, coarsest: 64 }.mesh_shape(&ball, (DVec3::splat(-0.05), DVec3::splat(0.05))).unwrap();
         (mesh.tets.len() as f64, evaluations.into_inner() as f64)
     };
-    let (coarse, fine) = (cost(0.002), cost(0.001));
+    let (coarse, fine) = (cost(0.003), cost(0.0015));
     println!("tets {} and {}, evaluations {} and {}", coarse.0, fine.0, coarse.1, fine.1);
     assert!(fine.0 < 5.0 * coarse.0 && fine.1 < 5.0 * coarse.1);
+}
+
+#[test]
+fn a_cell_too_small_is_refused_before_it_fills_the_memory() {
+    let half = DVec3::splat(0.05);
+    let ball = Shape(|p: DVec3| p.length() - 0.05);
+    let words = LatticeMesher::uniform(0.0005).mesh_shape(&ball, (-half, half)).unwrap_err().to_string();
+    assert!(words.contains("30 million"), "{words}");
+    assert!(LatticeMesher::graded(1e-6).mesh_shape(&ball, (-half, half)).unwrap_err().to_string().contains("too fine"));
 }
 
 /// A ball as triangles: latitudes and longitudes.
@@ -166,7 +175,7 @@ fn ball(radius: f64) -> TriMesh {
 fn the_cell_follows_the_budget() {
     let ball = ball(0.05);
     assert_eq!(LatticeMesher::for_body(&ball, 0.01, 1_000_000).cell, 0.01);
-    for budget in [5_000, 50_000, 200_000] {
+    for budget in [5_000, 50_000, 100_000] {
         let (mesher, mesh) = LatticeMesher::fit(&ball, 1e-4, budget).unwrap();
         let part = mesh.tets.len() as f64 / budget as f64;
         println!("{budget}: {} with cells of {:.2} mm; {}", mesh.tets.len(), 1e3 * mesher.cell, mesher.describe());

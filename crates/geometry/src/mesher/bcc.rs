@@ -3,6 +3,10 @@
 //! A point is named by its coordinates in half cells: all three even at the corners of the cubic cells, all three odd at
 //! their centres.
 
+mod survey;
+
+pub(super) use survey::jumps;
+
 use crate::{Error, Result, SignedDistance};
 use glam::DVec3;
 use rayon::prelude::*;
@@ -50,22 +54,18 @@ pub(super) fn step_between(p: Point, q: Point) -> usize {
 pub(super) const BLOCK: usize = 8;
 /// Points of a block: the lower corner and the centre of each of its cells.
 pub(super) const BLOCK_POINTS: usize = 2 * BLOCK * BLOCK * BLOCK;
-/// Blocks along the edge of a tile, the unit in which the space is searched for the surface.
-const TILE: usize = 8;
 /// Cells of slack between the shape's bounds and the lattice's rim.
 const MARGIN: f64 = 2.0;
 /// Most blocks the lattice may span, stored or not.
 const MAX_BLOCKS: f64 = (1 << 23) as f64;
+/// Most points with a value; with at most 14 cut points to each, 32 bits number them all.
+const MAX_SLOTS: usize = 1 << 26;
 /// A distance changes no faster than the position. Estimates of a distance may; this much steeper is still handled.
 const STEEPEST: f64 = 1.25;
-/// Cells around a block in which the surface must not lie for the block to count as wholly inside or outside. Then none
-/// of its points is moved, and none has a neighbour on the other side.
-const CLEAR: f64 = 2.0;
 
 /// What a block is, in the table of blocks; smaller numbers are those of stored blocks.
 const OUTSIDE: u32 = u32::MAX;
 const INSIDE: u32 = u32::MAX - 1;
-const UNKNOWN: u32 = u32::MAX - 2;
 
 /// What is known at a lattice point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,8 +116,7 @@ impl Lattice {
         let blocks = blocks.to_array().map(|n| n as usize);
         let mut lattice = Self { origin, cell, blocks, stored: Vec::new(), block_of: Vec::new(), values: Vec::new() };
         lattice.classify(shape);
-        // Cut points are numbered after the slots, at most 14 of them to a slot.
-        if lattice.block_of.len() > (u32::MAX / 16) as usize / BLOCK_POINTS {
+        if lattice.block_of.len() > MAX_SLOTS / BLOCK_POINTS {
             return Err(too_fine());
         }
         let mut values = vec![0.0; lattice.block_of.len() * BLOCK_POINTS];
@@ -225,76 +224,6 @@ impl Lattice {
         [block % nx, block / nx % ny, block / nx / ny].map(|b| b * BLOCK)
     }
 
-    /// Fills the table of blocks.
-    fn classify(&mut self, shape: &dyn SignedDistance) {
-        let tiles = self.blocks.map(|n| n.div_ceil(TILE));
-        let found: Vec<Vec<(usize, u32)>> = (0..tiles.iter().product())
-            .into_par_iter()
-            .map(|tile: usize| {
-                let first = [tile % tiles[0], tile / tiles[0] % tiles[1], tile / tiles[0] / tiles[1]];
-                let mut known = Vec::new();
-                self.classify_cube(shape, first.map(|t| t * TILE), TILE, &mut known);
-                known
-            })
-            .collect();
-        self.stored = vec![UNKNOWN; self.blocks.iter().product()];
-        for (block, kind) in found.into_iter().flatten() {
-            self.stored[block] = kind;
-        }
-        for (block, kind) in self.stored.iter_mut().enumerate().filter(|(_, kind)| **kind == UNKNOWN) {
-            *kind = self.block_of.len() as u32;
-            self.block_of.push(block as u32);
-        }
-    }
-
-    /// Lists the blocks of the cube of `size` blocks at block `first` that are wholly inside or outside.
-    fn classify_cube(&self, shape: &dyn SignedDistance, first: [usize; 3], size: usize, known: &mut Vec<(usize, u32)>) {
-        if (0..3).any(|a| first[a] >= self.blocks[a]) {
-            return;
-        }
-        let (distance, reach) = self.probe(shape, first.map(|b| b * BLOCK), size * BLOCK);
-        if distance.abs() > reach + CLEAR * STEEPEST * self.cell {
-            let kind = if distance > 0.0 { OUTSIDE } else { INSIDE };
-            let ends = first.map_with(self.blocks, |b, n| (b + size).min(n));
-            for z in first[2]..ends[2] {
-                for y in first[1]..ends[1] {
-                    let row = (z * self.blocks[1] + y) * self.blocks[0];
-                    known.extend((first[0]..ends[0]).map(|x| (row + x, kind)));
-                }
-            }
-        } else if size > 1 {
-            for octant in 0..8 {
-                let offset = [octant & 1, octant >> 1 & 1, octant >> 2].map(|bit| bit * (size / 2));
-                self.classify_cube(shape, first.map_with(offset, |a, b| a + b), size / 2, known);
-            }
-        }
-    }
-
-    /// A place where the inside of the shape meets blocks that are outside, or the rim, without a surface between: the
-    /// field jumps or the bounds are too narrow.
-    fn jump(&self) -> Option<DVec3> {
-        (0..self.stored.len()).into_par_iter().filter(|&block| self.stored[block] != OUTSIDE).find_map_first(|block| {
-            let first = self.first_cell(block);
-            let position = |p: Point| self.position(p);
-            if self.stored[block] == INSIDE {
-                let clash = (0..27).any(|n: i32| {
-                    let offset = [n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1];
-                    self.at(first.map_with(offset, |c, o| 2 * (c as i32 + o * BLOCK as i32))) == At::Outside
-                });
-                return clash.then(|| position(first.map(|c| (2 * c + BLOCK) as i32)));
-            }
-            let slots = self.stored[block] * BLOCK_POINTS as u32;
-            let rim = |c: i32| c % (2 * BLOCK as i32) < 2 || c % (2 * BLOCK as i32) > 2 * BLOCK as i32 - 3;
-            (slots..slots + BLOCK_POINTS as u32).map(|slot| (slot, self.point(slot))).find_map(|(slot, p)| {
-                let inside = self.values[slot as usize] < 0.0;
-                let wrong = if inside { At::Outside } else { At::Inside };
-                let clash = p.iter().any(|&c| rim(c))
-                    && (0..STEPS.len()).any(|step| self.at(Self::neighbour(p, step)) == wrong);
-                clash.then(|| position(p))
-            })
-        })
-    }
-
     /// Fills the cube of `size` cells at `inner` (in cells, from the block's `first` cell) into the block's values:
     /// at once where its centre is so far from the surface that the sign cannot change, else in halves.
     fn sample_cube(
@@ -339,14 +268,6 @@ impl Lattice {
         let centre = self.position(first.map(|c| (2 * c + size) as i32));
         (shape.distance(centre), STEEPEST * 0.5 * 3f64.sqrt() * size as f64 * self.cell)
     }
-}
-
-/// The complaint about a field whose sign changes where it promised none.
-pub(super) fn jumps(at: DVec3) -> Error {
-    Error::Mesh(format!(
-        "the shape has an inside at {at} m, beyond its bounds or where its signed distance promised none; widen the \
-         bounds, or use a field that changes no faster than the position"
-    ))
 }
 
 /// Component by component combination of two triples.

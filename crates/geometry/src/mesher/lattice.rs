@@ -91,7 +91,8 @@ impl LatticeMesher {
     /// it is parted there.
     ///
     /// # Errors
-    /// A field that is not finite, a shape that reaches beyond `bounds`, and a shape too thin for the cell to hold one tet.
+    /// A field that is not finite, a shape that reaches beyond `bounds`, a shape too thin for the cell to hold one tet,
+    /// and a cell so small that there would be more than 30 million.
     pub fn mesh_shape(&self, shape: &dyn SignedDistance, bounds: (DVec3, DVec3)) -> Result<TetMesh> {
         let mut lattice = Lattice::sample(shape, bounds, self.cell)?;
         let mut cuts = Cuts::find(&lattice, shape)?;

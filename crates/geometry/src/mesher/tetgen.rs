@@ -73,7 +73,8 @@ impl Mesher for TetgenMesher {
             .tempdir()
             .map_err(|e| self.wrong(&format!("needs a folder for temporary files, and none can be made: {e}")))?;
         let folder = folder.path();
-        files::write_smesh(&folder.join(INPUT), surface)?;
+        // Without vertices that no triangle uses: they would become nodes.
+        files::write_smesh(&folder.join(INPUT), &surface.submesh(|_| true))?;
 
         let deadline = Instant::now() + self.time_limit;
         let status = self.run(&switches, folder, deadline)?;
@@ -172,7 +173,8 @@ impl TetgenMesher {
             return Err(self.wrong("gave no elements"));
         }
         let (filled, enclosed) = (mesh.volume(), surface.volume());
-        if !((filled - enclosed).abs() <= VOLUME_TOLERANCE * enclosed.abs()) {
+        let off = ((filled - enclosed) / enclosed).abs();
+        if off.is_nan() || off > VOLUME_TOLERANCE {
             return Err(self.wrong(&format!(
                 "filled {:.3} cm3 of a surface that encloses {:.3} cm3; is it a single outward surface without hollows?",
                 1e6 * filled,
@@ -192,7 +194,8 @@ fn complaint(folder: &Path) -> Option<String> {
     let text = ["out.txt", "err.txt"].map(|name| tail(&folder.join(name)).unwrap_or_default()).join("\n");
     let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty());
     let marked = |mark: &str| lines().find(|line| line.to_lowercase().contains(mark));
-    let line = ["!!", "intersect", "error", "fail", "stop"].iter().find_map(|mark| marked(mark)).or(lines().last())?;
+    let line =
+        ["!!", "intersect", "error", "fail", "stop"].iter().find_map(|mark| marked(mark)).or(lines().next_back())?;
     Some(line.trim_start_matches(['!', ' ']).chars().filter(|c| !c.is_control()).take(MOST_WORDS).collect())
 }
 
