@@ -29,7 +29,7 @@ pub use composite::CompositeTimes;
 pub use error::{Error, Result};
 pub use from_surface::from_surface;
 pub use pipeline::{OrganView, Reconstruction, reconstruct};
-pub use settings::{MesherRule, Settings, SurfaceRule};
+pub use settings::{BackRule, MesherRule, Settings, SurfaceRule};
 pub use thickness::modelled_volume;
 
 /// Colour of tissue that no photograph shows.

@@ -9,7 +9,7 @@ use crate::front::front;
 use crate::outline::tidy;
 use crate::resample::{self, resample};
 use crate::thickness::thickness;
-use crate::{Error, Result, SurfaceRule};
+use crate::{BackRule, Error, Result, SurfaceRule};
 use glam::{DVec2, DVec3};
 use trocar_camera::{Camera, Mask};
 use trocar_geometry::TriMesh;
@@ -23,6 +23,8 @@ pub struct View<'a> {
     pub camera: Camera,
     /// Unit of the recording's depth [m].
     pub depth_scale: f64,
+    /// How thick organs are.
+    pub back: BackRule,
     /// How surfaces are made.
     pub surface: SurfaceRule,
 }
@@ -44,7 +46,7 @@ pub struct Closed {
 /// # Errors
 /// When no depth was measured inside the mask, or nothing closed comes out.
 pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<String>) -> Result<Closed> {
-    let View { background, ref camera, depth_scale, surface: rule } = *view;
+    let View { background, ref camera, depth_scale, back: back_rule, surface: rule } = *view;
     let name = &info.name;
     let tidied = tidy(&mut mask);
     let pixels = mask.count();
@@ -70,7 +72,7 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
     // Noise of the composite: the recording's unit, or what the window shows.
     let noise = depth_scale.max(0.5 * background.depth_range_median);
     // A first radius, from the mask at one depth, tells edges from outliers.
-    let flat = thickness(&vec![middle; mask.set.len()], &mask, camera).radius;
+    let flat = thickness(&vec![middle; mask.set.len()], &mask, camera, BackRule::Rounded).radius;
     let front = front(&background.depth, &mask, camera, flat, noise).ok_or_else(unmeasured)?;
     if front.outliers > 0 {
         note(format!("{} depths that are not the organ's were left out", front.outliers));
@@ -80,7 +82,10 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
         note(format!("{share:.0}% of its pixels had no depth and were filled in"));
     }
 
-    let back = thickness(&front.depth, &mask, camera);
+    let back = thickness(&front.depth, &mask, camera, back_rule);
+    if back_rule == BackRule::Fitted {
+        note(format!("its profile is taken {:.2} times as high as it is wide", back.height_ratio));
+    }
     let raw = closed_surface(&front.depth, &back.h, &mask, camera);
     let mut surface = match (rule, raw.bounds()) {
         (SurfaceRule::BinaryGrid, Some(bounds)) => {
@@ -155,7 +160,7 @@ mod tests {
             pins: Pins::None,
         };
         let surface = SurfaceRule::SignedDistance;
-        let view = View { background: &background, camera, depth_scale: 1e-3, surface };
+        let view = View { background: &background, camera, depth_scale: 1e-3, back: BackRule::Rounded, surface };
         close(&info, mask, &view, &mut Vec::new()).unwrap()
     }
 

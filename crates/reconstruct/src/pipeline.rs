@@ -83,6 +83,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         background: &background,
         camera: recording.camera(),
         depth_scale: recording.depth_scale(),
+        back: settings.back,
         surface: settings.surface,
     };
     let (mut organs, mut views) = (Vec::new(), Vec::new());

@@ -13,6 +13,8 @@ pub struct Settings {
     pub centre: Option<usize>,
     /// Fewest samples a pixel needs (paper: 3); a recording of fewer frames needs as many as it has.
     pub min_samples: usize,
+    /// How thick an organ is taken to be behind its front.
+    pub back: BackRule,
     /// How the surface is made from front and back.
     pub surface: SurfaceRule,
     /// What fills it with tetrahedra.
@@ -23,6 +25,17 @@ pub struct Settings {
     pub finest_cell: f64,
     /// About how many tetrahedra a body may have where no `element_size` is given.
     pub max_tets: usize,
+}
+
+/// How thick an organ is taken to be behind its front; no camera saw its back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BackRule {
+    /// A round profile of the silhouette's width (paper eq. 1). Flat organs come out too thick.
+    #[default]
+    Rounded,
+    /// As high against its width as the front rises above its rim, and the same below: right for organs that are alike above
+    /// and below their widest outline.
+    Fitted,
 }
 
 /// How a surface is made from front and back.
@@ -52,6 +65,7 @@ impl Default for Settings {
             stride: 2,
             centre: None,
             min_samples: 3,
+            back: BackRule::default(),
             surface: SurfaceRule::default(),
             mesher: MesherRule::default(),
             element_size: None,
@@ -94,6 +108,7 @@ impl Settings {
             format!("stride = {}", self.stride),
             self.centre.map_or("centre = middle".into(), |c| format!("centre = {c}")),
             format!("min_samples = {}", self.min_samples),
+            format!("back = {:?}", self.back),
             format!("surface = {:?}", self.surface),
             format!("mesher = {:?}", self.mesher),
         ];

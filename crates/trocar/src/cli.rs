@@ -129,6 +129,9 @@ pub struct Reconstruct {
     /// Every how many frames of the window are used.
     #[arg(long, default_value_t = 2)]
     pub stride: usize,
+    /// How thick organs are taken to be behind their fronts.
+    #[arg(long, value_enum, default_value_t = BackName::Rounded)]
+    pub back: BackName,
     /// Make the surface from a binary grid of 1.5 mm, as the paper does, for comparison.
     #[arg(long)]
     pub binary_grid: bool,
@@ -173,6 +176,9 @@ pub struct ReconstructionExperiment {
     /// What kind of noise depth has.
     #[arg(long, value_enum, default_value_t = SensorName::Plain)]
     pub sensor: SensorName,
+    /// How thick organs are taken to be behind their fronts.
+    #[arg(long, value_enum, default_value_t = BackName::Rounded)]
+    pub back: BackName,
     /// What fills the surfaces with tetrahedra.
     #[arg(long, value_enum, default_value_t = MesherName::Lattice)]
     pub mesher: MesherName,
@@ -210,6 +216,24 @@ pub struct MeshingBench {
     /// Folder for the report.
     #[arg(short, long, default_value = "trocar-bench/meshing")]
     pub output: PathBuf,
+}
+
+/// Models of the unseen back by name.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum BackName {
+    /// As round as the silhouette is wide: the paper's. Flat organs come out too thick.
+    Rounded,
+    /// As high as the front rises above its rim, and the same below.
+    Fitted,
+}
+
+impl From<BackName> for trocar_reconstruct::BackRule {
+    fn from(name: BackName) -> Self {
+        match name {
+            BackName::Rounded => Self::Rounded,
+            BackName::Fitted => Self::Fitted,
+        }
+    }
 }
 
 /// Meshers by name.

@@ -11,7 +11,7 @@ use trocar_camera::DepthImage;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_phantom::RecordOptions;
 use trocar_progress::Progress;
-use trocar_reconstruct::{Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
+use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
 use trocar_recording::{Recording, RecordingInfo};
 
 /// The experiment's options.
@@ -118,7 +118,7 @@ impl ReconstructionExperiment {
                 reconstruct_recording(&recording, &self.settings, &folder.join("specimen"), progress)?;
             let paper_way = Settings { surface: SurfaceRule::BinaryGrid, ..self.settings.clone() };
             let paper_way = trocar_reconstruct::reconstruct(&Recording::open(&recording)?, &paper_way, progress)?;
-            result.organs.extend(rows(phantom, &recording, &reconstruction, &paper_way)?);
+            result.organs.extend(rows(phantom, &recording, &reconstruction, &paper_way, self.settings.back)?);
             result.phantoms.push(PhantomFigures {
                 phantom: phantom.clone(),
                 composite: CompositeFigures::of(&reconstruction, &recording)?,
@@ -154,6 +154,7 @@ fn rows(
     recording: &Path,
     made: &Reconstruction,
     paper_way: &Reconstruction,
+    back: BackRule,
 ) -> Result<Vec<ReconstructionRow>> {
     let truth = recording.join("truth");
     let true_depth = DepthImage::read(&truth.join("depth.png"), DEPTH_UNIT)?;
@@ -188,7 +189,7 @@ fn rows(
             truth_error_median_mm,
             truth_error_signed_mm,
             volume_cm3: facts.volume_cm3,
-            volume_error: volume / modelled_volume(&front, mask, &camera) - 1.0,
+            volume_error: volume / modelled_volume(&front, mask, &camera, back) - 1.0,
             volume_error_truth: volume / true_volume - 1.0,
             binary_grid_signed_error_mm: signed_the_papers_way,
             paper_nodes: paper.map(|p| p.nodes),

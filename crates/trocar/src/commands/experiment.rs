@@ -22,7 +22,7 @@ fn reconstruction(arguments: &ReconstructionExperiment, json: bool, progress: &d
             named.clone()
         },
         record: RecordOptions { frames: arguments.frames, seed: arguments.seed, sensor: arguments.sensor.into() },
-        settings: Settings { mesher: arguments.mesher.into(), ..Settings::default() },
+        settings: Settings { back: arguments.back.into(), mesher: arguments.mesher.into(), ..Settings::default() },
     };
     let result = experiment.run(&arguments.output, progress)?;
     output::print(json, &result, text);

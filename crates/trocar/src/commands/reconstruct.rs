@@ -12,6 +12,7 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
         window: arguments.window,
         stride: arguments.stride,
         centre: arguments.centre,
+        back: arguments.back.into(),
         surface: if arguments.binary_grid { SurfaceRule::BinaryGrid } else { SurfaceRule::SignedDistance },
         mesher: arguments.mesher.into(),
         element_size: arguments.element_size.map(|mm| 1e-3 * mm),
