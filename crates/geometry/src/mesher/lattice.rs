@@ -13,7 +13,7 @@ use glam::DVec3;
 /// Largest cell that is chosen, in volume over area: the radius of a long tube.
 const THICKEST: f64 = 2.0;
 
-/// The default mesher: no slivers by construction. Every dihedral angle lies between 10.78 and 164.74 degrees.
+/// The default mesher: no slivers by construction. Every dihedral angle lies between 10.7 and 165 degrees.
 ///
 /// The elements at the surface have the finest size, `cell`. Away from it they grow by factors of two, up to `coarsest`
 /// times that size; these inner elements have angles between 45 and 120 degrees. The surface does not depend on `coarsest`.

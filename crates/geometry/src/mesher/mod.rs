@@ -2,6 +2,8 @@
 
 mod bcc;
 mod body;
+#[cfg(test)]
+mod bound;
 mod cuts;
 mod fill;
 mod lattice;
