@@ -119,11 +119,9 @@ impl Mesher for LatticeMesher {
 
     fn describe(&self) -> String {
         let mm = 1e3 * self.cell;
-        if self.coarsest < 2 {
-            format!("isosurface stuffing, uniform lattice of {mm:.3} mm cells")
-        } else {
-            let times = 1u32 << self.coarsest.ilog2();
-            format!("isosurface stuffing, lattice of {mm:.3} mm cells, up to {times} times larger inside")
+        match self.coarsest {
+            0 | 1 => format!("lattice {mm:.2} mm, uniform"),
+            coarsest => format!("lattice {mm:.2} mm, {} times as coarse inside", 1u32 << coarsest.ilog2()),
         }
     }
 }

@@ -89,7 +89,7 @@ impl Mesher for TetgenMesher {
 
     fn describe(&self) -> String {
         let (ratio, angle) = (self.radius_edge, self.min_dihedral_deg);
-        format!("TetGen, radius-edge ratio {ratio}, dihedral angles of {angle} degrees or more aimed at")
+        format!("TetGen -q{ratio}/{angle}")
     }
 }
 
