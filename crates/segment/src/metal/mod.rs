@@ -2,9 +2,13 @@
 //!
 //! 1. Grey pixels: little chroma for their brightness; the clearest of them, neutral or bluish, are seeds.
 //! 2. Single pixels of noise go, narrow gaps (reflections of tissue on the shaft) close, and connected parts are formed.
-//! 3. A part stays if enough speaks for it: it reaches the image's rim, is long, has dark steel in it, or stands nearer
-//!    to the camera than its surroundings (where there is depth). White spots inside tissue are wet highlights and go.
+//! 3. A part stays if two things speak for it: it reaches the image's rim, is long, is darker than its surroundings in good
+//!    part, or stands nearer to the camera than they (where there is depth; farther speaks against it). Inside the picture
+//!    darkness is a must: wet highlights on tissue are grey, long and on ridges too, but never dark.
 //! 4. What stays loses its very thick parts (drapes, trays), has its small holes filled and grows by a margin.
+//!
+//! What this misses: a bright jaw that shows without its shaft, and blades thinner than about 3 pixels. What it takes too:
+//! anything grey that reaches the rim and is not very thick, such as gloves and sutures.
 //!
 //! Lengths are shares of the image's height, so that one set of parameters serves every camera.
 
@@ -12,7 +16,7 @@ mod parts;
 
 use crate::distance::{PIXEL, close, distances, grow};
 use crate::{Error, Picture, Result, Segmenter, Target};
-use parts::{Part, find_parts};
+use parts::{Part, compare, find_parts};
 use trocar_camera::{ColorImage, Mask, pixel_neighbours};
 
 /// What counts as metal. Colours are sRGB, 0 to 255; lengths are shares of the image's height and areas shares of its
@@ -28,8 +32,8 @@ pub struct MetalParameters {
     pub seed_chroma: f64,
     /// See `seed_chroma`.
     pub seed_saturation: f64,
-    /// A seed's red is above the mean of green and blue by at most this and half its chroma bound: shadows and pale
-    /// tissue are warm, steel is not.
+    /// A seed's red is above the mean of green and blue, and its blue below that of red and green, by at most this and half
+    /// its chroma bound: shadows, pale tissue, fat and bile are warm, steel is not.
     pub seed_warmth: f64,
     /// Darker pixels (largest channel) are no seeds: in the dark everything is grey.
     pub seed_brightness: u8,
@@ -37,14 +41,10 @@ pub struct MetalParameters {
     pub black: u8,
     /// Share of seeds among a part's grey pixels, at least.
     pub seed_share: f64,
-    /// Darker pixels (largest channel) count as dark steel.
-    pub dark: u8,
-    /// Share of dark steel that speaks for a part.
+    /// Pixels below this share of their surroundings' brightness (mean largest channel) are dark.
+    pub dark: f64,
+    /// Share of dark pixels that speaks for a part.
     pub dark_share: f64,
-    /// Pixels whose smallest channel is above this are highlights.
-    pub highlight: u8,
-    /// A part that does not reach the rim and has a larger share of highlights than this is wet tissue.
-    pub highlight_share: f64,
     /// Gaps up to twice this close.
     pub closing: f64,
     /// Smaller parts are dropped (area).
@@ -53,7 +53,7 @@ pub struct MetalParameters {
     pub elongation: f64,
     /// Parts are cut where they are thicker than twice this.
     pub half_thickness: f64,
-    /// Surroundings whose depth is compared reach this far.
+    /// Surroundings that are compared reach this far.
     pub surroundings: f64,
     /// A part stands out if it is nearer than its surroundings by this [m]; the same farther away speaks against it.
     pub nearer: f64,
@@ -74,10 +74,8 @@ impl Default for MetalParameters {
             seed_brightness: 24,
             black: 8,
             seed_share: 0.15,
-            dark: 110,
+            dark: 0.85,
             dark_share: 0.3,
-            highlight: 150,
-            highlight_share: 0.5,
             closing: 0.010,
             smallest: 0.0002,
             elongation: 3.0,
@@ -102,8 +100,8 @@ pub struct MetalDetector {
 struct Look {
     grey: bool,
     seed: bool,
-    dark: bool,
-    highlight: bool,
+    /// Largest channel.
+    brightness: u8,
 }
 
 impl Segmenter for MetalDetector {
@@ -117,7 +115,8 @@ impl Segmenter for MetalDetector {
         let looks = p.looks(picture.color);
         let grey = without_speckle(&looks, width, height);
         let closed = close(&grey, width, height, px(p.closing));
-        let (labels, parts) = find_parts(&closed, &looks, picture.matching_depth(), width, height, px(p.surroundings));
+        let (labels, mut parts) = find_parts(&closed, &looks, width, height);
+        compare(&labels, &mut parts, &looks, picture.matching_depth(), [width, height], px(p.surroundings), p.dark);
         let kept: Vec<bool> = parts.iter().map(|part| self.is_metal(part, width * height)).collect();
         if !kept.contains(&true) {
             return Ok(Mask::new(width, height));
@@ -144,9 +143,6 @@ impl MetalDetector {
         if (part.area as f64) < p.smallest * pixels as f64 || share(part.seeds) < p.seed_share {
             return false;
         }
-        if !part.at_rim && share(part.highlights) > p.highlight_share {
-            return false;
-        }
         let depth = match part.nearer {
             Some(by) if by > p.nearer => 1,
             Some(by) if by < -p.nearer => -1,
@@ -154,7 +150,7 @@ impl MetalDetector {
         };
         let long = part.elongation() >= p.elongation;
         let dark = share(part.dark) >= p.dark_share;
-        depth + i32::from(part.at_rim) + i32::from(long) + i32::from(dark) >= 2
+        (dark || part.at_rim) && depth + i32::from(part.at_rim) + i32::from(long) + i32::from(dark) >= 2
     }
 }
 
@@ -165,7 +161,7 @@ impl MetalParameters {
             ("seed_saturation", self.seed_saturation),
             ("seed_share", self.seed_share),
             ("dark_share", self.dark_share),
-            ("highlight_share", self.highlight_share),
+            ("dark", self.dark),
             ("closing", self.closing),
             ("smallest", self.smallest),
             ("half_thickness", self.half_thickness),
@@ -204,12 +200,12 @@ impl MetalParameters {
             let chroma = i16::from(most - least);
             let bound = seed[usize::from(most)];
             let is_grey = most >= self.black && chroma <= grey[usize::from(most)];
-            let warm = i16::from(r) - (i16::from(g) + i16::from(b)) / 2;
+            let (r, g, b) = (i16::from(r), i16::from(g), i16::from(b));
+            let warm = (r - (g + b) / 2).max((r + g) / 2 - b);
             Look {
                 grey: is_grey,
                 seed: is_grey && most >= self.seed_brightness && chroma <= bound && warm <= warmth + bound / 2,
-                dark: most < self.dark,
-                highlight: least > self.highlight,
+                brightness: most,
             }
         };
         color.pixels.iter().map(look).collect()

@@ -12,8 +12,8 @@ pub(super) struct Part {
     /// Grey pixels in it; the counts below are among these.
     pub grey: usize,
     pub seeds: usize,
+    /// Darker than the surroundings by a given share; none where nothing surrounds it.
     pub dark: usize,
-    pub highlights: usize,
     /// Reaches the image's rim.
     pub at_rim: bool,
     /// Largest distance to what is outside [fifths of a pixel].
@@ -30,15 +30,8 @@ impl Part {
     }
 }
 
-/// Parts (4-connected) of `set`, with the part of every pixel. Depth is compared up to `reach` pixels away.
-pub(super) fn find_parts(
-    set: &[bool],
-    looks: &[Look],
-    depth: Option<&DepthImage>,
-    width: usize,
-    height: usize,
-    reach: f64,
-) -> (Vec<Option<u32>>, Vec<Part>) {
+/// Parts (4-connected) of `set`, with the part of every pixel.
+pub(super) fn find_parts(set: &[bool], looks: &[Look], width: usize, height: usize) -> (Vec<Option<u32>>, Vec<Part>) {
     let rest: Vec<bool> = set.iter().map(|s| !s).collect();
     let inside = distances(&rest, width, height, false);
     let mut labels: Vec<Option<u32>> = vec![None; set.len()];
@@ -59,8 +52,6 @@ pub(super) fn find_parts(
             if look.grey {
                 part.grey += 1;
                 part.seeds += usize::from(look.seed);
-                part.dark += usize::from(look.dark);
-                part.highlights += usize::from(look.highlight);
             }
             part.at_rim |= u == 0 || v == 0 || u + 1 == width || v + 1 == height;
             part.thickness = part.thickness.max(inside[i]);
@@ -73,17 +64,21 @@ pub(super) fn find_parts(
         }
         parts.push(part);
     }
-    if let Some(depth) = depth {
-        compare_depth(&labels, &mut parts, depth, reach);
-    }
     (labels, parts)
 }
 
-/// Walks outwards from all parts at once; each pixel reached compares its depth with that of the part's pixel it was
-/// reached from.
-fn compare_depth(labels: &[Option<u32>], parts: &mut [Part], depth: &DepthImage, reach: f64) {
-    let (width, height) = (depth.width, depth.height);
-    // Pixels next to the rim mix both sides, and a stereo camera widens what is near.
+/// Compares parts with what lies up to `reach` pixels around them, on an image of `size` (width, height). Walks outwards
+/// from all parts at once; each pixel reached is compared with the part's pixel it was reached from.
+pub(super) fn compare(
+    labels: &[Option<u32>],
+    parts: &mut [Part],
+    looks: &[Look],
+    depth: Option<&DepthImage>,
+    [width, height]: [usize; 2],
+    reach: f64,
+    dark: f64,
+) {
+    // Pixels next to the edge mix both sides, and a stereo camera widens what is near.
     let (skip, steps) = ((0.25 * reach).ceil() as usize, reach.ceil() as usize);
     let mut origin: Vec<u32> = vec![u32::MAX; labels.len()];
     let at_edge = |i: &usize| labels[*i].is_some() && pixel_neighbours(*i, width, height).any(|n| labels[n].is_none());
@@ -92,6 +87,7 @@ fn compare_depth(labels: &[Option<u32>], parts: &mut [Part], depth: &DepthImage,
         origin[*i] = *i as u32;
     }
     let mut differences: Vec<Vec<f32>> = vec![Vec::new(); parts.len()];
+    let mut brightness = vec![(0u64, 0u64); parts.len()]; // sum and count
     for step in 1..=steps {
         let mut next = Vec::new();
         for i in front {
@@ -102,12 +98,15 @@ fn compare_depth(labels: &[Option<u32>], parts: &mut [Part], depth: &DepthImage,
                 origin[n] = origin[i];
                 next.push(n);
                 let from = origin[n] as usize;
-                let (Some(label), far) = (labels[from], depth.depth[n]) else { continue };
-                if step > skip
-                    && valid(far)
+                let Some(label) = labels[from].filter(|_| step > skip) else { continue };
+                let (sum, count) = &mut brightness[label as usize];
+                *sum += u64::from(looks[n].brightness);
+                *count += 1;
+                if let Some(depth) = depth
+                    && valid(depth.depth[n])
                     && let Some(near) = nearest_around(depth, from)
                 {
-                    differences[label as usize].push(far - near);
+                    differences[label as usize].push(depth.depth[n] - near);
                 }
             }
         }
@@ -117,6 +116,12 @@ fn compare_depth(labels: &[Option<u32>], parts: &mut [Part], depth: &DepthImage,
         if differences.len() >= 20 {
             let middle = differences.len() / 2;
             part.nearer = Some(f64::from(*differences.select_nth_unstable_by(middle, f32::total_cmp).1));
+        }
+    }
+    let limits: Vec<f64> = brightness.into_iter().map(|(sum, n)| dark * sum as f64 / n.max(1) as f64).collect();
+    for (label, look) in labels.iter().zip(looks) {
+        if let Some(label) = label.filter(|_| look.grey) {
+            parts[label as usize].dark += usize::from(f64::from(look.brightness) < limits[label as usize]);
         }
     }
 }

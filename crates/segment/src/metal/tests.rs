@@ -54,6 +54,13 @@ fn paint(bars: &[Bar], dark_room: f64) -> (ColorImage, DepthImage, Mask) {
             rgb = rgb.map(|c| c + (255.0 - c) * white);
         }
         depth.depth[i] = (0.15 - 0.01 * wave) as f32;
+        let ridge = ((x - 230.0) / 8.0).hypot((y - 215.0) / 22.0);
+        if ridge < 1.0 {
+            // A gall bladder: green, near, with a long wet highlight that is nearly grey.
+            let shine = (1.3 - ((x - 228.0) / 4.0).hypot((y - 215.0) / 18.0)).clamp(0.0, 0.7);
+            rgb = [110.0, 120.0, 72.0].map(|c| c + (220.0 - c) * shine);
+            depth.depth[i] -= (0.01 * (1.0 - ridge * ridge).sqrt()) as f32;
+        }
         for bar in bars {
             if let Some(s) = across(bar, x, y) {
                 // Lit from one side: bright line, grey flank, dark edge; red glow of the tissue on the other flank.
