@@ -81,6 +81,9 @@ pub enum Error {
     /// A recording is unusable.
     #[error(transparent)]
     Recording(#[from] trocar_recording::Error),
+    /// Something cannot be found in a picture.
+    #[error(transparent)]
+    Segment(#[from] trocar_segment::Error),
     /// A specimen cannot be read or written.
     #[error(transparent)]
     Specimen(#[from] trocar_specimen::Error),

@@ -7,6 +7,7 @@ mod experiment;
 mod inspect;
 mod paper;
 pub mod report;
+mod segment;
 mod truth;
 mod workflow;
 
@@ -15,6 +16,7 @@ pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
 pub use inspect::{Inspection, inspect};
+pub use segment::{Segment, Segmented, Wanted, wanted_weights};
 pub use truth::TruthFigures;
 pub use workflow::{
     CompositeFigures, OrganRow, Reconstructed, SimulatedRun, reconstruct_recording, reconstruct_surface, simulate,

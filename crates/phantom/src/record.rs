@@ -136,6 +136,7 @@ fn info(plan: &Plan, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy
         camera: Some(*camera),
         depth_camera: None,
         depth_to_color: None,
+        followed: Vec::new(),
         organs: anatomy.organs.iter().map(organ).collect(),
     }
 }

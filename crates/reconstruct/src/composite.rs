@@ -1,6 +1,7 @@
 //! The background: per-pixel medians over a window of frames, instruments left out (paper section III, "Instrument
 //! removal").
 
+use crate::masks::instruments;
 use crate::{Error, Result, Settings};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -147,10 +148,13 @@ fn read_window(
         if progress.interrupted() {
             return (packet.frame, Err(Error::Interrupted));
         }
-        let sample = packet.parts.and_then(|parts| {
+        let sample = packet.parts.map_err(Error::from).and_then(|parts| {
             let clock = Instant::now();
-            let RgbdFrame { color, depth, instruments } = recording.decode(packet.frame, &parts)?;
+            let frame = recording.decode(packet.frame, &parts)?;
             decoding.fetch_add(clock.elapsed().as_nanos() as u64, Ordering::Relaxed);
+            let found = instruments(recording.info.instruments, &frame, &recording.frame_name(packet.frame))?;
+            let RgbdFrame { color, depth, instruments } = frame;
+            let instruments = found.unwrap_or(instruments);
             Ok(Sample {
                 frame: packet.frame,
                 depth: depth.depth.iter().map(|z| (f64::from(*z) / scale).round() as u16).collect(),
@@ -160,7 +164,7 @@ fn read_window(
             })
         });
         progress.advance(1);
-        (packet.frame, sample.map_err(Error::from))
+        (packet.frame, sample)
     };
     // One thread reads while the others decode; what is read is decoded at once, so no more than a packet a thread waits.
     let mut read: Vec<(usize, Result<Sample>)> = recording.packets(window).par_bridge().map(read).collect();

@@ -41,6 +41,9 @@ pub enum Error {
     /// The recording is unusable.
     #[error(transparent)]
     Recording(#[from] trocar_recording::Error),
+    /// Something cannot be found in a picture.
+    #[error(transparent)]
+    Segment(#[from] trocar_segment::Error),
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),

@@ -19,7 +19,6 @@ mod masks;
 mod organ;
 mod outline;
 mod pipeline;
-mod polygon;
 mod resample;
 mod settings;
 mod thickness;

@@ -1,44 +1,101 @@
-//! Where an organ is seen.
+//! Where organs and instruments are seen: each by the segmenter that its description calls for.
 
-use crate::polygon::fill_polygon;
-use crate::{Error, Result};
-use trocar_camera::Mask;
-use trocar_recording::{OrganInfo, Recording};
+use crate::{Error, Result, Settings};
+use std::path::Path;
+use trocar_camera::{ColorImage, Mask};
+use trocar_recording::{InstrumentRule, OrganInfo, Recording, RgbdFrame};
+use trocar_segment::{MaskFolder, MetalDetector, Picture, Polygon, Sam2, Segmenter, Target};
 
-/// The still mask of `organ`, from its file or polygon.
+/// Finds the organs of a recording in its composite.
+pub struct OrganSegmenters {
+    files: MaskFolder,
+    polygon: Polygon,
+    /// Opened where an organ is only pointed at.
+    sam: Option<Sam2>,
+}
+
+/// What an organ's description says of it.
+fn target(organ: &OrganInfo) -> Target {
+    Target {
+        name: organ.name.clone(),
+        polygon: organ.polygon.clone(),
+        points: organ.points.clone(),
+        points_outside: organ.points_outside.clone(),
+        box_px: None,
+    }
+}
+
+/// True where the organ has neither an outline nor a mask file, but points.
+fn only_points(organ: &OrganInfo, masks: &Path) -> bool {
+    !organ.points.is_empty() && organ.polygon.is_empty() && !masks.join(format!("{}.png", organ.name)).is_file()
+}
+
+impl OrganSegmenters {
+    /// Opens what the organs of `recording` need, and makes sure that each can be found: a missing mask should not be noticed
+    /// after minutes of work.
+    ///
+    /// # Errors
+    /// An organ without mask, outline or points; a mask of another size, or empty; points without a SAM 2.1.
+    pub fn open(recording: &Recording, settings: &Settings) -> Result<Self> {
+        let folder = recording.dir().join("masks");
+        let organs = &recording.info.organs;
+        let pointed_at = organs.iter().find(|o| only_points(o, &folder));
+        let sam = match (pointed_at, &settings.sam) {
+            (None, _) => None,
+            (Some(_), Some(weights)) => Some(Sam2::open(weights, settings.onnxruntime.as_deref())?),
+            (Some(organ), None) => {
+                let reason = "it is only pointed at, for which SAM 2.1 is needed (--sam FOLDER; `trocar segment --weights` \
+                              says which files); else a polygon or a mask";
+                return Err(Error::Organ { organ: organ.name.clone(), reason: reason.into() });
+            }
+        };
+        let segmenters = Self { files: MaskFolder { folder }, polygon: Polygon, sam };
+        let camera = recording.camera();
+        let blank = ColorImage::new(camera.width, camera.height, [0; 3]);
+        for organ in organs.iter().filter(|o| !only_points(o, &segmenters.files.folder)) {
+            segmenters.mask(organ, &blank)?;
+        }
+        Ok(segmenters)
+    }
+
+    /// The mask of `organ` in the composite `color`.
+    ///
+    /// # Errors
+    /// When the mask is missing, of another size than the images, or empty.
+    pub fn mask(&self, organ: &OrganInfo, color: &ColorImage) -> Result<Mask> {
+        let wrong = |reason: String| Error::Organ { organ: organ.name.clone(), reason };
+        let file = self.files.folder.join(format!("{}.png", organ.name));
+        let segmenter: &dyn Segmenter = match &self.sam {
+            _ if !organ.polygon.is_empty() => &self.polygon,
+            Some(sam) if only_points(organ, &self.files.folder) => sam,
+            _ if !file.is_file() => {
+                let reason =
+                    format!("no mask: {} does not exist, and there is no polygon and no points", file.display());
+                return Err(wrong(reason));
+            }
+            _ => &self.files,
+        };
+        let picture = Picture { color, depth: None, name: "the composite" };
+        let mask = segmenter.segment(&picture, &target(organ)).map_err(|e| wrong(e.to_string()))?;
+        if mask.count() == 0 {
+            return Err(wrong(format!("{} covers no pixel of the image", segmenter.describe())));
+        }
+        Ok(mask)
+    }
+}
+
+/// Pixels of a frame that instruments cover, by the recording's rule.
 ///
 /// # Errors
-/// When the mask is missing, of another size than the images, or empty.
-pub fn organ_mask(recording: &Recording, organ: &OrganInfo) -> Result<Mask> {
-    let unusable = |reason: String| Error::Organ { organ: organ.name.clone(), reason };
-    let camera = recording.camera();
-    if !organ.polygon.is_empty() {
-        let mask = fill_polygon(camera.width, camera.height, &organ.polygon);
-        return match mask.count() {
-            0 => Err(unusable("its polygon covers no pixel of the image".into())),
-            _ => Ok(mask),
-        };
-    }
-    let path = recording.dir().join("masks").join(format!("{}.png", organ.name));
-    if !path.is_file() {
-        return Err(unusable(format!(
-            "no mask: {} does not exist, and recording.toml gives no polygon",
-            path.display()
-        )));
-    }
-    let mask = Mask::read(&path)?;
-    if (mask.width, mask.height) != (camera.width, camera.height) {
-        return Err(unusable(format!(
-            "its mask {} has {} x {} pixels, but the images have {} x {}; masks lie on the image's pixels",
-            path.display(),
-            mask.width,
-            mask.height,
-            camera.width,
-            camera.height
-        )));
-    }
-    match mask.count() {
-        0 => Err(unusable(format!("no pixel of its mask is set: {}", path.display()))),
-        _ => Ok(mask),
+/// When the detector cannot work on the frame.
+pub fn instruments(rule: InstrumentRule, frame: &RgbdFrame, name: &str) -> Result<Option<Mask>> {
+    match rule {
+        InstrumentRule::Masks => Ok(None),
+        InstrumentRule::None => Ok(Some(Mask::new(frame.color.width, frame.color.height))),
+        InstrumentRule::Metal => {
+            let picture = Picture { color: &frame.color, depth: Some(&frame.depth), name };
+            let target = Target { name: "instruments".into(), ..Target::default() };
+            Ok(Some(MetalDetector::default().segment(&picture, &target)?))
+        }
     }
 }

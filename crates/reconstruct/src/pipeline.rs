@@ -2,7 +2,7 @@
 
 use crate::body::fill_with_tets;
 use crate::composite::{Composite, CompositeTimes, composite};
-use crate::masks::organ_mask;
+use crate::masks::OrganSegmenters;
 use crate::organ::{Closed, View, close};
 use crate::{Error, Result, Settings};
 use trocar_camera::{ColorImage, DepthImage, Mask};
@@ -71,10 +71,11 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
             reason: "no [[organ]]; name at least one, with a mask in masks/, a polygon or points (`trocar inspect` writes a template)".into(),
         });
     }
-    // All masks first: a missing one should not be found after minutes of work.
-    let masks = recording.info.organs.iter().map(|organ| organ_mask(recording, organ)).collect::<Result<Vec<_>>>()?;
+    let segmenters = OrganSegmenters::open(recording, settings)?;
     let mut notes = recording.notes().to_vec();
     let background = composite(recording, settings, &mut notes, progress)?;
+    let organs = &recording.info.organs;
+    let masks = organs.iter().map(|o| segmenters.mask(o, &background.color)).collect::<Result<Vec<_>>>()?;
     if background.frames_used < settings.min_samples {
         notes.push(format!("The window holds only {} frames.", background.frames_used));
     }

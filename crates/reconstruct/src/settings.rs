@@ -1,6 +1,7 @@
 //! The choices of a reconstruction; one set serves every recording.
 
 use crate::{Error, Result};
+use std::path::PathBuf;
 
 /// Settings of the reconstruction.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,6 +14,10 @@ pub struct Settings {
     pub centre: Option<usize>,
     /// Fewest samples a pixel needs (paper: 3); a recording of fewer frames needs as many as it has.
     pub min_samples: usize,
+    /// Folder with the networks of SAM 2.1, for organs that are only pointed at.
+    pub sam: Option<PathBuf>,
+    /// ONNX Runtime's library, or a folder with a Python `onnxruntime`; `ORT_DYLIB_PATH` by default.
+    pub onnxruntime: Option<PathBuf>,
     /// How thick an organ is taken to be behind its front.
     pub back: BackRule,
     /// How the surface is made from front and back.
@@ -65,6 +70,8 @@ impl Default for Settings {
             stride: 2,
             centre: None,
             min_samples: 3,
+            sam: None,
+            onnxruntime: None,
             back: BackRule::default(),
             surface: SurfaceRule::default(),
             mesher: MesherRule::default(),
@@ -112,6 +119,9 @@ impl Settings {
             format!("surface = {:?}", self.surface),
             format!("mesher = {:?}", self.mesher),
         ];
+        if let Some(sam) = &self.sam {
+            list.push(format!("sam = {}", sam.display()));
+        }
         match self.element_size {
             Some(size) => list.push(format!("element_size_m = {size}")),
             None => {

@@ -43,7 +43,37 @@ fn a_polygon_beside_the_image_is_named() {
     let mut info = info();
     info.organs[0].polygon = vec![[-9.0, -9.0], [-8.0, -9.0], [-9.0, -8.0]];
     let (_root, dir) = recording(&info);
-    assert!(failure(&dir).contains("covers no pixel"));
+    let error = failure(&dir);
+    assert!(error.contains("organ 'ball'") && error.contains("no pixel"), "{error}");
+}
+
+#[test]
+fn points_ask_for_sam() {
+    let mut info = info();
+    info.organs[0].points = vec![[80.0, 60.0]];
+    let (_root, dir) = recording(&info);
+    assert!(
+        reconstruct(&Recording::open(&dir).unwrap(), &Settings::default(), &Silent).is_ok(),
+        "the mask file is enough"
+    );
+    fs::remove_file(dir.join("masks/ball.png")).unwrap();
+    assert!(failure(&dir).contains("--sam FOLDER"));
+    let settings = Settings { sam: Some(dir.join("nowhere")), ..Settings::default() };
+    let error = reconstruct(&Recording::open(&dir).unwrap(), &settings, &Silent).unwrap_err().to_string();
+    assert!(error.contains("nowhere") && !error.contains('\n'), "{error}");
+}
+
+#[test]
+fn metal_is_found_where_the_recording_says_so() {
+    let mut info = info();
+    info.instruments = trocar_recording::InstrumentRule::None;
+    let (_root, dir) = recording(&info);
+    let made = reconstruct(&Recording::open(&dir).unwrap(), &Settings::default(), &Silent).unwrap();
+    assert_eq!(made.instruments.count(), 0, "the masks are there, but the recording says none");
+    let toml = dir.join("recording.toml");
+    let text = fs::read_to_string(&toml).unwrap().replace("instruments = \"none\"", "instruments = \"metal\"");
+    fs::write(&toml, text).unwrap();
+    assert!(reconstruct(&Recording::open(&dir).unwrap(), &Settings::default(), &Silent).is_ok());
 }
 
 #[test]

@@ -47,9 +47,28 @@ pub struct RecordingInfo {
     /// From the depth camera's frame to the colour camera's; together with `depth_camera`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_to_color: Option<DepthToColor>,
+    /// Instruments that a segmenter is to follow through the frames.
+    #[serde(default, rename = "instrument", skip_serializing_if = "Vec::is_empty")]
+    pub followed: Vec<InstrumentInfo>,
     /// The organs to reconstruct.
     #[serde(default, rename = "organ")]
     pub organs: Vec<OrganInfo>,
+}
+
+/// An instrument pointed at in one frame.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct InstrumentInfo {
+    /// Name.
+    pub name: String,
+    /// The frame in which it is pointed at.
+    #[serde(default)]
+    pub frame: usize,
+    /// Pixels [u, v] on it.
+    pub points: Vec<[f64; 2]>,
+    /// Pixels [u, v] beside it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub points_outside: Vec<[f64; 2]>,
 }
 
 /// A rigid motion: p_color = rotation p_depth + translation.
@@ -168,6 +187,7 @@ impl RecordingInfo {
             camera: None,
             depth_camera: None,
             depth_to_color: None,
+            followed: Vec::new(),
             organs: Vec::new(),
         }
     }
@@ -211,6 +231,12 @@ impl RecordingInfo {
             && (max.is_nan() || max <= 0.0)
         {
             return wrong(format!("depth_max_m is {max}; metres, above 0"));
+        }
+        for (i, instrument) in self.followed.iter().enumerate() {
+            let points = || instrument.points.iter().chain(&instrument.points_outside).flatten();
+            if instrument.points.is_empty() || points().any(|c| !c.is_finite()) {
+                return wrong(format!("instrument[{i}].points needs at least one pixel [u, v] on the instrument"));
+            }
         }
         for (i, organ) in self.organs.iter().enumerate() {
             if let Err(reason) = trocar_specimen::check_name(&organ.name) {

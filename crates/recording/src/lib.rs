@@ -26,7 +26,7 @@ mod source;
 mod writer;
 
 pub use error::{Error, Result};
-pub use info::{DepthToColor, InstrumentRule, OrganInfo, RecordingInfo, SourceInfo};
+pub use info::{DepthToColor, InstrumentInfo, InstrumentRule, OrganInfo, RecordingInfo, SourceInfo};
 pub use pairing::Pairing;
 pub use recording::{Recording, RgbdFrame};
 pub use register::Registration;

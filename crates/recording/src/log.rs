@@ -4,8 +4,8 @@ use crate::pairing::Pairing;
 use crate::source::{FrameSource, Images, Packet, Parts};
 use crate::{DepthToColor, Error, Result, SourceInfo};
 use std::collections::BTreeMap;
-use std::path::Path;
-use trocar_camera::{Camera, Pose};
+use std::path::{Path, PathBuf};
+use trocar_camera::{Camera, Mask, Pose};
 use trocar_messages::{
     DepthValues, Guess, Image, MessageLog, decode_calibration, decode_float, decode_image, decode_transforms, read_one,
     realsense,
@@ -26,6 +26,8 @@ pub struct Log {
     /// (colour, depth): indices of messages.
     pairs: Vec<(usize, usize)>,
     depth_scale_m: f64,
+    /// `masks/instruments` of its folder, with a mask `000012.png` for frame 12.
+    instruments: PathBuf,
     notes: Vec<String>,
 }
 
@@ -64,8 +66,21 @@ impl Log {
             return Err(Error::wrong(&path, reason));
         }
         let depth_scale_m = cameras.depth_scale_m;
-        let log = Self { log, color: guess.color, depth: guess.depth, pairs: pairing.pairs, depth_scale_m, notes };
+        let instruments = dir.join("masks/instruments");
+        let log = Self {
+            log,
+            color: guess.color,
+            depth: guess.depth,
+            pairs: pairing.pairs,
+            depth_scale_m,
+            instruments,
+            notes,
+        };
         Ok((log, cameras))
+    }
+
+    fn mask_file(&self, frame: usize) -> PathBuf {
+        self.instruments.join(format!("{frame:06}.png"))
     }
 }
 
@@ -102,7 +117,11 @@ impl FrameSource for Log {
                 return None;
             };
             let parts = match if is_color { (bytes, other) } else { (other, bytes) } {
-                (Ok(color), Ok(depth)) => Ok(Parts { color: Some(color), depth, instruments: None }),
+                (Ok(color), Ok(depth)) => {
+                    // A frame without a mask shows no instrument.
+                    let instruments = std::fs::read(self.mask_file(frame)).ok();
+                    Ok(Parts { color: Some(color), depth, instruments })
+                }
                 (Err(e), _) | (_, Err(e)) => Err(e),
             };
             Some(Packet { frame, parts })
@@ -123,7 +142,11 @@ impl FrameSource for Log {
             None => None,
         };
         match decode_image(&topics[self.depth], &parts.depth)?.image {
-            Image::Depth(depth) => Ok(Images { color, depth: depth.to_metres(self.depth_scale_m), instruments: None }),
+            Image::Depth(depth) => {
+                let decode = |bytes: &Vec<u8>| Mask::decode(bytes, &self.mask_file(frame));
+                let instruments = parts.instruments.as_ref().map(decode).transpose()?;
+                Ok(Images { color, depth: depth.to_metres(self.depth_scale_m), instruments })
+            }
             Image::Color(_) => wrong("depth"),
         }
     }

@@ -27,6 +27,8 @@ pub enum Command {
     Record(Record),
     /// Say what a recording holds, and write the file in which to say more of it.
     Inspect(Inspect),
+    /// Make masks of a recording: organs pointed at by SAM 2.1, instruments by the looks of metal or followed by SAM 2.1.
+    Segment(Segment),
     /// Turn an RGB-D recording, or a ready surface, into watertight tetrahedral organs.
     Reconstruct(Reconstruct),
     /// Run a scripted task on a specimen without a window.
@@ -105,6 +107,33 @@ pub struct Inspect {
     pub template: bool,
 }
 
+/// Arguments of `segment`.
+#[derive(Debug, Args)]
+pub struct Segment {
+    /// Recording; its .toml points at organs (`points`) and instruments (`[[instrument]]`).
+    #[arg(required_unless_present = "weights")]
+    pub recording: Option<PathBuf>,
+    /// Folder to write: put it into the recording as masks/ and `reconstruct` uses it.
+    #[arg(short, long, required_unless_present = "weights")]
+    pub output: Option<PathBuf>,
+    /// Say which files SAM 2.1 needs, which are there, and where the others can be had.
+    #[arg(long)]
+    pub weights: bool,
+    #[command(flatten)]
+    pub sam: Sam,
+}
+
+/// Where SAM 2.1 is.
+#[derive(Debug, Args)]
+pub struct Sam {
+    /// Folder with the ONNX networks of SAM 2.1 (`trocar segment --weights` says which).
+    #[arg(long = "sam", value_name = "FOLDER")]
+    pub folder: Option<PathBuf>,
+    /// ONNX Runtime's library, or a folder with a Python onnxruntime; the variable ORT_DYLIB_PATH goes before it.
+    #[arg(long, value_name = "PATH")]
+    pub onnxruntime: Option<PathBuf>,
+}
+
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Reconstruct {
@@ -129,6 +158,9 @@ pub struct Reconstruct {
     /// Every how many frames of the window are used.
     #[arg(long, default_value_t = 2)]
     pub stride: usize,
+    /// SAM 2.1, for organs that are only pointed at.
+    #[command(flatten)]
+    pub sam: Sam,
     /// How thick organs are taken to be behind their fronts.
     #[arg(long, value_enum, default_value_t = BackName::Rounded)]
     pub back: BackName,

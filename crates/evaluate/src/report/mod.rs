@@ -22,6 +22,7 @@ use crate::experiment::ReconstructionResult;
 use crate::{Error, Result};
 use moving_picture::Lift;
 use std::path::Path;
+use trocar_camera::{ColorImage, Mask};
 use trocar_cell::GraspLiftRun;
 use trocar_geometry::RepairReport;
 use trocar_reconstruct::Reconstruction;
@@ -129,6 +130,12 @@ pub fn grasp_lift(s: &Specimen, run: &GraspLiftRun, before: Option<&str>) -> Res
 /// A run without snapshots, or with snapshots that are not of this specimen.
 pub fn lift_gif(s: &Specimen, run: &GraspLiftRun) -> Result<Vec<u8>> {
     Lift::new(s, run)?.ok_or(Error::NoSnapshots)?.gif()
+}
+
+/// Tints and outlines `mask` in `picture`, in the colour that organ `index` has everywhere.
+pub(crate) fn overlay(picture: &mut ColorImage, mask: &Mask, index: usize) {
+    overlays::tint(picture, mask, colors::organ(index), 0.42);
+    overlays::outline(picture, mask, colors::organ(index));
 }
 
 fn made_from(s: &Specimen, what: &str) -> String {

@@ -25,6 +25,7 @@ pub fn info() -> RecordingInfo {
         source: None,
         depth_camera: None,
         depth_to_color: None,
+        followed: Vec::new(),
         camera: Some(Camera {
             width: 160,
             height: 120,

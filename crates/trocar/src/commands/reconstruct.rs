@@ -12,6 +12,8 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
         window: arguments.window,
         stride: arguments.stride,
         centre: arguments.centre,
+        sam: arguments.sam.folder.clone(),
+        onnxruntime: arguments.sam.onnxruntime.clone(),
         back: arguments.back.into(),
         surface: if arguments.binary_grid { SurfaceRule::BinaryGrid } else { SurfaceRule::SignedDistance },
         mesher: arguments.mesher.into(),
