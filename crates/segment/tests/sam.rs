@@ -20,7 +20,10 @@ fn fixture(name: &str) -> PathBuf {
 /// The networks, or why there are none.
 fn open(name: &str) -> Option<Sam2> {
     let tools = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools");
-    if std::env::var_os("ORT_DYLIB_PATH").is_none() && !tools.join("lib").is_dir() {
+    // Where pip puts it: lib/python3.11/site-packages/onnxruntime/capi.
+    let versions = std::fs::read_dir(tools.join("lib")).into_iter().flatten().flatten();
+    let installed = versions.map(|v| v.path().join("site-packages/onnxruntime/capi")).any(|capi| capi.is_dir());
+    if std::env::var_os("ORT_DYLIB_PATH").is_none() && !installed {
         println!("skipped: no ONNX Runtime; set ORT_DYLIB_PATH, or make a Python environment with it in target/tools");
         return None;
     }
