@@ -126,7 +126,7 @@ impl MeshingBench {
     fn surfaces(&self) -> Result<Vec<(String, TriMesh)>> {
         if self.surfaces.is_empty() {
             let half = glam::DVec3::from(LIVER);
-            let grid = sample_everywhere(&Ellipsoid(half), (-half, half), 1.5e-3);
+            let grid = sample_everywhere(&Ellipsoid(half), (-half, half), 3e-3);
             return Ok(vec![("ellipsoid of 815 cm3".into(), isosurface(&grid, 0.0))]);
         }
         let read = |path: &PathBuf| -> Result<(String, TriMesh)> {
