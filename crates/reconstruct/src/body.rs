@@ -1,7 +1,10 @@
 //! The tetrahedra that fill a closed surface, measured.
 
+use crate::resample::smooth;
 use crate::{Error, MesherRule, Result, Settings};
-use trocar_geometry::{LatticeMesher, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh};
+use trocar_geometry::{
+    LatticeMesher, MeshDistance, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, isosurface, sample_distance,
+};
 use trocar_specimen::OrganFacts;
 
 /// Fills a closed surface with tetrahedra and measures the result.
@@ -30,9 +33,22 @@ pub fn fill_with_tets(organ: &str, surface: &TriMesh, settings: &Settings) -> Re
 }
 
 fn fill(surface: &TriMesh, settings: &Settings) -> trocar_geometry::Result<TetMesh> {
+    let Settings { finest_cell, max_tets, .. } = *settings;
     match (settings.mesher, settings.element_size) {
-        (MesherRule::Tetgen, _) => TetgenMesher::default().mesh(surface),
         (MesherRule::Lattice, Some(cell)) => LatticeMesher::graded(cell).mesh(surface),
-        (MesherRule::Lattice, None) => Ok(LatticeMesher::fit(surface, settings.finest_cell, settings.max_tets)?.1),
+        (MesherRule::Lattice, None) => Ok(LatticeMesher::fit(surface, finest_cell, max_tets)?.1),
+        (MesherRule::Tetgen, size) => {
+            let size = size.unwrap_or_else(|| LatticeMesher::for_body(surface, finest_cell, max_tets).cell);
+            TetgenMesher::default().mesh(&with_edges_of(size, surface)?)
+        }
     }
+}
+
+/// The surface with triangles of about `size` [m]: TetGen keeps those it is given, and ours are as fine as the pixels.
+fn with_edges_of(size: f64, surface: &TriMesh) -> trocar_geometry::Result<TriMesh> {
+    let bounds = surface.bounds().ok_or_else(|| trocar_geometry::Error::Mesh("the surface is empty".into()))?;
+    let grid = sample_distance(&MeshDistance::new(surface)?, bounds, size);
+    let mut coarse = isosurface(&grid, 0.0).largest_component();
+    smooth(&mut coarse);
+    Ok(coarse)
 }

@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use trocar_geometry::{MeshDistance, TriMesh, isosurface, sample_distance, taubin};
 
-/// Taubin's smoothing as in the paper.
+/// The paper's values.
 const LAMBDA: f64 = 0.5;
 const MU: f64 = -0.53;
 const SMOOTHING_ITERATIONS: usize = 10;
@@ -30,7 +30,7 @@ pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
 pub fn tidy(organ: &str, rough: &TriMesh) -> Result<TriMesh> {
     let wrong = |reason: &str| Error::Organ { organ: organ.to_owned(), reason: reason.to_owned() };
     let mut surface = rough.largest_component();
-    taubin(&mut surface, LAMBDA, MU, SMOOTHING_ITERATIONS);
+    smooth(&mut surface);
     if surface.triangles.is_empty() || surface.volume() <= 0.0 {
         return Err(wrong("its surface encloses no volume; is the mask only a few pixels wide?"));
     }
@@ -38,4 +38,9 @@ pub fn tidy(organ: &str, rough: &TriMesh) -> Result<TriMesh> {
         return Err(wrong("its surface does not close"));
     }
     Ok(surface)
+}
+
+/// Taubin's smoothing as in the paper.
+pub fn smooth(surface: &mut TriMesh) {
+    taubin(surface, LAMBDA, MU, SMOOTHING_ITERATIONS);
 }

@@ -24,7 +24,7 @@ pub struct Settings {
     pub surface: SurfaceRule,
     /// What fills it with tetrahedra.
     pub mesher: MesherRule,
-    /// Edge of the elements at the surface [m]; by default `finest_cell`, or larger so that there are no more than `max_tets`.
+    /// Edge of the elements at the surface [m] (and of the triangles that TetGen is given); by default `finest_cell`, or larger so that there are no more than `max_tets`.
     pub element_size: Option<f64>,
     /// Edge of the finest lattice cell where no `element_size` is given [m].
     pub finest_cell: f64,

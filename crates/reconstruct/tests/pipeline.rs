@@ -86,7 +86,7 @@ fn stops_when_asked_and_says_what_is_wrong() {
     let failure = |settings: Settings| reconstruct(&recording, &settings, &Silent).err().unwrap().to_string();
     assert!(failure(Settings { centre: Some(4), ..Settings::default() }).contains("frame 4; the recording has 4"));
     assert!(failure(Settings { stride: 0, ..Settings::default() }).contains("stride is 0"));
-    assert!(failure(Settings { finest_cell: 0.0, ..Settings::default() }).contains("finest_cell is 0"));
+    assert!(failure(Settings { finest_cell: 0.0, ..Settings::default() }).contains("finest cell is 0 mm"));
 
     // An organ where no depth was measured.
     let mut blind = info();
