@@ -73,7 +73,7 @@ fn fitted_ratio(front: &[f64], inside: &[usize], profile: &[f64], width: usize, 
     if ratio.is_finite() { ratio.clamp(*PLAUSIBLE.start(), *PLAUSIBLE.end()) } else { 1.0 }
 }
 
-/// Volume between `front` and the back that [`thickness`] models behind it [m3]: what a reconstruction of an organ whose front
+/// Volume between `front` and the back that is modelled behind it by `rule` [m3]: what a reconstruction of an organ whose front
 /// is known exactly should enclose. Each pixel is a frustum between its front and back depth. `front` is a depth a pixel [m]. For a
 /// camera without distortion.
 pub fn modelled_volume(front: &[f64], mask: &Mask, camera: &Camera, rule: BackRule) -> f64 {
