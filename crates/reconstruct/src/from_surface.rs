@@ -34,8 +34,8 @@ fn make(path: &Path, unit: Unit, settings: &Settings, progress: &dyn Progress) -
         progress.advance(1);
         if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
     };
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
     let raw = read_surface(path, unit)?;
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
     check_size(path, &raw, unit)?;
     step()?;
     let named = |e: trocar_geometry::Error| Error::Input { path: path.to_owned(), reason: e.to_string() };

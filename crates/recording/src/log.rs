@@ -52,7 +52,14 @@ impl Log {
     pub fn open(dir: &Path, source: &SourceInfo, depth_scale_m: Option<f64>) -> Result<(Self, LogCameras)> {
         let path = dir.join(&source.file);
         let log = trocar_messages::open(&path)?;
-        let guess = trocar_messages::guess(&*log, source.color_topic.as_deref(), source.depth_topic.as_deref())?;
+        let guess = trocar_messages::guess(&*log, source.color_topic.as_deref(), source.depth_topic.as_deref());
+        // In a damaged file what is missing may be what was lost.
+        let guess = guess.map_err(|e| match (e, log.problems().first()) {
+            (trocar_messages::Error::Choice { reason, .. }, Some(problem)) => {
+                Error::wrong(&path, format!("{problem}; {reason}"))
+            }
+            (e, _) => e.into(),
+        })?;
         let mut cameras = cameras(&*log, &guess);
         cameras.depth_scale_m = depth_scale_m.unwrap_or(cameras.depth_scale_m);
         let seconds = |topic: usize| -> Vec<f64> { log.times(topic).iter().map(|t| 1e-9 * *t as f64).collect() };

@@ -144,7 +144,7 @@ pub struct Reconstruct {
     #[arg(long, requires = "units")]
     pub surface: Option<PathBuf>,
     /// Unit of the surface file.
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, conflicts_with = "recording")]
     pub units: Option<Units>,
     /// Specimen folder to write.
     #[arg(short, long)]

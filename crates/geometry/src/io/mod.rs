@@ -47,6 +47,9 @@ pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
         "obj" => obj::parse,
         _ => return Err(bad(path, "not a known surface file; supported are .stl, .ply and .obj")),
     };
+    if !path.exists() {
+        return Err(bad(path, "no such file"));
+    }
     let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
     let mut mesh = parse(&bytes).map_err(|reason| bad(path, reason))?;
     if mesh.triangles.is_empty() {
