@@ -92,12 +92,18 @@ fn write_template(recording: &Recording, written: &mut Vec<PathBuf>) -> Result<(
         material: Material::default(),
         pins: Pins::Band { share: 0.42 },
     };
-    let info = RecordingInfo { organs: vec![organ], ..recording.info.clone() };
-    let text = toml::to_string(&info).map_err(|e| Error::Format(e.to_string()))?;
+    let described = |info: &RecordingInfo| toml::to_string(info).map_err(|e| Error::Format(e.to_string()));
+    let text = described(&recording.info)?;
+    // The organ is a comment: an outline that nobody drew must not become an organ.
+    let with_organ = described(&RecordingInfo { organs: vec![organ], ..recording.info.clone() })?;
+    let example = with_organ.split_once("[[organ]]").map_or(String::new(), |(_, rest)| format!("[[organ]]{rest}"));
+    let example: String =
+        example.lines().map(|l| if l.is_empty() { "#\n".into() } else { format!("# {l}\n") }).collect();
     let comment = "# What is known of this recording; docs/recordings.md explains every key. Cameras and depth scale come from the log\n\
-                   # unless they are said here. Name each organ, with its outline in pixels of the colour image, or a mask.\n";
+                   # unless they are said here. Name each organ below, with its outline in pixels of the colour image, or a mask.\n";
     let path = recording.toml().to_owned();
-    std::fs::write(&path, format!("{comment}{text}")).map_err(|source| Error::Io { path: path.clone(), source })?;
+    std::fs::write(&path, format!("{comment}{text}\n{example}"))
+        .map_err(|source| Error::Io { path: path.clone(), source })?;
     written.push(path);
     Ok(())
 }

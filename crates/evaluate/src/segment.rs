@@ -74,6 +74,11 @@ impl Segment {
     pub fn run(&self, recording: &Path, output: &Path, progress: &dyn Progress) -> Result<Segmented> {
         let clock = Instant::now();
         let recording = Recording::open(recording)?;
+        if output.exists() {
+            let reason =
+                "is there already; masks may have been corrected by hand, so it is not overwritten; name a new folder";
+            return Err(Error::Exists { path: output.to_owned(), reason: reason.into() });
+        }
         let staged = StagedFolder::create(output, MARKER)?;
         let folder = staged.path();
         let organs: Vec<_> = recording.info.organs.iter().filter(|o| !o.points.is_empty()).collect();

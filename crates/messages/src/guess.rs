@@ -147,5 +147,8 @@ fn choice(log: &dyn MessageLog, what: &str) -> Error {
         log.topics().iter().map(|t| format!("{} ({}, {} messages)", t.name, t.kind, t.count)).collect();
     let list =
         if list.is_empty() { "there are no topics".into() } else { format!("the topics are {}", list.join(", ")) };
-    Error::Choice { path: log.path().to_owned(), reason: format!("{what}; name the topics to use; {list}") }
+    Error::Choice {
+        path: log.path().to_owned(),
+        reason: format!("{what}; name them as color_topic and depth_topic under [source]; {list}"),
+    }
 }

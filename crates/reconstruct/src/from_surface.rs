@@ -87,7 +87,7 @@ fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
         Unit::Metre => 1.0,
     };
     let extent = (high - low).max_element();
-    let organ = 2e-3..=2.0;
+    let organ = 2e-3..=1.0;
     if organ.contains(&extent) || !extent.is_finite() {
         return Ok(());
     }
@@ -102,7 +102,7 @@ fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
         Some((name, u)) => {
             format!("try --units {name}, which makes it {:.0} mm", 1e3 * extent / metres(unit) * metres(u))
         }
-        None => "organs are 2 mm to 2 m long".into(),
+        None => "organs are 2 mm to 1 m long".into(),
     };
     let reason = format!("the surface is {extent:.3} m long, which is no organ; {advice}");
     Err(Error::Input { path: path.to_owned(), reason })

@@ -87,6 +87,7 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
         note(format!("its profile is taken {:.2} times as high as it is wide", back.height_ratio));
     }
     let raw = closed_surface(&front.depth, &back.h, &mask, camera);
+    check_size(name, &raw)?;
     let mut surface = match (rule, raw.bounds()) {
         (SurfaceRule::BinaryGrid, Some(bounds)) => {
             resample::tidy(name, &binary_grid(&front.depth, &back.h, &mask, camera, bounds))?
@@ -97,6 +98,19 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
     let check = check(&surface, &background.depth, &mask, camera).ok_or_else(unmeasured)?;
     let base = base(info.base_px, &mask, &front.depth, camera, middle);
     Ok(Closed { surface, mask, base, check })
+}
+
+/// Refuses what is too large or too small for an organ: nearly always a wrong unit.
+fn check_size(name: &str, surface: &TriMesh) -> Result<()> {
+    let extent = surface.bounds().map_or(0.0, |(low, high)| (high - low).max_element());
+    if (2e-3..=1.0).contains(&extent) {
+        return Ok(());
+    }
+    let reason = format!(
+        "it would be {:.1} mm long; organs are 2 mm to 1 m: is depth_scale_m right, and camera.fx and camera.fy?",
+        1e3 * extent
+    );
+    Err(Error::Organ { organ: name.to_owned(), reason })
 }
 
 /// The organ's point at `base_px`, or at the mask's pixel nearest to it; by default the point that the image's centre shows

@@ -56,6 +56,7 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
     let (mut frames, mut missing) = (Vec::new(), Vec::new());
     let mut previous: Option<u64> = None;
     let mut last_time = f64::NEG_INFINITY;
+    let mut maskless = 0;
     for (row, line) in reader.deserialize::<Row>().zip(2..) {
         let row = row.map_err(|e| wrong(path, explain(&e)))?;
         let at = |reason: String| wrong(path, format!("line {line}: {reason}"));
@@ -75,8 +76,13 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
         let color = file("color", &row.color)?;
         let depth = file("depth", &row.depth)?.ok_or_else(|| at("depth is empty; a file of the folder".into()))?;
         let instruments = file("instruments", &row.instruments)?;
-        let files = [color.as_ref(), Some(&depth), instruments.as_ref()];
-        let absent = files.into_iter().flatten().find(|f| !f.is_file()).cloned();
+        // A frame whose mask is missing shows no instrument; that is told below.
+        let instruments = instruments.filter(|f| {
+            let there = f.is_file();
+            maskless += usize::from(!there);
+            there
+        });
+        let absent = [color.as_ref(), Some(&depth)].into_iter().flatten().find(|f| !f.is_file()).cloned();
         match absent {
             Some(absent) => missing.push(absent),
             None => frames.push(FrameFiles { color, depth, instruments }),
@@ -94,6 +100,11 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
         return Err(wrong(path, reason));
     }
     let mut notes = Vec::new();
+    if maskless > 0 {
+        notes.push(format!(
+            "{maskless} instrument masks that frames.csv names are missing; these frames were taken to show no instrument."
+        ));
+    }
     if let Some(first) = missing.first() {
         let name = first.strip_prefix(dir).unwrap_or(first).display();
         notes.push(format!(

@@ -51,7 +51,7 @@ pub struct RecordingInfo {
     #[serde(default, rename = "instrument", skip_serializing_if = "Vec::is_empty")]
     pub followed: Vec<InstrumentInfo>,
     /// The organs to reconstruct.
-    #[serde(default, rename = "organ")]
+    #[serde(default, rename = "organ", skip_serializing_if = "Vec::is_empty")]
     pub organs: Vec<OrganInfo>,
 }
 

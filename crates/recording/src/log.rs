@@ -61,11 +61,16 @@ impl Log {
             (e, _) => e.into(),
         })?;
         let mut cameras = cameras(&*log, &guess);
-        cameras.depth_scale_m = depth_scale_m.unwrap_or(cameras.depth_scale_m);
+        let said = cameras.depth_scale_m;
+        cameras.depth_scale_m = depth_scale_m.unwrap_or(said);
         let seconds = |topic: usize| -> Vec<f64> { log.times(topic).iter().map(|t| 1e-9 * *t as f64).collect() };
         let pairing = Pairing::by_time(&seconds(guess.color), &seconds(guess.depth));
         let mut notes = log.problems().to_vec();
         notes.extend(pairing.notes());
+        if (cameras.depth_scale_m / said - 1.0).abs() > 1e-6 {
+            let given = cameras.depth_scale_m;
+            notes.push(format!("depth_scale_m = {given} is used, although the file says {said}."));
+        }
         if pairing.pairs.is_empty() {
             let name = |t: usize| &log.topics()[t].name;
             let reason =
@@ -138,13 +143,15 @@ impl FrameSource for Log {
 
     fn decode(&self, frame: usize, parts: &Parts) -> Result<Images> {
         let topics = self.log.topics();
-        let wrong = |what: &str| {
-            Err(Error::wrong(self.log.path(), format!("{}: the {what} topic holds other images", self.name(frame))))
+        let wrong = |what: &str, topic: usize| {
+            let name = &topics[topic].name;
+            let swapped = "are color_topic and depth_topic swapped?";
+            Err(Error::wrong(self.log.path(), format!("frame {frame}: {name} holds no {what} images; {swapped}")))
         };
         let color = match &parts.color {
             Some(bytes) => match decode_image(&topics[self.color], bytes)?.image {
                 Image::Color(image) => Some(image),
-                Image::Depth(_) => return wrong("colour"),
+                Image::Depth(_) => return wrong("colour", self.color),
             },
             None => None,
         };
@@ -154,7 +161,7 @@ impl FrameSource for Log {
                 let instruments = parts.instruments.as_ref().map(decode).transpose()?;
                 Ok(Images { color, depth: depth.to_metres(self.depth_scale_m), instruments })
             }
-            Image::Color(_) => wrong("depth"),
+            Image::Color(_) => wrong("depth", self.depth),
         }
     }
 

@@ -75,8 +75,11 @@ fn what_the_user_says_overrules_the_log() {
     assert_eq!(Recording::open(&path).unwrap().depth_scale(), 0.0005);
 
     for (topics, expected) in [
-        ("color_topic = \"/nowhere\"", "no topic '/nowhere'; name the topics to use; the topics are"),
-        ("depth_topic = \"/camera/color/image_raw\"", "holds other images"),
+        (
+            "color_topic = \"/nowhere\"",
+            "no topic '/nowhere'; name them as color_topic and depth_topic under [source]; the topics are",
+        ),
+        ("depth_topic = \"/camera/color/image_raw\"", "swapped?"),
         ("colour_topic = \"/camera\"", "did you mean `color_topic`?"),
     ] {
         fs::write(&toml, format!("{said}[source]\nfile = \"ros2_none.mcap\"\n{topics}\n")).unwrap();

@@ -57,8 +57,20 @@ fn a_bag_is_inspected_and_gets_its_template() {
     for file in ["session.toml", "session.png"] {
         assert!(dir.path().join(file).is_file(), "{file}");
     }
+    let toml = dir.path().join("session.toml");
+    let template = std::fs::read_to_string(&toml).unwrap();
+    assert!(template.contains("# [[organ]]"), "an outline that nobody drew is no organ: {template}");
+    std::fs::write(
+        &toml,
+        template
+            .replace("# ", "")
+            .replace("#\n", "\n")
+            .replacen("What is", "# What is", 1)
+            .replacen("unless", "# unless", 1),
+    )
+    .unwrap();
     let organs = &trocar(dir.path(), &["inspect", "session.mcap"])["organs"];
-    assert_eq!(*organs, serde_json::json!(["organ"]), "the template is read again");
+    assert_eq!(*organs, serde_json::json!(["organ"]), "the template is read again once it is filled in");
     let refused = Command::new(env!("CARGO_BIN_EXE_trocar"))
         .args(["inspect", "session.mcap", "--template"])
         .current_dir(dir.path())

@@ -10,7 +10,10 @@ use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, Mesher, SignedDistance, TetMesh, TetQuality, TetgenMesher, TriMesh, isosurface};
 use trocar_geometry::{repair, sample_everywhere};
 use trocar_progress::Progress;
+use trocar_specimen::StagedFolder;
 
+/// The file that makes a folder one of this benchmark's.
+const MARKER: &str = "meshing.json";
 /// Half axes of the body that is meshed where no surface is named [m]: 815 cm3, the paper's liver.
 const LIVER: [f64; 3] = [0.105, 0.064, 0.029];
 
@@ -79,6 +82,7 @@ impl MeshingBench {
     /// # Errors
     /// A surface that cannot be read, a folder that cannot be written, an interruption. A mesher that fails is a row that says why.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<MeshingResult> {
+        let staged = StagedFolder::create(output, MARKER)?;
         let surfaces = self.surfaces()?;
         progress.begin("meshes", (self.sizes.len() + 3 * surfaces.len()) as u64);
         let mut rows = Vec::new();
@@ -102,6 +106,9 @@ impl MeshingBench {
             measure(name, "peers", surface, &PytetwildMesher { python: self.python.clone() }, 1)?;
         }
         progress.end();
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
         let per_tet = |r: Option<&MeshingRow>| r.filter(|r| r.tets > 0).map(|r| r.ns_per_tet);
         let mut of_size: Vec<&MeshingRow> = rows.iter().filter(|r| r.series == "size").collect();
         of_size.sort_by_key(|r| r.tets);
@@ -112,13 +119,13 @@ impl MeshingBench {
             report: output.join(REPORT).display().to_string(),
             rows,
         };
-        std::fs::create_dir_all(output).map_err(|source| Error::Io { path: output.to_owned(), source })?;
         let html = report::meshing(&result)?;
         let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        for (name, bytes) in [(REPORT, html.into_bytes()), ("result.json", json)] {
-            let path = output.join(name);
+        for (name, bytes) in [(REPORT, html.into_bytes()), (MARKER, json)] {
+            let path = staged.path().join(name);
             std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })?;
         }
+        staged.commit()?;
         Ok(result)
     }
 

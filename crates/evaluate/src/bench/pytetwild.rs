@@ -30,7 +30,8 @@ impl Mesher for PytetwildMesher {
         let triangles = surface.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         write(&file("vertices"), vertices)?;
         write(&file("triangles"), triangles)?;
-        let run = Command::new(&self.python).args(["-c", SCRIPT]).arg(folder.path()).output();
+        let run =
+            Command::new(&self.python).args(["-c", SCRIPT]).arg(folder.path()).current_dir(folder.path()).output();
         let output = run.map_err(|e| wrong(format!("{} cannot be started: {e}", self.python.display())))?;
         if !output.status.success() {
             let text = String::from_utf8_lossy(&output.stderr);

@@ -14,6 +14,9 @@ use trocar_progress::Progress;
 use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
 use trocar_recording::{Recording, RecordingInfo};
 
+/// The file that makes a folder one of this experiment's.
+const MARKER: &str = "reconstruction.json";
+
 /// The experiment's options.
 #[derive(Clone, Debug)]
 pub struct ReconstructionExperiment {
@@ -103,6 +106,7 @@ impl ReconstructionExperiment {
     /// When the folder cannot be written, or an interruption; what is finished by then is used again the next time.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<ReconstructionResult> {
         let clock = Instant::now();
+        claim(output)?;
         let mut result = ReconstructionResult {
             organs: Vec::new(),
             phantoms: Vec::new(),
@@ -131,7 +135,7 @@ impl ReconstructionExperiment {
         let html = report::reconstruction_experiment(&result, &pictures)?;
         write(&output.join(REPORT), html.as_bytes())?;
         let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        write(&output.join("result.json"), &json)?;
+        write(&output.join(MARKER), &json)?;
         Ok(result)
     }
 
@@ -147,6 +151,22 @@ impl ReconstructionExperiment {
         }
         Ok(trocar_phantom::record(phantom, &self.record, dir, progress)?)
     }
+}
+
+/// Makes the folder, which must be new, empty, or an earlier one of this experiment.
+fn claim(output: &Path) -> Result<()> {
+    let io = |source| Error::Io { path: output.to_owned(), source };
+    let marker = output.join(MARKER);
+    if output.exists() && !marker.is_file() && output.read_dir().map_err(io)?.next().is_some() {
+        let reason =
+            format!("holds no {MARKER}, so it is no earlier experiment and is not written to; name a new folder");
+        return Err(Error::Exists { path: output.to_owned(), reason });
+    }
+    std::fs::create_dir_all(output).map_err(io)?;
+    if !marker.is_file() {
+        write(&marker, b"{}\n")?;
+    }
+    Ok(())
 }
 
 fn rows(

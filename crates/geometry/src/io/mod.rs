@@ -48,7 +48,8 @@ pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
         _ => return Err(bad(path, "not a known surface file; supported are .stl, .ply and .obj")),
     };
     if !path.exists() {
-        return Err(bad(path, "no such file"));
+        let source = std::io::Error::new(std::io::ErrorKind::NotFound, "no such file");
+        return Err(Error::Io { path: path.into(), source });
     }
     let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
     let mut mesh = parse(&bytes).map_err(|reason| bad(path, reason))?;

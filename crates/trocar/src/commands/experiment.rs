@@ -84,9 +84,9 @@ fn text(r: &ReconstructionResult) -> String {
         );
         if let Some(t) = &c.truth {
             out += &format!(
-                "; composite against truth {:.2} mm, {:.2} mm under instruments",
+                "; composite against truth {:.2} mm, {} mm under instruments",
                 t.depth_error_median_mm,
-                t.under_instruments_median_mm.unwrap_or(f64::NAN)
+                t.under_instruments_median_mm.map_or("-".to_owned(), |e| format!("{e:.2}"))
             );
         }
         out += &format!("; {:.1} s", p.seconds);

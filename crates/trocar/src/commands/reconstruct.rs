@@ -79,10 +79,10 @@ pub fn text(r: &Reconstructed) -> String {
         );
         if let Some(t) = &c.truth {
             out += &format!(
-                "\nagainst the truth: depth error {:.2} mm (median; 95% below {:.2}), {:.2} mm under the instruments",
+                "\nagainst the truth: depth error {:.2} mm (median; 95% below {:.2}), {} mm under the instruments",
                 t.depth_error_median_mm,
                 t.depth_error_p95_mm,
-                t.under_instruments_median_mm.unwrap_or(f64::NAN)
+                t.under_instruments_median_mm.map_or("-".to_owned(), |e| format!("{e:.2}"))
             );
         }
     }
