@@ -79,6 +79,7 @@ fn material(organ: &Organ) -> Material {
         model: match m.model {
             MaterialModel::StableNeoHookean => ConstitutiveModel::StableNeoHookean,
             MaterialModel::StVenantKirchhoff => ConstitutiveModel::StVenantKirchhoff,
+            MaterialModel::Corotated => ConstitutiveModel::Corotated,
         },
         young_modulus: m.young_modulus_pa,
         poisson_ratio: m.poisson_ratio,

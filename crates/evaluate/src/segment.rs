@@ -155,7 +155,7 @@ fn by_metal(recording: &Recording, folder: &Path, progress: &dyn Progress) -> Re
             let name = recording.frame_name(packet.frame);
             let picture = Picture { color: &frame.color, depth: Some(&frame.depth), name: &name };
             let mask = detector.segment(&picture, &target)?;
-            save(folder, recording.len(), packet.frame, &frame, &mask)?;
+            save(folder, recording, packet.frame, &frame, &mask)?;
             progress.advance(1);
             Ok(share(&mask))
         })
@@ -201,7 +201,7 @@ fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Pro
     let mut shares = Vec::new();
     for (index, mask) in masks.iter().enumerate() {
         if let (Some(mask), Some(frame)) = (mask, frame_of(index)?) {
-            save(folder, recording.len(), index, &frame, mask)?;
+            save(folder, recording, index, &frame, mask)?;
             shares.push(share(mask));
         }
     }
@@ -209,10 +209,10 @@ fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Pro
 }
 
 /// Writes the mask of a frame, and of a few frames spread over the recording a picture to judge it by.
-fn save(folder: &Path, frames: usize, index: usize, frame: &RgbdFrame, mask: &Mask) -> Result<()> {
+fn save(folder: &Path, recording: &Recording, index: usize, frame: &RgbdFrame, mask: &Mask) -> Result<()> {
     const SHOWN: usize = 6;
-    mask.write_png(&folder.join(format!("instruments/{index:06}.png")))?;
-    if index.is_multiple_of(frames.div_ceil(SHOWN).max(1)) {
+    mask.write_png(&folder.join("instruments").join(recording.mask_file_name(index)))?;
+    if index.is_multiple_of(recording.len().div_ceil(SHOWN).max(1)) {
         let mut shown: ColorImage = frame.color.clone();
         overlay(&mut shown, mask, 0);
         shown.write_png(&folder.join(format!("instruments-seen-{index:06}.png")))?;

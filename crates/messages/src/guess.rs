@@ -36,8 +36,14 @@ pub struct Guess {
 pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> Result<Guess> {
     let topics = log.topics();
     let transforms = (0..topics.len()).filter(|&t| is_transforms(&topics[t])).collect();
-    let unnamed = color.is_none() && depth.is_none();
-    if let Some(found) = realsense::find(topics).filter(|_| unnamed) {
+    let named = |name: &str| {
+        let found = topics.iter().position(|t| t.name == name);
+        found.ok_or_else(|| choice(log, &format!("no topic '{name}'")))
+    };
+    let (color, depth) = (color.map(named).transpose()?, depth.map(named).transpose()?);
+    // Its own streams by their names are still its own: units and transforms belong to them.
+    let chosen = |named: Option<usize>, found: usize| named.is_none_or(|t| t == found);
+    if let Some(found) = realsense::find(topics).filter(|f| chosen(color, f.color) && chosen(depth, f.depth)) {
         return Ok(Guess {
             color: found.color,
             depth: found.depth,
@@ -56,12 +62,8 @@ pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> 
         let top = of_kind.iter().map(rank).max();
         of_kind.iter().copied().filter(|t| Some(rank(t)) == top).collect::<Vec<usize>>()
     };
-    let named = |name: &str| {
-        let found = topics.iter().position(|t| t.name == name);
-        found.ok_or_else(|| choice(log, &format!("no topic '{name}'")))
-    };
-    let one = |what: &str, depth: bool, name: Option<&str>| match (name, &best(depth)[..]) {
-        (Some(name), _) => named(name),
+    let one = |what: &str, depth: bool, named: Option<usize>| match (named, &best(depth)[..]) {
+        (Some(t), _) => Ok(t),
         (None, [t]) => Ok(*t),
         (None, []) => Err(choice(log, &format!("no {what} images"))),
         (None, _) => Err(choice(log, &format!("several topics with {what} images"))),

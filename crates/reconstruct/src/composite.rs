@@ -157,7 +157,7 @@ fn read_window(
             let instruments = found.unwrap_or(instruments);
             Ok(Sample {
                 frame: packet.frame,
-                depth: depth.depth.iter().map(|z| (f64::from(*z) / scale).round() as u16).collect(),
+                depth: depth.depth.iter().map(|z| units(*z, scale)).collect(),
                 color: color.pixels,
                 instruments: instruments.set,
                 hash: parts.hash(),
@@ -190,6 +190,12 @@ fn read_window(
         notes.push(format!("{count} of {} frames are broken and were left out (first: {first}).", window.len()));
     }
     Ok(samples)
+}
+
+/// A depth [m] in whole units of `scale` [m]; what 16 bits do not hold is invalid, 0.
+fn units(depth: f32, scale: f64) -> u16 {
+    let units = (f64::from(depth) / scale).round();
+    if units <= f64::from(u16::MAX) { units as u16 } else { 0 }
 }
 
 /// Indices of the window's frames.

@@ -92,7 +92,7 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
         (SurfaceRule::BinaryGrid, Some(bounds)) => {
             resample::tidy(name, &binary_grid(&front.depth, &back.h, &mask, camera, bounds))?
         }
-        _ => resample(name, &raw, back.radius)?,
+        _ => resample(name, &raw, back.radius * back.height_ratio.min(1.0))?,
     };
     color_vertices(&mut surface, &background.color, &background.colored, &mask, camera);
     let check = check(&surface, &background.depth, &mask, camera).ok_or_else(unmeasured)?;

@@ -156,6 +156,9 @@ fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]
     let mut hash = Xxh3::new();
     let said = toml::to_string(&recording.info).map_err(|e| Error::Setting(format!("the recording's facts: {e}")))?;
     hash.update(said.as_bytes());
+    // What a log says of its cameras is not in there.
+    let cameras = (recording.camera(), recording.depth_scale(), recording.registration());
+    hash.update(format!("{cameras:?}").as_bytes());
     hash.update(&background.hash.to_le_bytes());
     for view in views {
         hash.update(&view.mask.set.iter().map(|s| u8::from(*s)).collect::<Vec<u8>>());

@@ -39,7 +39,8 @@ pub enum BackRule {
     #[default]
     Rounded,
     /// As high against its width as the front rises above its rim, and the same below: right for organs that are alike above
-    /// and below their widest outline.
+    /// and below their widest outline; of one that is sunk in or covered to half its height, half is missed. 0.2 to 1.5 times as
+    /// high as wide.
     Fitted,
 }
 

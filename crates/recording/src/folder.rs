@@ -1,6 +1,6 @@
 //! Frames from folders of image files.
 
-use crate::frame_list::{FrameFiles, FrameList, list_frames};
+use crate::frame_list::{FrameFiles, FrameList, list_frames, stem};
 use crate::source::{FrameSource, Images, Packet, Parts};
 use crate::{Error, Result};
 use std::path::Path;
@@ -58,6 +58,11 @@ impl FrameSource for Folder {
 
     fn name(&self, index: usize) -> String {
         self.frames[index].depth.display().to_string()
+    }
+
+    fn mask_stem(&self, index: usize) -> String {
+        let files = &self.frames[index];
+        stem(files.color.as_ref().unwrap_or(&files.depth))
     }
 
     fn notes(&self) -> &[String] {

@@ -94,6 +94,12 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
             None => wrong(path, "no frames: no line below the header; remove it to pair the files by name"),
         });
     }
+    // Masks that were made later are found by name.
+    let masks = dir.join("masks/instruments");
+    for frame in frames.iter_mut().filter(|f: &&mut FrameFiles| f.instruments.is_none()) {
+        let mask = masks.join(format!("{}.png", stem(frame.color.as_ref().unwrap_or(&frame.depth))));
+        frame.instruments = mask.is_file().then_some(mask);
+    }
     let with_color = frames.iter().filter(|f| f.color.is_some()).count();
     if with_color != 0 && with_color != frames.len() {
         let reason = format!("{with_color} of {} frames have a color file; all of them or none should", frames.len());
@@ -238,7 +244,8 @@ fn images(dir: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-fn stem(path: &Path) -> String {
+/// The file's name without its extension.
+pub fn stem(path: &Path) -> String {
     path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
 }
 

@@ -4,6 +4,7 @@ use crate::pairing::Pairing;
 use crate::source::{FrameSource, Images, Packet, Parts};
 use crate::{DepthToColor, Error, Result, SourceInfo};
 use std::collections::BTreeMap;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use trocar_camera::{Camera, Mask, Pose};
 use trocar_messages::{
@@ -92,7 +93,7 @@ impl Log {
     }
 
     fn mask_file(&self, frame: usize) -> PathBuf {
-        self.instruments.join(format!("{frame:06}.png"))
+        self.instruments.join(format!("{}.png", self.mask_stem(frame)))
     }
 }
 
@@ -131,8 +132,14 @@ impl FrameSource for Log {
             let parts = match if is_color { (bytes, other) } else { (other, bytes) } {
                 (Ok(color), Ok(depth)) => {
                     // A frame without a mask shows no instrument.
-                    let instruments = std::fs::read(self.mask_file(frame)).ok();
-                    Ok(Parts { color: Some(color), depth, instruments })
+                    let path = self.mask_file(frame);
+                    match std::fs::read(&path) {
+                        Ok(mask) => Ok(Parts { color: Some(color), depth, instruments: Some(mask) }),
+                        Err(e) if e.kind() == ErrorKind::NotFound => {
+                            Ok(Parts { color: Some(color), depth, instruments: None })
+                        }
+                        Err(e) => Err(Error::io(&path)(e)),
+                    }
                 }
                 (Err(e), _) | (_, Err(e)) => Err(e),
             };
@@ -171,6 +178,10 @@ impl FrameSource for Log {
         let start = times.first().copied().unwrap_or(0);
         let seconds = 1e-9 * times.get(depth).map_or(0, |t| t - start) as f64;
         format!("{}: frame {index} at {seconds:.3} s", self.log.path().display())
+    }
+
+    fn mask_stem(&self, index: usize) -> String {
+        format!("{index:06}")
     }
 
     fn notes(&self) -> &[String] {

@@ -86,8 +86,11 @@ impl Recording {
         };
         let depth_scale_m = said.depth_scale_m;
         let (camera, registration) = cameras(&info, &said).map_err(|reason| Error::wrong(&toml, reason))?;
-        let mut recording =
-            Self { notes: source.notes().to_vec(), source, camera, depth_scale_m, registration, toml, info };
+        let mut notes = source.notes().to_vec();
+        if info.source.is_some() && info.depth_camera.or(said.depth).is_none() {
+            notes.push("Nothing is known of the depth camera; its images are taken as registered to colour.".into());
+        }
+        let mut recording = Self { notes, source, camera, depth_scale_m, registration, toml, info };
         let [du, dv] = recording.offset();
         recording.camera.cx += du as f64;
         recording.camera.cy += dv as f64;
@@ -150,6 +153,11 @@ impl Recording {
     /// True without frames (an opened recording never is).
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// File name of frame `index`'s instrument mask in `masks/instruments`, as it is looked for.
+    pub fn mask_file_name(&self, index: usize) -> String {
+        format!("{}.png", self.source.mask_stem(index))
     }
 
     /// What to call frame `index` in a message.

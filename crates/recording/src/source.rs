@@ -52,6 +52,9 @@ pub trait FrameSource: Send + Sync + std::fmt::Debug {
     /// What to call frame `index` in a message: its depth file, or its number and time.
     fn name(&self, index: usize) -> String;
 
+    /// Stem of the file name of frame `index`'s instrument mask in `masks/instruments`.
+    fn mask_stem(&self, index: usize) -> String;
+
     /// What was dropped or replaced while the frames were listed, a sentence each.
     fn notes(&self) -> &[String];
 

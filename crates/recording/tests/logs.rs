@@ -55,6 +55,12 @@ fn realsense_bags_register_depth_by_their_own_extrinsics() {
         );
         assert!((registration.translation.x - 0.015).abs() < 1e-9);
         assert!(recording.frame(2).is_ok());
+        // Naming its own topics changes nothing.
+        let topics = "color_topic = \"/device_0/sensor_1/Color_0/image/data\"\ndepth_topic = \"/device_0/sensor_0/Depth_0/image/data\"";
+        let said = format!("name = \"x\"\nup = [0, 0, -1]\n[source]\nfile = \"{name}\"\n{topics}\n");
+        fs::write(path.with_extension("toml"), said).unwrap();
+        let named = Recording::open(&path).unwrap();
+        assert_eq!((named.depth_scale(), named.registration()), (recording.depth_scale(), recording.registration()));
         assert!(recording.describe().iter().any(|t| t.contains("Depth_0/image/data") && t.contains("used as depth")));
     }
 }

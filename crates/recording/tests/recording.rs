@@ -225,6 +225,30 @@ fn times_in_file_names_pair_streams_of_unequal_length() {
 }
 
 #[test]
+fn masks_made_later_are_found_by_name() {
+    let (_root, dir) = recording();
+    let csv = dir.join("frames.csv");
+    let text = fs::read_to_string(&csv).unwrap();
+    let without = |line: &str| match line.split_once(",masks/") {
+        Some((kept, _)) => format!("{kept},"),
+        None => line.to_owned(),
+    };
+    fs::write(&csv, text.lines().map(without).collect::<Vec<_>>().join("\n")).unwrap();
+    let opened = Recording::open(&dir).unwrap();
+    assert!(opened.frame(1).unwrap().instruments.count() > 0);
+    assert_eq!(opened.mask_file_name(1), "000001.png");
+    // Frames numbered from 1, without an index: each keeps its own mask.
+    fs::remove_file(&csv).unwrap();
+    for folder in ["color", "depth", "masks/instruments"] {
+        for i in (0..3).rev() {
+            let file = |i: usize| dir.join(format!("{folder}/{i:06}.png"));
+            fs::rename(file(i), file(i + 1)).unwrap();
+        }
+    }
+    assert_eq!(Recording::open(&dir).unwrap().mask_file_name(0), "000001.png");
+}
+
+#[test]
 fn depth_of_another_camera_is_registered() {
     let (_root, dir) = recording();
     let toml = dir.join("recording.toml");

@@ -13,6 +13,8 @@ pub enum MaterialModel {
     StableNeoHookean,
     /// St. Venant-Kirchhoff, the paper's.
     StVenantKirchhoff,
+    /// Fixed corotated (Stomakhin and others 2012).
+    Corotated,
 }
 
 /// Material of an organ.

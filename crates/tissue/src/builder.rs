@@ -214,7 +214,7 @@ fn add_corners(body: &mut Body, incident: &[(usize, usize)]) {
         let others = SEEN_FROM[*k].map(|c| body.tets[*t][c]);
         let volume = body.volumes[*t];
         body.corners.push(Corner { others, inverse_6v: (1.0 / (6.0 * volume)) as f32, volume: volume as f32 });
-        if body.material.model == ConstitutiveModel::StVenantKirchhoff {
+        if body.material.model != ConstitutiveModel::StableNeoHookean {
             let gradients = shape_gradients(&body.rest, *t);
             body.gradients.push(SEEN_FROM[*k].map(|c| Vec3A::from(gradients[c].as_vec3())));
         }
@@ -226,8 +226,8 @@ fn add_edges(body: &mut Body, i: usize, neighbours: &[u32], incident: &[(usize, 
     let (mu, lambda) = body.material.lame();
     let mu = match body.material.model {
         ConstitutiveModel::StableNeoHookean => StableNeoHookean::new(mu, lambda).mu,
-        // Its energy has no constant quadratic part.
-        ConstitutiveModel::StVenantKirchhoff => 0.0,
+        // Their kernels hold the whole energy.
+        ConstitutiveModel::StVenantKirchhoff | ConstitutiveModel::Corotated => 0.0,
     };
     let mut diagonal = 0.0;
     let mut stiffness = vec![0.0; neighbours.len()];
@@ -258,7 +258,7 @@ fn add_edges(body: &mut Body, i: usize, neighbours: &[u32], incident: &[(usize, 
 }
 
 /// Gradients of the four shape functions of element `t` at rest [1/m].
-fn shape_gradients(mesh: &TetMesh, t: usize) -> [DVec3; 4] {
+pub(crate) fn shape_gradients(mesh: &TetMesh, t: usize) -> [DVec3; 4] {
     let x = mesh.corners(t);
     let six_v = 6.0 * mesh.tet_volume(t);
     [0, 1, 2, 3].map(|k: usize| {

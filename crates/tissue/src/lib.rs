@@ -4,7 +4,8 @@
 //! and restored exactly; a [`Stepper`] owns the scratch memory and advances a state. No robot, no camera, no files.
 //!
 //! Every step minimises implicit Euler's incremental potential 1/(2h^2) |x - y|_M^2 + E(x) by Vertex Block Descent (Chen et al. 2024): each
-//! vertex in turn takes a Newton step on its own 3x3 block, all vertices of one colour at once.
+//! vertex in turn takes a Newton step on its own 3x3 block, all vertices of one colour at once. [`Oracle`] finds the same minimum to double precision, slowly,
+//! for every solver to be judged by.
 
 mod body;
 mod builder;
@@ -14,6 +15,7 @@ mod grasp;
 mod kernel;
 mod material;
 mod model;
+pub mod oracle;
 pub mod pins;
 mod schedule;
 mod state;
@@ -24,8 +26,9 @@ pub use body::Body;
 pub use builder::{BodyDescription, ModelBuilder};
 pub use error::{Error, Result};
 pub use grasp::{Grasp, ToolMotion};
-pub use material::{ConstitutiveModel, Hyperelastic, Material, StVenantKirchhoff, StableNeoHookean};
+pub use material::{ConstitutiveModel, Corotated, Hyperelastic, Material, StVenantKirchhoff, StableNeoHookean};
 pub use model::{Model, SupportPlane};
+pub use oracle::{Held, Oracle, OracleState};
 pub use schedule::{Schedule, Start};
 pub use state::State;
 pub use stepper::{Divergence, StepReport, Stepper};

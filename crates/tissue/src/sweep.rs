@@ -19,7 +19,7 @@ const KEPT_SHARE: f32 = 0.1;
 const FLOOR: f32 = 1e-3;
 
 /// Speed below which friction sticks [m/s].
-const STICK_SPEED: f32 = 1e-3;
+pub(crate) const STICK_SPEED: f32 = 1e-3;
 
 /// Corners whose volume gradients are remembered between the force and the guard.
 const REMEMBERED: usize = 32;
@@ -59,6 +59,7 @@ impl Substep<'_> {
         match Kernel::of(self.body) {
             Kernel::StableNeoHookean(term) => self.sweep_with(&term, x, moved),
             Kernel::StVenantKirchhoff(term) => self.sweep_with(&term, x, moved),
+            Kernel::Corotated(term) => self.sweep_with(&term, x, moved),
         }
     }
 
@@ -275,8 +276,8 @@ mod tests {
         sum
     }
 
-    /// The kernels' forces are the negative gradient of the energy, and their blocks its second derivative (for St. Venant-Kirchhoff in a
-    /// stretched state, where nothing of it is dropped).
+    /// The kernels' forces are the negative gradient of the energy, and their blocks its second derivative (for St. Venant-Kirchhoff and corotated
+    /// tissue in a stretched state, where nothing of it is dropped).
     #[test]
     fn forces_and_blocks_are_the_energys_derivatives() {
         let mesh = mesh();
@@ -284,6 +285,7 @@ mod tests {
             (ConstitutiveModel::StableNeoHookean, 1.0),
             (ConstitutiveModel::StableNeoHookean, 0.45),
             (ConstitutiveModel::StVenantKirchhoff, 1.4),
+            (ConstitutiveModel::Corotated, 1.4),
         ] {
             let material =
                 Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 60.0 };
@@ -316,6 +318,7 @@ mod tests {
                 let local = match Kernel::of(body) {
                     Kernel::StableNeoHookean(term) => substep.local(&term, i, &to_f32(&x), &mut memory),
                     Kernel::StVenantKirchhoff(term) => substep.local(&term, i, &to_f32(&x), &mut memory),
+                    Kernel::Corotated(term) => substep.local(&term, i, &to_f32(&x), &mut memory),
                 };
                 let d = 1e-7;
                 let shifted = |steps: DVec3| {

@@ -30,8 +30,12 @@ impl Mesher for PytetwildMesher {
         let triangles = surface.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         write(&file("vertices"), vertices)?;
         write(&file("triangles"), triangles)?;
-        let run =
-            Command::new(&self.python).args(["-c", SCRIPT]).arg(folder.path()).current_dir(folder.path()).output();
+        // A relative path is the user's, not the temporary folder's; a bare name is looked for in PATH.
+        let python = match self.python.components().count() {
+            1 => self.python.clone(),
+            _ => std::path::absolute(&self.python).unwrap_or_else(|_| self.python.clone()),
+        };
+        let run = Command::new(&python).args(["-c", SCRIPT]).arg(folder.path()).current_dir(folder.path()).output();
         let output = run.map_err(|e| wrong(format!("{} cannot be started: {e}", self.python.display())))?;
         if !output.status.success() {
             let text = String::from_utf8_lossy(&output.stderr);

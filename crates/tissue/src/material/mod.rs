@@ -3,11 +3,15 @@
 //! Each model says its energy and stress in double precision, the plain textbook form that tests hold the fast kernels to; the kernels of
 //! the sweeps stand in [`crate::kernel`].
 
+mod corotated;
 mod st_venant_kirchhoff;
 mod stable_neo_hookean;
+mod volume;
 
+pub use corotated::Corotated;
 pub use st_venant_kirchhoff::StVenantKirchhoff;
 pub use stable_neo_hookean::StableNeoHookean;
+pub(crate) use volume::VolumeEnergy;
 
 use glam::DMat3;
 
@@ -18,6 +22,9 @@ pub trait Hyperelastic {
 
     /// First Piola-Kirchhoff stress P = dPsi/dF [Pa].
     fn stress(&self, f: DMat3) -> DMat3;
+
+    /// Change of the stress when F changes by `change`, to first order: d2Psi/dF2 applied to `change` [Pa]; symmetric as a map.
+    fn stress_change(&self, f: DMat3, change: DMat3) -> DMat3;
 }
 
 /// Constitutive model by name.
@@ -28,6 +35,13 @@ pub enum ConstitutiveModel {
     StableNeoHookean,
     /// St. Venant-Kirchhoff, the paper's.
     StVenantKirchhoff,
+    /// Fixed corotated.
+    Corotated,
+}
+
+impl ConstitutiveModel {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::StableNeoHookean, Self::StVenantKirchhoff, Self::Corotated];
 }
 
 /// Material of a body.
@@ -58,6 +72,7 @@ impl Material {
         match self.model {
             ConstitutiveModel::StableNeoHookean => Box::new(StableNeoHookean::new(mu, lambda)),
             ConstitutiveModel::StVenantKirchhoff => Box::new(StVenantKirchhoff { mu, lambda }),
+            ConstitutiveModel::Corotated => Box::new(Corotated { mu, lambda }),
         }
     }
 }
@@ -66,8 +81,6 @@ impl Material {
 mod tests {
     use super::*;
     use glam::DVec3;
-
-    const MODELS: [ConstitutiveModel; 2] = [ConstitutiveModel::StableNeoHookean, ConstitutiveModel::StVenantKirchhoff];
 
     fn material(model: ConstitutiveModel) -> Material {
         Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 0.0 }
@@ -88,7 +101,7 @@ mod tests {
 
     #[test]
     fn stress_is_the_derivative_of_the_energy() {
-        for model in MODELS {
+        for model in ConstitutiveModel::ALL {
             let psi = material(model).hyperelastic();
             for f in deformations() {
                 let stress = psi.stress(f);
@@ -112,8 +125,27 @@ mod tests {
     }
 
     #[test]
+    fn the_stresss_change_is_its_derivative() {
+        for model in ConstitutiveModel::ALL {
+            let psi = material(model).hyperelastic();
+            for f in deformations() {
+                for k in 0..9 {
+                    let mut along = [0.0; 9];
+                    along[k] = 1.0;
+                    let along = DMat3::from_cols_array(&along);
+                    let h = 1e-6;
+                    let difference = (psi.stress(f + along * h) - psi.stress(f - along * h)) * (0.5 / h);
+                    let error = psi.stress_change(f, along) - difference;
+                    let norm = |m: DMat3| m.to_cols_array().iter().map(|x| x * x).sum::<f64>().sqrt();
+                    assert!(norm(error) < 1e-7 * (12e3 + norm(difference)), "{model:?} at {f}: {error}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn rest_is_free_of_stress() {
-        for model in MODELS {
+        for model in ConstitutiveModel::ALL {
             let stress = material(model).hyperelastic().stress(DMat3::IDENTITY);
             assert!(stress.to_cols_array().iter().all(|s| s.abs() < 1e-9 * 12e3), "{model:?}");
         }
@@ -122,7 +154,7 @@ mod tests {
     /// A bar pulled by a small strain shows its Young's modulus and, sides left free, its Poisson ratio.
     #[test]
     fn small_strains_show_the_moduli() {
-        for model in MODELS {
+        for model in ConstitutiveModel::ALL {
             let psi = material(model).hyperelastic();
             let strain = 1e-5;
             let stress =

@@ -1,6 +1,7 @@
 //! St. Venant-Kirchhoff elasticity, the paper's.
 
 use super::Hyperelastic;
+use super::volume::trace;
 use glam::DMat3;
 
 /// Psi = mu tr(E^2) + lambda/2 tr(E)^2 with Green's strain E = (F'F - I)/2 (paper, section IV-B). Its compressive stress peaks at a
@@ -17,10 +18,6 @@ fn green_strain(f: DMat3) -> DMat3 {
     (f.transpose() * f - DMat3::IDENTITY) * 0.5
 }
 
-fn trace(m: DMat3) -> f64 {
-    m.x_axis.x + m.y_axis.y + m.z_axis.z
-}
-
 impl Hyperelastic for StVenantKirchhoff {
     fn energy(&self, f: DMat3) -> f64 {
         let e = green_strain(f);
@@ -30,5 +27,11 @@ impl Hyperelastic for StVenantKirchhoff {
     fn stress(&self, f: DMat3) -> DMat3 {
         let e = green_strain(f);
         f * (e * (2.0 * self.mu) + DMat3::IDENTITY * (self.lambda * trace(e)))
+    }
+
+    fn stress_change(&self, f: DMat3, change: DMat3) -> DMat3 {
+        let second = |e: DMat3| e * (2.0 * self.mu) + DMat3::IDENTITY * (self.lambda * trace(e));
+        let product = f.transpose() * change;
+        change * second(green_strain(f)) + f * second((product + product.transpose()) * 0.5)
     }
 }

@@ -1,6 +1,7 @@
 //! Stable neo-Hookean elasticity.
 
 use super::Hyperelastic;
+use super::volume::VolumeEnergy;
 use glam::DMat3;
 
 /// Psi = mu/2 (tr(F'F) - 3) + lambda'/2 (J - alpha)^2 - const, alpha = 1 + mu/lambda'.
@@ -19,10 +20,6 @@ pub struct StableNeoHookean {
     pub alpha: f64,
 }
 
-/// Volume ratio below which the barrier acts, and its strength over lambda'.
-const BARRIER_BEGINS: f64 = 0.2;
-const BARRIER_STRENGTH: f64 = 0.1;
-
 impl StableNeoHookean {
     /// From Lame's parameters [Pa].
     pub fn new(mu: f64, lame_lambda: f64) -> Self {
@@ -32,16 +29,12 @@ impl StableNeoHookean {
 
     /// Energy density of the volume ratio J [J/m3], and its first and second derivatives; convex for J above 0.
     pub fn volume_term(&self, j: f64) -> (f64, f64, f64) {
-        let d = j - self.alpha;
-        let (mut energy, mut slope, mut curvature) = (0.5 * self.lambda * d * d, self.lambda * d, self.lambda);
-        if j < BARRIER_BEGINS {
-            let strength = BARRIER_STRENGTH * self.lambda;
-            let log = (j / BARRIER_BEGINS).ln();
-            energy += 0.5 * strength * log * log;
-            slope += strength * log / j;
-            curvature += strength * (1.0 - log) / (j * j);
-        }
-        (energy, slope, curvature)
+        self.volume().at(j)
+    }
+
+    /// The energy of the volume ratio.
+    pub(crate) fn volume(&self) -> VolumeEnergy {
+        VolumeEnergy::new(self.lambda, self.alpha, self.lambda)
     }
 }
 
@@ -52,12 +45,10 @@ impl Hyperelastic for StableNeoHookean {
     }
 
     fn stress(&self, f: DMat3) -> DMat3 {
-        f * self.mu + cofactor(f) * self.volume_term(f.determinant()).1
+        f * self.mu + self.volume().stress(f)
     }
-}
 
-/// The cofactor matrix dJ/dF.
-fn cofactor(f: DMat3) -> DMat3 {
-    let [a, b, c] = [f.x_axis, f.y_axis, f.z_axis];
-    DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
+    fn stress_change(&self, f: DMat3, change: DMat3) -> DMat3 {
+        change * self.mu + self.volume().stress_change(f, change)
+    }
 }

@@ -1,0 +1,253 @@
+//! The function that is minimised: energy, gradient and Hessian over all nodes of a body.
+
+use super::element::{blocks, deformation, projected, tangent};
+use super::factor::Stiffness;
+use super::state::Nodes;
+use crate::builder::shape_gradients;
+use crate::sweep::STICK_SPEED;
+use crate::{Body, Hyperelastic, SupportPlane};
+use glam::{DMat3, DVec3};
+
+/// What a body's energies are made of, nodes in their original order.
+pub(super) struct Elastic {
+    pub tets: Vec<[u32; 4]>,
+    /// Rest gradients of the shape functions [1/m].
+    pub gradients: Vec<[DVec3; 4]>,
+    /// Rest volumes [m3].
+    pub volumes: Vec<f64>,
+    pub psi: Box<dyn Hyperelastic>,
+    /// [kg]
+    pub masses: Vec<f64>,
+    /// Edges with a dashpot: nodes and coefficient [N s/m].
+    dashpots: Vec<([usize; 2], f64)>,
+    planes: Vec<SupportPlane>,
+    /// [N/m]
+    contact_stiffness: Vec<f64>,
+    /// An energy that is large beside every change that matters [J]: energies are known to its rounding.
+    pub scale: f64,
+}
+
+impl Elastic {
+    pub fn new(body: &Body) -> Self {
+        let mut node_of = vec![0; body.len()];
+        for (node, i) in body.internal.iter().enumerate() {
+            node_of[*i as usize] = node;
+        }
+        let mut dashpots = Vec::new();
+        let mut contact_stiffness = Vec::with_capacity(body.len());
+        for (node, i) in body.internal.iter().enumerate() {
+            contact_stiffness.push(f64::from(body.vertices[*i as usize].contact_stiffness));
+            for edge in body.edges_of(*i as usize) {
+                let to = node_of[edge.to as usize];
+                if to > node && edge.damping > 0.0 {
+                    dashpots.push(([node, to], f64::from(edge.damping)));
+                }
+            }
+        }
+        let (mu, lambda) = body.material.lame();
+        Self {
+            tets: body.rest.tets.clone(),
+            gradients: (0..body.rest.tets.len()).map(|t| shape_gradients(&body.rest, t)).collect(),
+            volumes: body.volumes.clone(),
+            psi: body.material.hyperelastic(),
+            masses: (0..body.len()).map(|i| body.mass(i)).collect(),
+            dashpots,
+            planes: body.supports.clone(),
+            contact_stiffness,
+            scale: (mu + lambda) * body.volumes.iter().sum::<f64>(),
+        }
+    }
+
+    /// Deformation gradient of an element.
+    pub fn deformation(&self, t: usize, x: &[DVec3]) -> DMat3 {
+        deformation(self.tets[t].map(|i| x[i as usize]), &self.gradients[t])
+    }
+}
+
+/// What a step in time adds to the elastic energy.
+pub(super) struct Motion {
+    dt: f64,
+    /// Positions at the beginning [m].
+    start: Vec<DVec3>,
+    /// Inertial predictor y [m].
+    predictor: Vec<DVec3>,
+    /// Directions of the dashpots at the beginning.
+    directions: Vec<DVec3>,
+}
+
+impl Motion {
+    pub fn new(elastic: &Elastic, nodes: &Nodes, gravity: DVec3, dt: f64) -> Self {
+        let start = nodes.x.clone();
+        let predictor = start.iter().zip(&nodes.v).map(|(x, v)| x + dt * v + dt * dt * gravity).collect();
+        let along = |([i, j], _): &([usize; 2], f64)| (start[*j] - start[*i]).normalize_or_zero();
+        Self { dt, directions: elastic.dashpots.iter().map(along).collect(), predictor, start }
+    }
+
+    pub fn dt(&self) -> f64 {
+        self.dt
+    }
+}
+
+/// A body's incremental potential.
+pub(super) struct Potential<'a> {
+    pub elastic: &'a Elastic,
+    /// None: statics.
+    pub motion: Option<Motion>,
+    pub gravity: DVec3,
+    /// Greatest friction of each node at each plane [N], plane by plane; empty: none.
+    pub limits: Vec<f64>,
+}
+
+impl Potential<'_> {
+    /// Energy at x [J]; not finite where an element has no volume. Writes the gradient [N] over all nodes.
+    pub fn gradient(&self, x: &[DVec3], out: &mut [DVec3]) -> f64 {
+        let e = self.elastic;
+        out.fill(DVec3::ZERO);
+        let mut energy = 0.0;
+        for (t, tet) in e.tets.iter().enumerate() {
+            let f = e.deformation(t, x);
+            let ratio = f.determinant();
+            if ratio.is_nan() || ratio <= 0.0 {
+                return f64::INFINITY;
+            }
+            energy += e.volumes[t] * e.psi.energy(f);
+            let stress = e.psi.stress(f) * e.volumes[t];
+            for (i, m) in tet.iter().zip(&e.gradients[t]) {
+                out[*i as usize] += stress * *m;
+            }
+        }
+        match &self.motion {
+            Some(motion) => {
+                let k = 1.0 / (motion.dt * motion.dt);
+                for (i, mass) in e.masses.iter().enumerate() {
+                    let off = x[i] - motion.predictor[i];
+                    energy += 0.5 * mass * k * off.length_squared();
+                    out[i] += mass * k * off;
+                }
+                for (([i, j], damping), n) in e.dashpots.iter().zip(&motion.directions) {
+                    let k = damping / motion.dt;
+                    let stretching = n.dot((x[*j] - motion.start[*j]) - (x[*i] - motion.start[*i]));
+                    energy += 0.5 * k * stretching * stretching;
+                    out[*i] -= k * stretching * n;
+                    out[*j] += k * stretching * n;
+                }
+            }
+            None => {
+                for (i, mass) in e.masses.iter().enumerate() {
+                    energy -= mass * self.gravity.dot(x[i]);
+                    out[i] -= *mass * self.gravity;
+                }
+            }
+        }
+        self.for_contacts(x, |i, contact| {
+            energy += contact.energy;
+            out[i] += contact.gradient;
+        });
+        energy
+    }
+
+    /// Writes the Hessian at x [N/m] into `into`; elements' tangents made positive semidefinite if `project`, friction's curvature replaced by its secant if
+    /// `secant`. False if the projection is impossible.
+    pub fn hessian(&self, x: &[DVec3], project: bool, secant: bool, into: &mut Stiffness) -> bool {
+        let e = self.elastic;
+        into.clear();
+        for (t, tet) in e.tets.iter().enumerate() {
+            let mut tangent = tangent(e.psi.as_ref(), e.deformation(t, x));
+            if project {
+                match projected(&tangent) {
+                    Some(positive) => tangent = positive,
+                    None => return false,
+                }
+            }
+            let blocks = blocks(&tangent, &e.gradients[t]);
+            for a in 0..4 {
+                for b in 0..4 {
+                    into.add(tet[a] as usize, tet[b] as usize, blocks[a][b] * e.volumes[t]);
+                }
+            }
+        }
+        if let Some(motion) = &self.motion {
+            for (i, mass) in e.masses.iter().enumerate() {
+                into.add(i, i, DMat3::from_diagonal(DVec3::splat(mass / (motion.dt * motion.dt))));
+            }
+            for (([i, j], damping), n) in e.dashpots.iter().zip(&motion.directions) {
+                let block = outer(*n) * (damping / motion.dt);
+                into.add(*i, *i, block);
+                into.add(*j, *j, block);
+                into.add(*i, *j, -block);
+                into.add(*j, *i, -block);
+            }
+        }
+        self.for_contacts(x, |i, contact| into.add(i, i, if secant { contact.secant } else { contact.hessian }));
+        true
+    }
+
+    /// Friction's limits at x: coefficient times the planes' forces.
+    pub fn friction_limits(&self, x: &[DVec3]) -> Vec<f64> {
+        let e = self.elastic;
+        let limit = |plane: &SupportPlane, i: usize| {
+            plane.friction * e.contact_stiffness[i] * -(x[i] - plane.point).dot(plane.normal).min(0.0)
+        };
+        e.planes.iter().flat_map(|plane| (0..x.len()).map(move |i| limit(plane, i))).collect()
+    }
+
+    /// Whether there is friction at all.
+    pub fn rubs(&self) -> bool {
+        self.motion.is_some() && self.elastic.planes.iter().any(|plane| plane.friction > 0.0)
+    }
+
+    fn for_contacts(&self, x: &[DVec3], mut add: impl FnMut(usize, &Contact)) {
+        for (p, plane) in self.elastic.planes.iter().enumerate() {
+            for (i, x) in x.iter().enumerate() {
+                let limit = self.limits.get(p * self.elastic.masses.len() + i).copied().unwrap_or(0.0);
+                let height = (x - plane.point).dot(plane.normal);
+                if height < 0.0 || limit > 0.0 {
+                    let mut contact = Contact::pressed(plane, height.min(0.0), self.elastic.contact_stiffness[i]);
+                    if let Some(motion) = self.motion.as_ref().filter(|_| limit > 0.0) {
+                        contact.rub(plane, x - motion.start[i], limit, f64::from(STICK_SPEED) * motion.dt);
+                    }
+                    add(i, &contact);
+                }
+            }
+        }
+    }
+}
+
+/// One node at one plane.
+struct Contact {
+    energy: f64,
+    gradient: DVec3,
+    hessian: DMat3,
+    /// The quadratic that touches the energy at this slide and at the opposite one, and lies above it everywhere: the sweeps' block.
+    secant: DMat3,
+}
+
+impl Contact {
+    /// The penalty of a depth.
+    fn pressed(plane: &SupportPlane, height: f64, stiffness: f64) -> Self {
+        let n = plane.normal;
+        let hessian = if height < 0.0 { outer(n) * stiffness } else { DMat3::ZERO };
+        Self { energy: 0.5 * stiffness * height * height, gradient: stiffness * height * n, hessian, secant: hessian }
+    }
+
+    /// Friction with its limit held: the force of the sweeps, limit (2 l/s - l^2/s^2) below the sticking length s and limit above, as a potential.
+    fn rub(&mut self, plane: &SupportPlane, motion: DVec3, limit: f64, stick: f64) {
+        let slide = motion - motion.dot(plane.normal) * plane.normal;
+        let length = slide.length();
+        let across = DMat3::IDENTITY - outer(plane.normal);
+        let (energy, drag, softening) = if length < stick {
+            let energy = limit * (length * length / stick - length.powi(3) / (3.0 * stick * stick));
+            (energy, limit / stick * (2.0 - length / stick), limit * length / (stick * stick))
+        } else {
+            (limit * (length - stick / 3.0), limit / length, limit / length)
+        };
+        self.energy += energy;
+        self.gradient += drag * slide;
+        self.secant += across * drag;
+        self.hessian += across * drag - outer(slide.normalize_or_zero()) * softening;
+    }
+}
+
+fn outer(n: DVec3) -> DMat3 {
+    DMat3::from_cols(n * n.x, n * n.y, n * n.z)
+}

@@ -1,0 +1,105 @@
+//! The oracle's state: positions and velocities in double precision.
+
+use crate::{Error, Grasp, Model, Result, State};
+use glam::DVec3;
+use trocar_geometry::Pose;
+
+/// A node whose position at the end of a step is prescribed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Held {
+    /// The body.
+    pub body: usize,
+    /// Its node.
+    pub node: u32,
+    /// Where it is to be, in the world [m].
+    pub target: DVec3,
+}
+
+impl Held {
+    /// The nodes of `grasp` when the tool is at `tool`.
+    pub fn by(grasp: &Grasp, tool: &Pose) -> Vec<Self> {
+        grasp.prescribed(tool).map(|(node, target)| Self { body: grasp.body, node, target }).collect()
+    }
+}
+
+/// Positions and velocities at one instant, in double precision, nodes in their original order.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OracleState {
+    /// Simulated time [s].
+    pub time: f64,
+    pub(crate) bodies: Vec<Nodes>,
+}
+
+/// A body's nodes.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Nodes {
+    /// World positions [m].
+    pub x: Vec<DVec3>,
+    /// Velocities [m/s].
+    pub v: Vec<DVec3>,
+}
+
+impl OracleState {
+    /// The model at rest in its rest shape.
+    pub fn new(model: &Model) -> Self {
+        let at_rest = |body: &crate::Body| {
+            let x = body.rest_positions().to_vec();
+            Nodes { v: vec![DVec3::ZERO; x.len()], x }
+        };
+        Self { time: 0.0, bodies: model.bodies.iter().map(at_rest).collect() }
+    }
+
+    /// A stepper's state of the same model, without its grasp: that is said to the oracle by [`Held`].
+    pub fn from_state(model: &Model, state: &State) -> Self {
+        let nodes = |body: usize| {
+            let velocity = |node| state.velocity(model, body, node);
+            Nodes { x: state.positions(model, body), v: (0..model.bodies[body].len()).map(velocity).collect() }
+        };
+        Self { time: state.time, bodies: (0..model.bodies.len()).map(nodes).collect() }
+    }
+
+    /// World positions of a body's nodes [m].
+    pub fn positions(&self, body: usize) -> &[DVec3] {
+        &self.bodies[body].x
+    }
+
+    /// Velocities of a body's nodes [m/s].
+    pub fn velocities(&self, body: usize) -> &[DVec3] {
+        &self.bodies[body].v
+    }
+
+    /// World positions of a body's nodes, to be changed [m].
+    pub fn positions_mut(&mut self, body: usize) -> &mut [DVec3] {
+        &mut self.bodies[body].x
+    }
+
+    /// Velocities of a body's nodes, to be changed [m/s].
+    pub fn velocities_mut(&mut self, body: usize) -> &mut [DVec3] {
+        &mut self.bodies[body].v
+    }
+
+    /// Refuses what does not fit the model.
+    pub(super) fn check(&self, model: &Model, held: &[Held]) -> Result<()> {
+        let same = self.bodies.len() == model.bodies.len()
+            && self.bodies.iter().zip(&model.bodies).all(|(s, b)| s.x.len() == b.len());
+        if !same {
+            return Err(Error::Model("the oracle's state belongs to another model".to_owned()));
+        }
+        for (nodes, body) in self.bodies.iter().zip(&model.bodies) {
+            if let Some(i) = (0..body.len()).find(|i| !(nodes.x[*i].is_finite() && nodes.v[*i].is_finite())) {
+                let reason = format!("node {i} is at {} with velocity {}; both must be finite", nodes.x[i], nodes.v[i]);
+                return Err(Error::Body { body: body.name.clone(), reason });
+            }
+        }
+        for h in held {
+            let nodes = model.bodies.get(h.body).map_or(0, crate::Body::len);
+            if h.node as usize >= nodes || !h.target.is_finite() {
+                let (body, node, target) = (h.body, h.node, h.target);
+                return Err(Error::Model(format!(
+                    "node {node} of body {body} (which has {nodes}) is held at {target}"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
