@@ -77,6 +77,8 @@ fn without_sam_metal_is_looked_for_and_points_are_refused() {
     info.organs[0].points = vec![[82.0, 58.0]];
     let (_root, dir) = recording(&info);
     let error = Segment::default().run(&dir, &masks, &Silent).unwrap_err().to_string();
+    assert!(error.contains("corrected by hand"), "{error}");
+    let error = Segment::default().run(&dir, &root.path().join("other"), &Silent).unwrap_err().to_string();
     assert!(error.contains("recording.toml") && error.contains("--sam FOLDER"), "{error}");
     assert!(wanted_weights(None).iter().all(|w| w.found.is_none() || w.name.contains("ONNX Runtime")));
 }
