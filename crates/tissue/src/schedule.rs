@@ -34,6 +34,8 @@ pub struct QuasiNewton {
     pub memory: usize,
     /// A correction this small ends a substep [m]; a body whose first one is no larger is at rest.
     pub tolerance: f64,
+    /// A correction this small over how far the substep went so far ends it, too.
+    pub relative: f64,
 }
 
 /// A solver and how it cuts a frame.
@@ -55,9 +57,9 @@ impl Schedule {
     /// The paper's: Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor, with our inversion guard.
     pub const PAPER: Self = Self::Descent(Descent { substeps: 8, iterations: 10, start: Start::Inertial });
 
-    /// The default: two substeps of at most six quasi-Newton iterations.
+    /// The default: two substeps of as many quasi-Newton iterations as it takes, at most twenty.
     pub const FAST: Self =
-        Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 6, memory: 6, tolerance: 3e-8 });
+        Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 20, memory: 8, tolerance: 3e-8, relative: 3e-3 });
 
     /// Substeps a frame.
     pub fn substeps(&self) -> usize {
@@ -70,10 +72,11 @@ impl Schedule {
     /// Refuses what is no schedule.
     pub(crate) fn check(&self) -> Result<()> {
         let (substeps, iterations) = match *self {
-            Self::QuasiNewton(QuasiNewton { substeps, iterations, memory, tolerance }) => {
-                if !(tolerance >= 0.0 && tolerance.is_finite()) || memory > MOST_PAIRS {
+            Self::QuasiNewton(QuasiNewton { substeps, iterations, memory, tolerance, relative }) => {
+                let sane = (0.0..1.0).contains(&tolerance) && (0.0..1.0).contains(&relative);
+                if !sane || memory > MOST_PAIRS {
                     return Err(Error::Model(format!(
-                        "a quasi-Newton schedule with a tolerance of {tolerance} m and {memory} pairs; 0 m or more and at most {MOST_PAIRS} pairs make sense"
+                        "a quasi-Newton schedule with tolerances of {tolerance} m and {relative} and {memory} pairs; 0 or more, below 1, and at most {MOST_PAIRS} pairs make sense"
                     )));
                 }
                 (substeps, iterations)

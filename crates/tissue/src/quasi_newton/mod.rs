@@ -173,12 +173,12 @@ impl QuasiNewtonIntegrator {
             report.iterations += 1;
             report.grasp_limited += usize::from(!self.pull(simd, h));
         }
-        let tolerance = self.settings.tolerance as f32;
+        let (tolerance, relative) = (self.settings.tolerance as f32, self.settings.relative as f32);
         for iteration in usize::from(guess == Guess::Behind)..self.settings.iterations {
             self.find_direction(simd);
             report.iterations += 1;
             let longest = longest(&self.direction);
-            if longest <= tolerance {
+            if longest <= tolerance.max(if iteration > 0 { relative * self.way() } else { 0.0 }) {
                 if iteration == 0 && !moved {
                     // At rest: what is left of the velocity is noise.
                     self.v.fill([0.0; 4]);
@@ -219,6 +219,12 @@ impl QuasiNewtonIntegrator {
         self.warp.to_rest(simd, &self.direction, &mut self.right);
         self.factor.solve(simd, &mut self.right);
         self.warp.from_rest(simd, &self.right, &mut self.direction);
+    }
+
+    /// How far any coordinate has gone since the substep began [m].
+    fn way(&self) -> f32 {
+        let coordinates = self.x[..self.layout.free].as_flattened().iter().zip(self.start.as_flattened());
+        coordinates.map(|(now, before)| (now - before).abs()).fold(0.0, f32::max)
     }
 
     /// Puts the substep's beginning back.

@@ -22,7 +22,11 @@ const MOST_SECANTS: usize = 3;
 
 /// Times the steps of squeezed elements' nodes are halved, and then dropped, before a search gives up.
 const HALVINGS: usize = 3;
-const DROPS: usize = 6;
+const DROPS: usize = 5;
+
+/// Times all nodes' steps are cut, and to what share, where that does not help.
+const RETREATS: usize = 3;
+const RETREAT: f32 = 0.25;
 
 /// Where a substep starts from.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -199,25 +203,31 @@ impl QuasiNewtonIntegrator {
         Found::Step
     }
 
-    /// Goes `share` of the direction; where elements would be squeezed too far, their nodes go less far, and at last not at all. False if that does not help either.
+    /// Goes `share` of the direction. Where elements would be squeezed too far, their nodes go less far, and at last not at all; where that squeezes others again and again, all go less
+    /// far. False if that does not help either.
     #[inline(always)]
     fn go<S: Simd>(&mut self, simd: S, share: f32, h: f32) -> bool {
-        for round in 0..=HALVINGS + DROPS {
-            for i in 0..self.layout.free {
-                for c in 0..3 {
-                    self.x[i][c] = self.base[i][c] + share * self.direction[i][c];
+        for _ in 0..=RETREATS {
+            for round in 0..=HALVINGS + DROPS {
+                for i in 0..self.layout.free {
+                    for c in 0..3 {
+                        self.x[i][c] = self.base[i][c] + share * self.direction[i][c];
+                    }
                 }
-            }
-            if !self.elements.pass(simd, &self.layout, &self.x, h) {
-                return true;
-            }
-            let (by, direction) = (if round < HALVINGS { 0.5 } else { 0.0 }, &mut self.direction);
-            let free = self.layout.free as u32;
-            self.elements.for_squeezed(&self.layout, |nodes| {
-                for i in nodes.into_iter().filter(|i| *i < free) {
-                    direction[i as usize] = direction[i as usize].map(|d: f32| by * d);
+                if !self.elements.pass(simd, &self.layout, &self.x, h) {
+                    return true;
                 }
-            });
+                let (by, direction) = (if round < HALVINGS { 0.5 } else { 0.0 }, &mut self.direction);
+                let free = self.layout.free as u32;
+                self.elements.for_squeezed(&self.layout, |nodes| {
+                    for i in nodes.into_iter().filter(|i| *i < free) {
+                        direction[i as usize] = direction[i as usize].map(|d: f32| by * d);
+                    }
+                });
+            }
+            for d in self.direction.as_flattened_mut() {
+                *d *= RETREAT;
+            }
         }
         false
     }
