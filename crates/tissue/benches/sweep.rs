@@ -6,7 +6,9 @@ use std::path::Path;
 use std::time::Instant;
 use trocar_geometry::TetMesh;
 use trocar_geometry::io::read_msh;
-use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper};
+use trocar_tissue::{
+    BodyDescription, ConstitutiveModel, Descent, Isa, Material, Model, ModelBuilder, Schedule, Start, State, Stepper,
+};
 
 /// Six organs in one file, beside the repository.
 const MESH: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/peers/meshes/specimen_a.msh");
@@ -30,25 +32,29 @@ fn main() {
     let (model, pairs) = model(&organs);
     let built = begun.elapsed().as_secs_f64() * 1e3;
     println!("{} bodies, {pairs} pairs of a free vertex and an element, built in {built:.0} ms", organs.len());
-    println!("threads   ns/pair  ms/sweep  ms/frame  ms/substep beside the sweeps");
-    for threads in [1, 2] {
-        let [frame, twice] = times(&model, threads, repetitions);
-        let sweep = (twice - frame) / (SUBSTEPS * SWEEPS) as f64;
-        let beside = frame / SUBSTEPS as f64 - sweep * SWEEPS as f64;
-        println!("{threads:7} {:9.2} {sweep:9.4} {frame:9.2} {beside:9.4}", sweep * 1e6 / pairs as f64);
+    println!("instructions  threads   ns/pair  ms/sweep  ms/frame  ms/substep beside the sweeps");
+    for isa in Isa::ALL.into_iter().filter(|isa| isa.is_available()) {
+        Isa::limit(isa);
+        for threads in [1, 2] {
+            let [frame, twice] = times(&model, threads, repetitions);
+            let sweep = (twice - frame) / (SUBSTEPS * SWEEPS) as f64;
+            let beside = frame / SUBSTEPS as f64 - sweep * SWEEPS as f64;
+            let (name, pair) = (isa.name(), sweep * 1e6 / pairs as f64);
+            println!("{name:12}  {threads:7} {pair:9.2} {sweep:9.4} {frame:9.2} {beside:9.4}");
+        }
     }
 }
 
 /// Least times of a frame with the paper's sweeps, and with twice as many [ms].
 fn times(model: &Model, threads: usize, repetitions: usize) -> [f64; 2] {
     let mut runs = [SWEEPS, 2 * SWEEPS].map(|iterations| {
-        let schedule = Schedule { substeps: SUBSTEPS, iterations, ..Schedule::default() };
-        (State::new(model), Stepper::new(model, schedule, threads), f64::INFINITY)
+        let schedule = Schedule::Descent(Descent { substeps: SUBSTEPS, iterations, start: Start::Adaptive });
+        (State::new(model), Stepper::new(model, schedule, FRAME, threads).unwrap(), f64::INFINITY)
     });
     for _ in 0..repetitions {
         for (state, stepper, least) in &mut runs {
             let begun = Instant::now();
-            let report = stepper.step(model, state, FRAME, None);
+            let report = stepper.step(model, state, &[]);
             *least = least.min(begun.elapsed().as_secs_f64() * 1e3);
             assert!(report.divergence.is_none());
         }

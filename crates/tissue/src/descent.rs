@@ -4,7 +4,7 @@ use crate::integrator::{Frame, Integrator};
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
 use crate::sweep::{LocalPlane, Substep, is_squeezed};
-use crate::{Body, StepReport};
+use crate::{Body, Isa, StepReport};
 use glam::Vec3A;
 
 /// Held nodes go no farther from their neighbours than this many rest lengths of the edge between them.
@@ -24,6 +24,7 @@ pub(crate) struct DescentIntegrator {
     fixed: Vec<bool>,
     held: Vec<bool>,
     planes: Vec<LocalPlane>,
+    isa: Isa,
 }
 
 impl Integrator for DescentIntegrator {
@@ -47,6 +48,7 @@ impl DescentIntegrator {
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
             planes: LocalPlane::of(body),
+            isa: Isa::detect(),
         }
     }
 
@@ -72,6 +74,7 @@ impl DescentIntegrator {
             predictor: &self.predictor,
             fixed: &self.fixed,
             planes: &self.planes,
+            isa: self.isa,
         };
         for _ in 0..self.schedule.iterations {
             substep.sweep(&mut state.x, &mut self.guess);
