@@ -6,7 +6,7 @@
 
 use crate::groups::{Group, Groups};
 use crate::kernel::{Local, VolumeTerm};
-use crate::simd::{BLOCK, Block, Lanes, Task, part_of};
+use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, splat3, store3};
 use crate::sweep::{FLOOR, KEPT_SHARE, Substep, allowed_share};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
@@ -95,22 +95,6 @@ impl Memory {
     }
 }
 
-/// Vectors of lanes.
-#[inline(always)]
-fn minus<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
-}
-
-#[inline(always)]
-fn dot<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> L::F {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
-#[inline(always)]
-fn cross<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
 /// Forces and blocks of lanes: xx, xy, xz, yy, yz, zz.
 #[derive(Clone, Copy)]
 struct Sums<L: Lanes> {
@@ -128,7 +112,7 @@ impl<L: Lanes> Sums<L> {
     /// block += k d d'
     #[inline(always)]
     fn add_outer(&mut self, k: L::F, d: [L::F; 3]) {
-        let kd = [k * d[0], k * d[1], k * d[2]];
+        let kd = scaled::<L>(k, d);
         let b = self.block;
         self.block = [
             b[0] + kd[0] * d[0],
@@ -147,15 +131,20 @@ impl<L: Lanes> Sums<L> {
         let (a, b, c) = ([xx, xy, xz], [xy, yy, yz], [xz, yz, zz]);
         let (bc, ca, ab) = (cross::<L>(b, c), cross::<L>(c, a), cross::<L>(a, b));
         let inverse = lanes.splat(1.0) / dot::<L>(a, bc);
-        [bc, ca, ab].map(|row| dot::<L>(row, self.force) * inverse)
+        let f = scaled::<L>(inverse, self.force);
+        [dot::<L>(bc, f), dot::<L>(ca, f), dot::<L>(ab, f)]
     }
 
     /// Lets `change` alter the lanes of a part that are set in `mask`, one by one.
     #[inline(always)]
     fn alter(&mut self, lanes: L, part: usize, mask: u16, mut change: impl FnMut(usize, &mut Local)) {
         let mut spilled = [Block([0.0f32; BLOCK]); 9];
-        let values = self.force.into_iter().chain(self.block);
-        values.zip(&mut spilled).for_each(|(value, to)| lanes.store(value, to, part));
+        for c in 0..3 {
+            lanes.store(self.force[c], &mut spilled[c], part);
+        }
+        for c in 0..6 {
+            lanes.store(self.block[c], &mut spilled[3 + c], part);
+        }
         for lane in (0..L::WIDTH).filter(|lane| mask >> lane & 1 == 1).map(|lane| part * L::WIDTH + lane) {
             let [fx, fy, fz, xx, xy, xz, yy, yz, zz] = spilled.map(|block| block.0[lane]);
             let mut local = Local {
@@ -168,8 +157,12 @@ impl<L: Lanes> Sums<L> {
             let values = [f.x, f.y, f.z, a.x, a.y, a.z, b.y, b.z, c.z];
             values.into_iter().zip(&mut spilled).for_each(|(value, to)| to.0[lane] = value);
         }
-        let [f0, f1, f2, b0, b1, b2, b3, b4, b5] = spilled.each_ref().map(|block| lanes.load(block, part));
-        (self.force, self.block) = ([f0, f1, f2], [b0, b1, b2, b3, b4, b5]);
+        for c in 0..3 {
+            self.force[c] = lanes.load(&spilled[c], part);
+        }
+        for c in 0..6 {
+            self.block[c] = lanes.load(&spilled[3 + c], part);
+        }
     }
 }
 
@@ -226,8 +219,30 @@ impl LaneSweep<'_> {
         active
     }
 
+    /// Points that a group's offsets name.
     #[inline(always)]
     #[allow(unsafe_code, reason = "points are read by indices that the groups vouch for")]
+    fn read<L: Lanes>(&self, lanes: L, part: usize, points: &[Vec3A], offsets: &Block<u32>) -> [L::F; 3] {
+        // SAFETY: the offsets are 16 times numbers below `Groups::points`, the length of all arrays of points (`sweep` asserts it).
+        unsafe { lanes.rows(points, offsets, part) }
+    }
+
+    /// Adds the dashpot along the edge to the point of step `k`, which is at `d` from the vertex.
+    #[inline(always)]
+    fn add_dashpot<L: Lanes>(&self, lanes: L, group: &Group, part: usize, k: usize, d: [L::F; 3], sums: &mut Sums<L>) {
+        let Substep { start, h, .. } = *self.substep;
+        let to = self.groups.steps_of(group)[k].to();
+        let before = minus::<L>(self.read(lanes, part, start, to), self.read(lanes, part, start, group.own()));
+        let length = lanes.max(dot::<L>(before, before), lanes.splat(1e-30));
+        let damping = lanes.load(&self.groups.damping_of(group)[k], part);
+        let stiffness = damping * lanes.splat(1.0 / h) / length;
+        // The vertex's displacement less the point's.
+        let stretching = dot::<L>(before, minus::<L>(before, d));
+        sums.pull(stiffness * stretching, before);
+        sums.add_outer(stiffness, before);
+    }
+
+    #[inline(always)]
     fn relax_part<L: Lanes, const VISCOUS: bool>(
         &self,
         lanes: L,
@@ -237,47 +252,38 @@ impl LaneSweep<'_> {
         x: &[Vec3A],
         memory: &mut Memory,
     ) {
-        // SAFETY: the offsets are 16 times numbers below `Groups::points`, the length of all arrays of points (`sweep` asserts it).
-        let read = |points: &[Vec3A], offsets: &Block<u32>| unsafe { lanes.rows(points, offsets, part) };
         let h = self.substep.h;
-        let here = read(x, group.own());
+        let here = self.read(lanes, part, x, group.own());
         let inertia = lanes.load(&group.mass, part) * lanes.splat(1.0 / (h * h));
         let zero = lanes.splat(0.0);
         let diagonal = inertia + lanes.load(&group.laplacian, part);
-        let pulled = minus::<L>(read(self.substep.predictor, group.own()), here);
+        let pulled = minus::<L>(self.read(lanes, part, self.substep.predictor, group.own()), here);
         let mut sums =
-            Sums::<L> { force: pulled.map(|d| inertia * d), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
+            Sums::<L> { force: scaled::<L>(inertia, pulled), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
         let (sixth, plain) = (lanes.splat(self.term.lambda / 6.0), lanes.splat(VolumeTerm::PLAIN));
         let pressure = lanes.splat(self.term.lambda * self.term.alpha / 6.0);
         let steps = self.groups.steps_of(group);
         let drops = self.groups.drops_of(group);
-        let damping = self.groups.damping_of(group);
-        let start = if VISCOUS { read(self.substep.start, group.own()) } else { [zero; 3] };
-        let dashpot = |k: usize, d: [L::F; 3], sums: &mut Sums<L>| {
-            if VISCOUS {
-                let before = minus::<L>(read(self.substep.start, steps[k].to()), start);
-                let length = lanes.max(dot::<L>(before, before), lanes.splat(1e-30));
-                let stiffness = lanes.load(&damping[k], part) * lanes.splat(1.0 / h) / length;
-                // The vertex's displacement less the point's.
-                let stretching = dot::<L>(before, minus::<L>(before, d));
-                sums.pull(stiffness * stretching, before);
-                sums.add_outer(stiffness, before);
-            }
-        };
         // The window, relative to the vertex. It takes two points to fill it.
         let (mut p, mut q, mut r) = ([zero; 3], [zero; 3], [zero; 3]);
-        for (k, step) in steps.iter().enumerate().take(2) {
-            (p, q, r) = (q, r, minus::<L>(read(x, step.to()), here));
+        for k in 0..2.min(steps.len()) {
+            let step = &steps[k];
+            (p, q, r) = (q, r, minus::<L>(self.read(lanes, part, x, step.to()), here));
             sums.pull(lanes.load(&step.edge, part), r);
-            dashpot(k, r, &mut sums);
+            if VISCOUS {
+                self.add_dashpot(lanes, group, part, k, r, &mut sums);
+            }
         }
         let mut low = 0;
-        for (k, ((step, drop), face)) in steps.iter().zip(drops).zip(&mut memory.faces).enumerate().skip(2) {
-            let d = minus::<L>(read(x, step.to()), here);
+        for k in 2..steps.len() {
+            let (step, drop, face) = (&steps[k], drops[k], &mut memory.faces[k]);
+            let d = minus::<L>(self.read(lanes, part, x, step.to()), here);
             sums.pull(lanes.load(&step.edge, part), d);
-            dashpot(k, d, &mut sums);
-            let drop = part_of::<L>(*drop, part);
-            p = [0, 1, 2].map(|c| lanes.select(drop, q[c], p[c]));
+            if VISCOUS {
+                self.add_dashpot(lanes, group, part, k, d, &mut sums);
+            }
+            let drop = part_of::<L>(drop, part);
+            p = [lanes.select(drop, q[0], p[0]), lanes.select(drop, q[1], p[1]), lanes.select(drop, q[2], p[2])];
             (q, r) = (r, d);
             let area = cross::<L>(minus::<L>(q, p), minus::<L>(r, p));
             let six_v = zero - dot::<L>(area, p);
@@ -288,7 +294,7 @@ impl LaneSweep<'_> {
             sums.pull(stiffness * six_v - lanes.signed(pressure, inverse), area);
             sums.add_outer(stiffness, area);
             low |= lanes.less(lanes.abs(inverse) * ratio, lanes.abs(inverse) * plain);
-            area.into_iter().zip(&mut face.area).for_each(|(value, to)| lanes.store(value, to, part));
+            store3(lanes, area, &mut face.area, part);
             lanes.store(ratio, &mut face.ratio, part);
         }
         low &= part_of::<L>(active, part);
@@ -300,7 +306,7 @@ impl LaneSweep<'_> {
         let step = sums.solve(lanes);
         let to = self.guarded(lanes, group, part, step, memory);
         let to = [here[0] + to[0], here[1] + to[1], here[2] + to[2]];
-        to.into_iter().zip(&mut memory.to).for_each(|(value, to)| lanes.store(value, to, part));
+        store3(lanes, to, &mut memory.to, part);
     }
 
     /// Lanes below a support.
@@ -308,10 +314,9 @@ impl LaneSweep<'_> {
     fn below<L: Lanes>(&self, lanes: L, here: [L::F; 3]) -> u16 {
         let mut below = 0;
         for plane in self.substep.planes {
-            let (point, normal) = (plane.point.to_array(), plane.normal.to_array());
-            let from = minus::<L>(here, point.map(|v| lanes.splat(v)));
+            let (from, normal) = (minus::<L>(here, splat3(lanes, plane.point)), splat3(lanes, plane.normal));
             // A little more than the height says: whether a vertex is below is decided where its force is found.
-            below |= lanes.less(dot::<L>(from, normal.map(|v| lanes.splat(v))), lanes.splat(1e-6));
+            below |= lanes.less(dot::<L>(from, normal), lanes.splat(1e-6));
         }
         below
     }
@@ -340,22 +345,26 @@ impl LaneSweep<'_> {
     fn guarded<L: Lanes>(&self, lanes: L, group: &Group, part: usize, step: [L::F; 3], memory: &Memory) -> [L::F; 3] {
         let (kept, least) = (lanes.splat(KEPT_SHARE), lanes.splat(FLOOR));
         let mut too_far = 0;
-        for (corner, face) in self.groups.steps_of(group).iter().zip(&memory.faces).skip(2) {
-            let area = face.area.each_ref().map(|area| lanes.load(area, part));
+        let steps = self.groups.steps_of(group);
+        for k in 2..steps.len() {
+            let (corner, face) = (&steps[k], &memory.faces[k]);
             let ratio = lanes.load(&face.ratio, part);
-            let after = ratio + lanes.load(&corner.inverse_6v, part) * dot::<L>(area, step);
-            too_far |= lanes.less(after, lanes.min(lanes.max(kept * ratio, least), ratio));
+            let change = lanes.load(&corner.inverse_6v, part) * dot::<L>(load3(lanes, &face.area, part), step);
+            too_far |= lanes.less(ratio + change, lanes.min(lanes.max(kept * ratio, least), ratio));
         }
         if too_far == 0 {
             return step;
         }
         let mut spilled = [Block([0.0f32; BLOCK]); 3];
-        step.into_iter().zip(&mut spilled).for_each(|(value, to)| lanes.store(value, to, part));
+        store3(lanes, step, &mut spilled, part);
         for lane in (0..L::WIDTH).filter(|lane| too_far >> lane & 1 == 1).map(|lane| part * L::WIDTH + lane) {
-            let share = self.share(group, lane, spilled.map(|block| block.0[lane]), memory);
-            spilled.iter_mut().for_each(|block| block.0[lane] *= share);
+            let step = [spilled[0].0[lane], spilled[1].0[lane], spilled[2].0[lane]];
+            let share = self.share(group, lane, step, memory);
+            for block in &mut spilled {
+                block.0[lane] *= share;
+            }
         }
-        spilled.each_ref().map(|block| lanes.load(block, part))
+        load3(lanes, &spilled, part)
     }
 
     /// The share of one lane's step that the guard allows.

@@ -114,13 +114,15 @@ impl Lanes for Avx2 {
     unsafe fn rows(self, points: &[Vec3A], offsets: &Block<u32>, part: usize) -> [F32x8; 3] {
         const { assert!(size_of::<Vec3A>() == 16) };
         let base = points.as_ptr().cast::<f32>();
-        let offsets: &[u32; 8] = &offsets.0.as_chunks().0[part];
+        let o: &[u32; 8] = &offsets.0.as_chunks().0[part];
         // SAFETY: `self` is the proof of AVX2; the caller vouches for the offsets, and a point is 16 aligned bytes.
         unsafe {
-            let row = |i: usize| _mm_load_ps(base.byte_add(offsets[i] as usize));
-            // Rows i and i+4, so that the transposed lanes are in order.
-            let two = |i: usize| _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(row(i)), row(i + 4));
-            let [a, b, c, d] = [two(0), two(1), two(2), two(3)];
+            let [a, b, c, d] = [
+                every_fourth(base, o, 0),
+                every_fourth(base, o, 1),
+                every_fourth(base, o, 2),
+                every_fourth(base, o, 3),
+            ];
             let (ab, cd) = (_mm256_castps_pd(_mm256_unpacklo_ps(a, b)), _mm256_castps_pd(_mm256_unpacklo_ps(c, d)));
             let (abz, cdz) = (_mm256_castps_pd(_mm256_unpackhi_ps(a, b)), _mm256_castps_pd(_mm256_unpackhi_ps(c, d)));
             let x = _mm256_castpd_ps(_mm256_unpacklo_pd(ab, cd));
@@ -128,5 +130,18 @@ impl Lanes for Avx2 {
             let z = _mm256_castpd_ps(_mm256_unpacklo_pd(abz, cdz));
             [F32x8(x), F32x8(y), F32x8(z)]
         }
+    }
+}
+
+/// Rows i and i+4, so that the transposed lanes are in order. A function, not a closure: closures have not the caller's instructions.
+///
+/// # Safety
+/// As for [`Lanes::rows`].
+#[inline(always)]
+unsafe fn every_fourth(base: *const f32, offsets: &[u32; 8], i: usize) -> __m256 {
+    // SAFETY: handed on.
+    unsafe {
+        let low = _mm256_castps128_ps256(_mm_load_ps(base.byte_add(offsets[i] as usize)));
+        _mm256_insertf128_ps::<1>(low, _mm_load_ps(base.byte_add(offsets[i + 4] as usize)))
     }
 }

@@ -105,20 +105,17 @@ impl Lanes for Avx512 {
     }
 
     #[inline(always)]
-    unsafe fn rows(self, points: &[Vec3A], offsets: &Block<u32>, _: usize) -> [F32x16; 3] {
+    unsafe fn rows(self, points: &[Vec3A], Block(o): &Block<u32>, _: usize) -> [F32x16; 3] {
         const { assert!(size_of::<Vec3A>() == 16) };
         let base = points.as_ptr().cast::<f32>();
         // SAFETY: `self` is the proof of AVX-512; the caller vouches for the offsets, and a point is 16 aligned bytes.
         unsafe {
-            let row = |i: usize| _mm_load_ps(base.byte_add(offsets.0[i] as usize));
-            // Rows i, i+4, i+8, i+12, so that the transposed lanes are in order.
-            let four = |i: usize| {
-                let low = _mm512_castps128_ps512(row(i));
-                let low = _mm512_insertf32x4::<1>(low, row(i + 4));
-                let low = _mm512_insertf32x4::<2>(low, row(i + 8));
-                _mm512_insertf32x4::<3>(low, row(i + 12))
-            };
-            let [a, b, c, d] = [four(0), four(1), four(2), four(3)];
+            let [a, b, c, d] = [
+                every_fourth(base, o, 0),
+                every_fourth(base, o, 1),
+                every_fourth(base, o, 2),
+                every_fourth(base, o, 3),
+            ];
             let (ab, cd) = (_mm512_castps_pd(_mm512_unpacklo_ps(a, b)), _mm512_castps_pd(_mm512_unpacklo_ps(c, d)));
             let (abz, cdz) = (_mm512_castps_pd(_mm512_unpackhi_ps(a, b)), _mm512_castps_pd(_mm512_unpackhi_ps(c, d)));
             let x = _mm512_castpd_ps(_mm512_unpacklo_pd(ab, cd));
@@ -126,5 +123,20 @@ impl Lanes for Avx512 {
             let z = _mm512_castpd_ps(_mm512_unpacklo_pd(abz, cdz));
             [F32x16(x), F32x16(y), F32x16(z)]
         }
+    }
+}
+
+/// Rows i, i+4, i+8, i+12, so that the transposed lanes are in order. A function, not a closure: closures have not the caller's instructions.
+///
+/// # Safety
+/// As for [`Lanes::rows`].
+#[inline(always)]
+unsafe fn every_fourth(base: *const f32, offsets: &[u32; 16], i: usize) -> __m512 {
+    // SAFETY: handed on.
+    unsafe {
+        let rows = _mm512_castps128_ps512(_mm_load_ps(base.byte_add(offsets[i] as usize)));
+        let rows = _mm512_insertf32x4::<1>(rows, _mm_load_ps(base.byte_add(offsets[i + 4] as usize)));
+        let rows = _mm512_insertf32x4::<2>(rows, _mm_load_ps(base.byte_add(offsets[i + 8] as usize)));
+        _mm512_insertf32x4::<3>(rows, _mm_load_ps(base.byte_add(offsets[i + 12] as usize)))
     }
 }

@@ -85,7 +85,8 @@ impl Isa {
     }
 }
 
-/// A kernel. Its `run` and all it calls in its inner loops must be `#[inline(always)]`: only then are they compiled with the lanes' instructions.
+/// A kernel. Its `run` and all it calls in its inner loops must be `#[inline(always)]`, and neither closures nor iterators' adaptors that take one: only what is
+/// inlined for certain is compiled with the lanes' instructions; the rest calls every one of them.
 pub(crate) trait Task {
     type Output;
     fn run<L: Lanes>(self, lanes: L) -> Self::Output;
@@ -123,6 +124,46 @@ pub(crate) trait Lanes: Copy {
     /// # Safety
     /// Each of the part's `offsets` [bytes] is 16 times the index of one of `points`.
     unsafe fn rows(self, points: &[Vec3A], offsets: &Block<u32>, part: usize) -> [Self::F; 3];
+}
+
+/// Three registers of three blocks.
+#[inline(always)]
+pub(crate) fn load3<L: Lanes>(lanes: L, from: &[Block<f32>; 3], part: usize) -> [L::F; 3] {
+    [lanes.load(&from[0], part), lanes.load(&from[1], part), lanes.load(&from[2], part)]
+}
+
+/// Three registers into three blocks.
+#[inline(always)]
+pub(crate) fn store3<L: Lanes>(lanes: L, value: [L::F; 3], to: &mut [Block<f32>; 3], part: usize) {
+    lanes.store(value[0], &mut to[0], part);
+    lanes.store(value[1], &mut to[1], part);
+    lanes.store(value[2], &mut to[2], part);
+}
+
+/// The same vector in all lanes.
+#[inline(always)]
+pub(crate) fn splat3<L: Lanes>(lanes: L, value: Vec3A) -> [L::F; 3] {
+    [lanes.splat(value.x), lanes.splat(value.y), lanes.splat(value.z)]
+}
+
+#[inline(always)]
+pub(crate) fn minus<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+pub(crate) fn scaled<L: Lanes>(k: L::F, a: [L::F; 3]) -> [L::F; 3] {
+    [k * a[0], k * a[1], k * a[2]]
+}
+
+#[inline(always)]
+pub(crate) fn dot<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> L::F {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[inline(always)]
+pub(crate) fn cross<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// `mask`'s bits of a part.

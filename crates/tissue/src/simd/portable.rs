@@ -95,10 +95,13 @@ impl Lanes for Portable {
     unsafe fn rows(self, points: &[Vec3A], offsets: &Block<u32>, part: usize) -> [F32x4; 3] {
         const { assert!(size_of::<Vec3A>() == 16 && BLOCK.is_multiple_of(WIDTH)) };
         let offsets: [u32; WIDTH] = offsets.0.as_chunks().0[part];
-        let rows = offsets.map(|offset| {
-            // SAFETY: the caller vouches for the indices.
-            unsafe { points.get_unchecked(offset as usize / 16) }
-        });
-        [0, 1, 2].map(|c| F32x4(rows.map(|row| row[c])))
+        // SAFETY: the caller vouches for the indices.
+        unsafe {
+            let a = points.get_unchecked(offsets[0] as usize / 16);
+            let b = points.get_unchecked(offsets[1] as usize / 16);
+            let c = points.get_unchecked(offsets[2] as usize / 16);
+            let d = points.get_unchecked(offsets[3] as usize / 16);
+            [F32x4([a.x, b.x, c.x, d.x]), F32x4([a.y, b.y, c.y, d.y]), F32x4([a.z, b.z, c.z, d.z])]
+        }
     }
 }
