@@ -16,6 +16,8 @@ mod grasp;
 mod groups;
 mod integrator;
 mod kernel;
+#[cfg(test)]
+mod lane_tests;
 mod lanes;
 mod material;
 mod model;

@@ -81,7 +81,7 @@ impl Substep<'_> {
         }
     }
 
-    fn sweep_with<E: VertexElasticity>(&self, elasticity: &E, x: &mut [Vec3A], moved: &mut [Vec3A]) {
+    pub fn sweep_with<E: VertexElasticity>(&self, elasticity: &E, x: &mut [Vec3A], moved: &mut [Vec3A]) {
         for color in self.body.color_start.windows(2) {
             let (first, end) = (color[0] as usize, color[1] as usize);
             if end - first < 2 * CHUNK {
