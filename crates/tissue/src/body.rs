@@ -4,6 +4,7 @@
 //! origin: rounding of `f32` is then far below the sags that are measured. What a vertex needs of its elements and edges stands in
 //! one piece, in the order the sweeps read it.
 
+use crate::elements::Elements;
 use crate::groups::Groups;
 use crate::{Material, SupportPlane};
 use glam::{DVec3, Vec3A};
@@ -43,6 +44,8 @@ pub struct Body {
     pub(crate) edges: Vec<Edge>,
     /// The free vertices as the lanes of the sweeps read them; empty unless the tissue is stable neo-Hookean.
     pub(crate) groups: Groups,
+    /// The elements that can move, in lanes; none for bodies of hundreds of millions of nodes.
+    pub(crate) elements: Option<Elements>,
     /// Rest volume of each element [m3], by `tets`.
     pub(crate) volumes: Vec<f64>,
 }

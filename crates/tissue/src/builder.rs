@@ -2,6 +2,7 @@
 
 use crate::body::{Corner, Edge, Vertex};
 use crate::coloring::color;
+use crate::elements::Elements;
 use crate::groups::Groups;
 use crate::strip::{Push, strip};
 use crate::{Body, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, SupportPlane};
@@ -185,6 +186,7 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
         gradients: Vec::new(),
         edges: Vec::with_capacity(2 * edges.len()),
         groups: Groups::default(),
+        elements: None,
         volumes,
         name,
     };
@@ -206,6 +208,7 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
             v.laplacian = laplacian;
         }
     }
+    body.elements = Elements::new(&body.tets, &body.volumes, |i| body.vertices[i as usize].pinned, nodes);
     if material.model == ConstitutiveModel::StableNeoHookean {
         let inside = |push: &Push| Push { to: body.internal[push.to as usize], ..*push };
         let strips: Vec<Vec<Push>> = order.iter().map(|i| strips[*i as usize].iter().map(inside).collect()).collect();

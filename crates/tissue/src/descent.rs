@@ -147,15 +147,22 @@ impl DescentIntegrator {
                 *x = if share == 1.0 { self.guess[i] } else { self.start[i].lerp(self.guess[i], share) };
             }
             followed = held == 1.0;
-            let squeezed = |(tet, volume): (&[u32; 4], &f64)| {
-                let ratio = |x: &[Vec3A]| volume_ratio(tet, x, *volume as f32);
-                is_squeezed(ratio(&state.x), ratio(&self.start))
-            };
-            if !body.tets.iter().zip(&body.volumes).any(squeezed) && !self.overstretches(body, &state.x) {
+            if !self.squeezes(body, &state.x) && !self.overstretches(body, &state.x) {
                 break;
             }
         }
         followed
+    }
+
+    /// Whether an element has too little of the volume that it had at the substep's beginning.
+    fn squeezes(&self, body: &Body, x: &[Vec3A]) -> bool {
+        if let Some(elements) = &body.elements {
+            return elements.any_squeezed(self.isa, &self.start, x);
+        }
+        body.tets.iter().zip(&body.volumes).any(|(tet, volume)| {
+            let ratio = |x: &[Vec3A]| volume_ratio(tet, x, *volume as f32);
+            is_squeezed(ratio(x), ratio(&self.start))
+        })
     }
 
     /// Whether an edge at a held vertex is stretched too far, and further than at the substep's beginning.

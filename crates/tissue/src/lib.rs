@@ -11,6 +11,7 @@ mod body;
 mod builder;
 mod coloring;
 mod descent;
+mod elements;
 mod error;
 mod grasp;
 mod groups;
