@@ -17,6 +17,7 @@ mod grasp;
 mod groups;
 mod integrator;
 mod kernel;
+mod lane_sweep;
 #[cfg(test)]
 mod lane_tests;
 mod lanes;
@@ -24,11 +25,13 @@ mod material;
 mod model;
 pub mod oracle;
 pub mod pins;
+mod quasi_newton;
 mod report;
 mod schedule;
 mod simd;
 mod state;
 mod stepper;
+mod stiffness;
 mod strip;
 mod sweep;
 
@@ -40,7 +43,7 @@ pub use material::{ConstitutiveModel, Corotated, Hyperelastic, Material, StVenan
 pub use model::{Model, SupportPlane};
 pub use oracle::{Held, Oracle, OracleState};
 pub use report::{Divergence, StepReport};
-pub use schedule::{Descent, Schedule, Start};
+pub use schedule::{Descent, QuasiNewton, Schedule, Start};
 pub use simd::Isa;
 pub use state::State;
 pub use stepper::Stepper;

@@ -8,7 +8,7 @@
 use crate::SupportPlane;
 use crate::body::Body;
 use crate::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
-use crate::lanes::LaneSweep;
+use crate::lane_sweep::LaneSweep;
 use crate::simd::Isa;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
