@@ -1,9 +1,11 @@
 //! One deformable body, laid out for the sweeps.
 //!
-//! Vertices are renumbered by colour, so that the vertices of one colour are a range, and their positions are kept relative to the body's own
+//! Vertices are renumbered by colour, so that the vertices of one colour are a range and the pinned ones, which have none, the last; and their positions are kept relative to the body's own
 //! origin: rounding of `f32` is then far below the sags that are measured. What a vertex needs of its elements and edges stands in
 //! one piece, in the order the sweeps read it.
 
+use crate::elements::Elements;
+use crate::groups::Groups;
 use crate::{Material, SupportPlane};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;
@@ -28,7 +30,7 @@ pub struct Body {
     pub(crate) origin: DVec3,
     /// Internal number of each node.
     pub(crate) internal: Vec<u32>,
-    /// First vertex of each colour, and the number of vertices.
+    /// First vertex of each colour, and the number of vertices that are not pinned.
     pub(crate) color_start: Vec<u32>,
     /// Elements by internal vertex numbers.
     pub(crate) tets: Vec<[u32; 4]>,
@@ -40,6 +42,10 @@ pub struct Body {
     pub(crate) gradients: Vec<[Vec3A; 3]>,
     /// Edges, by vertex.
     pub(crate) edges: Vec<Edge>,
+    /// The free vertices as the lanes of the sweeps read them; empty unless the tissue is stable neo-Hookean.
+    pub(crate) groups: Groups,
+    /// The elements that can move, in lanes; none for bodies of hundreds of millions of nodes.
+    pub(crate) elements: Option<Elements>,
     /// Rest volume of each element [m3], by `tets`.
     pub(crate) volumes: Vec<f64>,
 }

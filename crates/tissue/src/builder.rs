@@ -2,6 +2,9 @@
 
 use crate::body::{Corner, Edge, Vertex};
 use crate::coloring::color;
+use crate::elements::Elements;
+use crate::groups::Groups;
+use crate::strip::{Push, strip};
 use crate::{Body, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, SupportPlane};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::{TetMesh, TetQuality};
@@ -132,21 +135,6 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
         neighbours[*a as usize].push(*b);
         neighbours[*b as usize].push(*a);
     }
-    let (colors, color_count) = color(&neighbours);
-    let mut order: Vec<u32> = (0..nodes as u32).collect();
-    order.sort_by_key(|i| (colors[*i as usize], *i));
-    let mut internal = vec![0; nodes];
-    for (k, i) in order.iter().enumerate() {
-        internal[*i as usize] = k as u32;
-    }
-    let mut color_start = vec![0; color_count + 1];
-    for c in &colors {
-        color_start[*c as usize + 1] += 1;
-    }
-    for c in 0..color_count {
-        color_start[c + 1] += color_start[c];
-    }
-
     let volumes: Vec<f64> = (0..mesh.tets.len()).map(|t| mesh.tet_volume(t)).collect();
     let mut share = vec![0.0; nodes];
     let mut incident = vec![Vec::new(); nodes];
@@ -155,6 +143,30 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
             share[*i as usize] += 0.25 * volumes[t];
             incident[*i as usize].push((t, k));
         }
+    }
+    // Pinned vertices are never swept and have no colour. Vertices of a colour are sorted by the work they are, so that those next to each other are alike.
+    let (colors, color_count) = color(&neighbours, &pinned);
+    let strips: Vec<Vec<Push>> = match material.model {
+        ConstitutiveModel::StableNeoHookean => {
+            (0..nodes).map(|i| if pinned[i] { vec![] } else { strip(&faces(mesh, &incident[i])) }).collect()
+        }
+        ConstitutiveModel::StVenantKirchhoff | ConstitutiveModel::Corotated => vec![vec![]; nodes],
+    };
+    let mut order: Vec<u32> = (0..nodes as u32).collect();
+    order.sort_by_key(|i| {
+        let i = *i as usize;
+        (pinned[i], colors[i], std::cmp::Reverse((strips[i].len(), incident[i].len())), i)
+    });
+    let mut internal = vec![0; nodes];
+    for (k, i) in order.iter().enumerate() {
+        internal[*i as usize] = k as u32;
+    }
+    let mut color_start = vec![0; color_count + 1];
+    for (c, _) in colors.iter().zip(&pinned).filter(|(_, pinned)| !**pinned) {
+        color_start[*c as usize + 1] += 1;
+    }
+    for c in 0..color_count {
+        color_start[c + 1] += color_start[c];
     }
     let (masses, raised_masses) = lumped_masses(&share, material.density);
 
@@ -173,12 +185,14 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
         corners: Vec::with_capacity(4 * mesh.tets.len()),
         gradients: Vec::new(),
         edges: Vec::with_capacity(2 * edges.len()),
+        groups: Groups::default(),
+        elements: None,
         volumes,
         name,
     };
     body.tets = mesh.tets.iter().map(|t| t.map(|i| body.internal[i as usize])).collect();
-    for i in order {
-        let i = i as usize;
+    for i in &order {
+        let i = *i as usize;
         let vertex = Vertex {
             mass: masses[i] as f32,
             pinned: body.pinned[i],
@@ -194,6 +208,12 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
             v.laplacian = laplacian;
         }
     }
+    body.elements = Elements::new(&body.tets, &body.volumes, |i| body.vertices[i as usize].pinned, nodes);
+    if material.model == ConstitutiveModel::StableNeoHookean {
+        let inside = |push: &Push| Push { to: body.internal[push.to as usize], ..*push };
+        let strips: Vec<Vec<Push>> = order.iter().map(|i| strips[*i as usize].iter().map(inside).collect()).collect();
+        body.groups = Groups::new(&body, &strips);
+    }
     body
 }
 
@@ -208,6 +228,11 @@ fn lumped_masses(share: &[f64], density: f64) -> (Vec<f64>, usize) {
 
 /// Other corners of an element seen from corner k, so that (b-a)x(c-a).(x-a) is positive.
 const SEEN_FROM: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
+
+/// The faces opposite a node in its elements, turned as its corners are.
+fn faces(mesh: &TetMesh, incident: &[(usize, usize)]) -> Vec<[u32; 3]> {
+    incident.iter().map(|(t, k)| SEEN_FROM[*k].map(|c| mesh.tets[*t][c])).collect()
+}
 
 fn add_corners(body: &mut Body, incident: &[(usize, usize)]) {
     for (t, k) in incident {

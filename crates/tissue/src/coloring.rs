@@ -1,10 +1,11 @@
 //! Graph colouring: vertices of one colour share no element, so their steps do not see each other.
 
 /// Colours nodes greedily, most neighbours first (ties by index), each with the lowest colour none of its neighbours has.
-/// `neighbours[i]` lists the nodes that share an element with node i. Returns each node's colour and the number of colours.
-pub(crate) fn color(neighbours: &[Vec<u32>]) -> (Vec<u32>, usize) {
-    let mut order: Vec<u32> = (0..neighbours.len() as u32).collect();
-    order.sort_by_key(|i| (std::cmp::Reverse(neighbours[*i as usize].len()), *i));
+/// `neighbours[i]` lists the nodes that share an element with node i. Nodes that are `left_out` get none and do not matter to the others. Returns each node's colour and the number of colours.
+pub(crate) fn color(neighbours: &[Vec<u32>], left_out: &[bool]) -> (Vec<u32>, usize) {
+    let mut order: Vec<u32> = (0..neighbours.len() as u32).filter(|i| !left_out[*i as usize]).collect();
+    let others = |i: usize| neighbours[i].iter().filter(|j| !left_out[**j as usize]).count();
+    order.sort_by_cached_key(|i| (std::cmp::Reverse(others(*i as usize)), *i));
     let mut colors = vec![u32::MAX; neighbours.len()];
     let mut taken: Vec<u32> = Vec::new();
     let mut count = 0;
@@ -34,7 +35,7 @@ mod tests {
         // A ring of 9 with chords.
         let neighbours: Vec<Vec<u32>> =
             (0..9u32).map(|i| vec![(i + 1) % 9, (i + 8) % 9, (i + 3) % 9, (i + 6) % 9]).collect();
-        let (colors, count) = color(&neighbours);
+        let (colors, count) = color(&neighbours, &[false; 9]);
         for (i, list) in neighbours.iter().enumerate() {
             assert!(list.iter().all(|j| colors[*j as usize] != colors[i]));
         }

@@ -4,7 +4,7 @@ use crate::integrator::{Frame, Integrator};
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
 use crate::sweep::{LocalPlane, Substep, is_squeezed};
-use crate::{Body, StepReport};
+use crate::{Body, Isa, StepReport};
 use glam::Vec3A;
 
 /// Held nodes go no farther from their neighbours than this many rest lengths of the edge between them.
@@ -24,6 +24,7 @@ pub(crate) struct DescentIntegrator {
     fixed: Vec<bool>,
     held: Vec<bool>,
     planes: Vec<LocalPlane>,
+    isa: Isa,
 }
 
 impl Integrator for DescentIntegrator {
@@ -47,11 +48,19 @@ impl DescentIntegrator {
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
             planes: LocalPlane::of(body),
+            isa: Isa::detect(),
         }
     }
 
     /// One substep of implicit Euler, which ends when `share` of the frame is over: predict, start, sweep, take the velocity.
-    pub fn substep(&mut self, frame: &Frame<'_>, share: f64, body: &Body, state: &mut BodyState, report: &mut StepReport) {
+    pub fn substep(
+        &mut self,
+        frame: &Frame<'_>,
+        share: f64,
+        body: &Body,
+        state: &mut BodyState,
+        report: &mut StepReport,
+    ) {
         let h = (frame.dt / self.schedule.substeps as f64) as f32;
         let gravity = frame.gravity.as_vec3a();
         self.start.copy_from_slice(&state.x);
@@ -72,6 +81,7 @@ impl DescentIntegrator {
             predictor: &self.predictor,
             fixed: &self.fixed,
             planes: &self.planes,
+            isa: self.isa,
         };
         for _ in 0..self.schedule.iterations {
             substep.sweep(&mut state.x, &mut self.guess);
@@ -145,15 +155,22 @@ impl DescentIntegrator {
                 *x = if share == 1.0 { self.guess[i] } else { self.start[i].lerp(self.guess[i], share) };
             }
             followed = held == 1.0;
-            let squeezed = |(tet, volume): (&[u32; 4], &f64)| {
-                let ratio = |x: &[Vec3A]| volume_ratio(tet, x, *volume as f32);
-                is_squeezed(ratio(&state.x), ratio(&self.start))
-            };
-            if !body.tets.iter().zip(&body.volumes).any(squeezed) && !self.overstretches(body, &state.x) {
+            if !self.squeezes(body, &state.x) && !self.overstretches(body, &state.x) {
                 break;
             }
         }
         followed
+    }
+
+    /// Whether an element has too little of the volume that it had at the substep's beginning.
+    fn squeezes(&self, body: &Body, x: &[Vec3A]) -> bool {
+        if let Some(elements) = &body.elements {
+            return elements.any_squeezed(self.isa, &self.start, x);
+        }
+        body.tets.iter().zip(&body.volumes).any(|(tet, volume)| {
+            let ratio = |x: &[Vec3A]| volume_ratio(tet, x, *volume as f32);
+            is_squeezed(ratio(x), ratio(&self.start))
+        })
     }
 
     /// Whether an edge at a held vertex is stretched too far, and further than at the substep's beginning.

@@ -63,12 +63,27 @@ pub(crate) trait VertexElasticity: Sync {
 /// other part, mu/2 tr(F'F), is quadratic in the positions: a constant Laplacian along the edges, added by the sweep.
 pub(crate) struct VolumeTerm {
     energy: VolumeEnergy,
-    lambda: f32,
-    alpha: f32,
+    /// Volume modulus [Pa].
+    pub lambda: f32,
+    /// Volume ratio at which the quadratic is least.
+    pub alpha: f32,
 }
 
-/// Above this volume ratio the volume term is its plain quadratic.
-const PLAIN: f32 = 0.25;
+impl VolumeTerm {
+    /// Above this volume ratio the volume term is its plain quadratic.
+    pub const PLAIN: f32 = 0.25;
+
+    /// Its first and second derivatives [Pa].
+    #[inline(always)]
+    pub fn at(&self, ratio: f32) -> (f32, f32) {
+        if ratio > Self::PLAIN {
+            return (self.lambda * (ratio - self.alpha), self.lambda);
+        }
+        // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
+        let (_, slope, curvature) = self.energy.at(f64::from(ratio).max(1e-4));
+        (slope as f32, curvature as f32)
+    }
+}
 
 impl From<VolumeEnergy> for VolumeTerm {
     fn from(energy: VolumeEnergy) -> Self {
@@ -80,13 +95,7 @@ impl VertexElasticity for VolumeTerm {
     #[inline(always)]
     fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, .. }: &Seen, local: &mut Local) {
         let volume = body.corners[k].volume;
-        let (slope, curvature) = if ratio > PLAIN {
-            (self.lambda * (ratio - self.alpha), self.lambda)
-        } else {
-            // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
-            let (_, slope, curvature) = self.energy.at(f64::from(ratio).max(1e-4));
-            (slope as f32, curvature as f32)
-        };
+        let (slope, curvature) = self.at(ratio);
         local.force -= volume * slope * gradient;
         local.add_outer(volume * curvature, gradient);
     }

@@ -4,8 +4,8 @@ use crate::descent::DescentIntegrator;
 use crate::integrator::{Frame, Integrator};
 use crate::quasi_newton::QuasiNewtonIntegrator;
 use crate::report::Divergence;
-use crate::state::BodyState;
 use crate::schedule::{Descent, Start};
+use crate::state::BodyState;
 use crate::{Body, Error, Model, Result, Schedule, State, StepReport, ToolMotion};
 use rayon::prelude::*;
 
@@ -98,7 +98,9 @@ fn integrator(schedule: &Schedule, body: &Body, dt: f64) -> Box<dyn Integrator> 
         Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt) {
             Some(integrator) => Box::new(integrator),
             // Every node is pinned, or the matrix cannot be factorised: sweeps need no matrix.
-            None => sweeps(Descent { substeps: method.substeps, iterations: method.iterations, start: Start::Adaptive }),
+            None => {
+                sweeps(Descent { substeps: method.substeps, iterations: method.iterations, start: Start::Adaptive })
+            }
         },
         Schedule::Descent(descent) => sweeps(*descent),
     }

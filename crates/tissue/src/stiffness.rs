@@ -126,4 +126,3 @@ impl Stiffness {
         SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows)
     }
 }
-

@@ -8,6 +8,8 @@
 use crate::SupportPlane;
 use crate::body::Body;
 use crate::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
+use crate::lane_sweep::LaneSweep;
+use crate::simd::Isa;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -62,19 +64,24 @@ pub(crate) struct Substep<'a> {
     /// Pinned or held vertices.
     pub fixed: &'a [bool],
     pub planes: &'a [LocalPlane],
+    /// Instructions to use; all give the same bits.
+    pub isa: Isa,
 }
 
 impl Substep<'_> {
     /// Sweeps over all colours once; `moved` is scratch.
     pub fn sweep(&self, x: &mut [Vec3A], moved: &mut [Vec3A]) {
         match Kernel::of(self.body) {
+            Kernel::StableNeoHookean(term) if !self.body.groups.is_empty() => {
+                LaneSweep { substep: self, groups: &self.body.groups, term: &term }.sweep(x, moved);
+            }
             Kernel::StableNeoHookean(term) => self.sweep_with(&term, x, moved),
             Kernel::StVenantKirchhoff(term) => self.sweep_with(&term, x, moved),
             Kernel::Corotated(term) => self.sweep_with(&term, x, moved),
         }
     }
 
-    fn sweep_with<E: VertexElasticity>(&self, elasticity: &E, x: &mut [Vec3A], moved: &mut [Vec3A]) {
+    pub fn sweep_with<E: VertexElasticity>(&self, elasticity: &E, x: &mut [Vec3A], moved: &mut [Vec3A]) {
         for color in self.body.color_start.windows(2) {
             let (first, end) = (color[0] as usize, color[1] as usize);
             if end - first < 2 * CHUNK {
@@ -95,7 +102,7 @@ impl Substep<'_> {
 
     /// Where vertex `i` goes: its Newton step, cut by the inversion guard.
     #[inline(always)]
-    fn relax<E: VertexElasticity>(&self, elasticity: &E, i: usize, x: &[Vec3A]) -> Vec3A {
+    pub fn relax<E: VertexElasticity>(&self, elasticity: &E, i: usize, x: &[Vec3A]) -> Vec3A {
         let here = x[i];
         if self.fixed[i] {
             return here;
@@ -181,7 +188,7 @@ impl Substep<'_> {
     /// One-sided quadratic penalty of the support planes, and Coulomb friction against the motion since the substep's beginning,
     /// regularised to stick below a small speed.
     #[inline(always)]
-    fn add_supports(&self, i: usize, here: Vec3A, local: &mut Local) {
+    pub fn add_supports(&self, i: usize, here: Vec3A, local: &mut Local) {
         for plane in self.planes {
             let height = plane.height(here);
             if height >= 0.0 {
@@ -322,6 +329,7 @@ mod tests {
                 predictor: &to_f32(&predictor),
                 fixed: &[false; 6],
                 planes: &[plane],
+                isa: Isa::detect(),
             };
             let at: Vec<DVec3> = to_f32(&x).iter().map(|p| p.as_dvec3()).collect();
             for i in 0..6 {

@@ -1,12 +1,12 @@
 //! The Hessian's Cholesky factor. The symbolic factorisation (approximate minimum degree, faer) depends on the mesh and on which nodes are fixed only, and is kept.
 
+use crate::stiffness::Stiffness;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use crate::stiffness::Stiffness;
-use faer::sparse::SparseColMatRef;
 use faer::{Conj, MatMut, Par, Side};
 use glam::DVec3;
 

@@ -4,9 +4,9 @@
 //! "Robust quasistatic finite elements and flesh simulation", 2005), and where that is singular, the diagonal is shifted.
 
 use super::factor::Factor;
-use crate::stiffness::Stiffness;
 use super::potential::Potential;
 use super::{Failure, Solution, guard};
+use crate::stiffness::Stiffness;
 use glam::DVec3;
 
 /// Share of the linear decrease that a step must bring (Armijo).

@@ -1,9 +1,9 @@
 //! The function that is minimised: energy, gradient and Hessian over all nodes of a body.
 
 use super::element::{blocks, deformation, projected, tangent};
-use crate::stiffness::Stiffness;
 use super::state::Nodes;
 use crate::builder::shape_gradients;
+use crate::stiffness::Stiffness;
 use crate::sweep::STICK_SPEED;
 use crate::{Body, Hyperelastic, SupportPlane};
 use glam::{DMat3, DVec3};

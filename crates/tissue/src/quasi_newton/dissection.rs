@@ -47,8 +47,16 @@ impl Graph {
 /// Orders the nodes of `graph` at `positions`.
 pub(super) fn dissect(graph: &Graph, positions: &[DVec3]) -> Dissection {
     let n = graph.len();
-    let mut work =
-        Work { graph, positions, part: vec![0; n], parts: 0, side: vec![0; n], mate: vec![NONE; n], seen: vec![0; n], visits: 0 };
+    let mut work = Work {
+        graph,
+        positions,
+        part: vec![0; n],
+        parts: 0,
+        side: vec![0; n],
+        mate: vec![NONE; n],
+        seen: vec![0; n],
+        visits: 0,
+    };
     let mut order = Vec::with_capacity(n);
     let halves = work.cut((0..n as u32).collect(), &mut order);
     Dissection { order, halves }

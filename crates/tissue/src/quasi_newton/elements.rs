@@ -79,7 +79,11 @@ impl Elements {
             for c in 0..3 {
                 p[c] = scale(p[c], volume);
             }
-            let forces = [apply(&p, gradient(simd, batch, 0)), apply(&p, gradient(simd, batch, 1)), apply(&p, gradient(simd, batch, 2))];
+            let forces = [
+                apply(&p, gradient(simd, batch, 0)),
+                apply(&p, gradient(simd, batch, 1)),
+                apply(&p, gradient(simd, batch, 2)),
+            ];
             let sum = add(add(forces[0], forces[1]), forces[2]);
             let zero = splat(simd, 0.0);
             let rows = &mut self.corners[b * 4 * LANES..(b + 1) * 4 * LANES];

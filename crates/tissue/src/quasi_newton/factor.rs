@@ -3,20 +3,20 @@
 use super::dissection::{Graph, dissect};
 use super::tiles::Tiles;
 use crate::Body;
-use crate::oracle::element::{blocks, tangent};
 use crate::builder::shape_gradients;
+use crate::oracle::element::{blocks, tangent};
 use crate::stiffness::Stiffness;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::triangular_inverse::invert_lower_triangular;
+use faer::perm::PermRef;
+use faer::sparse::SparseColMatRef;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::SymbolicSupernodalParams;
 use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::linalg::SupernodalThreshold;
-use faer::sparse::SparseColMatRef;
-use faer::perm::PermRef;
 use faer::{Mat, Par, Side};
 use fearless_simd::Simd;
 use glam::DMat3;
@@ -202,27 +202,60 @@ mod tests {
 
     fn components(mesh: &TetMesh) -> Vec<TetMesh> {
         let mut label: Vec<usize> = (0..mesh.vertices.len()).collect();
-        fn find(l: &mut Vec<usize>, mut i: usize) -> usize { while l[i] != i { l[i] = l[l[i]]; i = l[i]; } i }
-        for t in &mesh.tets { for k in 1..4 { let (a, b) = (find(&mut label, t[0] as usize), find(&mut label, t[k] as usize)); label[a.max(b)] = a.min(b); } }
+        fn find(l: &mut Vec<usize>, mut i: usize) -> usize {
+            while l[i] != i {
+                l[i] = l[l[i]];
+                i = l[i];
+            }
+            i
+        }
+        for t in &mesh.tets {
+            for k in 1..4 {
+                let (a, b) = (find(&mut label, t[0] as usize), find(&mut label, t[k] as usize));
+                label[a.max(b)] = a.min(b);
+            }
+        }
         let mut roots: Vec<usize> = (0..label.len()).map(|i| find(&mut label, i)).collect();
         let all = roots.clone();
-        roots.sort_unstable(); roots.dedup();
-        roots.iter().map(|r| {
-            let nodes: Vec<usize> = (0..all.len()).filter(|i| all[*i] == *r).collect();
-            let mut number = vec![0u32; all.len()];
-            nodes.iter().enumerate().for_each(|(k, i)| number[*i] = k as u32);
-            TetMesh { vertices: nodes.iter().map(|i| mesh.vertices[*i]).collect(), tets: mesh.tets.iter().filter(|t| all[t[0] as usize] == *r).map(|t| t.map(|i| number[i as usize])).collect() }
-        }).collect()
+        roots.sort_unstable();
+        roots.dedup();
+        roots
+            .iter()
+            .map(|r| {
+                let nodes: Vec<usize> = (0..all.len()).filter(|i| all[*i] == *r).collect();
+                let mut number = vec![0u32; all.len()];
+                nodes.iter().enumerate().for_each(|(k, i)| number[*i] = k as u32);
+                TetMesh {
+                    vertices: nodes.iter().map(|i| mesh.vertices[*i]).collect(),
+                    tets: mesh
+                        .tets
+                        .iter()
+                        .filter(|t| all[t[0] as usize] == *r)
+                        .map(|t| t.map(|i| number[i as usize]))
+                        .collect(),
+                }
+            })
+            .collect()
     }
 
     #[test]
     #[ignore]
     fn dev_solve_speed() {
-        let mesh = trocar_geometry::io::read_msh(std::path::Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/peers/meshes/specimen_a.msh"))).unwrap();
+        let mesh = trocar_geometry::io::read_msh(std::path::Path::new(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/../../../shared/peers/meshes/specimen_a.msh"
+        )))
+        .unwrap();
         let mut builder = ModelBuilder::new();
         for m in components(&mesh) {
             let pinned = pins::lowest_band(&m.vertices, glam::DVec3::Z, 0.42);
-            let material = Material { model: ConstitutiveModel::StableNeoHookean, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 0.0 };
+            let material = Material {
+                model: ConstitutiveModel::StableNeoHookean,
+                young_modulus: 12e3,
+                poisson_ratio: 0.45,
+                density: 1200.0,
+                viscosity: 0.0,
+            };
             builder.body(BodyDescription { name: "x".into(), mesh: &m, material, pinned, supports: vec![] }).unwrap();
         }
         let model = builder.build().unwrap();
@@ -234,7 +267,8 @@ mod tests {
             let h = 1.0 / 120.0f64;
             let added: Vec<f32> = f.order.iter().map(|i| (body.mass(*i as usize) / h / h) as f32).collect();
             let held = vec![false; f.order.len()];
-            f.added.copy_from_slice(&added); assert!(f.factorise(&held));
+            f.added.copy_from_slice(&added);
+            assert!(f.factorise(&held));
             let t2 = std::time::Instant::now();
             let n = 3 * f.order.len();
             let mut v = vec![0.0f32; n + 16];
@@ -242,19 +276,43 @@ mod tests {
             // A x
             let pattern = f.rest.pattern();
             let mut b = vec![0.0f64; n];
-            for c in 0..n { for k in pattern.col_ptr()[c]..pattern.col_ptr()[c + 1] { let r = pattern.row_idx()[k]; let a = f.rest.values()[k] + if r == c { added[c / 3] as f64 } else { 0.0 }; b[r] += a * truth[c]; if r != c { b[c] += a * truth[r]; } } }
-            for k in 0..n { v[k] = b[k] as f32; }
+            for c in 0..n {
+                for k in pattern.col_ptr()[c]..pattern.col_ptr()[c + 1] {
+                    let r = pattern.row_idx()[k];
+                    let a = f.rest.values()[k] + if r == c { added[c / 3] as f64 } else { 0.0 };
+                    b[r] += a * truth[c];
+                    if r != c {
+                        b[c] += a * truth[r];
+                    }
+                }
+            }
+            for k in 0..n {
+                v[k] = b[k] as f32;
+            }
             let level = Level::new();
             dispatch!(level, simd => f.solve(simd, &mut v));
-            let (e, s): (f64, f64) = (0..n).fold((0.0, 0.0), |(e, s), k| (e + (v[k] as f64 - truth[k]).powi(2), s + truth[k].powi(2)));
+            let (e, s): (f64, f64) =
+                (0..n).fold((0.0, 0.0), |(e, s), k| (e + (v[k] as f64 - truth[k]).powi(2), s + truth[k].powi(2)));
             let mut best = f64::INFINITY;
             for _ in 0..200 {
                 let t = std::time::Instant::now();
                 dispatch!(level, simd => f.solve(simd, &mut v));
                 best = best.min(t.elapsed().as_secs_f64());
             }
-            total += best; bytes += f.bytes();
-            println!("free {} tets {} new {:.1} ms factor {:.1} ms solve {:.3} ms bytes {:.2} MB error {:.2e} supernodes {} nnz {:.2}M", f.order.len(), body.tets.len(), (t1 - t0).as_secs_f64() * 1e3, (t2 - t1).as_secs_f64() * 1e3, best * 1e3, f.bytes() as f64 / 1e6, (e / s).sqrt(), f.tiles.supernodes_len(), f.numbers.len() as f64 / 1e6);
+            total += best;
+            bytes += f.bytes();
+            println!(
+                "free {} tets {} new {:.1} ms factor {:.1} ms solve {:.3} ms bytes {:.2} MB error {:.2e} supernodes {} nnz {:.2}M",
+                f.order.len(),
+                body.tets.len(),
+                (t1 - t0).as_secs_f64() * 1e3,
+                (t2 - t1).as_secs_f64() * 1e3,
+                best * 1e3,
+                f.bytes() as f64 / 1e6,
+                (e / s).sqrt(),
+                f.tiles.supernodes_len(),
+                f.numbers.len() as f64 / 1e6
+            );
         }
         println!("total solve {:.3} ms, {:.2} MB", total * 1e3, bytes as f64 / 1e6);
     }

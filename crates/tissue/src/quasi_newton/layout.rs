@@ -54,8 +54,9 @@ impl Layout {
         let mut number = vec![0u32; body.len()];
         vertex.iter().enumerate().for_each(|(k, v)| number[*v as usize] = k as u32);
 
-        let mut tets: Vec<usize> =
-            (0..body.rest.tets.len()).filter(|t| body.rest.tets[*t].iter().any(|i| (place[*i as usize] as usize) < free)).collect();
+        let mut tets: Vec<usize> = (0..body.rest.tets.len())
+            .filter(|t| body.rest.tets[*t].iter().any(|i| (place[*i as usize] as usize) < free))
+            .collect();
         // Elements near each other in the order of elimination share nodes: their gathers hit the cache.
         tets.sort_by_key(|t| body.rest.tets[*t].iter().map(|i| place[*i as usize]).min());
         let batches: Vec<Batch> = tets.chunks(LANES).map(|chunk| batch(body, &place, chunk)).collect();
@@ -109,8 +110,7 @@ impl Layout {
 }
 
 fn batch(body: &Body, place: &[u32], tets: &[usize]) -> Batch {
-    let mut batch =
-        Batch { nodes: [[0; LANES]; 4], gradients: [[[0.0; LANES]; 3]; 3], volumes: [0.0; LANES] };
+    let mut batch = Batch { nodes: [[0; LANES]; 4], gradients: [[[0.0; LANES]; 3]; 3], volumes: [0.0; LANES] };
     for lane in 0..LANES {
         // The last batch is filled up with its first element, without volume.
         let t = tets.get(lane).copied().unwrap_or(tets[0]);

@@ -82,7 +82,10 @@ impl QuasiNewtonIntegrator {
             history: History::new(settings.memory, layout.rows),
             warp: Warp::new(&layout),
             planes: LocalPlane::of(body),
-            contact_stiffness: layout.vertex[..layout.free].iter().map(|v| body.vertices[*v as usize].contact_stiffness).collect(),
+            contact_stiffness: layout.vertex[..layout.free]
+                .iter()
+                .map(|v| body.vertices[*v as usize].contact_stiffness)
+                .collect(),
             fallback: DescentIntegrator::new(sweeps, body),
             x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
             start: rows(),
@@ -238,7 +241,10 @@ impl QuasiNewtonIntegrator {
     fn flies(&self) -> bool {
         self.layout.free == self.layout.nodes
             && !self.held.contains(&true)
-            && self.planes.iter().all(|plane| self.x[..self.layout.free].iter().all(|x| plane.height(position(x)) >= 0.0))
+            && self
+                .planes
+                .iter()
+                .all(|plane| self.x[..self.layout.free].iter().all(|x| plane.height(position(x)) >= 0.0))
     }
 
     /// Marks the nodes that tools carry; a factor in which others are held is made anew.

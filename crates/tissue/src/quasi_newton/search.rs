@@ -1,10 +1,10 @@
 //! Where a substep starts from and how far it goes along a direction: nowhere that squeezes an element too far, and downhill.
 
 use super::{QuasiNewtonIntegrator, position};
+use crate::Body;
 use crate::integrator::Frame;
 use crate::lanes::dot_rows;
 use crate::sweep::STICK_SPEED;
-use crate::Body;
 use fearless_simd::{Simd, SimdBase, f32x4};
 use glam::Vec3A;
 

@@ -65,7 +65,14 @@ impl Stress {
             Self::StVenantKirchhoff { mu, lambda } => {
                 let [xx, yy, zz, xy, yz, zx] = green_strain(simd, f);
                 let (two_mu, pressure) = (splat(simd, 2.0 * mu), (xx + yy + zz) * *lambda);
-                let s = [xx * two_mu + pressure, yy * two_mu + pressure, zz * two_mu + pressure, xy * two_mu, yz * two_mu, zx * two_mu];
+                let s = [
+                    xx * two_mu + pressure,
+                    yy * two_mu + pressure,
+                    zz * two_mu + pressure,
+                    xy * two_mu,
+                    yz * two_mu,
+                    zx * two_mu,
+                ];
                 times_symmetric(f, s)
             }
             Self::Corotated { mu, volume } => {

@@ -64,7 +64,9 @@ impl Tiles {
     }
 
     #[cfg(test)]
-    pub fn supernodes_len(&self) -> usize { self.supernodes.len() }
+    pub fn supernodes_len(&self) -> usize {
+        self.supernodes.len()
+    }
 
     /// Bytes of the factor.
     pub fn bytes(&self) -> usize {
