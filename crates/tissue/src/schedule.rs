@@ -1,6 +1,6 @@
 //! How a frame is integrated: which solver, and how the frame is cut.
 
-use crate::{Error, Result};
+use crate::{Error, Newton, Result, SemiImplicit, Xpbd, XpbdSweep};
 
 /// Where the sweeps of a substep start from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +28,12 @@ pub struct Descent {
 pub enum Schedule {
     /// Vertex Block Descent.
     Descent(Descent),
+    /// Semi-implicit Euler, to compare with.
+    SemiImplicit(SemiImplicit),
+    /// Extended position-based dynamics, to compare with.
+    Xpbd(Xpbd),
+    /// Implicit Euler exactly, in double precision: slow, to compare with.
+    Newton(Newton),
 }
 
 /// More substeps or iterations than anyone means.
@@ -41,12 +47,25 @@ impl Schedule {
     pub fn substeps(&self) -> usize {
         match self {
             Self::Descent(descent) => descent.substeps,
+            Self::SemiImplicit(settings) => settings.substeps,
+            Self::Xpbd(settings) => settings.substeps,
+            Self::Newton(settings) => settings.substeps,
         }
     }
 
     /// Refuses what is no schedule.
     pub(crate) fn check(&self) -> Result<()> {
-        let Self::Descent(Descent { substeps, iterations, .. }) = *self;
+        let iterations = match self {
+            Self::Descent(descent) => descent.iterations,
+            Self::Xpbd(settings) => settings.iterations,
+            Self::SemiImplicit(_) | Self::Newton(_) => 1,
+        };
+        if let Self::Xpbd(Xpbd { sweep: XpbdSweep::Jacobi { relaxation }, .. }) = self
+            && !(*relaxation > 0.0 && *relaxation <= 1.0)
+        {
+            return Err(Error::Model(format!("a relaxation of {relaxation}; above 0 and at most 1 make sense")));
+        }
+        let substeps = self.substeps();
         for (name, count) in [("substeps", substeps), ("iterations", iterations)] {
             if !(1..=MOST).contains(&count) {
                 return Err(Error::Model(format!("a schedule of {count} {name}; 1 to {MOST} make sense")));

@@ -1,7 +1,9 @@
 //! One frame of simulation: every body by its solver, bodies in parallel.
 
+use crate::comparator::ComparatorIntegrator;
 use crate::descent::DescentIntegrator;
 use crate::integrator::{Frame, Integrator};
+use crate::oracle::NewtonIntegrator;
 use crate::report::Divergence;
 use crate::state::BodyState;
 use crate::{Body, Error, Model, Result, Schedule, State, StepReport, ToolMotion};
@@ -93,5 +95,8 @@ impl Worker {
 fn integrator(schedule: &Schedule, body: &Body) -> Box<dyn Integrator> {
     match schedule {
         Schedule::Descent(descent) => Box::new(DescentIntegrator::new(*descent, body)),
+        Schedule::SemiImplicit(settings) => Box::new(ComparatorIntegrator::semi_implicit(*settings, body)),
+        Schedule::Xpbd(settings) => Box::new(ComparatorIntegrator::xpbd(*settings, body)),
+        Schedule::Newton(settings) => Box::new(NewtonIntegrator::new(*settings, body)),
     }
 }

@@ -1,11 +1,9 @@
 //! What the comparators know of a body, in double precision and internal order, and what moves.
 
 use crate::builder::shape_gradients;
+use crate::report::SPEED_LIMIT;
 use crate::{Body, SupportPlane};
 use glam::{DMat3, DVec3};
-
-/// A node at this speed [m/s] has diverged (the paper's particle velocity limit).
-pub(crate) const SPEED_LIMIT: f64 = 20.0;
 
 /// A body's constants, vertices in internal order, positions relative to the body's origin.
 pub(crate) struct Mechanics {

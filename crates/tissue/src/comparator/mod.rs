@@ -4,12 +4,14 @@
 //! within a frame: their steps are so short that `f32` would round slow motion away. A body of which a node reaches the speed limit is left as it is
 //! at that instant, for the stepper to report; nothing is clamped.
 
-pub(crate) mod mechanics;
-pub(crate) mod semi_implicit;
+mod integrator;
+mod mechanics;
+mod semi_implicit;
 mod stable_step;
-pub(crate) mod xpbd;
+mod xpbd;
 mod xpbd_constraints;
 
+pub(crate) use integrator::ComparatorIntegrator;
 pub use semi_implicit::SemiImplicit;
 pub use stable_step::stable_explicit_step;
 pub use xpbd::{Xpbd, XpbdConstraints, XpbdSweep};

@@ -23,12 +23,15 @@ mod element;
 mod factor;
 mod friction;
 mod guard;
+mod integrator;
 mod newton;
 mod potential;
 mod state;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use integrator::NewtonIntegrator;
+pub use integrator::Newton;
 pub use state::{Held, OracleState};
 
 use crate::{Error, Model, Result};
