@@ -76,7 +76,12 @@ fn momenta_are_kept() {
             let after = momenta(&state);
             // One vertex' mass at a tenth of a metre a second is 5e-6 kg m/s; the state is rounded to f32 between frames.
             assert!((after.0 - before.0).length() < 1e-5 * before.0.length(), "{schedule:?}: {before:?} {after:?}");
-            assert!((after.1 - before.1).length() < 1e-2 * before.1.length(), "{schedule:?}: {before:?} {after:?}");
+            // XPBD's pushes have no moment about where the vertices were, but a small one about where they end.
+            let tolerance = if matches!(schedule, Schedule::Xpbd(_)) { 0.05 } else { 1e-4 };
+            assert!(
+                (after.1 - before.1).length() < tolerance * before.1.length(),
+                "{schedule:?}: {before:?} {after:?}"
+            );
         }
     }
 }
@@ -99,7 +104,12 @@ fn a_column_sags_under_its_weight() {
         let report = run(&model, schedule, &mut state, 90);
         assert!(report.max_speed < 1e-3, "{schedule:?}: {} m/s", report.max_speed);
         let sag = length - state.centroid(&model, 0, &top).z;
-        assert!((sag / expected - 1.0).abs() < tolerance, "{schedule:?}: {:.5} mm for {:.5}", sag * 1e3, expected * 1e3);
+        assert!(
+            (sag / expected - 1.0).abs() < tolerance,
+            "{schedule:?}: {:.5} mm for {:.5}",
+            sag * 1e3,
+            expected * 1e3
+        );
     }
 }
 
@@ -114,7 +124,7 @@ fn strain_traces_do_not_hold_a_column() {
         run(&model, Schedule::Xpbd(Xpbd { substeps: 400, constraints, ..Xpbd::default() }), &mut state, 60);
         12e-3 - state.centroid(&model, 0, &top).z
     };
-    let (material, traces) = (sag(XpbdConstraints::Material), sag(XpbdConstraints::StrainTrace));
+    let (material, traces) = (sag(XpbdConstraints::NeoHookean), sag(XpbdConstraints::StrainTrace));
     assert!(traces > 5.0 * material, "{:.4} mm and {:.4} mm", traces * 1e3, material * 1e3);
 }
 
@@ -158,21 +168,21 @@ fn the_stable_step_is_where_it_is_said_to_be() {
     assert_eq!(report.divergence, Some(Divergence::OverSpeed { body: 0 }), "limit {step:.3e} s");
 }
 
-/// Many iterations of XPBD in few substeps come to implicit Euler's step.
+/// Many iterations of XPBD a substep come to implicit Euler's.
 #[test]
 fn converged_xpbd_is_implicit_euler() {
     let mesh = block([2, 2, 3], 2e-3);
     let foot = nodes(&mesh, |p| p.z == 0.0);
-    let model = model(&mesh, Material { viscosity: 60.0, ..tissue(12e3) }, foot, GRAVITY);
+    let model = model(&mesh, tissue(12e3), foot, GRAVITY);
     let (mut state, mut newton) = (State::new(&model), State::new(&model));
     let mut truth = OracleState::new(&model);
     let mut oracle = Oracle::new(&model);
-    for _ in 0..12 {
-        oracle.step(&model, &mut truth, FRAME / 4.0, &[]).unwrap();
+    for _ in 0..96 {
+        oracle.step(&model, &mut truth, FRAME / 32.0, &[]).unwrap();
     }
-    let xpbd = Xpbd { substeps: 4, iterations: 3000, ..Xpbd::default() };
+    let xpbd = Xpbd { substeps: 32, iterations: 100, constraints: XpbdConstraints::Strains, ..Xpbd::default() };
     run(&model, Schedule::Xpbd(xpbd), &mut state, 3);
-    run(&model, Schedule::Newton(Newton { substeps: 4 }), &mut newton, 3);
+    run(&model, Schedule::Newton(Newton { substeps: 32 }), &mut newton, 3);
     let largest = |of: &dyn Fn(usize) -> f64| (0..mesh.vertices.len()).map(of).fold(0.0, f64::max);
     let moved = largest(&|i| (truth.positions(0)[i] - mesh.vertices[i]).length());
     let off = largest(&|i| (state.position(&model, 0, i) - truth.positions(0)[i]).length());

@@ -72,6 +72,20 @@ impl Mechanics {
         }
         f
     }
+
+    /// Lets the dashpots act on velocities for a time of `h` [s], pair by pair, each as implicit Euler has it for the pair alone: they take energy at any `h` and keep both
+    /// momenta. Fixed vertices keep their velocities.
+    pub fn damp(&self, h: f64, x: &[DVec3], v: &mut [DVec3], fixed: &[bool]) {
+        for ([i, j], coefficient) in &self.dashpots {
+            let (i, j) = (*i as usize, *j as usize);
+            let inverse = |i: usize| if fixed[i] { 0.0 } else { 1.0 / self.masses[i] };
+            let (wi, wj) = (inverse(i), inverse(j));
+            let n = (x[j] - x[i]).normalize_or_zero();
+            let impulse = h * coefficient * n.dot(v[j] - v[i]) / (1.0 + h * coefficient * (wi + wj));
+            v[i] += wi * impulse * n;
+            v[j] -= wj * impulse * n;
+        }
+    }
 }
 
 impl Span<'_> {

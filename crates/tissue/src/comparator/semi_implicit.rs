@@ -6,7 +6,7 @@
 //! ([`super::stable_explicit_step`]): beyond it the method grows without limit, and that is the method, not a setting of it.
 
 use super::mechanics::{Mechanics, Particles, Span, too_fast};
-use crate::{ConstitutiveModel, Hyperelastic, Material, Model, StableNeoHookean, StVenantKirchhoff, Corotated};
+use crate::{ConstitutiveModel, Corotated, Hyperelastic, Material, Model, StVenantKirchhoff, StableNeoHookean};
 use glam::{DMat3, DVec3};
 
 /// Semi-implicit Euler in so many steps a frame.
@@ -98,6 +98,7 @@ struct Form<'a> {
 impl Form<'_> {
     fn advance<S: Stress>(&self, law: &S, particles: &mut Particles, force: &mut [DVec3]) -> bool {
         let Span { dt, fixed, targets, .. } = self.span;
+        let m = self.mechanics;
         let h = dt / self.substeps as f64;
         let Particles { x, v } = particles;
         for (i, v) in v.iter_mut().enumerate().filter(|(i, _)| fixed[*i]) {
@@ -107,19 +108,13 @@ impl Form<'_> {
         for step in 1..=self.substeps {
             self.elastic_forces(law, x, force);
             self.accelerate(h, x, v, force);
-            self.damp(h, x, v);
+            m.damp(h, x, v, fixed);
             if too_fast(v, fixed) {
                 bounded = false;
                 break;
             }
             for (i, x) in x.iter_mut().enumerate() {
-                if !fixed[i] {
-                    *x += h * v[i];
-                } else if step == self.substeps {
-                    *x = targets[i];
-                } else {
-                    *x += h * v[i];
-                }
+                *x = if fixed[i] && step == self.substeps { targets[i] } else { *x + h * v[i] };
             }
         }
         v.iter_mut().zip(fixed).filter(|(_, fixed)| **fixed).for_each(|(v, _)| *v = DVec3::ZERO);
@@ -159,23 +154,6 @@ impl Form<'_> {
                     }
                 }
             }
-        }
-    }
-
-    /// The dashpots, pair by pair.
-    fn damp(&self, h: f64, x: &[DVec3], v: &mut [DVec3]) {
-        let (m, fixed) = (self.mechanics, self.span.fixed);
-        for ([i, j], coefficient) in &m.dashpots {
-            let (i, j) = (*i as usize, *j as usize);
-            let inverse = |i: usize| if fixed[i] { 0.0 } else { 1.0 / m.masses[i] };
-            let (wi, wj) = (inverse(i), inverse(j));
-            if wi + wj == 0.0 {
-                continue;
-            }
-            let n = (x[j] - x[i]).normalize_or_zero();
-            let impulse = h * coefficient * n.dot(v[j] - v[i]) / (1.0 + h * coefficient * (wi + wj));
-            v[i] += wi * impulse * n;
-            v[j] -= wj * impulse * n;
         }
     }
 }

@@ -21,7 +21,8 @@ fn greatest_frequency(body: &Body) -> f64 {
     // A start without symmetry, the same every time; u is M^(1/2) x, so that the matrix is symmetric.
     let mut u: Vec<DVec3> = (0..body.len())
         .map(|i| {
-            let noise = |k: u64| ((i as u64 * 3 + k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / (1 << 24) as f64 - 0.5;
+            let noise =
+                |k: u64| ((i as u64 * 3 + k).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40) as f64 / (1 << 24) as f64 - 0.5;
             if fixed(i) { DVec3::ZERO } else { DVec3::new(noise(0), noise(1), noise(2)) }
         })
         .collect();

@@ -2,11 +2,12 @@
 //!
 //! Macklin, Mueller and Chentanez, "XPBD", 2016; small steps of one iteration each, Macklin and others, "Small steps in physics simulation", 2019; stable neo-Hookean
 //! tissue as two constraints an element, Macklin and Mueller, "A constraint-based formulation of stable neo-Hookean materials", 2021, solved together (Ton-That,
-//! Kry and Andrews, "Parallel block neo-Hookean XPBD using graph clustering", 2023). Dashpots and support planes are constraints too: a dashpot is one of no stiffness that
-//! resists the substep's motion with a compliance of h/c. Fully converged, a substep is implicit Euler's.
+//! Kry and Andrews, "Parallel block neo-Hookean XPBD using graph clustering", 2023). Support planes
+//! are constraints too. Dashpots act on the velocities after each substep, each pair by itself: as constraints among the others they are a hundred times stiffer than the
+//! elements and undo their corrections, and the same meshes diverge.
 
 use super::mechanics::{Mechanics, Particles, Span, too_fast};
-use super::xpbd_constraints::{Dashpots, Elements, Planes};
+use super::xpbd_constraints::{Elements, Multipliers, Planes};
 use crate::Material;
 use glam::DVec3;
 
@@ -39,9 +40,14 @@ pub enum XpbdSweep {
 /// What an element resists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum XpbdConstraints {
-    /// The body's own material. Stable neo-Hookean: |F| with compliance 1/(mu V) and J - alpha with 1/(lambda V), their energies summing to the
-    /// material's (without the barrier below a fifth of the rest volume). Others: the root of twice the energy, with compliance 1.
-    Material,
+    /// The six Green strains together, with the compliance matrix of linear elasticity (XPBD's for finite elements), and with the material's own stress: a body
+    /// at rest has no multipliers, and every strain is resisted implicitly.
+    Strains,
+    /// |F| with compliance 1/(mu V) and J - alpha with 1/(lambda V), solved together (Macklin and Mueller 2021; Ton-That, Kry and Andrews 2023). Their energies sum to
+    /// stable neo-Hookean's (without its barrier below a fifth of the rest volume). At rest both multipliers are large and hold each other; shear stiffness
+    /// lies in the change of their gradients, which XPBD leaves out of its linearisation, so it is explicit: without dashpots the step is bounded by it. Bodies of other
+    /// materials are given [`Self::Strains`].
+    NeoHookean,
     /// tr(F'F) - 3 and J - 1 with compliances 1/(mu V) and 1/(lambda V), as Newton 1.8 has it (`solve_tetrahedra`). To first order both constraints are volume changes:
     /// small shear costs nothing.
     StrainTrace,
@@ -58,9 +64,9 @@ impl Xpbd {
 }
 
 impl Default for Xpbd {
-    /// The best form: 80 substeps of one Gauss-Seidel iteration (as many iterations a frame as the paper's 8 x 10), the material's own constraints.
+    /// The best form: 80 substeps of one Gauss-Seidel iteration (as many iterations a frame as the paper's 8 x 10), Macklin and Mueller's constraints.
     fn default() -> Self {
-        Self { substeps: 80, iterations: 1, sweep: XpbdSweep::GaussSeidel, constraints: XpbdConstraints::Material }
+        Self { substeps: 80, iterations: 1, sweep: XpbdSweep::GaussSeidel, constraints: XpbdConstraints::NeoHookean }
     }
 }
 
@@ -72,8 +78,7 @@ pub(crate) struct Scratch {
     inverse_mass: Vec<f64>,
     /// Corrections of a Jacobi iteration.
     correction: Vec<DVec3>,
-    elements: Vec<[f64; 2]>,
-    dashpots: Vec<f64>,
+    elements: Vec<Multipliers>,
     planes: Vec<f64>,
 }
 
@@ -84,8 +89,7 @@ impl Scratch {
             start: vec![DVec3::ZERO; nodes],
             inverse_mass: vec![0.0; nodes],
             correction: vec![DVec3::ZERO; nodes],
-            elements: vec![[0.0; 2]; mechanics.tets.len()],
-            dashpots: vec![0.0; mechanics.dashpots.len()],
+            elements: vec![[0.0; 6]; mechanics.tets.len()],
             planes: vec![0.0; mechanics.planes.len() * nodes],
         }
     }
@@ -102,7 +106,6 @@ pub(crate) fn advance(
 ) -> bool {
     let h = span.dt / settings.substeps as f64;
     let elements = Elements::new(mechanics, material, settings.constraints, h);
-    let dashpots = Dashpots { mechanics, h };
     let planes = Planes { mechanics, h };
     let Particles { x, v } = particles;
     let Scratch { start, inverse_mass, correction, .. } = scratch;
@@ -116,20 +119,15 @@ pub(crate) fn advance(
         for (i, x) in x.iter_mut().enumerate() {
             *x = if span.fixed[i] { span.prescribed(i, *x, share) } else { *x + h * v[i] + h * h * span.gravity };
         }
-        scratch.elements.fill([0.0; 2]);
-        scratch.dashpots.fill(0.0);
+        scratch.elements.fill([0.0; 6]);
         scratch.planes.fill(0.0);
         for _ in 0..settings.iterations {
             match settings.sweep {
-                XpbdSweep::GaussSeidel => {
-                    elements.sweep(x, inverse_mass, &mut scratch.elements);
-                    dashpots.sweep(x, start, inverse_mass, &mut scratch.dashpots);
-                }
+                XpbdSweep::GaussSeidel => elements.sweep(x, inverse_mass, &mut scratch.elements),
                 XpbdSweep::Jacobi { relaxation } => {
                     correction.fill(DVec3::ZERO);
                     elements.gather(relaxation, x, inverse_mass, &mut scratch.elements, correction);
                     x.iter_mut().zip(correction.iter()).for_each(|(x, d)| *x += *d);
-                    dashpots.sweep(x, start, inverse_mass, &mut scratch.dashpots);
                 }
             }
             planes.sweep(x, start, inverse_mass, &mut scratch.planes);
@@ -137,6 +135,7 @@ pub(crate) fn advance(
         for (i, v) in v.iter_mut().enumerate() {
             *v = if span.fixed[i] { DVec3::ZERO } else { (x[i] - start[i]) / h };
         }
+        mechanics.damp(h, x, v, span.fixed);
         if too_fast(v, span.fixed) {
             return false;
         }

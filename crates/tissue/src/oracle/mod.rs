@@ -30,8 +30,8 @@ mod state;
 #[cfg(test)]
 mod tests;
 
-pub(crate) use integrator::NewtonIntegrator;
 pub use integrator::Newton;
+pub(crate) use integrator::NewtonIntegrator;
 pub use state::{Held, OracleState};
 
 use crate::{Error, Model, Result};
