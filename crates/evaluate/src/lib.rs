@@ -7,6 +7,7 @@ mod experiment;
 mod inspect;
 mod paper;
 pub mod report;
+pub mod scenes;
 mod segment;
 mod truth;
 mod workflow;
