@@ -12,7 +12,9 @@ mod segment;
 mod truth;
 mod workflow;
 
-pub use bench::{MeshingBench, MeshingResult, MeshingRow};
+pub use bench::{
+    Machine, MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, Timing,
+};
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};

@@ -1,5 +1,9 @@
 //! What a user may type.
 
+mod solver;
+
+pub use solver::*;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -229,6 +233,8 @@ pub struct Bench {
 pub enum BenchName {
     /// The lattice mesher from ten thousand to a million elements, and beside TetGen and fTetWild.
     Meshing(MeshingBench),
+    /// Speed and error of the stepping of six organs by one schedule.
+    Organs(OrgansBench),
 }
 
 /// Arguments of `bench meshing`.

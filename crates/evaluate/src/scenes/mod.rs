@@ -13,6 +13,7 @@ mod solvers;
 pub use error_norms::{mean_error, rms_error};
 pub use organs::{Organ, Organs};
 pub use run::{OracleRun, Run};
+pub(crate) use run::rest_positions;
 pub use scene::{Motion, Patch, SCENES, Scene, material};
 pub(crate) use shapes::ellipsoid;
 pub use solvers::{SOLVERS, one_substep, solver_named};

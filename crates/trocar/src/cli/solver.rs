@@ -1,0 +1,67 @@
+//! Arguments of the commands that measure the stepping of tissue.
+
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+use trocar_evaluate::OrganSource;
+
+/// Which organs.
+#[derive(Debug, Args)]
+pub struct OrganChoice {
+    /// Gmsh file (.msh, in metres, z up) with the organs, one a physical group or connected part; our own organs by default.
+    #[arg(long, value_name = "FILE", conflicts_with = "tets")]
+    pub mesh: Option<PathBuf>,
+    /// Elements of our own organs together, about.
+    #[arg(long, default_value_t = 44_000)]
+    pub tets: usize,
+}
+
+impl From<&OrganChoice> for OrganSource {
+    fn from(choice: &OrganChoice) -> Self {
+        choice.mesh.clone().map_or(Self::Analytic(choice.tets), Self::File)
+    }
+}
+
+/// Solvers by name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum SolverName {
+    /// Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor: the paper's.
+    Paper,
+    /// The default.
+    Fast,
+}
+
+impl SolverName {
+    /// The name by which the work knows it.
+    pub fn name(self) -> String {
+        match self {
+            Self::Paper => "paper",
+            Self::Fast => "fast",
+        }
+        .to_owned()
+    }
+}
+
+/// Arguments of `bench organs`.
+#[derive(Debug, Args)]
+pub struct OrgansBench {
+    #[command(flatten)]
+    pub organs: OrganChoice,
+    /// What steps them.
+    #[arg(long, value_enum, default_value_t = SolverName::Fast)]
+    pub schedule: SolverName,
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Young's modulus [kPa].
+    #[arg(long, default_value_t = 12.0)]
+    pub young: f64,
+    /// Poisson's ratio.
+    #[arg(long, default_value_t = 0.45)]
+    pub poisson: f64,
+    /// Timed frames, after a quarter as many that are not.
+    #[arg(long, default_value_t = 120)]
+    pub frames: usize,
+    /// Simulated seconds for which the organs settle before their sag is measured.
+    #[arg(long, default_value_t = 3.0)]
+    pub settle: f64,
+}
