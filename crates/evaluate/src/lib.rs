@@ -17,7 +17,10 @@ pub use bench::{
 };
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
-pub use experiment::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
+pub use experiment::{
+    ConvergenceCase, ConvergenceExperiment, ConvergenceResult, PhantomFigures, ReconstructionExperiment, ReconstructionResult,
+    ReconstructionRow, StepRow,
+};
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};
 pub use truth::TruthFigures;

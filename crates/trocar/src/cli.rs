@@ -192,6 +192,8 @@ pub struct Experiment {
 pub enum ExperimentName {
     /// Table I and Fig. 6(a): every phantom recorded, reconstructed and measured against its truth.
     Reconstruction(ReconstructionExperiment),
+    /// How near each iteration comes to the exact step: scenes, moduli and Poisson ratios, over iterations and over time.
+    Convergence(ConvergenceExperiment),
 }
 
 /// Arguments of `experiment reconstruction`.

@@ -10,3 +10,4 @@ pub use machine::Machine;
 pub use meshing::{MeshingBench, MeshingResult, MeshingRow};
 pub use organs::{OrganSource, OrgansBench, OrgansResult};
 pub use timing::Timing;
+pub(crate) use timing::median;

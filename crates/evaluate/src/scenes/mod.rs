@@ -13,10 +13,10 @@ mod solvers;
 pub use error_norms::{mean_error, rms_error};
 pub use organs::{Organ, Organs};
 pub use run::{OracleRun, Run};
-pub(crate) use run::rest_positions;
+pub(crate) use run::{grasps, rest_positions, tools};
 pub use scene::{Motion, Patch, SCENES, Scene, material};
 pub(crate) use shapes::ellipsoid;
-pub use solvers::{SOLVERS, one_substep, solver_named};
+pub use solvers::{SOLVERS, iterations_of, one_substep, solver_named};
 
 /// Length of a frame [s].
 pub const FRAME: f64 = 1.0 / 60.0;

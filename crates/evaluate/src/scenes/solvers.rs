@@ -24,3 +24,10 @@ pub fn one_substep(schedule: Schedule, iterations: usize) -> Schedule {
         Schedule::Descent(descent) => Schedule::Descent(Descent { substeps: 1, iterations, ..descent }),
     }
 }
+
+/// Iterations of each substep of `schedule`.
+pub fn iterations_of(schedule: Schedule) -> usize {
+    match schedule {
+        Schedule::Descent(descent) => descent.iterations,
+    }
+}

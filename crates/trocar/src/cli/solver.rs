@@ -65,3 +65,29 @@ pub struct OrgansBench {
     #[arg(long, default_value_t = 3.0)]
     pub settle: f64,
 }
+
+/// Arguments of `experiment convergence`.
+#[derive(Debug, Args)]
+pub struct ConvergenceExperiment {
+    /// Folder for the report; finished cases in it are kept and used again.
+    #[arg(short, long, default_value = "trocar-experiment/convergence")]
+    pub output: PathBuf,
+    /// Gmsh file (.msh, in metres, z up) with organs, of which the appendix is used; our own appendix by default.
+    #[arg(long, value_name = "FILE", conflicts_with = "tets")]
+    pub mesh: Option<PathBuf>,
+    /// Elements of our own appendix, about.
+    #[arg(long, default_value_t = 2_500)]
+    pub tets: usize,
+    /// Scenes (sag, drag, shake, tube, fall); all by default.
+    #[arg(long = "scene")]
+    pub scenes: Vec<String>,
+    /// Young's moduli [kPa].
+    #[arg(long, value_delimiter = ',', default_values_t = [3.0, 12.0, 48.0])]
+    pub young: Vec<f64>,
+    /// Poisson's ratios.
+    #[arg(long, value_delimiter = ',', default_values_t = [0.3, 0.45, 0.49])]
+    pub poisson: Vec<f64>,
+    /// Most iterations; they double from 1.
+    #[arg(long, default_value_t = 512)]
+    pub iterations: usize,
+}
