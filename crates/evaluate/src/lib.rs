@@ -13,7 +13,8 @@ mod truth;
 mod workflow;
 
 pub use bench::{
-    Machine, MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, Timing,
+    Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, ScalingBench, ScalingResult,
+    ScalingRow, Timing,
 };
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};

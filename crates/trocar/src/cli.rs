@@ -237,6 +237,8 @@ pub enum BenchName {
     Meshing(MeshingBench),
     /// Speed and error of the stepping of six organs by one schedule.
     Organs(OrgansBench),
+    /// Speed of the stepping from a thousand to a million elements, over threads, and of many small models at once.
+    Scaling(ScalingBench),
 }
 
 /// Arguments of `bench meshing`.

@@ -13,12 +13,13 @@ mod page;
 mod plots;
 mod reconstruction_experiment;
 mod run;
+mod scaling;
 mod seen;
 mod table;
 mod truth;
 mod views;
 
-use crate::bench::MeshingResult;
+use crate::bench::{MeshingResult, ScalingResult};
 use crate::experiment::{ConvergenceResult, ReconstructionResult};
 use crate::{Error, Result};
 use moving_picture::Lift;
@@ -76,6 +77,14 @@ pub(crate) fn reconstruction_experiment(result: &ReconstructionResult, made: &[R
 /// A plot that cannot be drawn.
 pub(crate) fn meshing(result: &MeshingResult) -> Result<String> {
     Ok(page::page("Meshing", "From closed surfaces to tetrahedra", &meshing::body(result)?))
+}
+
+/// The page of the scaling benchmark.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn scaling(result: &ScalingResult) -> Result<String> {
+    Ok(page::page("Scaling", "Stepping over elements, threads and models", &scaling::body(result)?))
 }
 
 /// The page of the convergence experiment.

@@ -66,6 +66,29 @@ pub struct OrgansBench {
     pub settle: f64,
 }
 
+/// Arguments of `bench scaling`.
+#[derive(Debug, Args)]
+pub struct ScalingBench {
+    /// Numbers of elements to aim at, ascending.
+    #[arg(long, value_delimiter = ',', default_values_t = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000])]
+    pub sizes: Vec<usize>,
+    /// Numbers of worker threads.
+    #[arg(long, value_delimiter = ',', default_values_t = [1, 2])]
+    pub threads: Vec<usize>,
+    /// Seconds that one measurement may take; what is expected to take longer is left out.
+    #[arg(long, default_value_t = 20.0)]
+    pub budget: f64,
+    /// Small models stepped at once; 0 for none.
+    #[arg(long, default_value_t = 64)]
+    pub many: usize,
+    /// Elements of each of them, about.
+    #[arg(long, default_value_t = 700)]
+    pub small: usize,
+    /// Folder for the report.
+    #[arg(short, long, default_value = "trocar-bench/scaling")]
+    pub output: PathBuf,
+}
+
 /// Arguments of `experiment convergence`.
 #[derive(Debug, Args)]
 pub struct ConvergenceExperiment {

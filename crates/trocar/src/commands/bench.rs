@@ -1,6 +1,7 @@
 //! `trocar bench`.
 
 mod organs;
+mod scaling;
 
 use crate::cli::{Bench, BenchName, MeshingBench};
 use crate::output;
@@ -11,6 +12,7 @@ pub fn run(arguments: &Bench, json: bool, progress: &dyn Progress) -> Result<()>
     match &arguments.name {
         BenchName::Meshing(arguments) => meshing(arguments, json, progress),
         BenchName::Organs(arguments) => organs::run(arguments, json, progress),
+        BenchName::Scaling(arguments) => scaling::run(arguments, json, progress),
     }
 }
 
