@@ -1,5 +1,6 @@
 //! Table I and Fig. 6(a): every phantom recorded, reconstructed with one set of settings, and measured against its truth.
 
+use super::{claim, write};
 use crate::paper::table_i;
 use crate::truth::DEPTH_UNIT;
 use crate::workflow::{CompositeFigures, REPORT, reconstruct_recording};
@@ -106,7 +107,7 @@ impl ReconstructionExperiment {
     /// When the folder cannot be written, or an interruption; what is finished by then is used again the next time.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<ReconstructionResult> {
         let clock = Instant::now();
-        claim(output)?;
+        claim(output, MARKER)?;
         let mut result = ReconstructionResult {
             organs: Vec::new(),
             phantoms: Vec::new(),
@@ -151,22 +152,6 @@ impl ReconstructionExperiment {
         }
         Ok(trocar_phantom::record(phantom, &self.record, dir, progress)?)
     }
-}
-
-/// Makes the folder, which must be new, empty, or an earlier one of this experiment.
-fn claim(output: &Path) -> Result<()> {
-    let io = |source| Error::Io { path: output.to_owned(), source };
-    let marker = output.join(MARKER);
-    if output.exists() && !marker.is_file() && output.read_dir().map_err(io)?.next().is_some() {
-        let reason =
-            format!("holds no {MARKER}, so it is no earlier experiment and is not written to; name a new folder");
-        return Err(Error::Exists { path: output.to_owned(), reason });
-    }
-    std::fs::create_dir_all(output).map_err(io)?;
-    if !marker.is_file() {
-        write(&marker, b"{}\n")?;
-    }
-    Ok(())
 }
 
 fn rows(
@@ -217,8 +202,4 @@ fn rows(
         })
     };
     made.specimen.organs.iter().enumerate().map(row).collect()
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.to_owned(), source })
 }

@@ -1,5 +1,7 @@
 //! `trocar experiment`.
 
+mod convergence;
+
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
 use trocar_evaluate::{ReconstructionResult, Result};
@@ -9,6 +11,7 @@ use trocar_reconstruct::Settings;
 
 pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Result<()> {
     match &arguments.name {
+        ExperimentName::Convergence(arguments) => convergence::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }
 }
