@@ -19,8 +19,8 @@ pub use bench::{
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{
-    ConvergenceCase, ConvergenceExperiment, ConvergenceResult, PhantomFigures, ReconstructionExperiment, ReconstructionResult,
-    ReconstructionRow, StepRow,
+    ConvergenceCase, ConvergenceExperiment, ConvergenceResult, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PhantomFigures, ReconstructionExperiment, ReconstructionResult,
+    ReconstructionRow, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};

@@ -1,7 +1,9 @@
 //! What a user may type.
 
+mod comparison;
 mod solver;
 
+pub use comparison::*;
 pub use solver::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -194,6 +196,10 @@ pub enum ExperimentName {
     Reconstruction(ReconstructionExperiment),
     /// How near each iteration comes to the exact step: scenes, moduli and Poisson ratios, over iterations and over time.
     Convergence(ConvergenceExperiment),
+    /// Fig. 6(b): which integrators stay bounded when specimen A is released, and how far each sags from the truth.
+    Integrators(IntegratorsExperiment),
+    /// Fig. 6(c): how fast phantoms A, B and C come to rest in the cell.
+    Settling(SettlingExperiment),
 }
 
 /// Arguments of `experiment reconstruction`.

@@ -1,11 +1,19 @@
 //! The paper's tables and figures, made anew: one file an experiment.
 
 mod convergence;
+mod integrator_forms;
+mod integrators;
+mod phantoms;
 mod reconstruction;
+mod settling;
 mod step_ladder;
 
 pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult};
+pub(crate) use integrators::SPEED_LIMIT;
+pub use integrators::{IntegratorRow, IntegratorsExperiment, IntegratorsResult};
 pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
+pub(crate) use settling::SETTLED;
+pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
 pub use step_ladder::StepRow;
 
 use crate::{Error, Result};

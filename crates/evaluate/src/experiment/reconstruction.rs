@@ -1,5 +1,6 @@
 //! Table I and Fig. 6(a): every phantom recorded, reconstructed with one set of settings, and measured against its truth.
 
+use super::phantoms::recorded;
 use super::{claim, write};
 use crate::paper::table_i;
 use crate::truth::DEPTH_UNIT;
@@ -13,7 +14,7 @@ use trocar_geometry::io::{Unit, read_surface};
 use trocar_phantom::RecordOptions;
 use trocar_progress::Progress;
 use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
-use trocar_recording::{Recording, RecordingInfo};
+use trocar_recording::Recording;
 
 /// The file that makes a folder one of this experiment's.
 const MARKER: &str = "reconstruction.json";
@@ -118,7 +119,7 @@ impl ReconstructionExperiment {
         for phantom in &self.phantoms {
             let folder = output.join(phantom);
             let recording = folder.join("recording");
-            self.record(phantom, &recording, progress)?;
+            recorded(phantom, &self.record, &recording, progress)?;
             let (made, reconstruction) =
                 reconstruct_recording(&recording, &self.settings, &folder.join("specimen"), progress)?;
             let paper_way = Settings { surface: SurfaceRule::BinaryGrid, ..self.settings.clone() };
@@ -138,19 +139,6 @@ impl ReconstructionExperiment {
         let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
         write(&output.join(MARKER), &json)?;
         Ok(result)
-    }
-
-    /// Records `phantom` into `dir` unless a recording of the same options lies there.
-    fn record(&self, phantom: &str, dir: &Path, progress: &dyn Progress) -> Result<()> {
-        let described = trocar_phantom::describe(phantom, &self.record)?;
-        let same = |info: &RecordingInfo| *info == described;
-        if let Ok(earlier) = Recording::open(dir)
-            && same(&earlier.info)
-            && earlier.len() == self.record.frames
-        {
-            return Ok(());
-        }
-        Ok(trocar_phantom::record(phantom, &self.record, dir, progress)?)
     }
 }
 

@@ -6,6 +6,7 @@
 mod colors;
 mod convergence;
 mod figures;
+mod integrators;
 mod meshing;
 mod moving_picture;
 mod overlays;
@@ -15,12 +16,13 @@ mod reconstruction_experiment;
 mod run;
 mod scaling;
 mod seen;
+mod settling;
 mod table;
 mod truth;
 mod views;
 
 use crate::bench::{MeshingResult, ScalingResult};
-use crate::experiment::{ConvergenceResult, ReconstructionResult};
+use crate::experiment::{ConvergenceResult, IntegratorsResult, ReconstructionResult, SettlingResult};
 use crate::{Error, Result};
 use moving_picture::Lift;
 use std::path::Path;
@@ -85,6 +87,22 @@ pub(crate) fn meshing(result: &MeshingResult) -> Result<String> {
 /// A plot that cannot be drawn.
 pub(crate) fn scaling(result: &ScalingResult) -> Result<String> {
     Ok(page::page("Scaling", "Stepping over elements, threads and models", &scaling::body(result)?))
+}
+
+/// The page of the integrators' comparison.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn integrators(result: &IntegratorsResult) -> Result<String> {
+    Ok(page::page("Integrators", "Which stay bounded, and which are right", &integrators::body(result)?))
+}
+
+/// The page of the settling experiment.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn settling(result: &SettlingResult) -> Result<String> {
+    Ok(page::page("Settling", "Phantoms released into the cell", &settling::body(result)?))
 }
 
 /// The page of the convergence experiment.

@@ -1,7 +1,7 @@
 //! Solvers by the names under which the command line, reports and JSON know them.
 
 use crate::{Error, Result};
-use trocar_tissue::{Descent, Schedule};
+use trocar_tissue::{Descent, Newton, Schedule, SemiImplicit, Xpbd};
 
 /// The names, and the schedules behind them.
 pub const SOLVERS: [&str; 2] = ["paper", "fast"];
@@ -22,6 +22,10 @@ pub fn solver_named(name: &str) -> Result<Schedule> {
 pub fn one_substep(schedule: Schedule, iterations: usize) -> Schedule {
     match schedule {
         Schedule::Descent(descent) => Schedule::Descent(Descent { substeps: 1, iterations, ..descent }),
+        Schedule::Xpbd(settings) => Schedule::Xpbd(Xpbd { substeps: 1, iterations, ..settings }),
+        // They have no iterations.
+        Schedule::SemiImplicit(_) => Schedule::SemiImplicit(SemiImplicit { substeps: 1 }),
+        Schedule::Newton(_) => Schedule::Newton(Newton { substeps: 1 }),
     }
 }
 
@@ -29,5 +33,7 @@ pub fn one_substep(schedule: Schedule, iterations: usize) -> Schedule {
 pub fn iterations_of(schedule: Schedule) -> usize {
     match schedule {
         Schedule::Descent(descent) => descent.iterations,
+        Schedule::Xpbd(settings) => settings.iterations,
+        Schedule::SemiImplicit(_) | Schedule::Newton(_) => 1,
     }
 }

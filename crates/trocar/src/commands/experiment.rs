@@ -1,6 +1,8 @@
 //! `trocar experiment`.
 
 mod convergence;
+mod integrators;
+mod settling;
 
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
@@ -12,6 +14,8 @@ use trocar_reconstruct::Settings;
 pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Result<()> {
     match &arguments.name {
         ExperimentName::Convergence(arguments) => convergence::run(arguments, json, progress),
+        ExperimentName::Integrators(arguments) => integrators::run(arguments, json, progress),
+        ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }
 }
