@@ -136,8 +136,19 @@ fn newton(places: &Places) -> Outcome<Figures> {
 }
 
 fn mujoco(places: &Places) -> Outcome<Figures> {
-    let arguments =
-        ["bench_mujoco.py", "--mesh", MESH, "--dt", "0.0166667", "--mass", "lumped", "--sim", "0.5", "--save", "mujoco.npy"];
+    let arguments = [
+        "bench_mujoco.py",
+        "--mesh",
+        MESH,
+        "--dt",
+        "0.0166667",
+        "--mass",
+        "lumped",
+        "--sim",
+        "0.5",
+        "--save",
+        "mujoco.npy",
+    ];
     peer(places, &arguments, "mujoco.npy")
 }
 
@@ -158,7 +169,19 @@ fn peer(places: &Places, arguments: &[&str], saved: &str) -> Outcome<Figures> {
 
 fn ours(places: &Places, schedule: &str, threads: &str) -> Outcome<Figures> {
     let mut command = Command::new(&places.trocar);
-    command.args(["--json", "--quiet", "bench", "organs", "--schedule", schedule, "--threads", threads, "--frames", "60", "--mesh"]);
+    command.args([
+        "--json",
+        "--quiet",
+        "bench",
+        "organs",
+        "--schedule",
+        schedule,
+        "--threads",
+        threads,
+        "--frames",
+        "60",
+        "--mesh",
+    ]);
     let result = json_of(&output(command.arg(&places.mesh))?)?;
     let wall = number(&result, "real_time_factor")?;
     Ok(Figures { wall, cpu: (threads == "1").then_some(wall), sag: number(&result, "static_sag_error")? })
@@ -244,7 +267,8 @@ fn print(medians: &[Outcome<Figures>]) {
         match figures {
             Err(why) => eprintln!("{:<26} {:>7} {why}", solver.name, solver.threads),
             Ok(f) => {
-                let over = |peer: &Outcome<Figures>| times(peer.as_ref().ok().filter(|_| k >= PEERS).map(|p| ratio(f, p)));
+                let over =
+                    |peer: &Outcome<Figures>| times(peer.as_ref().ok().filter(|_| k >= PEERS).map(|p| ratio(f, p)));
                 eprintln!(
                     "{:<26} {:>7} {:>10} {:>10} {:>9.2}% {:>10} {:>10}",
                     solver.name,
@@ -258,7 +282,9 @@ fn print(medians: &[Outcome<Figures>]) {
             }
         }
     }
-    eprintln!("real time, CPU time: simulated over wall time, over CPU time. Newton, MuJoCo: ours over theirs, by CPU time where ours ran on one thread.");
+    eprintln!(
+        "real time, CPU time: simulated over wall time, over CPU time. Newton, MuJoCo: ours over theirs, by CPU time where ours ran on one thread."
+    );
 }
 
 /// Runs a command without a word of it; says whether it went well.

@@ -31,11 +31,36 @@ pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
     let cut = |x: &Xpbd| format!("{} substeps of {}", x.substeps, x.iterations);
     vec![
         form("Semi-implicit Euler", "8 substeps".into(), DIVERGES, Schedule::SemiImplicit(SemiImplicit::PAPER)),
-        form("Semi-implicit Euler, stable steps", format!("{} substeps", stable.substeps), "", Schedule::SemiImplicit(stable)),
-        form("XPBD as in Newton 1.8", format!("{}, Jacobi, relaxation 0.9", cut(&Xpbd::NEWTON)), DIVERGES, Schedule::Xpbd(Xpbd::NEWTON)),
-        form("XPBD as in Newton, relaxed", format!("{}, Jacobi, relaxation 0.1", cut(&relaxed)), "", Schedule::Xpbd(relaxed)),
-        form("XPBD, neo-Hookean, large steps", format!("{}, Gauss-Seidel", cut(&large_steps)), "", Schedule::Xpbd(large_steps)),
-        form("XPBD, neo-Hookean, small steps", format!("{}, Gauss-Seidel", cut(&small_steps)), "", Schedule::Xpbd(small_steps)),
+        form(
+            "Semi-implicit Euler, stable steps",
+            format!("{} substeps", stable.substeps),
+            "",
+            Schedule::SemiImplicit(stable),
+        ),
+        form(
+            "XPBD as in Newton 1.8",
+            format!("{}, Jacobi, relaxation 0.9", cut(&Xpbd::NEWTON)),
+            DIVERGES,
+            Schedule::Xpbd(Xpbd::NEWTON),
+        ),
+        form(
+            "XPBD as in Newton, relaxed",
+            format!("{}, Jacobi, relaxation 0.1", cut(&relaxed)),
+            "",
+            Schedule::Xpbd(relaxed),
+        ),
+        form(
+            "XPBD, neo-Hookean, large steps",
+            format!("{}, Gauss-Seidel", cut(&large_steps)),
+            "",
+            Schedule::Xpbd(large_steps),
+        ),
+        form(
+            "XPBD, neo-Hookean, small steps",
+            format!("{}, Gauss-Seidel", cut(&small_steps)),
+            "",
+            Schedule::Xpbd(small_steps),
+        ),
         form("XPBD, six strains, small steps", format!("{}, Gauss-Seidel", cut(&strains)), "", Schedule::Xpbd(strains)),
         form("Vertex Block Descent as in the paper", "8 substeps of 10".into(), "stays at 0.16 m/s", Schedule::PAPER),
         form("Our default", "adaptive".into(), "", Schedule::default()),
@@ -56,19 +81,34 @@ fn method_finding(method: &str, rows: &[&IntegratorRow]) -> String {
     let unbounded = named(&|r| !r.bounded);
     let right: Vec<String> = rows
         .iter()
-        .filter_map(|r| r.sag_error.filter(|e| *e <= RIGHT).map(|e| format!("{} ({}; sag off by {:.2}%)", r.name, r.settings, 100.0 * e)))
+        .filter_map(|r| {
+            r.sag_error
+                .filter(|e| *e <= RIGHT)
+                .map(|e| format!("{} ({}; sag off by {:.2}%)", r.name, r.settings, 100.0 * e))
+        })
         .collect();
     let wrong: Vec<String> = rows
         .iter()
-        .filter_map(|r| r.sag_error.filter(|e| e.is_nan() || *e > RIGHT).map(|e| format!("{} ({}; sag off by {:.0}%)", r.name, r.settings, 100.0 * e)))
+        .filter_map(|r| {
+            r.sag_error
+                .filter(|e| e.is_nan() || *e > RIGHT)
+                .map(|e| format!("{} ({}; sag off by {:.0}%)", r.name, r.settings, 100.0 * e))
+        })
         .collect();
     let verdict = match (unbounded.is_empty(), right.is_empty()) {
         (false, false) => format!("that {method} does not stay bounded is true of its settings, not of the method"),
         (true, _) => format!("{method} stayed bounded in every form"),
         (false, true) => format!("no form of {method} was both bounded and right"),
     };
-    let part = |what: &str, names: &[String]| if names.is_empty() { String::new() } else { format!("; {what}: {}", names.join(", ")) };
-    format!("{verdict}{}{}{}.", part("it diverges as", &unbounded), part("bounded, but wrong, as", &wrong), part("bounded and right as", &right))
+    let part = |what: &str, names: &[String]| {
+        if names.is_empty() { String::new() } else { format!("; {what}: {}", names.join(", ")) }
+    };
+    format!(
+        "{verdict}{}{}{}.",
+        part("it diverges as", &unbounded),
+        part("bounded, but wrong, as", &wrong),
+        part("bounded and right as", &right)
+    )
 }
 
 /// How wrong bounded states are.
@@ -76,7 +116,9 @@ fn sags(rows: &[IntegratorRow]) -> Option<String> {
     let paper = rows.iter().find(|r| r.name.starts_with("Vertex Block Descent"))?;
     let (error, ratio) = (paper.sag_error?, paper.sag_ratio?);
     Some(if error > RIGHT {
-        format!("Bounded is not right: Vertex Block Descent as in the paper stays slow, and sags {ratio:.1} times as far as it should.")
+        format!(
+            "Bounded is not right: Vertex Block Descent as in the paper stays slow, and sags {ratio:.1} times as far as it should."
+        )
     } else {
         format!("Vertex Block Descent as in the paper sags within {:.1}% of what it should.", 100.0 * error)
     })
@@ -113,7 +155,11 @@ mod tests {
             row("Vertex Block Descent as in the paper", Some(9.5)),
         ]);
         assert!(found[0].starts_with("no form of Semi-implicit Euler was both"), "{}", found[0]);
-        assert!(found[1].contains("true of its settings") && found[1].contains("XPBD b (so; sag off by 4.00%)"), "{}", found[1]);
+        assert!(
+            found[1].contains("true of its settings") && found[1].contains("XPBD b (so; sag off by 4.00%)"),
+            "{}",
+            found[1]
+        );
         assert!(found[1].contains("wrong, as: XPBD c"), "{}", found[1]);
         assert!(found[2].contains("10.5 times"), "{}", found[2]);
     }

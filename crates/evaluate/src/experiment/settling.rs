@@ -131,7 +131,12 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
         .model
         .bodies
         .iter()
-        .map(|b| SettlingOrgan { organ: b.name.clone(), pinned: share(b.pinned()), peak_speed_m_s: 0.0, speed_m_s: f64::NAN })
+        .map(|b| SettlingOrgan {
+            organ: b.name.clone(),
+            pinned: share(b.pinned()),
+            peak_speed_m_s: 0.0,
+            speed_m_s: f64::NAN,
+        })
         .collect();
     let (mut speeds, mut event) = (Vec::with_capacity(frames), None);
     progress.begin(phantom, frames as u64);

@@ -49,14 +49,28 @@ fn cards(result: &IntegratorsResult) -> String {
     };
     page::cards(&[
         Card::new("Bounded", format!("{bounded} of {}", result.integrators.len()), "ran to the end below 20 m/s"),
-        Card::new("Stable explicit step", format!("{} \u{b5}s", fixed(result.stable_step_us, 1)), "2/\u{3c9} of the stiffest mode at rest"),
+        Card::new(
+            "Stable explicit step",
+            format!("{} \u{b5}s", fixed(result.stable_step_us, 1)),
+            "2/\u{3c9} of the stiffest mode at rest",
+        ),
         Card::new("XPBD's least sag error", best("XPBD"), "of its bounded forms"),
         Card::new("Sag", format!("{} mm", fixed(result.sag_mm, 4)), "mean displacement in the static equilibrium"),
     ])
 }
 
 fn rows(result: &IntegratorsResult) -> String {
-    let head = ["Integrator", "Settings", "The paper", "Outcome", "Peak [m/s]", "Last [m/s]", "Sag over true sag", "Sag error", "Frame [ms]"];
+    let head = [
+        "Integrator",
+        "Settings",
+        "The paper",
+        "Outcome",
+        "Peak [m/s]",
+        "Last [m/s]",
+        "Sag over true sag",
+        "Sag error",
+        "Frame [ms]",
+    ];
     let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
     let row = |r: &IntegratorRow| {
         let outcome = match (&r.event, r.ended_at_s) {

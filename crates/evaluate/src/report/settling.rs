@@ -13,7 +13,11 @@ pub(super) fn body(result: &SettlingResult) -> Result<String> {
          line is {SETTLED} m/s, below which each must be after a second.",
         page::escape(&result.schedule)
     );
-    let line = |(k, speeds): (usize, &Vec<(f64, f64)>)| Line { points: speeds.clone(), color: colors::organ(k), filled: false };
+    let line = |(k, speeds): (usize, &Vec<(f64, f64)>)| Line {
+        points: speeds.clone(),
+        color: colors::organ(k),
+        filled: false,
+    };
     let plot = Plot {
         title: "Greatest node speed",
         x: "time since release [s]",
@@ -38,7 +42,18 @@ pub(super) fn body(result: &SettlingResult) -> Result<String> {
 }
 
 fn phantoms(result: &SettlingResult) -> String {
-    let head = ["Phantom", "Nodes", "Tetrahedra", "Pinned", "(paper)", "Peak [m/s]", "After 1 s [m/s]", "(paper)", "Settled after", "Event"];
+    let head = [
+        "Phantom",
+        "Nodes",
+        "Tetrahedra",
+        "Pinned",
+        "(paper)",
+        "Peak [m/s]",
+        "After 1 s [m/s]",
+        "(paper)",
+        "Settled after",
+        "Event",
+    ];
     let rows: Vec<Vec<String>> = result
         .phantoms
         .iter()

@@ -19,7 +19,8 @@ pub fn run(arguments: &IntegratorsExperiment, json: bool, progress: &dyn Progres
 }
 
 fn text(r: &IntegratorsResult) -> String {
-    let header = ["integrator", "settings", "peak m/s", "last m/s", "ended", "sag ratio", "sag error", "ms/frame", "paper"];
+    let header =
+        ["integrator", "settings", "peak m/s", "last m/s", "ended", "sag ratio", "sag error", "ms/frame", "paper"];
     let or_dash = |v: Option<String>| v.unwrap_or_else(|| "-".to_owned());
     let rows: Vec<Vec<String>> = r
         .integrators

@@ -20,7 +20,8 @@ pub fn run(arguments: &SettlingExperiment, json: bool, progress: &dyn Progress) 
 }
 
 fn text(r: &SettlingResult) -> String {
-    let header = ["phantom", "nodes", "pinned", "(paper)", "peak m/s", "after 1 s", "(paper)", "settled after", "fastest organ"];
+    let header =
+        ["phantom", "nodes", "pinned", "(paper)", "peak m/s", "after 1 s", "(paper)", "settled after", "fastest organ"];
     let rows: Vec<Vec<String>> = r
         .phantoms
         .iter()
