@@ -29,7 +29,7 @@ fn the_papers_finding_is_one_of_settings() {
     let small = row("XPBD, neo-Hookean, small steps");
     assert!(small.bounded && small.sag_error.unwrap() < 0.1, "{:?}", small.sag_error);
     assert!(row("Vertex Block Descent as in the paper").bounded);
-    assert!(result.findings.iter().any(|f| f.contains("XPBD does not stay bounded is true of its settings")));
+    assert!(result.findings.iter().any(|f| f.contains("XPBD: that it does not stay bounded is true of settings")));
     let page = std::fs::read_to_string(output.join("report.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("six strains"));
     let json: serde_json::Value =

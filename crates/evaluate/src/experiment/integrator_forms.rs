@@ -96,9 +96,9 @@ fn method_finding(method: &str, rows: &[&IntegratorRow]) -> String {
         })
         .collect();
     let verdict = match (unbounded.is_empty(), right.is_empty()) {
-        (false, false) => format!("that {method} does not stay bounded is true of its settings, not of the method"),
-        (true, _) => format!("{method} stayed bounded in every form"),
-        (false, true) => format!("no form of {method} was both bounded and right"),
+        (false, false) => format!("{method}: that it does not stay bounded is true of settings, not of the method"),
+        (true, _) => format!("{method}: it stayed bounded in every form"),
+        (false, true) => format!("{method}: no form was both bounded and right"),
     };
     let part = |what: &str, names: &[String]| {
         if names.is_empty() { String::new() } else { format!("; {what}: {}", names.join(", ")) }
@@ -154,9 +154,9 @@ mod tests {
             row("XPBD c", Some(9.0)),
             row("Vertex Block Descent as in the paper", Some(9.5)),
         ]);
-        assert!(found[0].starts_with("no form of Semi-implicit Euler was both"), "{}", found[0]);
+        assert!(found[0].starts_with("Semi-implicit Euler: no form was both"), "{}", found[0]);
         assert!(
-            found[1].contains("true of its settings") && found[1].contains("XPBD b (so; sag off by 4.00%)"),
+            found[1].contains("true of settings") && found[1].contains("XPBD b (so; sag off by 4.00%)"),
             "{}",
             found[1]
         );
