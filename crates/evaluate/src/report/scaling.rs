@@ -72,7 +72,17 @@ fn threads(n: usize) -> String {
 }
 
 fn sizes(result: &ScalingResult) -> String {
-    let head = ["Schedule", "Threads", "Elements", "Nodes", "Frame [ms]", "Real time", "Iterations a frame", "Inverted", "Yielded"];
+    let head = [
+        "Schedule",
+        "Threads",
+        "Elements",
+        "Nodes",
+        "Frame [ms]",
+        "Real time",
+        "Iterations a frame",
+        "Inverted",
+        "Yielded",
+    ];
     let row = |r: &ScalingRow| {
         let mut cells = vec![r.schedule.clone(), r.threads.to_string(), count(r.tets), count(r.nodes)];
         match (&r.timing, &r.skipped) {
