@@ -27,7 +27,7 @@ fn energies_are_inertias_where_nothing_is_strained_and_least_at_the_step() {
 
     let held = model(&mesh, tissue(12e3), nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut oracle = Oracle::new(&held);
-    let mut reached = before.clone();
+    let mut reached = before;
     for _ in 0..3 {
         let before = reached.clone();
         oracle.step(&held, &mut reached, SUBSTEP, &[]).unwrap();
