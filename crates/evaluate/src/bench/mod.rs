@@ -14,4 +14,3 @@ pub use meshing::{MeshingBench, MeshingResult, MeshingRow};
 pub use organs::{OrganSource, OrgansBench, OrgansResult};
 pub use scaling::{ScalingBench, ScalingResult, ScalingRow};
 pub use timing::Timing;
-pub(crate) use timing::median;

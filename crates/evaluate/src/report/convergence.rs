@@ -29,7 +29,7 @@ fn described(scene: &str) -> &'static str {
 pub(super) fn body(result: &ConvergenceResult) -> Result<String> {
     let lead = format!(
         "One substep of {} ({} elements, {} nodes) from one state, with 1, 2, 4, \u{2026} iterations, against the minimum that Newton's method finds in double \
-         precision for the same substep. Time is that of the substep on one thread.",
+         precision for the same substep. Time is that of the substep on one thread, the least of five.",
         page::escape(&result.mesh),
         count(result.tets),
         count(result.nodes)
