@@ -16,13 +16,16 @@ mod error;
 mod grasp;
 mod integrator;
 mod kernel;
+mod lanes;
 mod material;
 mod model;
 pub mod oracle;
 pub mod pins;
+mod quasi_newton;
 mod report;
 mod schedule;
 mod state;
+mod stiffness;
 mod stepper;
 mod sweep;
 
@@ -35,6 +38,6 @@ pub use material::{ConstitutiveModel, Corotated, Hyperelastic, Material, StVenan
 pub use model::{Model, SupportPlane};
 pub use oracle::{Held, Newton, Oracle, OracleState};
 pub use report::{Divergence, StepReport};
-pub use schedule::{Descent, Schedule, Start};
+pub use schedule::{Descent, QuasiNewton, Schedule, Start};
 pub use state::State;
 pub use stepper::Stepper;

@@ -3,7 +3,6 @@
 use super::timing::median;
 use crate::scenes::{Organs, Run, SOLVERS, Scene, material, solver_named};
 use crate::{Error, Result};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::time::Instant;
 use trocar_progress::Progress;
@@ -56,8 +55,6 @@ pub(super) fn measure(
     for name in SOLVERS {
         let schedule = solver_named(name)?;
         for &threads in threads {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            let pool = pool.map_err(|e| Error::Mismatch(format!("{threads} threads cannot be started: {e}")))?;
             let mut many = (0..count).map(|_| Run::new(&single, schedule, 1)).collect::<Result<Vec<_>>>()?;
             let (mut one, mut large) = (Run::new(&together, schedule, threads)?, Run::new(&six, schedule, threads)?);
             let mut times: [Vec<f64>; 3] = Default::default();
@@ -67,7 +64,7 @@ pub(super) fn measure(
                     return Err(Error::Interrupted);
                 }
                 let took = [
-                    timed(|| pool.install(|| many.par_iter_mut().try_for_each(|run| run.frame().map(|_| ()))))?,
+                    timed(|| step_all(&mut many, threads))?,
                     timed(|| one.frame().map(|_| ()))?,
                     timed(|| large.frame().map(|_| ()))?,
                 ];
@@ -97,6 +94,17 @@ pub(super) fn measure(
     }
     progress.end();
     Ok(rows)
+}
+
+/// Steps all by a frame, shared out among `threads` threads. Plain threads: those of a pool would begin with another model while they wait for one's own pool.
+fn step_all(runs: &mut [Run<'_>], threads: usize) -> Result<()> {
+    let share = runs.len().div_ceil(threads.max(1)).max(1);
+    std::thread::scope(|scope| {
+        let step = |part: &mut [Run<'_>]| part.iter_mut().try_for_each(|run| run.frame().map(|_| ()));
+        let others: Vec<_> = runs.chunks_mut(share).map(|part| scope.spawn(move || step(part))).collect();
+        let lost = || Err(Error::Mismatch("a thread that steps models was lost".to_owned()));
+        others.into_iter().try_for_each(|thread| thread.join().unwrap_or_else(|_| lost()))
+    })
 }
 
 /// Wall time [ms].

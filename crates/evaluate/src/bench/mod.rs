@@ -9,9 +9,8 @@ mod scaling;
 mod timing;
 
 pub use machine::Machine;
+pub use many::ManyRow;
 pub use meshing::{MeshingBench, MeshingResult, MeshingRow};
 pub use organs::{OrganSource, OrgansBench, OrgansResult};
-pub use many::ManyRow;
 pub use scaling::{ScalingBench, ScalingResult, ScalingRow};
 pub use timing::Timing;
-pub(crate) use timing::median;

@@ -2,7 +2,9 @@
 
 use super::machine::Machine;
 use super::timing::Timing;
-use crate::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error, solver_named};
+use crate::scenes::{
+    FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error, solver_named,
+};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
@@ -10,6 +12,9 @@ use trocar_progress::Progress;
 
 /// The frames of the tube at which errors are taken.
 const TUBE_FRAMES: [usize; 3] = [15, 30, 60];
+
+/// Longest time to settle [s].
+const LONGEST: f64 = 3600.0;
 
 /// Where organs come from.
 #[derive(Clone, Debug)]
@@ -126,6 +131,12 @@ impl OrgansBench {
     /// # Errors
     /// Organs that cannot be read or simulated, a scene that diverges, an oracle that finds no minimum, an interruption.
     pub fn run(&self, progress: &dyn Progress) -> Result<OrgansResult> {
+        if self.frames == 0 || !(self.settle > 0.0 && self.settle <= LONGEST) {
+            return Err(Error::Mismatch(format!(
+                "{} timed frames and {} s to settle; 1 or more frames and up to {LONGEST} s make sense",
+                self.frames, self.settle
+            )));
+        }
         let machine = Machine::here();
         let schedule = solver_named(&self.schedule)?;
         let organs = self.organs.organs()?;
@@ -195,12 +206,7 @@ struct Tube {
 }
 
 impl Tube {
-    fn run(
-        scene: &Scene,
-        schedule: trocar_tissue::Schedule,
-        threads: usize,
-        progress: &dyn Progress,
-    ) -> Result<Self> {
+    fn run(scene: &Scene, schedule: trocar_tissue::Schedule, threads: usize, progress: &dyn Progress) -> Result<Self> {
         let substeps = schedule.substeps();
         let last = TUBE_FRAMES[TUBE_FRAMES.len() - 1];
         progress.begin("tube, oracle", (last * substeps) as u64);

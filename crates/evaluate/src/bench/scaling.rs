@@ -90,7 +90,8 @@ impl ScalingBench {
         let mut rows: Vec<ScalingRow> = Vec::new();
         for size in &self.sizes {
             progress.begin(&format!("{size} tets"), (settings * (WARM_UP + FRAMES)) as u64);
-            let made = Organs::analytic(*size).and_then(|organs| Ok((Scene::moving(&organs, material(12e3, 0.45))?, organs)));
+            let made =
+                Organs::analytic(*size).and_then(|organs| Ok((Scene::moving(&organs, material(12e3, 0.45))?, organs)));
             for schedule in SOLVERS {
                 for threads in &self.threads {
                     let row = match &made {

@@ -1,7 +1,7 @@
 //! The integrators that are compared, each as the paper or an engine has it and in its best form, and what the comparison says.
 
 use super::integrators::IntegratorRow;
-use trocar_tissue::{Model, Schedule, SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep};
+use trocar_tissue::{Descent, Model, Schedule, SemiImplicit, Start, Xpbd, XpbdConstraints, XpbdSweep};
 
 /// An integrator with its settings.
 pub(super) struct Form {
@@ -28,6 +28,7 @@ pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
     let strains = Xpbd { constraints: XpbdConstraints::Strains, ..small_steps };
     let relaxed = Xpbd { sweep: XpbdSweep::Jacobi { relaxation: SMALL_RELAXATION }, ..Xpbd::NEWTON };
     let large_steps = Xpbd { substeps: Xpbd::NEWTON.substeps, iterations: Xpbd::NEWTON.iterations, ..small_steps };
+    let adaptive = Descent { substeps: 8, iterations: 10, start: Start::Adaptive };
     let cut = |x: &Xpbd| format!("{} substeps of {}", x.substeps, x.iterations);
     vec![
         form("Semi-implicit Euler", "8 substeps".into(), DIVERGES, Schedule::SemiImplicit(SemiImplicit::PAPER)),
@@ -63,7 +64,8 @@ pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
         ),
         form("XPBD, six strains, small steps", format!("{}, Gauss-Seidel", cut(&strains)), "", Schedule::Xpbd(strains)),
         form("Vertex Block Descent as in the paper", "8 substeps of 10".into(), "stays at 0.16 m/s", Schedule::PAPER),
-        form("Our default", "adaptive".into(), "", Schedule::default()),
+        form("Vertex Block Descent, adaptive start", "8 substeps of 10".into(), "", Schedule::Descent(adaptive)),
+        form("Quasi-Newton", "fast schedule".into(), "", Schedule::FAST),
     ]
 }
 

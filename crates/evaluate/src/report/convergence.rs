@@ -1,9 +1,9 @@
 //! The page of the convergence experiment: errors over iterations and over time, scene by scene.
 
+use super::colors;
 use super::page::{self, Columns};
 use super::plots::{Line, Plot};
 use super::table::{self, count, fixed};
-use super::colors;
 use crate::Result;
 use crate::experiment::{ConvergenceCase, ConvergenceResult, StepRow};
 use crate::scenes::SCENES;
@@ -20,14 +20,16 @@ fn described(scene: &str) -> &'static str {
         "tube" => {
             "Pinned within 10 mm of one end, the middle lifted at 30 mm/s, 0.25 s after it began: large, slow, global motion."
         }
-        _ => "Nothing holds it; it falls since 0.1 s. The predictor of implicit Euler is its exact step, so there is no excess energy to compare with.",
+        _ => {
+            "Nothing holds it; it falls since 0.1 s. The predictor of implicit Euler is its exact step, so there is no excess energy to compare with."
+        }
     }
 }
 
 pub(super) fn body(result: &ConvergenceResult) -> Result<String> {
     let lead = format!(
         "One substep of {} ({} elements, {} nodes) from one state, with 1, 2, 4, \u{2026} iterations, against the minimum that Newton's method finds in double \
-         precision for the same substep. Time is that of the substep on one thread.",
+         precision for the same substep. Time is that of the substep on one thread, the least of five.",
         page::escape(&result.mesh),
         count(result.tets),
         count(result.nodes)
@@ -56,17 +58,8 @@ fn plots(result: &ConvergenceResult, cases: &[&ConvergenceCase]) -> Result<Strin
             if lines.iter().all(|l| l.points.iter().all(|p| !p.1.is_finite())) {
                 continue;
             }
-            let plot = Plot {
-                title,
-                x,
-                y,
-                lines,
-                bands: vec![],
-                show: vec![],
-                limits: vec![],
-                log_x: true,
-                log_y: true,
-            };
+            let plot =
+                Plot { title, x, y, lines, bands: vec![], show: vec![], limits: vec![], log_x: true, log_y: true };
             let legend = result.schedules.iter().enumerate().map(|(k, name)| (name.as_str(), colors::organ(k)));
             figures.push(page::figure(&plot.svg()?, &format!("<b>{title}</b> over {x}.{}", page::legend(legend))));
         }
@@ -103,7 +96,18 @@ fn failures(cases: &[&ConvergenceCase]) -> String {
 
 /// Every case with the schedules' own iterations.
 fn own(result: &ConvergenceResult) -> String {
-    let head = ["Scene", "E [kPa]", "nu", "Schedule", "Iterations", "ms", "RMS error [\u{b5}m]", "over displacement", "Energy", "Inverted"];
+    let head = [
+        "Scene",
+        "E [kPa]",
+        "nu",
+        "Schedule",
+        "Iterations",
+        "ms",
+        "RMS error [\u{b5}m]",
+        "over displacement",
+        "Energy",
+        "Inverted",
+    ];
     let scientific = |v: Option<f64>| v.map_or("\u{2013}".to_owned(), |v| format!("{v:.1e}"));
     let mut rows = Vec::new();
     for case in &result.cases {

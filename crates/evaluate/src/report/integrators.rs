@@ -41,9 +41,13 @@ pub(super) fn body(result: &IntegratorsResult) -> Result<String> {
     Ok(body + &page::section("What the data say", "", &page::list(&result.findings)) + &rows(result))
 }
 
-/// There are more forms than hues of organs; ours, the last, has one of its own.
+/// There are more forms than hues of organs; the last ones have their own.
 fn color(k: usize) -> [u8; 3] {
-    if k < 8 { colors::organ(k) } else { [190, 30, 60] }
+    match k {
+        0..8 => colors::organ(k),
+        8 => [150, 90, 60],
+        _ => [190, 30, 60],
+    }
 }
 
 fn cards(result: &IntegratorsResult) -> String {

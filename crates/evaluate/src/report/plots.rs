@@ -56,9 +56,12 @@ impl Plot<'_> {
             .iter()
             .map(|l| l.points.iter().filter(|p| keep(p)).map(|&(x, y)| (along(x), scale(y))).collect())
             .collect();
-        let Some(x_range) = range(lines.iter().flatten().map(|p| p.0)) else {
+        let Some((left, right)) = range(lines.iter().flatten().map(|p| p.0)) else {
             return Ok(format!("<p class=\"lead\">Nothing to plot for {}.</p>", super::page::escape(self.title)));
         };
+        // Values that are a little off a power of ten still show it.
+        let beside = if self.log_x { 0.04 * (right - left) } else { 0.0 };
+        let x_range = (left - beside, right + beside);
         let shown = self.show.iter().chain(&self.limits).filter(|y| shown_on(self.log_y, **y)).map(|y| scale(*y));
         let (low, high) = range(lines.iter().flatten().map(|p| p.1).chain(shown)).unwrap_or((0.0, 1.0));
         let y_range = if self.log_y {
@@ -226,6 +229,17 @@ mod tests {
         assert!(plot(vec![(1.0, 2.0)], false).contains("<svg"));
         assert!(plot(vec![(0.0, 1e-9), (1.0, 1e5)], true).contains("10⁻⁸"));
         assert!(plot(vec![(0.0, 1e300), (1.0, -1e300)], false).contains("<svg"));
+    }
+
+    #[test]
+    fn both_axes_may_be_logarithmic() {
+        let points = vec![(0.0, 1.0), (1_039.0, 0.5), (10_000.0, 5.0), (99_900.0, 50.0)];
+        let line = Line { points, color: [10, 20, 30], filled: false };
+        let (title, x, y) = ("speed", "elements", "times");
+        let (lines, limits) = (vec![line], vec![1.0]);
+        let plot = Plot { title, x, y, lines, bands: vec![], show: vec![], limits, log_x: true, log_y: true };
+        let svg = plot.svg().unwrap();
+        assert!(["10³", "10⁴", "10⁵"].iter().all(|tick| svg.contains(tick)), "{svg}");
     }
 
     #[test]

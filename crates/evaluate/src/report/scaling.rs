@@ -12,10 +12,13 @@ const LOSS: f64 = 0.1;
 
 pub(super) fn body(result: &ScalingResult) -> Result<String> {
     let m = &result.machine;
-    let load = m.load.map_or(String::new(), |l| format!(", load {} at the beginning", fixed(l, 1)));
+    let load = m.load.map_or(String::new(), |l| {
+        let busy = if l > 0.5 { "; the machine was not idle, so the figures are too low" } else { "" };
+        format!(", load {} at the beginning{busy}", fixed(l, 1))
+    });
     let lead = format!(
-        "Our own six organs, finer and finer, the lowest 42% of each pinned and a patch of each shaken. Median of up to 60 frames of 1/60 s; {} cores{load}; kernels \
-         compiled for {}. The dashed line is real time.",
+        "Our own six organs (fewer at the smallest sizes), finer and finer, the lowest 42% of each pinned and a patch of each shaken. Median of up to 60 frames of \
+         1/60 s; {} cores{load}; kernels compiled for {}. The dashed line is real time.",
         m.cores, m.isa
     );
     let plots = [
@@ -72,7 +75,17 @@ fn threads(n: usize) -> String {
 }
 
 fn sizes(result: &ScalingResult) -> String {
-    let head = ["Schedule", "Threads", "Elements", "Nodes", "Frame [ms]", "Real time", "Iterations a frame", "Inverted", "Yielded"];
+    let head = [
+        "Schedule",
+        "Threads",
+        "Elements",
+        "Nodes",
+        "Frame [ms]",
+        "Real time",
+        "Iterations a frame",
+        "Inverted",
+        "Yielded",
+    ];
     let row = |r: &ScalingRow| {
         let mut cells = vec![r.schedule.clone(), r.threads.to_string(), count(r.tets), count(r.nodes)];
         match (&r.timing, &r.skipped) {

@@ -45,6 +45,9 @@ const ELLIPSOIDS: [(&str, f64, [f64; 3]); 5] = [
 /// Our own appendix: share of the elements, length, radius at the base [m], taper, bend [rad].
 const TUBE: (f64, f64, f64, f64, f64) = (0.185, 0.085, 0.00455, 0.85, 1.8);
 
+/// Elements for each of our own organs below which there are fewer organs.
+const LEAST: usize = 900;
+
 /// Gap between our own organs [m].
 const GAP: f64 = 4e-3;
 
@@ -67,7 +70,9 @@ impl Organs {
             }
         }
         let source = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        if let Some((low, high)) = organs.iter().find_map(|o| o.mesh.bounds().filter(|(a, b)| (b - a).max_element() > LARGEST)) {
+        if let Some((low, high)) =
+            organs.iter().find_map(|o| o.mesh.bounds().filter(|(a, b)| (b - a).max_element() > LARGEST))
+        {
             let size = high - low;
             return Err(Error::Mismatch(format!(
                 "{}: an organ of {:.3} x {:.3} x {:.3} m; the file must be in metres",
@@ -81,17 +86,20 @@ impl Organs {
     }
 
     /// Our own organs, of about `tets` elements together: a bent tube of the appendix's size and five ellipsoids, side by side, meshed by
-    /// the lattice mesher.
+    /// the lattice mesher. An organ falls apart with less than some hundred elements: where there are too few, there are fewer ellipsoids.
     ///
     /// # Errors
     /// So few elements that an organ cannot be meshed.
     pub fn analytic(tets: usize) -> Result<Self> {
-        let share = |share: f64| (share * tets as f64).round() as usize;
+        let count = (tets / LEAST).clamp(1, ELLIPSOIDS.len() + 1);
+        let ellipsoids = &ELLIPSOIDS[ELLIPSOIDS.len() + 1 - count..];
+        let whole = TUBE.0 + ellipsoids.iter().map(|e| e.1).sum::<f64>();
+        let share = |share: f64| (share / whole * tets as f64).round() as usize;
         let mut organs = Vec::new();
         let mut beside = 0.0;
-        for (name, part, half) in ELLIPSOIDS {
-            let surface = shapes::ellipsoid(DVec3::from(half), SPACING);
-            organs.push(Organ { name: name.into(), mesh: mesh(&surface, share(part))? });
+        for (name, part, half) in ellipsoids {
+            let surface = shapes::ellipsoid(DVec3::from(*half), SPACING);
+            organs.push(Organ { name: (*name).into(), mesh: mesh(&surface, share(*part))? });
         }
         organs.push(Organ { name: APPENDIX.into(), mesh: analytic_appendix(share(TUBE.0))? });
         for organ in &mut organs {
@@ -215,10 +223,8 @@ mod tests {
         for (a, b) in read.organs.iter().zip(&made.organs) {
             assert_eq!(a.mesh, b.mesh);
         }
-        let in_millimetres = TetMesh {
-            vertices: together.vertices.iter().map(|v| 1e3 * *v).collect(),
-            tets: together.tets,
-        };
+        let in_millimetres =
+            TetMesh { vertices: together.vertices.iter().map(|v| 1e3 * *v).collect(), tets: together.tets };
         trocar_geometry::io::write_msh(&path, &in_millimetres).unwrap();
         let said = Organs::read(&path).unwrap_err().to_string();
         assert!(said.contains("metres") && said.contains("all.msh"), "{said}");

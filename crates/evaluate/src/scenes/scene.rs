@@ -277,10 +277,17 @@ mod tests {
         for (patch, body) in moving.patches.iter().zip(&moving.model.bodies) {
             let share = body.pinned().iter().filter(|p| **p).count() as f64 / body.len() as f64;
             assert!((share - 0.42).abs() < 0.01, "{}: {share}", body.name);
-            assert!(!patch.nodes.is_empty() && patch.nodes.iter().all(|i| !body.pinned()[*i as usize]), "{}", body.name);
+            assert!(
+                !patch.nodes.is_empty() && patch.nodes.iter().all(|i| !body.pinned()[*i as usize]),
+                "{}",
+                body.name
+            );
         }
         let drag = Scene::drag(&organs, material).unwrap();
-        assert_eq!((drag.patches[0].body, drag.model.bodies[drag.appendix].name.as_str()), (organs.appendix, "appendix"));
+        assert_eq!(
+            (drag.patches[0].body, drag.model.bodies[drag.appendix].name.as_str()),
+            (organs.appendix, "appendix")
+        );
         let tube = Scene::tube(&organs, material).unwrap();
         let pinned = tube.model.bodies[0].pinned().iter().filter(|p| **p).count();
         let share = pinned as f64 / tube.model.bodies[0].len() as f64;
@@ -293,7 +300,10 @@ mod tests {
     fn motions_keep_their_speed_and_reach() {
         let drag = Motion::Drag { speed: 0.01, reach: 0.01 };
         assert!((drag.height(0.7) - 7e-3).abs() < 1e-12 && (drag.height(1.7) - 3e-3).abs() < 1e-12);
-        assert!((0..400).all(|k| (drag.height(0.01 * f64::from(k + 1)) - drag.height(0.01 * f64::from(k))).abs() < 1.001e-4));
+        assert!(
+            (0..400)
+                .all(|k| (drag.height(0.01 * f64::from(k + 1)) - drag.height(0.01 * f64::from(k))).abs() < 1.001e-4)
+        );
         let lift = Motion::Lift { speed: 0.03, seconds: 1.0 };
         assert!((lift.height(0.5) - 0.015).abs() < 1e-12 && lift.height(3.0) == lift.height(1.0));
     }

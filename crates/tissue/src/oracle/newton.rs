@@ -3,7 +3,8 @@
 //! The exact Hessian is tried first, since it alone converges quadratically; where it is not positive definite, the elements' tangents are projected (Teran and others,
 //! "Robust quasistatic finite elements and flesh simulation", 2005), and where that is singular, the diagonal is shifted.
 
-use super::factor::{Factor, Stiffness};
+use super::factor::Factor;
+use crate::stiffness::Stiffness;
 use super::potential::Potential;
 use super::{Failure, Solution, guard};
 use glam::DVec3;

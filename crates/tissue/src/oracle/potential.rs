@@ -1,7 +1,7 @@
 //! The function that is minimised: energy, gradient and Hessian over all nodes of a body.
 
 use super::element::{blocks, deformation, projected, tangent};
-use super::factor::Stiffness;
+use crate::stiffness::Stiffness;
 use super::state::Nodes;
 use crate::builder::shape_gradients;
 use crate::sweep::STICK_SPEED;

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use super::element::{blocks, projected, tangent};
-use super::factor::Stiffness;
+use crate::stiffness::Stiffness;
 use super::guard::allowed_share;
 use super::newton::{Solver, norm};
 use super::potential::{Elastic, Motion, Potential};

@@ -32,7 +32,9 @@ pub(super) fn read_volumes(source: &mut Source<'_>, content: &mut Content) -> Pa
                 source.real()?;
             }
             let physical = numbers(source)?;
-            if dimension == VOLUME && let Some(group) = physical.first() {
+            if dimension == VOLUME
+                && let Some(group) = physical.first()
+            {
                 // Negative for a volume turned inside out.
                 content.volumes.push((entity, group.saturating_abs()));
             }

@@ -33,7 +33,8 @@ fn text(r: &OrgansResult) -> String {
             t.fallbacks.to_string(),
         ]
     };
-    let header = ["1/60 s frames", "median ms", "worst ms", "real time", "iterations", "inverted", "yielded", "fallbacks"];
+    let header =
+        ["1/60 s frames", "median ms", "worst ms", "real time", "iterations", "inverted", "yielded", "fallbacks"];
     let percent = |e: f64| format!("{:.3}%", 100.0 * e);
     format!(
         "{}: {} organs, {} nodes, {} tets; schedule '{}' ({} substeps), {} threads, {} (the processor has {}, {} cores{})\n{}\n\
@@ -50,7 +51,10 @@ fn text(r: &OrgansResult) -> String {
         r.machine.widest_isa,
         r.machine.cores,
         r.machine.load.map_or(String::new(), |l| format!(", load {l:.1}")),
-        output::table(&header, &[row(&format!("{} dragged", r.appendix), &r.drag), row("every organ shaken", &r.moving)]),
+        output::table(
+            &header,
+            &[row(&format!("{} dragged", r.appendix), &r.drag), row("every organ shaken", &r.moving)]
+        ),
         percent(r.static_sag_error),
         r.static_sag_um,
         r.settled_s,
