@@ -3,6 +3,7 @@
 
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
+mod peers;
 mod tools;
 
 use std::process::{Command, ExitCode};
@@ -20,6 +21,7 @@ const TEST: &[Check] = &[
 
 const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests and docs, warnings as errors
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
+       cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
 
 fn main() -> ExitCode {
@@ -34,6 +36,13 @@ fn main() -> ExitCode {
             tools::fetch();
             ExitCode::SUCCESS
         }
+        ["peers"] => match peers::run() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(why) => {
+                eprintln!("{why}");
+                ExitCode::FAILURE
+            }
+        },
         ["fuzz"] => fuzz(1_000_000),
         ["fuzz", cases] => match cases.parse() {
             Ok(cases) => fuzz(cases),

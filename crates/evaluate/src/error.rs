@@ -58,6 +58,16 @@ pub enum Error {
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// A scene blew up.
+    #[error("scene '{scene}', frame {frame}: {why}")]
+    Diverged {
+        /// The scene.
+        scene: &'static str,
+        /// Its frame.
+        frame: usize,
+        /// What happened.
+        why: String,
+    },
     /// A result cannot be written down.
     #[error("the result cannot be written: {0}")]
     Format(String),
@@ -87,6 +97,9 @@ pub enum Error {
     /// A specimen cannot be read or written.
     #[error(transparent)]
     Specimen(#[from] trocar_specimen::Error),
+    /// A model cannot be built or stepped.
+    #[error(transparent)]
+    Tissue(#[from] trocar_tissue::Error),
     /// A task cannot be run.
     #[error(transparent)]
     Cell(#[from] trocar_cell::Error),

@@ -7,14 +7,22 @@ mod experiment;
 mod inspect;
 mod paper;
 pub mod report;
+pub mod scenes;
 mod segment;
 mod truth;
 mod workflow;
 
-pub use bench::{MeshingBench, MeshingResult, MeshingRow};
+pub use bench::{
+    Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, ScalingBench,
+    ScalingResult, ScalingRow, Timing,
+};
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
-pub use experiment::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
+pub use experiment::{
+    ConvergenceCase, ConvergenceExperiment, ConvergenceResult, IntegratorRow, IntegratorsExperiment, IntegratorsResult,
+    PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow, SettlingExperiment,
+    SettlingOrgan, SettlingResult, SettlingRow, StepRow,
+};
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};
 pub use truth::TruthFigures;

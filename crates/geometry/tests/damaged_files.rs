@@ -4,7 +4,7 @@
 
 use std::path::Path;
 use trocar_fuzz::{Allowance, PEAK, Peak, assault};
-use trocar_geometry::io::{Unit, read_msh, read_surface, write_msh, write_ply};
+use trocar_geometry::io::{Unit, read_msh, read_msh_groups, read_surface, write_msh, write_ply};
 use trocar_geometry::{TetMesh, TriMesh, repair};
 
 #[global_allocator]
@@ -52,6 +52,10 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
     text_stl += "endsolid organ\n";
     let text_msh = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n4\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n$EndNodes\n\
         $Elements\n1\n1 4 2 0 1 1 2 3 4\n$EndElements\n";
+    let grouped_msh = "$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 9 \"appendix\"\n$EndPhysicalNames\n\
+        $Entities\n1 0 1 1\n1 0 0 0 0\n5 0 0 0 1 1 1 1 7 0\n1 0 0 0 1 1 1 1 9 1 5\n$EndEntities\n\
+        $Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n\
+        $Elements\n1 1 1 1\n3 1 4 1\n1 1 2 3 4\n$EndElements\n";
     vec![
         ("stl", binary_stl),
         ("stl", text_stl.into_bytes()),
@@ -60,12 +64,15 @@ fn good_files() -> Vec<(&'static str, Vec<u8>)> {
         ("ply", std::fs::read(ply).unwrap()),
         ("msh", std::fs::read(msh).unwrap()),
         ("msh", text_msh.as_bytes().to_vec()),
+        ("msh", grouped_msh.as_bytes().to_vec()),
     ]
 }
 
 fn read(path: &Path) -> Result<(), String> {
     if path.extension().is_some_and(|e| e == "msh") {
-        return read_msh(path).map(|_| ()).map_err(|e| e.to_string());
+        let (whole, groups) = (read_msh(path), read_msh_groups(path));
+        assert_eq!(whole.is_ok(), groups.is_ok());
+        return whole.map(|_| ()).map_err(|e| e.to_string());
     }
     let mesh = read_surface(path, Unit::Metre).map_err(|e| e.to_string())?;
     assert!(mesh.vertices.iter().all(|v| v.is_finite()));

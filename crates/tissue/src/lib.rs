@@ -10,6 +10,7 @@
 mod body;
 mod builder;
 mod coloring;
+mod comparator;
 mod descent;
 mod elements;
 mod error;
@@ -37,11 +38,12 @@ mod sweep;
 
 pub use body::Body;
 pub use builder::{BodyDescription, ModelBuilder};
+pub use comparator::{SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep, stable_explicit_step};
 pub use error::{Error, Result};
 pub use grasp::{Grasp, ToolMotion};
 pub use material::{ConstitutiveModel, Corotated, Hyperelastic, Material, StVenantKirchhoff, StableNeoHookean};
 pub use model::{Model, SupportPlane};
-pub use oracle::{Held, Oracle, OracleState};
+pub use oracle::{Held, Newton, Oracle, OracleState};
 pub use report::{Divergence, StepReport};
 pub use schedule::{Descent, QuasiNewton, Schedule, Start};
 pub use simd::Isa;

@@ -4,7 +4,7 @@ use crate::Body;
 use crate::state::BodyState;
 
 /// A node at this speed [m/s] has diverged (the paper's particle velocity limit).
-const SPEED_LIMIT: f64 = 20.0;
+pub(crate) const SPEED_LIMIT: f64 = 20.0;
 
 /// An edge of more than this many rest lengths has diverged.
 const STRETCH_LIMIT: f32 = 10.0;
@@ -27,6 +27,11 @@ pub enum Divergence {
         /// The body.
         body: usize,
     },
+    /// Newton's method found no minimum in a substep; the body is where it was at its beginning.
+    Unsolved {
+        /// The body.
+        body: usize,
+    },
 }
 
 impl std::fmt::Display for Divergence {
@@ -34,6 +39,7 @@ impl std::fmt::Display for Divergence {
         match self {
             Self::NonFinite { body } => write!(f, "body {body} has a position that is not finite"),
             Self::OverSpeed { body } => write!(f, "a node of body {body} is at the speed limit of {SPEED_LIMIT} m/s"),
+            Self::Unsolved { body } => write!(f, "no minimum was found for body {body}"),
             Self::OverStretch { body } => {
                 write!(f, "an edge of body {body} is over {STRETCH_LIMIT} times its rest length")
             }

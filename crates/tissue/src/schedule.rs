@@ -1,6 +1,6 @@
 //! How a frame is integrated: which solver, and how the frame is cut.
 
-use crate::{Error, Result};
+use crate::{Error, Newton, Result, SemiImplicit, Xpbd, XpbdSweep};
 
 /// Where the sweeps of a substep start from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,6 +45,12 @@ pub enum Schedule {
     QuasiNewton(QuasiNewton),
     /// Vertex Block Descent.
     Descent(Descent),
+    /// Semi-implicit Euler, to compare with.
+    SemiImplicit(SemiImplicit),
+    /// Extended position-based dynamics, to compare with.
+    Xpbd(Xpbd),
+    /// Implicit Euler exactly, in double precision: slow, to compare with.
+    Newton(Newton),
 }
 
 /// More substeps or iterations than anyone means.
@@ -66,6 +72,9 @@ impl Schedule {
         match self {
             Self::QuasiNewton(method) => method.substeps,
             Self::Descent(descent) => descent.substeps,
+            Self::SemiImplicit(settings) => settings.substeps,
+            Self::Xpbd(settings) => settings.substeps,
+            Self::Newton(settings) => settings.substeps,
         }
     }
 
@@ -82,6 +91,15 @@ impl Schedule {
                 (substeps, iterations)
             }
             Self::Descent(Descent { substeps, iterations, .. }) => (substeps, iterations),
+            Self::Xpbd(Xpbd { substeps, iterations, sweep, .. }) => {
+                if let XpbdSweep::Jacobi { relaxation } = sweep
+                    && !(relaxation > 0.0 && relaxation <= 1.0)
+                {
+                    return Err(Error::Model(format!("a relaxation of {relaxation}; above 0 and at most 1 make sense")));
+                }
+                (substeps, iterations)
+            }
+            Self::SemiImplicit(SemiImplicit { substeps }) | Self::Newton(Newton { substeps }) => (substeps, 1),
         };
         for (name, count) in [("substeps", substeps), ("iterations", iterations)] {
             if !(1..=MOST).contains(&count) {

@@ -1,7 +1,9 @@
 //! One frame of simulation: every body by its solver, bodies in parallel.
 
+use crate::comparator::ComparatorIntegrator;
 use crate::descent::DescentIntegrator;
 use crate::integrator::{Frame, Integrator};
+use crate::oracle::NewtonIntegrator;
 use crate::quasi_newton::QuasiNewtonIntegrator;
 use crate::report::Divergence;
 use crate::schedule::{Descent, Start};
@@ -103,5 +105,8 @@ fn integrator(schedule: &Schedule, body: &Body, dt: f64) -> Box<dyn Integrator> 
             }
         },
         Schedule::Descent(descent) => sweeps(*descent),
+        Schedule::SemiImplicit(settings) => Box::new(ComparatorIntegrator::semi_implicit(*settings, body)),
+        Schedule::Xpbd(settings) => Box::new(ComparatorIntegrator::xpbd(*settings, body)),
+        Schedule::Newton(settings) => Box::new(NewtonIntegrator::new(*settings, body)),
     }
 }

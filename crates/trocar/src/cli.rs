@@ -1,5 +1,11 @@
 //! What a user may type.
 
+mod comparison;
+mod solver;
+
+pub use comparison::*;
+pub use solver::*;
+
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
@@ -188,6 +194,12 @@ pub struct Experiment {
 pub enum ExperimentName {
     /// Table I and Fig. 6(a): every phantom recorded, reconstructed and measured against its truth.
     Reconstruction(ReconstructionExperiment),
+    /// How near each iteration comes to the exact step: scenes, moduli and Poisson ratios, over iterations and over time.
+    Convergence(ConvergenceExperiment),
+    /// Fig. 6(b): which integrators stay bounded when specimen A is released, and how far each sags from the truth.
+    Integrators(IntegratorsExperiment),
+    /// Fig. 6(c): how fast phantoms A, B and C come to rest in the cell.
+    Settling(SettlingExperiment),
 }
 
 /// Arguments of `experiment reconstruction`.
@@ -229,6 +241,10 @@ pub struct Bench {
 pub enum BenchName {
     /// The lattice mesher from ten thousand to a million elements, and beside TetGen and fTetWild.
     Meshing(MeshingBench),
+    /// Speed and error of the stepping of six organs by one schedule.
+    Organs(OrgansBench),
+    /// Speed of the stepping from a thousand to a million elements, over threads, and of many small models at once.
+    Scaling(ScalingBench),
 }
 
 /// Arguments of `bench meshing`.

@@ -1,14 +1,14 @@
 //! What meshing costs: the lattice mesher from ten thousand to a million elements, and side by side with TetGen and fTetWild.
 
 use super::pytetwild::PytetwildMesher;
+use crate::scenes::ellipsoid;
 use crate::workflow::REPORT;
 use crate::{Error, Result, report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_geometry::io::{Unit, read_surface};
-use trocar_geometry::{LatticeMesher, Mesher, SignedDistance, TetMesh, TetQuality, TetgenMesher, TriMesh, isosurface};
-use trocar_geometry::{repair, sample_everywhere};
+use trocar_geometry::{LatticeMesher, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, repair};
 use trocar_progress::Progress;
 use trocar_specimen::StagedFolder;
 
@@ -132,9 +132,7 @@ impl MeshingBench {
     /// The surfaces by name, repaired if need be.
     fn surfaces(&self) -> Result<Vec<(String, TriMesh)>> {
         if self.surfaces.is_empty() {
-            let half = glam::DVec3::from(LIVER);
-            let grid = sample_everywhere(&Ellipsoid(half), (-half, half), 3e-3);
-            return Ok(vec![("ellipsoid of 815 cm3".into(), isosurface(&grid, 0.0))]);
+            return Ok(vec![("ellipsoid of 815 cm3".into(), ellipsoid(LIVER.into(), 3e-3))]);
         }
         let read = |path: &PathBuf| -> Result<(String, TriMesh)> {
             let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
@@ -142,16 +140,6 @@ impl MeshingBench {
             Ok((name, repair(&raw)?.0))
         };
         self.surfaces.iter().map(read).collect()
-    }
-}
-
-/// An ellipsoid by its half axes; the value is a distance near its surface.
-struct Ellipsoid(glam::DVec3);
-
-impl SignedDistance for Ellipsoid {
-    fn distance(&self, p: glam::DVec3) -> f64 {
-        let (k, g) = ((p / self.0).length(), (p / (self.0 * self.0)).length());
-        if g > 0.0 { k * (k - 1.0) / g } else { -self.0.min_element() }
     }
 }
 

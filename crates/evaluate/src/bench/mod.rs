@@ -1,6 +1,16 @@
 //! Measurements of speed and cost: one file each.
 
+mod machine;
+mod many;
 mod meshing;
+mod organs;
 mod pytetwild;
+mod scaling;
+mod timing;
 
+pub use machine::Machine;
+pub use many::ManyRow;
 pub use meshing::{MeshingBench, MeshingResult, MeshingRow};
+pub use organs::{OrganSource, OrgansBench, OrgansResult};
+pub use scaling::{ScalingBench, ScalingResult, ScalingRow};
+pub use timing::Timing;

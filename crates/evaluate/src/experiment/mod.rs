@@ -1,5 +1,40 @@
 //! The paper's tables and figures, made anew: one file an experiment.
 
+mod convergence;
+mod integrator_forms;
+mod integrators;
+mod phantoms;
 mod reconstruction;
+mod settling;
+mod step_ladder;
 
+pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult};
+pub(crate) use integrators::SPEED_LIMIT;
+pub use integrators::{IntegratorRow, IntegratorsExperiment, IntegratorsResult};
 pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
+pub(crate) use settling::SETTLED;
+pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
+pub use step_ladder::StepRow;
+
+use crate::{Error, Result};
+use std::path::Path;
+
+/// Makes the folder of an experiment that goes on where an earlier run was: it must be new, empty, or hold `marker`.
+fn claim(output: &Path, marker: &str) -> Result<()> {
+    let io = |source| Error::Io { path: output.to_owned(), source };
+    let path = output.join(marker);
+    if output.exists() && !path.is_file() && output.read_dir().map_err(io)?.next().is_some() {
+        let reason =
+            format!("holds no {marker}, so it is no earlier experiment and is not written to; name a new folder");
+        return Err(Error::Exists { path: output.to_owned(), reason });
+    }
+    std::fs::create_dir_all(output).map_err(io)?;
+    if !path.is_file() {
+        write(&path, b"{}\n")?;
+    }
+    Ok(())
+}
+
+fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+    std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.to_owned(), source })
+}

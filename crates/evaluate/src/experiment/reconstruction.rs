@@ -1,5 +1,7 @@
 //! Table I and Fig. 6(a): every phantom recorded, reconstructed with one set of settings, and measured against its truth.
 
+use super::phantoms::recorded;
+use super::{claim, write};
 use crate::paper::table_i;
 use crate::truth::DEPTH_UNIT;
 use crate::workflow::{CompositeFigures, REPORT, reconstruct_recording};
@@ -12,7 +14,7 @@ use trocar_geometry::io::{Unit, read_surface};
 use trocar_phantom::RecordOptions;
 use trocar_progress::Progress;
 use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
-use trocar_recording::{Recording, RecordingInfo};
+use trocar_recording::Recording;
 
 /// The file that makes a folder one of this experiment's.
 const MARKER: &str = "reconstruction.json";
@@ -106,7 +108,7 @@ impl ReconstructionExperiment {
     /// When the folder cannot be written, or an interruption; what is finished by then is used again the next time.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<ReconstructionResult> {
         let clock = Instant::now();
-        claim(output)?;
+        claim(output, MARKER)?;
         let mut result = ReconstructionResult {
             organs: Vec::new(),
             phantoms: Vec::new(),
@@ -117,7 +119,7 @@ impl ReconstructionExperiment {
         for phantom in &self.phantoms {
             let folder = output.join(phantom);
             let recording = folder.join("recording");
-            self.record(phantom, &recording, progress)?;
+            recorded(phantom, &self.record, &recording, progress)?;
             let (made, reconstruction) =
                 reconstruct_recording(&recording, &self.settings, &folder.join("specimen"), progress)?;
             let paper_way = Settings { surface: SurfaceRule::BinaryGrid, ..self.settings.clone() };
@@ -138,35 +140,6 @@ impl ReconstructionExperiment {
         write(&output.join(MARKER), &json)?;
         Ok(result)
     }
-
-    /// Records `phantom` into `dir` unless a recording of the same options lies there.
-    fn record(&self, phantom: &str, dir: &Path, progress: &dyn Progress) -> Result<()> {
-        let described = trocar_phantom::describe(phantom, &self.record)?;
-        let same = |info: &RecordingInfo| *info == described;
-        if let Ok(earlier) = Recording::open(dir)
-            && same(&earlier.info)
-            && earlier.len() == self.record.frames
-        {
-            return Ok(());
-        }
-        Ok(trocar_phantom::record(phantom, &self.record, dir, progress)?)
-    }
-}
-
-/// Makes the folder, which must be new, empty, or an earlier one of this experiment.
-fn claim(output: &Path) -> Result<()> {
-    let io = |source| Error::Io { path: output.to_owned(), source };
-    let marker = output.join(MARKER);
-    if output.exists() && !marker.is_file() && output.read_dir().map_err(io)?.next().is_some() {
-        let reason =
-            format!("holds no {MARKER}, so it is no earlier experiment and is not written to; name a new folder");
-        return Err(Error::Exists { path: output.to_owned(), reason });
-    }
-    std::fs::create_dir_all(output).map_err(io)?;
-    if !marker.is_file() {
-        write(&marker, b"{}\n")?;
-    }
-    Ok(())
 }
 
 fn rows(
@@ -217,8 +190,4 @@ fn rows(
         })
     };
     made.specimen.organs.iter().enumerate().map(row).collect()
-}
-
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.to_owned(), source })
 }

@@ -16,8 +16,17 @@ pub(super) fn body(result: &MeshingResult) -> Result<String> {
     let plot = |title: &'static str, y: &'static str, points: Vec<(f64, f64)>| {
         let line = Line { points, color: super::colors::organ(0), filled: false };
         let x = "tetrahedra [thousands]";
-        let plot =
-            Plot { title, x, y, lines: vec![line], bands: vec![], show: vec![0.0], limits: vec![], log_y: false };
+        let plot = Plot {
+            title,
+            x,
+            y,
+            lines: vec![line],
+            bands: vec![],
+            show: vec![0.0],
+            limits: vec![],
+            log_x: false,
+            log_y: false,
+        };
         Ok::<_, crate::Error>(page::figure(&plot.svg()?, &format!("<b>{title}.</b>")))
     };
     let figures = [

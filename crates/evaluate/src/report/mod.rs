@@ -4,7 +4,9 @@
 //! the organs behaved when they were lifted.
 
 mod colors;
+mod convergence;
 mod figures;
+mod integrators;
 mod meshing;
 mod moving_picture;
 mod overlays;
@@ -12,13 +14,15 @@ mod page;
 mod plots;
 mod reconstruction_experiment;
 mod run;
+mod scaling;
 mod seen;
+mod settling;
 mod table;
 mod truth;
 mod views;
 
-use crate::bench::MeshingResult;
-use crate::experiment::ReconstructionResult;
+use crate::bench::{MeshingResult, ScalingResult};
+use crate::experiment::{ConvergenceResult, IntegratorsResult, ReconstructionResult, SettlingResult};
 use crate::{Error, Result};
 use moving_picture::Lift;
 use std::path::Path;
@@ -75,6 +79,39 @@ pub(crate) fn reconstruction_experiment(result: &ReconstructionResult, made: &[R
 /// A plot that cannot be drawn.
 pub(crate) fn meshing(result: &MeshingResult) -> Result<String> {
     Ok(page::page("Meshing", "From closed surfaces to tetrahedra", &meshing::body(result)?))
+}
+
+/// The page of the scaling benchmark.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn scaling(result: &ScalingResult) -> Result<String> {
+    Ok(page::page("Scaling", "Stepping over elements, threads and models", &scaling::body(result)?))
+}
+
+/// The page of the integrators' comparison.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn integrators(result: &IntegratorsResult) -> Result<String> {
+    Ok(page::page("Integrators", "Which stay bounded, and which are right", &integrators::body(result)?))
+}
+
+/// The page of the settling experiment.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn settling(result: &SettlingResult) -> Result<String> {
+    Ok(page::page("Settling", "Phantoms released into the cell", &settling::body(result)?))
+}
+
+/// The page of the convergence experiment.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn convergence(result: &ConvergenceResult) -> Result<String> {
+    let subtitle = "Position and energy error of one substep, over iterations and over time";
+    Ok(page::page("Convergence", subtitle, &convergence::body(result)?))
 }
 
 /// The page of a specimen made from a ready surface.

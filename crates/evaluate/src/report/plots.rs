@@ -38,6 +38,8 @@ pub(super) struct Plot<'a> {
     pub(super) show: Vec<f64>,
     /// Dashed horizontal lines.
     pub(super) limits: Vec<f64>,
+    /// Logarithmic x axis; values at or below 0 are left out.
+    pub(super) log_x: bool,
     /// Logarithmic y axis; values at or below 0 are left out.
     pub(super) log_y: bool,
 }
@@ -45,17 +47,22 @@ pub(super) struct Plot<'a> {
 impl Plot<'_> {
     /// The plot as an `<svg>`, or a sentence when there is nothing to plot.
     pub(super) fn svg(&self) -> Result<String> {
-        let keep = |&(x, y): &(f64, f64)| x.is_finite() && y.is_finite() && (!self.log_y || y > 0.0);
+        let shown_on = |log: bool, v: f64| v.is_finite() && (!log || v > 0.0);
+        let keep = |&(x, y): &(f64, f64)| shown_on(self.log_x, x) && shown_on(self.log_y, y);
         let scale = |y: f64| if self.log_y { y.log10() } else { y };
+        let along = |x: f64| if self.log_x { x.log10() } else { x };
         let lines: Vec<Vec<(f64, f64)>> = self
             .lines
             .iter()
-            .map(|l| l.points.iter().filter(|p| keep(p)).map(|&(x, y)| (x, scale(y))).collect())
+            .map(|l| l.points.iter().filter(|p| keep(p)).map(|&(x, y)| (along(x), scale(y))).collect())
             .collect();
-        let Some(x_range) = range(lines.iter().flatten().map(|p| p.0)) else {
+        let Some((left, right)) = range(lines.iter().flatten().map(|p| p.0)) else {
             return Ok(format!("<p class=\"lead\">Nothing to plot for {}.</p>", super::page::escape(self.title)));
         };
-        let shown = self.show.iter().chain(&self.limits).filter(|y| keep(&(0.0, **y))).map(|y| scale(*y));
+        // Values that are a little off a power of ten still show it.
+        let beside = if self.log_x { 0.04 * (right - left) } else { 0.0 };
+        let x_range = (left - beside, right + beside);
+        let shown = self.show.iter().chain(&self.limits).filter(|y| shown_on(self.log_y, **y)).map(|y| scale(*y));
         let (low, high) = range(lines.iter().flatten().map(|p| p.1).chain(shown)).unwrap_or((0.0, 1.0));
         let y_range = if self.log_y {
             (low.floor(), high.ceil().max(low.floor() + 1.0))
@@ -103,6 +110,8 @@ impl Plot<'_> {
         let log = self.log_y;
         let tick = move |y: &f64| if log { power_of_ten(*y) } else { decimal(*y, y1 - y0) };
         let across = x1 - x0;
+        let log_x = self.log_x;
+        let tick_x = move |x: &f64| if log_x { power_of_ten(*x) } else { decimal(*x, across) };
         chart
             .configure_mesh()
             .light_line_style(TRANSPARENT)
@@ -110,7 +119,7 @@ impl Plot<'_> {
             .axis_style(INK.mix(0.6))
             .x_labels(9)
             .y_labels(if log { ((y1 - y0) as usize + 1).min(7) } else { 6 })
-            .x_label_formatter(&move |x| decimal(*x, across))
+            .x_label_formatter(&tick_x)
             .y_label_formatter(&tick)
             .x_desc(self.x)
             .y_desc(self.y)
@@ -197,6 +206,7 @@ mod tests {
             bands: vec![Band { name: "settle".into(), from: 0.0, to: 2.0 }],
             show: vec![0.0],
             limits: vec![3.0],
+            log_x: false,
             log_y,
         }
         .svg()
@@ -219,6 +229,17 @@ mod tests {
         assert!(plot(vec![(1.0, 2.0)], false).contains("<svg"));
         assert!(plot(vec![(0.0, 1e-9), (1.0, 1e5)], true).contains("10⁻⁸"));
         assert!(plot(vec![(0.0, 1e300), (1.0, -1e300)], false).contains("<svg"));
+    }
+
+    #[test]
+    fn both_axes_may_be_logarithmic() {
+        let points = vec![(0.0, 1.0), (1_039.0, 0.5), (10_000.0, 5.0), (99_900.0, 50.0)];
+        let line = Line { points, color: [10, 20, 30], filled: false };
+        let (title, x, y) = ("speed", "elements", "times");
+        let (lines, limits) = (vec![line], vec![1.0]);
+        let plot = Plot { title, x, y, lines, bands: vec![], show: vec![], limits, log_x: true, log_y: true };
+        let svg = plot.svg().unwrap();
+        assert!(["10³", "10⁴", "10⁵"].iter().all(|tick| svg.contains(tick)), "{svg}");
     }
 
     #[test]

@@ -138,8 +138,18 @@ fn plots(samples: &[Sample]) -> Result<String> {
         filled: false,
     };
     let plot = |title, y, lines, show: &[f64], limits: &[f64], log_y| {
-        Plot { title, x: "time [s]", y, lines, bands: bands(), show: show.to_vec(), limits: limits.to_vec(), log_y }
-            .svg()
+        Plot {
+            title,
+            x: "time [s]",
+            y,
+            lines,
+            bands: bands(),
+            show: show.to_vec(),
+            limits: limits.to_vec(),
+            log_x: false,
+            log_y,
+        }
+        .svg()
     };
     let lift = vec![line(&|s| s.jaw_lift_mm, JAW), line(&|s| s.tissue_lift_mm, TISSUE)];
     let slip = vec![Line { filled: true, ..line(&|s| s.slip_mm, TISSUE) }];

@@ -195,6 +195,7 @@ fn histogram(r: &Reconstruction) -> Result<String> {
         bands: vec![],
         show: vec![0.0],
         limits: vec![],
+        log_x: false,
         log_y: false,
     }
     .svg()

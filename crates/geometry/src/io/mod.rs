@@ -5,7 +5,7 @@ mod obj;
 mod ply;
 mod stl;
 
-pub use msh::{read_msh, write_msh};
+pub use msh::{read_msh, read_msh_groups, write_msh};
 pub use ply::write_ply;
 
 use crate::{Error, Result, TriMesh};

@@ -3,6 +3,8 @@
 //! Format: Gmsh reference manual, "Gmsh file formats". The two versions and the two encodings hold the same numbers in
 //! almost the same order, so one parser reads them all from a source of numbers that knows the encoding.
 
+mod groups;
+
 use super::{Parsed, bad, write};
 use crate::{Error, Result, TetMesh};
 use glam::DVec3;
@@ -27,6 +29,16 @@ const NO_VOLUME: f64 = 1e-12;
 pub fn read_msh(path: &Path) -> Result<TetMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
     parse(&bytes).map_err(|reason| bad(path, reason))
+}
+
+/// Reads the tetrahedra of a Gmsh `.msh` file group by group: of each physical group with a name, name and mesh, by the groups' numbers, and before them without a
+/// name what is in none. Nodes that groups share are in each of them. Otherwise as [`read_msh`].
+///
+/// # Errors
+/// As [`read_msh`].
+pub fn read_msh_groups(path: &Path) -> Result<Vec<(Option<String>, TetMesh)>> {
+    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    contents(&bytes).and_then(groups::split).map_err(|reason| bad(path, reason))
 }
 
 /// Writes a Gmsh 4.1 binary `.msh`, in metres.
@@ -66,9 +78,19 @@ pub fn write_msh(path: &Path, mesh: &TetMesh) -> Result<()> {
 struct Content {
     nodes: Vec<(u64, DVec3)>,
     tets: Vec<(u64, [u64; 4])>,
+    /// For each of `tets`, its physical group; 0 for none.
+    group_of: Vec<i64>,
+    /// Physical groups of volumes: number and name.
+    groups: Vec<(i64, String)>,
+    /// Version 4.1: volumes and their first physical group.
+    volumes: Vec<(i64, i64)>,
 }
 
 fn parse(bytes: &[u8]) -> Parsed<TetMesh> {
+    assemble(&contents(bytes)?)
+}
+
+fn contents(bytes: &[u8]) -> Parsed<Content> {
     let mut source = Source { bytes, at: 0, binary: false };
     if source.line() != b"$MeshFormat" {
         return Err("a Gmsh file starts with $MeshFormat".into());
@@ -94,6 +116,8 @@ fn parse(bytes: &[u8]) -> Parsed<TetMesh> {
     let (mut seen_nodes, mut seen_elements) = (false, false);
     while let Some(section) = source.section() {
         match section.as_str() {
+            "$PhysicalNames" => groups::read_names(&mut source, &mut content)?,
+            "$Entities" if !old => groups::read_volumes(&mut source, &mut content)?,
             "$Nodes" if old => read_nodes_2(&mut source, &mut content)?,
             "$Nodes" => read_nodes_4(&mut source, &mut content)?,
             "$Elements" if old => read_elements_2(&mut source, &mut content)?,
@@ -105,7 +129,7 @@ fn parse(bytes: &[u8]) -> Parsed<TetMesh> {
         source.skip_past(&section.replacen('$', "$End", 1))?;
     }
     match (seen_nodes, seen_elements) {
-        (true, true) => assemble(&content),
+        (true, true) => Ok(content),
         (false, _) => Err("the file has no section $Nodes".into()),
         (_, false) => Err("the file has no section $Elements".into()),
     }
@@ -163,10 +187,13 @@ fn read_elements_2(source: &mut Source<'_>, content: &mut Content) -> Parsed<()>
         let corners = node_count(kind)?;
         for _ in 0..run {
             let tag = tag.map_or_else(|| source.tag_2(), Ok)?;
-            for _ in 0..tags {
-                source.int()?;
+            let mut group = 0;
+            for k in 0..tags {
+                let tag = source.int()?;
+                // The first is the physical group.
+                group = if k == 0 { tag } else { group };
             }
-            read_element(content, kind, corners, tag, || source.tag_2())?;
+            read_element(content, kind, corners, (tag, group), || source.tag_2())?;
         }
         read += run;
     }
@@ -179,12 +206,13 @@ fn read_elements_4(source: &mut Source<'_>, content: &mut Content) -> Parsed<()>
     let _tag_range = (source.size()?, source.size()?);
     let mut read = 0;
     for _ in 0..blocks {
-        let (_dimension, _entity, kind, count) = (source.int()?, source.int()?, source.int()?, source.size()?);
+        let (_dimension, entity, kind, count) = (source.int()?, source.int()?, source.int()?, source.size()?);
         source.expect(count, if source.binary { 16 } else { 4 }, "elements")?;
         let corners = node_count(kind)?;
+        let group = content.volumes.iter().find(|v| v.0 == entity).map_or(0, |v| v.1);
         for _ in 0..count {
             let tag = source.size()?;
-            read_element(content, kind, corners, tag, || source.size())?;
+            read_element(content, kind, corners, (tag, group), || source.size())?;
         }
         read += count;
     }
@@ -206,11 +234,12 @@ fn read_element(
     content: &mut Content,
     kind: i64,
     corners: usize,
-    tag: u64,
+    (tag, group): (u64, i64),
     mut node: impl FnMut() -> Parsed<u64>,
 ) -> Parsed<()> {
     if kind == TET {
         content.tets.push((tag, [node()?, node()?, node()?, node()?]));
+        content.group_of.push(group);
     } else {
         for _ in 0..corners {
             node()?;

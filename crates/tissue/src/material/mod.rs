@@ -16,7 +16,7 @@ pub(crate) use volume::VolumeEnergy;
 use glam::DMat3;
 
 /// A hyperelastic material: a stored energy of the deformation gradient F.
-pub trait Hyperelastic {
+pub trait Hyperelastic: Send + Sync {
     /// Energy density at F [J/m3]; 0 and smallest at rest.
     fn energy(&self, f: DMat3) -> f64;
 

@@ -23,12 +23,15 @@ pub(crate) mod element;
 mod factor;
 mod friction;
 mod guard;
+mod integrator;
 mod newton;
 mod potential;
 mod state;
 #[cfg(test)]
 mod tests;
 
+pub use integrator::Newton;
+pub(crate) use integrator::NewtonIntegrator;
 pub use state::{Held, OracleState};
 
 use crate::{Error, Model, Result};
@@ -111,6 +114,33 @@ impl Oracle {
         self.solve(model, state, held, None)
     }
 
+    /// The incremental potential of each body [J] of a step of `dt` [s] from `before` that ends with the positions of `after`: what [`Self::step`] minimises over free
+    /// nodes, without friction. Not finite where an element has no volume. Zero is nothing in particular: only differences mean something.
+    ///
+    /// # Errors
+    /// States of another model or that are not finite; a `dt` that is not above 0.
+    pub fn energy(&self, model: &Model, before: &OracleState, after: &OracleState, dt: f64) -> Result<Vec<f64>> {
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::Model(format!("a step of {dt} s; it must be above 0")));
+        }
+        before.check(model, &[])?;
+        after.check(model, &[])?;
+        self.check(model)?;
+        let of_body = |(((elastic, _), before), after): ((&(Elastic, Solver), &state::Nodes), &state::Nodes)| {
+            let motion = Some(Motion::new(elastic, before, model.gravity, dt));
+            let potential = Potential { elastic, motion, gravity: model.gravity, limits: Vec::new() };
+            potential.gradient(&after.x, &mut vec![DVec3::ZERO; after.x.len()])
+        };
+        Ok(self.bodies.iter().zip(&before.bodies).zip(&after.bodies).map(of_body).collect())
+    }
+
+    /// Refuses another model than it was prepared for.
+    fn check(&self, model: &Model) -> Result<()> {
+        let fits = self.bodies.len() == model.bodies.len()
+            && self.bodies.iter().zip(&model.bodies).all(|((elastic, _), body)| elastic.masses.len() == body.len());
+        if fits { Ok(()) } else { Err(Error::Model("the oracle was prepared for another model".to_owned())) }
+    }
+
     fn solve(
         &mut self,
         model: &Model,
@@ -119,11 +149,7 @@ impl Oracle {
         dt: Option<f64>,
     ) -> Result<Vec<Solution>> {
         state.check(model, held)?;
-        let fits = self.bodies.len() == model.bodies.len()
-            && self.bodies.iter().zip(&model.bodies).all(|((elastic, _), body)| elastic.masses.len() == body.len());
-        if !fits {
-            return Err(Error::Model("the oracle was prepared for another model".to_owned()));
-        }
+        self.check(model)?;
         let mut solved = Vec::with_capacity(self.bodies.len());
         for (index, (elastic, solver)) in self.bodies.iter_mut().enumerate() {
             let body = &model.bodies[index];

@@ -58,6 +58,35 @@ impl OracleState {
         Self { time: state.time, bodies: (0..model.bodies.len()).map(nodes).collect() }
     }
 
+    /// A stepper's state of the same motion, rounded to `f32`, without grasps. What the adaptive start is to know of the acceleration is taken from `before`, the oracle's state
+    /// a step of `dt` [s] earlier.
+    ///
+    /// # Errors
+    /// States of another model or that are not finite; a `dt` that is not above 0.
+    pub fn to_state(&self, model: &Model, before: &OracleState, dt: f64) -> Result<State> {
+        self.check(model, &[])?;
+        before.check(model, &[])?;
+        if !(dt > 0.0 && dt.is_finite()) {
+            return Err(Error::Model(format!("a step of {dt} s; it must be above 0")));
+        }
+        let strength = model.gravity.length_squared();
+        let mut state = State::new(model);
+        state.time = self.time;
+        for (k, body) in model.bodies.iter().enumerate() {
+            let (to, now, earlier) = (&mut state.bodies[k], &self.bodies[k], &before.bodies[k]);
+            for (node, i) in body.internal.iter().enumerate() {
+                let i = *i as usize;
+                to.x[i] = (now.x[node] - body.origin).as_vec3a();
+                to.v[i] = now.v[node].as_vec3a();
+                if strength > 0.0 {
+                    let acceleration = (now.v[node] - earlier.v[node]) / dt;
+                    to.falling[i] = (acceleration.dot(model.gravity) / strength).clamp(0.0, 1.0) as f32;
+                }
+            }
+        }
+        Ok(state)
+    }
+
     /// World positions of a body's nodes [m].
     pub fn positions(&self, body: usize) -> &[DVec3] {
         &self.bodies[body].x

@@ -1,5 +1,8 @@
 //! `trocar bench`.
 
+mod organs;
+mod scaling;
+
 use crate::cli::{Bench, BenchName, MeshingBench};
 use crate::output;
 use trocar_evaluate::{MeshingResult, Result};
@@ -8,6 +11,8 @@ use trocar_progress::Progress;
 pub fn run(arguments: &Bench, json: bool, progress: &dyn Progress) -> Result<()> {
     match &arguments.name {
         BenchName::Meshing(arguments) => meshing(arguments, json, progress),
+        BenchName::Organs(arguments) => organs::run(arguments, json, progress),
+        BenchName::Scaling(arguments) => scaling::run(arguments, json, progress),
     }
 }
 

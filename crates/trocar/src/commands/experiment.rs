@@ -1,5 +1,9 @@
 //! `trocar experiment`.
 
+mod convergence;
+mod integrators;
+mod settling;
+
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
 use trocar_evaluate::{ReconstructionResult, Result};
@@ -9,6 +13,9 @@ use trocar_reconstruct::Settings;
 
 pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Result<()> {
     match &arguments.name {
+        ExperimentName::Convergence(arguments) => convergence::run(arguments, json, progress),
+        ExperimentName::Integrators(arguments) => integrators::run(arguments, json, progress),
+        ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }
 }

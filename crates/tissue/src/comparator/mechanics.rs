@@ -1,0 +1,102 @@
+//! What the comparators know of a body, in double precision and internal order, and what moves.
+
+use crate::builder::shape_gradients;
+use crate::report::SPEED_LIMIT;
+use crate::{Body, SupportPlane};
+use glam::{DMat3, DVec3};
+
+/// A body's constants, vertices in internal order, positions relative to the body's origin.
+pub(crate) struct Mechanics {
+    pub tets: Vec<[u32; 4]>,
+    /// Rest gradients of the shape functions [1/m].
+    pub gradients: Vec<[DVec3; 4]>,
+    /// Rest volumes [m3].
+    pub volumes: Vec<f64>,
+    /// [kg]
+    pub masses: Vec<f64>,
+    /// Edges with a dashpot: vertices and coefficient [N s/m].
+    pub dashpots: Vec<([u32; 2], f64)>,
+    pub planes: Vec<SupportPlane>,
+    /// [N/m]
+    pub contact_stiffness: Vec<f64>,
+}
+
+/// Positions [m] and velocities [m/s].
+pub(crate) struct Particles {
+    pub x: Vec<DVec3>,
+    pub v: Vec<DVec3>,
+}
+
+/// A stretch of time, and where fixed vertices are at its end.
+#[derive(Clone, Copy)]
+pub(crate) struct Span<'a> {
+    /// [s]
+    pub dt: f64,
+    /// [m/s2]
+    pub gravity: DVec3,
+    /// Pinned or held vertices.
+    pub fixed: &'a [bool],
+    /// Read for fixed vertices only [m].
+    pub targets: &'a [DVec3],
+}
+
+impl Mechanics {
+    pub fn new(body: &Body) -> Self {
+        let mut dashpots = Vec::new();
+        for i in 0..body.len() {
+            for edge in body.edges_of(i).iter().filter(|e| e.to as usize > i && e.damping > 0.0) {
+                dashpots.push(([i as u32, edge.to], f64::from(edge.damping)));
+            }
+        }
+        let local = |plane: &SupportPlane| SupportPlane { point: plane.point - body.origin, ..*plane };
+        Self {
+            tets: body.tets.clone(),
+            gradients: (0..body.tets.len()).map(|t| shape_gradients(&body.rest, t)).collect(),
+            volumes: body.volumes.clone(),
+            masses: body.vertices.iter().map(|v| f64::from(v.mass)).collect(),
+            dashpots,
+            planes: body.supports.iter().map(local).collect(),
+            contact_stiffness: body.vertices.iter().map(|v| f64::from(v.contact_stiffness)).collect(),
+        }
+    }
+
+    /// Deformation gradient of an element.
+    pub fn deformation(&self, t: usize, x: &[DVec3]) -> DMat3 {
+        let [a, b, c, d] = self.tets[t].map(|i| x[i as usize]);
+        let mut f = DMat3::ZERO;
+        // The gradients sum to zero.
+        for (edge, m) in [(b - a), (c - a), (d - a)].into_iter().zip(&self.gradients[t][1..]) {
+            f.x_axis += edge * m.x;
+            f.y_axis += edge * m.y;
+            f.z_axis += edge * m.z;
+        }
+        f
+    }
+
+    /// Lets the dashpots act on velocities for a time of `h` [s], pair by pair, each as implicit Euler has it for the pair alone: they take energy at any `h` and keep both
+    /// momenta. Fixed vertices keep their velocities.
+    pub fn damp(&self, h: f64, x: &[DVec3], v: &mut [DVec3], fixed: &[bool]) {
+        for ([i, j], coefficient) in &self.dashpots {
+            let (i, j) = (*i as usize, *j as usize);
+            let inverse = |i: usize| if fixed[i] { 0.0 } else { 1.0 / self.masses[i] };
+            let (wi, wj) = (inverse(i), inverse(j));
+            let n = (x[j] - x[i]).normalize_or_zero();
+            let impulse = h * coefficient * n.dot(v[j] - v[i]) / (1.0 + h * coefficient * (wi + wj));
+            v[i] += wi * impulse * n;
+            v[j] -= wj * impulse * n;
+        }
+    }
+}
+
+impl Span<'_> {
+    /// Where a fixed vertex that begins at `from` is when `share` of the span is over.
+    pub fn prescribed(&self, i: usize, from: DVec3, share: f64) -> DVec3 {
+        if share >= 1.0 { self.targets[i] } else { from.lerp(self.targets[i], share) }
+    }
+}
+
+/// Whether a free vertex is at the speed limit, or has no speed at all.
+pub(crate) fn too_fast(v: &[DVec3], fixed: &[bool]) -> bool {
+    let limit = SPEED_LIMIT * SPEED_LIMIT;
+    v.iter().zip(fixed).any(|(v, fixed)| !fixed && !(v.length_squared() < limit))
+}
