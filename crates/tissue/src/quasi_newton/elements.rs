@@ -1,98 +1,95 @@
 //! One pass over a body's elements: forces on their corners and volume ratios.
 
 use super::layout::{Batch, Layout};
-use super::stress::{Stress, green_strain, times_symmetric};
+use super::stress::Stress;
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
+use crate::Body;
 use crate::sweep::{FLOOR, KEPT_SHARE};
+use std::collections::BTreeMap;
 use fearless_simd::{Simd, SimdBase, f32x16};
 
 /// What a pass over the elements writes, and what it compares with.
 pub(super) struct Elements {
     stress: Stress,
-    /// Twice the viscosity [Pa s].
-    viscosity: f32,
     /// Gradient of the energy by each corner's position [N], batch by batch, corner by corner.
     pub corners: Vec<Row>,
     /// Volume ratios at the accepted positions and at those of the last pass.
     pub ratios: Vec<[f32; LANES]>,
     pub trial: Vec<[f32; LANES]>,
-    /// Green's strains at the substep's beginning; empty without viscosity.
-    start: Vec<[[f32; LANES]; 6]>,
+    /// Each element's part of the dashpots along its edges [N s/m]; empty without viscosity.
+    dashpots: Vec<[[f32; LANES]; 6]>,
 }
 
 impl Elements {
-    pub fn new(layout: &Layout, stress: Stress, viscosity: f64) -> Self {
+    pub fn new(layout: &Layout, body: &Body) -> Self {
         let batches = layout.batches.len();
         Self {
-            stress,
-            viscosity: 2.0 * viscosity as f32,
+            stress: Stress::of(&body.material),
             corners: vec![[0.0; 4]; batches * 4 * LANES],
             ratios: vec![[1.0; LANES]; batches],
             trial: vec![[1.0; LANES]; batches],
-            start: vec![[[0.0; LANES]; 6]; if viscosity > 0.0 { batches } else { 0 }],
+            dashpots: if body.material.viscosity > 0.0 { dashpots(layout, body) } else { Vec::new() },
         }
     }
 
-    /// Remembers the strains at `x`, from which viscosity counts; `x` are the positions of the accepted ratios.
+    /// Forces and volume ratios at `x`. A substep of `h` [s] began at `start`, which the dashpots know. Whether an element has lost too much of its accepted volume.
     #[inline(always)]
-    pub fn begin<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row]) {
-        for (batch, start) in layout.batches.iter().zip(&mut self.start) {
-            let strain = green_strain(simd, &deformation(simd, batch, x));
-            for (to, from) in start.iter_mut().zip(strain) {
-                from.store_slice(to);
-            }
-        }
-    }
-
-    /// Forces and volume ratios at `x`; `h` is the substep [s]. Whether an element has lost too much of its accepted volume.
-    #[inline(always)]
-    pub fn pass<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row], h: f32) -> bool {
-        if self.start.is_empty() {
-            self.pass_with::<S, false>(simd, layout, x, h)
+    pub fn pass<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row], start: &[Row], h: f32) -> bool {
+        if self.dashpots.is_empty() {
+            self.pass_with::<S, false>(simd, layout, x, start, h)
         } else {
-            self.pass_with::<S, true>(simd, layout, x, h)
+            self.pass_with::<S, true>(simd, layout, x, start, h)
         }
     }
 
     #[inline(always)]
-    fn pass_with<S: Simd, const VISCOUS: bool>(&mut self, simd: S, layout: &Layout, x: &[Row], h: f32) -> bool {
-        let mut squeezed = splat(simd, 0.0);
-        let rate = splat(simd, self.viscosity / h);
+    fn pass_with<S: Simd, const VISCOUS: bool>(
+        &mut self,
+        simd: S,
+        layout: &Layout,
+        x: &[Row],
+        start: &[Row],
+        h: f32,
+    ) -> bool {
+        let (zero, rate) = (splat(simd, 0.0), splat(simd, 1.0 / h));
+        let mut squeezed = zero;
         for (b, batch) in layout.batches.iter().enumerate() {
-            let f = deformation(simd, batch, x);
+            let edges = edges(simd, batch, x);
+            let f = deformation(simd, batch, &edges);
             let ratio = dot(f[0], cross(f[1], f[2]));
-            let mut p = self.stress.at(simd, &f, ratio);
-            if VISCOUS {
-                let (strain, start) = (green_strain(simd, &f), &self.start[b]);
-                let mut s = strain;
-                for k in 0..6 {
-                    s[k] = (strain[k] - load(simd, &start[k])) * rate;
-                }
-                let viscous = times_symmetric(&f, s);
-                for c in 0..3 {
-                    p[c] = add(p[c], viscous[c]);
-                }
-            }
             ratio.store_slice(&mut self.trial[b]);
             squeezed = simd.max_f32x16(squeezed, lack(simd, ratio, load(simd, &self.ratios[b])));
+            let mut p = self.stress.at(simd, &f, ratio);
             let volume = load(simd, &batch.volumes);
             for c in 0..3 {
                 p[c] = scale(p[c], volume);
             }
-            let forces = [
-                apply(&p, gradient(simd, batch, 0)),
-                apply(&p, gradient(simd, batch, 1)),
-                apply(&p, gradient(simd, batch, 2)),
-            ];
-            let sum = add(add(forces[0], forces[1]), forces[2]);
-            let zero = splat(simd, 0.0);
+            let mut forces =
+                [apply(&p, gradient(simd, batch, 0)), apply(&p, gradient(simd, batch, 1)), apply(&p, gradient(simd, batch, 2))];
+            let mut first = sub([zero; 3], add(add(forces[0], forces[1]), forces[2]));
+            if VISCOUS {
+                let from = self::edges(simd, batch, start);
+                for (k, [i, j]) in EDGES.into_iter().enumerate() {
+                    // Corner 0 is the origin of the edges.
+                    let (direction, now) =
+                        if i == 0 { (from[j - 1], edges[j - 1]) } else { (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1])) };
+                    let along = load(simd, &self.dashpots[b][k]) * rate / dot(direction, direction);
+                    let force = scale(direction, along * dot(direction, sub(now, direction)));
+                    forces[j - 1] = add(forces[j - 1], force);
+                    if i == 0 {
+                        first = sub(first, force);
+                    } else {
+                        forces[i - 1] = sub(forces[i - 1], force);
+                    }
+                }
+            }
             let rows = &mut self.corners[b * 4 * LANES..(b + 1) * 4 * LANES];
-            store_rows(simd, sub([zero, zero, zero], sum), &mut rows[..LANES]);
+            store_rows(simd, first, &mut rows[..LANES]);
             store_rows(simd, forces[0], &mut rows[LANES..2 * LANES]);
             store_rows(simd, forces[1], &mut rows[2 * LANES..3 * LANES]);
             store_rows(simd, forces[2], &mut rows[3 * LANES..]);
         }
-        simd.any_true_mask32x16(simd.simd_gt_f32x16(squeezed, splat(simd, 0.0)))
+        simd.any_true_mask32x16(simd.simd_gt_f32x16(squeezed, zero))
     }
 
     /// The last pass's positions are accepted.
@@ -111,10 +108,6 @@ impl Elements {
         }
     }
 
-    /// Smallest accepted volume ratio.
-    pub fn least_ratio(&self) -> f32 {
-        self.ratios.iter().flatten().copied().fold(f32::INFINITY, f32::min)
-    }
 }
 
 /// By how much a volume ratio is below what it must be after `before`; 0 or less where it is not. Not a number counts as too low.
@@ -124,17 +117,48 @@ fn lack<S: Simd>(simd: S, ratio: f32x16<S>, before: f32x16<S>) -> f32x16<S> {
     simd.select_f32x16(simd.simd_ge_f32x16(ratio, floor), splat(simd, 0.0), splat(simd, 1.0))
 }
 
-/// Deformation gradients of a batch.
+/// The edges of an element, by corners.
+const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
+
+/// Each element's part of its edges' dashpots, by its share of the volume at the edge.
+fn dashpots(layout: &Layout, body: &Body) -> Vec<[[f32; LANES]; 6]> {
+    let vertices = |batch: &Batch, lane: usize, [i, j]: [usize; 2]| {
+        let (i, j) = (layout.vertex[batch.nodes[i][lane] as usize], layout.vertex[batch.nodes[j][lane] as usize]);
+        (i.min(j), i.max(j))
+    };
+    let mut volumes = BTreeMap::new();
+    for batch in &layout.batches {
+        for lane in 0..LANES {
+            for edge in EDGES {
+                *volumes.entry(vertices(batch, lane, edge)).or_insert(0.0) += batch.volumes[lane];
+            }
+        }
+    }
+    let part = |batch: &Batch, lane: usize, edge: [usize; 2]| {
+        let (i, j) = vertices(batch, lane, edge);
+        let whole = body.edges_of(i as usize).iter().find(|e| e.to == j).map_or(0.0, |e| e.damping);
+        whole * batch.volumes[lane] / volumes.get(&(i, j)).copied().unwrap_or(1.0)
+    };
+    let of = |batch: &Batch| EDGES.map(|edge| std::array::from_fn(|lane| part(batch, lane, edge)));
+    layout.batches.iter().map(of).collect()
+}
+
+/// Edges of a batch's elements from corner 0.
 #[inline(always)]
-fn deformation<S: Simd>(simd: S, batch: &Batch, x: &[Row]) -> Mat3L<S> {
+fn edges<S: Simd>(simd: S, batch: &Batch, x: &[Row]) -> [Vec3L<S>; 3] {
     let origin = gather(simd, x, &batch.nodes[0]);
-    let edges = [
+    [
         sub(gather(simd, x, &batch.nodes[1]), origin),
         sub(gather(simd, x, &batch.nodes[2]), origin),
         sub(gather(simd, x, &batch.nodes[3]), origin),
-    ];
+    ]
+}
+
+/// Deformation gradients of a batch.
+#[inline(always)]
+fn deformation<S: Simd>(simd: S, batch: &Batch, edges: &[Vec3L<S>; 3]) -> Mat3L<S> {
     let m = [gradient(simd, batch, 0), gradient(simd, batch, 1), gradient(simd, batch, 2)];
-    let mut f = edges;
+    let mut f = *edges;
     for c in 0..3 {
         f[c] = add(add(scale(edges[0], m[0][c]), scale(edges[1], m[1][c])), scale(edges[2], m[2][c]));
     }

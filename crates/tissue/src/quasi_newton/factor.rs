@@ -48,8 +48,8 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Orders, assembles and analyses; `pinned` nodes have no part in it. None if memory is short or no node is free.
-    pub fn new(body: &Body) -> Option<Self> {
+    /// Orders, assembles and analyses for substeps of `h` [s]; pinned nodes have no part in it. None if memory is short or no node is free.
+    pub fn new(body: &Body, h: f64) -> Option<Self> {
         let mesh = &body.rest;
         let free: Vec<usize> = (0..body.len()).filter(|i| !body.pinned[*i]).collect();
         let mut number = vec![u32::MAX; body.len()];
@@ -88,6 +88,7 @@ impl Factor {
                 }
             }
         }
+        add_dashpots(body, &rank, h, &mut rest);
         let parameters = CholeskySymbolicParams {
             supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
             supernodal_params: SymbolicSupernodalParams { relax: Some(&RELAX) },
@@ -193,6 +194,23 @@ impl Factor {
     }
 }
 
+/// Adds what the dashpots resist within a substep to the stiffness, nodes numbered by `rank`.
+fn add_dashpots(body: &Body, rank: &[u32], h: f64, stiffness: &mut Stiffness) {
+    let mut node_of = vec![0; body.len()];
+    body.internal.iter().enumerate().for_each(|(node, i)| node_of[*i as usize] = node);
+    for (i, node) in node_of.iter().enumerate() {
+        for edge in body.edges_of(i).iter().filter(|edge| edge.damping > 0.0) {
+            let to = node_of[edge.to as usize];
+            let n = (body.rest.vertices[to] - body.rest.vertices[*node]).normalize_or_zero();
+            let block = DMat3::from_cols(n * n.x, n * n.y, n * n.z) * (f64::from(edge.damping) / h);
+            // Every edge is met from both its ends.
+            let (i, j) = (rank[*node] as usize, rank[to] as usize);
+            stiffness.add(i, i, block);
+            stiffness.add(i, j, -block);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -262,7 +280,7 @@ mod tests {
         let (mut total, mut bytes) = (0.0, 0);
         for body in &model.bodies {
             let t0 = std::time::Instant::now();
-            let mut f = Factor::new(body).unwrap();
+            let mut f = Factor::new(body, 1.0 / 120.0).unwrap();
             let t1 = std::time::Instant::now();
             let h = 1.0 / 120.0f64;
             let added: Vec<f32> = f.order.iter().map(|i| (body.mass(*i as usize) / h / h) as f32).collect();

@@ -28,7 +28,6 @@ use fearless_simd::{Level, Simd, dispatch};
 use history::History;
 use layout::Layout;
 use search::{Found, Guess};
-use stress::Stress;
 use warp::Warp;
 
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
@@ -67,10 +66,10 @@ pub(crate) struct QuasiNewtonIntegrator {
 impl QuasiNewtonIntegrator {
     /// For `body` stepped by frames of `dt` [s]; None if every node is pinned or the matrix cannot be factorised.
     pub fn new(settings: QuasiNewton, body: &Body, dt: f64) -> Option<Self> {
-        let mut factor = Factor::new(body)?;
+        let h = dt / settings.substeps as f64;
+        let mut factor = Factor::new(body, h)?;
         let layout = Layout::new(body, &factor.order);
         let held = vec![false; layout.free];
-        let h = dt / settings.substeps as f64;
         factor.set_step(&layout.masses, h);
         factor.factorise(&held).then_some(())?;
         let rows = || vec![[0.0f32; 4]; layout.rows];
@@ -78,7 +77,7 @@ impl QuasiNewtonIntegrator {
         Some(Self {
             settings,
             level: Level::new(),
-            elements: Elements::new(&layout, Stress::of(&body.material), body.material.viscosity),
+            elements: Elements::new(&layout, body),
             history: History::new(settings.memory, layout.rows),
             warp: Warp::new(&layout),
             planes: LocalPlane::of(body),
@@ -88,7 +87,7 @@ impl QuasiNewtonIntegrator {
                 .collect(),
             fallback: DescentIntegrator::new(sweeps, body),
             x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
-            start: rows(),
+            start: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
             v: rows(),
             predictor: rows(),
             gradient: rows(),
@@ -127,7 +126,7 @@ impl QuasiNewtonIntegrator {
         self.load(state);
         self.hold(frame, body);
         self.history.clear();
-        self.elements.pass(simd, &self.layout, &self.x, h);
+        self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
         self.elements.accept();
         for substep in 1..=substeps {
             let share = substep as f64 / substeps as f64;
@@ -138,7 +137,7 @@ impl QuasiNewtonIntegrator {
                 self.fallback.substep(frame, share, body, state, report);
                 self.load(state);
                 self.history.clear();
-                self.elements.pass(simd, &self.layout, &self.x, h);
+                self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
                 self.elements.accept();
             }
         }
@@ -158,7 +157,7 @@ impl QuasiNewtonIntegrator {
     ) -> bool {
         let gravity = frame.gravity.as_vec3a().extend(0.0).to_array();
         let free = self.layout.free;
-        self.start.copy_from_slice(&self.x[..self.layout.rows]);
+        self.start.copy_from_slice(&self.x);
         // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere implicit Euler's h^2 g.
         let reach = if self.flies() { 0.5 * h * h } else { h * h };
         for i in 0..free {
@@ -166,7 +165,6 @@ impl QuasiNewtonIntegrator {
                 self.predictor[i][c] = self.x[i][c] + h * self.v[i][c] + reach * gravity[c];
             }
         }
-        self.elements.begin(simd, &self.layout, &self.x);
         let guess = self.guess(simd, frame, share, h, body);
         self.warp.update(simd, &self.layout, &self.x);
         self.take_gradient(simd, h);

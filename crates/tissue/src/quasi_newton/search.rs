@@ -71,16 +71,16 @@ impl QuasiNewtonIntegrator {
             moves |= targets[i] != start[i];
         });
         if !moves {
-            self.elements.pass(simd, &self.layout, &self.x, h);
+            self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
             return Guess::Still;
         }
         self.x[..free].copy_from_slice(&self.targets[..free]);
-        if !self.elements.pass(simd, &self.layout, &self.x, h) {
+        if !self.elements.pass(simd, &self.layout, &self.x, &self.start, h) {
             self.elements.accept();
             return Guess::Ahead;
         }
         self.x[..free].copy_from_slice(&self.start[..free]);
-        self.elements.pass(simd, &self.layout, &self.x, h);
+        self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
         Guess::Behind
     }
 
@@ -106,7 +106,7 @@ impl QuasiNewtonIntegrator {
             self.elements.accept();
         } else {
             self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
-            self.elements.pass(simd, &self.layout, &self.x, h);
+            self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
         }
         self.take_gradient(simd, h);
         std::mem::swap(&mut self.gradient, &mut self.next_gradient);
@@ -214,7 +214,7 @@ impl QuasiNewtonIntegrator {
                         self.x[i][c] = self.base[i][c] + share * self.direction[i][c];
                     }
                 }
-                if !self.elements.pass(simd, &self.layout, &self.x, h) {
+                if !self.elements.pass(simd, &self.layout, &self.x, &self.start, h) {
                     return true;
                 }
                 let (by, direction) = (if round < HALVINGS { 0.5 } else { 0.0 }, &mut self.direction);

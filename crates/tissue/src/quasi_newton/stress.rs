@@ -1,4 +1,4 @@
-//! Stresses of sixteen elements at once, and their viscosity.
+//! Stresses of sixteen elements at once.
 
 use crate::lanes::{LANES, Mat3L, add, apply, cofactor, dot, load, rotation, scale, splat, sub};
 use crate::material::VolumeEnergy;
@@ -114,7 +114,7 @@ impl Volume {
 
 /// Green's strain (F'F - I)/2: xx, yy, zz, xy, yz, zx.
 #[inline(always)]
-pub(super) fn green_strain<S: Simd>(simd: S, f: &Mat3L<S>) -> [f32x16<S>; 6] {
+fn green_strain<S: Simd>(simd: S, f: &Mat3L<S>) -> [f32x16<S>; 6] {
     let (half, one) = (splat(simd, 0.5), splat(simd, 1.0));
     [
         (dot(f[0], f[0]) - one) * half,
@@ -128,6 +128,6 @@ pub(super) fn green_strain<S: Simd>(simd: S, f: &Mat3L<S>) -> [f32x16<S>; 6] {
 
 /// F S for a symmetric S.
 #[inline(always)]
-pub(super) fn times_symmetric<S: Simd>(f: &Mat3L<S>, [xx, yy, zz, xy, yz, zx]: [f32x16<S>; 6]) -> Mat3L<S> {
+fn times_symmetric<S: Simd>(f: &Mat3L<S>, [xx, yy, zz, xy, yz, zx]: [f32x16<S>; 6]) -> Mat3L<S> {
     [apply(f, [xx, xy, zx]), apply(f, [xy, yy, yz]), apply(f, [zx, yz, zz])]
 }
