@@ -262,7 +262,7 @@ impl<'a> Run<'a> {
         match phase {
             Phase::Approach => self.target = Some(Target::choose(&self.world, self.organ, self.task.at)?),
             Phase::Lift => self.activate(),
-            Phase::Open => self.world.state.grasp = None,
+            Phase::Open => self.world.state.grasps.clear(),
             _ => {}
         }
         Ok(())
@@ -293,7 +293,7 @@ impl<'a> Run<'a> {
         self.gripper = self.gripper_at(phase, share);
         let before = (phase == Phase::Lift && self.summary.activation_step_mm == 0.0).then(|| self.world.state.clone());
         let clock = Instant::now();
-        let report = self.world.step(Some(&ToolMotion { from, to: self.gripper.pose }));
+        let report = self.world.step(&[ToolMotion { from, to: self.gripper.pose }]);
         self.stepping += clock.elapsed();
         self.frame += 1;
         if let Some(before) = before {
@@ -325,7 +325,7 @@ impl<'a> Run<'a> {
     fn activate(&mut self) {
         let Some(target) = &self.target else { return };
         let (world, organ) = (&mut self.world, self.organ);
-        let grasp = Grasp::capture(&world.model, &world.state, organ, &target.cluster.nodes, &self.gripper.pose);
+        let grasp = Grasp::capture(&world.model, &world.state, organ, &target.cluster.nodes, 0, &self.gripper.pose);
         self.summary.snap_mm = grasp
             .prescribed(&self.gripper.pose)
             .map(|(i, x)| (x - world.state.position(&world.model, organ, i as usize)).length())
@@ -339,7 +339,7 @@ impl<'a> Run<'a> {
             centroid_in_jaw: self.gripper.pose.inverse().transform(centroid),
             jaw: self.gripper.pose.translation,
         });
-        world.state.grasp = Some(grasp);
+        world.state.grasps = vec![grasp];
     }
 
     fn record(&mut self, phase: Phase, report: &trocar_tissue::StepReport) {

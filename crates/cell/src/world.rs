@@ -5,7 +5,8 @@ use glam::DVec3;
 use trocar_geometry::OrganAxis;
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, SupportPlane, pins,
+    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, SupportPlane,
+    ToolMotion, pins,
 };
 
 /// Length of a frame [s].
@@ -57,13 +58,13 @@ impl World {
         }
         let model = builder.build()?;
         let state = State::new(&model);
-        let stepper = Stepper::new(&model, schedule, threads);
+        let stepper = Stepper::new(&model, schedule, FRAME, threads)?;
         Ok(Self { model, state, axes, up, stepper })
     }
 
-    /// Advances by one [`FRAME`]; `tool` is the motion of the tool that holds the grasp.
-    pub fn step(&mut self, tool: Option<&trocar_tissue::ToolMotion>) -> trocar_tissue::StepReport {
-        self.stepper.step(&self.model, &mut self.state, FRAME, tool)
+    /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps.
+    pub fn step(&mut self, tools: &[ToolMotion]) -> trocar_tissue::StepReport {
+        self.stepper.step(&self.model, &mut self.state, tools)
     }
 }
 

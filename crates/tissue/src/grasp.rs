@@ -33,6 +33,8 @@ impl ToolMotion {
 /// A set of nodes carried by a tool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grasp {
+    /// The tool that carries them: its place among the motions of a step.
+    pub tool: usize,
     /// The body.
     pub body: usize,
     /// Its nodes.
@@ -40,26 +42,27 @@ pub struct Grasp {
     /// Where each node was at activation [m].
     pub(crate) captured: Vec<DVec3>,
     /// Where the tool was.
-    pub(crate) tool: Pose,
+    pub(crate) captured_at: Pose,
 }
 
 impl Grasp {
-    /// Captures `nodes` of `body` where they are now, with the tool at `tool`. Pinned nodes are left out.
-    pub fn capture(model: &Model, state: &State, body: usize, nodes: &[u32], tool: &Pose) -> Self {
+    /// Captures `nodes` of `body` where they are now, with tool number `tool` at `pose`. Pinned nodes are left out.
+    pub fn capture(model: &Model, state: &State, body: usize, nodes: &[u32], tool: usize, pose: &Pose) -> Self {
         let free = |i: &u32| !model.bodies[body].pinned()[*i as usize];
         let nodes: Vec<u32> = nodes.iter().copied().filter(free).collect();
         let captured = nodes.iter().map(|i| state.position(model, body, *i as usize)).collect();
-        Self { body, nodes, captured, tool: *tool }
+        Self { tool, body, nodes, captured, captured_at: *pose }
     }
 
     /// Where each held node is to be when the tool is at `tool`: (node, world position [m]).
     pub fn prescribed(&self, tool: &Pose) -> impl Iterator<Item = (u32, DVec3)> {
-        let turn = tool.rotation * self.tool.rotation.inverse();
-        let shift = tool.translation - self.tool.translation;
-        let turned = tool.rotation != self.tool.rotation;
+        let from = &self.captured_at;
+        let turn = tool.rotation * from.rotation.inverse();
+        let shift = tool.translation - from.translation;
+        let turned = tool.rotation != from.rotation;
         let (nodes, captured) = (self.nodes.iter(), self.captured.iter());
         nodes.zip(captured).map(move |(i, x)| {
-            let arm = x - self.tool.translation;
+            let arm = x - from.translation;
             let swing = if turned { turn * arm - arm } else { DVec3::ZERO };
             (*i, x + (swing + shift))
         })

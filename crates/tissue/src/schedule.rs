@@ -1,4 +1,6 @@
-//! How a frame is cut into substeps and sweeps.
+//! How a frame is integrated: which solver, and how the frame is cut.
+
+use crate::{Error, Result};
 
 /// Where the sweeps of a substep start from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -10,9 +12,9 @@ pub enum Start {
     Adaptive,
 }
 
-/// A frame's substeps and sweeps.
+/// Vertex Block Descent (Chen et al. 2024): a local smoother, a fixed number of sweeps a substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Schedule {
+pub struct Descent {
     /// Substeps a frame.
     pub substeps: usize,
     /// Sweeps over all colours a substep.
@@ -21,13 +23,41 @@ pub struct Schedule {
     pub start: Start,
 }
 
+/// A solver and how it cuts a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Schedule {
+    /// Vertex Block Descent.
+    Descent(Descent),
+}
+
+/// More substeps or iterations than anyone means.
+const MOST: usize = 1_000_000;
+
 impl Schedule {
-    /// The paper's substeps, sweeps and start (8 of 10 from the inertial predictor), with our inversion guard.
-    pub const PAPER: Self = Self { substeps: 8, iterations: 10, start: Start::Inertial };
+    /// The paper's: Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor, with our inversion guard.
+    pub const PAPER: Self = Self::Descent(Descent { substeps: 8, iterations: 10, start: Start::Inertial });
+
+    /// Substeps a frame.
+    pub fn substeps(&self) -> usize {
+        match self {
+            Self::Descent(descent) => descent.substeps,
+        }
+    }
+
+    /// Refuses what is no schedule.
+    pub(crate) fn check(&self) -> Result<()> {
+        let Self::Descent(Descent { substeps, iterations, .. }) = *self;
+        for (name, count) in [("substeps", substeps), ("iterations", iterations)] {
+            if !(1..=MOST).contains(&count) {
+                return Err(Error::Model(format!("a schedule of {count} {name}; 1 to {MOST} make sense")));
+            }
+        }
+        Ok(())
+    }
 }
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self { start: Start::Adaptive, ..Self::PAPER }
+        Self::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
     }
 }

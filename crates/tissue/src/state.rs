@@ -9,8 +9,8 @@ use xxhash_rust::xxh3::Xxh3;
 pub struct State {
     /// Simulated time [s].
     pub time: f64,
-    /// The grasp in force, if any. Setting it closes a grasp; taking it away opens it, and the nodes are free.
-    pub grasp: Option<Grasp>,
+    /// The grasps in force. Adding one closes it; taking it away opens it, and its nodes are free. A node in several grasps follows the last.
+    pub grasps: Vec<Grasp>,
     /// One for each body.
     pub(crate) bodies: Vec<BodyState>,
 }
@@ -45,7 +45,7 @@ impl State {
             }
             BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()] }
         };
-        Self { time: 0.0, grasp: None, bodies: model.bodies.iter().map(at_rest).collect() }
+        Self { time: 0.0, grasps: Vec::new(), bodies: model.bodies.iter().map(at_rest).collect() }
     }
 
     /// World position of a node [m].
@@ -105,15 +105,17 @@ impl State {
                 hash.update(&f.to_bits().to_le_bytes());
             }
         }
-        if let Some(grasp) = &self.grasp {
+        for grasp in &self.grasps {
             hash.update(&(grasp.body as u64).to_le_bytes());
-            for (node, x) in grasp.prescribed(&grasp.tool) {
+            hash.update(&(grasp.tool as u64).to_le_bytes());
+            for (node, x) in grasp.prescribed(&grasp.captured_at) {
                 hash.update(&node.to_le_bytes());
                 for c in x.to_array() {
                     hash.update(&c.to_bits().to_le_bytes());
                 }
             }
-            for c in grasp.tool.translation.to_array().into_iter().chain(grasp.tool.rotation.to_array()) {
+            let pose = &grasp.captured_at;
+            for c in pose.translation.to_array().into_iter().chain(pose.rotation.to_array()) {
                 hash.update(&c.to_bits().to_le_bytes());
             }
         }

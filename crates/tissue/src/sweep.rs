@@ -5,6 +5,7 @@
 //! and by any thread with the same bits. Along one vertex's step the volume of each of its elements is linear: the step is cut so that none
 //! falls below a floor, and no element is ever inverted.
 
+use crate::SupportPlane;
 use crate::body::Body;
 use crate::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
 use glam::{Mat3A, Vec3A};
@@ -33,6 +34,16 @@ pub(crate) struct LocalPlane {
 }
 
 impl LocalPlane {
+    /// The planes that support a body.
+    pub fn of(body: &Body) -> Vec<Self> {
+        let local = |plane: &SupportPlane| Self {
+            point: (plane.point - body.origin).as_vec3a(),
+            normal: plane.normal.as_vec3a(),
+            friction: plane.friction as f32,
+        };
+        body.supports.iter().map(local).collect()
+    }
+
     /// Height of a point above the plane [m].
     pub fn height(&self, x: Vec3A) -> f32 {
         (x - self.point).dot(self.normal)
@@ -216,7 +227,7 @@ fn solve(block: &Mat3A, force: Vec3A) -> Vec3A {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BodyDescription, ConstitutiveModel, Material, ModelBuilder, SupportPlane};
+    use crate::{BodyDescription, ConstitutiveModel, Material, ModelBuilder};
     use glam::{DMat3, DVec3, Vec3};
     use trocar_geometry::TetMesh;
 

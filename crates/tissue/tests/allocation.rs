@@ -40,13 +40,13 @@ fn stepping_allocates_nothing() {
     let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut state = State::new(&model);
     let held = nodes(&mesh, |p| p.z > 19e-3 && p.x < 10e-3);
-    state.grasp = Some(Grasp::capture(&model, &state, 0, &held, &Pose::IDENTITY));
-    let mut stepper = Stepper::new(&model, Schedule::default(), 2);
+    state.grasps = vec![Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY)];
+    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 2).unwrap();
     let still = ToolMotion { from: Pose::IDENTITY, to: Pose::IDENTITY };
-    stepper.step(&model, &mut state, FRAME, Some(&still));
+    stepper.step(&model, &mut state, &[still]);
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     for _ in 0..FRAMES {
-        stepper.step(&model, &mut state, FRAME, Some(&still));
+        stepper.step(&model, &mut state, &[still]);
     }
     let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
     // The thread pool's queue takes a new block now and then, once in dozens of frames; our own code would show in every frame.

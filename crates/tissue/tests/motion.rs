@@ -5,7 +5,7 @@ mod common;
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Material, ModelBuilder, Schedule, State, Stepper, SupportPlane,
+    BodyDescription, ConstitutiveModel, Descent, Material, ModelBuilder, Schedule, Start, State, Stepper, SupportPlane,
 };
 
 /// SPEC T2: free fall matches g t^2/2 and g t to four digits, with damping, in all materials; the paper's schedule follows
@@ -18,9 +18,9 @@ fn free_fall() {
         let model = model(&mesh, material, vec![], GRAVITY);
         for (schedule, h) in [(Schedule::default(), 0.0), (Schedule::PAPER, FRAME / 8.0)] {
             let mut state = State::new(&model);
-            let mut stepper = Stepper::new(&model, schedule, 1);
+            let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
             for _ in 0..60 {
-                assert_eq!(stepper.step(&model, &mut state, FRAME, None).divergence, None);
+                assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None);
             }
             let fall = |i: usize| (state.position(&model, 0, i) - mesh.vertices[i]).z;
             let speed = |i: usize| state.velocity(&model, 0, i).z;
@@ -42,10 +42,10 @@ fn a_column_sags_under_its_weight() {
     let material = Material { poisson_ratio: 0.0, viscosity: 60.0, ..tissue(12e3) };
     let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::default(), 0);
+    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 0).unwrap();
     let mut report = Default::default();
     for _ in 0..180 {
-        report = stepper.step(&model, &mut state, FRAME, None);
+        report = stepper.step(&model, &mut state, &[]);
     }
     assert!(report.max_speed < 1e-4, "it has not come to rest: {} m/s", report.max_speed);
     let length = 0.02;
@@ -78,9 +78,9 @@ fn dashpots_do_not_brake_rotation() {
                 .sum()
         };
         let before = momentum(&state);
-        let mut stepper = Stepper::new(&model, Schedule::default(), 1);
+        let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 1).unwrap();
         for _ in 0..30 {
-            stepper.step(&model, &mut state, FRAME, None);
+            stepper.step(&model, &mut state, &[]);
         }
         kept.push(momentum(&state) / before);
     }
@@ -102,12 +102,12 @@ fn the_plane_supports_and_holds() {
     let mut state = State::new(&model);
     // Ten sweeps do not carry the friction of the foot through the block, which then slides several times too far; the law itself is
     // tested with enough of them.
-    let schedule = Schedule { iterations: 150, ..Schedule::default() };
-    let mut stepper = Stepper::new(&model, schedule, 0);
+    let schedule = Schedule::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive });
+    let mut stepper = Stepper::new(&model, schedule, FRAME, 0).unwrap();
     let all: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
     let mut report = Default::default();
     for _ in 0..90 {
-        report = stepper.step(&model, &mut state, FRAME, None);
+        report = stepper.step(&model, &mut state, &[]);
     }
     assert!(report.max_speed < 0.01, "{} m/s", report.max_speed);
     let deepest = state.positions(&model, 0).iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
@@ -119,7 +119,7 @@ fn the_plane_supports_and_holds() {
         state.set_velocity(&model, 0, node, DVec3::X * speed);
     }
     for _ in 0..60 {
-        report = stepper.step(&model, &mut state, FRAME, None);
+        report = stepper.step(&model, &mut state, &[]);
     }
     let slid = (state.centroid(&model, 0, &all) - from).x;
     let expected = speed * speed / (2.0 * 0.6 * 9.81);

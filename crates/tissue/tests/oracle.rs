@@ -9,8 +9,8 @@ use glam::DVec3;
 use trocar_geometry::{Pose, TetMesh};
 use trocar_tissue::oracle::{Failure, Precision};
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Error, Grasp, Held, Material, Model, ModelBuilder, Oracle, OracleState,
-    Schedule, Start, State, Stepper, SupportPlane, ToolMotion,
+    BodyDescription, ConstitutiveModel, Descent, Error, Grasp, Held, Material, Model, ModelBuilder, Oracle,
+    OracleState, Schedule, Start, State, Stepper, SupportPlane, ToolMotion,
 };
 
 const SUBSTEP: f64 = FRAME / 8.0;
@@ -138,7 +138,7 @@ fn sweeps_converge_to_the_oracles_step() {
     for constitutive in ConstitutiveModel::ALL {
         let (model, start) = busy(constitutive, 60.0, 0.6, &mesh);
         let held = nodes(&mesh, |p| p.x > 11e-3 && p.z > 5e-3);
-        let grasp = Grasp::capture(&model, &start, 0, &held, &Pose::IDENTITY);
+        let grasp = Grasp::capture(&model, &start, 0, &held, 0, &Pose::IDENTITY);
         let to = Pose { translation: DVec3::new(-1e-5, 0.0, 3e-5), ..Pose::IDENTITY };
         let exact = |model: &Model| {
             let mut exact = OracleState::from_state(model, &start);
@@ -150,11 +150,11 @@ fn sweeps_converge_to_the_oracles_step() {
         let moved = rms(oracle.positions(0), &start.positions(&model, 0));
         let mut off = Vec::new();
         for iterations in [10, 40, 150, 600] {
-            let schedule = Schedule { substeps: 1, iterations, start: Start::Inertial };
+            let schedule = Schedule::Descent(Descent { substeps: 1, iterations, start: Start::Inertial });
             let mut state = start.clone();
-            state.grasp = Some(grasp.clone());
+            state.grasps = vec![grasp.clone()];
             let motion = ToolMotion { from: Pose::IDENTITY, to };
-            let report = Stepper::new(&model, schedule, 1).step(&model, &mut state, SUBSTEP, Some(&motion));
+            let report = Stepper::new(&model, schedule, SUBSTEP, 1).unwrap().step(&model, &mut state, &[motion]);
             assert_eq!((report.divergence, report.grasp_limited), (None, 0));
             off.push(rms(oracle.positions(0), &state.positions(&model, 0)) / moved);
         }
@@ -195,9 +195,9 @@ fn the_default_schedule_sags_to_the_equilibrium() {
     let model = model(&mesh, material, nodes(&mesh, |p| p.z < 6e-3), GRAVITY);
     let rest = settled(&model);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::default(), 0);
+    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 0).unwrap();
     for _ in 0..120 {
-        stepper.step(&model, &mut state, FRAME, None);
+        stepper.step(&model, &mut state, &[]);
     }
     let sag = rms(rest.positions(0), &mesh.vertices);
     let off = rms(rest.positions(0), &state.positions(&model, 0)) / sag;

@@ -18,13 +18,13 @@ fn lifted(height: f64) -> Pose {
 /// Grasps the top of a block pinned at its foot and moves it by `travel` in `frames` frames; returns the most elements inverted in any frame.
 fn drag(model: &Model, mesh: &TetMesh, top: f64, travel: f64, frames: usize) -> (usize, State) {
     let mut state = State::new(model);
-    let mut stepper = Stepper::new(model, Schedule::default(), 0);
+    let mut stepper = Stepper::new(model, Schedule::default(), FRAME, 0).unwrap();
     let held = nodes(mesh, |p| p.z > top);
-    state.grasp = Some(Grasp::capture(model, &state, 0, &held, &Pose::IDENTITY));
+    state.grasps = vec![Grasp::capture(model, &state, 0, &held, 0, &Pose::IDENTITY)];
     let mut worst = 0;
     for k in 0..frames {
         let at = |k: usize| lifted(travel * k as f64 / frames as f64);
-        let report = stepper.step(model, &mut state, FRAME, Some(&ToolMotion { from: at(k), to: at(k + 1) }));
+        let report = stepper.step(model, &mut state, &[ToolMotion { from: at(k), to: at(k + 1) }]);
         assert_eq!(report.divergence, None);
         assert!(report.min_volume_ratio > 0.0);
         worst = worst.max(report.inverted);
@@ -70,15 +70,15 @@ fn the_grasp_is_exact_when_it_closes() {
     let mesh = block([3, 3, 3], 2e-3);
     let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::default(), 1);
+    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 1).unwrap();
     for _ in 0..7 {
-        stepper.step(&model, &mut state, FRAME, None);
+        stepper.step(&model, &mut state, &[]);
     }
     let tool = Pose {
         rotation: DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.2),
         translation: DVec3::new(0.11, -0.07, 0.31),
     };
-    let grasp = Grasp::capture(&model, &state, 0, &[0, 5, 17], &tool);
+    let grasp = Grasp::capture(&model, &state, 0, &[0, 5, 17], 0, &tool);
     for (node, x) in grasp.prescribed(&tool) {
         assert_eq!(x, state.position(&model, 0, node as usize));
     }
@@ -98,10 +98,10 @@ fn held_nodes_follow_the_tool_and_are_free_afterwards() {
     let top = nodes(&mesh, |p| p.z > 11e-3);
     let rest = State::new(&model).centroid(&model, 0, &top);
     assert!((state.centroid(&model, 0, &top) - rest - DVec3::Z * 4e-3).length() < 1e-7);
-    state.grasp = None;
-    let mut stepper = Stepper::new(&model, Schedule::default(), 1);
+    state.grasps.clear();
+    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 1).unwrap();
     for _ in 0..120 {
-        stepper.step(&model, &mut state, FRAME, None);
+        stepper.step(&model, &mut state, &[]);
     }
     assert!((state.centroid(&model, 0, &top) - rest).length() < 1e-5, "it springs back to its rest shape");
 }
@@ -124,11 +124,11 @@ fn the_same_bits_for_any_run_and_any_number_of_threads() {
     let (model, held) = two_bodies();
     let run = |threads: usize| {
         let mut state = State::new(&model);
-        state.grasp = Some(Grasp::capture(&model, &state, 0, &held, &Pose::IDENTITY));
-        let mut stepper = Stepper::new(&model, Schedule::default(), threads);
+        state.grasps = vec![Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY)];
+        let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, threads).unwrap();
         for k in 0..6 {
             let motion = ToolMotion { from: lifted(5e-4 * k as f64), to: lifted(5e-4 * (k + 1) as f64) };
-            stepper.step(&model, &mut state, FRAME, Some(&motion));
+            stepper.step(&model, &mut state, &[motion]);
         }
         state.hash()
     };
@@ -141,15 +141,15 @@ fn the_same_bits_for_any_run_and_any_number_of_threads() {
 #[test]
 fn a_saved_state_goes_on_as_if_nothing_had_happened() {
     let (model, _) = two_bodies();
-    let mut stepper = Stepper::new(&model, Schedule::default(), 2);
+    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 2).unwrap();
     let mut state = State::new(&model);
     for _ in 0..3 {
-        stepper.step(&model, &mut state, FRAME, None);
+        stepper.step(&model, &mut state, &[]);
     }
     let saved = state.clone();
     let mut go_on = |mut state: State| {
         for _ in 0..3 {
-            stepper.step(&model, &mut state, FRAME, None);
+            stepper.step(&model, &mut state, &[]);
         }
         state.hash()
     };

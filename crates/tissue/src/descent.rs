@@ -1,0 +1,174 @@
+//! Vertex Block Descent: every vertex in turn takes a Newton step on its own 3x3 block, all vertices of one colour at once.
+
+use crate::integrator::{Frame, Integrator};
+use crate::schedule::{Descent, Start};
+use crate::state::BodyState;
+use crate::sweep::{LocalPlane, Substep, is_squeezed};
+use crate::{Body, StepReport};
+use glam::Vec3A;
+
+/// Held nodes go no farther from their neighbours than this many rest lengths of the edge between them.
+const HELD_STRETCH: f32 = 7.0;
+
+/// How much of the guessed motion of free vertices, and of the prescribed motion of held ones, is tried at the beginning of a
+/// substep, until no element is squeezed too far by it.
+const START_SHARES: [(f32, f32); 8] =
+    [(1.0, 1.0), (0.5, 1.0), (0.25, 1.0), (0.0, 1.0), (0.0, 0.5), (0.0, 0.25), (0.0, 0.125), (0.0, 0.0)];
+
+/// The solver of one body.
+pub(crate) struct DescentIntegrator {
+    schedule: Descent,
+    start: Vec<Vec3A>,
+    predictor: Vec<Vec3A>,
+    guess: Vec<Vec3A>,
+    fixed: Vec<bool>,
+    held: Vec<bool>,
+    planes: Vec<LocalPlane>,
+}
+
+impl Integrator for DescentIntegrator {
+    fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
+        self.mark_fixed(frame, body);
+        let substeps = self.schedule.substeps;
+        for substep in 1..=substeps {
+            self.substep(frame, substep as f64 / substeps as f64, body, state, report);
+        }
+    }
+}
+
+impl DescentIntegrator {
+    pub fn new(schedule: Descent, body: &Body) -> Self {
+        let zeros = vec![Vec3A::ZERO; body.len()];
+        Self {
+            schedule,
+            start: zeros.clone(),
+            predictor: zeros.clone(),
+            guess: zeros,
+            fixed: vec![false; body.len()],
+            held: vec![false; body.len()],
+            planes: LocalPlane::of(body),
+        }
+    }
+
+    /// One substep of implicit Euler, which ends when `share` of the frame is over: predict, start, sweep, take the velocity.
+    fn substep(&mut self, frame: &Frame<'_>, share: f64, body: &Body, state: &mut BodyState, report: &mut StepReport) {
+        let h = (frame.dt / self.schedule.substeps as f64) as f32;
+        let gravity = frame.gravity.as_vec3a();
+        self.start.copy_from_slice(&state.x);
+        let flies = self.schedule.start == Start::Adaptive && self.flies_freely();
+        // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere
+        // implicit Euler's h^2 g.
+        let reach = if flies { 0.5 * h * h } else { h * h };
+        for (y, (x, v)) in self.predictor.iter_mut().zip(state.x.iter().zip(&state.v)) {
+            *y = x + h * v + reach * gravity;
+        }
+        self.guess(flies, h, gravity, state);
+        self.place_fixed(frame, share, body);
+        report.grasp_limited += usize::from(!self.start_sweeps(body, state));
+        let substep = Substep {
+            body,
+            h,
+            start: &self.start,
+            predictor: &self.predictor,
+            fixed: &self.fixed,
+            planes: &self.planes,
+        };
+        for _ in 0..self.schedule.iterations {
+            substep.sweep(&mut state.x, &mut self.guess);
+        }
+        report.iterations += self.schedule.iterations;
+        self.take_velocities(h, gravity, state);
+    }
+
+    /// Where the sweeps would like to start from.
+    fn guess(&mut self, flies: bool, h: f32, gravity: Vec3A, state: &BodyState) {
+        if flies || self.schedule.start == Start::Inertial {
+            self.guess.copy_from_slice(&self.predictor);
+            return;
+        }
+        for (i, guess) in self.guess.iter_mut().enumerate() {
+            *guess = state.x[i] + h * state.v[i] + h * h * state.falling[i] * gravity;
+        }
+    }
+
+    /// Sets the guess of held vertices to where the tool prescribes them, and of pinned ones to where they are.
+    fn place_fixed(&mut self, frame: &Frame<'_>, share: f64, body: &Body) {
+        for (i, _) in self.fixed.iter().enumerate().filter(|(_, fixed)| **fixed) {
+            self.guess[i] = self.start[i];
+        }
+        frame.for_held(body, share, |vertex, x| self.guess[vertex] = x);
+    }
+
+    /// The velocity after the substep: v + h g + (x - y)/h. That is (x - x_start)/h for implicit Euler's predictor, and exact for the one of free
+    /// flight; but the rounding of positions far from the body's origin does not enter it.
+    fn take_velocities(&self, h: f32, gravity: Vec3A, state: &mut BodyState) {
+        let strength = gravity.length_squared();
+        let direction = if strength > 0.0 { gravity / strength } else { Vec3A::ZERO };
+        for i in 0..state.x.len() {
+            if self.fixed[i] {
+                state.v[i] = Vec3A::ZERO;
+                state.falling[i] = 0.0;
+                continue;
+            }
+            let velocity = state.v[i] + h * gravity + (state.x[i] - self.predictor[i]) / h;
+            state.falling[i] = ((velocity - state.v[i]) / h).dot(direction).clamp(0.0, 1.0);
+            state.v[i] = velocity;
+        }
+    }
+
+    fn mark_fixed(&mut self, frame: &Frame<'_>, body: &Body) {
+        self.held.fill(false);
+        for grasp in frame.grasps() {
+            for node in &grasp.nodes {
+                self.held[body.internal[*node as usize] as usize] = true;
+            }
+        }
+        for (i, fixed) in self.fixed.iter_mut().enumerate() {
+            *fixed = body.vertices[i].pinned || self.held[i];
+        }
+    }
+
+    /// Whether nothing holds or touches the body.
+    fn flies_freely(&self) -> bool {
+        !self.fixed.contains(&true)
+            && self.planes.iter().all(|plane| self.start.iter().all(|x| plane.height(*x) >= 0.0))
+    }
+
+    /// Moves the body to as much of its guess as squeezes no element too far: first all of it, then less of the free vertices' guess, and only then less
+    /// of the held vertices' prescribed motion; false if it was less of that.
+    fn start_sweeps(&self, body: &Body, state: &mut BodyState) -> bool {
+        let mut followed = false;
+        for (free, held) in START_SHARES {
+            for (i, x) in state.x.iter_mut().enumerate() {
+                let share = if self.held[i] { held } else { free };
+                *x = if share == 1.0 { self.guess[i] } else { self.start[i].lerp(self.guess[i], share) };
+            }
+            followed = held == 1.0;
+            let squeezed = |(tet, volume): (&[u32; 4], &f64)| {
+                let ratio = |x: &[Vec3A]| volume_ratio(tet, x, *volume as f32);
+                is_squeezed(ratio(&state.x), ratio(&self.start))
+            };
+            if !body.tets.iter().zip(&body.volumes).any(squeezed) && !self.overstretches(body, &state.x) {
+                break;
+            }
+        }
+        followed
+    }
+
+    /// Whether an edge at a held vertex is stretched too far, and further than at the substep's beginning.
+    fn overstretches(&self, body: &Body, x: &[Vec3A]) -> bool {
+        let too_long = |i: usize, to: u32, length: f32| {
+            let (now, before) = (x[to as usize] - x[i], self.start[to as usize] - self.start[i]);
+            let now = now.length_squared();
+            now > (HELD_STRETCH * length).powi(2) && now > before.length_squared()
+        };
+        let mut held = (0..x.len()).filter(|i| self.held[*i]);
+        held.any(|i| body.edges_of(i).iter().any(|e| too_long(i, e.to, e.length)))
+    }
+}
+
+#[inline(always)]
+fn volume_ratio(tet: &[u32; 4], x: &[Vec3A], rest: f32) -> f32 {
+    let [a, b, c, d] = tet.map(|i| x[i as usize]);
+    (b - a).cross(c - a).dot(d - a) / (6.0 * rest)
+}

@@ -1,0 +1,115 @@
+//! What a frame reports: speeds, volumes, and the events that end a run.
+
+use crate::Body;
+use crate::state::BodyState;
+
+/// A node at this speed [m/s] has diverged (the paper's particle velocity limit).
+const SPEED_LIMIT: f64 = 20.0;
+
+/// An edge of more than this many rest lengths has diverged.
+const STRETCH_LIMIT: f32 = 10.0;
+
+/// Why a run is over.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Divergence {
+    /// A position or velocity is not finite; the state is the last finite frame's.
+    NonFinite {
+        /// The body.
+        body: usize,
+    },
+    /// A node reached the speed limit of 20 m/s.
+    OverSpeed {
+        /// The body.
+        body: usize,
+    },
+    /// An edge is longer than 10 times its rest length.
+    OverStretch {
+        /// The body.
+        body: usize,
+    },
+}
+
+impl std::fmt::Display for Divergence {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::NonFinite { body } => write!(f, "body {body} has a position that is not finite"),
+            Self::OverSpeed { body } => write!(f, "a node of body {body} is at the speed limit of {SPEED_LIMIT} m/s"),
+            Self::OverStretch { body } => {
+                write!(f, "an edge of body {body} is over {STRETCH_LIMIT} times its rest length")
+            }
+        }
+    }
+}
+
+/// What happened in one frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StepReport {
+    /// Largest node speed at the end of the frame [m/s].
+    pub max_speed: f64,
+    /// Elements with signed volume at or below 0 at the end of the frame.
+    pub inverted: usize,
+    /// Smallest ratio of an element's volume to its rest volume.
+    pub min_volume_ratio: f64,
+    /// Substeps in which held nodes could not follow the tool without inverting or overstretching an element; they catch up later.
+    pub grasp_limited: usize,
+    /// Iterations of all bodies and substeps: sweeps, or quasi-Newton steps.
+    pub iterations: usize,
+    /// Substeps in which the quasi-Newton solver gave a body up to sweeps.
+    pub fallbacks: usize,
+    /// The event that ended the run, if any.
+    pub divergence: Option<Divergence>,
+}
+
+impl Default for StepReport {
+    fn default() -> Self {
+        Self {
+            max_speed: 0.0,
+            inverted: 0,
+            min_volume_ratio: f64::INFINITY,
+            grasp_limited: 0,
+            iterations: 0,
+            fallbacks: 0,
+            divergence: None,
+        }
+    }
+}
+
+impl StepReport {
+    /// Both together.
+    pub(crate) fn with(self, other: &Self) -> Self {
+        Self {
+            max_speed: self.max_speed.max(other.max_speed),
+            inverted: self.inverted + other.inverted,
+            min_volume_ratio: self.min_volume_ratio.min(other.min_volume_ratio),
+            grasp_limited: self.grasp_limited + other.grasp_limited,
+            iterations: self.iterations + other.iterations,
+            fallbacks: self.fallbacks + other.fallbacks,
+            divergence: self.divergence.or(other.divergence),
+        }
+    }
+
+    /// Fills in what is seen of a body at the end of the frame.
+    pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState) {
+        let finite = state.x.iter().chain(&state.v).all(|p| p.is_finite());
+        if !finite {
+            self.divergence = Some(Divergence::NonFinite { body: index });
+            return;
+        }
+        self.max_speed = f64::from(state.v.iter().map(|v| v.length_squared()).fold(0.0, f32::max)).sqrt();
+        for (tet, rest) in body.tets.iter().zip(&body.volumes) {
+            let [a, b, c, d] = tet.map(|i| state.x[i as usize].as_dvec3());
+            let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
+            self.inverted += usize::from(volume <= 0.0);
+            self.min_volume_ratio = self.min_volume_ratio.min(volume / rest);
+        }
+        let stretched = (0..state.x.len()).any(|i| {
+            let too_long = |length: f32, j: u32| (state.x[j as usize] - state.x[i]).length() > STRETCH_LIMIT * length;
+            body.edges_of(i).iter().any(|e| too_long(e.length, e.to))
+        });
+        if self.max_speed >= SPEED_LIMIT {
+            self.divergence = Some(Divergence::OverSpeed { body: index });
+        } else if stretched {
+            self.divergence = Some(Divergence::OverStretch { body: index });
+        }
+    }
+}
