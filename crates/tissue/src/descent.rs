@@ -3,7 +3,8 @@
 use crate::integrator::{Frame, Integrator};
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
-use crate::sweep::{LocalPlane, Substep, is_squeezed};
+use crate::support::LocalSupport;
+use crate::sweep::{Substep, is_squeezed};
 use crate::{Body, StepReport};
 use glam::Vec3A;
 
@@ -23,7 +24,7 @@ pub(crate) struct DescentIntegrator {
     guess: Vec<Vec3A>,
     fixed: Vec<bool>,
     held: Vec<bool>,
-    planes: Vec<LocalPlane>,
+    supports: Vec<LocalSupport>,
 }
 
 impl Integrator for DescentIntegrator {
@@ -46,7 +47,7 @@ impl DescentIntegrator {
             guess: zeros,
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
-            planes: LocalPlane::of(body),
+            supports: LocalSupport::of(body),
         }
     }
 
@@ -71,7 +72,7 @@ impl DescentIntegrator {
             start: &self.start,
             predictor: &self.predictor,
             fixed: &self.fixed,
-            planes: &self.planes,
+            supports: &self.supports,
         };
         for _ in 0..self.schedule.iterations {
             substep.sweep(&mut state.x, &mut self.guess);
@@ -131,7 +132,7 @@ impl DescentIntegrator {
     /// Whether nothing holds or touches the body.
     fn flies_freely(&self) -> bool {
         !self.fixed.contains(&true)
-            && self.planes.iter().all(|plane| self.start.iter().all(|x| plane.height(*x) >= 0.0))
+            && self.supports.iter().all(|support| self.start.iter().all(|x| support.touch(*x).0 >= 0.0))
     }
 
     /// Moves the body to as much of its guess as squeezes no element too far: first all of it, then less of the free vertices' guess, and only then less

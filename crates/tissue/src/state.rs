@@ -64,6 +64,12 @@ impl State {
         self.bodies[body].v[model.bodies[body].internal[node] as usize].as_dvec3()
     }
 
+    /// Sets the world position of a node [m], whether it is pinned or not; its velocity stays.
+    pub fn set_position(&mut self, model: &Model, body: usize, node: usize, position: DVec3) {
+        let b = &model.bodies[body];
+        self.bodies[body].x[b.internal[node] as usize] = (position - b.origin).as_vec3a();
+    }
+
     /// Sets the velocity of a node [m/s]; a pinned or held node keeps none.
     pub fn set_velocity(&mut self, model: &Model, body: usize, node: usize, velocity: DVec3) {
         self.bodies[body].v[model.bodies[body].internal[node] as usize] = velocity.as_vec3a();
