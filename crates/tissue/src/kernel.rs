@@ -67,7 +67,7 @@ pub(crate) struct VolumeTerm {
     alpha: f32,
 }
 
-/// Above this volume ratio the volume term is its plain quadratic.
+/// Above this volume ratio the volume term is its plain quadratic, as it is for inverted elements.
 const PLAIN: f32 = 0.25;
 
 impl From<VolumeEnergy> for VolumeTerm {
@@ -80,10 +80,10 @@ impl VertexElasticity for VolumeTerm {
     #[inline(always)]
     fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, .. }: &Seen, local: &mut Local) {
         let volume = body.corners[k].volume;
-        let (slope, curvature) = if ratio > PLAIN {
+        let (slope, curvature) = if ratio > PLAIN || ratio <= 0.0 {
             (self.lambda * (ratio - self.alpha), self.lambda)
         } else {
-            // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
+            // The guard keeps J well above this.
             let (_, slope, curvature) = self.energy.at(f64::from(ratio).max(1e-4));
             (slope as f32, curvature as f32)
         };

@@ -178,16 +178,20 @@ impl Substep<'_> {
     }
 }
 
-/// The share of a step that leaves an element of volume ratio `ratio` enough volume, if the whole step changes the ratio by `change`.
+/// The share of a step that leaves an element of volume ratio `ratio` enough volume, if the whole step changes the ratio by `change`. An inverted element has nothing
+/// to lose: its energy alone brings it back.
 #[inline(always)]
 pub(crate) fn allowed_share(ratio: f32, change: f32) -> f32 {
+    if ratio <= 0.0 {
+        return 1.0;
+    }
     let floor = (KEPT_SHARE * ratio).max(FLOOR).min(ratio);
     if ratio + change >= floor { 1.0 } else { ((floor - ratio) / change).max(0.0) }
 }
 
 /// Whether an element of this volume ratio may not get any smaller.
 pub(crate) fn is_squeezed(ratio: f32, before: f32) -> bool {
-    ratio < (KEPT_SHARE * before).max(FLOOR).min(before)
+    before > 0.0 && ratio < (KEPT_SHARE * before).max(FLOOR).min(before)
 }
 
 /// Solves a symmetric positive definite 3x3 system.

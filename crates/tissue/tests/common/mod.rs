@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use trocar_geometry::TetMesh;
-use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder};
+use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule};
 
 pub const FRAME: f64 = 1.0 / 60.0;
 pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
@@ -17,6 +17,20 @@ pub fn tissue(young_modulus: f64) -> Material {
         density: 1200.0,
         viscosity: 0.0,
     }
+}
+
+/// Every schedule that solvers are judged by, by name.
+pub fn schedules() -> Vec<(&'static str, Schedule)> {
+    vec![("paper", Schedule::PAPER), ("default", Schedule::default())]
+}
+
+/// A number in 0..1 for each counter, the same on every machine.
+pub fn noise(k: u64) -> f64 {
+    // SplitMix64.
+    let mut z = k.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// A box of `cells` cubes of edge `edge` [m], lower corner at the origin, six tetrahedra a cube around its main diagonal.

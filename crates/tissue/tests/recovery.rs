@@ -1,0 +1,51 @@
+//! Tissue from the worst of starts: every node thrown to a random place.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+mod common;
+
+use common::{FRAME, block, model, nodes, noise, schedules, tissue};
+use glam::DVec3;
+use trocar_tissue::{ConstitutiveModel, Material, State, Stepper};
+
+/// Nodes at random places inside the bounding box find back until no element is inverted, and then to their rest shape.
+#[test]
+fn random_starts_recover() {
+    let mesh = block([4, 4, 4], 2e-3);
+    let high = DVec3::splat(8e-3);
+    for constitutive in [ConstitutiveModel::StableNeoHookean, ConstitutiveModel::Corotated] {
+        for (pinned, how) in [(vec![], "free"), (nodes(&mesh, |p| p.z == 0.0), "pinned")] {
+            let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
+            let model = model(&mesh, material, pinned, DVec3::ZERO);
+            for (name, schedule) in schedules() {
+                for seed in 0..4 {
+                    let mut state = State::new(&model);
+                    for i in 0..mesh.vertices.len() {
+                        let at = |c: u64| noise(1000 * seed + 3 * i as u64 + c);
+                        if !model.bodies()[0].pinned()[i] {
+                            state.set_position(&model, 0, i, high * DVec3::new(at(0), at(1), at(2)));
+                        }
+                    }
+                    let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+                    let first = stepper.step(&model, &mut state, &[]);
+                    let (mut report, mut frames) = (first, 1);
+                    while report.inverted > 0 && frames < 120 {
+                        report = stepper.step(&model, &mut state, &[]);
+                        frames += 1;
+                    }
+                    let what = format!("{constitutive:?}, {how}, {name}, seed {seed}");
+                    println!(
+                        "{what}: {} inverted after a frame, {} after {frames}",
+                        first.inverted, report.inverted
+                    );
+                    assert_eq!(report.inverted, 0, "{what}: {report:?}");
+                    for _ in 0..60 {
+                        report = stepper.step(&model, &mut state, &[]);
+                        assert_eq!(report.inverted, 0, "{what}: an element inverts again");
+                    }
+                    assert!(report.min_volume_ratio > 0.9, "{what}: {report:?}");
+                }
+            }
+        }
+    }
+}
