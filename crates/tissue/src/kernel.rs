@@ -51,6 +51,8 @@ pub(crate) struct Seen {
     pub gradient: Vec3A,
     /// Volume over rest volume.
     pub ratio: f32,
+    /// Whether the body recovers from inversion: there are no barriers then.
+    pub recovers: bool,
 }
 
 /// A material's part of the sweep.
@@ -78,12 +80,12 @@ impl From<VolumeEnergy> for VolumeTerm {
 
 impl VertexElasticity for VolumeTerm {
     #[inline(always)]
-    fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, .. }: &Seen, local: &mut Local) {
+    fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, recovers, .. }: &Seen, local: &mut Local) {
         let volume = body.corners[k].volume;
-        let (slope, curvature) = if ratio > PLAIN || ratio <= 0.0 {
+        let (slope, curvature) = if ratio > PLAIN || recovers {
             (self.lambda * (ratio - self.alpha), self.lambda)
         } else {
-            // The guard keeps J well above this.
+            // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
             let (_, slope, curvature) = self.energy.at(f64::from(ratio).max(1e-4));
             (slope as f32, curvature as f32)
         };
@@ -144,6 +146,9 @@ const ROTATION_SHARE: f32 = 0.5;
 impl VertexElasticity for RotatedStrain {
     #[inline(always)]
     fn add(&self, body: &Body, k: usize, seen: &Seen, local: &mut Local) {
+        if seen.recovers {
+            return self.add_inverted(body, k, seen, local);
+        }
         self.volume.add(body, k, seen, local);
         let (f, m) = deformation(&body.gradients[k], seen.x, seen.others);
         let r = rotation(f);
@@ -167,6 +172,20 @@ impl VertexElasticity for RotatedStrain {
         }
         local.add_isotropic(stiffness * m.length_squared());
         local.block -= turning * stiffness;
+    }
+}
+
+impl RotatedStrain {
+    /// An inverted element has no rotation. It is brought back by the stable neo-Hookean energy of the same Lame parameters.
+    fn add_inverted(&self, body: &Body, k: usize, seen: &Seen, local: &mut Local) {
+        let (f, m) = deformation(&body.gradients[k], seen.x, seen.others);
+        let stiffness = self.mu * body.corners[k].volume;
+        local.force -= stiffness * (f * m);
+        local.add_isotropic(stiffness * m.length_squared());
+        let modulus = body.corners[k].volume * (self.volume.lambda + self.mu);
+        let alpha = 1.0 + self.mu / (self.volume.lambda + self.mu);
+        local.force -= modulus * (seen.ratio - alpha) * seen.gradient;
+        local.add_outer(modulus, seen.gradient);
     }
 }
 

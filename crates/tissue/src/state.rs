@@ -24,6 +24,8 @@ pub(crate) struct BodyState {
     pub v: Vec<Vec3A>,
     /// Acceleration along gravity that the last substep showed, as a share of gravity, 0..=1: for the adaptive start.
     pub falling: Vec<f32>,
+    /// Whether elements were inverted and have not all come back yet.
+    pub recovers: bool,
 }
 
 impl BodyState {
@@ -32,6 +34,7 @@ impl BodyState {
         self.x.copy_from_slice(&other.x);
         self.v.copy_from_slice(&other.v);
         self.falling.copy_from_slice(&other.falling);
+        self.recovers = other.recovers;
     }
 }
 
@@ -43,7 +46,7 @@ impl State {
             for (node, p) in body.rest_positions().iter().enumerate() {
                 x[body.internal[node] as usize] = (p - body.origin).as_vec3a();
             }
-            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()] }
+            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()], recovers: false }
         };
         Self { time: 0.0, grasps: Vec::new(), bodies: model.bodies.iter().map(at_rest).collect() }
     }
@@ -110,6 +113,7 @@ impl State {
             for f in &body.falling {
                 hash.update(&f.to_bits().to_le_bytes());
             }
+            hash.update(&[u8::from(body.recovers)]);
         }
         for grasp in &self.grasps {
             hash.update(&(grasp.body as u64).to_le_bytes());

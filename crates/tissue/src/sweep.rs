@@ -37,6 +37,8 @@ pub(crate) struct Substep<'a> {
     /// Pinned or held vertices.
     pub fixed: &'a [bool],
     pub supports: &'a [LocalSupport],
+    /// Whether elements are or were inverted: neither guard nor barrier, which would hold them where they are.
+    pub recovers: bool,
 }
 
 impl Substep<'_> {
@@ -76,10 +78,13 @@ impl Substep<'_> {
             return here;
         }
         let mut remembered = [(Vec3A::ZERO, 0.0f32); REMEMBERED];
-        let local = self.local(elasticity, i, x, &mut remembered);
-        let step = solve(&local.block, local.force);
         let corners = self.body.corners_of(i);
         let first = corners.start;
+        let local = self.local(elasticity, i, x, &mut remembered);
+        let step = solve(&local.block, local.force);
+        if self.recovers {
+            return here + step;
+        }
         let mut share = 1.0f32;
         for k in corners {
             let (gradient, ratio) = remembered.get(k - first).copied().unwrap_or_else(|| {
@@ -122,7 +127,7 @@ impl Substep<'_> {
         let corner = &self.body.corners[k];
         let others = corner.others.map(|j| x[j as usize]);
         let gradient = volume_gradient(corner, others);
-        Seen { x: here, others, gradient, ratio: gradient.dot(here - others[0]) }
+        Seen { x: here, others, gradient, ratio: gradient.dot(here - others[0]), recovers: self.recovers }
     }
 
     #[inline(always)]
@@ -178,13 +183,9 @@ impl Substep<'_> {
     }
 }
 
-/// The share of a step that leaves an element of volume ratio `ratio` enough volume, if the whole step changes the ratio by `change`. An inverted element has nothing
-/// to lose: its energy alone brings it back.
+/// The share of a step that leaves an element of volume ratio `ratio` enough volume, if the whole step changes the ratio by `change`.
 #[inline(always)]
 pub(crate) fn allowed_share(ratio: f32, change: f32) -> f32 {
-    if ratio <= 0.0 {
-        return 1.0;
-    }
     let floor = (KEPT_SHARE * ratio).max(FLOOR).min(ratio);
     if ratio + change >= floor { 1.0 } else { ((floor - ratio) / change).max(0.0) }
 }
@@ -302,6 +303,7 @@ mod tests {
                 predictor: &to_f32(&predictor),
                 fixed: &[false; 6],
                 supports: &LocalSupport::of(body),
+                recovers: false,
             };
             let at: Vec<DVec3> = to_f32(&x).iter().map(|p| p.as_dvec3()).collect();
             for i in 0..6 {

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::{FRAME, GRAVITY, block, nodes, schedules, tissue};
+use common::{FRAME, GRAVITY, Judged, block, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
 use trocar_geometry::Pose;
 use trocar_tissue::{
@@ -14,9 +14,9 @@ use trocar_tissue::{
 
 const FRAMES: usize = 600;
 
-/// Three bodies: one grasped and large enough to be swept in several tasks, one dropped on a plane, one on a field.
+/// Three small bodies: one grasped, one dropped on a plane, one on a field. (A body that several threads sweep at once is in robustness.rs.)
 fn scene() -> (Model, Vec<u32>) {
-    let (large, small) = (block([14, 9, 6], 2e-3), block([3, 2, 2], 2e-3));
+    let (large, small) = (block([2, 2, 4], 2e-3), block([2, 1, 1], 2e-3));
     let mut builder = ModelBuilder::new().gravity(GRAVITY);
     let material = Material { viscosity: 4.0, ..tissue(12e3) };
     let pinned = nodes(&large, |p| p.z == 0.0);
@@ -31,7 +31,7 @@ fn scene() -> (Model, Vec<u32>) {
         let body = BodyDescription { name: name.into(), mesh: &small, material, pinned: vec![], supports };
         builder.body(body).unwrap();
     }
-    (builder.build().unwrap(), nodes(&large, |p| p.z > 11e-3 && p.x < 8e-3))
+    (builder.build().unwrap(), nodes(&large, |p| p.z > 7e-3 && p.x < 3e-3))
 }
 
 /// A tool that lifts, turns and lowers.
@@ -40,7 +40,7 @@ fn tool(frame: usize) -> Pose {
     // A parabola, not a sine: the library's sines differ between machines.
     let bump = 4.0 * t * (1.0 - t);
     let rotation = DQuat::from_xyzw(0.0, 0.1 * bump, 0.0, 1.0).normalize();
-    Pose { rotation, translation: DVec3::new(0.0, 0.0, 6e-3 * bump) }
+    Pose { rotation, translation: DVec3::new(0.0, 0.0, 4e-3 * bump) }
 }
 
 fn run(model: &Model, stepper: &mut Stepper, state: &mut State, frames: std::ops::Range<usize>) {
@@ -85,7 +85,7 @@ fn same_bits(schedule: Schedule, name: &str) -> u64 {
 
 #[test]
 fn six_hundred_frames_have_the_same_bits() {
-    for (name, schedule) in schedules() {
+    for Judged { name, schedule, .. } in schedules().into_iter().filter(|judged| judged.name != "many sweeps") {
         println!("{name}: {:#018x}", same_bits(schedule, name));
     }
 }

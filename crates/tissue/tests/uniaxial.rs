@@ -8,6 +8,8 @@
 //!   P1 = mu s + l (J - a) t^2 = mu (s - t^2/s);
 //! - corotated: 2 mu (t - 1) + lambda (J - 1) s t = 0, a cubic in t with one root between 0 and (1 + 1/s), found by halving, and
 //!   P1 = 2 mu (s - 1) + lambda (J - 1) t^2.
+//!
+//! Stretches go from 0.6 to 1.8; of St. Venant-Kirchhoff tissue from 0.8, since a pressed bar of it gives way sideways, element against element, at less than 0.7.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -63,7 +65,7 @@ fn a_bar_pulls_and_pushes_as_its_energy_says() {
             let mut oracle = Oracle::new(&model);
             for way in [-1.0, 1.0] {
                 let mut state = OracleState::new(&model);
-                for step in 1..=if way < 0.0 { 4 } else { 8 } {
+                for step in 1..=if way > 0.0 { 8 } else if constitutive == ConstitutiveModel::StVenantKirchhoff { 2 } else { 4 } {
                     let s = 1.0 + 0.1 * way * f64::from(step);
                     let mut at = |s: f64| {
                         let (t, _) = closed_form(&material, s);

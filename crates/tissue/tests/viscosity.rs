@@ -7,6 +7,7 @@ mod common;
 use common::{model, nodes, tissue};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
+use trocar_tissue::oracle::Precision;
 use trocar_tissue::{Material, Oracle, OracleState};
 
 const VISCOSITY: f64 = 50.0;
@@ -32,18 +33,19 @@ fn lattice(half: DVec3, cell: f64) -> TetMesh {
 /// Power that a rate of strain D dissipates in the mesh, over the Newtonian 2 eta D:D + (bulk - 2 eta/3) tr(D)^2 of its volume.
 fn power(mesh: &TetMesh, rate: DMat3, bulk: f64) -> f64 {
     let model = model(mesh, fluid(), vec![], DVec3::ZERO);
-    let (mut state, dt) = (OracleState::new(&model), 1e-9);
+    let (mut state, dt) = (OracleState::new(&model), 1e-7);
     for (i, p) in mesh.vertices.iter().enumerate() {
-        state.velocities_mut(0)[i] = rate * *p;
+        state.velocities_mut(0)[i] = 100.0 * (rate * *p);
     }
     let before = state.velocities(0).to_vec();
-    Oracle::new(&model).step(&model, &mut state, dt, &[]).unwrap();
+    let precision = Precision { gradient: 1e-6, ..Precision::default() };
+    Oracle::with_precision(&model, precision).step(&model, &mut state, dt, &[]).unwrap();
     let lost: f64 = before.iter().zip(state.velocities(0)).enumerate().map(|(i, (a, b))| {
         model.bodies()[0].mass(i) * a.dot(*a - *b) / dt
     }).sum();
     let squares: f64 = rate.to_cols_array().iter().map(|d| d * d).sum();
     let trace = rate.x_axis.x + rate.y_axis.y + rate.z_axis.z;
-    lost / (mesh.volume() * (2.0 * VISCOSITY * squares + (bulk - 2.0 / 3.0 * VISCOSITY) * trace * trace))
+    1e-4 * lost / (mesh.volume() * (2.0 * VISCOSITY * squares + (bulk - 2.0 / 3.0 * VISCOSITY) * trace * trace))
 }
 
 #[test]
@@ -60,8 +62,8 @@ fn shear_and_swelling_dissipate_as_in_a_newtonian_fluid() {
     println!("over Newtonian: shear {seen:.3?}, swelling {swelling:.3}");
     let mean = seen.iter().sum::<f64>() / seen.len() as f64;
     assert!((mean - 1.0).abs() < 0.1, "{seen:?}");
-    assert!(seen.iter().all(|s| (s - 1.0).abs() < 0.35), "{seen:?}");
-    assert!((swelling - 1.0).abs() < 1e-3, "{swelling}");
+    assert!(seen.iter().all(|s| (s - 1.0).abs() < 0.15), "{seen:?}");
+    assert!((swelling - 1.0).abs() < 1e-2, "{swelling}");
 }
 
 /// A shear wave between two walls, v = sin(pi z/H) along x, decays at the rate eta k^2/rho.
@@ -69,7 +71,6 @@ fn shear_and_swelling_dissipate_as_in_a_newtonian_fluid() {
 fn a_shear_wave_decays_at_the_viscosity_s_rate() {
     let half = DVec3::new(20e-3, 4e-3, 4e-3);
     let mut mesh = lattice(half, 1e-3);
-    // Turned, so that the lattice lies askew to the shear.
     let height = 8e-3;
     let material = fluid();
     let lift = mesh.vertices.iter().map(|p| p.z).fold(f64::INFINITY, f64::min);
