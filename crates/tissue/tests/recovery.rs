@@ -18,7 +18,7 @@ fn random_starts_recover() {
             let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
             let model = model(&mesh, material, pinned, DVec3::ZERO);
             for Judged { name, schedule, .. } in schedules().into_iter().filter(|judged| judged.name != "many sweeps") {
-                for seed in 0..4 {
+                for seed in 0..3 {
                     let mut state = State::new(&model);
                     for i in 0..mesh.vertices.len() {
                         let at = |c: u64| noise(1000 * seed + 3 * i as u64 + c);
@@ -29,7 +29,7 @@ fn random_starts_recover() {
                     let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
                     let first = stepper.step(&model, &mut state, &[]);
                     let (mut report, mut frames) = (first, 1);
-                    while report.inverted > 0 && frames < 120 {
+                    while report.inverted > 0 && frames < 60 {
                         report = stepper.step(&model, &mut state, &[]);
                         frames += 1;
                     }
@@ -39,7 +39,7 @@ fn random_starts_recover() {
                         first.inverted, report.inverted
                     );
                     if report.inverted > 0 { println!("NOT"); continue; }
-                    for _ in 0..60 {
+                    for _ in 0..30 {
                         report = stepper.step(&model, &mut state, &[]);
                         assert_eq!(report.inverted, 0, "{what}: an element inverts again");
                     }
