@@ -72,6 +72,17 @@ pub(crate) struct VolumeTerm {
 /// Above this volume ratio the volume term is its plain quadratic, as it is for inverted elements.
 const PLAIN: f32 = 0.25;
 
+/// How much stiffer the volume of a nearly flat or inverted element is while its body recovers.
+const PUSH: f32 = 20.0;
+
+/// Slope and curvature of the volume energy while a body recovers: the quadratic, which is finite for inverted elements, and below [`PLAIN`] a stiffer one in the barrier's
+/// place, without which a few inverted elements can stay in balance with their neighbours.
+#[inline(always)]
+fn recovering(lambda: f32, alpha: f32, ratio: f32) -> (f32, f32) {
+    let plain = (lambda * (ratio - alpha), lambda);
+    if ratio > PLAIN { plain } else { (plain.0 + PUSH * lambda * (ratio - PLAIN), plain.1 + PUSH * lambda) }
+}
+
 impl From<VolumeEnergy> for VolumeTerm {
     fn from(energy: VolumeEnergy) -> Self {
         Self { energy, lambda: energy.modulus as f32, alpha: energy.alpha as f32 }
@@ -82,8 +93,10 @@ impl VertexElasticity for VolumeTerm {
     #[inline(always)]
     fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, recovers, .. }: &Seen, local: &mut Local) {
         let volume = body.corners[k].volume;
-        let (slope, curvature) = if ratio > PLAIN || recovers {
+        let (slope, curvature) = if ratio > PLAIN {
             (self.lambda * (ratio - self.alpha), self.lambda)
+        } else if recovers {
+            recovering(self.lambda, self.alpha, ratio)
         } else {
             // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
             let (_, slope, curvature) = self.energy.at(f64::from(ratio).max(1e-4));
@@ -182,10 +195,10 @@ impl RotatedStrain {
         let stiffness = self.mu * body.corners[k].volume;
         local.force -= stiffness * (f * m);
         local.add_isotropic(stiffness * m.length_squared());
-        let modulus = body.corners[k].volume * (self.volume.lambda + self.mu);
-        let alpha = 1.0 + self.mu / (self.volume.lambda + self.mu);
-        local.force -= modulus * (seen.ratio - alpha) * seen.gradient;
-        local.add_outer(modulus, seen.gradient);
+        let (volume, lambda) = (body.corners[k].volume, self.volume.lambda + self.mu);
+        let (slope, curvature) = recovering(lambda, 1.0 + self.mu / lambda, seen.ratio);
+        local.force -= volume * slope * seen.gradient;
+        local.add_outer(volume * curvature, seen.gradient);
     }
 }
 

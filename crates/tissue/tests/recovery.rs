@@ -6,9 +6,10 @@ mod common;
 
 use common::{FRAME, Judged, block, model, nodes, noise, schedules, tissue};
 use glam::DVec3;
-use trocar_tissue::{ConstitutiveModel, Material, State, Stepper};
+use trocar_tissue::{ConstitutiveModel, Divergence, Material, State, Stepper};
 
-/// Nodes at random places inside the bounding box find back until no element is inverted, and then to their rest shape.
+/// Nodes at random places inside the bounding box find back until no element is inverted. Some bodies stay tangled: upright elements, in a minimum of the energy that is not
+/// the rest shape.
 #[test]
 fn random_starts_recover() {
     let mesh = block([3, 3, 3], 2e-3);
@@ -27,23 +28,29 @@ fn random_starts_recover() {
                         }
                     }
                     let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
-                    let first = stepper.step(&model, &mut state, &[]);
-                    let (mut report, mut frames) = (first, 1);
+                    let what = format!("{constitutive:?}, {how}, {name}, seed {seed}");
+                    let mut step = || {
+                        let report = stepper.step(&model, &mut state, &[]);
+                        // Speeds and stretches are absurd at first; numbers never are.
+                        let lost = matches!(report.divergence, Some(Divergence::NonFinite { .. }));
+                        assert!(!lost, "{what}: {report:?}");
+                        report
+                    };
+                    let (first, mut frames) = (step(), 1);
+                    let mut report = first;
                     while report.inverted > 0 && frames < 60 {
-                        report = stepper.step(&model, &mut state, &[]);
+                        report = step();
                         frames += 1;
                     }
-                    let what = format!("{constitutive:?}, {how}, {name}, seed {seed}");
-                    println!(
-                        "{what}: {} inverted after a frame, {} after {frames}",
-                        first.inverted, report.inverted
-                    );
-                    if report.inverted > 0 { println!("NOT"); continue; }
-                    for _ in 0..30 {
-                        report = stepper.step(&model, &mut state, &[]);
-                        assert_eq!(report.inverted, 0, "{what}: an element inverts again");
+                    // Until all have left the barrier's range there is no guard, and some may turn over once more.
+                    for _ in 0..60 {
+                        report = step();
                     }
-                    println!("{what} {}", report.min_volume_ratio);
+                    println!(
+                        "{what}: {} inverted after a frame, none after {frames}, least ratio {:.2}",
+                        first.inverted, report.min_volume_ratio
+                    );
+                    assert_eq!(report.inverted, 0, "{what}: {report:?}");
                 }
             }
         }
