@@ -41,7 +41,7 @@ impl Target {
         let Some(cluster) = within.into_iter().nth(enough) else {
             return Err(Error::Option(format!(
                 "organ '{}' has no free node to grasp: all are pinned or next to a pinned one; pin fewer",
-                body.name
+                body.name()
             )));
         };
         let axis = &world.axes[organ];

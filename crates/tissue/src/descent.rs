@@ -16,9 +16,6 @@ const HELD_STRETCH: f32 = 7.0;
 const START_SHARES: [(f32, f32); 8] =
     [(1.0, 1.0), (0.5, 1.0), (0.25, 1.0), (0.0, 1.0), (0.0, 0.5), (0.0, 0.25), (0.0, 0.125), (0.0, 0.0)];
 
-/// Volume ratio of every element at which a body has recovered from inversion; above where the barrier begins.
-const RECOVERED: f32 = 0.25;
-
 /// The solver of one body.
 pub(crate) struct DescentIntegrator {
     schedule: Descent,
@@ -33,10 +30,6 @@ pub(crate) struct DescentIntegrator {
 impl Integrator for DescentIntegrator {
     fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
         self.mark_fixed(frame, body);
-        // The guard lets nothing invert: it happens only to states that are set from outside.
-        let least = body.tets.iter().zip(&body.volumes).map(|(tet, volume)| volume_ratio(tet, &state.x, *volume as f32));
-        let least = least.fold(f32::INFINITY, f32::min);
-        state.recovers = least <= 0.0 || (state.recovers && least < RECOVERED);
         let substeps = self.schedule.substeps;
         for substep in 1..=substeps {
             self.substep(frame, substep as f64 / substeps as f64, body, state, report);
@@ -80,7 +73,6 @@ impl DescentIntegrator {
             predictor: &self.predictor,
             fixed: &self.fixed,
             supports: &self.supports,
-            recovers: state.recovers,
         };
         for _ in 0..self.schedule.iterations {
             substep.sweep(&mut state.x, &mut self.guess);
@@ -177,7 +169,7 @@ impl DescentIntegrator {
 }
 
 #[inline(always)]
-fn volume_ratio(tet: &[u32; 4], x: &[Vec3A], rest: f32) -> f32 {
+pub(crate) fn volume_ratio(tet: &[u32; 4], x: &[Vec3A], rest: f32) -> f32 {
     let [a, b, c, d] = tet.map(|i| x[i as usize]);
     (b - a).cross(c - a).dot(d - a) / (6.0 * rest)
 }

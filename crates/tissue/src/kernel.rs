@@ -51,8 +51,6 @@ pub(crate) struct Seen {
     pub gradient: Vec3A,
     /// Volume over rest volume.
     pub ratio: f32,
-    /// Whether the body recovers from inversion: there are no barriers then.
-    pub recovers: bool,
 }
 
 /// A material's part of the sweep.
@@ -69,19 +67,8 @@ pub(crate) struct VolumeTerm {
     alpha: f32,
 }
 
-/// Above this volume ratio the volume term is its plain quadratic, as it is for inverted elements.
+/// Above this volume ratio the volume term is its plain quadratic.
 const PLAIN: f32 = 0.25;
-
-/// How much stiffer the volume of a nearly flat or inverted element is while its body recovers.
-const PUSH: f32 = 20.0;
-
-/// Slope and curvature of the volume energy while a body recovers: the quadratic, which is finite for inverted elements, and below [`PLAIN`] a stiffer one in the barrier's
-/// place, without which a few inverted elements can stay in balance with their neighbours.
-#[inline(always)]
-fn recovering(lambda: f32, alpha: f32, ratio: f32) -> (f32, f32) {
-    let plain = (lambda * (ratio - alpha), lambda);
-    if ratio > PLAIN { plain } else { (plain.0 + PUSH * lambda * (ratio - PLAIN), plain.1 + PUSH * lambda) }
-}
 
 impl From<VolumeEnergy> for VolumeTerm {
     fn from(energy: VolumeEnergy) -> Self {
@@ -91,12 +78,10 @@ impl From<VolumeEnergy> for VolumeTerm {
 
 impl VertexElasticity for VolumeTerm {
     #[inline(always)]
-    fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, recovers, .. }: &Seen, local: &mut Local) {
+    fn add(&self, body: &Body, k: usize, &Seen { gradient, ratio, .. }: &Seen, local: &mut Local) {
         let volume = body.corners[k].volume;
         let (slope, curvature) = if ratio > PLAIN {
             (self.lambda * (ratio - self.alpha), self.lambda)
-        } else if recovers {
-            recovering(self.lambda, self.alpha, ratio)
         } else {
             // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
             let (_, slope, curvature) = self.energy.at(f64::from(ratio).max(1e-4));
@@ -159,9 +144,6 @@ const ROTATION_SHARE: f32 = 0.5;
 impl VertexElasticity for RotatedStrain {
     #[inline(always)]
     fn add(&self, body: &Body, k: usize, seen: &Seen, local: &mut Local) {
-        if seen.recovers {
-            return self.add_inverted(body, k, seen, local);
-        }
         self.volume.add(body, k, seen, local);
         let (f, m) = deformation(&body.gradients[k], seen.x, seen.others);
         let r = rotation(f);
@@ -185,20 +167,6 @@ impl VertexElasticity for RotatedStrain {
         }
         local.add_isotropic(stiffness * m.length_squared());
         local.block -= turning * stiffness;
-    }
-}
-
-impl RotatedStrain {
-    /// An inverted element has no rotation. It is brought back by the stable neo-Hookean energy of the same Lame parameters.
-    fn add_inverted(&self, body: &Body, k: usize, seen: &Seen, local: &mut Local) {
-        let (f, m) = deformation(&body.gradients[k], seen.x, seen.others);
-        let stiffness = self.mu * body.corners[k].volume;
-        local.force -= stiffness * (f * m);
-        local.add_isotropic(stiffness * m.length_squared());
-        let (volume, lambda) = (body.corners[k].volume, self.volume.lambda + self.mu);
-        let (slope, curvature) = recovering(lambda, 1.0 + self.mu / lambda, seen.ratio);
-        local.force -= volume * slope * seen.gradient;
-        local.add_outer(volume * curvature, seen.gradient);
     }
 }
 

@@ -26,6 +26,7 @@ mod state;
 mod stepper;
 mod support;
 mod sweep;
+mod untangle;
 
 pub use body::Body;
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};

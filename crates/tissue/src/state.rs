@@ -24,8 +24,8 @@ pub(crate) struct BodyState {
     pub v: Vec<Vec3A>,
     /// Acceleration along gravity that the last substep showed, as a share of gravity, 0..=1: for the adaptive start.
     pub falling: Vec<f32>,
-    /// Whether elements were inverted and have not all come back yet.
-    pub recovers: bool,
+    /// Whether nodes were put somewhere from outside, and elements may be inverted by it.
+    pub disturbed: bool,
 }
 
 impl BodyState {
@@ -34,7 +34,7 @@ impl BodyState {
         self.x.copy_from_slice(&other.x);
         self.v.copy_from_slice(&other.v);
         self.falling.copy_from_slice(&other.falling);
-        self.recovers = other.recovers;
+        self.disturbed = other.disturbed;
     }
 }
 
@@ -46,7 +46,7 @@ impl State {
             for (node, p) in body.rest_positions().iter().enumerate() {
                 x[body.internal[node] as usize] = (p - body.origin).as_vec3a();
             }
-            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()], recovers: false }
+            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()], disturbed: false }
         };
         Self { time: 0.0, grasps: Vec::new(), bodies: model.bodies.iter().map(at_rest).collect() }
     }
@@ -67,10 +67,12 @@ impl State {
         self.bodies[body].v[model.bodies[body].internal[node] as usize].as_dvec3()
     }
 
-    /// Sets the world position of a node [m], whether it is pinned or not; its velocity stays.
+    /// Sets the world position of a node [m], whether it is pinned or not; its velocity stays. Elements that are inverted by it are put right, without regard to time and
+    /// forces, at the beginning of the next step.
     pub fn set_position(&mut self, model: &Model, body: usize, node: usize, position: DVec3) {
         let b = &model.bodies[body];
         self.bodies[body].x[b.internal[node] as usize] = (position - b.origin).as_vec3a();
+        self.bodies[body].disturbed = true;
     }
 
     /// Sets the velocity of a node [m/s]; a pinned or held node keeps none.
@@ -113,7 +115,7 @@ impl State {
             for f in &body.falling {
                 hash.update(&f.to_bits().to_le_bytes());
             }
-            hash.update(&[u8::from(body.recovers)]);
+            hash.update(&[u8::from(body.disturbed)]);
         }
         for grasp in &self.grasps {
             hash.update(&(grasp.body as u64).to_le_bytes());

@@ -4,6 +4,7 @@ use crate::descent::DescentIntegrator;
 use crate::integrator::{Frame, Integrator};
 use crate::report::Divergence;
 use crate::state::BodyState;
+use crate::untangle::Untangler;
 use crate::{Body, Error, Model, Result, Schedule, State, StepReport, ToolMotion};
 use rayon::prelude::*;
 
@@ -19,6 +20,7 @@ pub struct Stepper {
 struct Worker {
     body: usize,
     integrator: Box<dyn Integrator>,
+    untangler: Untangler,
     before: BodyState,
     state: BodyState,
     report: StepReport,
@@ -42,6 +44,7 @@ impl Stepper {
             .map(|(index, (state, body))| Worker {
                 body: index,
                 integrator: integrator(&schedule, body),
+                untangler: Untangler::new(&state),
                 before: state.clone(),
                 state,
                 report: StepReport::default(),
@@ -84,6 +87,7 @@ impl Worker {
     fn advance(&mut self, frame: &Frame<'_>, body: &Body) {
         self.report = StepReport::default();
         self.before.copy_from(&self.state);
+        self.untangler.untangle(frame, body, &mut self.state);
         self.integrator.advance(frame, body, &mut self.state, &mut self.report);
         self.report.measure(frame.index, body, &self.state);
     }

@@ -37,8 +37,6 @@ pub(crate) struct Substep<'a> {
     /// Pinned or held vertices.
     pub fixed: &'a [bool],
     pub supports: &'a [LocalSupport],
-    /// Whether elements are or were inverted: neither guard nor barrier, which would hold them where they are.
-    pub recovers: bool,
 }
 
 impl Substep<'_> {
@@ -78,13 +76,10 @@ impl Substep<'_> {
             return here;
         }
         let mut remembered = [(Vec3A::ZERO, 0.0f32); REMEMBERED];
-        let corners = self.body.corners_of(i);
-        let first = corners.start;
         let local = self.local(elasticity, i, x, &mut remembered);
         let step = solve(&local.block, local.force);
-        if self.recovers {
-            return here + step;
-        }
+        let corners = self.body.corners_of(i);
+        let first = corners.start;
         let mut share = 1.0f32;
         for k in corners {
             let (gradient, ratio) = remembered.get(k - first).copied().unwrap_or_else(|| {
@@ -127,7 +122,7 @@ impl Substep<'_> {
         let corner = &self.body.corners[k];
         let others = corner.others.map(|j| x[j as usize]);
         let gradient = volume_gradient(corner, others);
-        Seen { x: here, others, gradient, ratio: gradient.dot(here - others[0]), recovers: self.recovers }
+        Seen { x: here, others, gradient, ratio: gradient.dot(here - others[0]) }
     }
 
     #[inline(always)]
@@ -303,7 +298,6 @@ mod tests {
                 predictor: &to_f32(&predictor),
                 fixed: &[false; 6],
                 supports: &LocalSupport::of(body),
-                recovers: false,
             };
             let at: Vec<DVec3> = to_f32(&x).iter().map(|p| p.as_dvec3()).collect();
             for i in 0..6 {

@@ -8,13 +8,12 @@ use common::{FRAME, Judged, block, model, nodes, noise, schedules, tissue};
 use glam::DVec3;
 use trocar_tissue::{ConstitutiveModel, Divergence, Material, State, Stepper};
 
-/// Nodes at random places inside the bounding box find back until no element is inverted. Some bodies stay tangled: upright elements, in a minimum of the energy that is not
-/// the rest shape.
+/// Nodes at random places inside the bounding box find back until no element is inverted. They are near their rest shape then, and end in it.
 #[test]
 fn random_starts_recover() {
     let mesh = block([3, 3, 3], 2e-3);
     let high = DVec3::splat(6e-3);
-    for constitutive in [ConstitutiveModel::StableNeoHookean, ConstitutiveModel::Corotated] {
+    for constitutive in ConstitutiveModel::ALL {
         for (pinned, how) in [(vec![], "free"), (nodes(&mesh, |p| p.z == 0.0), "pinned")] {
             let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
             let model = model(&mesh, material, pinned, DVec3::ZERO);
@@ -42,15 +41,15 @@ fn random_starts_recover() {
                         report = step();
                         frames += 1;
                     }
-                    // Until all have left the barrier's range there is no guard, and some may turn over once more.
                     for _ in 0..60 {
                         report = step();
+                        assert_eq!(report.inverted, 0, "{what}: {report:?}");
                     }
                     println!(
                         "{what}: {} inverted after a frame, none after {frames}, least ratio {:.2}",
                         first.inverted, report.min_volume_ratio
                     );
-                    assert_eq!(report.inverted, 0, "{what}: {report:?}");
+                    assert!(report.min_volume_ratio > 0.95, "{what}: {report:?}");
                 }
             }
         }

@@ -7,8 +7,7 @@ const BARRIER_BEGINS: f64 = 0.2;
 const BARRIER_STRENGTH: f64 = 0.1;
 
 /// modulus/2 (J - alpha)^2, and below a fifth of the rest volume a barrier strength/2 ln(J/0.2)^2: the quadratic is finite for flat elements, and an
-/// element between a rigid grasp and pinned tissue can be pulled flat. Convex for J above 0. The barrier keeps elements from
-/// inverting; those that are inverted already (J of 0 or less) feel the quadratic alone, which pushes them back: a barrier would hold them outside.
+/// element between a rigid grasp and pinned tissue can be pulled flat. Convex for J above 0, not a number below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VolumeEnergy {
     /// Volume modulus [Pa].
@@ -29,7 +28,7 @@ impl VolumeEnergy {
     pub fn at(&self, j: f64) -> (f64, f64, f64) {
         let d = j - self.alpha;
         let (mut energy, mut slope, mut curvature) = (0.5 * self.modulus * d * d, self.modulus * d, self.modulus);
-        if j > 0.0 && j < BARRIER_BEGINS {
+        if j < BARRIER_BEGINS {
             let log = (j / BARRIER_BEGINS).ln();
             energy += 0.5 * self.strength * log * log;
             slope += self.strength * log / j;
