@@ -5,7 +5,8 @@ use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, Support, SupportField, ToolMotion, pins,
+    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, Support, SupportField,
+    ToolMotion, pins,
 };
 
 /// Length of a frame [s].
@@ -73,10 +74,6 @@ impl World {
 /// The bed the organ lay on when it was recorded, and its imprint in it.
 fn support_under(organ: &Organ, up: DVec3) -> Result<Support> {
     let cell = SUPPORT_CELL * TetQuality::of(&organ.body).median_edge;
-    if std::env::var_os("PLANE").is_some() {
-        let lowest = organ.body.vertices.iter().min_by(|a, b| a.dot(up).total_cmp(&b.dot(up))).copied().unwrap_or_default();
-        return Ok(trocar_tissue::SupportPlane { point: lowest, normal: up, friction: SUPPORT_FRICTION }.into());
-    }
     Ok(SupportField::under(&organ.body, up, cell, SUPPORT_FRICTION)?.into())
 }
 

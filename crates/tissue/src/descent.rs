@@ -29,7 +29,7 @@ pub(crate) struct DescentIntegrator {
 
 impl Integrator for DescentIntegrator {
     fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
-        self.mark_fixed(frame, body);
+        self.begin(frame, body);
         let substeps = self.schedule.substeps;
         for substep in 1..=substeps {
             self.substep(frame, substep as f64 / substeps as f64, body, state, report);
@@ -52,7 +52,14 @@ impl DescentIntegrator {
     }
 
     /// One substep of implicit Euler, which ends when `share` of the frame is over: predict, start, sweep, take the velocity.
-    fn substep(&mut self, frame: &Frame<'_>, share: f64, body: &Body, state: &mut BodyState, report: &mut StepReport) {
+    pub fn substep(
+        &mut self,
+        frame: &Frame<'_>,
+        share: f64,
+        body: &Body,
+        state: &mut BodyState,
+        report: &mut StepReport,
+    ) {
         let h = (frame.dt / self.schedule.substeps as f64) as f32;
         let gravity = frame.gravity.as_vec3a();
         self.start.copy_from_slice(&state.x);
@@ -117,7 +124,8 @@ impl DescentIntegrator {
         }
     }
 
-    fn mark_fixed(&mut self, frame: &Frame<'_>, body: &Body) {
+    /// Marks the vertices that are fixed during this frame.
+    pub fn begin(&mut self, frame: &Frame<'_>, body: &Body) {
         self.held.fill(false);
         for grasp in frame.grasps() {
             for node in &grasp.nodes {

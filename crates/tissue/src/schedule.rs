@@ -23,9 +23,24 @@ pub struct Descent {
     pub start: Start,
 }
 
+/// The warped, prefactored quasi-Newton method: global, and exact to a tolerance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct QuasiNewton {
+    /// Substeps a frame.
+    pub substeps: usize,
+    /// Most iterations a substep.
+    pub iterations: usize,
+    /// Pairs that L-BFGS remembers.
+    pub memory: usize,
+    /// A correction this small ends a substep [m]; a body whose first one is no larger is at rest.
+    pub tolerance: f64,
+}
+
 /// A solver and how it cuts a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Schedule {
+    /// The quasi-Newton method.
+    QuasiNewton(QuasiNewton),
     /// Vertex Block Descent.
     Descent(Descent),
 }
@@ -33,20 +48,37 @@ pub enum Schedule {
 /// More substeps or iterations than anyone means.
 const MOST: usize = 1_000_000;
 
+/// More pairs than L-BFGS ever profits from.
+const MOST_PAIRS: usize = 64;
+
 impl Schedule {
     /// The paper's: Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor, with our inversion guard.
     pub const PAPER: Self = Self::Descent(Descent { substeps: 8, iterations: 10, start: Start::Inertial });
 
+    /// The default: two substeps of at most six quasi-Newton iterations.
+    pub const FAST: Self = Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 6, memory: 6, tolerance: 3e-8 });
+
     /// Substeps a frame.
     pub fn substeps(&self) -> usize {
         match self {
+            Self::QuasiNewton(method) => method.substeps,
             Self::Descent(descent) => descent.substeps,
         }
     }
 
     /// Refuses what is no schedule.
     pub(crate) fn check(&self) -> Result<()> {
-        let Self::Descent(Descent { substeps, iterations, .. }) = *self;
+        let (substeps, iterations) = match *self {
+            Self::QuasiNewton(QuasiNewton { substeps, iterations, memory, tolerance }) => {
+                if !(tolerance >= 0.0 && tolerance.is_finite()) || memory > MOST_PAIRS {
+                    return Err(Error::Model(format!(
+                        "a quasi-Newton schedule with a tolerance of {tolerance} m and {memory} pairs; 0 m or more and at most {MOST_PAIRS} pairs make sense"
+                    )));
+                }
+                (substeps, iterations)
+            }
+            Self::Descent(Descent { substeps, iterations, .. }) => (substeps, iterations),
+        };
         for (name, count) in [("substeps", substeps), ("iterations", iterations)] {
             if !(1..=MOST).contains(&count) {
                 return Err(Error::Model(format!("a schedule of {count} {name}; 1 to {MOST} make sense")));

@@ -2,7 +2,9 @@
 
 use crate::descent::DescentIntegrator;
 use crate::integrator::{Frame, Integrator};
+use crate::quasi_newton::QuasiNewtonIntegrator;
 use crate::report::Divergence;
+use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
 use crate::untangle::Untangler;
 use crate::{Body, Error, Model, Result, Schedule, State, StepReport, ToolMotion};
@@ -43,7 +45,7 @@ impl Stepper {
         let mut workers: Vec<Worker> = states
             .map(|(index, (state, body))| Worker {
                 body: index,
-                integrator: integrator(&schedule, body),
+                integrator: integrator(&schedule, body, dt),
                 untangler: Untangler::new(&state),
                 before: state.clone(),
                 state,
@@ -94,8 +96,16 @@ impl Worker {
 }
 
 /// The schedule's solver for a body.
-fn integrator(schedule: &Schedule, body: &Body) -> Box<dyn Integrator> {
+fn integrator(schedule: &Schedule, body: &Body, dt: f64) -> Box<dyn Integrator> {
+    let sweeps = |descent: Descent| Box::new(DescentIntegrator::new(descent, body));
     match schedule {
-        Schedule::Descent(descent) => Box::new(DescentIntegrator::new(*descent, body)),
+        Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt) {
+            Some(integrator) => Box::new(integrator),
+            // Every node is pinned, or the matrix cannot be factorised: sweeps need no matrix.
+            None => {
+                sweeps(Descent { substeps: method.substeps, iterations: method.iterations, start: Start::Adaptive })
+            }
+        },
+        Schedule::Descent(descent) => sweeps(*descent),
     }
 }

@@ -15,9 +15,9 @@ use rayon::prelude::*;
 const CHUNK: usize = 192;
 
 /// A step leaves an element at least this share of the volume it has ...
-const KEPT_SHARE: f32 = 0.1;
+pub(crate) const KEPT_SHARE: f32 = 0.1;
 /// ... and at least this share of its rest volume, unless it has less already: then its volume does not fall.
-const FLOOR: f32 = 1e-3;
+pub(crate) const FLOOR: f32 = 1e-3;
 
 /// Speed below which friction sticks [m/s].
 pub(crate) const STICK_SPEED: f32 = 1e-3;

@@ -10,8 +10,8 @@ use crate::integrator::Frame;
 use crate::state::BodyState;
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
-/// Volume ratio of every element at which the material's energy takes over; above where its barrier begins.
-const RIGHT: f32 = 0.3;
+/// Volume ratio of every element at which the material's energy takes over: near enough to the rest shape to end in it.
+const RIGHT: f32 = 0.6;
 
 /// Sweeps between two looks at the elements, and most looks a frame.
 const SWEEPS: usize = 5;

@@ -5,9 +5,7 @@
 mod common;
 
 use common::{GRAVITY, block, nodes, tissue};
-use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, MassFloor, Material, ModelBuilder, Oracle, OracleState,
-};
+use trocar_tissue::{BodyDescription, ConstitutiveModel, MassFloor, Material, ModelBuilder, Oracle, OracleState};
 
 /// Tip deflection over Timoshenko's, w L^4/(8 E I) + w L^2/(2 k G A) with k = 5/6, for the beam's own weight w per length; `n` elements over half its height. nu = 0: the
 /// clamp then holds no lateral contraction, of which beam theory knows nothing.

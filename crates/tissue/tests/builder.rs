@@ -117,7 +117,8 @@ fn unusable_supports_schedules_and_frames_are_refused() {
     let mesh = block([2, 2, 2], 2e-3);
     for (normal, friction) in [(DVec3::Z * 2.0, 0.1), (DVec3::Z, -0.1), (DVec3::Z, f64::INFINITY), (DVec3::NAN, 0.1)] {
         let supports = vec![SupportPlane { point: DVec3::ZERO, normal, friction }.into()];
-        let body = BodyDescription { name: "block".into(), mesh: &mesh, material: tissue(12e3), pinned: vec![], supports };
+        let body =
+            BodyDescription { name: "block".into(), mesh: &mesh, material: tissue(12e3), pinned: vec![], supports };
         assert!(ModelBuilder::new().body(body).is_err());
     }
     let model = model(&mesh, tissue(12e3), vec![], GRAVITY);

@@ -66,7 +66,9 @@ fn momenta_are_kept_in_free_flight() {
             let (now_push, now_spin) = momenta(&model, &seen(&model, &state));
             let (lost, spin_lost) =
                 ((now_push - push).length() / push.length(), (now_spin - oracle_spin).length() / spin.length());
-            println!("{constitutive:?}, {name}: push off by {lost:.1e}, spin by {spin_lost:.1e} beyond implicit Euler's");
+            println!(
+                "{constitutive:?}, {name}: push off by {lost:.1e}, spin by {spin_lost:.1e} beyond implicit Euler's"
+            );
             // Ten sweeps lose a third of the spin; what converges loses what implicit Euler does.
             let (most, most_spin) = if converges { (1e-2, 0.06) } else { (0.05, 0.5) };
             assert!(lost < most && spin_lost < most_spin, "{constitutive:?}, {name}: {lost} {spin_lost}");
@@ -99,7 +101,9 @@ fn what_converges_gains_no_energy() {
         let mut builder = ModelBuilder::new().gravity(GRAVITY);
         let plane = SupportPlane { point: DVec3::Z * -1e-3, normal: DVec3::Z, friction: 0.3 };
         let supports = vec![plane.into()];
-        builder.body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![], supports }).unwrap();
+        builder
+            .body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![], supports })
+            .unwrap();
         let dropped = builder.build().unwrap();
         for Judged { name, schedule, converges } in schedules() {
             for (model, start, what) in [

@@ -96,7 +96,13 @@ fn the_plane_supports_and_holds() {
     let mut builder = ModelBuilder::new().gravity(GRAVITY);
     let material = Material { viscosity: 4.0, ..tissue(30e3) };
     builder
-        .body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![], supports: vec![plane.into()] })
+        .body(BodyDescription {
+            name: "block".into(),
+            mesh: &mesh,
+            material,
+            pinned: vec![],
+            supports: vec![plane.into()],
+        })
         .unwrap();
     let model = builder.build().unwrap();
     let mut state = State::new(&model);

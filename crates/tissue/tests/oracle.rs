@@ -89,7 +89,9 @@ fn busy(constitutive: ConstitutiveModel, viscosity: f64, friction: f64, mesh: &T
     let material = Material { model: constitutive, viscosity, ..tissue(12e3) };
     let plane = SupportPlane { point: DVec3::Z * 0.2e-3, normal: DVec3::Z, friction };
     let pinned = nodes(mesh, |p| p.x == 0.0);
-    builder.body(BodyDescription { name: "busy".into(), mesh, material, pinned, supports: vec![plane.into()] }).unwrap();
+    builder
+        .body(BodyDescription { name: "busy".into(), mesh, material, pinned, supports: vec![plane.into()] })
+        .unwrap();
     let model = builder.build().unwrap();
     let mut state = State::new(&model);
     for (i, p) in mesh.vertices.iter().enumerate() {

@@ -79,7 +79,11 @@ fn an_organ_rests_in_its_imprint() {
         }
         let place = state.positions(&model, 0);
         let most = |a: &[DVec3], b: &[DVec3]| a.iter().zip(b).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-        moved.push((most(&place, &mesh.vertices), most(&place, exact.positions(0)), most(exact.positions(0), &mesh.vertices)));
+        moved.push((
+            most(&place, &mesh.vertices),
+            most(&place, exact.positions(0)),
+            most(exact.positions(0), &mesh.vertices),
+        ));
     }
     println!("moved, off the oracle, oracle moved [m]: plane {:?}, imprint {:?}", moved[0], moved[1]);
     assert!(moved[1].0 < 0.5 * moved[0].0, "{moved:?}");

@@ -65,7 +65,13 @@ fn a_bar_pulls_and_pushes_as_its_energy_says() {
             let mut oracle = Oracle::new(&model);
             for way in [-1.0, 1.0] {
                 let mut state = OracleState::new(&model);
-                for step in 1..=if way > 0.0 { 8 } else if constitutive == ConstitutiveModel::StVenantKirchhoff { 2 } else { 4 } {
+                for step in 1..=if way > 0.0 {
+                    8
+                } else if constitutive == ConstitutiveModel::StVenantKirchhoff {
+                    2
+                } else {
+                    4
+                } {
                     let s = 1.0 + 0.1 * way * f64::from(step);
                     let mut at = |s: f64| {
                         let (t, _) = closed_form(&material, s);

@@ -40,9 +40,12 @@ fn power(mesh: &TetMesh, rate: DMat3, bulk: f64) -> f64 {
     let before = state.velocities(0).to_vec();
     let precision = Precision { gradient: 1e-6, ..Precision::default() };
     Oracle::with_precision(&model, precision).step(&model, &mut state, dt, &[]).unwrap();
-    let lost: f64 = before.iter().zip(state.velocities(0)).enumerate().map(|(i, (a, b))| {
-        model.bodies()[0].mass(i) * a.dot(*a - *b) / dt
-    }).sum();
+    let lost: f64 = before
+        .iter()
+        .zip(state.velocities(0))
+        .enumerate()
+        .map(|(i, (a, b))| model.bodies()[0].mass(i) * a.dot(*a - *b) / dt)
+        .sum();
     let squares: f64 = rate.to_cols_array().iter().map(|d| d * d).sum();
     let trace = rate.x_axis.x + rate.y_axis.y + rate.z_axis.z;
     1e-4 * lost / (mesh.volume() * (2.0 * VISCOSITY * squares + (bulk - 2.0 / 3.0 * VISCOSITY) * trace * trace))

@@ -5,10 +5,10 @@ use faer::{Mat, Side};
 use glam::{DMat3, DVec3};
 
 /// dP/dF as a matrix over the entries of F, column by column [Pa].
-pub(super) type Tangent = [[f64; 9]; 9];
+pub(crate) type Tangent = [[f64; 9]; 9];
 
 /// F from the corners' positions and rest gradients, F = sum x m'.
-pub(super) fn deformation(x: [DVec3; 4], m: &[DVec3; 4]) -> DMat3 {
+pub(crate) fn deformation(x: [DVec3; 4], m: &[DVec3; 4]) -> DMat3 {
     // Gradients sum to zero: edges instead of positions keep the rounding of positions far from the origin out.
     let mut f = DMat3::ZERO;
     for k in 1..4 {
@@ -21,7 +21,7 @@ pub(super) fn deformation(x: [DVec3; 4], m: &[DVec3; 4]) -> DMat3 {
 }
 
 /// dP/dF at F.
-pub(super) fn tangent(psi: &dyn Hyperelastic, f: DMat3) -> Tangent {
+pub(crate) fn tangent(psi: &dyn Hyperelastic, f: DMat3) -> Tangent {
     std::array::from_fn(|k| {
         let mut change = [0.0; 9];
         change[k] = 1.0;
@@ -30,7 +30,7 @@ pub(super) fn tangent(psi: &dyn Hyperelastic, f: DMat3) -> Tangent {
 }
 
 /// The nearest positive semidefinite tangent: negative eigenvalues become 0. None if there is no eigendecomposition (numbers that are not finite).
-pub(super) fn projected(tangent: &Tangent) -> Option<Tangent> {
+pub(crate) fn projected(tangent: &Tangent) -> Option<Tangent> {
     if tangent.iter().flatten().any(|v| !v.is_finite()) {
         return None;
     }
@@ -50,7 +50,7 @@ pub(super) fn projected(tangent: &Tangent) -> Option<Tangent> {
 }
 
 /// The 3x3 blocks of an element's stiffness, over its volume, block (a, b) at [a][b].
-pub(super) fn blocks(tangent: &Tangent, m: &[DVec3; 4]) -> [[DMat3; 4]; 4] {
+pub(crate) fn blocks(tangent: &Tangent, m: &[DVec3; 4]) -> [[DMat3; 4]; 4] {
     let mut out = [[DMat3::ZERO; 4]; 4];
     for b in 0..4 {
         for s in 0..3 {

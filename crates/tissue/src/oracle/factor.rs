@@ -1,130 +1,14 @@
-//! The Hessian over free nodes as a sparse matrix, and its Cholesky factor.
-//!
-//! The pattern and the symbolic factorisation (approximate minimum degree, faer) depend on the mesh and on which nodes are fixed only, and are kept. Numbers are
-//! added element by element in the mesh's order, on one thread.
+//! The Hessian's Cholesky factor. The symbolic factorisation (approximate minimum degree, faer) depends on the mesh and on which nodes are fixed only, and is kept.
 
+use crate::stiffness::Stiffness;
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
+use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, LltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
-use glam::{DMat3, DVec3};
-
-/// Number of a fixed node among the free ones.
-const FIXED: usize = usize::MAX;
-
-/// The lower triangle of a symmetric matrix of 3x3 blocks, compressed by scalar columns.
-pub(super) struct Stiffness {
-    /// Number of each node among the free ones.
-    number: Vec<usize>,
-    /// Free nodes.
-    pub free: Vec<usize>,
-    /// Per free node, the numbers below its own of its neighbours, ascending.
-    below: Vec<Vec<usize>>,
-    columns: Vec<usize>,
-    rows: Vec<usize>,
-    values: Vec<f64>,
-}
-
-impl Stiffness {
-    /// An empty matrix over the nodes that are not fixed.
-    pub fn new(tets: &[[u32; 4]], fixed: &[bool]) -> Self {
-        let mut number = vec![FIXED; fixed.len()];
-        let free: Vec<usize> = (0..fixed.len()).filter(|i| !fixed[*i]).collect();
-        for (k, i) in free.iter().enumerate() {
-            number[*i] = k;
-        }
-        let mut below = vec![Vec::new(); free.len()];
-        for tet in tets {
-            for a in tet.map(|i| number[i as usize]) {
-                for b in tet.map(|i| number[i as usize]) {
-                    if a != FIXED && b != FIXED && b > a {
-                        below[a].push(b);
-                    }
-                }
-            }
-        }
-        for list in &mut below {
-            list.sort_unstable();
-            list.dedup();
-        }
-        let (mut columns, mut rows) = (vec![0], Vec::new());
-        for (j, list) in below.iter().enumerate() {
-            for c in 0..3 {
-                rows.extend(3 * j + c..3 * j + 3);
-                list.iter().for_each(|i| rows.extend(3 * i..3 * i + 3));
-                columns.push(rows.len());
-            }
-        }
-        let values = vec![0.0; rows.len()];
-        Self { number, free, below, columns, rows, values }
-    }
-
-    /// Sets all numbers to 0.
-    pub fn clear(&mut self) {
-        self.values.fill(0.0);
-    }
-
-    /// Adds a block at nodes (i, j). Fixed nodes have none, and of (i, j) and (j, i) one is kept, so both are to be added.
-    pub fn add(&mut self, i: usize, j: usize, block: DMat3) {
-        let (row, column) = (self.number[i], self.number[j]);
-        if row == FIXED || column == FIXED || row < column {
-            return;
-        }
-        if row == column {
-            for c in 0..3 {
-                let first = self.columns[3 * column + c];
-                for r in c..3 {
-                    self.values[first + r - c] += 0.5 * (block.col(c)[r] + block.col(r)[c]);
-                }
-            }
-        } else if let Ok(k) = self.below[column].binary_search(&row) {
-            for c in 0..3 {
-                let first = self.columns[3 * column + c] + 3 - c + 3 * k;
-                for r in 0..3 {
-                    self.values[first + r] += block.col(c)[r];
-                }
-            }
-        }
-    }
-
-    /// Adds the same number to the whole diagonal.
-    pub fn shift(&mut self, by: f64) {
-        for first in &self.columns[..self.columns.len() - 1] {
-            self.values[*first] += by;
-        }
-    }
-
-    /// Mean of the diagonal's absolute values [N/m].
-    pub fn mean_diagonal(&self) -> f64 {
-        let diagonal = self.columns[..self.columns.len() - 1].iter().map(|first| self.values[*first].abs());
-        diagonal.sum::<f64>() / (3 * self.free.len()).max(1) as f64
-    }
-
-    /// The matrix times a vector over all nodes, whose entries at fixed nodes count as 0.
-    #[cfg(test)]
-    pub fn times(&self, v: &[DVec3]) -> Vec<DVec3> {
-        let mut out = vec![DVec3::ZERO; v.len()];
-        for column in 0..3 * self.free.len() {
-            let (j, c) = (self.free[column / 3], column % 3);
-            for k in self.columns[column]..self.columns[column + 1] {
-                let (i, r) = (self.free[self.rows[k] / 3], self.rows[k] % 3);
-                out[i][r] += self.values[k] * v[j][c];
-                if (i, r) != (j, c) {
-                    out[j][c] += self.values[k] * v[i][r];
-                }
-            }
-        }
-        out
-    }
-
-    fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
-        let n = 3 * self.free.len();
-        SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows)
-    }
-}
+use glam::DVec3;
 
 /// A Cholesky factor and its memory.
 pub(super) struct Factor {
@@ -148,10 +32,10 @@ impl Factor {
 
     /// Factorises; false if the matrix is not positive definite.
     pub fn factorise(&mut self, matrix: &Stiffness) -> bool {
-        if matrix.values.iter().any(|v| !v.is_finite()) {
+        if matrix.values().iter().any(|v| !v.is_finite()) {
             return false;
         }
-        let sparse = SparseColMatRef::new(matrix.pattern(), matrix.values.as_slice());
+        let sparse = SparseColMatRef::new(matrix.pattern(), matrix.values());
         let stack = MemStack::new(&mut self.memory);
         let regularization = LltRegularization::default();
         let done = self.symbolic.factorize_numeric_llt(

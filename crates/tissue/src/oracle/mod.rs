@@ -19,7 +19,7 @@
 //!
 //! Everything runs on the calling thread in a fixed order: the same machine gives the same bits.
 
-mod element;
+pub(crate) mod element;
 mod factor;
 mod friction;
 mod guard;

@@ -3,9 +3,10 @@
 //! The exact Hessian is tried first, since it alone converges quadratically; where it is not positive definite, the elements' tangents are projected (Teran and others,
 //! "Robust quasistatic finite elements and flesh simulation", 2005), and where that is singular, the diagonal is shifted.
 
-use super::factor::{Factor, Stiffness};
+use super::factor::Factor;
 use super::potential::Potential;
 use super::{Failure, Solution, guard};
+use crate::stiffness::Stiffness;
 use glam::DVec3;
 
 /// Share of the linear decrease that a step must bring (Armijo).

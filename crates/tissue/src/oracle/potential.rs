@@ -1,11 +1,11 @@
 //! The function that is minimised: energy, gradient and Hessian over all nodes of a body.
 
 use super::element::{blocks, deformation, projected, tangent};
-use super::factor::Stiffness;
 use super::state::Nodes;
 use crate::builder::shape_gradients;
-use crate::sweep::STICK_SPEED;
+use crate::stiffness::Stiffness;
 use crate::support::Touch;
+use crate::sweep::STICK_SPEED;
 use crate::{Body, Hyperelastic, Support};
 use glam::{DMat3, DVec3};
 

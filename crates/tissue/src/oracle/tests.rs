@@ -3,11 +3,11 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use super::element::{blocks, projected, tangent};
-use super::factor::Stiffness;
 use super::guard::allowed_share;
 use super::newton::{Solver, norm};
 use super::potential::{Elastic, Motion, Potential};
 use super::state::Nodes;
+use crate::stiffness::Stiffness;
 use crate::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, SupportPlane};
 use glam::{DMat3, DVec3};
 use trocar_geometry::TetMesh;

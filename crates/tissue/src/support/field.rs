@@ -46,7 +46,9 @@ impl SupportField {
             return refuse(format!("up is {up}; it must be a direction"));
         };
         if !(cell > 0.0 && cell.is_finite() && friction >= 0.0 && friction.is_finite()) {
-            return refuse(format!("cells of {cell} m and friction of {friction}; the first is above 0, the second not below"));
+            return refuse(format!(
+                "cells of {cell} m and friction of {friction}; the first is above 0, the second not below"
+            ));
         }
         if mesh.tets.is_empty() || mesh.vertices.iter().any(|v| !v.is_finite()) {
             return refuse("the mesh has no element or a node that is nowhere".to_owned());
@@ -234,7 +236,8 @@ mod tests {
         for k in 0..300 {
             let at = |f: f64| (k as f64 * f).fract();
             let [a, b, up] = field.axes;
-            let p = field.origin + 2e-3 * (13.0 * at(0.617) - 1.0) * a + 2e-3 * (12.0 * at(0.137) - 1.0) * b + 1e-4 * up;
+            let p =
+                field.origin + 2e-3 * (13.0 * at(0.617) - 1.0) * a + 2e-3 * (12.0 * at(0.137) - 1.0) * b + 1e-4 * up;
             let touch = field.touch(p);
             steepest = steepest.max((touch.gradient - up).length());
             let d = 1e-7;

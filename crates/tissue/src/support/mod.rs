@@ -55,11 +55,9 @@ impl Support {
 
     pub(crate) fn touch(&self, x: DVec3) -> Touch {
         match self {
-            Self::Plane(plane) => Touch {
-                height: (x - plane.point).dot(plane.normal),
-                gradient: plane.normal,
-                curvature: DMat3::ZERO,
-            },
+            Self::Plane(plane) => {
+                Touch { height: (x - plane.point).dot(plane.normal), gradient: plane.normal, curvature: DMat3::ZERO }
+            }
             Self::Field(field) => field.touch(x),
         }
     }
@@ -69,7 +67,10 @@ impl Support {
         let Self::Plane(plane) = self else {
             return Ok(());
         };
-        if plane.normal.is_normalized() && plane.point.is_finite() && plane.friction >= 0.0 && plane.friction.is_finite()
+        if plane.normal.is_normalized()
+            && plane.point.is_finite()
+            && plane.friction >= 0.0
+            && plane.friction.is_finite()
         {
             Ok(())
         } else {

@@ -31,9 +31,15 @@ pub struct Judged {
 pub fn schedules() -> Vec<Judged> {
     vec![
         Judged { name: "paper", schedule: Schedule::PAPER, converges: false },
-        Judged { name: "default", schedule: Schedule::default(), converges: false },
+        Judged { name: "adaptive sweeps", schedule: adaptive(), converges: false },
+        Judged { name: "fast", schedule: Schedule::FAST, converges: true },
         Judged { name: "many sweeps", schedule: many_sweeps(), converges: true },
     ]
+}
+
+/// The paper's sweeps from an adaptive start.
+pub fn adaptive() -> Schedule {
+    Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
 }
 
 /// So many sweeps that little is left to minimise on a small mesh.

@@ -1,0 +1,225 @@
+//! Where a substep starts from and how far it goes along a direction: nowhere that squeezes an element too far, and downhill.
+
+use super::{QuasiNewtonIntegrator, position};
+use crate::Body;
+use crate::integrator::Frame;
+use crate::lanes::dot_rows;
+use crate::sweep::STICK_SPEED;
+use fearless_simd::{Simd, SimdBase, f32x4};
+use glam::Vec3A;
+
+/// Held nodes this near to their targets have arrived [m]: rounding of positions.
+const ARRIVED: f32 = 1e-7;
+
+/// Guessed motions below this are left out [m]: a body at rest starts where it is.
+const STILL: f32 = 1e-9;
+
+/// A slope that has fallen to this share, or risen to it on the other side, ends the search.
+const SLOPE_SHARE: f32 = 0.5;
+
+/// Most secant steps of a search.
+const MOST_SECANTS: usize = 3;
+
+/// Times the steps of squeezed elements' nodes are halved, and then dropped, before a search gives up.
+const HALVINGS: usize = 3;
+const DROPS: usize = 6;
+
+/// Where a substep starts from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Guess {
+    /// Where it was: nothing moves.
+    Still,
+    /// Free nodes went on with their velocities, held ones with their tools.
+    Ahead,
+    /// Where it was, though things move: elements would not bear it that nodes go on by themselves.
+    Behind,
+}
+
+/// What a search came to.
+pub(super) enum Found {
+    /// A step was taken; gradient and history know.
+    Step,
+    /// None helps; positions are as they were.
+    Nothing,
+}
+
+impl QuasiNewtonIntegrator {
+    /// Moves to where the substep starts from; the forces there are those of the last pass then.
+    #[inline(always)]
+    pub(super) fn guess<S: Simd>(&mut self, simd: S, frame: &Frame<'_>, share: f64, h: f32, body: &Body) -> Guess {
+        let free = self.layout.free;
+        let mut moves = false;
+        for i in 0..free {
+            let mut to = self.start[i];
+            for c in 0..3 {
+                let by = h * self.v[i][c];
+                if !self.held[i] && by.abs() > STILL {
+                    to[c] += by;
+                }
+            }
+            moves |= to != self.start[i];
+            self.targets[i] = to;
+        }
+        let (targets, layout, start) = (&mut self.targets, &self.layout, &self.start);
+        frame.for_held(body, share, |vertex, x| {
+            let i = layout.number[vertex] as usize;
+            targets[i] = x.extend(0.0).to_array();
+            moves |= targets[i] != start[i];
+        });
+        if !moves {
+            self.elements.pass(simd, &self.layout, &self.x, h);
+            return Guess::Still;
+        }
+        self.x[..free].copy_from_slice(&self.targets[..free]);
+        if !self.elements.pass(simd, &self.layout, &self.x, h) {
+            self.elements.accept();
+            return Guess::Ahead;
+        }
+        self.x[..free].copy_from_slice(&self.start[..free]);
+        self.elements.pass(simd, &self.layout, &self.x, h);
+        Guess::Behind
+    }
+
+    /// Goes from where the substep began, held nodes with their tools and the free ones as a linear body would follow; gradient and positions know. False if held nodes could not go all
+    /// the way without squeezing an element too far: they catch up later.
+    #[inline(always)]
+    pub(super) fn pull<S: Simd>(&mut self, simd: S, h: f32) -> bool {
+        self.direction.copy_from_slice(&self.gradient);
+        for i in (0..self.layout.free).filter(|i| self.held[*i]) {
+            for c in 0..3 {
+                self.direction[i][c] = -self.factor.holding[i] * (self.targets[i][c] - self.x[i][c]);
+            }
+        }
+        self.precondition(simd);
+        for i in 0..self.layout.free {
+            for c in 0..3 {
+                let way = self.targets[i][c] - self.x[i][c];
+                self.direction[i][c] = if self.held[i] { way } else { -self.direction[i][c] };
+            }
+        }
+        self.base.copy_from_slice(&self.x[..self.layout.rows]);
+        if self.go(simd, 1.0, h) {
+            self.elements.accept();
+        } else {
+            self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
+            self.elements.pass(simd, &self.layout, &self.x, h);
+        }
+        self.take_gradient(simd, h);
+        std::mem::swap(&mut self.gradient, &mut self.next_gradient);
+        let arrived = |i: usize| (0..3).all(|c| (self.x[i][c] - self.targets[i][c]).abs() <= ARRIVED);
+        (0..self.layout.free).all(|i| !self.held[i] || arrived(i))
+    }
+
+    /// Writes the potential's gradient into `next_gradient`, from the forces of the last pass; 0 at held nodes.
+    #[inline(always)]
+    pub(super) fn take_gradient<S: Simd>(&mut self, simd: S, h: f32) {
+        let inertia = 1.0 / (h * h);
+        for i in 0..self.layout.free {
+            if self.held[i] {
+                self.next_gradient[i] = [0.0; 4];
+                continue;
+            }
+            let x = f32x4::from_slice(simd, &self.x[i]);
+            let off = x - f32x4::from_slice(simd, &self.predictor[i]);
+            let mut sum = off * (self.layout.masses[i] * inertia);
+            let (first, end) = (self.layout.first_corner[i] as usize, self.layout.first_corner[i + 1] as usize);
+            for k in &self.layout.corners[first..end] {
+                sum = sum + f32x4::from_slice(simd, &self.elements.corners[*k as usize]);
+            }
+            sum.store_slice(&mut self.next_gradient[i]);
+        }
+        if !self.supports.is_empty() {
+            self.add_contacts(h);
+        }
+    }
+
+    /// One-sided quadratic penalty of the supports and regularised Coulomb friction, as in the sweeps.
+    fn add_contacts(&mut self, h: f32) {
+        for i in 0..self.layout.free {
+            let here = position(&self.x[i]);
+            for support in &self.supports {
+                let (height, steep) = support.touch(here);
+                if height >= 0.0 || self.held[i] {
+                    continue;
+                }
+                let stiffness = self.contact_stiffness[i];
+                let mut gradient: Vec3A = stiffness * height * steep;
+                let motion = here - position(&self.start[i]);
+                let normal = support.normal(position(&self.start[i]));
+                let slide = motion - motion.dot(normal) * normal;
+                let (length, stick) = (slide.length(), STICK_SPEED * h);
+                let most = -support.friction() * stiffness * height * support.steepness(steep);
+                let drag = if length < stick { most / stick * (2.0 - length / stick) } else { most / length };
+                gradient += drag * slide;
+                for c in 0..3 {
+                    self.next_gradient[i][c] += gradient[c];
+                }
+            }
+        }
+    }
+
+    /// Goes along the direction until the slope has fallen enough.
+    #[inline(always)]
+    pub(super) fn search<S: Simd>(&mut self, simd: S, h: f32) -> Found {
+        let rows = self.layout.rows;
+        let mut slope = dot_rows(simd, &self.gradient, &self.direction);
+        if !(slope < 0.0) {
+            // The history misleads: the preconditioner alone always points downhill.
+            self.history.clear();
+            self.find_direction(simd);
+            slope = dot_rows(simd, &self.gradient, &self.direction);
+            if !(slope < 0.0) {
+                return Found::Nothing;
+            }
+        }
+        self.base.copy_from_slice(&self.x[..rows]);
+        let mut share = 1.0f32;
+        for attempt in 0..=MOST_SECANTS {
+            if !self.go(simd, share, h) {
+                self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
+                return Found::Nothing;
+            }
+            if attempt == 0 {
+                // Steps of squeezed elements' nodes may have been cut.
+                slope = dot_rows(simd, &self.gradient, &self.direction);
+            }
+            self.take_gradient(simd, h);
+            let there = dot_rows(simd, &self.next_gradient, &self.direction);
+            if there.is_nan() {
+                self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
+                return Found::Nothing;
+            }
+            if there <= SLOPE_SHARE * slope.abs() || attempt == MOST_SECANTS {
+                break;
+            }
+            share *= (slope / (slope - there)).clamp(0.1, 0.9);
+        }
+        self.elements.accept();
+        self.history.learn(simd, share, &self.direction, &self.gradient, &self.next_gradient);
+        std::mem::swap(&mut self.gradient, &mut self.next_gradient);
+        Found::Step
+    }
+
+    /// Goes `share` of the direction; where elements would be squeezed too far, their nodes go less far, and at last not at all. False if that does not help either.
+    #[inline(always)]
+    fn go<S: Simd>(&mut self, simd: S, share: f32, h: f32) -> bool {
+        for round in 0..=HALVINGS + DROPS {
+            for i in 0..self.layout.free {
+                for c in 0..3 {
+                    self.x[i][c] = self.base[i][c] + share * self.direction[i][c];
+                }
+            }
+            if !self.elements.pass(simd, &self.layout, &self.x, h) {
+                return true;
+            }
+            let (by, direction) = (if round < HALVINGS { 0.5 } else { 0.0 }, &mut self.direction);
+            let free = self.layout.free as u32;
+            self.elements.for_squeezed(&self.layout, |nodes| {
+                for i in nodes.into_iter().filter(|i| *i < free) {
+                    direction[i as usize] = direction[i as usize].map(|d: f32| by * d);
+                }
+            });
+        }
+        false
+    }
+}

@@ -1,0 +1,133 @@
+//! Stresses of sixteen elements at once, and their viscosity.
+
+use crate::lanes::{LANES, Mat3L, add, apply, cofactor, dot, load, rotation, scale, splat, sub};
+use crate::material::VolumeEnergy;
+use crate::{ConstitutiveModel, Corotated, Material, StableNeoHookean};
+use fearless_simd::{Simd, SimdBase, f32x16};
+
+/// Volume ratio above which the volume energy is its plain quadratic.
+const PLAIN: f32 = 0.25;
+
+/// Smallest volume ratio whose logarithm is taken: the guard keeps ratios above, this keeps numbers finite if it ever did not.
+const LEAST: f64 = 1e-4;
+
+/// Determinant of F below which its rotation is not sought.
+const LEAST_ROTATION: f32 = 1e-4;
+
+/// A body's stress law.
+pub(super) enum Stress {
+    StableNeoHookean { mu: f32, volume: Volume },
+    StVenantKirchhoff { mu: f32, lambda: f32 },
+    Corotated { mu: f32, volume: Volume },
+}
+
+/// The energy of the volume ratio.
+pub(super) struct Volume {
+    energy: VolumeEnergy,
+    modulus: f32,
+    alpha: f32,
+}
+
+impl From<VolumeEnergy> for Volume {
+    fn from(energy: VolumeEnergy) -> Self {
+        Self { energy, modulus: energy.modulus as f32, alpha: energy.alpha as f32 }
+    }
+}
+
+impl Stress {
+    pub fn of(material: &Material) -> Self {
+        let (mu, lambda) = material.lame();
+        match material.model {
+            ConstitutiveModel::StableNeoHookean => {
+                let model = StableNeoHookean::new(mu, lambda);
+                Self::StableNeoHookean { mu: model.mu as f32, volume: model.volume().into() }
+            }
+            ConstitutiveModel::StVenantKirchhoff => Self::StVenantKirchhoff { mu: mu as f32, lambda: lambda as f32 },
+            ConstitutiveModel::Corotated => {
+                Self::Corotated { mu: mu as f32, volume: Corotated { mu, lambda }.volume().into() }
+            }
+        }
+    }
+
+    /// First Piola-Kirchhoff stress of F, whose determinant is `ratio`.
+    #[inline(always)]
+    pub fn at<S: Simd>(&self, simd: S, f: &Mat3L<S>, ratio: f32x16<S>) -> Mat3L<S> {
+        match self {
+            Self::StableNeoHookean { mu, volume } => {
+                let (mu, slope) = (splat(simd, *mu), volume.slope(simd, ratio));
+                let cofactor = cofactor(f);
+                let mut p = *f;
+                for c in 0..3 {
+                    p[c] = add(scale(f[c], mu), scale(cofactor[c], slope));
+                }
+                p
+            }
+            Self::StVenantKirchhoff { mu, lambda } => {
+                let [xx, yy, zz, xy, yz, zx] = green_strain(simd, f);
+                let (two_mu, pressure) = (splat(simd, 2.0 * mu), (xx + yy + zz) * *lambda);
+                let s = [
+                    xx * two_mu + pressure,
+                    yy * two_mu + pressure,
+                    zz * two_mu + pressure,
+                    xy * two_mu,
+                    yz * two_mu,
+                    zx * two_mu,
+                ];
+                times_symmetric(f, s)
+            }
+            Self::Corotated { mu, volume } => {
+                let (two_mu, slope) = (splat(simd, 2.0 * mu), volume.slope(simd, ratio));
+                let (r, cofactor) = (rotation(simd, f, LEAST_ROTATION), cofactor(f));
+                let mut p = *f;
+                for c in 0..3 {
+                    p[c] = add(scale(sub(f[c], r[c]), two_mu), scale(cofactor[c], slope));
+                }
+                p
+            }
+        }
+    }
+}
+
+impl Volume {
+    /// Derivative of the energy by the volume ratio.
+    #[inline(always)]
+    fn slope<S: Simd>(&self, simd: S, ratio: f32x16<S>) -> f32x16<S> {
+        let plain = (ratio - self.alpha) * self.modulus;
+        let squeezed = simd.simd_lt_f32x16(ratio, splat(simd, PLAIN));
+        if simd.any_true_mask32x16(squeezed) { self.with_barrier(simd, plain, ratio) } else { plain }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn with_barrier<S: Simd>(&self, simd: S, plain: f32x16<S>, ratio: f32x16<S>) -> f32x16<S> {
+        let (mut slopes, mut ratios) = ([0.0; LANES], [0.0; LANES]);
+        plain.store_slice(&mut slopes);
+        ratio.store_slice(&mut ratios);
+        for (slope, ratio) in slopes.iter_mut().zip(ratios) {
+            if ratio < PLAIN {
+                *slope = self.energy.at(f64::from(ratio).max(LEAST)).1 as f32;
+            }
+        }
+        load(simd, &slopes)
+    }
+}
+
+/// Green's strain (F'F - I)/2: xx, yy, zz, xy, yz, zx.
+#[inline(always)]
+pub(super) fn green_strain<S: Simd>(simd: S, f: &Mat3L<S>) -> [f32x16<S>; 6] {
+    let (half, one) = (splat(simd, 0.5), splat(simd, 1.0));
+    [
+        (dot(f[0], f[0]) - one) * half,
+        (dot(f[1], f[1]) - one) * half,
+        (dot(f[2], f[2]) - one) * half,
+        dot(f[0], f[1]) * half,
+        dot(f[1], f[2]) * half,
+        dot(f[2], f[0]) * half,
+    ]
+}
+
+/// F S for a symmetric S.
+#[inline(always)]
+pub(super) fn times_symmetric<S: Simd>(f: &Mat3L<S>, [xx, yy, zz, xy, yz, zx]: [f32x16<S>; 6]) -> Mat3L<S> {
+    [apply(f, [xx, xy, zx]), apply(f, [xy, yy, yz]), apply(f, [zx, yz, zz])]
+}

@@ -1,0 +1,264 @@
+//! A Cholesky factor packed for speed, and the solve with it.
+//!
+//! A solve reads the whole factor twice and does one multiplication a number: it is bound by memory. So the factor is kept in 16 bits a number, in tiles of 16 x 16 numbers with
+//! one scale each, supernode by supernode. The triangle on a supernode's diagonal is kept as its inverse, so that a solve is nothing but products with tiles and waits for no
+//! division.
+//!
+//! The backward half is the exact transpose of the forward half, tile by tile: rounding the factor to 16 bits leaves the preconditioner symmetric and positive definite.
+
+use fearless_simd::{Simd, SimdBase, SimdCvtFloat, f32x16, i32x16};
+use std::ops::Range;
+
+/// Rows and columns of a tile.
+const TILE: usize = 16;
+
+/// Greatest number in 16 bits.
+const GREATEST: f32 = 32767.0;
+
+/// 16 x 16 numbers. A word has the numbers of two neighbouring columns: the low half that of the even one; the whole word, over 65536, that of the odd one (what the low half
+/// adds to it is less than its rounding, and was taken into account in it).
+#[derive(Clone, Copy)]
+#[repr(C, align(64))]
+struct Tile {
+    words: [[i32; TILE]; TILE / 2],
+}
+
+/// One supernode: columns `first..first + width` of the vector, rows below by number.
+struct Supernode {
+    first: usize,
+    /// A multiple of 3.
+    width: usize,
+    /// Rows below its diagonal, as nodes, in `Tiles::rows`.
+    rows: Range<usize>,
+    /// Its tiles: by rows of tiles, those of the diagonal triangle first.
+    tiles: usize,
+}
+
+/// The packed factor.
+pub(super) struct Tiles {
+    supernodes: Vec<Supernode>,
+    /// Nodes below the supernodes' diagonals.
+    rows: Vec<u32>,
+    tiles: Vec<Tile>,
+    scales: Vec<f32>,
+    /// Room for the longest column of row tiles.
+    buffer: Vec<f32>,
+}
+
+/// Tiles that cover `n` numbers.
+fn covering(n: usize) -> usize {
+    n.div_ceil(TILE)
+}
+
+impl Tiles {
+    pub fn new() -> Self {
+        Self { supernodes: Vec::new(), rows: Vec::new(), tiles: Vec::new(), scales: Vec::new(), buffer: Vec::new() }
+    }
+
+    /// Forgets all supernodes but keeps the memory.
+    pub fn clear(&mut self) {
+        self.supernodes.clear();
+        self.rows.clear();
+        self.tiles.clear();
+        self.scales.clear();
+    }
+
+    #[cfg(test)]
+    pub fn supernodes_len(&self) -> usize {
+        self.supernodes.len()
+    }
+
+    /// Bytes of the factor.
+    pub fn bytes(&self) -> usize {
+        self.tiles.len() * size_of::<Tile>()
+    }
+
+    /// Adds the next supernode: the inverse of its diagonal triangle, `inverse(row, column)`, and what is below, `below(row, column)`; `rows` are the
+    /// nodes below, ascending.
+    pub fn push(
+        &mut self,
+        first: usize,
+        width: usize,
+        rows: impl Iterator<Item = u32>,
+        inverse: impl Fn(usize, usize) -> f32,
+        below: impl Fn(usize, usize) -> f32,
+    ) {
+        let begin = self.rows.len();
+        self.rows.extend(rows);
+        let height = 3 * (self.rows.len() - begin);
+        self.supernodes.push(Supernode { first, width, rows: begin..self.rows.len(), tiles: self.tiles.len() });
+        let columns = covering(width);
+        for i in 0..columns {
+            for j in 0..=i {
+                self.pack(|r, c| {
+                    let (r, c) = (TILE * i + r, TILE * j + c);
+                    if r < width && c <= r { inverse(r, c) } else { 0.0 }
+                });
+            }
+        }
+        for i in 0..covering(height) {
+            for j in 0..columns {
+                self.pack(|r, c| {
+                    let (r, c) = (TILE * i + r, TILE * j + c);
+                    if r < height && c < width { below(r, c) } else { 0.0 }
+                });
+            }
+        }
+        self.buffer.resize(self.buffer.len().max(TILE * (columns + covering(height)) + TILE), 0.0);
+    }
+
+    fn pack(&mut self, at: impl Fn(usize, usize) -> f32) {
+        let mut numbers = [[0.0f32; TILE]; TILE];
+        let mut most = 0.0f32;
+        for c in 0..TILE {
+            for r in 0..TILE {
+                numbers[c][r] = at(r, c);
+                most = most.max(numbers[c][r].abs());
+            }
+        }
+        let scale = if most > 0.0 { most / GREATEST } else { 1.0 };
+        let mut tile = Tile { words: [[0; TILE]; TILE / 2] };
+        for (pair, words) in tile.words.iter_mut().enumerate() {
+            for (r, word) in words.iter_mut().enumerate() {
+                let even = (numbers[2 * pair][r] / scale).round();
+                let odd = (numbers[2 * pair + 1][r] / scale - even / 65536.0).round().clamp(-GREATEST, GREATEST);
+                *word = (odd as i32) * 65536 + i32::from(even as i16);
+            }
+        }
+        self.tiles.push(tile);
+        // Both halves come out 65536 times too large.
+        self.scales.push(scale / 65536.0);
+    }
+
+    /// Solves in place: `x` is the right side and then the solution, three numbers a node in the order of elimination, padded by at least 16.
+    #[inline(always)]
+    pub fn solve<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
+        let mut buffer = std::mem::take(&mut self.buffer);
+        for supernode in &self.supernodes {
+            self.forward(simd, supernode, x, &mut buffer);
+        }
+        for supernode in self.supernodes.iter().rev() {
+            self.backward(simd, supernode, x, &mut buffer);
+        }
+        self.buffer = buffer;
+    }
+
+    /// y = inverse b, and what lies below loses its product with y.
+    #[inline(always)]
+    fn forward<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
+        let columns = covering(s.width);
+        let (y, below) = buffer.split_at_mut(TILE * columns);
+        let mut at = s.tiles;
+        for i in 0..columns {
+            let mut sum = f32x16::splat(simd, 0.0);
+            for j in 0..=i {
+                // Beyond the width other supernodes' numbers are read: their tiles are 0 there.
+                let b = &x[s.first + TILE * j..s.first + TILE * (j + 1)];
+                sum = self.product(simd, at, b, sum);
+                at += 1;
+            }
+            sum.store_slice(&mut y[TILE * i..TILE * (i + 1)]);
+        }
+        x[s.first..s.first + s.width].copy_from_slice(&y[..s.width]);
+        let rows = &self.rows[s.rows.clone()];
+        for i in 0..covering(3 * rows.len()) {
+            let mut sum = f32x16::splat(simd, 0.0);
+            for j in 0..columns {
+                sum = self.product(simd, at, &y[TILE * j..TILE * (j + 1)], sum);
+                at += 1;
+            }
+            sum.store_slice(&mut below[TILE * i..TILE * (i + 1)]);
+        }
+        for (k, node) in rows.iter().enumerate() {
+            let to = &mut x[3 * *node as usize..3 * *node as usize + 3];
+            let by = &below[3 * k..3 * k + 3];
+            for c in 0..3 {
+                to[c] -= by[c];
+            }
+        }
+    }
+
+    /// x = inverse' (y - below' x_below).
+    #[inline(always)]
+    fn backward<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
+        let columns = covering(s.width);
+        let rows = &self.rows[s.rows.clone()];
+        let tall = covering(3 * rows.len());
+        let (z, below) = buffer.split_at_mut(TILE * columns);
+        for (k, node) in rows.iter().enumerate() {
+            below[3 * k..3 * k + 3].copy_from_slice(&x[3 * *node as usize..3 * *node as usize + 3]);
+        }
+        below[3 * rows.len()..TILE * tall].fill(0.0);
+        let triangle = s.tiles;
+        let panel = triangle + columns * (columns + 1) / 2;
+        z[..s.width].copy_from_slice(&x[s.first..s.first + s.width]);
+        z[s.width..].fill(0.0);
+        for j in 0..columns {
+            let sum = self.transposed(simd, panel + j, columns, below, tall);
+            let b = f32x16::from_slice(simd, &z[TILE * j..TILE * (j + 1)]);
+            (b - sum).store_slice(&mut z[TILE * j..TILE * (j + 1)]);
+        }
+        for j in 0..columns {
+            let mut sums = [f32x16::splat(simd, 0.0); TILE];
+            for i in j..columns {
+                self.add_transposed(simd, triangle + i * (i + 1) / 2 + j, &z[TILE * i..TILE * (i + 1)], &mut sums);
+            }
+            let out = transpose_sum(simd, sums);
+            // Only columns j.. are read of z from here on.
+            out.store_slice(&mut z[TILE * j..TILE * (j + 1)]);
+        }
+        x[s.first..s.first + s.width].copy_from_slice(&z[..s.width]);
+    }
+
+    /// sum + tile y.
+    #[inline(always)]
+    fn product<S: Simd>(&self, simd: S, at: usize, y: &[f32], sum: f32x16<S>) -> f32x16<S> {
+        let tile = &self.tiles[at];
+        let mut even = f32x16::splat(simd, 0.0);
+        let mut odd = f32x16::splat(simd, 0.0);
+        for (pair, words) in tile.words.iter().enumerate() {
+            let word = i32x16::from_slice(simd, words);
+            let low: f32x16<S> = f32x16::float_from(word << 16);
+            let high: f32x16<S> = f32x16::float_from(word);
+            even = even + low * y[2 * pair];
+            odd = odd + high * y[2 * pair + 1];
+        }
+        sum + (even + odd) * self.scales[at]
+    }
+
+    /// Sum over a column of `tall` tiles, `stride` apart, of tile' times its part of `below`.
+    #[inline(always)]
+    fn transposed<S: Simd>(&self, simd: S, at: usize, stride: usize, below: &[f32], tall: usize) -> f32x16<S> {
+        let mut sums = [f32x16::splat(simd, 0.0); TILE];
+        for i in 0..tall {
+            self.add_transposed(simd, at + stride * i, &below[TILE * i..TILE * (i + 1)], &mut sums);
+        }
+        transpose_sum(simd, sums)
+    }
+
+    /// Adds the products of a tile's columns with `x`, lane by lane: what is wanted are the sums over lanes.
+    #[inline(always)]
+    fn add_transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32], sums: &mut [f32x16<S>; TILE]) {
+        let x = f32x16::from_slice(simd, x) * self.scales[at];
+        for (pair, words) in self.tiles[at].words.iter().enumerate() {
+            let word = i32x16::from_slice(simd, words);
+            let low: f32x16<S> = f32x16::float_from(word << 16);
+            let high: f32x16<S> = f32x16::float_from(word);
+            sums[2 * pair] = sums[2 * pair] + low * x;
+            sums[2 * pair + 1] = sums[2 * pair + 1] + high * x;
+        }
+    }
+}
+
+/// The sum over lanes of each of 16 vectors.
+#[inline(always)]
+fn transpose_sum<S: Simd>(simd: S, mut v: [f32x16<S>; TILE]) -> f32x16<S> {
+    // Each round adds neighbours and halves the number of vectors; unzipping keeps their order.
+    for half in [8, 4, 2, 1] {
+        for k in 0..half {
+            let (a, b) = (v[2 * k], v[2 * k + 1]);
+            v[k] = simd.unzip_low_f32x16(a, b) + simd.unzip_high_f32x16(a, b);
+        }
+    }
+    v[0]
+}
