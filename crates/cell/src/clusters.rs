@@ -37,7 +37,7 @@ pub struct Cluster {
 /// Nodes that share an element with a pinned one belong to no cluster: an element all of whose nodes are prescribed could
 /// not give way, and a rigid cluster tied directly to pinned tissue would invert it.
 pub fn clusters(world: &World, organ: usize) -> Vec<Cluster> {
-    let (axis, body) = (&world.axes[organ], &world.model.bodies[organ]);
+    let (axis, body) = (&world.axes[organ], &world.model.bodies()[organ]);
     let length = CLUSTER_LENGTH.max(CLUSTER_EDGES * body.median_edge());
     let count = ((axis.length / length).round() as usize).max(1);
     let mut clusters: Vec<Cluster> =

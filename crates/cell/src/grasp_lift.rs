@@ -371,7 +371,7 @@ impl<'a> Run<'a> {
         }
         self.samples.push(sample);
         if self.task.snapshot_every > 0 && self.frame.is_multiple_of(self.task.snapshot_every) {
-            let organs = 0..self.world.model.bodies.len();
+            let organs = 0..self.world.model.bodies().len();
             self.snapshots.push(Snapshot {
                 time_s: sample.time_s,
                 phase,
@@ -382,7 +382,7 @@ impl<'a> Run<'a> {
     }
 
     fn finish(mut self) -> GraspLiftRun {
-        let pinned = |organ: usize, node: usize| self.world.model.bodies[organ].pinned()[node];
+        let pinned = |organ: usize, node: usize| self.world.model.bodies()[organ].pinned()[node];
         let pin_drift_mm = self.largest_motion_since(&self.start, pinned);
         let summary = &mut self.summary;
         summary.pin_drift_mm = pin_drift_mm;
@@ -397,7 +397,7 @@ impl<'a> Run<'a> {
     fn largest_motion_since(&self, then: &trocar_tissue::State, chosen: impl Fn(usize, usize) -> bool) -> f64 {
         let model = &self.world.model;
         let mut largest: f64 = 0.0;
-        for organ in 0..model.bodies.len() {
+        for organ in 0..model.bodies().len() {
             let (now, then) = (self.world.state.positions(model, organ), then.positions(model, organ));
             for i in (0..now.len()).filter(|i| chosen(organ, *i)) {
                 largest = largest.max((now[i] - then[i]).length());

@@ -29,7 +29,7 @@ impl Target {
     /// # Errors
     /// When the organ has no free node.
     pub fn choose(world: &World, organ: usize, at: f64) -> Result<Self> {
-        let body = &world.model.bodies[organ];
+        let body = &world.model.bodies()[organ];
         let reach = REACH.max(REACH_EDGES * body.median_edge());
         let mut within: Vec<Cluster> =
             clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
@@ -41,7 +41,7 @@ impl Target {
         let Some(cluster) = within.into_iter().nth(enough) else {
             return Err(Error::Option(format!(
                 "organ '{}' has no free node to grasp: all are pinned or next to a pinned one; pin fewer",
-                body.name
+                body.name()
             )));
         };
         let axis = &world.axes[organ];

@@ -2,10 +2,10 @@
 
 use crate::Result;
 use glam::DVec3;
-use trocar_geometry::OrganAxis;
+use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, SupportPlane,
+    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, Support, SupportField,
     ToolMotion, pins,
 };
 
@@ -18,9 +18,12 @@ const GRAVITY: f64 = 9.80665;
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
 
-/// Viscosity of tissue over its Young's modulus [s]: the decay time of a strain along an edge. The paper damps its elements without saying how much; this lets
-/// specimen A come to rest within a second and stays far below the second that a lift takes.
-const VISCOSITY_TIME: f64 = 0.02;
+/// Shear viscosity of tissue over its Young's modulus [s]. Sheared tissue creeps with three times as long a time constant, 4 ms. The paper damps its elements
+/// without saying how much; this lets specimen A come to rest within a second and stays far below the second that a lift takes.
+const VISCOSITY_TIME: f64 = 0.02 / 15.0;
+
+/// Cell of the supports over the organ's median edge: as fine as the nodes that lie on it.
+const SUPPORT_CELL: f64 = 0.5;
 
 /// The organs of a specimen as bodies that gravity pulls and planes support.
 pub struct World {
@@ -36,8 +39,8 @@ pub struct World {
 }
 
 impl World {
-    /// Builds the world: one body an organ, its pins, gravity against `specimen.up`, and a plane under
-    /// its lowest node.
+    /// Builds the world: one body an organ, its pins, gravity against `specimen.up`, and the bed it
+    /// lies on, with its imprint.
     ///
     /// # Errors
     /// When a mesh, a material or the pins of an organ cannot be simulated.
@@ -52,7 +55,7 @@ impl World {
                 mesh: &organ.body,
                 material: material(organ),
                 pinned: pinned_nodes(organ, &axis, up),
-                supports: support_under(organ, up).into_iter().collect(),
+                supports: vec![support_under(organ, up)?],
             })?;
             axes.push(axis);
         }
@@ -68,10 +71,10 @@ impl World {
     }
 }
 
-/// A plane under the organ's lowest node: the bed it lay on when it was recorded.
-fn support_under(organ: &Organ, up: DVec3) -> Option<SupportPlane> {
-    let lowest = organ.body.vertices.iter().min_by(|a, b| a.dot(up).total_cmp(&b.dot(up)))?;
-    Some(SupportPlane { point: *lowest, normal: up, friction: SUPPORT_FRICTION })
+/// The bed the organ lay on when it was recorded, and its imprint in it.
+fn support_under(organ: &Organ, up: DVec3) -> Result<Support> {
+    let cell = SUPPORT_CELL * TetQuality::of(&organ.body).median_edge;
+    Ok(SupportField::under(&organ.body, up, cell, SUPPORT_FRICTION)?.into())
 }
 
 fn material(organ: &Organ) -> Material {

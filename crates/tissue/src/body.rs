@@ -6,21 +6,18 @@
 
 use crate::elements::Elements;
 use crate::groups::Groups;
-use crate::{Material, SupportPlane};
+use crate::{Material, Support};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;
 
 /// One deformable body.
 #[derive(Clone, Debug)]
 pub struct Body {
-    /// Name.
-    pub name: String,
-    /// Material.
-    pub material: Material,
-    /// Nodes whose mass was raised to a quarter of the median (SPEC T5).
-    pub raised_masses: usize,
-    /// Planes that support it.
-    pub supports: Vec<SupportPlane>,
+    pub(crate) name: String,
+    pub(crate) material: Material,
+    pub(crate) raised_masses: usize,
+    pub(crate) parts: usize,
+    pub(crate) supports: Vec<Support>,
     /// Rest shape, original node order [m].
     pub(crate) rest: TetMesh,
     /// Whether each node is pinned, original order.
@@ -89,6 +86,31 @@ pub(crate) struct Edge {
 }
 
 impl Body {
+    /// Name.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Material.
+    pub fn material(&self) -> &Material {
+        &self.material
+    }
+
+    /// Nodes whose mass was raised to the [`crate::MassFloor`] (SPEC T5).
+    pub fn raised_masses(&self) -> usize {
+        self.raised_masses
+    }
+
+    /// Pieces that hang together by shared nodes. A body of more than one is no mistake by itself, but a piece without pins or support falls away from the others.
+    pub fn parts(&self) -> usize {
+        self.parts
+    }
+
+    /// What it rests on.
+    pub fn supports(&self) -> &[Support] {
+        &self.supports
+    }
+
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.internal.len()

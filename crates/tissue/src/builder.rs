@@ -1,11 +1,13 @@
 //! Builds models; everything that can be wrong is found here.
 
+mod check;
+
 use crate::body::{Corner, Edge, Vertex};
 use crate::coloring::color;
 use crate::elements::Elements;
 use crate::groups::Groups;
 use crate::strip::{Push, strip};
-use crate::{Body, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, SupportPlane};
+use crate::{Body, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::{TetMesh, TetQuality};
 
@@ -20,21 +22,39 @@ pub struct BodyDescription<'a> {
     pub material: Material,
     /// Nodes that never move.
     pub pinned: Vec<u32>,
-    /// Planes that support it.
-    pub supports: Vec<SupportPlane>,
+    /// What it rests on.
+    pub supports: Vec<Support>,
 }
 
-/// Share of the median mass below which a node's mass is raised (SPEC T5).
-const MASS_FLOOR: f64 = 0.25;
+/// Below which mass a node's mass is raised.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MassFloor {
+    /// Masses stay as they are.
+    None,
+    /// This share (0..=1) of the body's median mass.
+    MedianShare(f64),
+}
+
+impl Default for MassFloor {
+    /// A quarter of the median (SPEC T5).
+    fn default() -> Self {
+        Self::MedianShare(0.25)
+    }
+}
 
 /// Stiffness of a support against a vertex, over Young's modulus times the vertex's size (the cube root of its share of the volume).
 const CONTACT_STIFFNESS: f64 = 20.0;
+
+/// Dashpots along edges of all directions dissipate 2/15 of (strain rate)^2 under shear, a viscous body 2.
+const DASHPOTS: f64 = 15.0;
 
 /// Collects bodies and boundary conditions.
 #[derive(Clone, Debug, Default)]
 pub struct ModelBuilder {
     bodies: Vec<Body>,
     gravity: DVec3,
+    mass_floor: MassFloor,
+    filtered: Vec<[usize; 2]>,
 }
 
 impl ModelBuilder {
@@ -49,16 +69,43 @@ impl ModelBuilder {
         self
     }
 
+    /// Sets the mass floor of the bodies that are added from now on; [`MassFloor::default`] otherwise.
+    pub fn mass_floor(mut self, floor: MassFloor) -> Self {
+        self.mass_floor = floor;
+        self
+    }
+
     /// Adds a body; returns its index.
     ///
     /// # Errors
-    /// Refuses, naming the body and the element, node or parameter: zero or negative volumes, isolated nodes, numbers that are not finite, moduli
-    /// outside 1 Pa to 1 GPa, Poisson ratios outside 0 to 0.4999, densities outside 1 to 30,000 kg/m3, negative viscosities, pins out of range, planes without
-    /// a unit normal.
+    /// Refuses, naming the body and the element, node or parameter: zero or negative volumes, elements that are flat beside their edges, isolated nodes, numbers that
+    /// are not finite, extents outside 1 mm to 2 m, moduli outside 1 Pa to 1 GPa, Poisson ratios outside 0 to 0.4999, densities outside 1 to 30,000 kg/m3, negative
+    /// viscosities, pins out of range or named twice, supports that are none, mass floors outside 0 to 1.
     pub fn body(&mut self, body: BodyDescription<'_>) -> Result<usize> {
-        check(&body).map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
-        self.bodies.push(lay_out(body));
+        check::check(&body).map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
+        if let MassFloor::MedianShare(share) = self.mass_floor
+            && !(0.0..=1.0).contains(&share)
+        {
+            return Err(Error::Model(format!("a mass floor of {share} of the median; 0 to 1 make sense")));
+        }
+        self.bodies.push(lay_out(body, self.mass_floor));
         Ok(self.bodies.len() - 1)
+    }
+
+    /// Says that bodies `a` and `b` do not collide; `a` may be `b`, which then does not collide with itself.
+    ///
+    /// # Errors
+    /// Refuses bodies that have not been added.
+    pub fn filter_pair(&mut self, a: usize, b: usize) -> Result<()> {
+        let bodies = self.bodies.len();
+        if a.max(b) >= bodies {
+            return Err(Error::Model(format!("bodies {a} and {b} are not to collide; there are {bodies} so far")));
+        }
+        let pair = [a.min(b), a.max(b)];
+        if let Err(at) = self.filtered.binary_search(&pair) {
+            self.filtered.insert(at, pair);
+        }
+        Ok(())
     }
 
     /// Finishes the model.
@@ -72,58 +119,12 @@ impl ModelBuilder {
         if !(self.gravity.is_finite() && self.gravity.length() <= 100.0) {
             return Err(Error::Model(format!("gravity is {} m/s2; the earth's is 9.8", self.gravity)));
         }
-        Ok(Model { bodies: self.bodies, gravity: self.gravity })
-    }
-}
-
-fn check(body: &BodyDescription<'_>) -> std::result::Result<(), String> {
-    let (mesh, m) = (body.mesh, body.material);
-    let within = |name: &str, value: f64, least: f64, most: f64, unit: &str| {
-        if (least..=most).contains(&value) {
-            Ok(())
-        } else {
-            Err(format!("{name} is {value} {unit}; {least} to {most} {unit} make sense (is the unit right?)"))
-        }
-    };
-    within("Young's modulus", m.young_modulus, 1.0, 1e9, "Pa")?;
-    within("Poisson's ratio", m.poisson_ratio, 0.0, 0.4999, "")?;
-    within("density", m.density, 1.0, 30e3, "kg/m3")?;
-    within("viscosity", m.viscosity, 0.0, 1e9, "Pa s")?;
-    if mesh.tets.is_empty() {
-        return Err("the mesh has no element".to_owned());
-    }
-    if let Some(i) = mesh.vertices.iter().position(|v| !v.is_finite()) {
-        return Err(format!("node {i} is at {}; coordinates are finite numbers", mesh.vertices[i]));
-    }
-    let nodes = mesh.vertices.len();
-    let mut used = vec![false; nodes];
-    for (t, tet) in mesh.tets.iter().enumerate() {
-        if tet.iter().any(|i| *i as usize >= nodes) {
-            return Err(format!("element {t} names nodes {tet:?}; there are {nodes}"));
-        }
-        let volume = mesh.tet_volume(t);
-        // Below the smallest volume whose reciprocal the f32 kernels can hold there is no element either.
-        if !(volume > 1e-24 && volume.is_finite()) {
-            return Err(format!("element {t} has a volume of {volume:.3e} m3; it must be positive"));
-        }
-        tet.iter().for_each(|i| used[*i as usize] = true);
-    }
-    if let Some(i) = used.iter().position(|u| !u) {
-        return Err(format!("node {i} belongs to no element"));
-    }
-    for plane in &body.supports {
-        if !(plane.normal.is_normalized() && plane.point.is_finite() && plane.friction >= 0.0) {
-            return Err(format!("{plane:?} is no plane: a point, a unit normal, friction of 0 or more"));
-        }
-    }
-    match body.pinned.iter().find(|i| **i as usize >= nodes) {
-        Some(i) => Err(format!("node {i} is to be pinned; there are {nodes}")),
-        None => Ok(()),
+        Ok(Model { bodies: self.bodies, gravity: self.gravity, filtered: self.filtered })
     }
 }
 
 /// Lays a checked body out for the sweeps.
-fn lay_out(description: BodyDescription<'_>) -> Body {
+fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor) -> Body {
     let BodyDescription { name, mesh, material, pinned: pinned_nodes, supports } = description;
     let nodes = mesh.vertices.len();
     let mut pinned = vec![false; nodes];
@@ -168,12 +169,13 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
     for c in 0..color_count {
         color_start[c + 1] += color_start[c];
     }
-    let (masses, raised_masses) = lumped_masses(&share, material.density);
+    let (masses, raised_masses) = lumped_masses(&share, material.density, mass_floor);
 
     let mut body = Body {
         material,
         supports,
         raised_masses,
+        parts: count_parts(&neighbours),
         rest: mesh.clone(),
         pinned,
         median_edge: TetQuality::of(mesh).median_edge,
@@ -217,13 +219,35 @@ fn lay_out(description: BodyDescription<'_>) -> Body {
     body
 }
 
-/// Masses lumped from the nodes' shares of the volume, none below a quarter of the median; and how many were raised.
-fn lumped_masses(share: &[f64], density: f64) -> (Vec<f64>, usize) {
+/// Masses lumped from the nodes' shares of the volume, none below the floor; and how many were raised.
+fn lumped_masses(share: &[f64], density: f64, floor: MassFloor) -> (Vec<f64>, usize) {
     let mut sorted = share.to_vec();
     sorted.sort_by(f64::total_cmp);
-    let floor = MASS_FLOOR * sorted[sorted.len() / 2];
-    let raised = share.iter().filter(|v| **v < floor).count();
-    (share.iter().map(|v| density * v.max(floor)).collect(), raised)
+    let least = match floor {
+        MassFloor::None => 0.0,
+        MassFloor::MedianShare(part) => part * sorted[sorted.len() / 2],
+    };
+    let raised = share.iter().filter(|v| **v < least).count();
+    (share.iter().map(|v| density * v.max(least)).collect(), raised)
+}
+
+/// Number of pieces that hang together by shared nodes.
+fn count_parts(neighbours: &[Vec<u32>]) -> usize {
+    let mut seen = vec![false; neighbours.len()];
+    let mut parts = 0;
+    let mut open = Vec::new();
+    for first in 0..neighbours.len() {
+        if std::mem::replace(&mut seen[first], true) {
+            continue;
+        }
+        parts += 1;
+        open.push(first as u32);
+        while let Some(i) = open.pop() {
+            let new = neighbours[i as usize].iter().filter(|j| !std::mem::replace(&mut seen[**j as usize], true));
+            open.extend(new);
+        }
+    }
+    parts
 }
 
 /// Other corners of an element seen from corner k, so that (b-a)x(c-a).(x-a) is positive.
@@ -274,8 +298,8 @@ fn add_edges(body: &mut Body, i: usize, neighbours: &[u32], incident: &[(usize, 
         body.edges.push(Edge {
             to: body.internal[*j as usize],
             laplacian: stiffness[at] as f32,
-            // A dashpot that dissipates eta (strain rate along the edge)^2 over the edge's share of the volume, a sixth of each element.
-            damping: (body.material.viscosity * volume[at] / (length * length)) as f32,
+            // See `Material::viscosity`; the edge's share of the volume is a sixth of each element.
+            damping: (DASHPOTS * body.material.viscosity * volume[at] / (length * length)) as f32,
             length: length as f32,
         });
     }

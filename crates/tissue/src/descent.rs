@@ -3,7 +3,8 @@
 use crate::integrator::{Frame, Integrator};
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
-use crate::sweep::{LocalPlane, Substep, is_squeezed};
+use crate::support::LocalSupport;
+use crate::sweep::{Substep, is_squeezed};
 use crate::{Body, Isa, StepReport};
 use glam::Vec3A;
 
@@ -23,7 +24,7 @@ pub(crate) struct DescentIntegrator {
     guess: Vec<Vec3A>,
     fixed: Vec<bool>,
     held: Vec<bool>,
-    planes: Vec<LocalPlane>,
+    supports: Vec<LocalSupport>,
     isa: Isa,
 }
 
@@ -47,7 +48,7 @@ impl DescentIntegrator {
             guess: zeros,
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
-            planes: LocalPlane::of(body),
+            supports: LocalSupport::of(body),
             isa: Isa::detect(),
         }
     }
@@ -80,7 +81,7 @@ impl DescentIntegrator {
             start: &self.start,
             predictor: &self.predictor,
             fixed: &self.fixed,
-            planes: &self.planes,
+            supports: &self.supports,
             isa: self.isa,
         };
         for _ in 0..self.schedule.iterations {
@@ -142,7 +143,7 @@ impl DescentIntegrator {
     /// Whether nothing holds or touches the body.
     fn flies_freely(&self) -> bool {
         !self.fixed.contains(&true)
-            && self.planes.iter().all(|plane| self.start.iter().all(|x| plane.height(*x) >= 0.0))
+            && self.supports.iter().all(|support| self.start.iter().all(|x| support.touch(*x).0 >= 0.0))
     }
 
     /// Moves the body to as much of its guess as squeezes no element too far: first all of it, then less of the free vertices' guess, and only then less
@@ -186,7 +187,7 @@ impl DescentIntegrator {
 }
 
 #[inline(always)]
-fn volume_ratio(tet: &[u32; 4], x: &[Vec3A], rest: f32) -> f32 {
+pub(crate) fn volume_ratio(tet: &[u32; 4], x: &[Vec3A], rest: f32) -> f32 {
     let [a, b, c, d] = tet.map(|i| x[i as usize]);
     (b - a).cross(c - a).dot(d - a) / (6.0 * rest)
 }

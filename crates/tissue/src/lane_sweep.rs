@@ -7,6 +7,7 @@
 use crate::groups::{Group, Groups};
 use crate::kernel::{Local, VolumeTerm};
 use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, splat3, store3};
+use crate::support::LocalSupport;
 use crate::sweep::{FLOOR, KEPT_SHARE, Substep, allowed_share};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
@@ -298,7 +299,7 @@ impl LaneSweep<'_> {
             lanes.store(ratio, &mut face.ratio, part);
         }
         low &= part_of::<L>(active, part);
-        let below = self.below(lanes, here) & part_of::<L>(active, part);
+        let below = self.below(lanes, group, here, x, part) & part_of::<L>(active, part);
         if (low | below) != 0 {
             let memory = &*memory;
             sums.alter(lanes, part, low | below, |lane, local| self.add_rare(group, lane, x, memory, local));
@@ -311,12 +312,17 @@ impl LaneSweep<'_> {
 
     /// Lanes below a support.
     #[inline(always)]
-    fn below<L: Lanes>(&self, lanes: L, here: [L::F; 3]) -> u16 {
+    fn below<L: Lanes>(&self, lanes: L, group: &Group, here: [L::F; 3], x: &[Vec3A], part: usize) -> u16 {
         let mut below = 0;
-        for plane in self.substep.planes {
-            let (from, normal) = (minus::<L>(here, splat3(lanes, plane.point)), splat3(lanes, plane.normal));
-            // A little more than the height says: whether a vertex is below is decided where its force is found.
-            below |= lanes.less(dot::<L>(from, normal), lanes.splat(1e-6));
+        for support in self.substep.supports {
+            below |= match support {
+                LocalSupport::Plane(plane) => {
+                    let (from, normal) = (minus::<L>(here, splat3(lanes, plane.point)), splat3(lanes, plane.normal));
+                    // A little more than the height says: whether a vertex is below is decided where its force is found.
+                    lanes.less(dot::<L>(from, normal), lanes.splat(1e-6))
+                }
+                LocalSupport::Field(_) => part_of::<L>(below_field(support, group, x), part),
+            };
         }
         below
     }
@@ -379,4 +385,10 @@ impl LaneSweep<'_> {
         }
         share
     }
+}
+
+/// Vertices of a group that are below a support.
+fn below_field(support: &LocalSupport, group: &Group, x: &[Vec3A]) -> u16 {
+    let vertices = x[group.first as usize..].iter().take(BLOCK).enumerate();
+    vertices.fold(0, |below, (lane, x)| below | u16::from(support.touch(*x).0 < 0.0) << lane)
 }

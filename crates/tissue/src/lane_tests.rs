@@ -2,7 +2,8 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use crate::kernel::Kernel;
-use crate::sweep::{LocalPlane, Substep};
+use crate::support::{LocalSupport, SupportField, SupportPlane};
+use crate::sweep::Substep;
 use crate::{BodyDescription, ConstitutiveModel, Isa, Material, Model, ModelBuilder};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;
@@ -51,7 +52,11 @@ fn model(mesh: &TetMesh, viscosity: f64) -> Model {
         viscosity,
     };
     let pinned = (0..mesh.vertices.len() as u32).filter(|i| mesh.vertices[*i as usize].z > 9e-3).collect();
-    let body = BodyDescription { name: "block".into(), mesh, material, pinned, supports: vec![] };
+    let middle = mesh.vertices.iter().sum::<DVec3>() / mesh.vertices.len() as f64;
+    let plane = SupportPlane { point: middle - 1e-3 * DVec3::Z, normal: DVec3::Z, friction: 0.4 };
+    let field = SupportField::under(mesh, DVec3::Y, 1e-3, 0.3).unwrap();
+    let supports = vec![plane.into(), field.into()];
+    let body = BodyDescription { name: "block".into(), mesh, material, pinned, supports };
     let mut builder = ModelBuilder::new();
     builder.body(body).unwrap();
     builder.build().unwrap()
@@ -80,7 +85,7 @@ fn lanes_do_what_single_vertices_do() {
             .iter_mut()
             .zip(&rest[body.color_start[body.colors()] as usize..])
             .for_each(|(x, p)| *x = squeezed(p));
-        let planes = [LocalPlane { point: Vec3A::new(0.0, 0.0, -1e-3), normal: Vec3A::Z, friction: 0.4 }];
+        let supports = LocalSupport::of(body);
         let fixed: Vec<bool> = (0..body.len()).map(|i| body.vertices[i].pinned || i % 7 == 3).collect();
         let sweep = |isa| {
             let (start, predictor) = (jolted(1e-4, 200), jolted(2e-3, 400));
@@ -90,7 +95,7 @@ fn lanes_do_what_single_vertices_do() {
                 start: &start,
                 predictor: &predictor,
                 fixed: &fixed,
-                planes: &planes,
+                supports: &supports,
                 isa,
             };
             let (mut x, mut moved, mut expected) = (begin.clone(), begin.clone(), begin.clone());

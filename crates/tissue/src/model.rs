@@ -3,22 +3,28 @@
 use crate::Body;
 use glam::DVec3;
 
-/// Everything that is constant over a simulation.
+/// Everything that is constant over a simulation. Made by [`crate::ModelBuilder`] alone, so that what it checked stays true.
 #[derive(Clone, Debug)]
 pub struct Model {
-    /// The bodies, in the order they were added.
-    pub bodies: Vec<Body>,
-    /// Gravitational acceleration [m/s2].
-    pub gravity: DVec3,
+    pub(crate) bodies: Vec<Body>,
+    pub(crate) gravity: DVec3,
+    /// Pairs that do not collide, the smaller index first, sorted.
+    pub(crate) filtered: Vec<[usize; 2]>,
 }
 
-/// A one-sided plane that a body rests on.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SupportPlane {
-    /// A point of the plane [m].
-    pub point: DVec3,
-    /// Unit normal, into the free side.
-    pub normal: DVec3,
-    /// Coulomb friction coefficient.
-    pub friction: f64,
+impl Model {
+    /// The bodies, in the order they were added.
+    pub fn bodies(&self) -> &[Body] {
+        &self.bodies
+    }
+
+    /// Gravitational acceleration [m/s2].
+    pub fn gravity(&self) -> DVec3 {
+        self.gravity
+    }
+
+    /// Whether bodies `a` and `b` are to collide: they exist, and their pair was not filtered ([`crate::ModelBuilder::filter_pair`]).
+    pub fn collides(&self, a: usize, b: usize) -> bool {
+        a.max(b) < self.bodies.len() && self.filtered.binary_search(&[a.min(b), a.max(b)]).is_err()
+    }
 }

@@ -24,6 +24,8 @@ pub(crate) struct BodyState {
     pub v: Vec<Vec3A>,
     /// Acceleration along gravity that the last substep showed, as a share of gravity, 0..=1: for the adaptive start.
     pub falling: Vec<f32>,
+    /// Whether nodes were put somewhere from outside, and elements may be inverted by it.
+    pub disturbed: bool,
 }
 
 impl BodyState {
@@ -32,6 +34,7 @@ impl BodyState {
         self.x.copy_from_slice(&other.x);
         self.v.copy_from_slice(&other.v);
         self.falling.copy_from_slice(&other.falling);
+        self.disturbed = other.disturbed;
     }
 }
 
@@ -43,7 +46,7 @@ impl State {
             for (node, p) in body.rest_positions().iter().enumerate() {
                 x[body.internal[node] as usize] = (p - body.origin).as_vec3a();
             }
-            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()] }
+            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()], disturbed: false }
         };
         Self { time: 0.0, grasps: Vec::new(), bodies: model.bodies.iter().map(at_rest).collect() }
     }
@@ -62,6 +65,14 @@ impl State {
     /// Velocity of a node [m/s].
     pub fn velocity(&self, model: &Model, body: usize, node: usize) -> DVec3 {
         self.bodies[body].v[model.bodies[body].internal[node] as usize].as_dvec3()
+    }
+
+    /// Sets the world position of a node [m], whether it is pinned or not; its velocity stays. Elements that are inverted by it are put right, without regard to time and
+    /// forces, at the beginning of the next step.
+    pub fn set_position(&mut self, model: &Model, body: usize, node: usize, position: DVec3) {
+        let b = &model.bodies[body];
+        self.bodies[body].x[b.internal[node] as usize] = (position - b.origin).as_vec3a();
+        self.bodies[body].disturbed = true;
     }
 
     /// Sets the velocity of a node [m/s]; a pinned or held node keeps none.
@@ -104,6 +115,7 @@ impl State {
             for f in &body.falling {
                 hash.update(&f.to_bits().to_le_bytes());
             }
+            hash.update(&[u8::from(body.disturbed)]);
         }
         for grasp in &self.grasps {
             hash.update(&(grasp.body as u64).to_le_bytes());

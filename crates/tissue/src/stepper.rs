@@ -8,6 +8,7 @@ use crate::quasi_newton::QuasiNewtonIntegrator;
 use crate::report::Divergence;
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
+use crate::untangle::Untangler;
 use crate::{Body, Error, Model, Result, Schedule, State, StepReport, ToolMotion};
 use rayon::prelude::*;
 
@@ -23,6 +24,7 @@ pub struct Stepper {
 struct Worker {
     body: usize,
     integrator: Box<dyn Integrator>,
+    untangler: Untangler,
     before: BodyState,
     state: BodyState,
     report: StepReport,
@@ -46,6 +48,7 @@ impl Stepper {
             .map(|(index, (state, body))| Worker {
                 body: index,
                 integrator: integrator(&schedule, body, dt),
+                untangler: Untangler::new(&state),
                 before: state.clone(),
                 state,
                 report: StepReport::default(),
@@ -88,6 +91,7 @@ impl Worker {
     fn advance(&mut self, frame: &Frame<'_>, body: &Body) {
         self.report = StepReport::default();
         self.before.copy_from(&self.state);
+        self.untangler.untangle(frame, body, &mut self.state);
         self.integrator.advance(frame, body, &mut self.state, &mut self.report);
         self.report.measure(frame.index, body, &self.state);
     }

@@ -5,11 +5,11 @@
 //! and by any thread with the same bits. Along one vertex's step the volume of each of its elements is linear: the step is cut so that none
 //! falls below a floor, and no element is ever inverted.
 
-use crate::SupportPlane;
 use crate::body::Body;
 use crate::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
 use crate::lane_sweep::LaneSweep;
 use crate::simd::Isa;
+use crate::support::LocalSupport;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -27,31 +27,6 @@ pub(crate) const STICK_SPEED: f32 = 1e-3;
 /// Corners whose volume gradients are remembered between the force and the guard.
 const REMEMBERED: usize = 32;
 
-/// A support plane in a body's frame.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LocalPlane {
-    pub point: Vec3A,
-    pub normal: Vec3A,
-    pub friction: f32,
-}
-
-impl LocalPlane {
-    /// The planes that support a body.
-    pub fn of(body: &Body) -> Vec<Self> {
-        let local = |plane: &SupportPlane| Self {
-            point: (plane.point - body.origin).as_vec3a(),
-            normal: plane.normal.as_vec3a(),
-            friction: plane.friction as f32,
-        };
-        body.supports.iter().map(local).collect()
-    }
-
-    /// Height of a point above the plane [m].
-    pub fn height(&self, x: Vec3A) -> f32 {
-        (x - self.point).dot(self.normal)
-    }
-}
-
 /// What is constant while a body's substep is swept.
 pub(crate) struct Substep<'a> {
     pub body: &'a Body,
@@ -63,7 +38,7 @@ pub(crate) struct Substep<'a> {
     pub predictor: &'a [Vec3A],
     /// Pinned or held vertices.
     pub fixed: &'a [bool],
-    pub planes: &'a [LocalPlane],
+    pub supports: &'a [LocalSupport],
     /// Instructions to use; all give the same bits.
     pub isa: Isa,
 }
@@ -185,26 +160,27 @@ impl Substep<'_> {
         }
     }
 
-    /// One-sided quadratic penalty of the support planes, and Coulomb friction against the motion since the substep's beginning,
-    /// regularised to stick below a small speed.
+    /// One-sided quadratic penalty of the supports, and Coulomb friction against the motion since the substep's beginning along the
+    /// support there, regularised to stick below a small speed.
     #[inline(always)]
     pub fn add_supports(&self, i: usize, here: Vec3A, local: &mut Local) {
-        for plane in self.planes {
-            let height = plane.height(here);
+        for support in self.supports {
+            let (height, gradient) = support.touch(here);
             if height >= 0.0 {
                 continue;
             }
             let stiffness = self.body.vertices[i].contact_stiffness;
-            local.force -= stiffness * height * plane.normal;
-            local.add_outer(stiffness, plane.normal);
+            local.force -= stiffness * height * gradient;
+            local.add_outer(stiffness, gradient);
             let motion = here - self.start[i];
-            let slide = motion - motion.dot(plane.normal) * plane.normal;
+            let normal = support.normal(self.start[i]);
+            let slide = motion - motion.dot(normal) * normal;
             let (length, stick) = (slide.length(), STICK_SPEED * self.h);
-            let most = -plane.friction * stiffness * height;
+            let most = -support.friction() * stiffness * height * support.steepness(gradient);
             let drag = if length < stick { most / stick * (2.0 - length / stick) } else { most / length };
             local.force -= drag * slide;
             local.add_isotropic(drag);
-            local.add_outer(-drag, plane.normal);
+            local.add_outer(-drag, normal);
         }
     }
 }
@@ -218,7 +194,7 @@ pub(crate) fn allowed_share(ratio: f32, change: f32) -> f32 {
 
 /// Whether an element of this volume ratio may not get any smaller.
 pub(crate) fn is_squeezed(ratio: f32, before: f32) -> bool {
-    ratio < (KEPT_SHARE * before).max(FLOOR).min(before)
+    before > 0.0 && ratio < (KEPT_SHARE * before).max(FLOOR).min(before)
 }
 
 /// Solves a symmetric positive definite 3x3 system.
@@ -234,7 +210,7 @@ fn solve(block: &Mat3A, force: Vec3A) -> Vec3A {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{BodyDescription, ConstitutiveModel, Material, ModelBuilder};
+    use crate::{BodyDescription, ConstitutiveModel, Material, ModelBuilder, SupportPlane};
     use glam::{DMat3, DVec3, Vec3};
     use trocar_geometry::TetMesh;
 
@@ -286,8 +262,8 @@ mod tests {
                 let stretching = direction.dot((x[i] - start(i)) - (x[j] - start(j)));
                 sum += 0.5 * 0.5 * f64::from(edge.damping) / h * stretching * stretching;
             }
-            for plane in substep.planes {
-                let height = (x[i] - plane.point.as_dvec3()).dot(plane.normal.as_dvec3()).min(0.0);
+            for support in &body.supports {
+                let height = support.touch(x[i] + body.origin).height.min(0.0);
                 sum += 0.5 * f64::from(vertex.contact_stiffness) * height * height;
             }
         }
@@ -307,9 +283,10 @@ mod tests {
         ] {
             let material =
                 Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 60.0 };
-            let plane = SupportPlane { point: DVec3::ZERO, normal: DVec3::Z, friction: 0.0 };
-            let body =
-                BodyDescription { name: "star".into(), mesh: &mesh, material, pinned: vec![], supports: vec![plane] };
+            let centre = mesh.vertices.iter().sum::<DVec3>() / 6.0;
+            let plane = SupportPlane { point: centre, normal: DVec3::Z, friction: 0.0 };
+            let supports = vec![plane.into()];
+            let body = BodyDescription { name: "star".into(), mesh: &mesh, material, pinned: vec![], supports };
             let mut builder = ModelBuilder::new();
             builder.body(body).unwrap();
             let built = builder.build().unwrap();
@@ -321,14 +298,13 @@ mod tests {
             let x: Vec<DVec3> = rest.iter().enumerate().map(|(i, p)| stretch * p + moved(i, 1e-4)).collect();
             let to_f32 = |x: &[DVec3]| -> Vec<Vec3A> { x.iter().map(|p| p.as_vec3a()).collect() };
             let predictor: Vec<DVec3> = x.iter().enumerate().map(|(i, p)| p + moved(i + 7, 1e-4)).collect();
-            let plane = LocalPlane { point: Vec3A::ZERO, normal: Vec3A::Z, friction: 0.0 };
             let substep = Substep {
                 body,
                 h: 1.0 / 480.0,
                 start: &to_f32(&rest),
                 predictor: &to_f32(&predictor),
                 fixed: &[false; 6],
-                planes: &[plane],
+                supports: &LocalSupport::of(body),
                 isa: Isa::detect(),
             };
             let at: Vec<DVec3> = to_f32(&x).iter().map(|p| p.as_dvec3()).collect();

@@ -36,7 +36,7 @@ fn stepping_allocates_nothing() {
     const FRAMES: usize = 40;
     // Large enough for several tasks a colour.
     let mesh = block([16, 16, 10], 2e-3);
-    let material = Material { viscosity: 60.0, ..tissue(12e3) };
+    let material = Material { viscosity: 4.0, ..tissue(12e3) };
     let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut state = State::new(&model);
     let held = nodes(&mesh, |p| p.z > 19e-3 && p.x < 10e-3);

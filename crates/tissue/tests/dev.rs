@@ -32,7 +32,7 @@ fn build(meshes: &[TetMesh], visc: f64) -> Model {
     builder.build().unwrap()
 }
 fn patch(model: &Model, body: usize) -> Vec<u32> {
-    let b = &model.bodies[body];
+    let b = &model.bodies()[body];
     let top = (0..b.len() as u32).filter(|i| !b.pinned()[*i as usize]).max_by(|i, j| b.rest_positions()[*i as usize].z.total_cmp(&b.rest_positions()[*j as usize].z)).unwrap();
     let p = b.rest_positions()[top as usize];
     (0..b.len() as u32).filter(|i| !b.pinned()[*i as usize] && (b.rest_positions()[*i as usize] - p).length() < 4e-3).collect()
@@ -54,7 +54,7 @@ fn drag() {
         let mut stepper = Stepper::new(&model, schedule(), FRAME, threads()).unwrap();
         for _ in 0..20 { stepper.step(&model, &mut state, &[]); }
         let at = |z: f64| Pose { translation: DVec3::Z * z, ..Pose::IDENTITY };
-        let bodies: Vec<usize> = if moving { (0..model.bodies.len()).collect() } else { vec![model.bodies.len() - 1] };
+        let bodies: Vec<usize> = if moving { (0..model.bodies().len()).collect() } else { vec![model.bodies().len() - 1] };
         for (k, b) in bodies.iter().enumerate() { let n = patch(&model, *b); let g = Grasp::capture(&model, &state, *b, &n, k, &Pose::IDENTITY); state.grasps.push(g); }
         let z = |k: usize| if moving { 1e-3 * (2.0 * std::f64::consts::PI * 7.3 * k as f64 * FRAME).sin() } else { 10e-3 * k as f64 * FRAME };
         let mut times = vec![]; let mut its = 0; let mut falls = 0; let mut inv = 0; let mut lim = 0; let mut minr = 1.0f64;
@@ -83,8 +83,8 @@ fn sag() {
     let mut r = StepReport::default();
     for k in 0..120 { r = stepper.step(&model2, &mut state, &[]); if k % 20 == 0 { println!("{k} {:?}", r); } }
     let (mut e, mut s) = (0.0, 0.0);
-    for b in 0..model.bodies.len() {
-        let (x, y, r) = (state.positions(&model, b), exact.positions(b), model.bodies[b].rest_positions());
+    for b in 0..model.bodies().len() {
+        let (x, y, r) = (state.positions(&model, b), exact.positions(b), model.bodies()[b].rest_positions());
         for i in 0..x.len() { e += (x[i] - y[i]).length(); s += (y[i] - r[i]).length(); }
     }
     println!("sag error {:.4}% speed {:e}", 100.0 * e / s, r.max_speed);
@@ -122,7 +122,7 @@ fn tube() {
             oracle.step(&model, &mut exact, FRAME / n as f64, &h).unwrap();
         }
         if [0, 4, 14, 29, 59].contains(&k) {
-            let (x, y, r0) = (state.positions(&model, 0), exact.positions(0), model.bodies[0].rest_positions());
+            let (x, y, r0) = (state.positions(&model, 0), exact.positions(0), model.bodies()[0].rest_positions());
             let e: f64 = (0..x.len()).map(|i| (x[i] - y[i]).length_squared()).sum();
             let s: f64 = (0..x.len()).map(|i| (y[i] - r0[i]).length_squared()).sum();
             println!("frame {} error {:.3}% (rms displacement {:.2} mm) iterations {its} falls {falls} limited {lim} ms/frame {:.2} min ratio {:.3}", k + 1, 100.0 * (e / s).sqrt(), (s / x.len() as f64).sqrt() * 1e3, total * 1e3 / (k + 1) as f64, r.min_volume_ratio);

@@ -14,7 +14,7 @@ use trocar_tissue::{
 fn free_fall() {
     let mesh = block([3, 3, 3], 2e-3);
     for constitutive in ConstitutiveModel::ALL {
-        let material = Material { model: constitutive, viscosity: 60.0, ..tissue(12e3) };
+        let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
         let model = model(&mesh, material, vec![], GRAVITY);
         for (schedule, h) in [(Schedule::default(), 0.0), (Schedule::PAPER, FRAME / 8.0)] {
             let mut state = State::new(&model);
@@ -39,7 +39,7 @@ fn free_fall() {
 fn a_column_sags_under_its_weight() {
     let (cells, edge) = ([4, 4, 10], 2e-3);
     let mesh = block(cells, edge);
-    let material = Material { poisson_ratio: 0.0, viscosity: 60.0, ..tissue(12e3) };
+    let material = Material { poisson_ratio: 0.0, viscosity: 4.0, ..tissue(12e3) };
     let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut state = State::new(&model);
     let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 0).unwrap();
@@ -73,7 +73,7 @@ fn dashpots_do_not_brake_rotation() {
             (0..mesh.vertices.len())
                 .map(|i| {
                     let arm = state.position(&model, 0, i) - centre;
-                    model.bodies[0].mass(i) * arm.cross(state.velocity(&model, 0, i)).z
+                    model.bodies()[0].mass(i) * arm.cross(state.velocity(&model, 0, i)).z
                 })
                 .sum()
         };
@@ -94,9 +94,15 @@ fn the_plane_supports_and_holds() {
     let mesh = block([4, 4, 2], 3e-3);
     let plane = SupportPlane { point: DVec3::ZERO, normal: DVec3::Z, friction: 0.6 };
     let mut builder = ModelBuilder::new().gravity(GRAVITY);
-    let material = Material { viscosity: 60.0, ..tissue(30e3) };
+    let material = Material { viscosity: 4.0, ..tissue(30e3) };
     builder
-        .body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![], supports: vec![plane] })
+        .body(BodyDescription {
+            name: "block".into(),
+            mesh: &mesh,
+            material,
+            pinned: vec![],
+            supports: vec![plane.into()],
+        })
         .unwrap();
     let model = builder.build().unwrap();
     let mut state = State::new(&model);

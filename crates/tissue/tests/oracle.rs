@@ -55,7 +55,7 @@ fn a_column_sags_by_its_weight() {
             let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
             let state = settled(&model);
             let height = mean_height_of_the_top(&mesh, state.positions(0), length);
-            let moment: f64 = (0..mesh.vertices.len()).map(|i| model.bodies[0].mass(i) * mesh.vertices[i].z).sum();
+            let moment: f64 = (0..mesh.vertices.len()).map(|i| model.bodies()[0].mass(i) * mesh.vertices[i].z).sum();
             let off = (length - height) / (9.81 * moment / (young_modulus * section)) - 1.0;
             let off_column = (length - height) / (1200.0 * 9.81 * length * length / (2.0 * young_modulus)) - 1.0;
             println!("{constitutive:?}: {n} cells wide, sag off by {off:.1e}, from the column's by {off_column:.1e}");
@@ -64,41 +64,12 @@ fn a_column_sags_by_its_weight() {
     }
 }
 
-/// A cantilever under its own weight bends by w L^4/(8 E I) + w L^2/(2 k G A) (Timoshenko, k = 5/6, nu = 0). Linear tetrahedra are too stiff in bending, by
-/// an error of second order: each refinement divides it by about four, and what is extrapolated is the beam's.
-#[test]
-fn a_cantilever_bends_as_beams_do() {
-    let (length, height, width): (f64, f64, f64) = (32e-3, 4e-3, 2e-3);
-    let young_modulus = 10e6;
-    let mut deflections = Vec::new();
-    for n in [1, 2, 4] {
-        let mesh = block([16 * n, n, 2 * n], 2e-3 / n as f64);
-        let material = Material { poisson_ratio: 0.0, ..tissue(young_modulus) };
-        let model = model(&mesh, material, nodes(&mesh, |p| p.x == 0.0), GRAVITY);
-        let state = settled(&model);
-        let tip = nodes(&mesh, |p| (p.x - length).abs() < 1e-9);
-        let sag: f64 =
-            tip.iter().map(|i| mesh.vertices[*i as usize].z - state.positions(0)[*i as usize].z).sum::<f64>();
-        let mass: f64 = (0..mesh.vertices.len()).map(|i| model.bodies[0].mass(i)).sum();
-        // Raised masses weigh; the load is the model's own.
-        let load = mass * 9.81 / length;
-        let bending = load * length.powi(4) / (8.0 * young_modulus * width * height.powi(3) / 12.0);
-        let shear = load * length.powi(2) / (2.0 * 5.0 / 6.0 * 0.5 * young_modulus * width * height);
-        deflections.push(sag / tip.len() as f64 / (bending + shear));
-    }
-    println!("deflection over the beam's: {deflections:?}");
-    assert!(deflections.iter().all(|d| *d < 1.0), "too soft: {deflections:?}");
-    assert!(deflections.windows(2).all(|d| 1.0 - d[1] < 0.5 * (1.0 - d[0])), "{deflections:?}");
-    let extrapolated = deflections[2] + (deflections[2] - deflections[1]) / 3.0;
-    assert!((extrapolated - 1.0).abs() < 0.02, "{extrapolated}, {deflections:?}");
-}
-
 /// Implicit Euler's own law: g h^2 n (n + 1)/2 after n steps, to rounding.
 #[test]
 fn free_fall_is_exact() {
     let mesh = block([2, 2, 2], 2e-3);
     for constitutive in ConstitutiveModel::ALL {
-        let material = Material { model: constitutive, viscosity: 60.0, ..tissue(12e3) };
+        let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
         let model = model(&mesh, material, vec![], GRAVITY);
         let (mut oracle, mut state) = (Oracle::new(&model), OracleState::new(&model));
         for _ in 0..48 {
@@ -118,7 +89,9 @@ fn busy(constitutive: ConstitutiveModel, viscosity: f64, friction: f64, mesh: &T
     let material = Material { model: constitutive, viscosity, ..tissue(12e3) };
     let plane = SupportPlane { point: DVec3::Z * 0.2e-3, normal: DVec3::Z, friction };
     let pinned = nodes(mesh, |p| p.x == 0.0);
-    builder.body(BodyDescription { name: "busy".into(), mesh, material, pinned, supports: vec![plane] }).unwrap();
+    builder
+        .body(BodyDescription { name: "busy".into(), mesh, material, pinned, supports: vec![plane.into()] })
+        .unwrap();
     let model = builder.build().unwrap();
     let mut state = State::new(&model);
     for (i, p) in mesh.vertices.iter().enumerate() {
@@ -173,7 +146,7 @@ fn sweeps_converge_to_the_oracles_step() {
 fn statics_are_where_steps_come_to_rest() {
     let mesh = block([5, 2, 2], 2e-3);
     for constitutive in ConstitutiveModel::ALL {
-        let material = Material { model: constitutive, viscosity: 60.0, ..tissue(12e3) };
+        let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
         let model = model(&mesh, material, nodes(&mesh, |p| p.x == 0.0), GRAVITY);
         let rest = settled(&model);
         let (mut oracle, mut state) = (Oracle::new(&model), OracleState::new(&model));
@@ -191,7 +164,7 @@ fn statics_are_where_steps_come_to_rest() {
 #[test]
 fn the_default_schedule_sags_to_the_equilibrium() {
     let mesh = block([4, 4, 8], 2e-3);
-    let material = Material { viscosity: 60.0, ..tissue(12e3) };
+    let material = Material { viscosity: 4.0, ..tissue(12e3) };
     let model = model(&mesh, material, nodes(&mesh, |p| p.z < 6e-3), GRAVITY);
     let rest = settled(&model);
     let mut state = State::new(&model);

@@ -93,7 +93,7 @@ fn the_grasp_is_exact_when_it_closes() {
 #[test]
 fn held_nodes_follow_the_tool_and_are_free_afterwards() {
     let mesh = block([4, 4, 6], 2e-3);
-    let model = model(&mesh, Material { viscosity: 60.0, ..tissue(12e3) }, nodes(&mesh, |p| p.z == 0.0), DVec3::ZERO);
+    let model = model(&mesh, Material { viscosity: 4.0, ..tissue(12e3) }, nodes(&mesh, |p| p.z == 0.0), DVec3::ZERO);
     let (_, mut state) = drag(&model, &mesh, 11e-3, 4e-3, 30);
     let top = nodes(&mesh, |p| p.z > 11e-3);
     let rest = State::new(&model).centroid(&model, 0, &top);
@@ -114,7 +114,7 @@ fn two_bodies() -> (Model, Vec<u32>) {
         let pinned = nodes(mesh, |p| p.z == 0.0);
         builder.body(BodyDescription { name: name.into(), mesh, material, pinned, supports: vec![] }).unwrap();
     };
-    add("large", &large, Material { viscosity: 60.0, ..tissue(12e3) });
+    add("large", &large, Material { viscosity: 4.0, ..tissue(12e3) });
     add("small", &small, Material { model: ConstitutiveModel::StVenantKirchhoff, ..tissue(30e3) });
     (builder.build().unwrap(), nodes(&large, |p| p.z > 16e-3 && p.x < 8e-3))
 }
@@ -156,50 +156,4 @@ fn a_saved_state_goes_on_as_if_nothing_had_happened() {
     let first = go_on(state);
     assert_eq!(first, go_on(saved.clone()));
     assert_ne!(first, saved.hash());
-}
-
-#[test]
-fn unusable_bodies_are_refused_by_name() {
-    let good = block([2, 2, 2], 2e-3);
-    let refuse = |mesh: &TetMesh, material: Material, pinned: Vec<u32>, words: &[&str]| {
-        let body = BodyDescription { name: "spleen".into(), mesh, material, pinned, supports: vec![] };
-        let said = ModelBuilder::new().body(body).unwrap_err().to_string();
-        assert!(words.iter().chain(&["spleen"]).all(|w| said.contains(w)), "{said}");
-    };
-    let fine = tissue(12e3);
-    refuse(&TetMesh::default(), fine, vec![], &["no element"]);
-    let mut flat = good.clone();
-    flat.vertices.iter_mut().for_each(|v| v.z = 0.0);
-    refuse(&flat, fine, vec![], &["element 0", "volume"]);
-    let mut turned = good.clone();
-    turned.tets[5].swap(0, 1);
-    refuse(&turned, fine, vec![], &["element 5"]);
-    let mut nan = good.clone();
-    nan.vertices[4].y = f64::NAN;
-    refuse(&nan, fine, vec![], &["node 4"]);
-    let mut lonely = good.clone();
-    lonely.vertices.push(DVec3::ONE);
-    refuse(&lonely, fine, vec![], &["node 27", "no element"]);
-    refuse(&good, Material { young_modulus: 12e12, ..fine }, vec![], &["Young", "unit"]);
-    refuse(&good, Material { poisson_ratio: 0.5, ..fine }, vec![], &["Poisson"]);
-    refuse(&good, Material { density: f64::NAN, ..fine }, vec![], &["density"]);
-    refuse(&good, fine, vec![99], &["node 99"]);
-    assert!(ModelBuilder::new().build().is_err());
-}
-
-#[test]
-fn light_nodes_are_raised_to_a_quarter_of_the_median() {
-    // A block with one corner cube collapsed towards its corner: its nodes carry little.
-    let mut mesh = block([4, 4, 4], 2e-3);
-    for v in &mut mesh.vertices {
-        if v.x < 3e-3 && v.y < 3e-3 && v.z < 3e-3 {
-            *v *= 0.05;
-        }
-    }
-    let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
-    let body = &model.bodies[0];
-    assert!(body.raised_masses > 0);
-    let mut masses: Vec<f64> = (0..body.len()).map(|i| body.mass(i)).collect();
-    masses.sort_by(f64::total_cmp);
-    assert!(masses[0] >= 0.249 * masses[masses.len() / 2]);
 }

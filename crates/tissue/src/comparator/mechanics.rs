@@ -2,7 +2,7 @@
 
 use crate::builder::shape_gradients;
 use crate::report::SPEED_LIMIT;
-use crate::{Body, SupportPlane};
+use crate::{Body, Support};
 use glam::{DMat3, DVec3};
 
 /// A body's constants, vertices in internal order, positions relative to the body's origin.
@@ -16,7 +16,9 @@ pub(crate) struct Mechanics {
     pub masses: Vec<f64>,
     /// Edges with a dashpot: vertices and coefficient [N s/m].
     pub dashpots: Vec<([u32; 2], f64)>,
-    pub planes: Vec<SupportPlane>,
+    pub supports: Vec<Support>,
+    /// World position of the body's origin [m]: supports stand in the world.
+    pub origin: DVec3,
     /// [N/m]
     pub contact_stiffness: Vec<f64>,
 }
@@ -48,14 +50,14 @@ impl Mechanics {
                 dashpots.push(([i as u32, edge.to], f64::from(edge.damping)));
             }
         }
-        let local = |plane: &SupportPlane| SupportPlane { point: plane.point - body.origin, ..*plane };
         Self {
             tets: body.tets.clone(),
             gradients: (0..body.tets.len()).map(|t| shape_gradients(&body.rest, t)).collect(),
             volumes: body.volumes.clone(),
             masses: body.vertices.iter().map(|v| f64::from(v.mass)).collect(),
             dashpots,
-            planes: body.supports.iter().map(local).collect(),
+            supports: body.supports.clone(),
+            origin: body.origin,
             contact_stiffness: body.vertices.iter().map(|v| f64::from(v.contact_stiffness)).collect(),
         }
     }

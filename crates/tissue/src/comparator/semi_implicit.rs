@@ -136,21 +136,23 @@ impl Form<'_> {
         }
     }
 
-    /// Velocities after gravity, elastic forces and support planes.
+    /// Velocities after gravity, elastic forces and supports.
     fn accelerate(&self, h: f64, x: &[DVec3], v: &mut [DVec3], force: &[DVec3]) {
         let (m, span) = (self.mechanics, &self.span);
         for i in (0..x.len()).filter(|i| !span.fixed[*i]) {
             let per_mass = h / m.masses[i];
             v[i] += h * span.gravity + per_mass * force[i];
-            for plane in &m.planes {
-                let depth = -(x[i] - plane.point).dot(plane.normal);
+            for support in &m.supports {
+                let touch = support.touch(x[i] + m.origin);
+                let depth = -touch.height;
                 if depth > 0.0 {
                     let push = per_mass * m.contact_stiffness[i] * depth;
-                    v[i] += push * plane.normal;
-                    let sliding = v[i] - v[i].dot(plane.normal) * plane.normal;
+                    v[i] += push * touch.gradient;
+                    let normal = touch.gradient.normalize();
+                    let sliding = v[i] - v[i].dot(normal) * normal;
                     let speed = sliding.length();
                     if speed > 0.0 {
-                        v[i] -= sliding * (plane.friction * push / speed).min(1.0);
+                        v[i] -= sliding * (support.friction() * push / speed).min(1.0);
                     }
                 }
             }

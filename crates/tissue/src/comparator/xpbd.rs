@@ -90,7 +90,7 @@ impl Scratch {
             inverse_mass: vec![0.0; nodes],
             correction: vec![DVec3::ZERO; nodes],
             elements: vec![[0.0; 6]; mechanics.tets.len()],
-            planes: vec![0.0; mechanics.planes.len() * nodes],
+            planes: vec![0.0; mechanics.supports.len() * nodes],
         }
     }
 }

@@ -253,19 +253,20 @@ pub(super) struct Planes<'a> {
 impl Planes<'_> {
     pub fn sweep(&self, x: &mut [DVec3], start: &[DVec3], w: &[f64], multipliers: &mut [f64]) {
         let m = self.mechanics;
-        for (p, plane) in m.planes.iter().enumerate() {
+        for (p, support) in m.supports.iter().enumerate() {
             for i in (0..x.len()).filter(|i| w[*i] > 0.0) {
                 let multiplier = &mut multipliers[p * w.len() + i];
-                let height = (x[i] - plane.point).dot(plane.normal);
+                let touch = support.touch(x[i] + m.origin);
+                let (height, normal) = (touch.height, touch.gradient.normalize());
                 let compliance = 1.0 / (self.h * self.h * m.contact_stiffness[i]);
                 let before = *multiplier;
                 // A plane only pushes.
                 *multiplier = (before - (height + compliance * before) / (w[i] + compliance)).max(0.0);
-                x[i] += w[i] * (*multiplier - before) * plane.normal;
+                x[i] += w[i] * (*multiplier - before) * normal;
                 if *multiplier > before {
                     let slide = x[i] - start[i];
-                    let slide = slide - slide.dot(plane.normal) * plane.normal;
-                    let most = plane.friction * w[i] * (*multiplier - before);
+                    let slide = slide - slide.dot(normal) * normal;
+                    let most = support.friction() * w[i] * (*multiplier - before);
                     x[i] -= slide * (most / slide.length().max(f64::MIN_POSITIVE)).min(1.0);
                 }
             }

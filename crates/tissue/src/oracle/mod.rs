@@ -9,7 +9,7 @@
 //!
 //! - energies, stresses and their derivatives of [`crate::Hyperelastic`]; masses, dashpots and contact stiffness as the model holds them (rounded to `f32`);
 //! - dashpots as the sweeps have them: quadratic, along the edges' directions at the beginning of the step;
-//! - support planes' one-sided quadratic penalty. Their friction is no potential, since its limit grows with the depth: it is minimised with the limits held
+//! - the supports' one-sided quadratic penalty. Their friction is no potential, since its limit grows with the depth: it is minimised with the limits held
 //!   and the limits are then taken anew, until the forces of the true law are in balance;
 //! - pinned nodes stay; held nodes are prescribed. The stepper's rules for what cannot follow a tool (yielding grasps) are left out: a motion that
 //!   cannot be followed is an error.
@@ -71,6 +71,12 @@ pub struct Solution {
 /// Finds converged steps and equilibria of one model. It keeps the symbolic factorisations from step to step, as long as the same nodes are held.
 pub struct Oracle {
     bodies: Vec<(Elastic, Solver)>,
+}
+
+/// Elastic energy of a body with its nodes at `x` [J].
+pub(crate) fn elastic_energy(body: &crate::Body, x: &[DVec3]) -> f64 {
+    let elastic = Elastic::new(body);
+    (0..elastic.tets.len()).map(|t| elastic.volumes[t] * elastic.psi.energy(elastic.deformation(t, x))).sum()
 }
 
 /// Acceleration that makes a mass a weight on earth [m/s2].

@@ -4,8 +4,9 @@ use super::element::{blocks, deformation, projected, tangent};
 use super::state::Nodes;
 use crate::builder::shape_gradients;
 use crate::stiffness::Stiffness;
+use crate::support::Touch;
 use crate::sweep::STICK_SPEED;
-use crate::{Body, Hyperelastic, SupportPlane};
+use crate::{Body, Hyperelastic, Support};
 use glam::{DMat3, DVec3};
 
 /// What a body's energies are made of, nodes in their original order.
@@ -20,7 +21,7 @@ pub(super) struct Elastic {
     pub masses: Vec<f64>,
     /// Edges with a dashpot: nodes and coefficient [N s/m].
     dashpots: Vec<([usize; 2], f64)>,
-    planes: Vec<SupportPlane>,
+    supports: Vec<Support>,
     /// [N/m]
     contact_stiffness: Vec<f64>,
     /// An energy that is large beside every change that matters [J]: energies are known to its rounding.
@@ -52,7 +53,7 @@ impl Elastic {
             psi: body.material.hyperelastic(),
             masses: (0..body.len()).map(|i| body.mass(i)).collect(),
             dashpots,
-            planes: body.supports.clone(),
+            supports: body.supports.clone(),
             contact_stiffness,
             scale: (mu + lambda) * body.volumes.iter().sum::<f64>(),
         }
@@ -94,7 +95,7 @@ pub(super) struct Potential<'a> {
     /// None: statics.
     pub motion: Option<Motion>,
     pub gravity: DVec3,
-    /// Greatest friction of each node at each plane [N], plane by plane; empty: none.
+    /// Greatest friction of each node at each support [N], support by support; empty: none.
     pub limits: Vec<f64>,
 }
 
@@ -178,33 +179,40 @@ impl Potential<'_> {
                 into.add(*j, *i, -block);
             }
         }
-        self.for_contacts(x, |i, contact| into.add(i, i, if secant { contact.secant } else { contact.hessian }));
+        self.for_contacts(x, |i, contact| {
+            // A field's curvature may make the Hessian indefinite.
+            let curvature = if secant || project { DMat3::ZERO } else { contact.curvature };
+            into.add(i, i, curvature + if secant { contact.secant } else { contact.hessian });
+        });
         true
     }
 
-    /// Friction's limits at x: coefficient times the planes' forces.
+    /// Friction's limits at x: coefficient times the supports' forces.
     pub fn friction_limits(&self, x: &[DVec3]) -> Vec<f64> {
         let e = self.elastic;
-        let limit = |plane: &SupportPlane, i: usize| {
-            plane.friction * e.contact_stiffness[i] * -(x[i] - plane.point).dot(plane.normal).min(0.0)
+        let limit = |support: &Support, i: usize| {
+            let touch = support.touch(x[i]);
+            support.friction() * e.contact_stiffness[i] * -touch.height.min(0.0) * touch.gradient.length()
         };
-        e.planes.iter().flat_map(|plane| (0..x.len()).map(move |i| limit(plane, i))).collect()
+        e.supports.iter().flat_map(|support| (0..x.len()).map(move |i| limit(support, i))).collect()
     }
 
     /// Whether there is friction at all.
     pub fn rubs(&self) -> bool {
-        self.motion.is_some() && self.elastic.planes.iter().any(|plane| plane.friction > 0.0)
+        self.motion.is_some() && self.elastic.supports.iter().any(|support| support.friction() > 0.0)
     }
 
     fn for_contacts(&self, x: &[DVec3], mut add: impl FnMut(usize, &Contact)) {
-        for (p, plane) in self.elastic.planes.iter().enumerate() {
+        for (s, support) in self.elastic.supports.iter().enumerate() {
             for (i, x) in x.iter().enumerate() {
-                let limit = self.limits.get(p * self.elastic.masses.len() + i).copied().unwrap_or(0.0);
-                let height = (x - plane.point).dot(plane.normal);
-                if height < 0.0 || limit > 0.0 {
-                    let mut contact = Contact::pressed(plane, height.min(0.0), self.elastic.contact_stiffness[i]);
+                let limit = self.limits.get(s * self.elastic.masses.len() + i).copied().unwrap_or(0.0);
+                let touch = support.touch(*x);
+                if touch.height < 0.0 || limit > 0.0 {
+                    let mut contact = Contact::pressed(&touch, self.elastic.contact_stiffness[i]);
                     if let Some(motion) = self.motion.as_ref().filter(|_| limit > 0.0) {
-                        contact.rub(plane, x - motion.start[i], limit, f64::from(STICK_SPEED) * motion.dt);
+                        // The plane of friction is that of the step's beginning: it has a potential then.
+                        let normal = support.touch(motion.start[i]).gradient.normalize_or_zero();
+                        contact.rub(normal, x - motion.start[i], limit, f64::from(STICK_SPEED) * motion.dt);
                     }
                     add(i, &contact);
                 }
@@ -213,28 +221,37 @@ impl Potential<'_> {
     }
 }
 
-/// One node at one plane.
+/// One node at one support.
 struct Contact {
     energy: f64,
     gradient: DVec3,
+    /// Without `curvature`.
     hessian: DMat3,
+    /// What the support's own curvature adds to the Hessian.
+    curvature: DMat3,
     /// The quadratic that touches the energy at this slide and at the opposite one, and lies above it everywhere: the sweeps' block.
     secant: DMat3,
 }
 
 impl Contact {
     /// The penalty of a depth.
-    fn pressed(plane: &SupportPlane, height: f64, stiffness: f64) -> Self {
-        let n = plane.normal;
-        let hessian = if height < 0.0 { outer(n) * stiffness } else { DMat3::ZERO };
-        Self { energy: 0.5 * stiffness * height * height, gradient: stiffness * height * n, hessian, secant: hessian }
+    fn pressed(touch: &Touch, stiffness: f64) -> Self {
+        let force = stiffness * touch.height.min(0.0);
+        let hessian = if touch.height < 0.0 { outer(touch.gradient) * stiffness } else { DMat3::ZERO };
+        Self {
+            energy: 0.5 * force * touch.height,
+            gradient: force * touch.gradient,
+            hessian,
+            curvature: touch.curvature * force,
+            secant: hessian,
+        }
     }
 
     /// Friction with its limit held: the force of the sweeps, limit (2 l/s - l^2/s^2) below the sticking length s and limit above, as a potential.
-    fn rub(&mut self, plane: &SupportPlane, motion: DVec3, limit: f64, stick: f64) {
-        let slide = motion - motion.dot(plane.normal) * plane.normal;
+    fn rub(&mut self, normal: DVec3, motion: DVec3, limit: f64, stick: f64) {
+        let slide = motion - motion.dot(normal) * normal;
         let length = slide.length();
-        let across = DMat3::IDENTITY - outer(plane.normal);
+        let across = DMat3::IDENTITY - outer(normal);
         let (energy, drag, softening) = if length < stick {
             let energy = limit * (length * length / stick - length.powi(3) / (3.0 * stick * stick));
             (energy, limit / stick * (2.0 - length / stick), limit * length / (stick * stick))

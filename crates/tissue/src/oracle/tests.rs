@@ -40,10 +40,10 @@ fn block() -> TetMesh {
 fn model(constitutive: ConstitutiveModel, friction: f64) -> Model {
     let mesh = block();
     let material =
-        Material { model: constitutive, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 60.0 };
+        Material { model: constitutive, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 4.0 };
     let plane = SupportPlane { point: DVec3::Z * 1e-3, normal: DVec3::Z, friction };
     let mut builder = ModelBuilder::new().gravity(DVec3::Z * -9.81);
-    let supports = vec![plane];
+    let supports = vec![plane.into()];
     builder.body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned: vec![26], supports }).unwrap();
     builder.build().unwrap()
 }

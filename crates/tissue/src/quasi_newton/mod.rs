@@ -20,7 +20,7 @@ use crate::integrator::{Frame, Integrator};
 use crate::lanes::Row;
 use crate::schedule::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
-use crate::sweep::LocalPlane;
+use crate::support::LocalSupport;
 use crate::{Body, StepReport};
 use elements::Elements;
 use factor::Factor;
@@ -42,7 +42,7 @@ pub(crate) struct QuasiNewtonIntegrator {
     elements: Elements,
     history: History,
     warp: Warp,
-    planes: Vec<LocalPlane>,
+    supports: Vec<LocalSupport>,
     /// Stiffness of the supports against free nodes [N/m].
     contact_stiffness: Vec<f32>,
     fallback: DescentIntegrator,
@@ -80,7 +80,7 @@ impl QuasiNewtonIntegrator {
             elements: Elements::new(&layout, body),
             history: History::new(settings.memory, layout.rows),
             warp: Warp::new(&layout),
-            planes: LocalPlane::of(body),
+            supports: LocalSupport::of(body),
             contact_stiffness: layout.vertex[..layout.free]
                 .iter()
                 .map(|v| body.vertices[*v as usize].contact_stiffness)
@@ -240,9 +240,9 @@ impl QuasiNewtonIntegrator {
         self.layout.free == self.layout.nodes
             && !self.held.contains(&true)
             && self
-                .planes
+                .supports
                 .iter()
-                .all(|plane| self.x[..self.layout.free].iter().all(|x| plane.height(position(x)) >= 0.0))
+                .all(|support| self.x[..self.layout.free].iter().all(|x| support.touch(position(x)).0 >= 0.0))
     }
 
     /// Marks the nodes that tools carry; a factor in which others are held is made anew.

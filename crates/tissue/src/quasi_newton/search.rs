@@ -132,26 +132,27 @@ impl QuasiNewtonIntegrator {
             }
             sum.store_slice(&mut self.next_gradient[i]);
         }
-        if !self.planes.is_empty() {
+        if !self.supports.is_empty() {
             self.add_contacts(h);
         }
     }
 
-    /// One-sided quadratic penalty of the support planes and regularised Coulomb friction, as in the sweeps.
+    /// One-sided quadratic penalty of the supports and regularised Coulomb friction, as in the sweeps.
     fn add_contacts(&mut self, h: f32) {
         for i in 0..self.layout.free {
             let here = position(&self.x[i]);
-            for plane in &self.planes {
-                let height = plane.height(here);
+            for support in &self.supports {
+                let (height, steep) = support.touch(here);
                 if height >= 0.0 || self.held[i] {
                     continue;
                 }
                 let stiffness = self.contact_stiffness[i];
-                let mut gradient: Vec3A = stiffness * height * plane.normal;
+                let mut gradient: Vec3A = stiffness * height * steep;
                 let motion = here - position(&self.start[i]);
-                let slide = motion - motion.dot(plane.normal) * plane.normal;
+                let normal = support.normal(position(&self.start[i]));
+                let slide = motion - motion.dot(normal) * normal;
                 let (length, stick) = (slide.length(), STICK_SPEED * h);
-                let most = -plane.friction * stiffness * height;
+                let most = -support.friction() * stiffness * height * support.steepness(steep);
                 let drag = if length < stick { most / stick * (2.0 - length / stick) } else { most / length };
                 gradient += drag * slide;
                 for c in 0..3 {

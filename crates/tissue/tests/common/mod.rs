@@ -3,7 +3,7 @@
 
 use glam::DVec3;
 use trocar_geometry::TetMesh;
-use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder};
+use trocar_tissue::{BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, Schedule, Start};
 
 pub const FRAME: f64 = 1.0 / 60.0;
 pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
@@ -17,6 +17,43 @@ pub fn tissue(young_modulus: f64) -> Material {
         density: 1200.0,
         viscosity: 0.0,
     }
+}
+
+/// A schedule to be judged.
+pub struct Judged {
+    pub name: &'static str,
+    pub schedule: Schedule,
+    /// Whether it minimises: held to the laws that the minimum keeps. Sweeps that stop early are not at the minimum.
+    pub converges: bool,
+}
+
+/// Every schedule that solvers are judged by.
+pub fn schedules() -> Vec<Judged> {
+    vec![
+        Judged { name: "paper", schedule: Schedule::PAPER, converges: false },
+        Judged { name: "adaptive sweeps", schedule: adaptive(), converges: false },
+        Judged { name: "fast", schedule: Schedule::FAST, converges: true },
+        Judged { name: "many sweeps", schedule: many_sweeps(), converges: true },
+    ]
+}
+
+/// The paper's sweeps from an adaptive start.
+pub fn adaptive() -> Schedule {
+    Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
+}
+
+/// So many sweeps that little is left to minimise on a small mesh.
+pub fn many_sweeps() -> Schedule {
+    Schedule::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive })
+}
+
+/// A number in 0..1 for each counter, the same on every machine.
+pub fn noise(k: u64) -> f64 {
+    // SplitMix64.
+    let mut z = k.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// A box of `cells` cubes of edge `edge` [m], lower corner at the origin, six tetrahedra a cube around its main diagonal.

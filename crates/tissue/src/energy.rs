@@ -1,0 +1,42 @@
+//! Mechanical energy of a state: what motion without work may never gain.
+
+use crate::oracle::elastic_energy;
+use crate::{Model, OracleState};
+
+/// Mechanical energies of all bodies [J], in double precision.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Energy {
+    /// Of motion.
+    pub kinetic: f64,
+    /// Stored in the tissue; 0 at rest. Not a number where corotated tissue is inverted.
+    pub elastic: f64,
+    /// Of the masses in gravity's field; 0 for a mass at the world's origin.
+    pub gravity: f64,
+    /// Stored in the supports' penalty.
+    pub supports: f64,
+}
+
+impl Energy {
+    /// The energies of `state`, which must be one of `model`.
+    pub fn of(model: &Model, state: &OracleState) -> Self {
+        let mut sum = Self::default();
+        for (body, nodes) in model.bodies.iter().zip(&state.bodies) {
+            sum.elastic += elastic_energy(body, &nodes.x);
+            for (i, (x, v)) in nodes.x.iter().zip(&nodes.v).enumerate() {
+                let mass = body.mass(i);
+                sum.kinetic += 0.5 * mass * v.length_squared();
+                sum.gravity -= mass * model.gravity.dot(*x);
+                let stiffness = f64::from(body.vertices[body.internal[i] as usize].contact_stiffness);
+                for support in &body.supports {
+                    sum.supports += 0.5 * stiffness * support.touch(*x).height.min(0.0).powi(2);
+                }
+            }
+        }
+        sum
+    }
+
+    /// All of it [J].
+    pub fn total(&self) -> f64 {
+        self.kinetic + self.elastic + self.gravity + self.supports
+    }
+}
