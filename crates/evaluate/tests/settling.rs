@@ -11,7 +11,7 @@ fn phantom_b_settles() {
     let experiment = SettlingExperiment {
         phantoms: vec!["phantom-b".into()],
         record: RecordOptions { frames: 9, ..RecordOptions::default() },
-        schedule: "fast".into(),
+        schedule: "adaptive".into(),
         threads: 0,
     };
     let result = experiment.run(folder.path(), &Silent).unwrap();

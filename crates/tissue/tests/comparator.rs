@@ -1,5 +1,7 @@
 //! Semi-implicit Euler, XPBD and Newton's method against analytic solutions and the oracle.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
 mod common;
 
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};

@@ -99,6 +99,8 @@ impl Span<'_> {
 
 /// Whether a free vertex is at the speed limit, or has no speed at all.
 pub(crate) fn too_fast(v: &[DVec3], fixed: &[bool]) -> bool {
-    let limit = SPEED_LIMIT * SPEED_LIMIT;
-    v.iter().zip(fixed).any(|(v, fixed)| !fixed && !(v.length_squared() < limit))
+    v.iter().zip(fixed).any(|(v, fixed)| {
+        let squared = v.length_squared();
+        !fixed && (squared.is_nan() || squared >= SPEED_LIMIT * SPEED_LIMIT)
+    })
 }
