@@ -14,6 +14,7 @@ mod descent;
 mod error;
 mod grasp;
 mod integrator;
+mod isa;
 mod kernel;
 mod lanes;
 mod material;
