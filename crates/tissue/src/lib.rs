@@ -18,6 +18,7 @@ mod error;
 mod grasp;
 mod groups;
 mod integrator;
+mod isa;
 mod kernel;
 mod lane_sweep;
 #[cfg(test)]

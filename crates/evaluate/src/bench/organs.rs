@@ -177,7 +177,7 @@ impl OrgansBench {
             static_sag_error,
             step_error: tube.errors.iter().copied().fold(0.0, f64::max),
             threads: if self.threads == 0 { machine.cores } else { self.threads },
-            isa: machine.isa,
+            isa: schedule.isa(),
             schedule: self.schedule.clone(),
             substeps: schedule.substeps(),
             mesh: organs.source.clone(),

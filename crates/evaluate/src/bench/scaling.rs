@@ -53,6 +53,8 @@ impl Default for ScalingBench {
 pub struct ScalingRow {
     /// The schedule's name.
     pub schedule: String,
+    /// Instruction set of its kernels; empty where nothing was measured.
+    pub isa: &'static str,
     /// Worker threads.
     pub threads: usize,
     /// Elements.
@@ -140,7 +142,8 @@ impl ScalingBench {
             Err(Error::Interrupted) => return Err(Error::Interrupted),
             Err(why) => (None, Some(why.to_string())),
         };
-        Ok(ScalingRow { schedule: schedule.to_owned(), threads, tets, nodes, timing, skipped })
+        let (schedule, isa) = (schedule.to_owned(), solver_named(schedule)?.isa());
+        Ok(ScalingRow { schedule, isa, threads, tets, nodes, timing, skipped })
     }
 }
 
@@ -152,5 +155,5 @@ fn expected_seconds(before: &[ScalingRow], schedule: &str, threads: usize, tets:
 }
 
 fn blank(schedule: &str, threads: usize, tets: usize, why: String) -> ScalingRow {
-    ScalingRow { schedule: schedule.to_owned(), threads, tets, nodes: 0, timing: None, skipped: Some(why) }
+    ScalingRow { schedule: schedule.to_owned(), isa: "", threads, tets, nodes: 0, timing: None, skipped: Some(why) }
 }

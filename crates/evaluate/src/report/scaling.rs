@@ -18,8 +18,8 @@ pub(super) fn body(result: &ScalingResult) -> Result<String> {
     });
     let lead = format!(
         "Our own six organs (fewer at the smallest sizes), finer and finer, the lowest 42% of each pinned and a patch of each shaken. Median of up to 60 frames of \
-         1/60 s; {} cores{load}; kernels compiled for {}. The dashed line is real time.",
-        m.cores, m.isa
+         1/60 s; {} cores{load}. The dashed line is real time.",
+        m.cores
     );
     let plots = [
         plot(result, "Real-time factor", "times real time", &|r, t| (r.tets as f64, t.real_time_factor))?,
@@ -77,6 +77,7 @@ fn threads(n: usize) -> String {
 fn sizes(result: &ScalingResult) -> String {
     let head = [
         "Schedule",
+        "Kernels",
         "Threads",
         "Elements",
         "Nodes",
@@ -87,7 +88,8 @@ fn sizes(result: &ScalingResult) -> String {
         "Yielded",
     ];
     let row = |r: &ScalingRow| {
-        let mut cells = vec![r.schedule.clone(), r.threads.to_string(), count(r.tets), count(r.nodes)];
+        let mut cells =
+            vec![r.schedule.clone(), r.isa.to_owned(), r.threads.to_string(), count(r.tets), count(r.nodes)];
         match (&r.timing, &r.skipped) {
             (Some(t), _) => cells.extend([
                 fixed(t.frame_ms_median, 2),

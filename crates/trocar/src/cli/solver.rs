@@ -26,8 +26,10 @@ impl From<&OrganChoice> for OrganSource {
 pub enum SolverName {
     /// Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor: the paper's.
     Paper,
-    /// The default.
+    /// The warped, prefactored quasi-Newton method.
     Fast,
+    /// The paper's sweeps from the adaptive start.
+    Adaptive,
 }
 
 impl SolverName {
@@ -36,6 +38,7 @@ impl SolverName {
         match self {
             Self::Paper => "paper",
             Self::Fast => "fast",
+            Self::Adaptive => "adaptive",
         }
         .to_owned()
     }

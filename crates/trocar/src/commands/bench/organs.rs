@@ -37,7 +37,7 @@ fn text(r: &OrgansResult) -> String {
         ["1/60 s frames", "median ms", "worst ms", "real time", "iterations", "inverted", "yielded", "fallbacks"];
     let percent = |e: f64| format!("{:.3}%", 100.0 * e);
     format!(
-        "{}: {} organs, {} nodes, {} tets; schedule '{}' ({} substeps), {} threads, {} (the processor has {}, {} cores{})\n{}\n\
+        "{}: {} organs, {} nodes, {} tets; schedule '{}' ({} substeps), {} threads, {} kernels ({} cores{})\n{}\n\
          sag {} off the static solution (mean {:.2} um) after {:.1} s, when the fastest node moves at {:.1e} m/s\n\
          tube {} off the oracle at frames 15, 30, 60; {} inverted, grasp yielded in {} substeps",
         r.mesh,
@@ -48,7 +48,6 @@ fn text(r: &OrgansResult) -> String {
         r.substeps,
         r.threads,
         r.isa,
-        r.machine.widest_isa,
         r.machine.cores,
         r.machine.load.map_or(String::new(), |l| format!(", load {l:.1}")),
         output::table(
