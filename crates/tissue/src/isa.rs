@@ -1,40 +1,28 @@
-//! The instruction set that a schedule's kernels run in, for figures of speed.
+//! The instruction set that a schedule's kernels run in: one choice for both kinds of lanes.
 
-use crate::Schedule;
+use crate::{Isa, Schedule};
 use fearless_simd::Level;
 
+impl Isa {
+    /// The same choice for kernels over `fearless_simd`'s vectors.
+    pub(crate) fn level(self) -> Level {
+        let best = Level::new();
+        #[cfg(target_arch = "x86_64")]
+        if self == Self::Avx2
+            && let Some(avx2) = best.as_avx2()
+        {
+            return Level::Avx2(avx2);
+        }
+        if self == Self::Portable { Level::baseline() } else { best }
+    }
+}
+
 impl Schedule {
-    /// Name of the instruction set of this schedule's kernels on this machine: the quasi-Newton method chooses the widest at run time, sweeps are what the program was
-    /// compiled for.
+    /// Name of the instruction set of this schedule's kernels on this machine; the comparators in double precision have what the program was compiled for.
     pub fn isa(&self) -> &'static str {
         match self {
-            Self::QuasiNewton(_) => chosen(Level::new()),
-            Self::Descent(_) => chosen(Level::baseline()),
+            Self::QuasiNewton(_) | Self::Descent(_) => Isa::detect().name(),
+            Self::SemiImplicit(_) | Self::Xpbd(_) | Self::Newton(_) => Isa::Portable.name(),
         }
     }
-}
-
-#[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-fn chosen(level: Level) -> &'static str {
-    if level.as_avx512().is_some() {
-        "avx512"
-    } else if level.as_avx2().is_some() {
-        "avx2"
-    } else if level.as_sse4_2().is_some() {
-        "sse4.2"
-    } else if level.as_sse2().is_some() {
-        "sse2"
-    } else {
-        "portable"
-    }
-}
-
-#[cfg(target_arch = "aarch64")]
-fn chosen(level: Level) -> &'static str {
-    if level.as_neon().is_some() { "neon" } else { "portable" }
-}
-
-#[cfg(not(any(target_arch = "x86", target_arch = "x86_64", target_arch = "aarch64")))]
-fn chosen(_: Level) -> &'static str {
-    "portable"
 }

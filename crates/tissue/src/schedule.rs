@@ -112,6 +112,6 @@ impl Schedule {
 
 impl Default for Schedule {
     fn default() -> Self {
-        Self::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
+        Self::FAST
     }
 }

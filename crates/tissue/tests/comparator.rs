@@ -57,7 +57,7 @@ fn momenta_are_kept() {
         let model = model(&mesh, Material { viscosity, ..tissue(12e3) }, vec![], DVec3::ZERO);
         let momenta = |state: &State| {
             let of = |i: usize| {
-                let p = model.bodies[0].mass(i) * state.velocity(&model, 0, i);
+                let p = model.bodies()[0].mass(i) * state.velocity(&model, 0, i);
                 (p, (state.position(&model, 0, i) - centre).cross(p))
             };
             let all = (0..mesh.vertices.len()).map(of);

@@ -17,7 +17,7 @@ fn energies_are_inertias_where_nothing_is_strained_and_least_at_the_step() {
     let free = model(&mesh, tissue(12e3), Vec::new(), GRAVITY);
     let before = OracleState::new(&free);
     let oracle = Oracle::new(&free);
-    let mass: f64 = (0..mesh.vertices.len()).map(|i| free.bodies[0].mass(i)).sum();
+    let mass: f64 = (0..mesh.vertices.len()).map(|i| free.bodies()[0].mass(i)).sum();
     let off = DVec3::new(1e-4, -2e-4, 5e-5);
     let mut moved = before.clone();
     moved.positions_mut(0).iter_mut().for_each(|x| *x += SUBSTEP * SUBSTEP * GRAVITY + off);

@@ -167,7 +167,7 @@ impl OrgansBench {
         let (rest, truth) = (rest_positions(&sag.model), oracle.positions());
         let static_sag_error = mean_error(&run.positions(), &truth, &rest);
         let sags = rest.iter().zip(&truth).map(|(a, b)| a.distance(*b)).sum::<f64>();
-        let free = sag.model.bodies.iter().flat_map(|b| b.pinned()).filter(|p| !**p).count();
+        let free = sag.model.bodies().iter().flat_map(|b| b.pinned()).filter(|p| !**p).count();
 
         let tube = Tube::run(&Scene::tube(&organs, material)?, schedule, self.threads, progress)?;
         Ok(OrgansResult {

@@ -128,8 +128,8 @@ impl IntegratorsExperiment {
             integrators,
             stable_step_us: 1e6 * stable,
             specimen,
-            nodes: model.bodies.iter().map(trocar_tissue::Body::len).sum(),
-            tets: model.bodies.iter().map(|b| b.tets().len()).sum(),
+            nodes: model.bodies().iter().map(trocar_tissue::Body::len).sum(),
+            tets: model.bodies().iter().map(|b| b.tets().len()).sum(),
             sag_mm: 1e3 * truth.sag,
             undamped: self.undamped,
             threads: if self.threads == 0 { rayon::current_num_threads() } else { self.threads },
@@ -172,7 +172,7 @@ impl Equilibrium {
         let mut state = OracleState::new(model);
         Oracle::new(model).settle(model, &mut state, &[])?;
         let rest = rest_positions(model);
-        let positions: Vec<DVec3> = (0..model.bodies.len()).flat_map(|b| state.positions(b).iter().copied()).collect();
+        let positions: Vec<DVec3> = (0..model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect();
         let sag = rest.iter().zip(&positions).map(|(a, b)| (*a - *b).length()).sum::<f64>() / rest.len() as f64;
         Ok(Self { rest, positions, sag })
     }
@@ -209,7 +209,7 @@ fn measured(
             break;
         }
         if frame >= first_measured {
-            let all = (0..model.bodies.len()).flat_map(|b| state.positions(model, b));
+            let all = (0..model.bodies().len()).flat_map(|b| state.positions(model, b));
             mean.iter_mut().zip(all).for_each(|(sum, x)| *sum += x / (frames - first_measured) as f64);
         }
     }

@@ -129,10 +129,10 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
     let share = |pinned: &[bool]| pinned.iter().filter(|p| **p).count() as f64 / pinned.len() as f64;
     let mut organs: Vec<SettlingOrgan> = world
         .model
-        .bodies
+        .bodies()
         .iter()
         .map(|b| SettlingOrgan {
-            organ: b.name.clone(),
+            organ: b.name().to_owned(),
             pinned: share(b.pinned()),
             peak_speed_m_s: 0.0,
             speed_m_s: f64::NAN,
@@ -148,7 +148,7 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
         progress.advance(1);
         speeds.push((frame as f64 * FRAME, report.max_speed));
         for (b, organ) in organs.iter_mut().enumerate() {
-            let nodes = 0..world.model.bodies[b].len();
+            let nodes = 0..world.model.bodies()[b].len();
             let speed = nodes.map(|i| world.state.velocity(&world.model, b, i).length()).fold(0.0, f64::max);
             organ.peak_speed_m_s = organ.peak_speed_m_s.max(speed);
             if frame == after {
@@ -168,7 +168,7 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
         Some(last) => speeds.get(last + 1).map(|s| s.0),
     };
     let paper = PAPER.iter().find(|p| p.0 == phantom);
-    let bodies = &world.model.bodies;
+    let bodies = &world.model.bodies();
     let pinned: Vec<bool> = bodies.iter().flat_map(|b| b.pinned().iter().copied()).collect();
     Ok(SettlingRow {
         phantom: phantom.to_owned(),

@@ -130,9 +130,9 @@ impl<'a> Ladder<'a> {
         let mut truth = before.clone();
         run.oracle().step(&scene.model, &mut truth, h, &held)?;
         let mut predictor = before.clone();
-        for (b, body) in scene.model.bodies.iter().enumerate() {
+        for (b, body) in scene.model.bodies().iter().enumerate() {
             for i in (0..body.len()).filter(|i| !body.pinned()[*i]) {
-                predictor.positions_mut(b)[i] += h * before.velocities(b)[i] + h * h * scene.model.gravity;
+                predictor.positions_mut(b)[i] += h * before.velocities(b)[i] + h * h * scene.model.gravity();
             }
         }
         held.iter().for_each(|n| predictor.positions_mut(n.body)[n.node as usize] = n.target);
@@ -141,9 +141,9 @@ impl<'a> Ladder<'a> {
         };
         let energy = total(run, &truth)?;
         let predictor_excess = total(run, &predictor)? - energy;
-        let bodies = scene.model.bodies.iter();
+        let bodies = scene.model.bodies().iter();
         let mass: f64 = bodies.map(|b| (0..b.len()).map(|i| b.mass(i)).sum::<f64>()).sum();
-        let least = LEAST_EXCESS * 0.5 * mass * (h * scene.model.gravity).length_squared();
+        let least = LEAST_EXCESS * 0.5 * mass * (h * scene.model.gravity()).length_squared();
         let along = tools(scene, time, time + FRAME);
         let share = h / FRAME;
         let displacement = rms(&positions(scene, &truth), &rest_positions(&scene.model));
@@ -197,7 +197,7 @@ impl<'a> Ladder<'a> {
 }
 
 fn positions(scene: &Scene, state: &OracleState) -> Vec<DVec3> {
-    (0..scene.model.bodies.len()).flat_map(|b| state.positions(b).iter().copied()).collect()
+    (0..scene.model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect()
 }
 
 fn rms(a: &[DVec3], b: &[DVec3]) -> f64 {

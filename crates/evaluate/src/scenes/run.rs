@@ -44,7 +44,7 @@ impl<'a> Run<'a> {
     /// World positions of the nodes of all bodies, one body after the other [m].
     pub fn positions(&self) -> Vec<DVec3> {
         let model = &self.scene.model;
-        (0..model.bodies.len()).flat_map(|b| self.state.positions(model, b)).collect()
+        (0..model.bodies().len()).flat_map(|b| self.state.positions(model, b)).collect()
     }
 }
 
@@ -120,11 +120,11 @@ impl<'a> OracleRun<'a> {
 
     /// World positions of the nodes of all bodies, one body after the other [m].
     pub fn positions(&self) -> Vec<DVec3> {
-        (0..self.scene.model.bodies.len()).flat_map(|b| self.state.positions(b).iter().copied()).collect()
+        (0..self.scene.model.bodies().len()).flat_map(|b| self.state.positions(b).iter().copied()).collect()
     }
 }
 
 /// Rest positions of the nodes of all bodies, one body after the other [m].
 pub(crate) fn rest_positions(model: &Model) -> Vec<DVec3> {
-    model.bodies.iter().flat_map(|b| b.rest_positions().iter().copied()).collect()
+    model.bodies().iter().flat_map(|b| b.rest_positions().iter().copied()).collect()
 }

@@ -169,7 +169,7 @@ impl Scene {
     /// As [`Self::sag`].
     pub fn moving(organs: &Organs, material: Material) -> Result<Self> {
         let mut scene = Self { name: "moving", ..Self::sag(organs, material)? };
-        scene.patches = (0..scene.model.bodies.len()).map(|body| scene.patch(body, Motion::SHAKE)).collect();
+        scene.patches = (0..scene.model.bodies().len()).map(|body| scene.patch(body, Motion::SHAKE)).collect();
         Ok(scene)
     }
 
@@ -238,7 +238,7 @@ impl Scene {
 
     /// Free nodes around the highest point near the middle of a body, none of them in an element with a pinned one; the highest free node where there are no such.
     fn patch(&self, body: usize, motion: Motion) -> Patch {
-        let b = &self.model.bodies[body];
+        let b = &self.model.bodies()[body];
         let (nodes, pinned) = (b.rest_positions(), b.pinned());
         let mut beside_pins = pinned.to_vec();
         for tet in b.tets().iter().filter(|t| t.iter().any(|i| pinned[*i as usize])) {
@@ -274,26 +274,26 @@ mod tests {
         let material = material(12e3, 0.45);
         let moving = Scene::moving(&organs, material).unwrap();
         assert_eq!(moving.patches.len(), 6);
-        for (patch, body) in moving.patches.iter().zip(&moving.model.bodies) {
+        for (patch, body) in moving.patches.iter().zip(moving.model.bodies()) {
             let share = body.pinned().iter().filter(|p| **p).count() as f64 / body.len() as f64;
-            assert!((share - 0.42).abs() < 0.01, "{}: {share}", body.name);
+            assert!((share - 0.42).abs() < 0.01, "{}: {share}", body.name());
             assert!(
                 !patch.nodes.is_empty() && patch.nodes.iter().all(|i| !body.pinned()[*i as usize]),
                 "{}",
-                body.name
+                body.name()
             );
         }
         let drag = Scene::drag(&organs, material).unwrap();
         assert_eq!(
-            (drag.patches[0].body, drag.model.bodies[drag.appendix].name.as_str()),
+            (drag.patches[0].body, drag.model.bodies()[drag.appendix].name()),
             (organs.appendix, "appendix")
         );
         let tube = Scene::tube(&organs, material).unwrap();
-        let pinned = tube.model.bodies[0].pinned().iter().filter(|p| **p).count();
-        let share = pinned as f64 / tube.model.bodies[0].len() as f64;
+        let pinned = tube.model.bodies()[0].pinned().iter().filter(|p| **p).count();
+        let share = pinned as f64 / tube.model.bodies()[0].len() as f64;
         assert!((0.08..0.25).contains(&share), "10 mm of 85: {share}");
         assert!(tube.patches[0].nodes.len() > 3);
-        assert!(!Scene::fall(&organs, material).unwrap().model.bodies[0].pinned().contains(&true));
+        assert!(!Scene::fall(&organs, material).unwrap().model.bodies()[0].pinned().contains(&true));
     }
 
     #[test]

@@ -21,7 +21,7 @@ use crate::lanes::Row;
 use crate::schedule::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
 use crate::support::LocalSupport;
-use crate::{Body, StepReport};
+use crate::{Body, Isa, StepReport};
 use elements::Elements;
 use factor::Factor;
 use fearless_simd::{Level, Simd, dispatch};
@@ -76,7 +76,7 @@ impl QuasiNewtonIntegrator {
         let sweeps = Descent { substeps: settings.substeps, iterations: FALLBACK_SWEEPS, start: Start::Adaptive };
         Some(Self {
             settings,
-            level: Level::new(),
+            level: Isa::detect().level(),
             elements: Elements::new(&layout, body),
             history: History::new(settings.memory, layout.rows),
             warp: Warp::new(&layout),
