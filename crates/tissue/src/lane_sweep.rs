@@ -237,10 +237,9 @@ impl LaneSweep<'_> {
         let length = lanes.max(dot::<L>(before, before), lanes.splat(1e-30));
         let damping = lanes.load(&self.groups.damping_of(group)[k], part);
         let stiffness = damping * lanes.splat(1.0 / h) / length;
-        // The vertex's displacement less the point's.
-        let stretching = dot::<L>(before, minus::<L>(before, d));
-        sums.pull(stiffness * stretching, before);
-        sums.add_outer(stiffness, before);
+        let shortening = (dot::<L>(before, before) - dot::<L>(d, d)) * lanes.splat(0.5);
+        sums.pull(stiffness * shortening, d);
+        sums.add_outer(stiffness, d);
     }
 
     #[inline(always)]

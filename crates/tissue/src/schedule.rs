@@ -34,7 +34,7 @@ pub struct QuasiNewton {
     pub memory: usize,
     /// A correction this small ends a substep [m]; a body whose first one is no larger is at rest.
     pub tolerance: f64,
-    /// A correction this small over how far the substep went so far ends it, too.
+    /// A correction this small over how far the substep's corrections went so far ends it, too.
     pub relative: f64,
 }
 
@@ -65,7 +65,7 @@ impl Schedule {
 
     /// The default: two substeps of as many quasi-Newton iterations as it takes, at most twenty.
     pub const FAST: Self =
-        Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 20, memory: 8, tolerance: 3e-8, relative: 3e-3 });
+        Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 20, memory: 8, tolerance: 3e-8, relative: 1e-2 });
 
     /// Substeps a frame.
     pub fn substeps(&self) -> usize {

@@ -24,6 +24,8 @@ pub(crate) struct BodyState {
     pub v: Vec<Vec3A>,
     /// Acceleration along gravity that the last substep showed, as a share of gravity, 0..=1: for the adaptive start.
     pub falling: Vec<f32>,
+    /// Vertices whose supports the quasi-Newton solver has in its matrix.
+    pub supported: Vec<bool>,
     /// Whether nodes were put somewhere from outside, and elements may be inverted by it.
     pub disturbed: bool,
 }
@@ -34,6 +36,7 @@ impl BodyState {
         self.x.copy_from_slice(&other.x);
         self.v.copy_from_slice(&other.v);
         self.falling.copy_from_slice(&other.falling);
+        self.supported.copy_from_slice(&other.supported);
         self.disturbed = other.disturbed;
     }
 }
@@ -46,7 +49,13 @@ impl State {
             for (node, p) in body.rest_positions().iter().enumerate() {
                 x[body.internal[node] as usize] = (p - body.origin).as_vec3a();
             }
-            BodyState { x, v: vec![Vec3A::ZERO; body.len()], falling: vec![0.0; body.len()], disturbed: false }
+            BodyState {
+                x,
+                v: vec![Vec3A::ZERO; body.len()],
+                falling: vec![0.0; body.len()],
+                supported: vec![false; body.len()],
+                disturbed: false,
+            }
         };
         Self { time: 0.0, grasps: Vec::new(), bodies: model.bodies.iter().map(at_rest).collect() }
     }
@@ -114,6 +123,9 @@ impl State {
             }
             for f in &body.falling {
                 hash.update(&f.to_bits().to_le_bytes());
+            }
+            for flag in body.supported.iter().chain([&body.disturbed]) {
+                hash.update(&[u8::from(*flag)]);
             }
             hash.update(&[u8::from(body.disturbed)]);
         }

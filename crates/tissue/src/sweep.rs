@@ -142,20 +142,18 @@ impl Substep<'_> {
         }
     }
 
-    /// The constant Laplacian of the stable neo-Hookean energy, and the dashpots: force -(c/h) n n'(u_i - u_j) for displacements u since the
-    /// substep's beginning and the edge's direction n then. They resist stretching of edges alone: rigid motion is free.
+    /// The constant Laplacian of the stable neo-Hookean energy, and the dashpots: energy c/(2 h l^2) e^2 with the change e = (|d|^2 - l^2)/2 of an edge of length l at the
+    /// substep's beginning. Any rigid motion is free of them, however large. The block leaves out their geometric stiffness.
     #[inline(always)]
     fn add_edges(&self, i: usize, here: Vec3A, x: &[Vec3A], local: &mut Local) {
-        let displacement = here - self.start[i];
         for edge in self.body.edges_of(i) {
             let j = edge.to as usize;
             local.force -= edge.laplacian * (x[j] - here);
             if edge.damping > 0.0 {
-                let direction = self.start[j] - self.start[i];
-                let k = edge.damping / (self.h * direction.length_squared());
-                let stretching = direction.dot(displacement - (x[j] - self.start[j]));
-                local.force -= k * stretching * direction;
-                local.add_outer(k, direction);
+                let (now, before) = (x[j] - here, (self.start[j] - self.start[i]).length_squared());
+                let k = edge.damping / (self.h * before);
+                local.force += 0.5 * k * (now.length_squared() - before) * now;
+                local.add_outer(k, now);
             }
         }
     }
@@ -255,12 +253,12 @@ mod tests {
         for (i, vertex) in body.vertices.iter().enumerate() {
             sum += 0.5 * f64::from(vertex.mass) / (h * h) * (x[i] - substep.predictor[i].as_dvec3()).length_squared();
             for edge in body.edges_of(i) {
-                // Each edge is met twice; the dashpot works along its direction at the beginning.
+                // Each edge is met twice.
                 let j = edge.to as usize;
                 let start = |k: usize| substep.start[k].as_dvec3();
-                let direction = (start(j) - start(i)).normalize();
-                let stretching = direction.dot((x[i] - start(i)) - (x[j] - start(j)));
-                sum += 0.5 * 0.5 * f64::from(edge.damping) / h * stretching * stretching;
+                let before = (start(j) - start(i)).length_squared();
+                let change = 0.5 * ((x[j] - x[i]).length_squared() - before);
+                sum += 0.5 * 0.5 * f64::from(edge.damping) / (h * before) * change * change;
             }
             for support in &body.supports {
                 let height = support.touch(x[i] + body.origin).height.min(0.0);

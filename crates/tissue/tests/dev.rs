@@ -41,7 +41,7 @@ fn schedule() -> Schedule {
     let v: Vec<usize> = std::env::var("SCHED").unwrap_or("2,20,8".into()).split(',').map(|s| s.parse().unwrap()).collect();
     if std::env::var("PAPER").is_ok() { return Schedule::PAPER; }
     let tol = std::env::var("TOL").ok().map_or(3e-8, |s| s.parse().unwrap());
-    Schedule::QuasiNewton(QuasiNewton { substeps: v[0], iterations: v[1], memory: v[2], tolerance: tol, relative: std::env::var("REL").ok().map_or(3e-3, |s| s.parse().unwrap()) })
+    Schedule::QuasiNewton(QuasiNewton { substeps: v[0], iterations: v[1], memory: v[2], tolerance: tol, relative: std::env::var("REL").ok().map_or(1e-2, |s| s.parse().unwrap()) })
 }
 fn threads() -> usize { std::env::var("T").ok().map_or(1, |s| s.parse().unwrap()) }
 

@@ -57,13 +57,10 @@ pub struct Material {
     pub density: f64,
     /// Shear viscosity eta [Pa s]; rigid motion is not damped.
     ///
-    /// The quasi-Newton method has the stress 2 eta dE/dt, E being Green's strain: the shear viscosity is eta, the bulk viscosity 2/3 eta. The sweeps and the oracle have dashpots, which come
-    /// near it:
-    ///
     /// Each edge of rest length L has a dashpot of 15 eta V/L^2, V being its share of the volume (a sixth of each element at it). Along edges of
     /// all directions the mean of (n'Dn)^2 is (2 D:D + tr(D)^2)/15 for a rate of strain D, so that an isotropic mesh dissipates eta (2 D:D + tr(D)^2) per volume: a Newtonian
     /// fluid of shear viscosity eta and bulk viscosity 5/3 eta. A mesh whose edges prefer directions is off: the lattice mesher's by up to 11% with the direction of the
-    /// shear (3% in the mean), a regular grid of six tetrahedra a cube by 30%. Directions are those of the substep's beginning; lengths are those at rest.
+    /// shear (3% in the mean), a regular grid of six tetrahedra a cube by 30%. Strain is told by the change of an edge's squared length over a substep, which no rotation changes.
     pub viscosity: f64,
 }
 

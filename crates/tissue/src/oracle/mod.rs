@@ -8,7 +8,7 @@
 //! experiments. What is in it:
 //!
 //! - energies, stresses and their derivatives of [`crate::Hyperelastic`]; masses, dashpots and contact stiffness as the model holds them (rounded to `f32`);
-//! - dashpots as the sweeps have them: quadratic, along the edges' directions at the beginning of the step;
+//! - dashpots as the sweeps have them: quadratic in the change of an edge's squared length since the beginning of the step, so that no rigid motion meets them;
 //! - the supports' one-sided quadratic penalty. Their friction is no potential, since its limit grows with the depth: it is minimised with the limits held
 //!   and the limits are then taken anew, until the forces of the true law are in balance;
 //! - pinned nodes stay; held nodes are prescribed. The stepper's rules for what cannot follow a tool (yielding grasps) are left out: a motion that

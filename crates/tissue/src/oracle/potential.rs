@@ -72,16 +72,16 @@ pub(super) struct Motion {
     start: Vec<DVec3>,
     /// Inertial predictor y [m].
     predictor: Vec<DVec3>,
-    /// Directions of the dashpots at the beginning.
-    directions: Vec<DVec3>,
+    /// Squared lengths of the dashpots at the beginning [m2].
+    lengths: Vec<f64>,
 }
 
 impl Motion {
     pub fn new(elastic: &Elastic, nodes: &Nodes, gravity: DVec3, dt: f64) -> Self {
         let start = nodes.x.clone();
         let predictor = start.iter().zip(&nodes.v).map(|(x, v)| x + dt * v + dt * dt * gravity).collect();
-        let along = |([i, j], _): &([usize; 2], f64)| (start[*j] - start[*i]).normalize_or_zero();
-        Self { dt, directions: elastic.dashpots.iter().map(along).collect(), predictor, start }
+        let length = |([i, j], _): &([usize; 2], f64)| (start[*j] - start[*i]).length_squared();
+        Self { dt, lengths: elastic.dashpots.iter().map(length).collect(), predictor, start }
     }
 
     pub fn dt(&self) -> f64 {
@@ -125,12 +125,12 @@ impl Potential<'_> {
                     energy += 0.5 * mass * k * off.length_squared();
                     out[i] += mass * k * off;
                 }
-                for (([i, j], damping), n) in e.dashpots.iter().zip(&motion.directions) {
-                    let k = damping / motion.dt;
-                    let stretching = n.dot((x[*j] - motion.start[*j]) - (x[*i] - motion.start[*i]));
-                    energy += 0.5 * k * stretching * stretching;
-                    out[*i] -= k * stretching * n;
-                    out[*j] += k * stretching * n;
+                for (([i, j], damping), before) in e.dashpots.iter().zip(&motion.lengths) {
+                    let (k, d) = (damping / (motion.dt * before), x[*j] - x[*i]);
+                    let change = 0.5 * (d.length_squared() - before);
+                    energy += 0.5 * k * change * change;
+                    out[*i] -= k * change * d;
+                    out[*j] += k * change * d;
                 }
             }
             None => {
@@ -171,8 +171,12 @@ impl Potential<'_> {
             for (i, mass) in e.masses.iter().enumerate() {
                 into.add(i, i, DMat3::from_diagonal(DVec3::splat(mass / (motion.dt * motion.dt))));
             }
-            for (([i, j], damping), n) in e.dashpots.iter().zip(&motion.directions) {
-                let block = outer(*n) * (damping / motion.dt);
+            for (([i, j], damping), before) in e.dashpots.iter().zip(&motion.lengths) {
+                let (k, d) = (damping / (motion.dt * before), x[*j] - x[*i]);
+                let change = 0.5 * (d.length_squared() - before);
+                // The geometric stiffness of a shortened dashpot is negative.
+                let geometric = if project { change.max(0.0) } else { change };
+                let block = (outer(d) + DMat3::from_diagonal(DVec3::splat(geometric))) * k;
                 into.add(*i, *i, block);
                 into.add(*j, *j, block);
                 into.add(*i, *j, -block);

@@ -71,10 +71,11 @@ impl Elements {
                 let from = self::edges(simd, batch, start);
                 for (k, [i, j]) in EDGES.into_iter().enumerate() {
                     // Corner 0 is the origin of the edges.
-                    let (direction, now) =
+                    let (before, now) =
                         if i == 0 { (from[j - 1], edges[j - 1]) } else { (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1])) };
-                    let along = load(simd, &self.dashpots[b][k]) * rate / dot(direction, direction);
-                    let force = scale(direction, along * dot(direction, sub(now, direction)));
+                    let length = dot(before, before);
+                    let along = load(simd, &self.dashpots[b][k]) * rate * (dot(now, now) - length) / (length + length);
+                    let force = scale(now, along);
                     forces[j - 1] = add(forces[j - 1], force);
                     if i == 0 {
                         first = sub(first, force);

@@ -39,7 +39,7 @@ pub(super) struct Factor {
     pub scale: Vec<f32>,
     /// What is added to the diagonal [N/m], three a node alike: masses over h^2.
     added: Vec<f32>,
-    /// Stiffness that holds nodes [N/m]; 0 for those that are not held.
+    /// Stiffness by which tools hold nodes or supports carry them [N/m].
     pub holding: Vec<f32>,
     symbolic: SymbolicCholesky<usize>,
     numbers: Vec<f32>,
@@ -121,13 +121,13 @@ impl Factor {
         }
     }
 
-    /// Factorises with the `held` nodes held by a large stiffness. False if the matrix is not positive definite.
-    pub fn factorise(&mut self, held: &[bool]) -> bool {
+    /// Factorises with the `held` nodes held by a large stiffness and the others by `supports` [N/m]. False if the matrix is not positive definite.
+    pub fn factorise(&mut self, held: &[bool], supports: &[f32]) -> bool {
         let pattern = self.rest.pattern();
         let columns = pattern.col_ptr();
         for (node, holding) in self.holding.iter_mut().enumerate() {
             let own = self.rest.values()[columns[3 * node]] as f32 + self.added[node];
-            *holding = if held[node] { HOLDING * own } else { 0.0 };
+            *holding = if held[node] { HOLDING * own } else { supports[node] };
         }
         for (column, first) in columns[..columns.len() - 1].iter().enumerate() {
             let diagonal = self.rest.values()[*first] as f32 + self.added[column / 3] + self.holding[column / 3];
@@ -286,7 +286,7 @@ mod tests {
             let added: Vec<f32> = f.order.iter().map(|i| (body.mass(*i as usize) / h / h) as f32).collect();
             let held = vec![false; f.order.len()];
             f.added.copy_from_slice(&added);
-            assert!(f.factorise(&held));
+            assert!(f.factorise(&held, &vec![0.0; held.len()]));
             let t2 = std::time::Instant::now();
             let n = 3 * f.order.len();
             let mut v = vec![0.0f32; n + 16];

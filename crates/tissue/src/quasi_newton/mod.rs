@@ -33,6 +33,12 @@ use warp::Warp;
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
 const FALLBACK_SWEEPS: usize = 20;
 
+/// A node this much above a support [m], and what it may fall within two frames, may touch it in a frame.
+const NEAR: f32 = 1e-3;
+
+/// As many more or fewer nodes that touch, beside an eighth of them, do not make the matrix another one.
+const FEW: usize = 3;
+
 /// The solver of one body.
 pub(crate) struct QuasiNewtonIntegrator {
     settings: QuasiNewton,
@@ -60,6 +66,10 @@ pub(crate) struct QuasiNewtonIntegrator {
     /// Nodes that a tool carries, now and in the factor.
     held: Vec<bool>,
     held_in_factor: Vec<bool>,
+    /// Free nodes that may touch a support in this frame, and what of their supports is in the factor [N/m].
+    near: Vec<u32>,
+    touching: Vec<bool>,
+    supports_in_factor: Vec<f32>,
     targets: Vec<Row>,
 }
 
@@ -71,7 +81,7 @@ impl QuasiNewtonIntegrator {
         let layout = Layout::new(body, &factor.order);
         let held = vec![false; layout.free];
         factor.set_step(&layout.masses, h);
-        factor.factorise(&held).then_some(())?;
+        factor.factorise(&held, &vec![0.0; layout.free]).then_some(())?;
         let rows = || vec![[0.0f32; 4]; layout.rows];
         let sweeps = Descent { substeps: settings.substeps, iterations: FALLBACK_SWEEPS, start: Start::Adaptive };
         Some(Self {
@@ -97,6 +107,9 @@ impl QuasiNewtonIntegrator {
             targets: rows(),
             right: vec![0.0; 3 * layout.rows + 16],
             held_in_factor: held.clone(),
+            near: Vec::with_capacity(layout.free),
+            touching: vec![false; layout.free],
+            supports_in_factor: vec![0.0; layout.free],
             held,
             factor,
             layout,
@@ -125,6 +138,8 @@ impl QuasiNewtonIntegrator {
         let h = (frame.dt / substeps as f64) as f32;
         self.load(state);
         self.hold(frame, body);
+        self.find_supports(frame, state);
+        self.refresh_factor(state);
         self.history.clear();
         self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
         self.elements.accept();
@@ -222,10 +237,15 @@ impl QuasiNewtonIntegrator {
         self.warp.from_rest(simd, &self.right, &mut self.direction);
     }
 
-    /// How far any coordinate has gone since the substep began [m].
+    /// How far any coordinate is from where the node would have gone by itself [m]: what the substep was found to be about, without any rigid motion.
     fn way(&self) -> f32 {
-        let coordinates = self.x[..self.layout.free].as_flattened().iter().zip(self.start.as_flattened());
-        coordinates.map(|(now, before)| (now - before).abs()).fold(0.0, f32::max)
+        let mut way = 0.0f32;
+        for i in (0..self.layout.free).filter(|i| !self.held[*i]) {
+            for c in 0..3 {
+                way = way.max((self.x[i][c] - self.targets[i][c]).abs());
+            }
+        }
+        way
     }
 
     /// Puts the substep's beginning back.
@@ -256,8 +276,51 @@ impl QuasiNewtonIntegrator {
                 }
             }
         }
-        if self.held != self.held_in_factor {
-            self.factor.factorise(&self.held);
+    }
+
+    /// Finds the nodes that are near a support. Where too many others touch than the matrix knows of, it is to know those that touch now: `state` says which, so that
+    /// nothing depends on what came before it.
+    fn find_supports(&mut self, frame: &Frame<'_>, state: &mut BodyState) {
+        self.near.clear();
+        if self.supports.is_empty() {
+            return;
+        }
+        let dt = frame.dt as f32;
+        let reach = NEAR + 2.0 * dt * longest(&self.v);
+        let (mut touching, mut changed) = (0, 0);
+        for i in (0..self.layout.free).filter(|i| !self.held[*i]) {
+            let (x, v) = (position(&self.x[i]), position(&self.v[i]));
+            let height = |x| self.supports.iter().map(|support| support.touch(x).0).fold(f32::INFINITY, f32::min);
+            let here = height(x);
+            if here > reach {
+                changed += usize::from(state.supported[self.layout.vertex[i] as usize]);
+                continue;
+            }
+            self.near.push(i as u32);
+            let touches = here < 0.0 || height(x + dt * v) < 0.0;
+            touching += usize::from(touches);
+            changed += usize::from(touches != state.supported[self.layout.vertex[i] as usize]);
+            self.touching[i] = touches;
+        }
+        if changed > FEW + touching / 8 {
+            state.supported.fill(false);
+            for i in &self.near {
+                state.supported[self.layout.vertex[*i as usize] as usize] = self.touching[*i as usize];
+            }
+        }
+    }
+
+    /// Makes the factor anew if it is not the one for the nodes that are held and supported.
+    fn refresh_factor(&mut self, state: &BodyState) {
+        let mut stale = self.held != self.held_in_factor;
+        for i in 0..self.layout.free {
+            let supported = state.supported[self.layout.vertex[i] as usize];
+            let stiffness = if supported { self.contact_stiffness[i] } else { 0.0 };
+            stale |= stiffness != self.supports_in_factor[i];
+            self.supports_in_factor[i] = stiffness;
+        }
+        if stale {
+            self.factor.factorise(&self.held, &self.supports_in_factor);
             self.held_in_factor.copy_from_slice(&self.held);
         }
     }

@@ -18,7 +18,7 @@ const STILL: f32 = 1e-9;
 const SLOPE_SHARE: f32 = 0.5;
 
 /// Most secant steps of a search.
-const MOST_SECANTS: usize = 3;
+const MOST_SECANTS: usize = 8;
 
 /// Times the steps of squeezed elements' nodes are halved, and then dropped, before a search gives up.
 const HALVINGS: usize = 3;
@@ -139,11 +139,11 @@ impl QuasiNewtonIntegrator {
 
     /// One-sided quadratic penalty of the supports and regularised Coulomb friction, as in the sweeps.
     fn add_contacts(&mut self, h: f32) {
-        for i in 0..self.layout.free {
+        for i in self.near.iter().map(|i| *i as usize) {
             let here = position(&self.x[i]);
             for support in &self.supports {
                 let (height, steep) = support.touch(here);
-                if height >= 0.0 || self.held[i] {
+                if height >= 0.0 {
                     continue;
                 }
                 let stiffness = self.contact_stiffness[i];
@@ -183,20 +183,18 @@ impl QuasiNewtonIntegrator {
                 self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
                 return Found::Nothing;
             }
-            if attempt == 0 {
-                // Steps of squeezed elements' nodes may have been cut.
-                slope = dot_rows(simd, &self.gradient, &self.direction);
-            }
+            // Steps of squeezed elements' nodes may have been cut.
+            slope = dot_rows(simd, &self.gradient, &self.direction);
             self.take_gradient(simd, h);
             let there = dot_rows(simd, &self.next_gradient, &self.direction);
-            if there.is_nan() {
+            if there <= SLOPE_SHARE * slope.abs() {
+                break;
+            }
+            if attempt == MOST_SECANTS || !(slope < 0.0 && there.is_finite()) {
                 self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
                 return Found::Nothing;
             }
-            if there <= SLOPE_SHARE * slope.abs() || attempt == MOST_SECANTS {
-                break;
-            }
-            share *= (slope / (slope - there)).clamp(0.1, 0.9);
+            share *= (slope / (slope - there)).clamp(0.05, 0.9);
         }
         self.elements.accept();
         self.history.learn(simd, share, &self.direction, &self.gradient, &self.next_gradient);
