@@ -15,4 +15,4 @@ pub use error::{Error, Result};
 pub use grasp_lift::{GraspLift, GraspLiftRun, Phase, Snapshot};
 pub use gripper::Gripper;
 pub use measure::{Sample, Summary};
-pub use world::{FRAME, World};
+pub use world::{FRAME, VISCOSITY_TIME, World};

@@ -9,7 +9,7 @@ use crate::{Body, Isa, StepReport};
 use glam::Vec3A;
 
 /// Held nodes go no farther from their neighbours than this many rest lengths of the edge between them.
-const HELD_STRETCH: f32 = 7.0;
+pub(crate) const HELD_STRETCH: f32 = 7.0;
 
 /// How much of the guessed motion of free vertices, and of the prescribed motion of held ones, is tried at the beginning of a
 /// substep, until no element is squeezed too far by it.

@@ -8,7 +8,7 @@ use crate::groups::{Group, Groups};
 use crate::kernel::{Local, VolumeTerm};
 use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, splat3, store3};
 use crate::support::LocalSupport;
-use crate::sweep::{FLOOR, KEPT_SHARE, Substep, allowed_share};
+use crate::sweep::{LEAST_SQUARE, FLOOR, KEPT_SHARE, Substep, allowed_share};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -234,7 +234,7 @@ impl LaneSweep<'_> {
         let Substep { start, h, .. } = *self.substep;
         let to = self.groups.steps_of(group)[k].to();
         let before = minus::<L>(self.read(lanes, part, start, to), self.read(lanes, part, start, group.own()));
-        let length = lanes.max(dot::<L>(before, before), lanes.splat(1e-30));
+        let length = lanes.max(dot::<L>(before, before), lanes.splat(LEAST_SQUARE));
         let damping = lanes.load(&self.groups.damping_of(group)[k], part);
         let stiffness = damping * lanes.splat(1.0 / h) / length;
         let shortening = (dot::<L>(before, before) - dot::<L>(d, d)) * lanes.splat(0.5);

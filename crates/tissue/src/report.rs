@@ -22,6 +22,8 @@ pub enum Divergence {
         /// The body.
         body: usize,
     },
+    /// The state or the model is not the one that the stepper was made for; nothing was stepped.
+    OtherModel,
     /// An edge is longer than 10 times its rest length.
     OverStretch {
         /// The body.
@@ -37,6 +39,7 @@ pub enum Divergence {
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
+            Self::OtherModel => write!(f, "the stepper was made for another model"),
             Self::NonFinite { body } => write!(f, "body {body} has a position that is not finite"),
             Self::OverSpeed { body } => write!(f, "a node of body {body} is at the speed limit of {SPEED_LIMIT} m/s"),
             Self::Unsolved { body } => write!(f, "no minimum was found for body {body}"),
@@ -90,7 +93,11 @@ impl StepReport {
             grasp_limited: self.grasp_limited + other.grasp_limited,
             iterations: self.iterations + other.iterations,
             fallbacks: self.fallbacks + other.fallbacks,
-            divergence: self.divergence.or(other.divergence),
+            divergence: match (self.divergence, other.divergence) {
+                // It is the reason why the state was put back.
+                (_, Some(lost @ Divergence::NonFinite { .. })) => Some(lost),
+                (first, second) => first.or(second),
+            },
         }
     }
 

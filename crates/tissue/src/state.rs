@@ -127,7 +127,6 @@ impl State {
             for flag in body.supported.iter().chain([&body.disturbed]) {
                 hash.update(&[u8::from(*flag)]);
             }
-            hash.update(&[u8::from(body.disturbed)]);
         }
         for grasp in &self.grasps {
             hash.update(&(grasp.body as u64).to_le_bytes());

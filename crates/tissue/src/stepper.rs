@@ -60,6 +60,12 @@ impl Stepper {
 
     /// Advances `state` by one frame. `tools` are the motions of the tools that carry the state's grasps; what is held by a tool without a motion stays where it is.
     pub fn step(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion]) -> StepReport {
+        let nodes = |worker: &Worker| state.bodies.get(worker.body).map(|body| body.x.len());
+        let known = |worker: &Worker| Some(worker.state.x.len());
+        let same = self.workers.len() == model.bodies.len() && self.workers.len() == state.bodies.len();
+        if !same || self.workers.iter().any(|w| nodes(w) != known(w) || model.bodies[w.body].len() != w.state.x.len()) {
+            return StepReport { divergence: Some(Divergence::OtherModel), ..StepReport::default() };
+        }
         for worker in &mut self.workers {
             std::mem::swap(&mut worker.state, &mut state.bodies[worker.body]);
         }
@@ -72,7 +78,8 @@ impl Stepper {
             });
         });
         let report = self.workers.iter().fold(StepReport::default(), |all, worker| all.with(&worker.report));
-        let broken = matches!(report.divergence, Some(Divergence::NonFinite { .. }));
+        let lost = |worker: &Worker| matches!(worker.report.divergence, Some(Divergence::NonFinite { .. }));
+        let broken = self.workers.iter().any(lost);
         for worker in &mut self.workers {
             // The whole state is of one instant: if a body is lost, all are put back.
             if broken {

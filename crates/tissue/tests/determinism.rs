@@ -91,7 +91,6 @@ fn six_hundred_frames_of_sweeps_have_the_same_bits() {
 }
 
 #[test]
-#[ignore = "the quasi-Newton method diverges where a free body lands on a support"]
 fn six_hundred_frames_of_the_fast_schedule_have_the_same_bits() {
     println!("fast: {:#018x}", same_bits(Schedule::FAST, "fast"));
 }

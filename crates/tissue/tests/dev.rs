@@ -129,3 +129,36 @@ fn tube() {
         }
     }
 }
+
+#[test]
+#[ignore]
+fn dropped() {
+    let mesh = common::block([4, 3, 2], 2e-3);
+    for kind in ["dropped", "flight"] {
+        for constitutive in [ConstitutiveModel::StableNeoHookean, ConstitutiveModel::Corotated] {
+            let mut builder = ModelBuilder::new().gravity(if kind == "dropped" { GRAVITY } else { DVec3::ZERO });
+            let plane = SupportPlane { point: DVec3::Z * -1e-3, normal: DVec3::Z, friction: 0.3 };
+            builder.body(BodyDescription { name: "b".into(), mesh: &mesh, material: Material { model: constitutive, ..material(0.0) }, pinned: vec![], supports: if kind == "dropped" { vec![plane.into()] } else { vec![] } }).unwrap();
+            let model = builder.build().unwrap();
+            let mut state = State::new(&model);
+            if kind == "flight" {
+                let rest = model.bodies()[0].rest_positions();
+                let centre = rest.iter().sum::<DVec3>() / rest.len() as f64;
+                for (i, p) in rest.iter().enumerate() {
+                    let arm = p - centre;
+                    let shiver = 6.0 * DVec3::new(arm.x, -arm.y, 0.3 * arm.x);
+                    state.set_velocity(&model, 0, i, DVec3::new(0.05, 0.02, -0.03) + 20.0 * DVec3::Z.cross(arm) + shiver);
+                }
+            }
+            let mut stepper = Stepper::new(&model, schedule(), FRAME, 1).unwrap();
+            println!("{kind} {constitutive:?}");
+            let mut before = Energy::of(&model, &OracleState::from_state(&model, &state)).total();
+            for k in 0..30 {
+                let r = stepper.step(&model, &mut state, &[]);
+                let e = Energy::of(&model, &OracleState::from_state(&model, &state));
+                println!("moving {k} total {:.3e} gain {:.2e} kinetic {:.3e} its {} falls {} speed {:.3e}", e.total(), e.total() - before, e.kinetic, r.iterations, r.fallbacks, r.max_speed);
+                before = e.total();
+            }
+        }
+    }
+}

@@ -60,7 +60,6 @@ fn random_starts_recover_by_sweeps() {
 }
 
 #[test]
-#[ignore = "the quasi-Newton method overstretches a body that was put far from where it was"]
 fn random_starts_recover_by_the_fast_schedule() {
     recovers("fast", Schedule::FAST);
 }

@@ -9,6 +9,7 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
 use trocar_progress::Progress;
+use trocar_tissue::Material;
 
 /// The frames of the tube at which errors are taken.
 const TUBE_FRAMES: [usize; 3] = [15, 30, 60];
@@ -51,6 +52,8 @@ pub struct OrgansBench {
     pub young_modulus: f64,
     /// Poisson's ratio.
     pub poisson_ratio: f64,
+    /// Whether tissue is damped as in the cell while it is timed and judged; it always is while it settles. The peers have no damping.
+    pub damped: bool,
     /// Frames before the timed ones.
     pub warm_up: usize,
     /// Timed frames.
@@ -67,6 +70,7 @@ impl Default for OrgansBench {
             threads: 0,
             young_modulus: 12e3,
             poisson_ratio: 0.45,
+            damped: false,
             warm_up: 30,
             frames: 120,
             settle: 3.0,
@@ -95,6 +99,8 @@ pub struct OrgansResult {
     pub schedule: String,
     /// Its substeps a frame.
     pub substeps: usize,
+    /// Whether tissue was damped while it was timed and judged.
+    pub damped: bool,
     /// Where the organs are from.
     pub mesh: String,
     /// Organs.
@@ -140,7 +146,8 @@ impl OrgansBench {
         let machine = Machine::here();
         let schedule = solver_named(&self.schedule)?;
         let organs = self.organs.organs()?;
-        let material = material(self.young_modulus, self.poisson_ratio);
+        let damped = material(self.young_modulus, self.poisson_ratio);
+        let material = if self.damped { damped } else { Material { viscosity: 0.0, ..damped } };
         let time = |scene: &Scene| {
             progress.begin(scene.name, (self.warm_up + self.frames) as u64);
             let mut run = Run::new(scene, schedule, self.threads)?;
@@ -151,7 +158,7 @@ impl OrgansBench {
         let drag = time(&Scene::drag(&organs, material)?)?;
         let moving = time(&Scene::moving(&organs, material)?)?;
 
-        let sag = Scene::sag(&organs, material)?;
+        let sag = Scene::sag(&organs, damped)?;
         let mut run = Run::new(&sag, schedule, self.threads)?;
         let frames = (self.settle / FRAME).round().max(1.0) as usize;
         progress.begin("sag", frames as u64 + 1);
@@ -179,6 +186,7 @@ impl OrgansBench {
             threads: if self.threads == 0 { machine.cores } else { self.threads },
             isa: schedule.isa(),
             schedule: self.schedule.clone(),
+            damped: self.damped,
             substeps: schedule.substeps(),
             mesh: organs.source.clone(),
             organs: organs.organs.len(),

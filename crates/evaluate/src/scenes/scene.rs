@@ -5,6 +5,7 @@ use super::organs::Organ;
 use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::TAU;
+use trocar_cell::VISCOSITY_TIME;
 use trocar_geometry::{OrganAxis, Pose};
 use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, pins};
 
@@ -13,9 +14,6 @@ const GRAVITY: f64 = 9.80665;
 
 /// Share of each organ's nodes, the lowest, that are pinned.
 const PINNED: f64 = 0.42;
-
-/// Viscosity of tissue over its Young's modulus [s], as in the cell: specimen A comes to rest within a second.
-const VISCOSITY_TIME: f64 = 0.02;
 
 /// Radius of a patch around an organ's highest point [m].
 const PATCH: f64 = 4e-3;

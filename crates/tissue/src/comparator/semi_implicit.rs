@@ -152,7 +152,7 @@ impl Form<'_> {
                     let sliding = v[i] - v[i].dot(normal) * normal;
                     let speed = sliding.length();
                     if speed > 0.0 {
-                        v[i] -= sliding * (support.friction() * push / speed).min(1.0);
+                        v[i] -= sliding * (support.friction() * touch.gradient.length() * push / speed).min(1.0);
                     }
                 }
             }

@@ -257,16 +257,16 @@ impl Planes<'_> {
             for i in (0..x.len()).filter(|i| w[*i] > 0.0) {
                 let multiplier = &mut multipliers[p * w.len() + i];
                 let touch = support.touch(x[i] + m.origin);
-                let (height, normal) = (touch.height, touch.gradient.normalize());
+                let (height, normal, steep) = (touch.height, touch.gradient.normalize(), touch.gradient.length_squared());
                 let compliance = 1.0 / (self.h * self.h * m.contact_stiffness[i]);
                 let before = *multiplier;
                 // A plane only pushes.
-                *multiplier = (before - (height + compliance * before) / (w[i] + compliance)).max(0.0);
-                x[i] += w[i] * (*multiplier - before) * normal;
+                *multiplier = (before - (height + compliance * before) / (w[i] * steep + compliance)).max(0.0);
+                x[i] += w[i] * (*multiplier - before) * touch.gradient;
                 if *multiplier > before {
                     let slide = x[i] - start[i];
                     let slide = slide - slide.dot(normal) * normal;
-                    let most = support.friction() * w[i] * (*multiplier - before);
+                    let most = support.friction() * steep.sqrt() * w[i] * (*multiplier - before);
                     x[i] -= slide * (most / slide.length().max(f64::MIN_POSITIVE)).min(1.0);
                 }
             }

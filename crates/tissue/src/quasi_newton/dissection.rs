@@ -9,14 +9,6 @@ use std::collections::VecDeque;
 /// Parts of at most this many nodes are not cut further.
 const LEAF: usize = 14;
 
-/// Nodes in the order of elimination.
-pub(super) struct Dissection {
-    /// Node numbers, first eliminated first.
-    pub order: Vec<u32>,
-    /// The two halves of the whole and what separates them, as ends in `order`: the first half ends at `.0`, the second at `.1`.
-    pub halves: (usize, usize),
-}
-
 /// A mesh graph: the neighbours of node i are `to[first[i]..first[i + 1]]`.
 pub(super) struct Graph {
     first: Vec<u32>,
@@ -44,8 +36,8 @@ impl Graph {
     }
 }
 
-/// Orders the nodes of `graph` at `positions`.
-pub(super) fn dissect(graph: &Graph, positions: &[DVec3]) -> Dissection {
+/// The nodes of `graph`, which lie at `positions`, in the order of elimination: first eliminated first.
+pub(super) fn dissect(graph: &Graph, positions: &[DVec3]) -> Vec<u32> {
     let n = graph.len();
     let mut work = Work {
         graph,
@@ -58,8 +50,8 @@ pub(super) fn dissect(graph: &Graph, positions: &[DVec3]) -> Dissection {
         visits: 0,
     };
     let mut order = Vec::with_capacity(n);
-    let halves = work.cut((0..n as u32).collect(), &mut order);
-    Dissection { order, halves }
+    work.cut((0..n as u32).collect(), &mut order);
+    order
 }
 
 const NONE: u32 = u32::MAX;
@@ -79,11 +71,11 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
-    /// Appends the nodes of a part to `order`; returns where the halves end.
-    fn cut(&mut self, nodes: Vec<u32>, order: &mut Vec<u32>) -> (usize, usize) {
+    /// Appends the nodes of a part to `order`.
+    fn cut(&mut self, nodes: Vec<u32>, order: &mut Vec<u32>) {
         if nodes.len() <= LEAF {
             order.extend(nodes);
-            return (order.len(), order.len());
+            return;
         }
         self.parts += 1;
         for i in &nodes {
@@ -96,17 +88,14 @@ impl Work<'_> {
                 best = Some((a, b, separator));
             }
         }
-        let Some((a, b, separator)) = best else { return (order.len(), order.len()) };
+        let Some((a, b, separator)) = best else { return };
         if a.is_empty() || b.is_empty() {
             order.extend(a.into_iter().chain(b).chain(separator));
-            return (order.len(), order.len());
+            return;
         }
         self.cut(a, order);
-        let first = order.len();
         self.cut(b, order);
-        let second = order.len();
         order.extend(separator);
-        (first, second)
     }
 
     /// Coordinates along which the part may be cut.

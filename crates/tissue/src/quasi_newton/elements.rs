@@ -4,7 +4,7 @@ use super::layout::{Batch, Layout};
 use super::stress::Stress;
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
 use crate::Body;
-use crate::sweep::{FLOOR, KEPT_SHARE};
+use crate::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE};
 use std::collections::BTreeMap;
 use fearless_simd::{Simd, SimdBase, f32x16};
 
@@ -73,7 +73,7 @@ impl Elements {
                     // Corner 0 is the origin of the edges.
                     let (before, now) =
                         if i == 0 { (from[j - 1], edges[j - 1]) } else { (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1])) };
-                    let length = dot(before, before);
+                    let length = simd.max_f32x16(dot(before, before), splat(simd, LEAST_SQUARE));
                     let along = load(simd, &self.dashpots[b][k]) * rate * (dot(now, now) - length) / (length + length);
                     let force = scale(now, along);
                     forces[j - 1] = add(forces[j - 1], force);

@@ -17,6 +17,7 @@ use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
+use faer::reborrow::ReborrowMut;
 use faer::{Mat, Par, Side};
 use fearless_simd::Simd;
 use glam::DMat3;
@@ -44,6 +45,8 @@ pub(super) struct Factor {
     symbolic: SymbolicCholesky<usize>,
     numbers: Vec<f32>,
     memory: MemBuffer,
+    /// Room for the inverse of the widest supernode's triangle.
+    inverse: Mat<f32>,
     tiles: Tiles,
 }
 
@@ -52,6 +55,9 @@ impl Factor {
     pub fn new(body: &Body, h: f64) -> Option<Self> {
         let mesh = &body.rest;
         let free: Vec<usize> = (0..body.len()).filter(|i| !body.pinned[*i]).collect();
+        if free.is_empty() {
+            return None;
+        }
         let mut number = vec![u32::MAX; body.len()];
         for (k, i) in free.iter().enumerate() {
             number[*i] = k as u32;
@@ -66,7 +72,7 @@ impl Factor {
         }
         let positions: Vec<glam::DVec3> = free.iter().map(|i| mesh.vertices[*i]).collect();
         let order: Vec<u32> =
-            dissect(&Graph::new(&neighbours), &positions).order.iter().map(|k| free[*k as usize] as u32).collect();
+            dissect(&Graph::new(&neighbours), &positions).iter().map(|k| free[*k as usize] as u32).collect();
         // Nodes numbered in the order of elimination, pinned ones behind.
         let mut rank = vec![u32::MAX; body.len()];
         order.iter().enumerate().for_each(|(k, i)| rank[*i as usize] = k as u32);
@@ -100,6 +106,9 @@ impl Factor {
         let symbolic = factorize_symbolic_cholesky(rest.pattern(), Side::Lower, as_it_is, parameters).ok()?;
         let request = symbolic.factorize_numeric_llt_scratch::<f32>(Par::Seq, Default::default());
         let memory = MemBuffer::try_new(request).ok()?;
+        let SymbolicCholeskyRaw::Supernodal(supernodes) = symbolic.raw() else { return None };
+        let ends = supernodes.supernode_begin().iter().zip(supernodes.supernode_end());
+        let widest = ends.map(|(begin, end)| end - begin).max().unwrap_or(0);
         Some(Self {
             values: vec![0.0; rest.values().len()],
             scale: vec![0.0; 3 * order.len()],
@@ -109,6 +118,7 @@ impl Factor {
             order,
             rest,
             symbolic,
+            inverse: Mat::zeros(widest, widest),
             memory,
             tiles: Tiles::new(),
         })
@@ -168,8 +178,8 @@ impl Factor {
             if first % 3 != 0 || width % 3 != 0 || pattern.len() % 3 != 0 {
                 return false;
             }
-            let mut inverse = Mat::<f32>::zeros(width, width);
-            invert_lower_triangular(inverse.as_mut(), numbers.subrows(0, width), Par::Seq);
+            let mut inverse = self.inverse.as_mut().submatrix_mut(0, 0, width, width);
+            invert_lower_triangular(inverse.rb_mut(), numbers.subrows(0, width), Par::Seq);
             let rows = pattern.iter().step_by(3).map(|row| (*row / 3) as u32);
             self.tiles.push(first, width, rows, |r, c| inverse[(r, c)], |r, c| numbers[(width + r, c)]);
         }
@@ -187,11 +197,6 @@ impl Factor {
             *x *= s;
         }
     }
-
-    /// Bytes of the packed factor.
-    pub fn bytes(&self) -> usize {
-        self.tiles.bytes()
-    }
 }
 
 /// Adds what the dashpots resist within a substep to the stiffness, nodes numbered by `rank`.
@@ -208,130 +213,5 @@ fn add_dashpots(body: &Body, rank: &[u32], h: f64, stiffness: &mut Stiffness) {
             stiffness.add(i, i, block);
             stiffness.add(i, j, -block);
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::*;
-    use fearless_simd::{Level, dispatch};
-    use trocar_geometry::TetMesh;
-
-    fn components(mesh: &TetMesh) -> Vec<TetMesh> {
-        let mut label: Vec<usize> = (0..mesh.vertices.len()).collect();
-        fn find(l: &mut Vec<usize>, mut i: usize) -> usize {
-            while l[i] != i {
-                l[i] = l[l[i]];
-                i = l[i];
-            }
-            i
-        }
-        for t in &mesh.tets {
-            for k in 1..4 {
-                let (a, b) = (find(&mut label, t[0] as usize), find(&mut label, t[k] as usize));
-                label[a.max(b)] = a.min(b);
-            }
-        }
-        let mut roots: Vec<usize> = (0..label.len()).map(|i| find(&mut label, i)).collect();
-        let all = roots.clone();
-        roots.sort_unstable();
-        roots.dedup();
-        roots
-            .iter()
-            .map(|r| {
-                let nodes: Vec<usize> = (0..all.len()).filter(|i| all[*i] == *r).collect();
-                let mut number = vec![0u32; all.len()];
-                nodes.iter().enumerate().for_each(|(k, i)| number[*i] = k as u32);
-                TetMesh {
-                    vertices: nodes.iter().map(|i| mesh.vertices[*i]).collect(),
-                    tets: mesh
-                        .tets
-                        .iter()
-                        .filter(|t| all[t[0] as usize] == *r)
-                        .map(|t| t.map(|i| number[i as usize]))
-                        .collect(),
-                }
-            })
-            .collect()
-    }
-
-    #[test]
-    #[ignore]
-    fn dev_solve_speed() {
-        let mesh = trocar_geometry::io::read_msh(std::path::Path::new(concat!(
-            env!("CARGO_MANIFEST_DIR"),
-            "/../../../shared/peers/meshes/specimen_a.msh"
-        )))
-        .unwrap();
-        let mut builder = ModelBuilder::new();
-        for m in components(&mesh) {
-            let pinned = pins::lowest_band(&m.vertices, glam::DVec3::Z, 0.42);
-            let material = Material {
-                model: ConstitutiveModel::StableNeoHookean,
-                young_modulus: 12e3,
-                poisson_ratio: 0.45,
-                density: 1200.0,
-                viscosity: 0.0,
-            };
-            builder.body(BodyDescription { name: "x".into(), mesh: &m, material, pinned, supports: vec![] }).unwrap();
-        }
-        let model = builder.build().unwrap();
-        let (mut total, mut bytes) = (0.0, 0);
-        for body in &model.bodies {
-            let t0 = std::time::Instant::now();
-            let mut f = Factor::new(body, 1.0 / 120.0).unwrap();
-            let t1 = std::time::Instant::now();
-            let h = 1.0 / 120.0f64;
-            let added: Vec<f32> = f.order.iter().map(|i| (body.mass(*i as usize) / h / h) as f32).collect();
-            let held = vec![false; f.order.len()];
-            f.added.copy_from_slice(&added);
-            assert!(f.factorise(&held, &vec![0.0; held.len()]));
-            let t2 = std::time::Instant::now();
-            let n = 3 * f.order.len();
-            let mut v = vec![0.0f32; n + 16];
-            let truth: Vec<f64> = (0..n).map(|k| ((k * 7919 % 1000) as f64 - 500.0) * 1e-6).collect();
-            // A x
-            let pattern = f.rest.pattern();
-            let mut b = vec![0.0f64; n];
-            for c in 0..n {
-                for k in pattern.col_ptr()[c]..pattern.col_ptr()[c + 1] {
-                    let r = pattern.row_idx()[k];
-                    let a = f.rest.values()[k] + if r == c { added[c / 3] as f64 } else { 0.0 };
-                    b[r] += a * truth[c];
-                    if r != c {
-                        b[c] += a * truth[r];
-                    }
-                }
-            }
-            for k in 0..n {
-                v[k] = b[k] as f32;
-            }
-            let level = Level::new();
-            dispatch!(level, simd => f.solve(simd, &mut v));
-            let (e, s): (f64, f64) =
-                (0..n).fold((0.0, 0.0), |(e, s), k| (e + (v[k] as f64 - truth[k]).powi(2), s + truth[k].powi(2)));
-            let mut best = f64::INFINITY;
-            for _ in 0..200 {
-                let t = std::time::Instant::now();
-                dispatch!(level, simd => f.solve(simd, &mut v));
-                best = best.min(t.elapsed().as_secs_f64());
-            }
-            total += best;
-            bytes += f.bytes();
-            println!(
-                "free {} tets {} new {:.1} ms factor {:.1} ms solve {:.3} ms bytes {:.2} MB error {:.2e} supernodes {} nnz {:.2}M",
-                f.order.len(),
-                body.tets.len(),
-                (t1 - t0).as_secs_f64() * 1e3,
-                (t2 - t1).as_secs_f64() * 1e3,
-                best * 1e3,
-                f.bytes() as f64 / 1e6,
-                (e / s).sqrt(),
-                f.tiles.supernodes_len(),
-                f.numbers.len() as f64 / 1e6
-            );
-        }
-        println!("total solve {:.3} ms, {:.2} MB", total * 1e3, bytes as f64 / 1e6);
     }
 }

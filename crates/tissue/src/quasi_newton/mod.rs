@@ -21,13 +21,13 @@ use crate::lanes::Row;
 use crate::schedule::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
 use crate::support::LocalSupport;
-use crate::{Body, Isa, StepReport};
+use crate::{Body, Isa, StepReport, ToolMotion};
 use elements::Elements;
 use factor::Factor;
 use fearless_simd::{Level, Simd, dispatch};
 use history::History;
 use layout::Layout;
-use search::{Found, Guess};
+use search::{Found, Guess, Pulled};
 use warp::Warp;
 
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
@@ -70,6 +70,10 @@ pub(crate) struct QuasiNewtonIntegrator {
     near: Vec<u32>,
     touching: Vec<bool>,
     supports_in_factor: Vec<f32>,
+    /// Whether the factor is that of the matrix.
+    usable: bool,
+    /// Whether a held node could not go on in this substep because an edge would be too long.
+    yielded: bool,
     targets: Vec<Row>,
 }
 
@@ -110,6 +114,8 @@ impl QuasiNewtonIntegrator {
             near: Vec::with_capacity(layout.free),
             touching: vec![false; layout.free],
             supports_in_factor: vec![0.0; layout.free],
+            usable: true,
+            yielded: false,
             held,
             factor,
             layout,
@@ -145,7 +151,7 @@ impl QuasiNewtonIntegrator {
         self.elements.accept();
         for substep in 1..=substeps {
             let share = substep as f64 / substeps as f64;
-            if !self.substep(simd, frame, share, h, body, report) {
+            if !(self.usable && self.substep(simd, frame, share, h, body, report)) {
                 report.fallbacks += 1;
                 self.store(state);
                 self.fallback.begin(frame, body);
@@ -185,26 +191,35 @@ impl QuasiNewtonIntegrator {
         self.take_gradient(simd, h);
         std::mem::swap(&mut self.gradient, &mut self.next_gradient);
         let moved = guess != Guess::Still;
+        let mut stepped = false;
+        report.grasp_limited += usize::from(self.yielded);
         if guess == Guess::Behind {
             report.iterations += 1;
-            report.grasp_limited += usize::from(!self.pull(simd, h));
+            let pulled = self.pull(simd, h);
+            stepped = pulled != Pulled::Nowhere;
+            report.grasp_limited += usize::from(pulled != Pulled::There && !self.yielded);
         }
-        let (tolerance, relative) = (self.settings.tolerance as f32, self.settings.relative as f32);
+        // Neither what positions cannot hold nor, at rest, what gravity does in a short substep is a correction.
+        let rounding = 2.0 * f32::EPSILON * longest(&self.x[..free]);
+        let settled = if gravity == [0.0; 4] { f32::INFINITY } else { 1e-4 * h * h * frame.gravity.length() as f32 };
+        let (tolerance, relative) = ((self.settings.tolerance as f32).max(rounding), self.settings.relative as f32);
         for iteration in usize::from(guess == Guess::Behind)..self.settings.iterations {
             self.find_direction(simd);
             report.iterations += 1;
             let longest = longest(&self.direction);
             if longest <= tolerance.max(if iteration > 0 { relative * self.way() } else { 0.0 }) {
-                if iteration == 0 && !moved {
+                if iteration > 0 || moved {
+                    break;
+                }
+                if longest <= settled {
                     // At rest: what is left of the velocity is noise.
                     self.v.fill([0.0; 4]);
                     return true;
                 }
-                break;
             }
             match self.search(simd, h) {
-                Found::Step => {}
-                Found::Nothing if iteration > 0 => break,
+                Found::Step => stepped = true,
+                Found::Nothing if stepped => break,
                 Found::Nothing => return self.restore(),
             }
         }
@@ -286,7 +301,13 @@ impl QuasiNewtonIntegrator {
             return;
         }
         let dt = frame.dt as f32;
-        let reach = NEAR + 2.0 * dt * longest(&self.v);
+        let travel = |motion: &ToolMotion| (motion.to.translation - motion.from.translation).length();
+        let tool = frame.tools.iter().map(travel).fold(0.0, f64::max) as f32;
+        let fall = dt * dt * frame.gravity.length() as f32;
+        let reach = NEAR + tool + 2.5 * (dt * longest(&self.v) + fall);
+        // What nothing holds falls in this frame; of what is held it cannot be said.
+        let loose = self.layout.free == self.layout.nodes && !self.held.contains(&true);
+        let drop = if loose { dt * dt * frame.gravity.as_vec3a() } else { glam::Vec3A::ZERO };
         let (mut touching, mut changed) = (0, 0);
         for i in (0..self.layout.free).filter(|i| !self.held[*i]) {
             let (x, v) = (position(&self.x[i]), position(&self.v[i]));
@@ -297,12 +318,12 @@ impl QuasiNewtonIntegrator {
                 continue;
             }
             self.near.push(i as u32);
-            let touches = here < 0.0 || height(x + dt * v) < 0.0;
+            let touches = here < 0.0 || height(x + dt * v + drop) < 0.0;
             touching += usize::from(touches);
             changed += usize::from(touches != state.supported[self.layout.vertex[i] as usize]);
             self.touching[i] = touches;
         }
-        if changed > FEW + touching / 8 {
+        if changed > FEW.min(touching / 2) + touching / 8 {
             state.supported.fill(false);
             for i in &self.near {
                 state.supported[self.layout.vertex[*i as usize] as usize] = self.touching[*i as usize];
@@ -312,7 +333,7 @@ impl QuasiNewtonIntegrator {
 
     /// Makes the factor anew if it is not the one for the nodes that are held and supported.
     fn refresh_factor(&mut self, state: &BodyState) {
-        let mut stale = self.held != self.held_in_factor;
+        let mut stale = !self.usable || self.held != self.held_in_factor;
         for i in 0..self.layout.free {
             let supported = state.supported[self.layout.vertex[i] as usize];
             let stiffness = if supported { self.contact_stiffness[i] } else { 0.0 };
@@ -320,7 +341,7 @@ impl QuasiNewtonIntegrator {
             self.supports_in_factor[i] = stiffness;
         }
         if stale {
-            self.factor.factorise(&self.held, &self.supports_in_factor);
+            self.usable = self.factor.factorise(&self.held, &self.supports_in_factor);
             self.held_in_factor.copy_from_slice(&self.held);
         }
     }
@@ -341,6 +362,9 @@ impl QuasiNewtonIntegrator {
             state.v[vertex] = position(&self.v[i]);
             // The sweeps' start is none of this solver's; a body that goes over to them starts afresh.
             state.falling[vertex] = 0.0;
+        }
+        for vertex in &self.layout.vertex[self.layout.free..] {
+            state.v[*vertex as usize] = glam::Vec3A::ZERO;
         }
     }
 }

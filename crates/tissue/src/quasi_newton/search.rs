@@ -1,9 +1,11 @@
 //! Where a substep starts from and how far it goes along a direction: nowhere that squeezes an element too far, and downhill.
 
+use super::layout::Layout;
 use super::{QuasiNewtonIntegrator, position};
 use crate::Body;
 use crate::integrator::Frame;
-use crate::lanes::dot_rows;
+use crate::descent::HELD_STRETCH;
+use crate::lanes::{LANES, Row, dot_rows};
 use crate::sweep::STICK_SPEED;
 use fearless_simd::{Simd, SimdBase, f32x4};
 use glam::Vec3A;
@@ -14,18 +16,21 @@ const ARRIVED: f32 = 1e-7;
 /// Guessed motions below this are left out [m]: a body at rest starts where it is.
 const STILL: f32 = 1e-9;
 
-/// A slope that has fallen to this share, or risen to it on the other side, ends the search.
+/// A slope of this share of the first one, falling or rising, is small enough.
 const SLOPE_SHARE: f32 = 0.5;
 
-/// Most secant steps of a search.
-const MOST_SECANTS: usize = 8;
+/// Most shares that a search tries after the first.
+const MOST_SHARES: usize = 8;
+
+/// More squeezed elements than these and a hundredth of all are not cured one by one.
+const MANY: usize = 8;
 
 /// Times the steps of squeezed elements' nodes are halved, and then dropped, before a search gives up.
 const HALVINGS: usize = 3;
 const DROPS: usize = 5;
 
 /// Times all nodes' steps are cut, and to what share, where that does not help.
-const RETREATS: usize = 3;
+const RETREATS: usize = 5;
 const RETREAT: f32 = 0.25;
 
 /// Where a substep starts from.
@@ -37,6 +42,17 @@ pub(super) enum Guess {
     Ahead,
     /// Where it was, though things move: elements would not bear it that nodes go on by themselves.
     Behind,
+}
+
+/// How far held nodes came with their tools.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Pulled {
+    /// All the way.
+    There,
+    /// Less, or an element would have been squeezed too far: they catch up later.
+    PartOfTheWay,
+    /// Nothing could move.
+    Nowhere,
 }
 
 /// What a search came to.
@@ -65,11 +81,20 @@ impl QuasiNewtonIntegrator {
             self.targets[i] = to;
         }
         let (targets, layout, start) = (&mut self.targets, &self.layout, &self.start);
+        let mut yielded = false;
         frame.for_held(body, share, |vertex, x| {
             let i = layout.number[vertex] as usize;
+            if i >= free {
+                return;
+            }
+            if overstretches(body, layout, start, vertex, x) {
+                yielded = true;
+                return;
+            }
             targets[i] = x.extend(0.0).to_array();
             moves |= targets[i] != start[i];
         });
+        self.yielded = yielded;
         if !moves {
             self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
             return Guess::Still;
@@ -84,10 +109,9 @@ impl QuasiNewtonIntegrator {
         Guess::Behind
     }
 
-    /// Goes from where the substep began, held nodes with their tools and the free ones as a linear body would follow; gradient and positions know. False if held nodes could not go all
-    /// the way without squeezing an element too far: they catch up later.
+    /// Goes from where the substep began, held nodes with their tools and the free ones as a linear body would follow; gradient and positions know.
     #[inline(always)]
-    pub(super) fn pull<S: Simd>(&mut self, simd: S, h: f32) -> bool {
+    pub(super) fn pull<S: Simd>(&mut self, simd: S, h: f32) -> Pulled {
         self.direction.copy_from_slice(&self.gradient);
         for i in (0..self.layout.free).filter(|i| self.held[*i]) {
             for c in 0..3 {
@@ -102,7 +126,8 @@ impl QuasiNewtonIntegrator {
             }
         }
         self.base.copy_from_slice(&self.x[..self.layout.rows]);
-        if self.go(simd, 1.0, h) {
+        let went = self.go(simd, 1.0, h);
+        if went {
             self.elements.accept();
         } else {
             self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
@@ -111,7 +136,12 @@ impl QuasiNewtonIntegrator {
         self.take_gradient(simd, h);
         std::mem::swap(&mut self.gradient, &mut self.next_gradient);
         let arrived = |i: usize| (0..3).all(|c| (self.x[i][c] - self.targets[i][c]).abs() <= ARRIVED);
-        (0..self.layout.free).all(|i| !self.held[i] || arrived(i))
+        let all = (0..self.layout.free).all(|i| !self.held[i] || arrived(i));
+        match (went, all) {
+            (false, _) => Pulled::Nowhere,
+            (true, false) => Pulled::PartOfTheWay,
+            (true, true) => Pulled::There,
+        }
     }
 
     /// Writes the potential's gradient into `next_gradient`, from the forces of the last pass; 0 at held nodes.
@@ -162,7 +192,7 @@ impl QuasiNewtonIntegrator {
         }
     }
 
-    /// Goes along the direction until the slope has fallen enough.
+    /// Goes along the direction: all of it where the slope does not rise too much by it, else as far as it takes for the slope to become small.
     #[inline(always)]
     pub(super) fn search<S: Simd>(&mut self, simd: S, h: f32) -> Found {
         let rows = self.layout.rows;
@@ -177,24 +207,32 @@ impl QuasiNewtonIntegrator {
             }
         }
         self.base.copy_from_slice(&self.x[..rows]);
-        let mut share = 1.0f32;
-        for attempt in 0..=MOST_SECANTS {
+        // The minimum lies between a share where the slope still falls and one where it rises.
+        let (mut share, mut below, mut above) = (1.0f32, (0.0f32, slope), None);
+        for attempt in 0..=MOST_SHARES {
             if !self.go(simd, share, h) {
-                self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
-                return Found::Nothing;
+                return self.turn_back();
             }
             // Steps of squeezed elements' nodes may have been cut.
             slope = dot_rows(simd, &self.gradient, &self.direction);
             self.take_gradient(simd, h);
             let there = dot_rows(simd, &self.next_gradient, &self.direction);
-            if there <= SLOPE_SHARE * slope.abs() {
+            if !(slope < 0.0 && there.is_finite()) {
+                return self.turn_back();
+            }
+            let falls = there <= SLOPE_SHARE * slope.abs();
+            if falls && (above.is_none() || there >= -SLOPE_SHARE * slope.abs() || attempt == MOST_SHARES) {
                 break;
             }
-            if attempt == MOST_SECANTS || !(slope < 0.0 && there.is_finite()) {
-                self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
-                return Found::Nothing;
+            if attempt == MOST_SHARES {
+                return self.turn_back();
             }
-            share *= (slope / (slope - there)).clamp(0.05, 0.9);
+            if falls {
+                below = (share, there);
+            } else {
+                above = Some((share, there));
+            }
+            share = between(below, above.unwrap_or((share, there)));
         }
         self.elements.accept();
         self.history.learn(simd, share, &self.direction, &self.gradient, &self.next_gradient);
@@ -202,8 +240,14 @@ impl QuasiNewtonIntegrator {
         Found::Step
     }
 
-    /// Goes `share` of the direction. Where elements would be squeezed too far, their nodes go less far, and at last not at all; where that squeezes others again and again, all go less
-    /// far. False if that does not help either.
+    /// Puts the positions before the search back.
+    fn turn_back(&mut self) -> Found {
+        self.x[..self.layout.free].copy_from_slice(&self.base[..self.layout.free]);
+        Found::Nothing
+    }
+
+    /// Goes `share` of the direction. Where a few elements would be squeezed too far, their nodes go less far, and at last not at all; where many would be, or others again and again, all
+    /// nodes go less far. False if that does not help either.
     #[inline(always)]
     fn go<S: Simd>(&mut self, simd: S, share: f32, h: f32) -> bool {
         for _ in 0..=RETREATS {
@@ -215,6 +259,11 @@ impl QuasiNewtonIntegrator {
                 }
                 if !self.elements.pass(simd, &self.layout, &self.x, &self.start, h) {
                     return true;
+                }
+                let mut squeezed = 0;
+                self.elements.for_squeezed(&self.layout, |_| squeezed += 1);
+                if squeezed == 0 || squeezed > MANY + self.layout.batches.len() * LANES / 100 {
+                    break;
                 }
                 let (by, direction) = (if round < HALVINGS { 0.5 } else { 0.0 }, &mut self.direction);
                 let free = self.layout.free as u32;
@@ -230,4 +279,21 @@ impl QuasiNewtonIntegrator {
         }
         false
     }
+}
+
+/// A share between two at which the slope falls and rises: where it would vanish if it were linear, but on a logarithmic scale while they are far apart.
+fn between((low, falls): (f32, f32), (high, rises): (f32, f32)) -> f32 {
+    let secant = low + (high - low) * (falls / (falls - rises)).clamp(0.1, 0.9);
+    let least = 0.02 * high;
+    if low > 0.0 && high > 4.0 * low { (low * high).sqrt() } else { secant.max(least) }
+}
+
+/// Whether an edge at a held vertex that goes to `x` would be too long, and longer than it is.
+fn overstretches(body: &Body, layout: &Layout, start: &[Row], vertex: usize, x: Vec3A) -> bool {
+    let here = position(&start[layout.number[vertex] as usize]);
+    body.edges_of(vertex).iter().any(|edge| {
+        let other = position(&start[layout.number[edge.to as usize] as usize]);
+        let now = (x - other).length_squared();
+        now > (HELD_STRETCH * edge.length).powi(2) && now > (here - other).length_squared()
+    })
 }

@@ -63,16 +63,6 @@ impl Tiles {
         self.scales.clear();
     }
 
-    #[cfg(test)]
-    pub fn supernodes_len(&self) -> usize {
-        self.supernodes.len()
-    }
-
-    /// Bytes of the factor.
-    pub fn bytes(&self) -> usize {
-        self.tiles.len() * size_of::<Tile>()
-    }
-
     /// Adds the next supernode: the inverse of its diagonal triangle, `inverse(row, column)`, and what is below, `below(row, column)`; `rows` are the
     /// nodes below, ascending.
     pub fn push(

@@ -61,6 +61,9 @@ pub struct OrgansBench {
     /// Poisson's ratio.
     #[arg(long, default_value_t = 0.45)]
     pub poisson: f64,
+    /// Damp the tissue as in the cell while it is timed and judged, too; the peers have no damping.
+    #[arg(long)]
+    pub damped: bool,
     /// Timed frames, after a quarter as many that are not.
     #[arg(long, default_value_t = 120)]
     pub frames: usize,

@@ -12,6 +12,7 @@ pub fn run(arguments: &OrgansBench, json: bool, progress: &dyn Progress) -> Resu
         threads: arguments.threads,
         young_modulus: 1e3 * arguments.young,
         poisson_ratio: arguments.poisson,
+        damped: arguments.damped,
         warm_up: arguments.frames / 4,
         frames: arguments.frames,
         settle: arguments.settle,
