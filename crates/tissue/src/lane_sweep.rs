@@ -8,7 +8,7 @@ use crate::groups::{Group, Groups};
 use crate::kernel::{Local, VolumeTerm};
 use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, splat3, store3};
 use crate::support::LocalSupport;
-use crate::sweep::{LEAST_SQUARE, FLOOR, KEPT_SHARE, Substep, allowed_share};
+use crate::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 

@@ -138,8 +138,8 @@ pub(crate) fn rotation<S: Simd>(simd: S, f: &Mat3L<S>, least: f32) -> Mat3L<S> {
             let size = dot(x[0], x[0]) + dot(x[1], x[1]) + dot(x[2], x[2]);
             let other = dot(cofactor[0], cofactor[0]) + dot(cofactor[1], cofactor[1]) + dot(cofactor[2], cofactor[2]);
             let ratio = simd.sqrt_f32x16(simd.sqrt_f32x16(other * inverse * inverse / size));
-            near = near * ratio;
-            far = far / ratio;
+            near *= ratio;
+            far /= ratio;
         }
         for c in 0..3 {
             x[c] = add(scale(x[c], near), scale(cofactor[c], far));
@@ -158,7 +158,7 @@ pub(crate) fn dot_rows<S: Simd>(simd: S, a: &[Row], b: &[Row]) -> f32 {
     let mut sum = splat(simd, 0.0);
     let (a, b) = (a.as_flattened(), b.as_flattened());
     for (a, b) in a.chunks_exact(LANES).zip(b.chunks_exact(LANES)) {
-        sum = sum + f32x16::from_slice(simd, a) * f32x16::from_slice(simd, b);
+        sum += f32x16::from_slice(simd, a) * f32x16::from_slice(simd, b);
     }
     add_up(sum)
 }

@@ -95,7 +95,9 @@ impl Schedule {
                 if let XpbdSweep::Jacobi { relaxation } = sweep
                     && !(relaxation > 0.0 && relaxation <= 1.0)
                 {
-                    return Err(Error::Model(format!("a relaxation of {relaxation}; above 0 and at most 1 make sense")));
+                    return Err(Error::Model(format!(
+                        "a relaxation of {relaxation}; above 0 and at most 1 make sense"
+                    )));
                 }
                 (substeps, iterations)
             }

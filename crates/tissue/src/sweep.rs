@@ -196,7 +196,7 @@ pub(crate) fn allowed_share(ratio: f32, change: f32) -> f32 {
 /// Whether an element of this volume ratio may not get any smaller.
 pub(crate) fn is_squeezed(ratio: f32, before: f32) -> bool {
     // Not a number counts as too small, and what is inverted may not get worse.
-    !(ratio >= (KEPT_SHARE * before).max(FLOOR).min(before))
+    ratio.is_nan() || ratio < (KEPT_SHARE * before).max(FLOOR).min(before)
 }
 
 /// Solves a symmetric positive definite 3x3 system.
@@ -284,7 +284,8 @@ mod tests {
             (ConstitutiveModel::Corotated, 1.4),
         ] {
             // The blocks leave the dashpots' geometric stiffness out: with so little viscosity it is below what is tested.
-            let material = Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 0.2 };
+            let material =
+                Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 0.2 };
             let centre = mesh.vertices.iter().sum::<DVec3>() / 6.0;
             let plane = SupportPlane { point: centre, normal: DVec3::Z, friction: 0.0 };
             let supports = vec![plane.into()];

@@ -1,6 +1,6 @@
 //! What free motion keeps: momentum, and never more energy than it had.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
 mod common;
 

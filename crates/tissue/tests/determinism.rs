@@ -1,6 +1,6 @@
 //! The same bits over 600 frames, whatever the threads, runs and interruptions.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
 mod common;
 

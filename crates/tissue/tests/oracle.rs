@@ -1,6 +1,6 @@
 //! The oracle against analytic solutions, and the stepper against the oracle.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
 mod common;
 

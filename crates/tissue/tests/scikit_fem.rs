@@ -1,6 +1,6 @@
 //! A block that hangs from a wall, against scikit-fem on the same mesh (`oracles/skfem_block.py` makes the fixture).
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
 mod common;
 

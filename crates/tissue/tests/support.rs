@@ -1,6 +1,6 @@
 //! Conforming supports: an organ lies in its imprint without being pushed, and on it as on any support.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
 mod common;
 

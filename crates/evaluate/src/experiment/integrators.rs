@@ -172,7 +172,8 @@ impl Equilibrium {
         let mut state = OracleState::new(model);
         Oracle::new(model).settle(model, &mut state, &[])?;
         let rest = rest_positions(model);
-        let positions: Vec<DVec3> = (0..model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect();
+        let positions: Vec<DVec3> =
+            (0..model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect();
         let sag = rest.iter().zip(&positions).map(|(a, b)| (*a - *b).length()).sum::<f64>() / rest.len() as f64;
         Ok(Self { rest, positions, sag })
     }

@@ -282,10 +282,7 @@ mod tests {
             );
         }
         let drag = Scene::drag(&organs, material).unwrap();
-        assert_eq!(
-            (drag.patches[0].body, drag.model.bodies()[drag.appendix].name()),
-            (organs.appendix, "appendix")
-        );
+        assert_eq!((drag.patches[0].body, drag.model.bodies()[drag.appendix].name()), (organs.appendix, "appendix"));
         let tube = Scene::tube(&organs, material).unwrap();
         let pinned = tube.model.bodies()[0].pinned().iter().filter(|p| **p).count();
         let share = pinned as f64 / tube.model.bodies()[0].len() as f64;

@@ -18,7 +18,9 @@ pub fn solver_named(name: &str) -> Result<Schedule> {
         "paper" => Ok(Schedule::PAPER),
         "fast" => Ok(Schedule::FAST),
         ADAPTIVE => Ok(Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })),
-        _ => Err(Error::Mismatch(format!("there is no schedule '{name}'; there are {}, {ADAPTIVE}", SOLVERS.join(", ")))),
+        _ => {
+            Err(Error::Mismatch(format!("there is no schedule '{name}'; there are {}, {ADAPTIVE}", SOLVERS.join(", "))))
+        }
     }
 }
 

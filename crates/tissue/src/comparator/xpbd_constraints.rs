@@ -257,7 +257,8 @@ impl Planes<'_> {
             for i in (0..x.len()).filter(|i| w[*i] > 0.0) {
                 let multiplier = &mut multipliers[p * w.len() + i];
                 let touch = support.touch(x[i] + m.origin);
-                let (height, normal, steep) = (touch.height, touch.gradient.normalize(), touch.gradient.length_squared());
+                let (height, normal, steep) =
+                    (touch.height, touch.gradient.normalize(), touch.gradient.length_squared());
                 let compliance = 1.0 / (self.h * self.h * m.contact_stiffness[i]);
                 let before = *multiplier;
                 // A plane only pushes.

@@ -2,11 +2,11 @@
 
 use super::layout::{Batch, Layout};
 use super::stress::Stress;
-use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
 use crate::Body;
+use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
 use crate::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE};
-use std::collections::BTreeMap;
 use fearless_simd::{Simd, SimdBase, f32x16};
+use std::collections::BTreeMap;
 
 /// What a pass over the elements writes, and what it compares with.
 pub(super) struct Elements {
@@ -64,15 +64,21 @@ impl Elements {
             for c in 0..3 {
                 p[c] = scale(p[c], volume);
             }
-            let mut forces =
-                [apply(&p, gradient(simd, batch, 0)), apply(&p, gradient(simd, batch, 1)), apply(&p, gradient(simd, batch, 2))];
+            let mut forces = [
+                apply(&p, gradient(simd, batch, 0)),
+                apply(&p, gradient(simd, batch, 1)),
+                apply(&p, gradient(simd, batch, 2)),
+            ];
             let mut first = sub([zero; 3], add(add(forces[0], forces[1]), forces[2]));
             if VISCOUS {
                 let from = self::edges(simd, batch, start);
                 for (k, [i, j]) in EDGES.into_iter().enumerate() {
                     // Corner 0 is the origin of the edges.
-                    let (before, now) =
-                        if i == 0 { (from[j - 1], edges[j - 1]) } else { (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1])) };
+                    let (before, now) = if i == 0 {
+                        (from[j - 1], edges[j - 1])
+                    } else {
+                        (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1]))
+                    };
                     let length = simd.max_f32x16(dot(before, before), splat(simd, LEAST_SQUARE));
                     let along = load(simd, &self.dashpots[b][k]) * rate * (dot(now, now) - length) / (length + length);
                     let force = scale(now, along);
@@ -108,7 +114,6 @@ impl Elements {
             }
         }
     }
-
 }
 
 /// By how much a volume ratio is below what it must be after `before`; 0 or less where it is not. Not a number counts as too low.

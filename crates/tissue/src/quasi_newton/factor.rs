@@ -10,6 +10,7 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::triangular_inverse::invert_lower_triangular;
 use faer::perm::PermRef;
+use faer::reborrow::ReborrowMut;
 use faer::sparse::SparseColMatRef;
 use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::SymbolicSupernodalParams;
@@ -17,7 +18,6 @@ use faer::sparse::linalg::cholesky::supernodal::SupernodalLltRef;
 use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
-use faer::reborrow::ReborrowMut;
 use faer::{Mat, Par, Side};
 use fearless_simd::Simd;
 use glam::DMat3;
@@ -76,11 +76,8 @@ impl Factor {
         // Nodes numbered in the order of elimination, pinned ones behind.
         let mut rank = vec![u32::MAX; body.len()];
         order.iter().enumerate().for_each(|(k, i)| rank[*i as usize] = k as u32);
-        let mut next = order.len() as u32;
-        for r in rank.iter_mut().filter(|r| **r == u32::MAX) {
-            *r = next;
-            next += 1;
-        }
+        let behind = rank.iter_mut().filter(|r| **r == u32::MAX);
+        behind.zip(order.len() as u32..).for_each(|(r, next)| *r = next);
         let tets: Vec<[u32; 4]> = mesh.tets.iter().map(|t| t.map(|i| rank[i as usize])).collect();
         let fixed: Vec<bool> = (0..body.len()).map(|k| k >= order.len()).collect();
         let mut rest = Stiffness::new(&tets, &fixed);

@@ -249,7 +249,7 @@ impl QuasiNewtonIntegrator {
     fn precondition<S: Simd>(&mut self, simd: S) {
         self.warp.to_rest(simd, &self.direction, &mut self.right);
         self.factor.solve(simd, &mut self.right);
-        self.warp.from_rest(simd, &self.right, &mut self.direction);
+        self.warp.out_of_rest(simd, &self.right, &mut self.direction);
     }
 
     /// How far any coordinate is from where the node would have gone by itself [m]: what the substep was found to be about, without any rigid motion.

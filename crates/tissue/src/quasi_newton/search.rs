@@ -3,8 +3,8 @@
 use super::layout::Layout;
 use super::{QuasiNewtonIntegrator, position};
 use crate::Body;
-use crate::integrator::Frame;
 use crate::descent::HELD_STRETCH;
+use crate::integrator::Frame;
 use crate::lanes::{LANES, Row, dot_rows};
 use crate::sweep::STICK_SPEED;
 use fearless_simd::{Simd, SimdBase, f32x4};
@@ -158,7 +158,7 @@ impl QuasiNewtonIntegrator {
             let mut sum = off * (self.layout.masses[i] * inertia);
             let (first, end) = (self.layout.first_corner[i] as usize, self.layout.first_corner[i + 1] as usize);
             for k in &self.layout.corners[first..end] {
-                sum = sum + f32x4::from_slice(simd, &self.elements.corners[*k as usize]);
+                sum += f32x4::from_slice(simd, &self.elements.corners[*k as usize]);
             }
             sum.store_slice(&mut self.next_gradient[i]);
         }
@@ -197,12 +197,12 @@ impl QuasiNewtonIntegrator {
     pub(super) fn search<S: Simd>(&mut self, simd: S, h: f32) -> Found {
         let rows = self.layout.rows;
         let mut slope = dot_rows(simd, &self.gradient, &self.direction);
-        if !(slope < 0.0) {
+        if slope.is_nan() || slope >= 0.0 {
             // The history misleads: the preconditioner alone always points downhill.
             self.history.clear();
             self.find_direction(simd);
             slope = dot_rows(simd, &self.gradient, &self.direction);
-            if !(slope < 0.0) {
+            if slope.is_nan() || slope >= 0.0 {
                 return Found::Nothing;
             }
         }

@@ -210,8 +210,8 @@ impl Tiles {
             let word = i32x16::from_slice(simd, words);
             let low: f32x16<S> = f32x16::float_from(word << 16);
             let high: f32x16<S> = f32x16::float_from(word);
-            even = even + low * y[2 * pair];
-            odd = odd + high * y[2 * pair + 1];
+            even += low * y[2 * pair];
+            odd += high * y[2 * pair + 1];
         }
         sum + (even + odd) * self.scales[at]
     }
@@ -234,8 +234,8 @@ impl Tiles {
             let word = i32x16::from_slice(simd, words);
             let low: f32x16<S> = f32x16::float_from(word << 16);
             let high: f32x16<S> = f32x16::float_from(word);
-            sums[2 * pair] = sums[2 * pair] + low * x;
-            sums[2 * pair + 1] = sums[2 * pair + 1] + high * x;
+            sums[2 * pair] += low * x;
+            sums[2 * pair + 1] += high * x;
         }
     }
 }

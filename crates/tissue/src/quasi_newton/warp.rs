@@ -44,9 +44,9 @@ impl Warp {
                 for k in layout.first_neighbour[i] as usize..layout.first_neighbour[i + 1] as usize {
                     let offset = f32x4::from_slice(simd, &x[layout.neighbours[k] as usize]) - here;
                     let weight = &layout.weights[k];
-                    columns[0] = columns[0] + offset * weight[0];
-                    columns[1] = columns[1] + offset * weight[1];
-                    columns[2] = columns[2] + offset * weight[2];
+                    columns[0] += offset * weight[0];
+                    columns[1] += offset * weight[1];
+                    columns[2] += offset * weight[2];
                 }
                 columns[0].store_slice(&mut f[0][lane]);
                 columns[1].store_slice(&mut f[1][lane]);
@@ -83,7 +83,7 @@ impl Warp {
 
     /// Turns the numbers back into rows.
     #[inline(always)]
-    pub fn from_rest<S: Simd>(&self, simd: S, numbers: &[f32], rows: &mut [Row]) {
+    pub fn out_of_rest<S: Simd>(&self, simd: S, numbers: &[f32], rows: &mut [Row]) {
         for (group, sixteen) in self.nodes.iter().enumerate() {
             let mut parts = [[0.0f32; LANES]; 3];
             let numbers = &numbers[3 * group * LANES..3 * (group + 1) * LANES];
