@@ -18,9 +18,9 @@ const GRAVITY: f64 = 9.80665;
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
 
-/// Shear viscosity of tissue over its Young's modulus [s]. Sheared tissue creeps with three times as long a time constant, 15 ms. The paper damps its elements
+/// Shear viscosity of tissue over its Young's modulus [s]. Sheared tissue creeps with three times as long a time constant, 18 ms. The paper damps its elements
 /// without saying how much; this lets the organs of all phantoms come to rest within a second and stays far below the second that a lift takes.
-pub const VISCOSITY_TIME: f64 = 0.005;
+pub const VISCOSITY_TIME: f64 = 0.006;
 
 /// Cell of the supports over the organ's median edge: as fine as the nodes that lie on it.
 const SUPPORT_CELL: f64 = 0.5;

@@ -4,8 +4,8 @@
 //! origin: rounding of `f32` is then far below the sags that are measured. What a vertex needs of its elements and edges stands in
 //! one piece, in the order the sweeps read it.
 
-use crate::elements::Elements;
-use crate::groups::Groups;
+use crate::descent::elements::Elements;
+use crate::descent::groups::Groups;
 use crate::{Material, Support};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;

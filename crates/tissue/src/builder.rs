@@ -3,10 +3,10 @@
 mod check;
 
 use crate::body::{Corner, Edge, Vertex};
-use crate::coloring::color;
-use crate::elements::Elements;
-use crate::groups::Groups;
-use crate::strip::{Push, strip};
+use crate::descent::coloring::color;
+use crate::descent::elements::Elements;
+use crate::descent::groups::Groups;
+use crate::descent::strip::{Push, strip};
 use crate::{Body, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::{TetMesh, TetQuality};

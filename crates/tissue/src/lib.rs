@@ -9,20 +9,13 @@
 
 mod body;
 mod builder;
-mod coloring;
 mod comparator;
 mod descent;
-mod elements;
 mod energy;
 mod error;
 mod grasp;
-mod groups;
 mod integrator;
 mod isa;
-mod kernel;
-mod lane_sweep;
-#[cfg(test)]
-mod lane_tests;
 mod lanes;
 mod material;
 mod model;
@@ -35,9 +28,7 @@ mod simd;
 mod state;
 mod stepper;
 mod stiffness;
-mod strip;
 mod support;
-mod sweep;
 mod untangle;
 
 pub use body::Body;

@@ -1,7 +1,7 @@
 //! Hyperelastic materials.
 //!
 //! Each model says its energy and stress in double precision, the plain textbook form that tests hold the fast kernels to; the kernels of
-//! the sweeps stand in [`crate::kernel`].
+//! the sweeps stand in [`crate::descent::kernel`].
 
 mod corotated;
 mod st_venant_kirchhoff;

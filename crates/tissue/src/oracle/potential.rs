@@ -3,9 +3,9 @@
 use super::element::{blocks, deformation, projected, tangent};
 use super::state::Nodes;
 use crate::builder::shape_gradients;
+use crate::descent::sweep::STICK_SPEED;
 use crate::stiffness::Stiffness;
 use crate::support::Touch;
-use crate::sweep::STICK_SPEED;
 use crate::{Body, Hyperelastic, Support};
 use glam::{DMat3, DVec3};
 

@@ -3,8 +3,8 @@
 use super::layout::{Batch, Layout};
 use super::stress::Stress;
 use crate::Body;
+use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE};
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
-use crate::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE};
 use fearless_simd::{Simd, SimdBase, f32x16};
 use std::collections::BTreeMap;
 
@@ -108,7 +108,7 @@ impl Elements {
     pub fn for_squeezed(&self, layout: &Layout, mut found: impl FnMut([u32; 4])) {
         for (b, batch) in layout.batches.iter().enumerate() {
             for lane in 0..LANES {
-                if crate::sweep::is_squeezed(self.trial[b][lane], self.ratios[b][lane]) {
+                if crate::descent::sweep::is_squeezed(self.trial[b][lane], self.ratios[b][lane]) {
                     found(batch.nodes.map(|nodes| nodes[lane]));
                 }
             }

@@ -4,9 +4,9 @@ use super::layout::Layout;
 use super::{QuasiNewtonIntegrator, position};
 use crate::Body;
 use crate::descent::HELD_STRETCH;
+use crate::descent::sweep::STICK_SPEED;
 use crate::integrator::Frame;
 use crate::lanes::{LANES, Row, dot_rows};
-use crate::sweep::STICK_SPEED;
 use fearless_simd::{Simd, SimdBase, f32x4};
 use glam::Vec3A;
 

@@ -1,10 +1,20 @@
 //! Vertex Block Descent: every vertex in turn takes a Newton step on its own 3x3 block, all vertices of one colour at once.
 
+pub(crate) mod coloring;
+pub(crate) mod elements;
+pub(crate) mod groups;
+pub(crate) mod kernel;
+pub(crate) mod lane_sweep;
+#[cfg(test)]
+mod lane_tests;
+pub(crate) mod strip;
+pub(crate) mod sweep;
+
+use crate::descent::sweep::{Substep, is_squeezed};
 use crate::integrator::{Frame, Integrator};
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
 use crate::support::LocalSupport;
-use crate::sweep::{Substep, is_squeezed};
 use crate::{Body, Isa, StepReport};
 use glam::Vec3A;
 

@@ -1,11 +1,11 @@
 //! A stable neo-Hookean body's free vertices in groups of sixteen, as the lanes of a sweep read them.
 //!
-//! The lanes of a group are vertices of one colour, with strips of nearly the same length ([`crate::strip`]). Step k of a group moves each lane one point along its
+//! The lanes of a group are vertices of one colour, with strips of nearly the same length ([`crate::descent::strip`]). Step k of a group moves each lane one point along its
 //! vertex's strip; a lane whose strip is over reads its own vertex, with no weight.
 
 use crate::body::Body;
+use crate::descent::strip::Push;
 use crate::simd::{BLOCK, Block};
-use crate::strip::Push;
 
 /// Sixteen vertices of one colour.
 #[derive(Clone, Debug)]

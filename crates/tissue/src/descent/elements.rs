@@ -1,7 +1,7 @@
 //! Elements in lanes: whether a motion squeezes any of them too far.
 
+use crate::descent::sweep::{FLOOR, KEPT_SHARE};
 use crate::simd::{BLOCK, Block, Isa, Lanes, Task, cross, dot, minus};
-use crate::sweep::{FLOOR, KEPT_SHARE};
 use glam::Vec3A;
 
 /// The elements that can move, sixteen to a block. The offsets are in range for `points` points, and private.

@@ -1,9 +1,9 @@
 //! The sweep in lanes does what the sweep vertex by vertex does, with any instructions.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-use crate::kernel::Kernel;
+use crate::descent::kernel::Kernel;
+use crate::descent::sweep::Substep;
 use crate::support::{LocalSupport, SupportField, SupportPlane};
-use crate::sweep::Substep;
 use crate::{BodyDescription, ConstitutiveModel, Isa, Material, Model, ModelBuilder};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;

@@ -6,8 +6,8 @@
 //! falls below a floor, and no element is ever inverted.
 
 use crate::body::Body;
-use crate::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
-use crate::lane_sweep::LaneSweep;
+use crate::descent::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
+use crate::descent::lane_sweep::LaneSweep;
 use crate::simd::Isa;
 use crate::support::LocalSupport;
 use glam::{Mat3A, Vec3A};

@@ -1,14 +1,14 @@
 //! The sweep of stable neo-Hookean tissue, sixteen vertices at once.
 //!
 //! Its block at a vertex is V0 (mu |m|^2 I + psi'' g g'), g the gradient of the volume ratio. The first part is a constant Laplacian along the edges. The second needs of each
-//! element the area vector A of the face opposite the vertex, g = A / (6 V0); a strip ([`crate::strip`]) yields a face with each point that is read. What is rare (elements
+//! element the area vector A of the face opposite the vertex, g = A / (6 V0); a strip ([`crate::descent::strip`]) yields a face with each point that is read. What is rare (elements
 //! below a quarter of their volume, vertices below a support) is added lane by lane.
 
-use crate::groups::{Group, Groups};
-use crate::kernel::{Local, VolumeTerm};
+use crate::descent::groups::{Group, Groups};
+use crate::descent::kernel::{Local, VolumeTerm};
+use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
 use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, splat3, store3};
 use crate::support::LocalSupport;
-use crate::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
