@@ -110,14 +110,17 @@ impl StepReport {
         }
         self.max_speed = f64::from(state.v.iter().map(|v| v.length_squared()).fold(0.0, f32::max)).sqrt();
         for (tet, rest) in body.tets.iter().zip(&body.volumes) {
-            let [a, b, c, d] = tet.map(|i| state.x[i as usize].as_dvec3());
-            let volume = (b - a).cross(c - a).dot(d - a) / 6.0;
+            let [a, b, c, d] = tet.map(|i| state.x[i as usize]);
+            let volume = f64::from((b - a).cross(c - a).dot(d - a)) / 6.0;
             self.inverted += usize::from(volume <= 0.0);
             self.min_volume_ratio = self.min_volume_ratio.min(volume / rest);
         }
         let stretched = (0..state.x.len()).any(|i| {
-            let too_long = |length: f32, j: u32| (state.x[j as usize] - state.x[i]).length() > STRETCH_LIMIT * length;
-            body.edges_of(i).iter().any(|e| too_long(e.length, e.to))
+            let too_long = |length: f32, j: u32| {
+                (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
+            };
+            // Every edge is met from both its ends.
+            body.edges_of(i).iter().any(|e| e.to as usize > i && too_long(e.length, e.to))
         });
         if self.max_speed >= SPEED_LIMIT {
             self.divergence = Some(Divergence::OverSpeed { body: index });

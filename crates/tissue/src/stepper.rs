@@ -15,7 +15,8 @@ use rayon::prelude::*;
 /// Advances states of one model; owns all scratch memory, so stepping allocates nothing.
 pub struct Stepper {
     dt: f64,
-    pool: rayon::ThreadPool,
+    /// None: the calling thread does the work.
+    pool: Option<rayon::ThreadPool>,
     /// Largest first, so that the threads end together.
     workers: Vec<Worker>,
 }
@@ -41,8 +42,14 @@ impl Stepper {
             return Err(Error::Model(format!("a frame of {dt} s; above 0 and at most 10 s make sense")));
         }
         schedule.check()?;
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        let pool = pool.map_err(|e| Error::Model(format!("{threads} threads cannot be started: {e}")))?;
+        // Bodies are what the quasi-Newton solver shares out among threads; handing a small model over to a pool of one would cost more than some frames do.
+        let alone = matches!(schedule, Schedule::QuasiNewton(_)) && (threads == 1 || model.bodies.len() == 1);
+        let pool = if alone {
+            None
+        } else {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+            Some(pool.map_err(|e| Error::Model(format!("{threads} threads cannot be started: {e}")))?)
+        };
         let states = State::new(model).bodies.into_iter().zip(&model.bodies).enumerate();
         let mut workers: Vec<Worker> = states
             .map(|(index, (state, body))| Worker {
@@ -71,12 +78,14 @@ impl Stepper {
         }
         let (dt, gravity, grasps) = (self.dt, model.gravity, &state.grasps[..]);
         let workers = &mut self.workers;
-        self.pool.install(|| {
-            workers.par_iter_mut().with_max_len(1).for_each(|worker| {
-                let frame = Frame { dt, gravity, index: worker.body, grasps, tools };
-                worker.advance(&frame, &model.bodies[worker.body]);
-            });
-        });
+        let advance = |worker: &mut Worker| {
+            let frame = Frame { dt, gravity, index: worker.body, grasps, tools };
+            worker.advance(&frame, &model.bodies[worker.body]);
+        };
+        match &self.pool {
+            Some(pool) => pool.install(|| workers.par_iter_mut().with_max_len(1).for_each(advance)),
+            None => workers.iter_mut().for_each(advance),
+        }
         let report = self.workers.iter().fold(StepReport::default(), |all, worker| all.with(&worker.report));
         let lost = |worker: &Worker| matches!(worker.report.divergence, Some(Divergence::NonFinite { .. }));
         let broken = self.workers.iter().any(lost);
