@@ -7,7 +7,7 @@ use crate::descent::coloring::color;
 use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
 use crate::descent::strip::{Push, strip};
-use crate::{Body, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support};
+use crate::{Body, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::{TetMesh, TetQuality};
 
@@ -55,6 +55,7 @@ pub struct ModelBuilder {
     gravity: DVec3,
     mass_floor: MassFloor,
     filtered: Vec<[usize; 2]>,
+    colliders: Vec<Collider>,
 }
 
 impl ModelBuilder {
@@ -108,6 +109,16 @@ impl ModelBuilder {
         Ok(())
     }
 
+    /// Adds a part of a tool that no body may enter; returns its index.
+    ///
+    /// # Errors
+    /// Refuses, naming the collider: shapes without extent or with numbers that are not finite, friction below 0, rest offsets outside 0 to 10 mm.
+    pub fn collider(&mut self, collider: Collider) -> Result<usize> {
+        collider.check().map_err(|reason| Error::Model(format!("collider '{}': {reason}", collider.name)))?;
+        self.colliders.push(collider);
+        Ok(self.colliders.len() - 1)
+    }
+
     /// Finishes the model.
     ///
     /// # Errors
@@ -119,7 +130,7 @@ impl ModelBuilder {
         if !(self.gravity.is_finite() && self.gravity.length() <= 100.0) {
             return Err(Error::Model(format!("gravity is {} m/s2; the earth's is 9.8", self.gravity)));
         }
-        Ok(Model { bodies: self.bodies, gravity: self.gravity, filtered: self.filtered })
+        Ok(Model { bodies: self.bodies, gravity: self.gravity, filtered: self.filtered, colliders: self.colliders })
     }
 }
 

@@ -30,6 +30,21 @@ impl ToolMotion {
     }
 }
 
+/// How a grasp gives way: its nodes hang on springs, held in the jaws by Coulomb's friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compliance {
+    /// Stiffness of a node's spring [N/m].
+    pub stiffness: f64,
+    /// Unit vector across the closing plane, in the tool's frame. Along it the blades hold on both sides and nothing slips.
+    pub closing: DVec3,
+    /// Force with which the jaws close [N]. It may be changed while they hold.
+    pub jaw_force: f64,
+    /// Coulomb friction coefficient of a blade. There are two, so that tissue slips at twice `friction` times `jaw_force`.
+    pub friction: f64,
+    /// Pull at which the tissue tears out of the jaws [N].
+    pub tear_force: f64,
+}
+
 /// A set of nodes carried by a tool.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grasp {
@@ -43,6 +58,10 @@ pub struct Grasp {
     pub(crate) captured: Vec<DVec3>,
     /// Where the tool was.
     pub(crate) captured_at: Pose,
+    /// None: the nodes follow the tool exactly.
+    pub compliance: Option<Compliance>,
+    /// The tissue tore out of it; it holds nothing.
+    pub torn: bool,
 }
 
 impl Grasp {
@@ -51,7 +70,19 @@ impl Grasp {
         let free = |i: &u32| !model.bodies[body].pinned()[*i as usize];
         let nodes: Vec<u32> = nodes.iter().copied().filter(free).collect();
         let captured = nodes.iter().map(|i| state.position(model, body, *i as usize)).collect();
-        Self { tool, body, nodes, captured, captured_at: *pose }
+        Self { tool, body, nodes, captured, captured_at: *pose, compliance: None, torn: false }
+    }
+
+    /// Holds `nodes` of `body` such that, with tool number `tool` at `pose`, each is to be at its place of `positions` [m, world], wherever it is now. Pinned nodes are left out.
+    pub fn prescribe(model: &Model, body: usize, nodes: &[u32], positions: &[DVec3], tool: usize, pose: &Pose) -> Self {
+        let free = |(i, _): &(&u32, &DVec3)| !model.bodies[body].pinned()[**i as usize];
+        let (nodes, captured) = nodes.iter().zip(positions).filter(free).map(|(i, x)| (*i, *x)).unzip();
+        Self { tool, body, nodes, captured, captured_at: *pose, compliance: None, torn: false }
+    }
+
+    /// The same grasp, giving way.
+    pub fn compliant(self, compliance: Compliance) -> Self {
+        Self { compliance: Some(compliance), ..self }
     }
 
     /// Where each held node is to be when the tool is at `tool`: (node, world position [m]).

@@ -1,6 +1,6 @@
 //! What never changes while stepping.
 
-use crate::Body;
+use crate::{Body, Collider};
 use glam::DVec3;
 
 /// Everything that is constant over a simulation. Made by [`crate::ModelBuilder`] alone, so that what it checked stays true.
@@ -10,6 +10,7 @@ pub struct Model {
     pub(crate) gravity: DVec3,
     /// Pairs that do not collide, the smaller index first, sorted.
     pub(crate) filtered: Vec<[usize; 2]>,
+    pub(crate) colliders: Vec<Collider>,
 }
 
 impl Model {
@@ -21,6 +22,11 @@ impl Model {
     /// Gravitational acceleration [m/s2].
     pub fn gravity(&self) -> DVec3 {
         self.gravity
+    }
+
+    /// What touches the bodies, in the order they were added.
+    pub fn colliders(&self) -> &[Collider] {
+        &self.colliders
     }
 
     /// Whether bodies `a` and `b` are to collide: they exist, and their pair was not filtered ([`crate::ModelBuilder::filter_pair`]).

@@ -9,7 +9,7 @@ use crate::report::Divergence;
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
 use crate::untangle::Untangler;
-use crate::{Body, Error, Model, Result, Schedule, State, StepReport, ToolMotion};
+use crate::{Body, Error, Event, Model, Result, Schedule, State, StepReport, ToolForce, ToolMotion};
 use rayon::prelude::*;
 
 /// Advances states of one model; owns all scratch memory, so stepping allocates nothing.
@@ -19,6 +19,8 @@ pub struct Stepper {
     pool: Option<rayon::ThreadPool>,
     /// Largest first, so that the threads end together.
     workers: Vec<Worker>,
+    forces: Vec<ToolForce>,
+    events: Vec<Event>,
 }
 
 /// A body's solver and what it reported.
@@ -62,7 +64,17 @@ impl Stepper {
             })
             .collect();
         workers.sort_by_key(|worker| std::cmp::Reverse(model.bodies[worker.body].tets.len()));
-        Ok(Self { dt, pool, workers })
+        Ok(Self { dt, pool, workers, forces: Vec::new(), events: Vec::new() })
+    }
+
+    /// What tissue did to each tool in the last frame, in the order of the motions that were given.
+    pub fn forces(&self) -> &[ToolForce] {
+        &self.forces
+    }
+
+    /// What happened to grasps in the last frame.
+    pub fn events(&self) -> &[Event] {
+        &self.events
     }
 
     /// Advances `state` by one frame. `tools` are the motions of the tools that carry the state's grasps; what is held by a tool without a motion stays where it is.

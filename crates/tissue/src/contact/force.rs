@@ -1,0 +1,46 @@
+//! What contact and grasp do to the tools, and what a user must hear of.
+
+use glam::DVec3;
+
+/// A force and its torque about a tool's origin, in world axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// [N]
+    pub force: DVec3,
+    /// About the tool's origin at the end of the frame [N m].
+    pub torque: DVec3,
+}
+
+/// What tissue does to one tool, mean over the last frame's last substep. Contact and constraint are kept apart (SPEC C8).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ToolForce {
+    /// Tissue's reaction on the tool's colliders.
+    pub contact: Wrench,
+    /// What the nodes that the tool holds pull at it.
+    pub constraint: Wrench,
+    /// Sum of the magnitudes of the normal contact forces [N]: how hard tissue is pressed, even where forces cancel.
+    pub pressing: f64,
+    /// Nodes that press against the tool's colliders.
+    pub touching: usize,
+}
+
+/// Something that happened to a grasp in a frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// Held tissue began to slide through the jaws; told once, until it sticks again.
+    Slipped {
+        /// The tool.
+        tool: usize,
+        /// The body.
+        body: usize,
+    },
+    /// The pull went beyond what the tissue bears: the grasp holds nothing any more. Told once.
+    Torn {
+        /// The tool.
+        tool: usize,
+        /// The body.
+        body: usize,
+        /// Pull at which it tore [N].
+        force: f64,
+    },
+}
