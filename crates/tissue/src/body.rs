@@ -8,11 +8,17 @@ use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
 use crate::{Material, Support};
 use glam::{DVec3, Vec3A};
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 use trocar_geometry::TetMesh;
 
-/// One deformable body.
+/// One deformable body. A clone is the same body, not a copy: models that follow from each other by cuts share what was not cut.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct Body(Arc<BodyData>);
+
+/// What a body is made of.
+#[derive(Clone, Debug)]
+pub struct BodyData {
     pub(crate) name: String,
     pub(crate) material: Material,
     pub(crate) raised_masses: usize,
@@ -85,7 +91,33 @@ pub(crate) struct Edge {
     pub length: f32,
 }
 
+impl Deref for Body {
+    type Target = BodyData;
+
+    fn deref(&self) -> &BodyData {
+        &self.0
+    }
+}
+
+impl DerefMut for Body {
+    /// Only the builder changes a body, before anyone shares it.
+    fn deref_mut(&mut self) -> &mut BodyData {
+        Arc::make_mut(&mut self.0)
+    }
+}
+
+impl From<BodyData> for Body {
+    fn from(data: BodyData) -> Self {
+        Self(Arc::new(data))
+    }
+}
+
 impl Body {
+    /// Whether both are one: laid out once, shared by two models.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     /// Name.
     pub fn name(&self) -> &str {
         &self.name
