@@ -145,11 +145,7 @@ pub(crate) struct Inherited {
 }
 
 /// Lays a checked body out for the sweeps; a piece of another takes what it has `inherited`, and no mass floor.
-pub(crate) fn lay_out(
-    description: BodyDescription<'_>,
-    mass_floor: MassFloor,
-    inherited: Option<Inherited>,
-) -> Body {
+pub(crate) fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor, inherited: Option<Inherited>) -> Body {
     let BodyDescription { name, mesh, material, pinned: pinned_nodes, supports } = description;
     let nodes = mesh.vertices.len();
     let mut pinned = vec![false; nodes];

@@ -61,15 +61,13 @@ impl Stepper {
     /// Threads that the system does not give; the stepper still steps the old model then.
     pub fn follow(&mut self, model: &Model) -> Result<()> {
         // Bodies are what the quasi-Newton solver shares out among threads; handing a small model over to a pool of one would cost more than some frames do.
-        let alone =
-            matches!(self.schedule, Schedule::QuasiNewton(_)) && (self.threads == 1 || model.bodies.len() == 1);
+        let alone = matches!(self.schedule, Schedule::QuasiNewton(_)) && (self.threads == 1 || model.bodies.len() == 1);
         if alone {
             self.pool = None;
         } else if self.pool.is_none() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
-            self.pool = Some(
-                pool.map_err(|e| Error::Model(format!("{} threads cannot be started: {e}", self.threads)))?,
-            );
+            self.pool =
+                Some(pool.map_err(|e| Error::Model(format!("{} threads cannot be started: {e}", self.threads)))?);
         }
         let mut old = std::mem::take(&mut self.workers);
         for (index, (state, body)) in State::new(model).bodies.into_iter().zip(&model.bodies).enumerate() {

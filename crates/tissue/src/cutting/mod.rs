@@ -134,3 +134,113 @@ pub fn sever(model: &Model, state: &State, cut: &Cut) -> Result<Severed> {
     }
     Ok(carry::carry(model, state, cut.body, &split))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Body, BodyDescription, ConstitutiveModel, Material, ModelBuilder};
+    use trocar_geometry::TetMesh;
+
+    const MATERIAL: Material = Material {
+        model: ConstitutiveModel::StableNeoHookean,
+        young_modulus: 12e3,
+        poisson_ratio: 0.45,
+        density: 1200.0,
+        viscosity: 0.0,
+    };
+
+    fn model(mesh: &TetMesh, pinned: Vec<u32>) -> Model {
+        let mut builder = ModelBuilder::new();
+        let description = BodyDescription { name: "body".into(), mesh, material: MATERIAL, pinned, supports: vec![] };
+        builder.body(description).unwrap();
+        builder.build().unwrap()
+    }
+
+    /// A row of cubes, six elements each.
+    fn row(cubes: u32) -> TetMesh {
+        let mut mesh = TetMesh::default();
+        for i in 0..=cubes {
+            for c in 0..4 {
+                mesh.vertices.push(2e-3 * DVec3::new(f64::from(i), f64::from(c & 1), f64::from(c >> 1)));
+            }
+        }
+        for i in 0..cubes {
+            let corner = |c: u32| 4 * (i + (c & 1)) + (c >> 1);
+            for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                mesh.tets.push([corner(0), corner(a), corner(b), corner(7)]);
+            }
+        }
+        mesh
+    }
+
+    fn color(body: &Body, node: u32) -> usize {
+        let vertex = body.internal[node as usize];
+        body.color_start.iter().filter(|start| **start <= vertex).count()
+    }
+
+    #[test]
+    fn colours_stay_valid_for_copies() {
+        let mesh = row(6);
+        let whole = model(&mesh, vec![0, 1]);
+        let state = State::new(&whole);
+        for k in 0..40 {
+            let tilt = 0.05 * f64::from(k - 20);
+            let point = 2e-3 * DVec3::new(3.0, 0.5, 0.5);
+            let cut = sever(&whole, &state, &Cut::through(0, point, DVec3::new(1.0, tilt, 0.3).normalize())).unwrap();
+            assert_eq!(cut.pieces.len(), 2);
+            for piece in &cut.pieces {
+                let body = &cut.model.bodies[piece.body];
+                for tet in body.tets() {
+                    let free = || tet.iter().filter(|i| !body.pinned[**i as usize]);
+                    // By the colours of the nodes they come from, and by those they were given.
+                    let old = |i: &u32| color(&whole.bodies[0], piece.nodes[*i as usize]);
+                    for colors in [free().map(old).collect::<Vec<_>>(), free().map(|i| color(body, *i)).collect()] {
+                        let mut distinct = colors.clone();
+                        distinct.sort_unstable();
+                        distinct.dedup();
+                        assert_eq!(distinct.len(), colors.len(), "{colors:?}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_hangs_by_an_edge_stays_with_its_side() {
+        // A row, and on each of two of its cubes an element that shares an edge along the row with it and nothing else.
+        let mut mesh = row(6);
+        for i in [1u32, 4] {
+            let first = mesh.vertices.len() as u32;
+            let middle = mesh.vertices[4 * i as usize] + 1e-3 * DVec3::X;
+            mesh.vertices
+                .extend([middle + 2e-3 * DVec3::new(0.0, -1.0, -0.3), middle + 2e-3 * DVec3::new(0.0, -0.3, -1.0)]);
+            mesh.tets.push([4 * i, 4 * (i + 1), first, first + 1]);
+            let last = mesh.tets.len() - 1;
+            if mesh.tet_volume(last) < 0.0 {
+                mesh.tets[last].swap(2, 3);
+            }
+        }
+        let whole = model(&mesh, vec![]);
+        let state = State::new(&whole);
+        assert_eq!(whole.bodies[0].parts(), 1);
+        // Between the cubes, through one end of the edge by which the second hangs.
+        for x in [4e-3, 6e-3, 8e-3] {
+            let cut = sever(&whole, &state, &Cut::through(0, DVec3::X * x, DVec3::X)).unwrap();
+            let parts = |p: &Piece| cut.model.bodies[p.body].parts();
+            assert_eq!(cut.pieces.iter().map(parts).collect::<Vec<_>>(), [1, 1], "cut at {x} m");
+            let hanging = mesh.tets.len() as u32 - 1;
+            let with = cut.pieces.iter().position(|p| p.elements.contains(&hanging)).unwrap();
+            let beside = cut.pieces.iter().position(|p| p.elements.contains(&(6 * 5))).unwrap();
+            assert_eq!(with, beside, "cut at {x} m");
+        }
+    }
+
+    #[test]
+    fn a_body_too_small_to_be_parted_stays_whole() {
+        let mesh = row(1);
+        let whole = model(&mesh, vec![]);
+        let middle = DVec3::splat(1e-3);
+        let cut = sever(&whole, &State::new(&whole), &Cut::through(0, middle, DVec3::new(0.0, 1.0, -1.0).normalize()));
+        assert_eq!(cut.unwrap().faces, 0, "two pieces of three elements each would be crumbs");
+    }
+}
