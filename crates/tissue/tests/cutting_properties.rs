@@ -24,7 +24,7 @@ static ORGANS: LazyLock<Vec<(Model, State)>> = LazyLock::new(|| {
         }
         (model, state)
     };
-    vec![deformed(&appendix(1.9e-3), 6.0), deformed(&block([8, 4, 4], 2e-3), 0.0)]
+    vec![deformed(&appendix(2.6e-3), 6.0), deformed(&block([8, 4, 4], 2e-3), 0.0)]
 });
 
 fn mesh_of(model: &Model, state: &State, body: usize) -> TetMesh {
@@ -114,7 +114,7 @@ fn unit() -> impl Strategy<Value = DVec3> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 64, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 128, failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn a_cut_keeps_what_it_must(

@@ -1,8 +1,7 @@
 //! Cutting: the blades of a tool part a body along the faces of its elements.
 //!
-//! A [`Model`] never changes, so a cut makes another one, in which the body that was cut is laid out anew and all others are shared. The alternative, a pool of spare vertices in a
-//! body of fixed size, would save nothing where it matters: the quasi-Newton solver needs another ordering and another factor after any change of topology, and they are most of what a
-//! cut costs. Measured on one core of a two-core machine that others used, release: see [`sever`].
+//! A [`Model`] never changes, so a cut makes another one, in which the body that was cut is laid out anew and all others are shared. A pool of spare vertices in a body of fixed size
+//! would not help: the quasi-Newton solver needs another ordering and another factor after any change of topology, and they are more than half of what a cut costs ([`sever`] has the figures).
 
 mod carry;
 mod faces;
@@ -107,8 +106,9 @@ impl Cut {
 /// A grasp goes with the nodes it holds: one that holds nodes of several pieces becomes a grasp for each, one behind the other, jaw and tear force shared by the number of nodes.
 /// Of a held node's copies those stay held that share an element with a held node off the cut; if there are none, those of a piece that has any; and if there are none at all, every copy.
 ///
-/// A cut that meets nothing opens no face and leaves model and state as they were. The model and the state of before stay good: [`crate::Stepper::follow`] goes over to either. Severing a tube of
-/// 8,000 elements takes TODO.
+/// A cut that meets nothing opens no face and leaves model and state as they were. The model and the state of before stay good: [`crate::Stepper::follow`] goes over to either. On one
+/// thread of a Zen 5 core that others used at the same time, a tube of 7,752 elements is severed in 15 ms, and the fast schedule goes over in 23 ms (layout, ordering and factor of both pieces),
+/// which are two frames of 60 Hz together; 3,958 elements take 8 and 14 ms, 31,498 take 53 and 179 ms. Sweeps go over at once. (`cargo bench -p trocar-tissue --bench cutting`)
 ///
 /// # Errors
 /// A body that is not there, a state of another model, numbers that are not finite, vectors that are not of unit length, a direction out of the plane, extents that are not above 0.
