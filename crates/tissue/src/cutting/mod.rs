@@ -82,7 +82,7 @@ impl Cut {
                 self.along, self.normal
             ));
         }
-        match self.half_extents.iter().find(|half| !(**half > 0.0)) {
+        match self.half_extents.iter().find(|half| half.is_nan() || **half <= 0.0) {
             Some(half) => Err(format!("a cut's half extent is {half} m; it must be above 0")),
             None => Ok(()),
         }
