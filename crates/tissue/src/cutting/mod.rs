@@ -223,11 +223,14 @@ mod tests {
         let whole = model(&mesh, vec![]);
         let state = State::new(&whole);
         assert_eq!(whole.bodies[0].parts(), 1);
-        // Between the cubes, through one end of the edge by which the second hangs.
+        // Between the cubes: through an end of the edge by which the first hangs, of none, of that by which the second does.
         for x in [4e-3, 6e-3, 8e-3] {
             let cut = sever(&whole, &state, &Cut::through(0, DVec3::X * x, DVec3::X)).unwrap();
             let parts = |p: &Piece| cut.model.bodies[p.body].parts();
             assert_eq!(cut.pieces.iter().map(parts).collect::<Vec<_>>(), [1, 1], "cut at {x} m");
+            // The four nodes in the plane fall in two, not in three where an element hangs.
+            let nodes: usize = cut.pieces.iter().map(|p| p.nodes.len()).sum();
+            assert_eq!(nodes, mesh.vertices.len() + 4, "cut at {x} m");
             let hanging = mesh.tets.len() as u32 - 1;
             let with = cut.pieces.iter().position(|p| p.elements.contains(&hanging)).unwrap();
             let beside = cut.pieces.iter().position(|p| p.elements.contains(&(6 * 5))).unwrap();
