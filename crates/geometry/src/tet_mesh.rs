@@ -51,6 +51,13 @@ impl TetMesh {
         (0..self.tets.len()).filter(|&t| !matches!(self.tet_volume(t), v if v > 0.0)).count()
     }
 
+    /// For each element and each of its corners, the element across the face opposite the corner; `None` on the boundary. A face of three or more elements, which no conforming mesh has,
+    /// counts as boundary of each.
+    pub fn neighbours(&self) -> Vec<[Option<u32>; 4]> {
+        let across = |t: u32| (t != NO_TET).then_some(t);
+        face_neighbours(&self.tets).into_iter().map(|faces| faces.map(across)).collect()
+    }
+
     /// Outward-facing boundary surface and, for each of its vertices, the node it is. Triangles follow the order of
     /// their elements, vertices the order of the nodes.
     pub fn boundary(&self) -> (TriMesh, Vec<u32>) {
@@ -148,6 +155,8 @@ mod tests {
         assert_eq!(mesh.bounds(), Some((DVec3::ZERO, DVec3::splat(2.0))));
         let (surface, nodes) = mesh.boundary();
         assert_eq!((surface.triangles.len(), nodes), (12, (0..8).collect()));
+        // The six tets stand around the diagonal in a ring.
+        assert_eq!(mesh.neighbours()[0], [None, Some(1), Some(5), None]);
         assert!((surface_volume(&surface) - 8.0).abs() < 1e-12, "triangles must face outward");
     }
 

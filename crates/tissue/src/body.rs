@@ -8,16 +8,24 @@ use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
 use crate::{Material, Support};
 use glam::{DVec3, Vec3A};
+use std::ops::{Deref, DerefMut};
+use std::sync::Arc;
 use trocar_geometry::TetMesh;
 
-/// One deformable body.
+/// One deformable body. A clone is the same body, not a copy: models that follow from each other by cuts share what was not cut.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct Body(Arc<BodyData>);
+
+/// What a body is made of.
+#[derive(Clone, Debug)]
+pub struct BodyData {
     pub(crate) name: String,
     pub(crate) material: Material,
     pub(crate) raised_masses: usize,
     pub(crate) parts: usize,
     pub(crate) supports: Vec<Support>,
+    /// Stiffness of contacts over Young's modulus times a node's size.
+    pub(crate) contact_stiffness: f64,
     /// Rest shape, original node order [m].
     pub(crate) rest: TetMesh,
     /// Whether each node is pinned, original order.
@@ -85,7 +93,33 @@ pub(crate) struct Edge {
     pub length: f32,
 }
 
+impl Deref for Body {
+    type Target = BodyData;
+
+    fn deref(&self) -> &BodyData {
+        &self.0
+    }
+}
+
+impl DerefMut for Body {
+    /// Only the builder changes a body, before anyone shares it.
+    fn deref_mut(&mut self) -> &mut BodyData {
+        Arc::make_mut(&mut self.0)
+    }
+}
+
+impl From<BodyData> for Body {
+    fn from(data: BodyData) -> Self {
+        Self(Arc::new(data))
+    }
+}
+
 impl Body {
+    /// Whether both are one: laid out once, shared by two models.
+    pub(crate) fn is(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+
     /// Name.
     pub fn name(&self) -> &str {
         &self.name

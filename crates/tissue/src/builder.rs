@@ -2,7 +2,7 @@
 
 mod check;
 
-use crate::body::{Corner, Edge, Vertex};
+use crate::body::{BodyData, Corner, Edge, Vertex};
 use crate::descent::coloring::color;
 use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
@@ -119,7 +119,7 @@ impl ModelBuilder {
                 self.contact_stiffness
             )));
         }
-        self.bodies.push(lay_out(body, self.mass_floor, self.contact_stiffness));
+        self.bodies.push(lay_out(body, self.mass_floor, self.contact_stiffness, None));
         Ok(self.bodies.len() - 1)
     }
 
@@ -164,8 +164,23 @@ impl ModelBuilder {
     }
 }
 
-/// Lays a checked body out for the sweeps.
-fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor, contact_stiffness: f64) -> Body {
+/// What a piece of a body has from the whole, so that its positions and its mass stay what they were to the bit.
+pub(crate) struct Inherited {
+    /// World position of the whole body's own origin [m].
+    pub origin: DVec3,
+    /// Mass of each node [kg].
+    pub masses: Vec<f64>,
+    /// How many of them were raised.
+    pub raised: usize,
+}
+
+/// Lays a checked body out for the sweeps; a piece of another takes what it has `inherited`, and no mass floor.
+pub(crate) fn lay_out(
+    description: BodyDescription<'_>,
+    mass_floor: MassFloor,
+    contact_stiffness: f64,
+    inherited: Option<Inherited>,
+) -> Body {
     let BodyDescription { name, mesh, material, pinned: pinned_nodes, supports } = description;
     let nodes = mesh.vertices.len();
     let mut pinned = vec![false; nodes];
@@ -210,17 +225,24 @@ fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor, contact_stif
     for c in 0..color_count {
         color_start[c + 1] += color_start[c];
     }
-    let (masses, raised_masses) = lumped_masses(&share, material.density, mass_floor);
+    let (masses, raised_masses, origin) = match inherited {
+        Some(whole) => (whole.masses, whole.raised, whole.origin),
+        None => {
+            let (masses, raised) = lumped_masses(&share, material.density, mass_floor);
+            (masses, raised, mesh.vertices.iter().sum::<DVec3>() / nodes as f64)
+        }
+    };
 
-    let mut body = Body {
+    let mut body = BodyData {
         material,
         supports,
+        contact_stiffness,
         raised_masses,
         parts: count_parts(&neighbours),
         rest: mesh.clone(),
         pinned,
         median_edge: TetQuality::of(mesh).median_edge,
-        origin: mesh.vertices.iter().sum::<DVec3>() / nodes as f64,
+        origin,
         internal,
         color_start,
         tets: Vec::new(),
@@ -252,10 +274,12 @@ fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor, contact_stif
         }
     }
     body.elements = Elements::new(&body.tets, &body.volumes, |i| body.vertices[i as usize].pinned, nodes);
+    let mut body = Body::from(body);
     if material.model == ConstitutiveModel::StableNeoHookean {
         let inside = |push: &Push| Push { to: body.internal[push.to as usize], ..*push };
         let strips: Vec<Vec<Push>> = order.iter().map(|i| strips[*i as usize].iter().map(inside).collect()).collect();
-        body.groups = Groups::new(&body, &strips);
+        let groups = Groups::new(&body, &strips);
+        body.groups = groups;
     }
     body
 }
@@ -299,7 +323,7 @@ fn faces(mesh: &TetMesh, incident: &[(usize, usize)]) -> Vec<[u32; 3]> {
     incident.iter().map(|(t, k)| SEEN_FROM[*k].map(|c| mesh.tets[*t][c])).collect()
 }
 
-fn add_corners(body: &mut Body, incident: &[(usize, usize)]) {
+fn add_corners(body: &mut BodyData, incident: &[(usize, usize)]) {
     for (t, k) in incident {
         let others = SEEN_FROM[*k].map(|c| body.tets[*t][c]);
         let volume = body.volumes[*t];
@@ -312,7 +336,7 @@ fn add_corners(body: &mut Body, incident: &[(usize, usize)]) {
 }
 
 /// Adds the edges of node `i`; returns the diagonal of its Laplacian.
-fn add_edges(body: &mut Body, i: usize, neighbours: &[u32], incident: &[(usize, usize)]) -> f32 {
+fn add_edges(body: &mut BodyData, i: usize, neighbours: &[u32], incident: &[(usize, usize)]) -> f32 {
     let (mu, lambda) = body.material.lame();
     let mu = match body.material.model {
         ConstitutiveModel::StableNeoHookean => StableNeoHookean::new(mu, lambda).mu,

@@ -3,7 +3,8 @@
 use crate::{Body, Collider};
 use glam::DVec3;
 
-/// Everything that is constant over a simulation. Made by [`crate::ModelBuilder`] alone, so that what it checked stays true.
+/// Everything that is constant over a simulation. Made by [`crate::ModelBuilder`], and out of another model by [`crate::sever`], alone, so that what was checked stays true. A clone shares
+/// the bodies.
 #[derive(Clone, Debug)]
 pub struct Model {
     pub(crate) bodies: Vec<Body>,

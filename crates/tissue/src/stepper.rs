@@ -15,6 +15,8 @@ use rayon::prelude::*;
 /// Advances states of one model; owns all scratch memory, so stepping allocates nothing.
 pub struct Stepper {
     dt: f64,
+    schedule: Schedule,
+    threads: usize,
     /// None: the calling thread does the work.
     pool: Option<rayon::ThreadPool>,
     /// Largest first, so that the threads end together.
@@ -26,6 +28,8 @@ pub struct Stepper {
 /// A body's solver and what it reported.
 struct Worker {
     body: usize,
+    /// The body that the solver was made for.
+    of: Body,
     integrator: Box<dyn Integrator>,
     untangler: Untangler,
     before: BodyState,
@@ -44,27 +48,45 @@ impl Stepper {
             return Err(Error::Model(format!("a frame of {dt} s; above 0 and at most 10 s make sense")));
         }
         schedule.check()?;
+        let mut stepper =
+            Self { dt, schedule, threads, pool: None, workers: Vec::new(), forces: Vec::new(), events: Vec::new() };
+        stepper.follow(model)?;
+        Ok(stepper)
+    }
+
+    /// Goes over to another `model`, such as that of before or after a cut ([`crate::sever`]). What both have in common keeps its solver; only the other bodies are prepared. States
+    /// of the new model go on with the same bits as in a new stepper.
+    ///
+    /// # Errors
+    /// Threads that the system does not give; the stepper still steps the old model then.
+    pub fn follow(&mut self, model: &Model) -> Result<()> {
         // Bodies are what the quasi-Newton solver shares out among threads; handing a small model over to a pool of one would cost more than some frames do.
-        let alone = matches!(schedule, Schedule::QuasiNewton(_)) && (threads == 1 || model.bodies.len() == 1);
-        let pool = if alone {
-            None
-        } else {
-            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-            Some(pool.map_err(|e| Error::Model(format!("{threads} threads cannot be started: {e}")))?)
-        };
-        let states = State::new(model).bodies.into_iter().zip(&model.bodies).enumerate();
-        let mut workers: Vec<Worker> = states
-            .map(|(index, (state, body))| Worker {
-                body: index,
-                integrator: integrator(&schedule, body, dt),
-                untangler: Untangler::new(&state),
-                before: state.clone(),
-                state,
-                report: StepReport::default(),
-            })
-            .collect();
-        workers.sort_by_key(|worker| std::cmp::Reverse(model.bodies[worker.body].tets.len()));
-        Ok(Self { dt, pool, workers, forces: Vec::new(), events: Vec::new() })
+        let alone = matches!(self.schedule, Schedule::QuasiNewton(_)) && (self.threads == 1 || model.bodies.len() == 1);
+        if alone {
+            self.pool = None;
+        } else if self.pool.is_none() {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(self.threads).build();
+            self.pool =
+                Some(pool.map_err(|e| Error::Model(format!("{} threads cannot be started: {e}", self.threads)))?);
+        }
+        let mut old = std::mem::take(&mut self.workers);
+        for (index, (state, body)) in State::new(model).bodies.into_iter().zip(&model.bodies).enumerate() {
+            let worker = match old.iter().position(|worker| worker.of.is(body)) {
+                Some(at) => Worker { body: index, ..old.swap_remove(at) },
+                None => Worker {
+                    body: index,
+                    of: body.clone(),
+                    integrator: integrator(&self.schedule, body, self.dt),
+                    untangler: Untangler::new(&state),
+                    before: state.clone(),
+                    state,
+                    report: StepReport::default(),
+                },
+            };
+            self.workers.push(worker);
+        }
+        self.workers.sort_by_key(|worker| std::cmp::Reverse(model.bodies[worker.body].tets.len()));
+        Ok(())
     }
 
     /// What tissue did to each tool in the last frame, in the order of the motions that were given.
@@ -82,7 +104,9 @@ impl Stepper {
         let nodes = |worker: &Worker| state.bodies.get(worker.body).map(|body| body.x.len());
         let known = |worker: &Worker| Some(worker.state.x.len());
         let same = self.workers.len() == model.bodies.len() && self.workers.len() == state.bodies.len();
-        if !same || self.workers.iter().any(|w| nodes(w) != known(w) || model.bodies[w.body].len() != w.state.x.len()) {
+        // A model that was built again is as good as the same; one that was cut elsewhere is not.
+        let other = |w: &Worker| !model.bodies[w.body].is(&w.of) && model.bodies[w.body].tets != w.of.tets;
+        if !same || self.workers.iter().any(|w| nodes(w) != known(w) || other(w)) {
             return StepReport { divergence: Some(Divergence::OtherModel), ..StepReport::default() };
         }
         for worker in &mut self.workers {

@@ -2,7 +2,7 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "each test binary uses its own part; helpers of tests may panic")]
 
 use glam::DVec3;
-use trocar_geometry::TetMesh;
+use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
 use trocar_tissue::{BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, Schedule, Start};
 
 pub const FRAME: f64 = 1.0 / 60.0;
@@ -91,4 +91,21 @@ pub fn model(mesh: &TetMesh, material: Material, pinned: Vec<u32>, gravity: DVec
     let mut builder = ModelBuilder::new().gravity(gravity);
     builder.body(BodyDescription { name: "block".into(), mesh, material, pinned, supports: vec![] }).unwrap();
     builder.build().unwrap()
+}
+
+/// An organ of an appendix's size, bent in the plane z = 0, by the lattice mesher with cells of `cell` [m]. It lies along x from 0 to its length.
+pub fn appendix(cell: f64) -> TetMesh {
+    struct Tube;
+    impl SignedDistance for Tube {
+        fn distance(&self, p: DVec3) -> f64 {
+            let x = p.x.clamp(RADIUS, LENGTH - RADIUS);
+            let middle = DVec3::new(x, 4.0 * x * (LENGTH - x), 0.0);
+            // The curve is steep at its ends: 0.9 keeps the value below the distance.
+            0.9 * (p.distance(middle) - RADIUS)
+        }
+    }
+    const LENGTH: f64 = 0.085;
+    const RADIUS: f64 = 0.0045;
+    let bounds = (DVec3::new(0.0, -RADIUS, -RADIUS), DVec3::new(LENGTH, 0.02, RADIUS));
+    LatticeMesher::uniform(cell).mesh_shape(&Tube, bounds).unwrap()
 }
