@@ -4,6 +4,7 @@
 //! origin: rounding of `f32` is then far below the sags that are measured. What a vertex needs of its elements and edges stands in
 //! one piece, in the order the sweeps read it.
 
+use crate::contact::surface::Surface;
 use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
 use crate::{Material, Support};
@@ -25,6 +26,8 @@ pub struct Body {
     pub(crate) median_edge: f64,
     /// World position of the body's own origin [m].
     pub(crate) origin: DVec3,
+    /// Its boundary.
+    pub(crate) surface: Surface,
     /// Internal number of each node.
     pub(crate) internal: Vec<u32>,
     /// First vertex of each colour, and the number of vertices that are not pinned.

@@ -3,6 +3,7 @@
 mod check;
 
 use crate::body::{Corner, Edge, Vertex};
+use crate::contact::surface::Surface;
 use crate::descent::coloring::color;
 use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
@@ -191,6 +192,7 @@ fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor) -> Body {
         pinned,
         median_edge: TetQuality::of(mesh).median_edge,
         origin: mesh.vertices.iter().sum::<DVec3>() / nodes as f64,
+        surface: Surface::of(mesh, &internal),
         internal,
         color_start,
         tets: Vec::new(),

@@ -1,10 +1,16 @@
-//! What touches tissue from outside: convex parts of tools.
+//! What touches tissue: convex parts of tools, and other tissue.
 
+pub(crate) mod broad_phase;
 mod collider;
 mod force;
 mod hull;
+#[allow(dead_code, reason = "the solvers do not ask for it yet")]
+pub(crate) mod proximity;
+#[cfg(test)]
+mod proximity_tests;
 mod shape;
 mod shape_surface;
+pub(crate) mod surface;
 
 pub use collider::Collider;
 pub use force::{Event, ToolForce, Wrench};
