@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3A};
 use std::ops::Range;
 
 /// Triangles that a leaf may have.
-const LEAF: usize = 6;
+const LEAF: usize = 4;
 
 /// An axis-aligned box [m].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,6 +134,21 @@ impl Tree {
     /// The vertices that a leaf owns.
     pub fn owned(&self, leaf: &Node) -> &[u32] {
         &self.corners[leaf.corners[0] as usize..leaf.corners[1] as usize]
+    }
+
+    /// Whether the box of any leaf meets `place`.
+    pub fn reaches(&self, boxes: &[Aabb], place: &Aabb) -> bool {
+        let mut at = 0;
+        while let Some(node) = self.nodes.get(at as usize) {
+            if !boxes[at as usize].meets(place) {
+                at = node.end;
+            } else if node.is_leaf() {
+                return true;
+            } else {
+                at += 1;
+            }
+        }
+        false
     }
 
     /// Calls `visit` for every leaf whose box meets `place`, in order.

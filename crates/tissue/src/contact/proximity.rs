@@ -1,7 +1,7 @@
 //! Which vertices of a body's surface are near or inside another body, or folded tissue of their own, and how far.
 //!
-//! A tree of boxes over each surface is fitted to its vertices. Leaf by leaf of one tree, the leaves of the other that are within reach are collected, and for each vertex of the
-//! leaf the nearest triangle in them is looked for. All in single precision, in the other body's frame: off by some 10 nm.
+//! A tree of boxes over each surface is fitted to its vertices. Leaf by leaf of one tree that the other reaches, the nearest triangle to each vertex is looked for, beginning with that
+//! of the vertex before. All in single precision, in the other body's frame: off by some 10 nm.
 
 use super::broad_phase::Aabb;
 use super::surface::{Foot, foot};
@@ -68,8 +68,6 @@ pub(crate) struct Proximity {
     free: Vec<Vec<f32>>,
     /// Rest positions by internal number and boxes round them, of bodies that are searched for folds.
     rest: Vec<(Vec<Vec3A>, Vec<Aabb>)>,
-    /// Leaves within reach of the leaf at hand.
-    leaves: Vec<u32>,
 }
 
 /// A body's surface where it is now.
@@ -113,7 +111,7 @@ impl Proximity {
         let folds = |a: usize| limits.folds && model.collides(a, a);
         let kept = |(a, s): (usize, BodyState)| if folds(a) { (s.x, boxes[a].clone()) } else { Default::default() };
         let rest = rest.into_iter().enumerate().map(kept).collect();
-        Self { limits, boxes, free, rest, leaves: Vec::new() }
+        Self { limits, boxes, free, rest }
     }
 
     /// Puts into `found` every vertex whose distance from another body it collides with is between minus [`Limits::depth`] and `reach` [m], with the nearest triangle; ordered by
@@ -155,30 +153,30 @@ impl Proximity {
         };
         let free = &self.free[a * n + b];
         let (rest, rest_boxes) = &self.rest[a];
-        let leaves = &mut self.leaves;
+        let mut last = 0;
         from.body.surface.tree.walk(from.boxes, &whole, |leaf| {
             let owned = from.body.surface.tree.owned(&from.body.surface.tree.nodes[leaf as usize]);
             if owned.is_empty() {
                 return;
             }
-            leaves.clear();
             let place = from.boxes[leaf as usize].moved(shift, search);
-            let together = |near: u32| {
-                let around = rest_boxes[leaf as usize].moved(Vec3A::ZERO, FOLDED * reach);
-                rest_boxes[near as usize].meets(&around)
-            };
-            to.body.surface.tree.walk(to.boxes, &place, |near| {
-                if a != b || !together(near) {
-                    leaves.push(near);
-                }
-            });
+            if !to.body.surface.tree.reaches(to.boxes, &place) {
+                return;
+            }
+            let around = rest_boxes.get(leaf as usize).map(|b| b.moved(Vec3A::ZERO, FOLDED * reach));
+            let apart = |near: u32| around.is_none_or(|around| !rest_boxes[near as usize].meets(&around));
             for vertex in owned {
                 let p = from.x[*vertex as usize] + shift;
                 let mut best = Best::within(search * search);
-                for near in leaves.iter() {
-                    if to.boxes[*near as usize].distance_squared(p) < best.squared {
-                        let skip = |t: u32| a == b && is_squeezed(from.body, rest, *vertex, t, OTHER_SIDE * reach);
-                        to.nearest_in(*near, p, &mut best, skip);
+                if a == b {
+                    let skip = |t: u32| is_squeezed(from.body, rest, *vertex, t, OTHER_SIDE * reach);
+                    to.nearest(p, &mut best, apart, skip);
+                } else {
+                    // The vertices before are neighbours, mostly: where they ended bounds the search.
+                    to.try_triangle(last, p, &mut best);
+                    to.nearest(p, &mut best, |_| true, |_| false);
+                    if best.triangle != u32::MAX {
+                        last = best.triangle;
                     }
                 }
                 let Some((normal, distance)) = to.signed(&best) else {
@@ -206,15 +204,35 @@ impl Side<'_> {
         self.body.surface.triangles[t as usize].map(|i| self.x[i as usize])
     }
 
-    /// Looks among a leaf's triangles for a nearer one.
+    /// Takes triangle `t` if it is nearer.
+    fn try_triangle(&self, t: u32, p: Vec3A, best: &mut Best) {
+        let foot = foot(p, self.corners(t));
+        let squared = foot.off.length_squared();
+        if squared < best.squared {
+            *best = Best { squared, triangle: t, foot };
+        }
+    }
+
+    /// Looks for the nearest triangle: in leaves that `open` lets in, but for those to `skip`.
     #[inline]
-    fn nearest_in(&self, leaf: u32, p: Vec3A, best: &mut Best, skip: impl Fn(u32) -> bool) {
-        for t in self.body.surface.tree.nodes[leaf as usize].triangles() {
-            let foot = foot(p, self.corners(t));
-            let squared = foot.off.length_squared();
-            if squared < best.squared && !skip(t) {
-                *best = Best { squared, triangle: t, foot };
+    fn nearest(&self, p: Vec3A, best: &mut Best, open: impl Fn(u32) -> bool, skip: impl Fn(u32) -> bool) {
+        let nodes = &self.body.surface.tree.nodes;
+        let mut at = 0;
+        while let Some(node) = nodes.get(at as usize) {
+            if self.boxes[at as usize].distance_squared(p) >= best.squared {
+                at = node.end;
+                continue;
             }
+            if node.is_leaf() && open(at) {
+                for t in node.triangles() {
+                    let foot = foot(p, self.corners(t));
+                    let squared = foot.off.length_squared();
+                    if squared < best.squared && !skip(t) {
+                        *best = Best { squared, triangle: t, foot };
+                    }
+                }
+            }
+            at += 1;
         }
     }
 
@@ -249,16 +267,7 @@ fn free_at_rest(from: &Side<'_>, to: &Side<'_>, offset: f32) -> Vec<f32> {
             continue;
         }
         let mut best = Best::within(f32::INFINITY);
-        let nodes = &to.body.surface.tree.nodes;
-        let mut at = 0;
-        while let Some(node) = nodes.get(at as usize) {
-            if to.boxes[at as usize].distance_squared(p) >= best.squared {
-                at = node.end;
-                continue;
-            }
-            to.nearest_in(at, p, &mut best, |_| false);
-            at += 1;
-        }
+        to.nearest(p, &mut best, |_| true, |_| false);
         if let Some((_, distance)) = to.signed(&best) {
             free[*vertex as usize] = distance.min(offset);
         }
