@@ -170,7 +170,7 @@ fn signs_near_sharp_edges_and_corners_are_those_of_the_convex_shape() {
             for node in 0..model.bodies()[0].len() {
                 let k = round * 100_000 + node as u64;
                 let [a, b] = [k as usize % 4, k as usize / 4 % 4];
-                let share = if k % 3 == 0 { 0.0 } else { noise(k) };
+                let share = if k.is_multiple_of(3) { 0.0 } else { noise(k) };
                 let p = corners[a].lerp(corners[b], share) + 2e-3 * noise(k + 5).powi(2) * random(k + which as u64);
                 state.set_position(&model, 0, node, p);
             }
