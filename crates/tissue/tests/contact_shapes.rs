@@ -112,6 +112,9 @@ fn hulls_are_as_far_as_parry_says() {
     }
 }
 
+/// Signed distance of a point.
+type Distance = Box<dyn Fn(DVec3) -> f64>;
+
 #[test]
 fn round_shapes_and_boxes_are_as_far_as_parry_says() {
     for seed in 0..20 {
@@ -120,7 +123,7 @@ fn round_shapes_and_boxes_are_as_far_as_parry_says() {
         let ends = [centre, centre + 0.03 * random(90 + seed)];
         let radius = half.x;
         let capsule = Capsule::new(to_parry(ends[0]), to_parry(ends[1]), radius);
-        let cases: [(Shape, Box<dyn Fn(DVec3) -> f64>); 3] = [
+        let cases: [(Shape, Distance); 3] = [
             (
                 Shape::Sphere { centre, radius },
                 Box::new(move |p| Ball::new(radius).distance_to_local_point(to_parry(p - centre), false)),
