@@ -4,6 +4,7 @@
 //! origin: rounding of `f32` is then far below the sags that are measured. What a vertex needs of its elements and edges stands in
 //! one piece, in the order the sweeps read it.
 
+use crate::contact::surface::Surface;
 use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
 use crate::{Material, Support};
@@ -33,6 +34,8 @@ pub struct BodyData {
     pub(crate) median_edge: f64,
     /// World position of the body's own origin [m].
     pub(crate) origin: DVec3,
+    /// Its boundary.
+    pub(crate) surface: Surface,
     /// Internal number of each node.
     pub(crate) internal: Vec<u32>,
     /// First vertex of each colour, and the number of vertices that are not pinned.
@@ -182,19 +185,8 @@ impl Body {
 
     /// Free vertices of the surface (internal numbers), ascending.
     pub(crate) fn surface_vertices(&self) -> Vec<u32> {
-        let mut faces: Vec<[u32; 3]> = Vec::with_capacity(4 * self.tets.len());
-        for [a, b, c, d] in &self.tets {
-            for mut face in [[*b, *c, *d], [*a, *c, *d], [*a, *b, *d], [*a, *b, *c]] {
-                face.sort_unstable();
-                faces.push(face);
-            }
-        }
-        faces.sort_unstable();
-        let outer = faces.chunk_by(|a, b| a == b).filter(|same| same.len() == 1);
-        let mut vertices: Vec<u32> = outer.flat_map(|same| same[0]).filter(|i| !self.vertices[*i as usize].pinned).collect();
-        vertices.sort_unstable();
-        vertices.dedup();
-        vertices
+        let free = |i: &u32| self.surface.areas[*i as usize] > 0.0 && !self.vertices[*i as usize].pinned;
+        (0..self.vertices.len() as u32).filter(free).collect()
     }
 
     /// Number of colours of the sweeps.

@@ -3,6 +3,7 @@
 mod check;
 
 use crate::body::{BodyData, Corner, Edge, Vertex};
+use crate::contact::surface::Surface;
 use crate::descent::coloring::color;
 use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
@@ -243,6 +244,7 @@ pub(crate) fn lay_out(
         pinned,
         median_edge: TetQuality::of(mesh).median_edge,
         origin,
+        surface: Surface::of(mesh, &internal),
         internal,
         color_start,
         tets: Vec::new(),

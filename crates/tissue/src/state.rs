@@ -152,7 +152,9 @@ impl State {
                 }
             }
             let compliance = grasp.compliance.iter();
-            for number in compliance.flat_map(|c| [c.stiffness, c.jaw_force, c.friction, c.tear_force, c.closing.x, c.closing.y, c.closing.z]) {
+            for number in compliance.flat_map(|c| {
+                [c.stiffness, c.jaw_force, c.friction, c.tear_force, c.closing.x, c.closing.y, c.closing.z]
+            }) {
                 hash.update(&number.to_bits().to_le_bytes());
             }
             for c in grasp.slid.iter().flat_map(|slid| slid.to_array()) {

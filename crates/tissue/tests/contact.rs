@@ -155,7 +155,8 @@ fn nothing_is_passed_through_at_half_a_metre_a_second() {
         for _ in 0..240 {
             stepper.step(&model, &mut state, &[still(at(DVec3::X * place))]);
         }
-        let off = state.positions(&model, 0).iter().zip(&mesh.vertices).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
+        let off =
+            state.positions(&model, 0).iter().zip(&mesh.vertices).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
         assert!(off < 1e-3 || schedule == Schedule::PAPER, "{schedule:?}: still {off} m off");
     }
 }
@@ -199,7 +200,9 @@ fn contact_holds_at_any_stiffness() {
         let material = Material { viscosity: 60.0, ..tissue(12e3) };
         let mut builder = ModelBuilder::new().gravity(GRAVITY).contact_stiffness(stiffness / (12e3 * 2e-3));
         let pinned = nodes(&mesh, |p| p.z == 0.0);
-        builder.body(BodyDescription { name: "tissue".into(), mesh: &mesh, material, pinned, supports: vec![] }).unwrap();
+        builder
+            .body(BodyDescription { name: "tissue".into(), mesh: &mesh, material, pinned, supports: vec![] })
+            .unwrap();
         builder.collider(collider(Shape::Sphere { centre: DVec3::ZERO, radius: 4e-3 }, 1.5e-3, 0.6)).unwrap();
         let model = builder.build().unwrap();
         let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
@@ -246,7 +249,8 @@ fn contact_repeats_to_the_bit() {
     for schedule in [Schedule::FAST, Schedule::PAPER] {
         let mut hashes = Vec::new();
         for (threads, pause) in [(1, 0), (2, 0), (3, 0), (1, 37)] {
-            let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, schedule, FRAME, threads).unwrap());
+            let (mut state, mut stepper) =
+                (State::new(&model), Stepper::new(&model, schedule, FRAME, threads).unwrap());
             for frame in 0..90 {
                 if pause > 0 && frame == pause {
                     let saved = state.clone();

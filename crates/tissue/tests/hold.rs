@@ -56,7 +56,11 @@ fn the_grasp_slips_at_twice_mu_times_the_jaw_force() {
                 state.grasps[0].slip().z
             };
             let (first, last) = (walk(&mut state, 90), walk(&mut state, 60));
-            println!("{} substeps, {share} of the weight: slips {:.4} mm a second", schedule.substeps(), (last - first) * 1e3);
+            println!(
+                "{} substeps, {share} of the weight: slips {:.4} mm a second",
+                schedule.substeps(),
+                (last - first) * 1e3
+            );
             if share > 1.0 {
                 assert!((last - first).abs() < 1e-5, "creeps: {first} {last} m");
             } else {

@@ -285,8 +285,7 @@ impl Contacts {
     #[cfg(test)]
     pub fn of_everything(body: &Body, x: &[Vec3A]) -> Self {
         let mut contacts = Self::new(body);
-        let frame =
-            Frame { dt: 1.0, gravity: glam::DVec3::ZERO, index: 0, grasps: &[], tools: &[], colliders: &[] };
+        let frame = Frame { dt: 1.0, gravity: glam::DVec3::ZERO, index: 0, grasps: &[], tools: &[], colliders: &[] };
         contacts.reach = f32::INFINITY;
         contacts.near.clone_from(&contacts.surface);
         contacts.find(&frame, body, 0.0, 1.0, |i| x[i]);
@@ -413,7 +412,9 @@ impl Hanging {
             point: place,
             place,
             stiffness: compliance.stiffness as f32,
-            friction: Friction::Clamped((2.0 * compliance.friction * compliance.jaw_force / grasp.nodes.len() as f64) as f32),
+            friction: Friction::Clamped(
+                (2.0 * compliance.friction * compliance.jaw_force / grasp.nodes.len() as f64) as f32,
+            ),
         })
     }
 }

@@ -17,8 +17,8 @@ const SMALLEST: f64 = 1e-5;
 /// Thickness over extent below which points lie in a plane or on a line.
 const FLAT: f64 = 1e-4;
 
-/// Share of the extent within which a point belongs to a face.
-const ON_FACE: f64 = 1e-12;
+/// Share of the extent within which a point belongs to a face: 10 nm for an instrument of 10 cm. A face that is this narrow still has its normal to a hundredth of it.
+const ON_FACE: f64 = 1e-7;
 
 /// Share of the extent that rounding can make of a distance: a shorter offset has no direction.
 const ROUNDING: f64 = 1e-14;
@@ -63,6 +63,10 @@ impl Hull {
         }
         let mut triangles = first_tetrahedron(points, extent)?.to_vec();
         while let Some(p) = farthest_outside(points, &triangles, ON_FACE * extent) {
+            // Each turn takes another point, so that there is an end.
+            if triangles.iter().flatten().any(|i| *i == p) {
+                return Err(too_close(p));
+            }
             add_corner(points, &mut triangles, p, ON_FACE * extent)?;
         }
         Ok(Self::from_triangles(points, triangles, extent))
@@ -246,9 +250,15 @@ fn add_corner(points: &[DVec3], triangles: &mut Vec<[usize; 3]>, p: usize, round
     }
     let new = outline.iter().map(|[a, b]| [*a, *b, p]);
     if !once || length != outline.len() || new.clone().any(|t| normal(points, t) == DVec3::ZERO) {
-        return Err(format!("point {p} of a hull is too close to others; corners are apart, faces flat or well bent"));
+        return Err(too_close(p));
     }
     kept.extend(new);
     *triangles = kept;
     Ok(())
+}
+
+fn too_close(p: usize) -> String {
+    format!(
+        "point {p} of a hull is too close to others, or to the line between them; leave it out, or move it by more than rounding"
+    )
 }

@@ -1,11 +1,18 @@
-//! What touches tissue from outside: convex parts of tools, supports, and the jaws that hold it.
+//! What touches tissue: convex parts of tools, supports, the jaws that hold it, and other tissue.
 
+pub(crate) mod broad_phase;
 mod collider;
 mod contacts;
 mod force;
 mod hull;
+#[allow(dead_code, reason = "the solvers do not couple bodies yet")]
+pub(crate) mod proximity;
+#[cfg(test)]
+mod proximity_tests;
 mod shape;
 mod shape_surface;
+#[allow(dead_code, reason = "the solvers do not couple bodies yet")]
+pub(crate) mod surface;
 mod touch;
 
 pub use collider::Collider;

@@ -146,7 +146,7 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
 
 /// What vertex `from` touches and rubs against, for its copy `to`.
 fn anchors(state: &BodyState, from: usize, to: u32) -> impl Iterator<Item = Anchor> {
-    let of = |anchor: &&Anchor| anchor.vertex == from as u32;
+    let of = move |anchor: &&Anchor| anchor.vertex == from as u32;
     let first = state.anchors.partition_point(|anchor| anchor.vertex < from as u32);
     state.anchors[first..].iter().take_while(of).map(move |anchor| Anchor { vertex: to, ..*anchor })
 }

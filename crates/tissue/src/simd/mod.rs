@@ -140,7 +140,6 @@ pub(crate) fn store3<L: Lanes>(lanes: L, value: [L::F; 3], to: &mut [Block<f32>;
     lanes.store(value[2], &mut to[2], part);
 }
 
-
 #[inline(always)]
 pub(crate) fn minus<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
