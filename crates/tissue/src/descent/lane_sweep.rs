@@ -7,8 +7,13 @@
 use crate::descent::groups::{Group, Groups};
 use crate::descent::kernel::{Local, VolumeTerm};
 use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
-use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, splat3, store3};
+use crate::lanes::{add, cross, dot, scale, sub};
+use crate::registers::{
+    BLOCK, Block, Mask, Reg, Reg3, bits, lanes, load, load3, part_of, parts, rows, signed, splat, splat3, store, store3,
+    width,
+};
 use crate::support::LocalSupport;
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, dispatch};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -44,45 +49,6 @@ impl Memory {
     }
 }
 
-/// Groups one after the other, in place.
-struct InPlace<'a>(&'a LaneSweep<'a>, &'a [Group], &'a mut [Vec3A]);
-
-/// Groups of one colour: where their vertices go from the positions of all, the first group's vertices first.
-struct Apart<'a>(&'a LaneSweep<'a>, &'a [Group], &'a [Vec3A], &'a mut [Vec3A]);
-
-impl Task for InPlace<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
-        let Self(sweep, groups, x) = self;
-        let mut memory = Memory::new();
-        for group in groups {
-            let active = sweep.relax(lanes, group, x, &mut memory);
-            let first = group.first as usize;
-            memory.write(active, &mut x[first..first + group.count as usize]);
-        }
-    }
-}
-
-impl Task for Apart<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
-        let Self(sweep, groups, x, moved) = self;
-        let mut memory = Memory::new();
-        let base = groups.first().map_or(0, |group| group.first);
-        for group in groups {
-            let active = sweep.relax(lanes, group, x, &mut memory);
-            let (first, at) = (group.first as usize, (group.first - base) as usize);
-            let moved = &mut moved[at..at + group.count as usize];
-            moved.copy_from_slice(&x[first..first + group.count as usize]);
-            memory.write(active, moved);
-        }
-    }
-}
-
 impl Memory {
     /// Moves the active lanes' vertices.
     #[inline(always)]
@@ -98,22 +64,22 @@ impl Memory {
 
 /// Forces and blocks of lanes: xx, xy, xz, yy, yz, zz.
 #[derive(Clone, Copy)]
-struct Sums<L: Lanes> {
-    force: [L::F; 3],
-    block: [L::F; 6],
+struct Sums<S: Simd> {
+    force: Reg3<S>,
+    block: [Reg<S>; 6],
 }
 
-impl<L: Lanes> Sums<L> {
+impl<S: Simd> Sums<S> {
     /// force -= k d
     #[inline(always)]
-    fn pull(&mut self, k: L::F, d: [L::F; 3]) {
+    fn pull(&mut self, k: Reg<S>, d: Reg3<S>) {
         self.force = [self.force[0] - k * d[0], self.force[1] - k * d[1], self.force[2] - k * d[2]];
     }
 
     /// block += k d d'
     #[inline(always)]
-    fn add_outer(&mut self, k: L::F, d: [L::F; 3]) {
-        let kd = scaled::<L>(k, d);
+    fn add_outer(&mut self, k: Reg<S>, d: Reg3<S>) {
+        let kd = scale(d, k);
         let b = self.block;
         self.block = [
             b[0] + kd[0] * d[0],
@@ -127,26 +93,26 @@ impl<L: Lanes> Sums<L> {
 
     /// The Newton step: the block's inverse times the force.
     #[inline(always)]
-    fn solve(&self, lanes: L) -> [L::F; 3] {
+    fn solve(&self, simd: S) -> Reg3<S> {
         let [xx, xy, xz, yy, yz, zz] = self.block;
         let (a, b, c) = ([xx, xy, xz], [xy, yy, yz], [xz, yz, zz]);
-        let (bc, ca, ab) = (cross::<L>(b, c), cross::<L>(c, a), cross::<L>(a, b));
-        let inverse = lanes.splat(1.0) / dot::<L>(a, bc);
-        let f = scaled::<L>(inverse, self.force);
-        [dot::<L>(bc, f), dot::<L>(ca, f), dot::<L>(ab, f)]
+        let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
+        let inverse = splat(simd, 1.0) / dot(a, bc);
+        let f = scale(self.force, inverse);
+        [dot(bc, f), dot(ca, f), dot(ab, f)]
     }
 
     /// Lets `change` alter the lanes of a part that are set in `mask`, one by one.
     #[inline(always)]
-    fn alter(&mut self, lanes: L, part: usize, mask: u16, mut change: impl FnMut(usize, &mut Local)) {
+    fn alter(&mut self, simd: S, part: usize, mask: u16, mut change: impl FnMut(usize, &mut Local)) {
         let mut spilled = [Block([0.0f32; BLOCK]); 9];
         for c in 0..3 {
-            lanes.store(self.force[c], &mut spilled[c], part);
+            store::<S>(self.force[c], &mut spilled[c], part);
         }
         for c in 0..6 {
-            lanes.store(self.block[c], &mut spilled[3 + c], part);
+            store::<S>(self.block[c], &mut spilled[3 + c], part);
         }
-        for lane in (0..L::WIDTH).filter(|lane| mask >> lane & 1 == 1).map(|lane| part * L::WIDTH + lane) {
+        for lane in (0..width::<S>()).filter(|lane| mask >> lane & 1 == 1).map(|lane| part * width::<S>() + lane) {
             let [fx, fy, fz, xx, xy, xz, yy, yz, zz] = spilled.map(|block| block.0[lane]);
             let mut local = Local {
                 force: Vec3A::new(fx, fy, fz),
@@ -159,10 +125,10 @@ impl<L: Lanes> Sums<L> {
             values.into_iter().zip(&mut spilled).for_each(|(value, to)| to.0[lane] = value);
         }
         for c in 0..3 {
-            self.force[c] = lanes.load(&spilled[c], part);
+            self.force[c] = load(simd, &spilled[c], part);
         }
         for c in 0..6 {
-            self.block[c] = lanes.load(&spilled[3 + c], part);
+            self.block[c] = load(simd, &spilled[3 + c], part);
         }
     }
 }
@@ -172,15 +138,15 @@ impl LaneSweep<'_> {
     pub fn sweep(&self, x: &mut [Vec3A], moved: &mut [Vec3A]) {
         assert!(x.len() == self.groups.points() && self.substep.start.len() == x.len());
         assert!(self.substep.predictor.len() == x.len());
-        let isa = self.substep.isa;
+        let level = self.substep.isa.level();
         let alone = rayon::current_num_threads() == 1;
         if alone || self.groups.colors().all(|groups| groups.len() < 2 * CHUNK) {
-            isa.run(InPlace(self, self.groups.all(), x));
+            dispatch!(level, simd => self.in_place(simd, self.groups.all(), x));
             return;
         }
         for groups in self.groups.colors() {
             if groups.len() < 2 * CHUNK {
-                isa.run(InPlace(self, groups, x));
+                dispatch!(level, simd => self.in_place(simd, groups, x));
                 continue;
             }
             let (first, last) = (groups[0].first as usize, &groups[groups.len() - 1]);
@@ -188,15 +154,40 @@ impl LaneSweep<'_> {
             let (all, chunks) = (&*x, groups.par_chunks(CHUNK));
             // All groups of a colour but the last are full.
             moved[first..end].par_chunks_mut(CHUNK * BLOCK).zip(chunks).for_each(|(moved, groups)| {
-                isa.run(Apart(self, groups, all, moved));
+                dispatch!(level, simd => self.apart(simd, groups, all, moved));
             });
             x[first..end].copy_from_slice(&moved[first..end]);
         }
     }
 
+    /// Groups one after the other, in place.
+    #[inline(always)]
+    fn in_place<S: Simd>(&self, simd: S, groups: &[Group], x: &mut [Vec3A]) {
+        let mut memory = Memory::new();
+        for group in groups {
+            let active = self.relax(simd, group, x, &mut memory);
+            let first = group.first as usize;
+            memory.write(active, &mut x[first..first + group.count as usize]);
+        }
+    }
+
+    /// Groups of one colour: where their vertices go from the positions of all, the first group's vertices first.
+    #[inline(always)]
+    fn apart<S: Simd>(&self, simd: S, groups: &[Group], x: &[Vec3A], moved: &mut [Vec3A]) {
+        let mut memory = Memory::new();
+        let base = groups.first().map_or(0, |group| group.first);
+        for group in groups {
+            let active = self.relax(simd, group, x, &mut memory);
+            let (first, at) = (group.first as usize, (group.first - base) as usize);
+            let moved = &mut moved[at..at + group.count as usize];
+            moved.copy_from_slice(&x[first..first + group.count as usize]);
+            memory.write(active, moved);
+        }
+    }
+
     /// Finds where a group's vertices go; returns the lanes that move.
     #[inline(always)]
-    fn relax<L: Lanes>(&self, lanes: L, group: &Group, x: &[Vec3A], memory: &mut Memory) -> u16 {
+    fn relax<S: Simd>(&self, simd: S, group: &Group, x: &[Vec3A], memory: &mut Memory) -> u16 {
         let active = group.active(self.substep.fixed);
         if active == 0 {
             return 0;
@@ -208,44 +199,36 @@ impl LaneSweep<'_> {
             }
             return active;
         }
-        for part in 0..L::PARTS {
-            if part_of::<L>(active, part) != 0 {
+        for part in 0..parts::<S>() {
+            if part_of::<S>(active, part) != 0 {
                 if self.groups.damping_of(group).is_empty() {
-                    self.relax_part::<L, false>(lanes, group, part, active, x, memory);
+                    self.relax_part::<S, false>(simd, group, part, active, x, memory);
                 } else {
-                    self.relax_part::<L, true>(lanes, group, part, active, x, memory);
+                    self.relax_part::<S, true>(simd, group, part, active, x, memory);
                 }
             }
         }
         active
     }
 
-    /// Points that a group's offsets name.
-    #[inline(always)]
-    #[allow(unsafe_code, reason = "points are read by indices that the groups vouch for")]
-    fn read<L: Lanes>(&self, lanes: L, part: usize, points: &[Vec3A], offsets: &Block<u32>) -> [L::F; 3] {
-        // SAFETY: the offsets are 16 times numbers below `Groups::points`, the length of all arrays of points (`sweep` asserts it).
-        unsafe { lanes.rows(points, offsets, part) }
-    }
-
     /// Adds the dashpot along the edge to the point of step `k`, which is at `d` from the vertex.
     #[inline(always)]
-    fn add_dashpot<L: Lanes>(&self, lanes: L, group: &Group, part: usize, k: usize, d: [L::F; 3], sums: &mut Sums<L>) {
+    fn add_dashpot<S: Simd>(&self, simd: S, group: &Group, part: usize, k: usize, d: Reg3<S>, sums: &mut Sums<S>) {
         let Substep { start, h, .. } = *self.substep;
-        let to = self.groups.steps_of(group)[k].to();
-        let before = minus::<L>(self.read(lanes, part, start, to), self.read(lanes, part, start, group.own()));
-        let length = lanes.max(dot::<L>(before, before), lanes.splat(LEAST_SQUARE));
-        let damping = lanes.load(&self.groups.damping_of(group)[k], part);
-        let stiffness = damping * lanes.splat(1.0 / h) / length;
-        let shortening = (dot::<L>(before, before) - dot::<L>(d, d)) * lanes.splat(0.5);
+        let to = &self.groups.steps_of(group)[k].to;
+        let before = sub(rows(simd, start, to, part), rows(simd, start, &group.own, part));
+        let length = dot(before, before).max(splat(simd, LEAST_SQUARE));
+        let damping = load(simd, &self.groups.damping_of(group)[k], part);
+        let stiffness = damping * splat(simd, 1.0 / h) / length;
+        let shortening = (dot(before, before) - dot(d, d)) * splat(simd, 0.5);
         sums.pull(stiffness * shortening, d);
         sums.add_outer(stiffness, d);
     }
 
     #[inline(always)]
-    fn relax_part<L: Lanes, const VISCOUS: bool>(
+    fn relax_part<S: Simd, const VISCOUS: bool>(
         &self,
-        lanes: L,
+        simd: S,
         group: &Group,
         part: usize,
         active: u16,
@@ -253,74 +236,74 @@ impl LaneSweep<'_> {
         memory: &mut Memory,
     ) {
         let h = self.substep.h;
-        let here = self.read(lanes, part, x, group.own());
-        let inertia = lanes.load(&group.mass, part) * lanes.splat(1.0 / (h * h));
-        let zero = lanes.splat(0.0);
-        let diagonal = inertia + lanes.load(&group.laplacian, part);
-        let pulled = minus::<L>(self.read(lanes, part, self.substep.predictor, group.own()), here);
+        let here = rows(simd, x, &group.own, part);
+        let inertia = load(simd, &group.mass, part) * splat(simd, 1.0 / (h * h));
+        let zero = splat(simd, 0.0);
+        let diagonal = inertia + load(simd, &group.laplacian, part);
+        let pulled = sub(rows(simd, self.substep.predictor, &group.own, part), here);
         let mut sums =
-            Sums::<L> { force: scaled::<L>(inertia, pulled), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
-        let (sixth, plain) = (lanes.splat(self.term.lambda / 6.0), lanes.splat(VolumeTerm::PLAIN));
-        let pressure = lanes.splat(self.term.lambda * self.term.alpha / 6.0);
+            Sums { force: scale(pulled, inertia), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
+        let (sixth, plain) = (splat(simd, self.term.lambda / 6.0), splat(simd, VolumeTerm::PLAIN));
+        let pressure = splat(simd, self.term.lambda * self.term.alpha / 6.0);
         let steps = self.groups.steps_of(group);
         let drops = self.groups.drops_of(group);
         // The window, relative to the vertex. It takes two points to fill it.
         let (mut p, mut q, mut r) = ([zero; 3], [zero; 3], [zero; 3]);
         for k in 0..2.min(steps.len()) {
             let step = &steps[k];
-            (p, q, r) = (q, r, minus::<L>(self.read(lanes, part, x, step.to()), here));
-            sums.pull(lanes.load(&step.edge, part), r);
+            (p, q, r) = (q, r, sub(rows(simd, x, &step.to, part), here));
+            sums.pull(load(simd, &step.edge, part), r);
             if VISCOUS {
-                self.add_dashpot(lanes, group, part, k, r, &mut sums);
+                self.add_dashpot(simd, group, part, k, r, &mut sums);
             }
         }
-        let mut low = 0;
+        let mut low = Mask::<S>::splat(simd, false);
         for k in 2..steps.len() {
             let (step, drop, face) = (&steps[k], drops[k], &mut memory.faces[k]);
-            let d = minus::<L>(self.read(lanes, part, x, step.to()), here);
-            sums.pull(lanes.load(&step.edge, part), d);
+            let d = sub(rows(simd, x, &step.to, part), here);
+            sums.pull(load(simd, &step.edge, part), d);
             if VISCOUS {
-                self.add_dashpot(lanes, group, part, k, d, &mut sums);
+                self.add_dashpot(simd, group, part, k, d, &mut sums);
             }
-            let drop = part_of::<L>(drop, part);
-            p = [lanes.select(drop, q[0], p[0]), lanes.select(drop, q[1], p[1]), lanes.select(drop, q[2], p[2])];
+            let drop = lanes(simd, part_of::<S>(drop, part));
+            p = [drop.select(q[0], p[0]), drop.select(q[1], p[1]), drop.select(q[2], p[2])];
             (q, r) = (r, d);
-            let area = cross::<L>(minus::<L>(q, p), minus::<L>(r, p));
-            let six_v = zero - dot::<L>(area, p);
-            let inverse = lanes.load(&step.inverse_6v, part);
+            let area = cross(sub(q, p), sub(r, p));
+            let six_v = zero - dot(area, p);
+            let inverse = load(simd, &step.inverse_6v, part);
             let ratio = inverse * six_v;
             // V0 psi'' = |inverse| lambda / 6 on A, and V0 psi' = lambda / 6 (|inverse| 6V - alpha sign).
-            let stiffness = lanes.abs(inverse) * sixth;
-            sums.pull(stiffness * six_v - lanes.signed(pressure, inverse), area);
+            let stiffness = inverse.abs() * sixth;
+            sums.pull(stiffness * six_v - signed(simd, pressure, inverse), area);
             sums.add_outer(stiffness, area);
-            low |= lanes.less(lanes.abs(inverse) * ratio, lanes.abs(inverse) * plain);
-            store3(lanes, area, &mut face.area, part);
-            lanes.store(ratio, &mut face.ratio, part);
+            low |= (inverse.abs() * ratio).simd_lt(inverse.abs() * plain);
+            store3::<S>(area, &mut face.area, part);
+            store::<S>(ratio, &mut face.ratio, part);
         }
-        low &= part_of::<L>(active, part);
-        let below = self.below(lanes, group, here, x, part) & part_of::<L>(active, part);
+        let low = bits::<S>(low) & part_of::<S>(active, part);
+        let below = self.below(simd, group, here, x, part) & part_of::<S>(active, part);
         if (low | below) != 0 {
             let memory = &*memory;
-            sums.alter(lanes, part, low | below, |lane, local| self.add_rare(group, lane, x, memory, local));
+            sums.alter(simd, part, low | below, |lane, local| self.add_rare(group, lane, x, memory, local));
         }
-        let step = sums.solve(lanes);
-        let to = self.guarded(lanes, group, part, step, memory);
-        let to = [here[0] + to[0], here[1] + to[1], here[2] + to[2]];
-        store3(lanes, to, &mut memory.to, part);
+        let step = sums.solve(simd);
+        let to = self.guarded(simd, group, part, step, memory);
+        let to = add(here, to);
+        store3::<S>(to, &mut memory.to, part);
     }
 
     /// Lanes below a support.
     #[inline(always)]
-    fn below<L: Lanes>(&self, lanes: L, group: &Group, here: [L::F; 3], x: &[Vec3A], part: usize) -> u16 {
+    fn below<S: Simd>(&self, simd: S, group: &Group, here: Reg3<S>, x: &[Vec3A], part: usize) -> u16 {
         let mut below = 0;
         for support in self.substep.supports {
             below |= match support {
                 LocalSupport::Plane(plane) => {
-                    let (from, normal) = (minus::<L>(here, splat3(lanes, plane.point)), splat3(lanes, plane.normal));
+                    let (from, normal) = (sub(here, splat3(simd, plane.point)), splat3(simd, plane.normal));
                     // A little more than the height says: whether a vertex is below is decided where its force is found.
-                    lanes.less(dot::<L>(from, normal), lanes.splat(1e-6))
+                    bits::<S>(dot(from, normal).simd_lt(splat(simd, 1e-6)))
                 }
-                LocalSupport::Field(_) => part_of::<L>(below_field(support, group, x), part),
+                LocalSupport::Field(_) => part_of::<S>(below_field(support, group, x), part),
             };
         }
         below
@@ -347,29 +330,30 @@ impl LaneSweep<'_> {
 
     /// The step, cut where it would take too much of an element's volume.
     #[inline(always)]
-    fn guarded<L: Lanes>(&self, lanes: L, group: &Group, part: usize, step: [L::F; 3], memory: &Memory) -> [L::F; 3] {
-        let (kept, least) = (lanes.splat(KEPT_SHARE), lanes.splat(FLOOR));
-        let mut too_far = 0;
+    fn guarded<S: Simd>(&self, simd: S, group: &Group, part: usize, step: Reg3<S>, memory: &Memory) -> Reg3<S> {
+        let (kept, least) = (splat(simd, KEPT_SHARE), splat(simd, FLOOR));
+        let mut too_far = Mask::<S>::splat(simd, false);
         let steps = self.groups.steps_of(group);
         for k in 2..steps.len() {
             let (corner, face) = (&steps[k], &memory.faces[k]);
-            let ratio = lanes.load(&face.ratio, part);
-            let change = lanes.load(&corner.inverse_6v, part) * dot::<L>(load3(lanes, &face.area, part), step);
-            too_far |= lanes.less(ratio + change, lanes.min(lanes.max(kept * ratio, least), ratio));
+            let ratio = load(simd, &face.ratio, part);
+            let change = load(simd, &corner.inverse_6v, part) * dot(load3(simd, &face.area, part), step);
+            too_far |= (ratio + change).simd_lt((kept * ratio).max(least).min(ratio));
         }
+        let too_far = bits::<S>(too_far);
         if too_far == 0 {
             return step;
         }
         let mut spilled = [Block([0.0f32; BLOCK]); 3];
-        store3(lanes, step, &mut spilled, part);
-        for lane in (0..L::WIDTH).filter(|lane| too_far >> lane & 1 == 1).map(|lane| part * L::WIDTH + lane) {
+        store3::<S>(step, &mut spilled, part);
+        for lane in (0..width::<S>()).filter(|lane| too_far >> lane & 1 == 1).map(|lane| part * width::<S>() + lane) {
             let step = [spilled[0].0[lane], spilled[1].0[lane], spilled[2].0[lane]];
             let share = self.share(group, lane, step, memory);
             for block in &mut spilled {
                 block.0[lane] *= share;
             }
         }
-        load3(lanes, &spilled, part)
+        load3(simd, &spilled, part)
     }
 
     /// The share of one lane's step that the guard allows.

@@ -5,10 +5,10 @@
 //! and by any thread with the same bits. Along one vertex's step the volume of each of its elements is linear: the step is cut so that none
 //! falls below a floor, and no element is ever inverted.
 
+use crate::Isa;
 use crate::body::Body;
 use crate::descent::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
 use crate::descent::lane_sweep::LaneSweep;
-use crate::simd::Isa;
 use crate::support::LocalSupport;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
