@@ -7,6 +7,8 @@
 //! vertex in turn takes a Newton step on its own 3x3 block, all vertices of one colour at once. [`Oracle`] finds the same minimum to double precision, slowly,
 //! for every solver to be judged by.
 
+#![forbid(unsafe_code)]
+
 mod body;
 mod builder;
 mod comparator;

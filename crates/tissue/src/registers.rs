@@ -4,7 +4,9 @@
 //! nothing is fused: all instruction sets give the same bits. What kernels call in their inner loops must be `#[inline(always)]`, and neither closures nor iterators'
 //! adaptors that take one: only what is inlined for certain is compiled with the registers' instructions.
 
-use fearless_simd::{Select, Simd, SimdBase, SimdFloat, SimdMask, f32x4};
+#[cfg(target_arch = "x86_64")]
+use fearless_simd::SimdInto;
+use fearless_simd::{Select, Simd, SimdBase, SimdCombine, SimdFloat, SimdMask, f32x4};
 use glam::Vec3A;
 
 /// Lanes of a [`Block`].
@@ -92,9 +94,12 @@ pub(crate) fn bits<S: Simd>(mask: Mask<S>) -> u16 {
     mask.to_bitmask() as u16
 }
 
-/// The points that a part of `at` names, turned from rows into registers.
+/// The points that a part of `at` names, turned from rows into registers; zeros if there are none.
 #[inline(always)]
 pub(crate) fn rows<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, part: usize) -> Reg3<S> {
+    if points.is_empty() {
+        return [splat(simd, 0.0); 3];
+    }
     let (quarter, first) = (width::<S>() / 4, part * width::<S>());
     let a = some(simd, points, at, first);
     let b = some(simd, points, at, first + quarter);
@@ -107,18 +112,37 @@ pub(crate) fn rows<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, part: us
 
 /// As many rows as fill a register, one after the other.
 #[inline(always)]
-fn some<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, first: usize) -> Reg<S> {
-    let mut rows = Reg::<S>::block_splat(row(simd, points[at.0[first] as usize]));
-    for k in 1..width::<S>() / 4 {
-        let next = Reg::<S>::block_splat(row(simd, points[at.0[first + k] as usize]));
-        rows = lanes(simd, 0b1111 << (4 * k)).select(next, rows);
+fn some<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, k: usize) -> Reg<S> {
+    match width::<S>() {
+        4 => Reg::<S>::from_slice(simd, row(simd, points, at.0[k]).as_slice()),
+        8 => {
+            let rows = row(simd, points, at.0[k]).combine(row(simd, points, at.0[k + 1]));
+            Reg::<S>::from_slice(simd, rows.as_slice())
+        }
+        _ => {
+            let low = row(simd, points, at.0[k]).combine(row(simd, points, at.0[k + 1]));
+            let high = row(simd, points, at.0[k + 2]).combine(row(simd, points, at.0[k + 3]));
+            Reg::<S>::from_slice(simd, low.combine(high).as_slice())
+        }
     }
-    rows
 }
 
 /// A point and whatever stands beside it.
 #[inline(always)]
-fn row<S: Simd>(simd: S, point: Vec3A) -> f32x4<S> {
+fn row<S: Simd>(simd: S, points: &[Vec3A], at: u32) -> f32x4<S> {
+    // All places are in range. To say so costs less than to ask: a check a row, each with an error of its own, made a sweep a seventh slower.
+    as_row(simd, points[(at as usize).min(points.len() - 1)])
+}
+
+#[cfg(target_arch = "x86_64")]
+#[inline(always)]
+fn as_row<S: Simd>(simd: S, point: Vec3A) -> f32x4<S> {
+    std::arch::x86_64::__m128::from(point).simd_into(simd)
+}
+
+#[cfg(not(target_arch = "x86_64"))]
+#[inline(always)]
+fn as_row<S: Simd>(simd: S, point: Vec3A) -> f32x4<S> {
     f32x4::from_slice(simd, &point.extend(0.0).to_array())
 }
 

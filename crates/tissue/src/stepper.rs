@@ -44,8 +44,8 @@ impl Stepper {
             return Err(Error::Model(format!("a frame of {dt} s; above 0 and at most 10 s make sense")));
         }
         schedule.check()?;
-        // Bodies are what the quasi-Newton solver shares out among threads; handing a small model over to a pool of one would cost more than some frames do.
-        let alone = matches!(schedule, Schedule::QuasiNewton(_)) && (threads == 1 || model.bodies.len() == 1);
+        // Handing a small model over to a pool of one would cost more than some frames do, and bodies are all that the quasi-Newton solver shares out among threads.
+        let alone = threads == 1 || (matches!(schedule, Schedule::QuasiNewton(_)) && model.bodies.len() == 1);
         let pool = if alone {
             None
         } else {
@@ -56,7 +56,7 @@ impl Stepper {
         let mut workers: Vec<Worker> = states
             .map(|(index, (state, body))| Worker {
                 body: index,
-                integrator: integrator(&schedule, body, dt),
+                integrator: integrator(&schedule, body, dt, alone),
                 untangler: Untangler::new(&state),
                 before: state.clone(),
                 state,
@@ -126,10 +126,10 @@ impl Worker {
 }
 
 /// The schedule's solver for a body.
-fn integrator(schedule: &Schedule, body: &Body, dt: f64) -> Box<dyn Integrator> {
-    let sweeps = |descent: Descent| Box::new(DescentIntegrator::new(descent, body));
+fn integrator(schedule: &Schedule, body: &Body, dt: f64, alone: bool) -> Box<dyn Integrator> {
+    let sweeps = |descent: Descent| Box::new(DescentIntegrator::new(descent, body, alone));
     match schedule {
-        Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt) {
+        Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt, alone) {
             Some(integrator) => Box::new(integrator),
             // Every node is pinned, or the matrix cannot be factorised: sweeps need no matrix.
             None => {

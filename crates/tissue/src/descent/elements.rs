@@ -1,7 +1,7 @@
 //! Elements in lanes: whether a motion squeezes any of them too far.
 
-use crate::descent::sweep::{FLOOR, KEPT_SHARE};
 use crate::Isa;
+use crate::descent::sweep::{FLOOR, KEPT_SHARE};
 use crate::lanes::{cross, dot, sub};
 use crate::registers::{BLOCK, Block, Reg, load, parts, rows, splat};
 use fearless_simd::{Simd, SimdBase, SimdMask, dispatch};

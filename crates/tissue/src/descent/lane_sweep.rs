@@ -9,11 +9,11 @@ use crate::descent::kernel::{Local, VolumeTerm};
 use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
 use crate::lanes::{add, cross, dot, scale, sub};
 use crate::registers::{
-    BLOCK, Block, Mask, Reg, Reg3, bits, lanes, load, load3, part_of, parts, rows, signed, splat, splat3, store, store3,
-    width,
+    BLOCK, Block, Mask, Reg, Reg3, bits, lanes, load, load3, part_of, parts, rows, signed, splat, splat3, store,
+    store3, width,
 };
 use crate::support::LocalSupport;
-use fearless_simd::{Select, Simd, SimdBase, SimdMask, dispatch};
+use fearless_simd::{ExtractToken, Select, Simd, SimdBase, SimdMask, dispatch};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -30,9 +30,11 @@ pub(crate) struct LaneSweep<'a> {
     pub term: &'a VolumeTerm,
 }
 
-/// Area vectors and volume ratios of a group's elements, kept between the force and the guard; and where its vertices go.
+/// A group's area vectors and volume ratios, kept between the force and the guard, its sums, and where its vertices go.
 struct Memory {
     faces: [Face; STEPS],
+    /// Forces and blocks, as in [`Sums`]. They are here and not in registers while anything is called.
+    sums: [Block<f32>; 9],
     to: [Block<f32>; 3],
 }
 
@@ -45,7 +47,7 @@ struct Face {
 impl Memory {
     fn new() -> Self {
         let zero = Block([0.0; BLOCK]);
-        Self { faces: [Face { area: [zero; 3], ratio: zero }; STEPS], to: [zero; 3] }
+        Self { faces: [Face { area: [zero; 3], ratio: zero }; STEPS], sums: [zero; 9], to: [zero; 3] }
     }
 }
 
@@ -102,33 +104,27 @@ impl<S: Simd> Sums<S> {
         [dot(bc, f), dot(ca, f), dot(ab, f)]
     }
 
-    /// Lets `change` alter the lanes of a part that are set in `mask`, one by one.
+    /// The sums of a part, out of memory.
     #[inline(always)]
-    fn alter(&mut self, simd: S, part: usize, mask: u16, mut change: impl FnMut(usize, &mut Local)) {
-        let mut spilled = [Block([0.0f32; BLOCK]); 9];
+    fn load(simd: S, from: &[Block<f32>; 9], part: usize) -> Self {
+        let mut sums = Self { force: [splat(simd, 0.0); 3], block: [splat(simd, 0.0); 6] };
         for c in 0..3 {
-            store::<S>(self.force[c], &mut spilled[c], part);
+            sums.force[c] = load(simd, &from[c], part);
         }
         for c in 0..6 {
-            store::<S>(self.block[c], &mut spilled[3 + c], part);
+            sums.block[c] = load(simd, &from[3 + c], part);
         }
-        for lane in (0..width::<S>()).filter(|lane| mask >> lane & 1 == 1).map(|lane| part * width::<S>() + lane) {
-            let [fx, fy, fz, xx, xy, xz, yy, yz, zz] = spilled.map(|block| block.0[lane]);
-            let mut local = Local {
-                force: Vec3A::new(fx, fy, fz),
-                block: Mat3A::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
-            };
-            change(lane, &mut local);
-            let Local { force: f, block: b } = local;
-            let (a, b, c) = (b.x_axis, b.y_axis, b.z_axis);
-            let values = [f.x, f.y, f.z, a.x, a.y, a.z, b.y, b.z, c.z];
-            values.into_iter().zip(&mut spilled).for_each(|(value, to)| to.0[lane] = value);
-        }
+        sums
+    }
+
+    /// Puts the sums of a part into memory.
+    #[inline(always)]
+    fn store(&self, to: &mut [Block<f32>; 9], part: usize) {
         for c in 0..3 {
-            self.force[c] = load(simd, &spilled[c], part);
+            store::<S>(self.force[c], &mut to[c], part);
         }
         for c in 0..6 {
-            self.block[c] = load(simd, &spilled[3 + c], part);
+            store::<S>(self.block[c], &mut to[3 + c], part);
         }
     }
 }
@@ -139,8 +135,7 @@ impl LaneSweep<'_> {
         assert!(x.len() == self.groups.points() && self.substep.start.len() == x.len());
         assert!(self.substep.predictor.len() == x.len());
         let level = self.substep.isa.level();
-        let alone = rayon::current_num_threads() == 1;
-        if alone || self.groups.colors().all(|groups| groups.len() < 2 * CHUNK) {
+        if self.substep.alone || self.groups.colors().all(|groups| groups.len() < 2 * CHUNK) {
             dispatch!(level, simd => self.in_place(simd, self.groups.all(), x));
             return;
         }
@@ -189,7 +184,8 @@ impl LaneSweep<'_> {
     #[inline(always)]
     fn relax<S: Simd>(&self, simd: S, group: &Group, x: &[Vec3A], memory: &mut Memory) -> u16 {
         let active = group.active(self.substep.fixed);
-        if active == 0 {
+        // There are points; nobody else has to ask.
+        if active == 0 || x.is_empty() || self.substep.start.is_empty() || self.substep.predictor.is_empty() {
             return 0;
         }
         if self.groups.steps_of(group).len() > STEPS {
@@ -211,14 +207,11 @@ impl LaneSweep<'_> {
         active
     }
 
-    /// Adds the dashpot along the edge to the point of step `k`, which is at `d` from the vertex.
+    /// Adds the dashpot along the edge to a step's point, which is at `d` from the vertex and was at `before`.
     #[inline(always)]
-    fn add_dashpot<S: Simd>(&self, simd: S, group: &Group, part: usize, k: usize, d: Reg3<S>, sums: &mut Sums<S>) {
-        let Substep { start, h, .. } = *self.substep;
-        let to = &self.groups.steps_of(group)[k].to;
-        let before = sub(rows(simd, start, to, part), rows(simd, start, &group.own, part));
+    fn add_dashpot<S: Simd>(&self, damping: Reg<S>, before: Reg3<S>, d: Reg3<S>, sums: &mut Sums<S>) {
+        let (simd, h) = (damping.token(), self.substep.h);
         let length = dot(before, before).max(splat(simd, LEAST_SQUARE));
-        let damping = load(simd, &self.groups.damping_of(group)[k], part);
         let stiffness = damping * splat(simd, 1.0 / h) / length;
         let shortening = (dot(before, before) - dot(d, d)) * splat(simd, 0.5);
         sums.pull(stiffness * shortening, d);
@@ -241,12 +234,15 @@ impl LaneSweep<'_> {
         let zero = splat(simd, 0.0);
         let diagonal = inertia + load(simd, &group.laplacian, part);
         let pulled = sub(rows(simd, self.substep.predictor, &group.own, part), here);
-        let mut sums =
+        let mut sums: Sums<S> =
             Sums { force: scale(pulled, inertia), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
         let (sixth, plain) = (splat(simd, self.term.lambda / 6.0), splat(simd, VolumeTerm::PLAIN));
         let pressure = splat(simd, self.term.lambda * self.term.alpha / 6.0);
         let steps = self.groups.steps_of(group);
-        let drops = self.groups.drops_of(group);
+        let drops = &self.groups.drops_of(group)[..steps.len()];
+        let faces = &mut memory.faces[..steps.len()];
+        let (start, damping) = (self.substep.start, self.groups.damping_of(group));
+        let began = if VISCOUS { rows(simd, start, &group.own, part) } else { [zero; 3] };
         // The window, relative to the vertex. It takes two points to fill it.
         let (mut p, mut q, mut r) = ([zero; 3], [zero; 3], [zero; 3]);
         for k in 0..2.min(steps.len()) {
@@ -254,16 +250,18 @@ impl LaneSweep<'_> {
             (p, q, r) = (q, r, sub(rows(simd, x, &step.to, part), here));
             sums.pull(load(simd, &step.edge, part), r);
             if VISCOUS {
-                self.add_dashpot(simd, group, part, k, r, &mut sums);
+                let before = sub(rows(simd, start, &step.to, part), began);
+                self.add_dashpot(load(simd, &damping[k], part), before, r, &mut sums);
             }
         }
         let mut low = Mask::<S>::splat(simd, false);
         for k in 2..steps.len() {
-            let (step, drop, face) = (&steps[k], drops[k], &mut memory.faces[k]);
+            let (step, drop, face) = (&steps[k], drops[k], &mut faces[k]);
             let d = sub(rows(simd, x, &step.to, part), here);
             sums.pull(load(simd, &step.edge, part), d);
             if VISCOUS {
-                self.add_dashpot(simd, group, part, k, d, &mut sums);
+                let before = sub(rows(simd, start, &step.to, part), began);
+                self.add_dashpot(load(simd, &damping[k], part), before, d, &mut sums);
             }
             let drop = lanes(simd, part_of::<S>(drop, part));
             p = [drop.select(q[0], p[0]), drop.select(q[1], p[1]), drop.select(q[2], p[2])];
@@ -276,17 +274,17 @@ impl LaneSweep<'_> {
             let stiffness = inverse.abs() * sixth;
             sums.pull(stiffness * six_v - signed(simd, pressure, inverse), area);
             sums.add_outer(stiffness, area);
-            low |= (inverse.abs() * ratio).simd_lt(inverse.abs() * plain);
+            low |= ratio.simd_lt(plain) & !inverse.simd_eq(zero);
             store3::<S>(area, &mut face.area, part);
             store::<S>(ratio, &mut face.ratio, part);
         }
+        sums.store(&mut memory.sums, part);
         let low = bits::<S>(low) & part_of::<S>(active, part);
         let below = self.below(simd, group, here, x, part) & part_of::<S>(active, part);
         if (low | below) != 0 {
-            let memory = &*memory;
-            sums.alter(simd, part, low | below, |lane, local| self.add_rare(group, lane, x, memory, local));
+            self.add_rare(group, (low | below) << (part * width::<S>()), x, memory);
         }
-        let step = sums.solve(simd);
+        let step = Sums::load(simd, &memory.sums, part).solve(simd);
         let to = self.guarded(simd, group, part, step, memory);
         let to = add(here, to);
         store3::<S>(to, &mut memory.to, part);
@@ -309,10 +307,26 @@ impl LaneSweep<'_> {
         below
     }
 
-    /// What the plain sums lack in one lane: the supports' forces, and the barrier in elements of little volume.
+    /// Adds what the plain sums lack in some lanes.
     #[cold]
     #[inline(never)]
-    fn add_rare(&self, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory, local: &mut Local) {
+    fn add_rare(&self, group: &Group, rare: u16, x: &[Vec3A], memory: &mut Memory) {
+        for lane in (0..BLOCK).filter(|lane| rare >> lane & 1 == 1) {
+            let [fx, fy, fz, xx, xy, xz, yy, yz, zz] = memory.sums.each_ref().map(|block| block.0[lane]);
+            let mut local = Local {
+                force: Vec3A::new(fx, fy, fz),
+                block: Mat3A::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
+            };
+            self.add_rare_to(&mut local, group, lane, x, memory);
+            let Local { force: f, block: b } = local;
+            let (a, b, c) = (b.x_axis, b.y_axis, b.z_axis);
+            let values = [f.x, f.y, f.z, a.x, a.y, a.z, b.y, b.z, c.z];
+            values.into_iter().zip(&mut memory.sums).for_each(|(value, to)| to.0[lane] = value);
+        }
+    }
+
+    /// What the plain sums lack in one lane: the supports' forces, and the barrier in elements of little volume.
+    fn add_rare_to(&self, local: &mut Local, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory) {
         let vertex = group.first as usize + lane;
         self.substep.add_supports(vertex, x[vertex], local);
         for (step, face) in self.groups.steps_of(group).iter().zip(&memory.faces).skip(2) {

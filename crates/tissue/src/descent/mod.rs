@@ -36,6 +36,7 @@ pub(crate) struct DescentIntegrator {
     held: Vec<bool>,
     supports: Vec<LocalSupport>,
     isa: Isa,
+    alone: bool,
 }
 
 impl Integrator for DescentIntegrator {
@@ -49,7 +50,8 @@ impl Integrator for DescentIntegrator {
 }
 
 impl DescentIntegrator {
-    pub fn new(schedule: Descent, body: &Body) -> Self {
+    /// For `body`; `alone`: the calling thread sweeps, and not a pool's.
+    pub fn new(schedule: Descent, body: &Body, alone: bool) -> Self {
         let zeros = vec![Vec3A::ZERO; body.len()];
         Self {
             schedule,
@@ -60,6 +62,7 @@ impl DescentIntegrator {
             held: vec![false; body.len()],
             supports: LocalSupport::of(body),
             isa: Isa::detect(),
+            alone,
         }
     }
 
@@ -93,6 +96,7 @@ impl DescentIntegrator {
             fixed: &self.fixed,
             supports: &self.supports,
             isa: self.isa,
+            alone: self.alone,
         };
         for _ in 0..self.schedule.iterations {
             substep.sweep(&mut state.x, &mut self.guess);
