@@ -177,17 +177,7 @@ fn peer(places: &Places, arguments: &[&str], saved: &str) -> Outcome<Figures> {
 
 fn ours(places: &Places, schedule: &str, threads: &str) -> Outcome<Figures> {
     let mut command = Command::new(&places.trocar);
-    command.args([
-        "--json",
-        "--quiet",
-        "bench",
-        "organs",
-        "--schedule",
-        schedule,
-        "--threads",
-        threads,
-        "--mesh",
-    ]);
+    command.args(["--json", "--quiet", "bench", "organs", "--schedule", schedule, "--threads", threads, "--mesh"]);
     let result = json_of(&output(command.arg(&places.mesh))?)?;
     let wall = number(&result, "real_time_factor")?;
     Ok(Figures { wall, cpu: (threads == "1").then_some(wall), sag: number(&result, "static_sag_error")? })
