@@ -3,6 +3,7 @@
 //! Every operation is one IEEE operation a lane, none is fused and sums have a fixed order: all instruction sets give the same bits.
 
 use fearless_simd::{Simd, SimdBase, SimdCombine, f32x4, f32x16};
+use std::ops::{Add, Mul, Sub};
 
 /// Lanes of a vector.
 pub(crate) const LANES: usize = 16;
@@ -77,27 +78,27 @@ pub(crate) fn store_rows<S: Simd>(simd: S, v: Vec3L<S>, rows: &mut [Row]) {
 }
 
 #[inline(always)]
-pub(crate) fn sub<S: Simd>(a: Vec3L<S>, b: Vec3L<S>) -> Vec3L<S> {
+pub(crate) fn sub<F: Copy + Sub<Output = F>>(a: [F; 3], b: [F; 3]) -> [F; 3] {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-pub(crate) fn add<S: Simd>(a: Vec3L<S>, b: Vec3L<S>) -> Vec3L<S> {
+pub(crate) fn add<F: Copy + Add<Output = F>>(a: [F; 3], b: [F; 3]) -> [F; 3] {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 #[inline(always)]
-pub(crate) fn scale<S: Simd>(a: Vec3L<S>, by: f32x16<S>) -> Vec3L<S> {
+pub(crate) fn scale<F: Copy + Mul<Output = F>>(a: [F; 3], by: F) -> [F; 3] {
     [a[0] * by, a[1] * by, a[2] * by]
 }
 
 #[inline(always)]
-pub(crate) fn dot<S: Simd>(a: Vec3L<S>, b: Vec3L<S>) -> f32x16<S> {
+pub(crate) fn dot<F: Copy + Add<Output = F> + Mul<Output = F>>(a: [F; 3], b: [F; 3]) -> F {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-pub(crate) fn cross<S: Simd>(a: Vec3L<S>, b: Vec3L<S>) -> Vec3L<S> {
+pub(crate) fn cross<F: Copy + Sub<Output = F> + Mul<Output = F>>(a: [F; 3], b: [F; 3]) -> [F; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 

@@ -7,6 +7,8 @@
 //! vertex in turn takes a Newton step on its own 3x3 block, all vertices of one colour at once. [`Oracle`] finds the same minimum to double precision, slowly,
 //! for every solver to be judged by.
 
+#![forbid(unsafe_code)]
+
 mod body;
 mod builder;
 mod comparator;
@@ -24,9 +26,9 @@ mod model;
 pub mod oracle;
 pub mod pins;
 mod quasi_newton;
+mod registers;
 mod report;
 mod schedule;
-mod simd;
 mod state;
 mod stepper;
 mod stiffness;
@@ -41,12 +43,12 @@ pub use cutting::{Cut, Piece, Severed, sever};
 pub use energy::Energy;
 pub use error::{Error, Result};
 pub use grasp::{Compliance, Grasp, ToolMotion};
+pub use isa::Isa;
 pub use material::{ConstitutiveModel, Corotated, Hyperelastic, Material, StVenantKirchhoff, StableNeoHookean};
 pub use model::Model;
 pub use oracle::{Held, Newton, Oracle, OracleState};
 pub use report::{Divergence, StepReport};
 pub use schedule::{Descent, QuasiNewton, Schedule, Start};
-pub use simd::Isa;
 pub use state::State;
 pub use stepper::Stepper;
 pub use support::{Support, SupportField, SupportPlane};

@@ -60,8 +60,9 @@ impl Stepper {
     /// # Errors
     /// Threads that the system does not give; the stepper still steps the old model then.
     pub fn follow(&mut self, model: &Model) -> Result<()> {
-        // Bodies are what the quasi-Newton solver shares out among threads; handing a small model over to a pool of one would cost more than some frames do.
-        let alone = matches!(self.schedule, Schedule::QuasiNewton(_)) && (self.threads == 1 || model.bodies.len() == 1);
+        // Handing a small model over to a pool of one would cost more than some frames do, and bodies are all that the quasi-Newton solver shares out among threads.
+        let one = matches!(self.schedule, Schedule::QuasiNewton(_)) && model.bodies.len() == 1;
+        let alone = self.threads == 1 || one;
         if alone {
             self.pool = None;
         } else if self.pool.is_none() {
@@ -76,7 +77,7 @@ impl Stepper {
                 None => Worker {
                     body: index,
                     of: body.clone(),
-                    integrator: integrator(&self.schedule, body, self.dt),
+                    integrator: integrator(&self.schedule, body, self.dt, alone),
                     untangler: Untangler::new(&state),
                     before: state.clone(),
                     state,
@@ -171,10 +172,10 @@ impl Worker {
 }
 
 /// The schedule's solver for a body.
-fn integrator(schedule: &Schedule, body: &Body, dt: f64) -> Box<dyn Integrator> {
-    let sweeps = |descent: Descent| Box::new(TouchingDescent::new(descent, body));
+fn integrator(schedule: &Schedule, body: &Body, dt: f64, alone: bool) -> Box<dyn Integrator> {
+    let sweeps = |descent: Descent| Box::new(TouchingDescent::new(descent, body, alone));
     match schedule {
-        Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt) {
+        Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt, alone) {
             Some(integrator) => Box::new(integrator),
             // Every node is pinned, or the matrix cannot be factorised: sweeps need no matrix.
             None => {

@@ -340,9 +340,9 @@ pub struct Simulate {
     /// Lift of the jaws [mm].
     #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
     pub lift: f64,
-    /// How a frame is cut into substeps and sweeps.
-    #[arg(long, value_enum, default_value_t = ScheduleName::Default)]
-    pub schedule: ScheduleName,
+    /// What steps the organs.
+    #[arg(long, value_enum, default_value_t = SolverName::Fast)]
+    pub schedule: SolverName,
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
@@ -356,13 +356,4 @@ pub struct Simulate {
 pub enum Task {
     /// Settle, grasp, lift, hold, lower, open.
     GraspLift,
-}
-
-/// Schedules by name.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub enum ScheduleName {
-    /// 8 substeps of 10 sweeps from the adaptive start.
-    Default,
-    /// 8 substeps of 10 sweeps from the inertial predictor: the paper's, with our inversion guard.
-    Paper,
 }

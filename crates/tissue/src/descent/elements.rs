@@ -1,10 +1,13 @@
 //! Elements in lanes: whether a motion squeezes any of them too far.
 
+use crate::Isa;
 use crate::descent::sweep::{FLOOR, KEPT_SHARE};
-use crate::simd::{BLOCK, Block, Isa, Lanes, Task, cross, dot, minus};
+use crate::lanes::{cross, dot, sub};
+use crate::registers::{BLOCK, Block, Reg, load, parts, rows, splat};
+use fearless_simd::{Simd, SimdBase, SimdMask, dispatch};
 use glam::Vec3A;
 
-/// The elements that can move, sixteen to a block. The offsets are in range for `points` points, and private.
+/// The elements that can move, sixteen to a block.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Elements {
     points: usize,
@@ -13,19 +16,15 @@ pub(crate) struct Elements {
 
 #[derive(Clone, Debug)]
 struct Elements16 {
-    /// Corners, as offsets [bytes].
     corners: [Block<u32>; 4],
     /// 1 / (6 V0) [1/m3].
     inverse_6v: Block<f32>,
 }
 
-/// Bytes of a point.
-const POINT: u32 = 16;
-
 impl Elements {
-    /// Those of `tets`, of volumes `volumes` [m3], that are not all pinned. None for bodies too large for byte offsets of 32 bits.
+    /// Those of `tets`, of volumes `volumes` [m3], that are not all pinned. None if a corner is none of the `points` nodes.
     pub fn new(tets: &[[u32; 4]], volumes: &[f64], pinned: impl Fn(u32) -> bool, points: usize) -> Option<Self> {
-        if points > (u32::MAX / POINT) as usize || tets.iter().flatten().any(|i| *i as usize >= points) {
+        if tets.iter().flatten().any(|i| *i as usize >= points) {
             return None;
         }
         let moving: Vec<usize> = (0..tets.len()).filter(|t| !tets[*t].iter().all(|i| pinned(*i))).collect();
@@ -33,7 +32,7 @@ impl Elements {
             // Places left over hold the chunk's last element again.
             let at = |lane: usize| chunk[lane.min(chunk.len() - 1)];
             Elements16 {
-                corners: [0, 1, 2, 3].map(|c| Block(std::array::from_fn(|lane| tets[at(lane)][c] * POINT))),
+                corners: [0, 1, 2, 3].map(|c| Block(std::array::from_fn(|lane| tets[at(lane)][c]))),
                 inverse_6v: Block(std::array::from_fn(|lane| (1.0 / (6.0 * volumes[at(lane)])) as f32)),
             }
         };
@@ -43,46 +42,32 @@ impl Elements {
     /// Whether the motion from `before` to `now` leaves an element less than a tenth of its volume and than the floor allows, unless it had less already.
     pub fn any_squeezed(&self, isa: Isa, before: &[Vec3A], now: &[Vec3A]) -> bool {
         assert!(before.len() == self.points && now.len() == self.points);
-        isa.run(AnySqueezed { blocks: &self.blocks, before, now })
+        dispatch!(isa.level(), simd => any_squeezed(simd, &self.blocks, before, now))
     }
 }
 
-/// The points are as many as the elements were made for.
-struct AnySqueezed<'a> {
-    blocks: &'a [Elements16],
-    before: &'a [Vec3A],
-    now: &'a [Vec3A],
-}
-
-impl Task for AnySqueezed<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) -> bool {
-        for block in self.blocks {
-            for part in 0..L::PARTS {
-                let before = ratio(lanes, block, part, self.before);
-                let now = ratio(lanes, block, part, self.now);
-                let floor = lanes.max(lanes.splat(KEPT_SHARE) * before, lanes.splat(FLOOR));
-                if lanes.less(now, lanes.min(floor, before)) != 0 {
-                    return true;
-                }
+#[inline(always)]
+fn any_squeezed<S: Simd>(simd: S, blocks: &[Elements16], before: &[Vec3A], now: &[Vec3A]) -> bool {
+    for block in blocks {
+        for part in 0..parts::<S>() {
+            let before = ratio(simd, block, part, before);
+            let now = ratio(simd, block, part, now);
+            let floor = (splat(simd, KEPT_SHARE) * before).max(splat(simd, FLOOR));
+            if now.simd_lt(floor.min(before)).any_true() {
+                return true;
             }
         }
-        false
     }
+    false
 }
 
 /// Volume over rest volume of a part's elements.
 #[inline(always)]
-#[allow(unsafe_code, reason = "points are read by indices that the elements vouch for")]
-fn ratio<L: Lanes>(lanes: L, block: &Elements16, part: usize, x: &[Vec3A]) -> L::F {
+fn ratio<S: Simd>(simd: S, block: &Elements16, part: usize, x: &[Vec3A]) -> Reg<S> {
     let [a, b, c, d] = &block.corners;
-    // SAFETY: the offsets are 16 times numbers below `Elements::points`, the length of `x` (`any_squeezed` asserts it).
-    let (a, b, c, d) =
-        unsafe { (lanes.rows(x, a, part), lanes.rows(x, b, part), lanes.rows(x, c, part), lanes.rows(x, d, part)) };
-    let area = cross::<L>(minus::<L>(b, a), minus::<L>(c, a));
-    dot::<L>(area, minus::<L>(d, a)) * lanes.load(&block.inverse_6v, part)
+    let (a, b) = (rows(simd, x, a, part), rows(simd, x, b, part));
+    let (c, d) = (rows(simd, x, c, part), rows(simd, x, d, part));
+    dot(cross(sub(b, a), sub(c, a)), sub(d, a)) * load(simd, &block.inverse_6v, part)
 }
 
 #[cfg(test)]

@@ -5,13 +5,13 @@
 
 use crate::body::Body;
 use crate::descent::strip::Push;
-use crate::simd::{BLOCK, Block};
+use crate::registers::{BLOCK, Block};
 
 /// Sixteen vertices of one colour.
 #[derive(Clone, Debug)]
 pub(crate) struct Group {
-    /// The lanes' own points, as offsets [bytes].
-    own: Block<u32>,
+    /// The lanes' own points.
+    pub own: Block<u32>,
     /// Masses [kg].
     pub mass: Block<f32>,
     /// Constant diagonals of the elastic blocks [N/m].
@@ -28,15 +28,15 @@ pub(crate) struct Group {
 /// One point along the lanes' strips.
 #[derive(Clone, Debug)]
 pub(crate) struct Step {
-    /// The point that enters, as an offset [bytes].
-    to: Block<u32>,
+    /// The point that enters.
+    pub to: Block<u32>,
     /// 1 / (6 V0) of the element behind the window [1/m3], negative where the window is turned over, 0 where there is none.
     pub inverse_6v: Block<f32>,
     /// Laplacian of the edge to the point [N/m]; 0 but for the first time that the strip meets it.
     pub edge: Block<f32>,
 }
 
-/// The groups of a body, colour by colour. Fields that index points are private: they are in range for `points` of them.
+/// The groups of a body, colour by colour.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Groups {
     points: usize,
@@ -50,17 +50,10 @@ pub(crate) struct Groups {
     color_start: Vec<u32>,
 }
 
-/// Bytes of a point.
-const POINT: u32 = 16;
-
 impl Groups {
-    /// Lays out a body; `strips` are those of its free vertices. None for bodies too large for byte offsets of 32 bits.
+    /// Lays out a body; `strips` are those of its free vertices.
     pub fn new(body: &Body, strips: &[Vec<Push>]) -> Self {
-        let points = body.len();
-        if points > (u32::MAX / POINT) as usize {
-            return Self::default();
-        }
-        let mut groups = Self { points, color_start: vec![0], ..Self::default() };
+        let mut groups = Self { points: body.len(), color_start: vec![0], ..Self::default() };
         for color in body.color_start.windows(2) {
             for first in (color[0]..color[1]).step_by(BLOCK) {
                 groups.add(body, first, (color[1] - first).min(BLOCK as u32), strips);
@@ -72,7 +65,7 @@ impl Groups {
 
     fn add(&mut self, body: &Body, first: u32, count: u32, strips: &[Vec<Push>]) {
         let zero = Block([0.0; BLOCK]);
-        let own = Block(std::array::from_fn(|lane| (first + (lane as u32).min(count - 1)) * POINT));
+        let own = Block(std::array::from_fn(|lane| first + (lane as u32).min(count - 1)));
         let (start, viscous) = (self.steps.len() as u32, body.material.viscosity > 0.0);
         let mut group = Group { own, mass: zero, laplacian: zero, first, count, start, end: start };
         let strips = &strips[first as usize..(first + count) as usize];
@@ -93,8 +86,7 @@ impl Groups {
             for (k, push) in strip.iter().enumerate() {
                 let at = start as usize + k;
                 let step = &mut self.steps[at];
-                debug_assert!((push.to as usize) < self.points);
-                step.to.0[lane] = push.to.min(self.points as u32 - 1) * POINT;
+                step.to.0[lane] = push.to;
                 if let Some((corner, turned)) = push.triangle {
                     let inverse = corners[corner as usize].inverse_6v;
                     step.inverse_6v.0[lane] = if turned { -inverse } else { inverse };
@@ -117,7 +109,7 @@ impl Groups {
         self.groups.is_empty()
     }
 
-    /// Points that the offsets are good for.
+    /// Points of the body.
     pub fn points(&self) -> usize {
         self.points
     }
@@ -152,24 +144,10 @@ impl Groups {
 }
 
 impl Group {
-    /// The lanes' own points, as offsets [bytes]: 16 times numbers below [`Groups::points`].
-    #[inline(always)]
-    pub fn own(&self) -> &Block<u32> {
-        &self.own
-    }
-
     /// Lanes whose vertices are free now.
     #[inline(always)]
     pub fn active(&self, fixed: &[bool]) -> u16 {
         let fixed = &fixed[self.first as usize..(self.first + self.count) as usize];
         fixed.iter().enumerate().fold(0, |mask, (lane, fixed)| mask | u16::from(!fixed) << lane)
-    }
-}
-
-impl Step {
-    /// The points that enter, as offsets [bytes]: 16 times numbers below [`Groups::points`].
-    #[inline(always)]
-    pub fn to(&self) -> &Block<u32> {
-        &self.to
     }
 }

@@ -7,7 +7,11 @@
 use crate::descent::groups::{Group, Groups};
 use crate::descent::kernel::{Local, VolumeTerm};
 use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
-use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, store3};
+use crate::lanes::{add, cross, dot, scale, sub};
+use crate::registers::{
+    BLOCK, Block, Mask, Reg, Reg3, bits, lanes, load, load3, part_of, parts, rows, signed, splat, store, store3, width,
+};
+use fearless_simd::{ExtractToken, Select, Simd, SimdBase, SimdMask, dispatch};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -24,9 +28,11 @@ pub(crate) struct LaneSweep<'a> {
     pub term: &'a VolumeTerm,
 }
 
-/// Area vectors and volume ratios of a group's elements, kept between the force and the guard; and where its vertices go.
+/// A group's area vectors and volume ratios, kept between the force and the guard, its sums, and where its vertices go.
 struct Memory {
     faces: [Face; STEPS],
+    /// Forces and blocks, as in [`Sums`]. They are here and not in registers while anything is called.
+    sums: [Block<f32>; 9],
     to: [Block<f32>; 3],
 }
 
@@ -39,46 +45,7 @@ struct Face {
 impl Memory {
     fn new() -> Self {
         let zero = Block([0.0; BLOCK]);
-        Self { faces: [Face { area: [zero; 3], ratio: zero }; STEPS], to: [zero; 3] }
-    }
-}
-
-/// Groups one after the other, in place.
-struct InPlace<'a>(&'a LaneSweep<'a>, &'a [Group], &'a mut [Vec3A]);
-
-/// Groups of one colour: where their vertices go from the positions of all, the first group's vertices first.
-struct Apart<'a>(&'a LaneSweep<'a>, &'a [Group], &'a [Vec3A], &'a mut [Vec3A]);
-
-impl Task for InPlace<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
-        let Self(sweep, groups, x) = self;
-        let mut memory = Memory::new();
-        for group in groups {
-            let active = sweep.relax(lanes, group, x, &mut memory);
-            let first = group.first as usize;
-            memory.write(active, &mut x[first..first + group.count as usize]);
-        }
-    }
-}
-
-impl Task for Apart<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<L: Lanes>(self, lanes: L) {
-        let Self(sweep, groups, x, moved) = self;
-        let mut memory = Memory::new();
-        let base = groups.first().map_or(0, |group| group.first);
-        for group in groups {
-            let active = sweep.relax(lanes, group, x, &mut memory);
-            let (first, at) = (group.first as usize, (group.first - base) as usize);
-            let moved = &mut moved[at..at + group.count as usize];
-            moved.copy_from_slice(&x[first..first + group.count as usize]);
-            memory.write(active, moved);
-        }
+        Self { faces: [Face { area: [zero; 3], ratio: zero }; STEPS], sums: [zero; 9], to: [zero; 3] }
     }
 }
 
@@ -97,22 +64,22 @@ impl Memory {
 
 /// Forces and blocks of lanes: xx, xy, xz, yy, yz, zz.
 #[derive(Clone, Copy)]
-struct Sums<L: Lanes> {
-    force: [L::F; 3],
-    block: [L::F; 6],
+struct Sums<S: Simd> {
+    force: Reg3<S>,
+    block: [Reg<S>; 6],
 }
 
-impl<L: Lanes> Sums<L> {
+impl<S: Simd> Sums<S> {
     /// force -= k d
     #[inline(always)]
-    fn pull(&mut self, k: L::F, d: [L::F; 3]) {
+    fn pull(&mut self, k: Reg<S>, d: Reg3<S>) {
         self.force = [self.force[0] - k * d[0], self.force[1] - k * d[1], self.force[2] - k * d[2]];
     }
 
     /// block += k d d'
     #[inline(always)]
-    fn add_outer(&mut self, k: L::F, d: [L::F; 3]) {
-        let kd = scaled::<L>(k, d);
+    fn add_outer(&mut self, k: Reg<S>, d: Reg3<S>) {
+        let kd = scale(d, k);
         let b = self.block;
         self.block = [
             b[0] + kd[0] * d[0],
@@ -126,42 +93,36 @@ impl<L: Lanes> Sums<L> {
 
     /// The Newton step: the block's inverse times the force.
     #[inline(always)]
-    fn solve(&self, lanes: L) -> [L::F; 3] {
+    fn solve(&self, simd: S) -> Reg3<S> {
         let [xx, xy, xz, yy, yz, zz] = self.block;
         let (a, b, c) = ([xx, xy, xz], [xy, yy, yz], [xz, yz, zz]);
-        let (bc, ca, ab) = (cross::<L>(b, c), cross::<L>(c, a), cross::<L>(a, b));
-        let inverse = lanes.splat(1.0) / dot::<L>(a, bc);
-        let f = scaled::<L>(inverse, self.force);
-        [dot::<L>(bc, f), dot::<L>(ca, f), dot::<L>(ab, f)]
+        let (bc, ca, ab) = (cross(b, c), cross(c, a), cross(a, b));
+        let inverse = splat(simd, 1.0) / dot(a, bc);
+        let f = scale(self.force, inverse);
+        [dot(bc, f), dot(ca, f), dot(ab, f)]
     }
 
-    /// Lets `change` alter the lanes of a part that are set in `mask`, one by one.
+    /// The sums of a part, out of memory.
     #[inline(always)]
-    fn alter(&mut self, lanes: L, part: usize, mask: u16, mut change: impl FnMut(usize, &mut Local)) {
-        let mut spilled = [Block([0.0f32; BLOCK]); 9];
+    fn load(simd: S, from: &[Block<f32>; 9], part: usize) -> Self {
+        let mut sums = Self { force: [splat(simd, 0.0); 3], block: [splat(simd, 0.0); 6] };
         for c in 0..3 {
-            lanes.store(self.force[c], &mut spilled[c], part);
+            sums.force[c] = load(simd, &from[c], part);
         }
         for c in 0..6 {
-            lanes.store(self.block[c], &mut spilled[3 + c], part);
+            sums.block[c] = load(simd, &from[3 + c], part);
         }
-        for lane in (0..L::WIDTH).filter(|lane| mask >> lane & 1 == 1).map(|lane| part * L::WIDTH + lane) {
-            let [fx, fy, fz, xx, xy, xz, yy, yz, zz] = spilled.map(|block| block.0[lane]);
-            let mut local = Local {
-                force: Vec3A::new(fx, fy, fz),
-                block: Mat3A::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
-            };
-            change(lane, &mut local);
-            let Local { force: f, block: b } = local;
-            let (a, b, c) = (b.x_axis, b.y_axis, b.z_axis);
-            let values = [f.x, f.y, f.z, a.x, a.y, a.z, b.y, b.z, c.z];
-            values.into_iter().zip(&mut spilled).for_each(|(value, to)| to.0[lane] = value);
-        }
+        sums
+    }
+
+    /// Puts the sums of a part into memory.
+    #[inline(always)]
+    fn store(&self, to: &mut [Block<f32>; 9], part: usize) {
         for c in 0..3 {
-            self.force[c] = lanes.load(&spilled[c], part);
+            store::<S>(self.force[c], &mut to[c], part);
         }
         for c in 0..6 {
-            self.block[c] = lanes.load(&spilled[3 + c], part);
+            store::<S>(self.block[c], &mut to[3 + c], part);
         }
     }
 }
@@ -171,15 +132,14 @@ impl LaneSweep<'_> {
     pub fn sweep(&self, x: &mut [Vec3A], moved: &mut [Vec3A]) {
         assert!(x.len() == self.groups.points() && self.substep.start.len() == x.len());
         assert!(self.substep.predictor.len() == x.len());
-        let isa = self.substep.isa;
-        let alone = rayon::current_num_threads() == 1;
-        if alone || self.groups.colors().all(|groups| groups.len() < 2 * CHUNK) {
-            isa.run(InPlace(self, self.groups.all(), x));
+        let level = self.substep.isa.level();
+        if self.substep.alone || self.groups.colors().all(|groups| groups.len() < 2 * CHUNK) {
+            dispatch!(level, simd => self.in_place(simd, self.groups.all(), x));
             return;
         }
         for groups in self.groups.colors() {
             if groups.len() < 2 * CHUNK {
-                isa.run(InPlace(self, groups, x));
+                dispatch!(level, simd => self.in_place(simd, groups, x));
                 continue;
             }
             let (first, last) = (groups[0].first as usize, &groups[groups.len() - 1]);
@@ -187,17 +147,43 @@ impl LaneSweep<'_> {
             let (all, chunks) = (&*x, groups.par_chunks(CHUNK));
             // All groups of a colour but the last are full.
             moved[first..end].par_chunks_mut(CHUNK * BLOCK).zip(chunks).for_each(|(moved, groups)| {
-                isa.run(Apart(self, groups, all, moved));
+                dispatch!(level, simd => self.apart(simd, groups, all, moved));
             });
             x[first..end].copy_from_slice(&moved[first..end]);
         }
     }
 
+    /// Groups one after the other, in place.
+    #[inline(always)]
+    fn in_place<S: Simd>(&self, simd: S, groups: &[Group], x: &mut [Vec3A]) {
+        let mut memory = Memory::new();
+        for group in groups {
+            let active = self.relax(simd, group, x, &mut memory);
+            let first = group.first as usize;
+            memory.write(active, &mut x[first..first + group.count as usize]);
+        }
+    }
+
+    /// Groups of one colour: where their vertices go from the positions of all, the first group's vertices first.
+    #[inline(always)]
+    fn apart<S: Simd>(&self, simd: S, groups: &[Group], x: &[Vec3A], moved: &mut [Vec3A]) {
+        let mut memory = Memory::new();
+        let base = groups.first().map_or(0, |group| group.first);
+        for group in groups {
+            let active = self.relax(simd, group, x, &mut memory);
+            let (first, at) = (group.first as usize, (group.first - base) as usize);
+            let moved = &mut moved[at..at + group.count as usize];
+            moved.copy_from_slice(&x[first..first + group.count as usize]);
+            memory.write(active, moved);
+        }
+    }
+
     /// Finds where a group's vertices go; returns the lanes that move.
     #[inline(always)]
-    fn relax<L: Lanes>(&self, lanes: L, group: &Group, x: &[Vec3A], memory: &mut Memory) -> u16 {
+    fn relax<S: Simd>(&self, simd: S, group: &Group, x: &[Vec3A], memory: &mut Memory) -> u16 {
         let active = group.active(self.substep.fixed);
-        if active == 0 {
+        // There are points; nobody else has to ask.
+        if active == 0 || x.is_empty() || self.substep.start.is_empty() || self.substep.predictor.is_empty() {
             return 0;
         }
         if self.groups.steps_of(group).len() > STEPS {
@@ -207,44 +193,33 @@ impl LaneSweep<'_> {
             }
             return active;
         }
-        for part in 0..L::PARTS {
-            if part_of::<L>(active, part) != 0 {
+        for part in 0..parts::<S>() {
+            if part_of::<S>(active, part) != 0 {
                 if self.groups.damping_of(group).is_empty() {
-                    self.relax_part::<L, false>(lanes, group, part, active, x, memory);
+                    self.relax_part::<S, false>(simd, group, part, active, x, memory);
                 } else {
-                    self.relax_part::<L, true>(lanes, group, part, active, x, memory);
+                    self.relax_part::<S, true>(simd, group, part, active, x, memory);
                 }
             }
         }
         active
     }
 
-    /// Points that a group's offsets name.
+    /// Adds the dashpot along the edge to a step's point, which is at `d` from the vertex and was at `before`.
     #[inline(always)]
-    #[allow(unsafe_code, reason = "points are read by indices that the groups vouch for")]
-    fn read<L: Lanes>(&self, lanes: L, part: usize, points: &[Vec3A], offsets: &Block<u32>) -> [L::F; 3] {
-        // SAFETY: the offsets are 16 times numbers below `Groups::points`, the length of all arrays of points (`sweep` asserts it).
-        unsafe { lanes.rows(points, offsets, part) }
-    }
-
-    /// Adds the dashpot along the edge to the point of step `k`, which is at `d` from the vertex.
-    #[inline(always)]
-    fn add_dashpot<L: Lanes>(&self, lanes: L, group: &Group, part: usize, k: usize, d: [L::F; 3], sums: &mut Sums<L>) {
-        let Substep { start, h, .. } = *self.substep;
-        let to = self.groups.steps_of(group)[k].to();
-        let before = minus::<L>(self.read(lanes, part, start, to), self.read(lanes, part, start, group.own()));
-        let length = lanes.max(dot::<L>(before, before), lanes.splat(LEAST_SQUARE));
-        let damping = lanes.load(&self.groups.damping_of(group)[k], part);
-        let stiffness = damping * lanes.splat(1.0 / h) / length;
-        let shortening = (dot::<L>(before, before) - dot::<L>(d, d)) * lanes.splat(0.5);
+    fn add_dashpot<S: Simd>(&self, damping: Reg<S>, before: Reg3<S>, d: Reg3<S>, sums: &mut Sums<S>) {
+        let (simd, h) = (damping.token(), self.substep.h);
+        let length = dot(before, before).max(splat(simd, LEAST_SQUARE));
+        let stiffness = damping * splat(simd, 1.0 / h) / length;
+        let shortening = (dot(before, before) - dot(d, d)) * splat(simd, 0.5);
         sums.pull(stiffness * shortening, d);
         sums.add_outer(stiffness, d);
     }
 
     #[inline(always)]
-    fn relax_part<L: Lanes, const VISCOUS: bool>(
+    fn relax_part<S: Simd, const VISCOUS: bool>(
         &self,
-        lanes: L,
+        simd: S,
         group: &Group,
         part: usize,
         active: u16,
@@ -252,60 +227,65 @@ impl LaneSweep<'_> {
         memory: &mut Memory,
     ) {
         let h = self.substep.h;
-        let here = self.read(lanes, part, x, group.own());
-        let inertia = lanes.load(&group.mass, part) * lanes.splat(1.0 / (h * h));
-        let zero = lanes.splat(0.0);
-        let diagonal = inertia + lanes.load(&group.laplacian, part);
-        let pulled = minus::<L>(self.read(lanes, part, self.substep.predictor, group.own()), here);
-        let mut sums =
-            Sums::<L> { force: scaled::<L>(inertia, pulled), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
-        let (sixth, plain) = (lanes.splat(self.term.lambda / 6.0), lanes.splat(VolumeTerm::PLAIN));
-        let pressure = lanes.splat(self.term.lambda * self.term.alpha / 6.0);
+        let here = rows(simd, x, &group.own, part);
+        let inertia = load(simd, &group.mass, part) * splat(simd, 1.0 / (h * h));
+        let zero = splat(simd, 0.0);
+        let diagonal = inertia + load(simd, &group.laplacian, part);
+        let pulled = sub(rows(simd, self.substep.predictor, &group.own, part), here);
+        let mut sums: Sums<S> =
+            Sums { force: scale(pulled, inertia), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
+        let (sixth, plain) = (splat(simd, self.term.lambda / 6.0), splat(simd, VolumeTerm::PLAIN));
+        let pressure = splat(simd, self.term.lambda * self.term.alpha / 6.0);
         let steps = self.groups.steps_of(group);
-        let drops = self.groups.drops_of(group);
+        let drops = &self.groups.drops_of(group)[..steps.len()];
+        let faces = &mut memory.faces[..steps.len()];
+        let (start, damping) = (self.substep.start, self.groups.damping_of(group));
+        let began = if VISCOUS { rows(simd, start, &group.own, part) } else { [zero; 3] };
         // The window, relative to the vertex. It takes two points to fill it.
         let (mut p, mut q, mut r) = ([zero; 3], [zero; 3], [zero; 3]);
         for k in 0..2.min(steps.len()) {
             let step = &steps[k];
-            (p, q, r) = (q, r, minus::<L>(self.read(lanes, part, x, step.to()), here));
-            sums.pull(lanes.load(&step.edge, part), r);
+            (p, q, r) = (q, r, sub(rows(simd, x, &step.to, part), here));
+            sums.pull(load(simd, &step.edge, part), r);
             if VISCOUS {
-                self.add_dashpot(lanes, group, part, k, r, &mut sums);
+                let before = sub(rows(simd, start, &step.to, part), began);
+                self.add_dashpot(load(simd, &damping[k], part), before, r, &mut sums);
             }
         }
-        let mut low = 0;
+        let mut low = Mask::<S>::splat(simd, false);
         for k in 2..steps.len() {
-            let (step, drop, face) = (&steps[k], drops[k], &mut memory.faces[k]);
-            let d = minus::<L>(self.read(lanes, part, x, step.to()), here);
-            sums.pull(lanes.load(&step.edge, part), d);
+            let (step, drop, face) = (&steps[k], drops[k], &mut faces[k]);
+            let d = sub(rows(simd, x, &step.to, part), here);
+            sums.pull(load(simd, &step.edge, part), d);
             if VISCOUS {
-                self.add_dashpot(lanes, group, part, k, d, &mut sums);
+                let before = sub(rows(simd, start, &step.to, part), began);
+                self.add_dashpot(load(simd, &damping[k], part), before, d, &mut sums);
             }
-            let drop = part_of::<L>(drop, part);
-            p = [lanes.select(drop, q[0], p[0]), lanes.select(drop, q[1], p[1]), lanes.select(drop, q[2], p[2])];
+            let drop = lanes(simd, part_of::<S>(drop, part));
+            p = [drop.select(q[0], p[0]), drop.select(q[1], p[1]), drop.select(q[2], p[2])];
             (q, r) = (r, d);
-            let area = cross::<L>(minus::<L>(q, p), minus::<L>(r, p));
-            let six_v = zero - dot::<L>(area, p);
-            let inverse = lanes.load(&step.inverse_6v, part);
+            let area = cross(sub(q, p), sub(r, p));
+            let six_v = zero - dot(area, p);
+            let inverse = load(simd, &step.inverse_6v, part);
             let ratio = inverse * six_v;
             // V0 psi'' = |inverse| lambda / 6 on A, and V0 psi' = lambda / 6 (|inverse| 6V - alpha sign).
-            let stiffness = lanes.abs(inverse) * sixth;
-            sums.pull(stiffness * six_v - lanes.signed(pressure, inverse), area);
+            let stiffness = inverse.abs() * sixth;
+            sums.pull(stiffness * six_v - signed(simd, pressure, inverse), area);
             sums.add_outer(stiffness, area);
-            low |= lanes.less(lanes.abs(inverse) * ratio, lanes.abs(inverse) * plain);
-            store3(lanes, area, &mut face.area, part);
-            lanes.store(ratio, &mut face.ratio, part);
+            low |= ratio.simd_lt(plain) & !inverse.simd_eq(zero);
+            store3::<S>(area, &mut face.area, part);
+            store::<S>(ratio, &mut face.ratio, part);
         }
-        low &= part_of::<L>(active, part);
-        let pressed = part_of::<L>(active & self.pressed(group, x), part);
+        sums.store(&mut memory.sums, part);
+        let low = bits::<S>(low) & part_of::<S>(active, part);
+        let pressed = part_of::<S>(active & self.pressed(group, x), part);
         if (low | pressed) != 0 {
-            let memory = &*memory;
-            sums.alter(lanes, part, low | pressed, |lane, local| self.add_rare(group, lane, x, memory, local));
+            self.add_rare(group, (low | pressed) << (part * width::<S>()), x, memory);
         }
-        let step = sums.solve(lanes);
-        let to = self.guarded(lanes, group, part, step, memory);
-        let to = [here[0] + to[0], here[1] + to[1], here[2] + to[2]];
-        store3(lanes, to, &mut memory.to, part);
+        let step = Sums::load(simd, &memory.sums, part).solve(simd);
+        let to = self.guarded(simd, group, part, step, memory);
+        let to = add(here, to);
+        store3::<S>(to, &mut memory.to, part);
     }
 
     /// Vertices of a group that something presses or holds.
@@ -319,10 +299,26 @@ impl LaneSweep<'_> {
         (0..group.count as usize).fold(0, |lanes, lane| lanes | u16::from(pressed(first + lane)) << lane)
     }
 
-    /// What the plain sums lack in one lane: what it touches, and the barrier in elements of little volume.
+    /// Adds what the plain sums lack in some lanes.
     #[cold]
     #[inline(never)]
-    fn add_rare(&self, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory, local: &mut Local) {
+    fn add_rare(&self, group: &Group, rare: u16, x: &[Vec3A], memory: &mut Memory) {
+        for lane in (0..BLOCK).filter(|lane| rare >> lane & 1 == 1) {
+            let [fx, fy, fz, xx, xy, xz, yy, yz, zz] = memory.sums.each_ref().map(|block| block.0[lane]);
+            let mut local = Local {
+                force: Vec3A::new(fx, fy, fz),
+                block: Mat3A::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]),
+            };
+            self.add_rare_to(&mut local, group, lane, x, memory);
+            let Local { force: f, block: b } = local;
+            let (a, b, c) = (b.x_axis, b.y_axis, b.z_axis);
+            let values = [f.x, f.y, f.z, a.x, a.y, a.z, b.y, b.z, c.z];
+            values.into_iter().zip(&mut memory.sums).for_each(|(value, to)| to.0[lane] = value);
+        }
+    }
+
+    /// What the plain sums lack in one lane: what it touches, and the barrier in elements of little volume.
+    fn add_rare_to(&self, local: &mut Local, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory) {
         let vertex = group.first as usize + lane;
         self.substep.add_touches(vertex, x[vertex], local);
         for (step, face) in self.groups.steps_of(group).iter().zip(&memory.faces).skip(2) {
@@ -340,29 +336,30 @@ impl LaneSweep<'_> {
 
     /// The step, cut where it would take too much of an element's volume.
     #[inline(always)]
-    fn guarded<L: Lanes>(&self, lanes: L, group: &Group, part: usize, step: [L::F; 3], memory: &Memory) -> [L::F; 3] {
-        let (kept, least) = (lanes.splat(KEPT_SHARE), lanes.splat(FLOOR));
-        let mut too_far = 0;
+    fn guarded<S: Simd>(&self, simd: S, group: &Group, part: usize, step: Reg3<S>, memory: &Memory) -> Reg3<S> {
+        let (kept, least) = (splat(simd, KEPT_SHARE), splat(simd, FLOOR));
+        let mut too_far = Mask::<S>::splat(simd, false);
         let steps = self.groups.steps_of(group);
         for k in 2..steps.len() {
             let (corner, face) = (&steps[k], &memory.faces[k]);
-            let ratio = lanes.load(&face.ratio, part);
-            let change = lanes.load(&corner.inverse_6v, part) * dot::<L>(load3(lanes, &face.area, part), step);
-            too_far |= lanes.less(ratio + change, lanes.min(lanes.max(kept * ratio, least), ratio));
+            let ratio = load(simd, &face.ratio, part);
+            let change = load(simd, &corner.inverse_6v, part) * dot(load3(simd, &face.area, part), step);
+            too_far |= (ratio + change).simd_lt((kept * ratio).max(least).min(ratio));
         }
+        let too_far = bits::<S>(too_far);
         if too_far == 0 {
             return step;
         }
         let mut spilled = [Block([0.0f32; BLOCK]); 3];
-        store3(lanes, step, &mut spilled, part);
-        for lane in (0..L::WIDTH).filter(|lane| too_far >> lane & 1 == 1).map(|lane| part * L::WIDTH + lane) {
+        store3::<S>(step, &mut spilled, part);
+        for lane in (0..width::<S>()).filter(|lane| too_far >> lane & 1 == 1).map(|lane| part * width::<S>() + lane) {
             let step = [spilled[0].0[lane], spilled[1].0[lane], spilled[2].0[lane]];
             let share = self.share(group, lane, step, memory);
             for block in &mut spilled {
                 block.0[lane] *= share;
             }
         }
-        load3(lanes, &spilled, part)
+        load3(simd, &spilled, part)
     }
 
     /// The share of one lane's step that the guard allows.

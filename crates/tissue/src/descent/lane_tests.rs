@@ -98,6 +98,7 @@ fn lanes_do_what_single_vertices_do() {
                 fixed: &fixed,
                 contacts: &contacts,
                 isa,
+                alone: false,
             };
             let (mut x, mut moved, mut expected) = (begin.clone(), begin.clone(), begin.clone());
             substep.sweep(&mut x, &mut moved);

@@ -35,6 +35,7 @@ pub(crate) struct DescentIntegrator {
     fixed: Vec<bool>,
     held: Vec<bool>,
     isa: Isa,
+    alone: bool,
 }
 
 /// The solver with what the body touches.
@@ -44,8 +45,8 @@ pub(crate) struct TouchingDescent {
 }
 
 impl TouchingDescent {
-    pub fn new(schedule: Descent, body: &Body) -> Self {
-        Self { descent: DescentIntegrator::new(schedule, body), contacts: Contacts::new(body) }
+    pub fn new(schedule: Descent, body: &Body, alone: bool) -> Self {
+        Self { descent: DescentIntegrator::new(schedule, body, alone), contacts: Contacts::new(body) }
     }
 }
 
@@ -70,7 +71,8 @@ impl Integrator for TouchingDescent {
 }
 
 impl DescentIntegrator {
-    pub fn new(schedule: Descent, body: &Body) -> Self {
+    /// For `body`; `alone`: the calling thread sweeps, and not a pool's.
+    pub fn new(schedule: Descent, body: &Body, alone: bool) -> Self {
         let zeros = vec![Vec3A::ZERO; body.len()];
         Self {
             schedule,
@@ -80,6 +82,7 @@ impl DescentIntegrator {
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
             isa: Isa::detect(),
+            alone,
         }
     }
 
@@ -114,6 +117,7 @@ impl DescentIntegrator {
             fixed: &self.fixed,
             contacts,
             isa: self.isa,
+            alone: self.alone,
         };
         for _ in 0..self.schedule.iterations {
             substep.sweep(&mut state.x, &mut self.guess);

@@ -159,7 +159,7 @@ fn every_newton_step_lowers_the_energy() {
         let (potential, far) = deformed(&elastic, &model, true);
         let mut fixed = vec![false; far.len()];
         fixed[26] = true;
-        // Far from the minimum and not convex; St. Venant-Kirchhoff tissue holds nothing that is squeezed more.
+        // Far from the minimum and not convex; squeezed so far, St. Venant-Kirchhoff tissue collapses (see below).
         let squeeze = match constitutive {
             ConstitutiveModel::StVenantKirchhoff => DVec3::new(0.8, 1.2, 0.8),
             _ => DVec3::new(0.5, 1.4, 0.6),
@@ -177,8 +177,33 @@ fn every_newton_step_lowers_the_energy() {
                 break;
             }
             (before, steps) = (energy, steps + 1);
-            assert!(steps < 200, "{constitutive:?}: {:.3e} N", norm(&scratch, &fixed));
+            assert!(steps < 60, "{constitutive:?}: {:.3e} N", norm(&scratch, &fixed));
         }
         assert!(steps > 2, "{constitutive:?}: not far enough away to tell");
+    }
+}
+
+/// Why the test above squeezes St. Venant-Kirchhoff tissue less: its energy falls all the way to a flat element and beyond. The guard leaves that element a tenth of its volume in
+/// each step, and it holds up all others; no Newton step, projected or not, leads out of there.
+#[test]
+fn st_venant_kirchhoff_tissue_squeezed_too_far_goes_flat() {
+    let model = model(ConstitutiveModel::StVenantKirchhoff, 0.0);
+    let elastic = Elastic::new(&model.bodies[0]);
+    let (potential, far) = deformed(&elastic, &model, true);
+    let mut fixed = vec![false; far.len()];
+    fixed[26] = true;
+    let far: Vec<DVec3> = far.iter().map(|p| DVec3::new(0.5, 1.4, 0.6) * *p).collect();
+    let after = |steps: usize| {
+        let (mut x, mut gradient) = (far.clone(), far.clone());
+        assert!(Solver::new(1e-10, steps).minimise(&potential, &fixed, 1e-10, &mut x).is_err());
+        let least = (0..elastic.tets.len()).map(|t| elastic.deformation(t, &x).determinant());
+        (least.fold(f64::INFINITY, f64::min), potential.gradient(&x, &mut gradient))
+    };
+    let mut before = after(2);
+    for steps in 3..10 {
+        let (least, energy) = after(steps);
+        assert!((0.09..0.11).contains(&(least / before.0)), "step {steps}: {least} after {}", before.0);
+        assert!(energy < before.1, "step {steps}: {energy} J after {}", before.1);
+        before = (least, energy);
     }
 }

@@ -70,8 +70,8 @@ pub(crate) struct QuasiNewtonIntegrator {
 }
 
 impl QuasiNewtonIntegrator {
-    /// For `body` stepped by frames of `dt` [s]; None if every node is pinned or the matrix cannot be factorised.
-    pub fn new(settings: QuasiNewton, body: &Body, dt: f64) -> Option<Self> {
+    /// For `body` stepped by frames of `dt` [s]; `alone`: the calling thread does all of it. None if every node is pinned or the matrix cannot be factorised.
+    pub fn new(settings: QuasiNewton, body: &Body, dt: f64, alone: bool) -> Option<Self> {
         let h = dt / settings.substeps as f64;
         let mut factor = Factor::new(body, h)?;
         let layout = Layout::new(body, &factor.order);
@@ -88,7 +88,7 @@ impl QuasiNewtonIntegrator {
             warp: Warp::new(&layout),
             contacts: Contacts::new(body),
             limits: Vec::with_capacity(2 * body.len()),
-            fallback: DescentIntegrator::new(sweeps, body),
+            fallback: DescentIntegrator::new(sweeps, body, alone),
             x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
             start: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
             v: rows(),

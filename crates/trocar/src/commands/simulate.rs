@@ -1,11 +1,11 @@
 //! `trocar simulate`.
 
-use crate::cli::{ScheduleName, Simulate, Task};
+use crate::cli::{Simulate, Task};
 use crate::output;
 use trocar_cell::{GraspLift, Summary};
+use trocar_evaluate::scenes::solver_named;
 use trocar_evaluate::{Result, SimulatedRun, simulate};
 use trocar_progress::Progress;
-use trocar_tissue::Schedule;
 
 pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<()> {
     let Task::GraspLift = arguments.task;
@@ -13,10 +13,7 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
         organ: arguments.organ.clone(),
         at: arguments.at,
         lift: arguments.lift * 1e-3,
-        schedule: match arguments.schedule {
-            ScheduleName::Default => Schedule::default(),
-            ScheduleName::Paper => Schedule::PAPER,
-        },
+        schedule: solver_named(&arguments.schedule.name())?,
         threads: arguments.threads,
         ..GraspLift::default()
     };
