@@ -12,7 +12,7 @@ pub struct Energy {
     pub elastic: f64,
     /// Of the masses in gravity's field; 0 for a mass at the world's origin.
     pub gravity: f64,
-    /// Stored in the supports' penalty.
+    /// Stored in the supports' penalty, and in the springs by which friction holds.
     pub supports: f64,
 }
 
@@ -27,8 +27,14 @@ impl Energy {
                 sum.kinetic += 0.5 * mass * v.length_squared();
                 sum.gravity -= mass * model.gravity.dot(*x);
                 let stiffness = f64::from(body.vertices[body.internal[i] as usize].contact_stiffness);
-                for support in &body.supports {
-                    sum.supports += 0.5 * stiffness * support.touch(*x).height.min(0.0).powi(2);
+                for (s, support) in body.supports.iter().enumerate() {
+                    let touch = support.touch(*x);
+                    sum.supports += 0.5 * stiffness * touch.height.min(0.0).powi(2);
+                    if let Some(Some(place)) = nodes.anchors.get(s * body.len() + i) {
+                        let (normal, off) = (touch.gradient.normalize(), x - place);
+                        let slide = off - off.dot(normal) * normal;
+                        sum.supports += 0.5 * stiffness * touch.gradient.length_squared() * slide.length_squared();
+                    }
                 }
             }
         }

@@ -49,9 +49,10 @@ fn centroid(model: &Model, state: &State) -> DVec3 {
 #[test]
 fn a_sphere_is_pushed_back_as_hertz_says() {
     // Finer towards the place of contact.
-    let half: f64 = std::env::var("HALF").map_or(0.04, |s| s.parse().unwrap());
+    let half = 0.04;
     let steep: f64 = std::env::var("STEEP").map_or(3.0, |s| s.parse().unwrap());
-    let n: usize = std::env::var("N").map_or(10, |s| s.parse().unwrap());
+    let n: usize = std::env::var("N").map_or(12, |s| s.parse().unwrap());
+    let cs: f64 = std::env::var("CS").map_or(20.0, |s| s.parse().unwrap());
     let mut mesh = block([2 * n, 2 * n, n + 3], 1.0);
     let graded = |u: f64| half * u.signum() * ((steep * u.abs()).exp() - 1.0) / (steep.exp() - 1.0);
     for p in &mut mesh.vertices {

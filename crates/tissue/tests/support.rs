@@ -62,8 +62,9 @@ fn the_imprint_touches_the_underside_and_pushes_nothing() {
 #[test]
 fn an_organ_rests_in_its_imprint() {
     let mesh = cushion();
-    let plane = SupportPlane { point: DVec3::ZERO, normal: DVec3::Z, friction: 0.5 };
-    let field = SupportField::under(&mesh, DVec3::Z, 1e-3, 0.5).unwrap();
+    // Where friction lets a body come to rest depends on its way there.
+    let plane = SupportPlane { point: DVec3::ZERO, normal: DVec3::Z, friction: 0.0 };
+    let field = SupportField::under(&mesh, DVec3::Z, 1e-3, 0.0).unwrap();
     let mut moved = Vec::new();
     for support in [Support::from(plane), field.into()] {
         let model = lying(&mesh, support, GRAVITY);
