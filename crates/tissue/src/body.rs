@@ -146,6 +146,23 @@ impl Body {
         f64::from(self.vertices[self.internal[node] as usize].mass)
     }
 
+    /// Free vertices of the surface (internal numbers), ascending.
+    pub(crate) fn surface_vertices(&self) -> Vec<u32> {
+        let mut faces: Vec<[u32; 3]> = Vec::with_capacity(4 * self.tets.len());
+        for [a, b, c, d] in &self.tets {
+            for mut face in [[*b, *c, *d], [*a, *c, *d], [*a, *b, *d], [*a, *b, *c]] {
+                face.sort_unstable();
+                faces.push(face);
+            }
+        }
+        faces.sort_unstable();
+        let outer = faces.chunk_by(|a, b| a == b).filter(|same| same.len() == 1);
+        let mut vertices: Vec<u32> = outer.flat_map(|same| same[0]).filter(|i| !self.vertices[*i as usize].pinned).collect();
+        vertices.sort_unstable();
+        vertices.dedup();
+        vertices
+    }
+
     /// Number of colours of the sweeps.
     pub fn colors(&self) -> usize {
         self.color_start.len() - 1

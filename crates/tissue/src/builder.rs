@@ -42,26 +42,43 @@ impl Default for MassFloor {
     }
 }
 
-/// Stiffness of a support against a vertex, over Young's modulus times the vertex's size (the cube root of its share of the volume).
+/// Stiffness of contacts against a vertex, over Young's modulus times the vertex's size (the cube root of its share of the volume).
 const CONTACT_STIFFNESS: f64 = 20.0;
+
+/// Contacts stiffer than this are beyond `f32`.
+const MOST_CONTACT_STIFFNESS: f64 = 1e5;
 
 /// Dashpots along edges of all directions dissipate 2/15 of (strain rate)^2 under shear, a viscous body 2.
 const DASHPOTS: f64 = 15.0;
 
 /// Collects bodies and boundary conditions.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct ModelBuilder {
     bodies: Vec<Body>,
     gravity: DVec3,
     mass_floor: MassFloor,
+    contact_stiffness: f64,
     filtered: Vec<[usize; 2]>,
     colliders: Vec<Collider>,
+}
+
+impl Default for ModelBuilder {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 impl ModelBuilder {
     /// No bodies, no gravity, no support.
     pub fn new() -> Self {
-        Self::default()
+        Self {
+            bodies: Vec::new(),
+            gravity: DVec3::ZERO,
+            mass_floor: MassFloor::default(),
+            contact_stiffness: CONTACT_STIFFNESS,
+            filtered: Vec::new(),
+            colliders: Vec::new(),
+        }
     }
 
     /// Sets the gravitational acceleration [m/s2].
@@ -73,6 +90,13 @@ impl ModelBuilder {
     /// Sets the mass floor of the bodies that are added from now on; [`MassFloor::default`] otherwise.
     pub fn mass_floor(mut self, floor: MassFloor) -> Self {
         self.mass_floor = floor;
+        self
+    }
+
+    /// Sets the stiffness of contacts against the nodes of the bodies that are added from now on, over Young's modulus times a node's size (the cube root of its share of the
+    /// volume); 20 otherwise. Contacts give way by the pressure over this.
+    pub fn contact_stiffness(mut self, over_tissue: f64) -> Self {
+        self.contact_stiffness = over_tissue;
         self
     }
 
@@ -89,7 +113,13 @@ impl ModelBuilder {
         {
             return Err(Error::Model(format!("a mass floor of {share} of the median; 0 to 1 make sense")));
         }
-        self.bodies.push(lay_out(body, self.mass_floor));
+        if !(self.contact_stiffness > 0.0 && self.contact_stiffness <= MOST_CONTACT_STIFFNESS) {
+            return Err(Error::Model(format!(
+                "a contact stiffness of {} times the tissue's; above 0 and at most {MOST_CONTACT_STIFFNESS} make sense",
+                self.contact_stiffness
+            )));
+        }
+        self.bodies.push(lay_out(body, self.mass_floor, self.contact_stiffness));
         Ok(self.bodies.len() - 1)
     }
 
@@ -135,7 +165,7 @@ impl ModelBuilder {
 }
 
 /// Lays a checked body out for the sweeps.
-fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor) -> Body {
+fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor, contact_stiffness: f64) -> Body {
     let BodyDescription { name, mesh, material, pinned: pinned_nodes, supports } = description;
     let nodes = mesh.vertices.len();
     let mut pinned = vec![false; nodes];
@@ -212,7 +242,7 @@ fn lay_out(description: BodyDescription<'_>, mass_floor: MassFloor) -> Body {
             corners: body.corners.len() as u32,
             edges: body.edges.len() as u32,
             laplacian: 0.0,
-            contact_stiffness: (CONTACT_STIFFNESS * material.young_modulus * share[i].cbrt()) as f32,
+            contact_stiffness: (contact_stiffness * material.young_modulus * share[i].cbrt()) as f32,
         };
         body.vertices.push(vertex);
         add_corners(&mut body, &incident[i]);

@@ -4,8 +4,9 @@
 //! x_i(t_a) and the tool pose at t_a and evaluated as x_i(t_a) + (R R(t_a)' - I)(x_i(t_a) - p(t_a)) + (p - p(t_a)), the
 //! same map, which is exact (snap 0 to the bit) at activation.
 
-use crate::{Model, State};
-use glam::DVec3;
+use crate::contact::Hanging;
+use crate::{Event, Model, State};
+use glam::{DVec3, Vec3A};
 use trocar_geometry::Pose;
 
 /// Pose of a tool at the beginning and the end of a frame.
@@ -60,8 +61,12 @@ pub struct Grasp {
     pub(crate) captured_at: Pose,
     /// None: the nodes follow the tool exactly.
     pub compliance: Option<Compliance>,
-    /// The tissue tore out of it; it holds nothing.
-    pub torn: bool,
+    /// How far each node has slipped through the jaws, in the tool's frame [m].
+    pub(crate) slid: Vec<Vec3A>,
+    /// More than half of the nodes slip.
+    pub(crate) slips: bool,
+    /// The tissue tore out of it: it holds nothing any more.
+    pub(crate) torn: bool,
 }
 
 impl Grasp {
@@ -70,19 +75,75 @@ impl Grasp {
         let free = |i: &u32| !model.bodies[body].pinned()[*i as usize];
         let nodes: Vec<u32> = nodes.iter().copied().filter(free).collect();
         let captured = nodes.iter().map(|i| state.position(model, body, *i as usize)).collect();
-        Self { tool, body, nodes, captured, captured_at: *pose, compliance: None, torn: false }
+        Self::new(tool, body, nodes, captured, pose)
     }
 
     /// Holds `nodes` of `body` such that, with tool number `tool` at `pose`, each is to be at its place of `positions` [m, world], wherever it is now. Pinned nodes are left out.
     pub fn prescribe(model: &Model, body: usize, nodes: &[u32], positions: &[DVec3], tool: usize, pose: &Pose) -> Self {
         let free = |(i, _): &(&u32, &DVec3)| !model.bodies[body].pinned()[**i as usize];
         let (nodes, captured) = nodes.iter().zip(positions).filter(free).map(|(i, x)| (*i, *x)).unzip();
-        Self { tool, body, nodes, captured, captured_at: *pose, compliance: None, torn: false }
+        Self::new(tool, body, nodes, captured, pose)
+    }
+
+    fn new(tool: usize, body: usize, nodes: Vec<u32>, captured: Vec<DVec3>, pose: &Pose) -> Self {
+        let slid = vec![Vec3A::ZERO; nodes.len()];
+        Self { tool, body, nodes, captured, captured_at: *pose, compliance: None, slid, slips: false, torn: false }
     }
 
     /// The same grasp, giving way.
     pub fn compliant(self, compliance: Compliance) -> Self {
         Self { compliance: Some(compliance), ..self }
+    }
+
+    /// Whether the tissue tore out of it: it holds nothing any more.
+    pub fn is_torn(&self) -> bool {
+        self.torn
+    }
+
+    /// Whether the tissue slips through the jaws.
+    pub fn slips(&self) -> bool {
+        self.slips
+    }
+
+    /// Mean slip of its nodes through the jaws since it was made, in the tool's frame [m].
+    pub fn slip(&self) -> DVec3 {
+        let sum: DVec3 = self.slid.iter().map(|s| s.as_dvec3()).sum();
+        sum / self.nodes.len().max(1) as f64
+    }
+
+    /// Whether its nodes hang on it compliantly.
+    pub(crate) fn hangs(&self) -> bool {
+        self.compliance.is_some() && !self.torn
+    }
+
+    /// [`Grasp::prescribed`] of one node by its place in `nodes`.
+    pub(crate) fn prescribed_node(&self, tool: &Pose, k: usize) -> (u32, DVec3) {
+        let from = &self.captured_at;
+        let arm = self.captured[k] - from.translation;
+        let turned = tool.rotation != from.rotation;
+        let swing = if turned { tool.rotation * from.rotation.inverse() * arm - arm } else { DVec3::ZERO };
+        (self.nodes[k], self.captured[k] + (swing + (tool.translation - from.translation)))
+    }
+
+    /// Whether it slips or tears, from what its nodes did in the last substep.
+    pub(crate) fn judge<'a>(&mut self, held: impl Iterator<Item = &'a Hanging>, events: &mut Vec<Event>) {
+        let Some(compliance) = self.compliance.filter(|_| !self.torn) else { return };
+        let (mut sliding, mut nodes, mut pull) = (0, 0, DVec3::ZERO);
+        for node in held {
+            sliding += usize::from(node.slides);
+            nodes += 1;
+            pull += node.pull.as_dvec3();
+        }
+        let (tool, body, force) = (self.tool, self.body, pull.length());
+        let slips = 2 * sliding > nodes;
+        if slips && !self.slips {
+            events.push(Event::Slipped { tool, body });
+        }
+        self.slips = slips;
+        if force > compliance.tear_force {
+            (self.torn, self.slips) = (true, false);
+            events.push(Event::Torn { tool, body, force });
+        }
     }
 
     /// Where each held node is to be when the tool is at `tool`: (node, world position [m]).

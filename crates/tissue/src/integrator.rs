@@ -1,13 +1,19 @@
 //! What every solver is: it advances one body by one frame.
 
+use crate::contact::Contacts;
 use crate::state::BodyState;
-use crate::{Body, Grasp, StepReport, ToolMotion};
+use crate::{Body, Collider, Grasp, StepReport, ToolMotion};
 use glam::{DVec3, Vec3A};
 
 /// A solver with its scratch memory for one body.
 pub(crate) trait Integrator: Send {
     /// Advances `state` by `frame`; writes what happened on the way into `report`. It allocates nothing.
     fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport);
+
+    /// What the body touched in the last frame; None for a solver that knows no tools.
+    fn contacts(&self) -> Option<&Contacts> {
+        None
+    }
 }
 
 /// What happens to a body from outside during one frame.
@@ -22,18 +28,40 @@ pub(crate) struct Frame<'a> {
     pub grasps: &'a [Grasp],
     /// Motions of the tools, by tool.
     pub tools: &'a [ToolMotion],
+    /// What touches bodies.
+    pub colliders: &'a [Collider],
 }
 
 impl Frame<'_> {
-    /// The body's grasps.
+    /// The body's grasps that hold something.
     pub fn grasps(&self) -> impl Iterator<Item = &Grasp> {
-        self.grasps.iter().filter(|g| g.body == self.index)
+        self.grasps.iter().filter(|g| g.body == self.index && !g.torn)
     }
 
-    /// Calls `place(vertex, position)` for every vertex that a tool carries, where it is to be when `share` of the frame is over, in the body's frame [m]. Vertices held
+    /// Those whose nodes follow the tool exactly.
+    pub fn rigid_grasps(&self) -> impl Iterator<Item = &Grasp> {
+        self.grasps().filter(|g| g.compliance.is_none())
+    }
+
+    /// Calls `place(vertex, position)` for every vertex that a tool carries rigidly, where it is to be when `share` of the frame is over, in the body's frame [m]. Vertices held
     /// by a tool of which no motion is given stay where they are and are left out.
-    pub fn for_held(&self, body: &Body, share: f64, mut place: impl FnMut(usize, Vec3A)) {
-        for grasp in self.grasps() {
+    pub fn for_held(&self, body: &Body, share: f64, place: impl FnMut(usize, Vec3A)) {
+        self.for_nodes(self.rigid_grasps(), body, share, place);
+    }
+
+    /// The same for all grasps, for solvers that know no compliant ones.
+    pub fn for_all_held(&self, body: &Body, share: f64, place: impl FnMut(usize, Vec3A)) {
+        self.for_nodes(self.grasps(), body, share, place);
+    }
+
+    fn for_nodes<'g>(
+        &self,
+        grasps: impl Iterator<Item = &'g Grasp>,
+        body: &Body,
+        share: f64,
+        mut place: impl FnMut(usize, Vec3A),
+    ) {
+        for grasp in grasps {
             if let Some(motion) = self.tools.get(grasp.tool) {
                 for (node, x) in grasp.prescribed(&motion.at(share)) {
                     place(body.internal[node as usize] as usize, (x - body.origin).as_vec3a());

@@ -1,5 +1,6 @@
 //! What changes while stepping: plain data.
 
+use crate::contact::{Anchor, Source};
 use crate::{Body, Grasp, Model};
 use glam::{DVec3, Vec3A};
 use xxhash_rust::xxh3::Xxh3;
@@ -26,6 +27,8 @@ pub(crate) struct BodyState {
     pub falling: Vec<f32>,
     /// Vertices whose supports the quasi-Newton solver has in its matrix.
     pub supported: Vec<bool>,
+    /// Where friction holds what touches something, by vertex.
+    pub anchors: Vec<Anchor>,
     /// Whether nodes were put somewhere from outside, and elements may be inverted by it.
     pub disturbed: bool,
 }
@@ -37,6 +40,7 @@ impl BodyState {
         self.v.copy_from_slice(&other.v);
         self.falling.copy_from_slice(&other.falling);
         self.supported.copy_from_slice(&other.supported);
+        self.anchors.clone_from(&other.anchors);
         self.disturbed = other.disturbed;
     }
 }
@@ -54,6 +58,7 @@ impl State {
                 v: vec![Vec3A::ZERO; body.len()],
                 falling: vec![0.0; body.len()],
                 supported: vec![false; body.len()],
+                anchors: Vec::with_capacity(2 * body.surface_vertices().len()),
                 disturbed: false,
             }
         };
@@ -124,6 +129,15 @@ impl State {
             for f in &body.falling {
                 hash.update(&f.to_bits().to_le_bytes());
             }
+            for anchor in &body.anchors {
+                let (kind, number) = match anchor.source {
+                    Source::Support(s) => (0u32, s),
+                    Source::Collider(c) => (1, c),
+                    Source::Grasp(g, _) => (2, g),
+                };
+                [anchor.vertex, kind, number].iter().for_each(|k| hash.update(&k.to_le_bytes()));
+                anchor.place.to_array().iter().for_each(|c| hash.update(&c.to_bits().to_le_bytes()));
+            }
             for flag in body.supported.iter().chain([&body.disturbed]) {
                 hash.update(&[u8::from(*flag)]);
             }
@@ -137,6 +151,14 @@ impl State {
                     hash.update(&c.to_bits().to_le_bytes());
                 }
             }
+            let compliance = grasp.compliance.iter();
+            for number in compliance.flat_map(|c| [c.stiffness, c.jaw_force, c.friction, c.tear_force, c.closing.x, c.closing.y, c.closing.z]) {
+                hash.update(&number.to_bits().to_le_bytes());
+            }
+            for c in grasp.slid.iter().flat_map(|slid| slid.to_array()) {
+                hash.update(&c.to_bits().to_le_bytes());
+            }
+            hash.update(&[u8::from(grasp.slips), u8::from(grasp.torn)]);
             let pose = &grasp.captured_at;
             for c in pose.translation.to_array().into_iter().chain(pose.rotation.to_array()) {
                 hash.update(&c.to_bits().to_le_bytes());

@@ -1,7 +1,7 @@
 //! One frame of simulation: every body by its solver, bodies in parallel.
 
 use crate::comparator::ComparatorIntegrator;
-use crate::descent::DescentIntegrator;
+use crate::descent::TouchingDescent;
 use crate::integrator::{Frame, Integrator};
 use crate::oracle::NewtonIntegrator;
 use crate::quasi_newton::QuasiNewtonIntegrator;
@@ -88,10 +88,10 @@ impl Stepper {
         for worker in &mut self.workers {
             std::mem::swap(&mut worker.state, &mut state.bodies[worker.body]);
         }
-        let (dt, gravity, grasps) = (self.dt, model.gravity, &state.grasps[..]);
+        let (dt, gravity, grasps, colliders) = (self.dt, model.gravity, &state.grasps[..], &model.colliders[..]);
         let workers = &mut self.workers;
         let advance = |worker: &mut Worker| {
-            let frame = Frame { dt, gravity, index: worker.body, grasps, tools };
+            let frame = Frame { dt, gravity, index: worker.body, grasps, tools, colliders };
             worker.advance(&frame, &model.bodies[worker.body]);
         };
         match &self.pool {
@@ -108,10 +108,31 @@ impl Stepper {
             }
             std::mem::swap(&mut worker.state, &mut state.bodies[worker.body]);
         }
+        self.events.clear();
         if !broken {
             state.time += dt;
+            self.tell_tools(state, tools.len());
         }
         report
+    }
+
+    /// Sums up what the bodies did to the tools, and lets grasps slip and tear.
+    fn tell_tools(&mut self, state: &mut State, tools: usize) {
+        self.forces.clear();
+        self.forces.resize(tools, ToolForce::default());
+        for contacts in self.workers.iter().filter_map(|worker| worker.integrator.contacts()) {
+            self.forces.iter_mut().zip(contacts.forces()).for_each(|(sum, part)| sum.add(part));
+            for held in contacts.hanging() {
+                state.grasps[held.grasp as usize].slid[held.node as usize] = held.slid;
+            }
+        }
+        for (g, grasp) in state.grasps.iter_mut().enumerate() {
+            let body = grasp.body;
+            let workers = self.workers.iter().filter(|worker| worker.body == body);
+            let contacts = workers.filter_map(|worker| worker.integrator.contacts());
+            let held = contacts.flat_map(|contacts| contacts.hanging()).filter(|held| held.grasp as usize == g);
+            grasp.judge(held, &mut self.events);
+        }
     }
 }
 
@@ -127,7 +148,7 @@ impl Worker {
 
 /// The schedule's solver for a body.
 fn integrator(schedule: &Schedule, body: &Body, dt: f64) -> Box<dyn Integrator> {
-    let sweeps = |descent: Descent| Box::new(DescentIntegrator::new(descent, body));
+    let sweeps = |descent: Descent| Box::new(TouchingDescent::new(descent, body));
     match schedule {
         Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt) {
             Some(integrator) => Box::new(integrator),

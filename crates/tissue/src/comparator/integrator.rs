@@ -59,7 +59,7 @@ impl Integrator for ComparatorIntegrator {
             fixed[body.internal[*node as usize] as usize] = true;
         }
         targets.copy_from_slice(&particles.x);
-        frame.for_held(body, 1.0, |vertex, x| targets[vertex] = x.as_dvec3());
+        frame.for_all_held(body, 1.0, |vertex, x| targets[vertex] = x.as_dvec3());
         let span = Span { dt: frame.dt, gravity: frame.gravity, fixed, targets };
         // A body at the speed limit is one in the report too, which looks at the state that is left here.
         match scheme {

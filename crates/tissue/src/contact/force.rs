@@ -11,6 +11,26 @@ pub struct Wrench {
     pub torque: DVec3,
 }
 
+impl Wrench {
+    /// Adds a force that acts at `arm` [m] from the tool's origin.
+    pub(crate) fn add(&mut self, force: DVec3, arm: DVec3) {
+        self.force += force;
+        self.torque += arm.cross(force);
+    }
+}
+
+impl ToolForce {
+    /// Adds what another body does.
+    pub(crate) fn add(&mut self, other: &Self) {
+        for (sum, part) in [(&mut self.contact, &other.contact), (&mut self.constraint, &other.constraint)] {
+            sum.force += part.force;
+            sum.torque += part.torque;
+        }
+        self.pressing += other.pressing;
+        self.touching += other.touching;
+    }
+}
+
 /// What tissue does to one tool, mean over the last frame's last substep. Contact and constraint are kept apart (SPEC C8).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToolForce {

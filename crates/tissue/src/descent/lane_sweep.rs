@@ -2,13 +2,12 @@
 //!
 //! Its block at a vertex is V0 (mu |m|^2 I + psi'' g g'), g the gradient of the volume ratio. The first part is a constant Laplacian along the edges. The second needs of each
 //! element the area vector A of the face opposite the vertex, g = A / (6 V0); a strip ([`crate::descent::strip`]) yields a face with each point that is read. What is rare (elements
-//! below a quarter of their volume, vertices below a support) is added lane by lane.
+//! below a quarter of their volume, vertices that touch something) is added lane by lane.
 
 use crate::descent::groups::{Group, Groups};
 use crate::descent::kernel::{Local, VolumeTerm};
 use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
-use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, splat3, store3};
-use crate::support::LocalSupport;
+use crate::simd::{BLOCK, Block, Lanes, Task, cross, dot, load3, minus, part_of, scaled, store3};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -298,10 +297,10 @@ impl LaneSweep<'_> {
             lanes.store(ratio, &mut face.ratio, part);
         }
         low &= part_of::<L>(active, part);
-        let below = self.below(lanes, group, here, x, part) & part_of::<L>(active, part);
-        if (low | below) != 0 {
+        let pressed = part_of::<L>(active & self.pressed(group, x), part);
+        if (low | pressed) != 0 {
             let memory = &*memory;
-            sums.alter(lanes, part, low | below, |lane, local| self.add_rare(group, lane, x, memory, local));
+            sums.alter(lanes, part, low | pressed, |lane, local| self.add_rare(group, lane, x, memory, local));
         }
         let step = sums.solve(lanes);
         let to = self.guarded(lanes, group, part, step, memory);
@@ -309,29 +308,23 @@ impl LaneSweep<'_> {
         store3(lanes, to, &mut memory.to, part);
     }
 
-    /// Lanes below a support.
+    /// Vertices of a group that something presses or holds.
     #[inline(always)]
-    fn below<L: Lanes>(&self, lanes: L, group: &Group, here: [L::F; 3], x: &[Vec3A], part: usize) -> u16 {
-        let mut below = 0;
-        for support in self.substep.supports {
-            below |= match support {
-                LocalSupport::Plane(plane) => {
-                    let (from, normal) = (minus::<L>(here, splat3(lanes, plane.point)), splat3(lanes, plane.normal));
-                    // A little more than the height says: whether a vertex is below is decided where its force is found.
-                    lanes.less(dot::<L>(from, normal), lanes.splat(1e-6))
-                }
-                LocalSupport::Field(_) => part_of::<L>(below_field(support, group, x), part),
-            };
+    fn pressed(&self, group: &Group, x: &[Vec3A]) -> u16 {
+        let (contacts, first) = (self.substep.contacts, group.first as usize);
+        if !contacts.any(first..first + group.count as usize) {
+            return 0;
         }
-        below
+        let pressed = |i: usize| contacts.of(i).iter().any(|touch| touch.push(x[i]).is_some());
+        (0..group.count as usize).fold(0, |lanes, lane| lanes | u16::from(pressed(first + lane)) << lane)
     }
 
-    /// What the plain sums lack in one lane: the supports' forces, and the barrier in elements of little volume.
+    /// What the plain sums lack in one lane: what it touches, and the barrier in elements of little volume.
     #[cold]
     #[inline(never)]
     fn add_rare(&self, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory, local: &mut Local) {
         let vertex = group.first as usize + lane;
-        self.substep.add_supports(vertex, x[vertex], local);
+        self.substep.add_touches(vertex, x[vertex], local);
         for (step, face) in self.groups.steps_of(group).iter().zip(&memory.faces).skip(2) {
             let (inverse, ratio) = (step.inverse_6v.0[lane], face.ratio.0[lane]);
             if inverse != 0.0 && ratio <= VolumeTerm::PLAIN {
@@ -384,10 +377,4 @@ impl LaneSweep<'_> {
         }
         share
     }
-}
-
-/// Vertices of a group that are below a support.
-fn below_field(support: &LocalSupport, group: &Group, x: &[Vec3A]) -> u16 {
-    let vertices = x[group.first as usize..].iter().take(BLOCK).enumerate();
-    vertices.fold(0, |below, (lane, x)| below | u16::from(support.touch(*x).0 < 0.0) << lane)
 }

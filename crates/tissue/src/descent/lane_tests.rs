@@ -1,9 +1,10 @@
 //! The sweep in lanes does what the sweep vertex by vertex does, with any instructions.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
+use crate::contact::Contacts;
 use crate::descent::kernel::Kernel;
 use crate::descent::sweep::Substep;
-use crate::support::{LocalSupport, SupportField, SupportPlane};
+use crate::support::{SupportField, SupportPlane};
 use crate::{BodyDescription, ConstitutiveModel, Isa, Material, Model, ModelBuilder};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;
@@ -85,17 +86,17 @@ fn lanes_do_what_single_vertices_do() {
             .iter_mut()
             .zip(&rest[body.color_start[body.colors()] as usize..])
             .for_each(|(x, p)| *x = squeezed(p));
-        let supports = LocalSupport::of(body);
         let fixed: Vec<bool> = (0..body.len()).map(|i| body.vertices[i].pinned || i % 7 == 3).collect();
         let sweep = |isa| {
             let (start, predictor) = (jolted(1e-4, 200), jolted(2e-3, 400));
+            let contacts = Contacts::of_everything(body, &start);
             let substep = Substep {
                 body,
                 h: 1.0 / 480.0,
                 start: &start,
                 predictor: &predictor,
                 fixed: &fixed,
-                supports: &supports,
+                contacts: &contacts,
                 isa,
             };
             let (mut x, mut moved, mut expected) = (begin.clone(), begin.clone(), begin.clone());

@@ -10,11 +10,11 @@ mod lane_tests;
 pub(crate) mod strip;
 pub(crate) mod sweep;
 
+use crate::contact::Contacts;
 use crate::descent::sweep::{Substep, is_squeezed};
 use crate::integrator::{Frame, Integrator};
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
-use crate::support::LocalSupport;
 use crate::{Body, Isa, StepReport};
 use glam::Vec3A;
 
@@ -34,17 +34,38 @@ pub(crate) struct DescentIntegrator {
     guess: Vec<Vec3A>,
     fixed: Vec<bool>,
     held: Vec<bool>,
-    supports: Vec<LocalSupport>,
     isa: Isa,
 }
 
-impl Integrator for DescentIntegrator {
+/// The solver with what the body touches.
+pub(crate) struct TouchingDescent {
+    descent: DescentIntegrator,
+    contacts: Contacts,
+}
+
+impl TouchingDescent {
+    pub fn new(schedule: Descent, body: &Body) -> Self {
+        Self { descent: DescentIntegrator::new(schedule, body), contacts: Contacts::new(body) }
+    }
+}
+
+impl Integrator for TouchingDescent {
     fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
-        self.begin(frame, body);
-        let substeps = self.schedule.substeps;
+        let Self { descent, contacts } = self;
+        descent.begin(frame, body);
+        contacts.begin(frame, body, state);
+        let substeps = descent.schedule.substeps;
         for substep in 1..=substeps {
-            self.substep(frame, substep as f64 / substeps as f64, body, state, report);
+            let share = |k: usize| k as f64 / substeps as f64;
+            contacts.find(frame, body, share(substep - 1), share(substep), |i| state.x[i]);
+            descent.substep(frame, share(substep), body, contacts, state, report);
+            contacts.settle(frame, body, share(substep), |i| state.x[i]);
         }
+        contacts.end(state);
+    }
+
+    fn contacts(&self) -> Option<&Contacts> {
+        Some(&self.contacts)
     }
 }
 
@@ -58,7 +79,6 @@ impl DescentIntegrator {
             guess: zeros,
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
-            supports: LocalSupport::of(body),
             isa: Isa::detect(),
         }
     }
@@ -69,13 +89,14 @@ impl DescentIntegrator {
         frame: &Frame<'_>,
         share: f64,
         body: &Body,
+        contacts: &Contacts,
         state: &mut BodyState,
         report: &mut StepReport,
     ) {
         let h = (frame.dt / self.schedule.substeps as f64) as f32;
         let gravity = frame.gravity.as_vec3a();
         self.start.copy_from_slice(&state.x);
-        let flies = self.schedule.start == Start::Adaptive && self.flies_freely();
+        let flies = self.schedule.start == Start::Adaptive && self.flies_freely(contacts);
         // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere
         // implicit Euler's h^2 g.
         let reach = if flies { 0.5 * h * h } else { h * h };
@@ -91,7 +112,7 @@ impl DescentIntegrator {
             start: &self.start,
             predictor: &self.predictor,
             fixed: &self.fixed,
-            supports: &self.supports,
+            contacts,
             isa: self.isa,
         };
         for _ in 0..self.schedule.iterations {
@@ -140,7 +161,7 @@ impl DescentIntegrator {
     /// Marks the vertices that are fixed during this frame.
     pub fn begin(&mut self, frame: &Frame<'_>, body: &Body) {
         self.held.fill(false);
-        for grasp in frame.grasps() {
+        for grasp in frame.rigid_grasps() {
             for node in &grasp.nodes {
                 self.held[body.internal[*node as usize] as usize] = true;
             }
@@ -151,9 +172,8 @@ impl DescentIntegrator {
     }
 
     /// Whether nothing holds or touches the body.
-    fn flies_freely(&self) -> bool {
-        !self.fixed.contains(&true)
-            && self.supports.iter().all(|support| self.start.iter().all(|x| support.touch(*x).0 >= 0.0))
+    fn flies_freely(&self, contacts: &Contacts) -> bool {
+        !self.fixed.contains(&true) && contacts.flies(|i| self.start[i])
     }
 
     /// Moves the body to as much of its guess as squeezes no element too far: first all of it, then less of the free vertices' guess, and only then less

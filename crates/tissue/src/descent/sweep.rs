@@ -6,10 +6,10 @@
 //! falls below a floor, and no element is ever inverted.
 
 use crate::body::Body;
+use crate::contact::Contacts;
 use crate::descent::kernel::{Kernel, Local, Seen, VertexElasticity, volume_gradient};
 use crate::descent::lane_sweep::LaneSweep;
 use crate::simd::Isa;
-use crate::support::LocalSupport;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
@@ -23,9 +23,6 @@ pub(crate) const FLOOR: f32 = 1e-3;
 
 /// Smallest squared length of an edge that has a dashpot [m2].
 pub(crate) const LEAST_SQUARE: f32 = 1e-30;
-
-/// Speed below which friction sticks [m/s].
-pub(crate) const STICK_SPEED: f32 = 1e-3;
 
 /// Corners whose volume gradients are remembered between the force and the guard.
 const REMEMBERED: usize = 32;
@@ -41,7 +38,8 @@ pub(crate) struct Substep<'a> {
     pub predictor: &'a [Vec3A],
     /// Pinned or held vertices.
     pub fixed: &'a [bool],
-    pub supports: &'a [LocalSupport],
+    /// What its vertices touch.
+    pub contacts: &'a Contacts,
     /// Instructions to use; all give the same bits.
     pub isa: Isa,
 }
@@ -113,7 +111,7 @@ impl Substep<'_> {
         let here = x[i];
         let mut local = self.inertia(i, here);
         self.add_edges(i, here, x, &mut local);
-        self.add_supports(i, here, &mut local);
+        self.add_touches(i, here, &mut local);
         let corners = self.body.corners_of(i);
         let first = corners.start;
         for k in corners {
@@ -161,27 +159,14 @@ impl Substep<'_> {
         }
     }
 
-    /// One-sided quadratic penalty of the supports, and Coulomb friction against the motion since the substep's beginning along the
-    /// support there, regularised to stick below a small speed.
+    /// What the vertex touches: see [`crate::contact::Touch`].
     #[inline(always)]
-    pub fn add_supports(&self, i: usize, here: Vec3A, local: &mut Local) {
-        for support in self.supports {
-            let (height, gradient) = support.touch(here);
-            if height >= 0.0 {
-                continue;
+    pub fn add_touches(&self, i: usize, here: Vec3A, local: &mut Local) {
+        for touch in self.contacts.of(i) {
+            if let Some(push) = touch.push(here) {
+                local.force -= push.gradient;
+                local.block += push.block(touch.normal);
             }
-            let stiffness = self.body.vertices[i].contact_stiffness;
-            local.force -= stiffness * height * gradient;
-            local.add_outer(stiffness, gradient);
-            let motion = here - self.start[i];
-            let normal = support.normal(self.start[i]);
-            let slide = motion - motion.dot(normal) * normal;
-            let (length, stick) = (slide.length(), STICK_SPEED * self.h);
-            let most = -support.friction() * stiffness * height * support.steepness(gradient);
-            let drag = if length < stick { most / stick * (2.0 - length / stick) } else { most / length };
-            local.force -= drag * slide;
-            local.add_isotropic(drag);
-            local.add_outer(-drag, normal);
         }
     }
 }
@@ -307,7 +292,7 @@ mod tests {
                 start: &to_f32(&rest),
                 predictor: &to_f32(&predictor),
                 fixed: &[false; 6],
-                supports: &LocalSupport::of(body),
+                contacts: &Contacts::of_everything(body, &to_f32(&rest)),
                 isa: Isa::detect(),
             };
             let at: Vec<DVec3> = to_f32(&x).iter().map(|p| p.as_dvec3()).collect();

@@ -41,6 +41,7 @@ impl Integrator for NewtonIntegrator {
         let mut nodes = Nodes {
             x: (0..body.len()).map(|i| place(state.x[internal(i)])).collect(),
             v: (0..body.len()).map(|i| state.v[internal(i)].as_dvec3()).collect(),
+            anchors: super::state::anchors(body, state),
         };
         let mut fixed = body.pinned().to_vec();
         frame.grasps().flat_map(|grasp| &grasp.nodes).for_each(|node| fixed[*node as usize] = true);
@@ -66,8 +67,10 @@ impl Integrator for NewtonIntegrator {
             for (i, v) in nodes.v.iter_mut().enumerate() {
                 *v = if fixed[i] { DVec3::ZERO } else { (x[i] - nodes.x[i]) / h };
             }
+            nodes.anchors = potential.anchors(&x);
             nodes.x = x;
         }
+        super::state::set_anchors(body, &nodes.anchors, state);
         for node in 0..body.len() {
             let i = internal(node);
             state.x[i] = (nodes.x[node] - body.origin).as_vec3a();

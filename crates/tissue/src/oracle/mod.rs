@@ -175,10 +175,11 @@ impl Oracle {
             let mut x = before.x.clone();
             let solution =
                 friction::minimise(solver, &mut potential, &fixed, &targets, &before.v, &mut x).map_err(named)?;
-            solved.push((x, fixed, solution));
+            let anchors = potential.anchors(&x);
+            solved.push((x, fixed, anchors, solution));
         }
         let mut solutions = Vec::with_capacity(solved.len());
-        for (body, (x, fixed, solution)) in state.bodies.iter_mut().zip(solved) {
+        for (body, (x, fixed, anchors, solution)) in state.bodies.iter_mut().zip(solved) {
             for (i, v) in body.v.iter_mut().enumerate() {
                 *v = match dt {
                     Some(dt) if !fixed[i] => (x[i] - body.x[i]) / dt,
@@ -186,6 +187,7 @@ impl Oracle {
                 };
             }
             body.x = x;
+            body.anchors = anchors;
             solutions.push(solution);
         }
         Ok(solutions)

@@ -3,7 +3,6 @@
 use super::element::{blocks, deformation, projected, tangent};
 use super::state::Nodes;
 use crate::builder::shape_gradients;
-use crate::descent::sweep::STICK_SPEED;
 use crate::stiffness::Stiffness;
 use crate::support::Touch;
 use crate::{Body, Hyperelastic, Support};
@@ -74,6 +73,8 @@ pub(super) struct Motion {
     predictor: Vec<DVec3>,
     /// Squared lengths of the dashpots at the beginning [m2].
     lengths: Vec<f64>,
+    /// Where friction holds each node at each support, support by support [m].
+    places: Vec<DVec3>,
 }
 
 impl Motion {
@@ -81,7 +82,11 @@ impl Motion {
         let start = nodes.x.clone();
         let predictor = start.iter().zip(&nodes.v).map(|(x, v)| x + dt * v + dt * dt * gravity).collect();
         let length = |([i, j], _): &([usize; 2], f64)| (start[*j] - start[*i]).length_squared();
-        Self { dt, lengths: elastic.dashpots.iter().map(length).collect(), predictor, start }
+        let places = match &nodes.anchors[..] {
+            [] => start.repeat(elastic.supports.len()),
+            anchors => anchors.iter().zip(start.iter().cycle()).map(|(anchor, x)| anchor.unwrap_or(*x)).collect(),
+        };
+        Self { dt, lengths: elastic.dashpots.iter().map(length).collect(), predictor, places, start }
     }
 
     pub fn dt(&self) -> f64 {
@@ -206,17 +211,36 @@ impl Potential<'_> {
         self.motion.is_some() && self.elastic.supports.iter().any(|support| support.friction() > 0.0)
     }
 
+    /// Where friction holds each node at each support after a step that ended at x: what pulled harder than the true limit was dragged along.
+    pub fn anchors(&self, x: &[DVec3]) -> Vec<Option<DVec3>> {
+        let (Some(motion), limits) = (&self.motion, self.friction_limits(x)) else { return Vec::new() };
+        let nodes = x.len();
+        let anchor = |(k, limit): (usize, &f64)| {
+            let (support, i) = (&self.elastic.supports[k / nodes], k % nodes);
+            let gradient = support.touch(motion.start[i]).gradient;
+            let (normal, off) = (gradient.normalize_or_zero(), x[i] - motion.places[k]);
+            let slide = off - off.dot(normal) * normal;
+            let most = limit / (self.elastic.contact_stiffness[i] * gradient.length_squared());
+            let length = slide.length();
+            let dragged = if length > most { slide * (1.0 - most / length) } else { DVec3::ZERO };
+            (support.touch(x[i]).height < 0.0).then(|| motion.places[k] + dragged)
+        };
+        limits.iter().enumerate().map(anchor).collect()
+    }
+
     fn for_contacts(&self, x: &[DVec3], mut add: impl FnMut(usize, &Contact)) {
         for (s, support) in self.elastic.supports.iter().enumerate() {
             for (i, x) in x.iter().enumerate() {
-                let limit = self.limits.get(s * self.elastic.masses.len() + i).copied().unwrap_or(0.0);
+                let k = s * self.elastic.masses.len() + i;
+                let limit = self.limits.get(k).copied().unwrap_or(0.0);
                 let touch = support.touch(*x);
                 if touch.height < 0.0 || limit > 0.0 {
                     let mut contact = Contact::pressed(&touch, self.elastic.contact_stiffness[i]);
                     if let Some(motion) = self.motion.as_ref().filter(|_| limit > 0.0) {
                         // The plane of friction is that of the step's beginning: it has a potential then.
-                        let normal = support.touch(motion.start[i]).gradient.normalize_or_zero();
-                        contact.rub(normal, x - motion.start[i], limit, f64::from(STICK_SPEED) * motion.dt);
+                        let gradient = support.touch(motion.start[i]).gradient;
+                        let stiffness = self.elastic.contact_stiffness[i] * gradient.length_squared();
+                        contact.rub(gradient.normalize_or_zero(), x - motion.places[k], limit, stiffness);
                     }
                     add(i, &contact);
                 }
@@ -251,16 +275,15 @@ impl Contact {
         }
     }
 
-    /// Friction with its limit held: the force of the sweeps, limit (2 l/s - l^2/s^2) below the sticking length s and limit above, as a potential.
-    fn rub(&mut self, normal: DVec3, motion: DVec3, limit: f64, stick: f64) {
+    /// Friction with its limit held: a spring towards where it sticks, and the limit beyond, as a potential.
+    fn rub(&mut self, normal: DVec3, motion: DVec3, limit: f64, stiffness: f64) {
         let slide = motion - motion.dot(normal) * normal;
         let length = slide.length();
         let across = DMat3::IDENTITY - outer(normal);
-        let (energy, drag, softening) = if length < stick {
-            let energy = limit * (length * length / stick - length.powi(3) / (3.0 * stick * stick));
-            (energy, limit / stick * (2.0 - length / stick), limit * length / (stick * stick))
+        let (energy, drag, softening) = if length * stiffness < limit {
+            (0.5 * stiffness * length * length, stiffness, 0.0)
         } else {
-            (limit * (length - stick / 3.0), limit / length, limit / length)
+            (limit * (length - 0.5 * limit / stiffness), limit / length, limit / length)
         };
         self.energy += energy;
         self.gradient += drag * slide;

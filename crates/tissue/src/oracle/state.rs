@@ -1,6 +1,8 @@
 //! The oracle's state: positions and velocities in double precision.
 
-use crate::{Error, Grasp, Model, Result, State};
+use crate::contact::{Anchor, Source};
+use crate::state::BodyState;
+use crate::{Body, Error, Grasp, Model, Result, State};
 use glam::DVec3;
 use trocar_geometry::Pose;
 
@@ -37,6 +39,8 @@ pub(crate) struct Nodes {
     pub x: Vec<DVec3>,
     /// Velocities [m/s].
     pub v: Vec<DVec3>,
+    /// Where friction holds each node at each support, support by support [m]; empty: nowhere yet.
+    pub anchors: Vec<Option<DVec3>>,
 }
 
 impl OracleState {
@@ -44,7 +48,7 @@ impl OracleState {
     pub fn new(model: &Model) -> Self {
         let at_rest = |body: &crate::Body| {
             let x = body.rest_positions().to_vec();
-            Nodes { v: vec![DVec3::ZERO; x.len()], x }
+            Nodes { v: vec![DVec3::ZERO; x.len()], x, anchors: Vec::new() }
         };
         Self { time: 0.0, bodies: model.bodies.iter().map(at_rest).collect() }
     }
@@ -53,7 +57,8 @@ impl OracleState {
     pub fn from_state(model: &Model, state: &State) -> Self {
         let nodes = |body: usize| {
             let velocity = |node| state.velocity(model, body, node);
-            Nodes { x: state.positions(model, body), v: (0..model.bodies[body].len()).map(velocity).collect() }
+            let v = (0..model.bodies[body].len()).map(velocity).collect();
+            Nodes { x: state.positions(model, body), v, anchors: anchors(&model.bodies[body], &state.bodies[body]) }
         };
         Self { time: state.time, bodies: (0..model.bodies.len()).map(nodes).collect() }
     }
@@ -74,6 +79,7 @@ impl OracleState {
         state.time = self.time;
         for (k, body) in model.bodies.iter().enumerate() {
             let (to, now, earlier) = (&mut state.bodies[k], &self.bodies[k], &before.bodies[k]);
+            set_anchors(body, &now.anchors, to);
             for (node, i) in body.internal.iter().enumerate() {
                 let i = *i as usize;
                 to.x[i] = (now.x[node] - body.origin).as_vec3a();
@@ -131,4 +137,30 @@ impl OracleState {
         }
         Ok(())
     }
+}
+
+/// Where friction holds a body's nodes at its supports, support by support [m].
+pub(super) fn anchors(body: &Body, state: &BodyState) -> Vec<Option<DVec3>> {
+    let mut node_of = vec![0; body.len()];
+    body.internal.iter().enumerate().for_each(|(node, i)| node_of[*i as usize] = node);
+    let mut anchors = vec![None; body.supports.len() * body.len()];
+    for anchor in &state.anchors {
+        if let Source::Support(s) = anchor.source {
+            let k = s as usize * body.len() + node_of[anchor.vertex as usize];
+            anchors[k] = Some(body.origin + anchor.place.as_dvec3());
+        }
+    }
+    anchors
+}
+
+/// Gives a stepper's state of a body those anchors.
+pub(super) fn set_anchors(body: &Body, anchors: &[Option<DVec3>], state: &mut BodyState) {
+    state.anchors.retain(|anchor| !matches!(anchor.source, Source::Support(_)));
+    for (k, place) in anchors.iter().enumerate() {
+        if let Some(place) = place {
+            let (vertex, source) = (body.internal[k % body.len()], Source::Support((k / body.len()) as u32));
+            state.anchors.push(Anchor { vertex, source, place: (*place - body.origin).as_vec3a() });
+        }
+    }
+    state.anchors.sort_unstable_by_key(|anchor| (anchor.vertex, anchor.source));
 }

@@ -53,7 +53,7 @@ fn deformed<'a>(elastic: &'a Elastic, model: &Model, dynamic: bool) -> (Potentia
     let rest = model.bodies[0].rest_positions();
     let n = rest.len();
     let motion = dynamic.then(|| {
-        let nodes = Nodes { x: rest.to_vec(), v: noises(n, 3, 0.3) };
+        let nodes = Nodes { x: rest.to_vec(), v: noises(n, 3, 0.3), anchors: Vec::new() };
         Motion::new(elastic, &nodes, model.gravity, 1.0 / 480.0)
     });
     let mut potential = Potential { elastic, motion, gravity: model.gravity, limits: Vec::new() };

@@ -15,13 +15,13 @@ mod stress;
 mod tiles;
 mod warp;
 
+use crate::contact::Contacts;
 use crate::descent::DescentIntegrator;
 use crate::integrator::{Frame, Integrator};
 use crate::lanes::Row;
 use crate::schedule::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
-use crate::support::LocalSupport;
-use crate::{Body, Isa, StepReport, ToolMotion};
+use crate::{Body, Isa, StepReport};
 use elements::Elements;
 use factor::Factor;
 use fearless_simd::{Level, Simd, dispatch};
@@ -33,12 +33,6 @@ use warp::Warp;
 /// Sweeps a substep for a body that the quasi-Newton steps gave up.
 const FALLBACK_SWEEPS: usize = 20;
 
-/// A node this much above a support [m], and what it may fall within two frames, may touch it in a frame.
-const NEAR: f32 = 1e-3;
-
-/// As many more or fewer nodes that touch, beside an eighth of them, do not make the matrix another one.
-const FEW: usize = 3;
-
 /// The solver of one body.
 pub(crate) struct QuasiNewtonIntegrator {
     settings: QuasiNewton,
@@ -48,9 +42,9 @@ pub(crate) struct QuasiNewtonIntegrator {
     elements: Elements,
     history: History,
     warp: Warp,
-    supports: Vec<LocalSupport>,
-    /// Stiffness of the supports against free nodes [N/m].
-    contact_stiffness: Vec<f32>,
+    contacts: Contacts,
+    /// Limits of friction of what is touched [N], held during a search.
+    limits: Vec<f32>,
     fallback: DescentIntegrator,
     /// Positions of all nodes [m].
     x: Vec<Row>,
@@ -66,10 +60,8 @@ pub(crate) struct QuasiNewtonIntegrator {
     /// Nodes that a tool carries, now and in the factor.
     held: Vec<bool>,
     held_in_factor: Vec<bool>,
-    /// Free nodes that may touch a support in this frame, and what of their supports is in the factor [N/m].
-    near: Vec<u32>,
-    touching: Vec<bool>,
-    supports_in_factor: Vec<f32>,
+    /// Stiffness of what free nodes touch or hang on that is in the factor [N/m].
+    touches_in_factor: Vec<f32>,
     /// Whether the factor is that of the matrix.
     usable: bool,
     /// Whether a held node could not go on in this substep because an edge would be too long.
@@ -94,11 +86,8 @@ impl QuasiNewtonIntegrator {
             elements: Elements::new(&layout, body),
             history: History::new(settings.memory, layout.rows),
             warp: Warp::new(&layout),
-            supports: LocalSupport::of(body),
-            contact_stiffness: layout.vertex[..layout.free]
-                .iter()
-                .map(|v| body.vertices[*v as usize].contact_stiffness)
-                .collect(),
+            contacts: Contacts::new(body),
+            limits: Vec::with_capacity(2 * body.len()),
             fallback: DescentIntegrator::new(sweeps, body),
             x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
             start: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
@@ -111,9 +100,7 @@ impl QuasiNewtonIntegrator {
             targets: rows(),
             right: vec![0.0; 3 * layout.rows + 16],
             held_in_factor: held.clone(),
-            near: Vec::with_capacity(layout.free),
-            touching: vec![false; layout.free],
-            supports_in_factor: vec![0.0; layout.free],
+            touches_in_factor: vec![0.0; layout.free],
             usable: true,
             yielded: false,
             held,
@@ -127,6 +114,10 @@ impl Integrator for QuasiNewtonIntegrator {
     fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
         let level = self.level;
         dispatch!(level, simd => self.frame(simd, frame, body, state, report));
+    }
+
+    fn contacts(&self) -> Option<&Contacts> {
+        Some(&self.contacts)
     }
 }
 
@@ -144,24 +135,32 @@ impl QuasiNewtonIntegrator {
         let h = (frame.dt / substeps as f64) as f32;
         self.load(state);
         self.hold(frame, body);
-        self.find_supports(frame, state);
-        self.refresh_factor(state);
+        self.contacts.begin(frame, body, state);
+        self.refresh_factor(frame, body, state);
         self.history.clear();
         self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
         self.elements.accept();
         for substep in 1..=substeps {
             let share = substep as f64 / substeps as f64;
+            let (x, number) = (&self.x, &self.layout.number);
+            let begin = (substep - 1) as f64 / substeps as f64;
+            self.contacts.find(frame, body, begin, share, |vertex| position(&x[number[vertex] as usize]));
+            self.limits.clear();
+            self.limits.resize(self.contacts.touches().len(), 0.0);
             if !(self.usable && self.substep(simd, frame, share, h, body, report)) {
                 report.fallbacks += 1;
                 self.store(state);
                 self.fallback.begin(frame, body);
-                self.fallback.substep(frame, share, body, state, report);
+                self.fallback.substep(frame, share, body, &self.contacts, state, report);
                 self.load(state);
                 self.history.clear();
                 self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
                 self.elements.accept();
             }
+            let (x, number) = (&self.x, &self.layout.number);
+            self.contacts.settle(frame, body, share, |vertex| position(&x[number[vertex] as usize]));
         }
+        self.contacts.end(state);
         self.store(state);
     }
 
@@ -190,6 +189,7 @@ impl QuasiNewtonIntegrator {
         self.warp.update(simd, &self.layout, &self.x);
         self.take_gradient(simd, h);
         std::mem::swap(&mut self.gradient, &mut self.next_gradient);
+        self.refresh_limits();
         let moved = guess != Guess::Still;
         let mut stepped = false;
         report.grasp_limited += usize::from(self.yielded);
@@ -274,16 +274,13 @@ impl QuasiNewtonIntegrator {
     fn flies(&self) -> bool {
         self.layout.free == self.layout.nodes
             && !self.held.contains(&true)
-            && self
-                .supports
-                .iter()
-                .all(|support| self.x[..self.layout.free].iter().all(|x| support.touch(position(x)).0 >= 0.0))
+            && self.contacts.flies(|vertex| position(&self.x[self.layout.number[vertex] as usize]))
     }
 
     /// Marks the nodes that tools carry; a factor in which others are held is made anew.
     fn hold(&mut self, frame: &Frame<'_>, body: &Body) {
         self.held.fill(false);
-        for grasp in frame.grasps() {
+        for grasp in frame.rigid_grasps() {
             for node in &grasp.nodes {
                 let i = self.layout.number[body.internal[*node as usize] as usize] as usize;
                 if i < self.layout.free {
@@ -293,55 +290,16 @@ impl QuasiNewtonIntegrator {
         }
     }
 
-    /// Finds the nodes that are near a support. Where too many others touch than the matrix knows of, it is to know those that touch now: `state` says which, so that
-    /// nothing depends on what came before it.
-    fn find_supports(&mut self, frame: &Frame<'_>, state: &mut BodyState) {
-        self.near.clear();
-        if self.supports.is_empty() {
-            return;
-        }
-        let dt = frame.dt as f32;
-        let travel = |motion: &ToolMotion| (motion.to.translation - motion.from.translation).length();
-        let tool = frame.tools.iter().map(travel).fold(0.0, f64::max) as f32;
-        let fall = dt * dt * frame.gravity.length() as f32;
-        let reach = NEAR + tool + 2.5 * (dt * longest(&self.v) + fall);
-        // What nothing holds falls in this frame; of what is held it cannot be said.
-        let loose = self.layout.free == self.layout.nodes && !self.held.contains(&true);
-        let drop = if loose { dt * dt * frame.gravity.as_vec3a() } else { glam::Vec3A::ZERO };
-        let (mut touching, mut changed) = (0, 0);
-        for i in (0..self.layout.free).filter(|i| !self.held[*i]) {
-            let (x, v) = (position(&self.x[i]), position(&self.v[i]));
-            let height = |x| self.supports.iter().map(|support| support.touch(x).0).fold(f32::INFINITY, f32::min);
-            let here = height(x);
-            if here > reach {
-                changed += usize::from(state.supported[self.layout.vertex[i] as usize]);
-                continue;
-            }
-            self.near.push(i as u32);
-            let touches = here < 0.0 || height(x + dt * v + drop) < 0.0;
-            touching += usize::from(touches);
-            changed += usize::from(touches != state.supported[self.layout.vertex[i] as usize]);
-            self.touching[i] = touches;
-        }
-        if changed > FEW.min(touching / 2) + touching / 8 {
-            state.supported.fill(false);
-            for i in &self.near {
-                state.supported[self.layout.vertex[*i as usize] as usize] = self.touching[*i as usize];
-            }
-        }
-    }
-
-    /// Makes the factor anew if it is not the one for the nodes that are held and supported.
-    fn refresh_factor(&mut self, state: &BodyState) {
+    /// Makes the factor anew if it is not the one for the nodes that are held, pressed or hang on a tool.
+    fn refresh_factor(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
         let mut stale = !self.usable || self.held != self.held_in_factor;
         for i in 0..self.layout.free {
-            let supported = state.supported[self.layout.vertex[i] as usize];
-            let stiffness = if supported { self.contact_stiffness[i] } else { 0.0 };
-            stale |= stiffness != self.supports_in_factor[i];
-            self.supports_in_factor[i] = stiffness;
+            let stiffness = self.contacts.stiffness(frame, body, state, self.layout.vertex[i] as usize);
+            stale |= stiffness != self.touches_in_factor[i];
+            self.touches_in_factor[i] = stiffness;
         }
         if stale {
-            self.usable = self.factor.factorise(&self.held, &self.supports_in_factor);
+            self.usable = self.factor.factorise(&self.held, &self.touches_in_factor);
             self.held_in_factor.copy_from_slice(&self.held);
         }
     }

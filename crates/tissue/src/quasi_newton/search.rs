@@ -4,7 +4,6 @@ use super::layout::Layout;
 use super::{QuasiNewtonIntegrator, position};
 use crate::Body;
 use crate::descent::HELD_STRETCH;
-use crate::descent::sweep::STICK_SPEED;
 use crate::integrator::Frame;
 use crate::lanes::{LANES, Row, dot_rows};
 use fearless_simd::{Simd, SimdBase, f32x4};
@@ -135,6 +134,7 @@ impl QuasiNewtonIntegrator {
         }
         self.take_gradient(simd, h);
         std::mem::swap(&mut self.gradient, &mut self.next_gradient);
+        self.refresh_limits();
         let arrived = |i: usize| (0..3).all(|c| (self.x[i][c] - self.targets[i][c]).abs() <= ARRIVED);
         let all = (0..self.layout.free).all(|i| !self.held[i] || arrived(i));
         match (went, all) {
@@ -162,33 +162,25 @@ impl QuasiNewtonIntegrator {
             }
             sum.store_slice(&mut self.next_gradient[i]);
         }
-        if !self.supports.is_empty() {
-            self.add_contacts(h);
+        for (touch, limit) in self.contacts.touches().iter().zip(&self.limits) {
+            let i = self.layout.number[touch.vertex as usize] as usize;
+            if let Some(push) = touch.push_within(position(&self.x[i]), *limit) {
+                add(&mut self.next_gradient[i], push.gradient);
+            }
         }
     }
 
-    /// One-sided quadratic penalty of the supports and regularised Coulomb friction, as in the sweeps.
-    fn add_contacts(&mut self, h: f32) {
-        for i in self.near.iter().map(|i| *i as usize) {
-            let here = position(&self.x[i]);
-            for support in &self.supports {
-                let (height, steep) = support.touch(here);
-                if height >= 0.0 {
-                    continue;
-                }
-                let stiffness = self.contact_stiffness[i];
-                let mut gradient: Vec3A = stiffness * height * steep;
-                let motion = here - position(&self.start[i]);
-                let normal = support.normal(position(&self.start[i]));
-                let slide = motion - motion.dot(normal) * normal;
-                let (length, stick) = (slide.length(), STICK_SPEED * h);
-                let most = -support.friction() * stiffness * height * support.steepness(steep);
-                let drag = if length < stick { most / stick * (2.0 - length / stick) } else { most / length };
-                gradient += drag * slide;
-                for c in 0..3 {
-                    self.next_gradient[i][c] += gradient[c];
-                }
+    /// Takes friction's limits as they are here; the gradient knows. Within a search they are held, so that there is a function to minimise.
+    pub(super) fn refresh_limits(&mut self) {
+        for (touch, limit) in self.contacts.touches().iter().zip(&mut self.limits) {
+            let i = self.layout.number[touch.vertex as usize] as usize;
+            let x = position(&self.x[i]);
+            let now = touch.limit(x);
+            if now != *limit && !self.held[i] {
+                let push = |limit| touch.push_within(x, limit).map_or(Vec3A::ZERO, |push| push.gradient);
+                add(&mut self.gradient[i], push(now) - push(*limit));
             }
+            *limit = now;
         }
     }
 
@@ -237,6 +229,7 @@ impl QuasiNewtonIntegrator {
         self.elements.accept();
         self.history.learn(simd, share, &self.direction, &self.gradient, &self.next_gradient);
         std::mem::swap(&mut self.gradient, &mut self.next_gradient);
+        self.refresh_limits();
         Found::Step
     }
 
@@ -286,6 +279,10 @@ fn between((low, falls): (f32, f32), (high, rises): (f32, f32)) -> f32 {
     let secant = low + (high - low) * (falls / (falls - rises)).clamp(0.1, 0.9);
     let least = 0.02 * high;
     if low > 0.0 && high > 4.0 * low { (low * high).sqrt() } else { secant.max(least) }
+}
+
+fn add(row: &mut Row, by: Vec3A) {
+    row.iter_mut().zip(by.to_array()).for_each(|(sum, part)| *sum += part);
 }
 
 /// Whether an edge at a held vertex that goes to `x` would be too long, and longer than it is.

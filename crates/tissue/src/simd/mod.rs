@@ -140,11 +140,6 @@ pub(crate) fn store3<L: Lanes>(lanes: L, value: [L::F; 3], to: &mut [Block<f32>;
     lanes.store(value[2], &mut to[2], part);
 }
 
-/// The same vector in all lanes.
-#[inline(always)]
-pub(crate) fn splat3<L: Lanes>(lanes: L, value: Vec3A) -> [L::F; 3] {
-    [lanes.splat(value.x), lanes.splat(value.y), lanes.splat(value.z)]
-}
 
 #[inline(always)]
 pub(crate) fn minus<L: Lanes>(a: [L::F; 3], b: [L::F; 3]) -> [L::F; 3] {

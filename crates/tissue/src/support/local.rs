@@ -56,25 +56,6 @@ impl LocalSupport {
             Self::Field(field) => field.touch(x),
         }
     }
-
-    /// Unit normal of the support at a point.
-    #[inline]
-    pub fn normal(&self, x: Vec3A) -> Vec3A {
-        match self {
-            Self::Plane(plane) => plane.normal,
-            // It has a part along `up` of 1.
-            Self::Field(field) => field.touch(x).1.normalize(),
-        }
-    }
-
-    /// Length of a gradient.
-    #[inline]
-    pub fn steepness(&self, gradient: Vec3A) -> f32 {
-        match self {
-            Self::Plane(_) => 1.0,
-            Self::Field(_) => gradient.length(),
-        }
-    }
 }
 
 impl LocalPlane {
