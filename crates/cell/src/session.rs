@@ -253,8 +253,8 @@ impl<'a> Session<'a> {
             JawCommand::Squeeze => {
                 let force = opening_force(&self.gripper, self.world.forces());
                 let next = self.jaw.squeeze(angle, force);
-                let feels = self.task.contact && !self.world.forces().is_empty();
-                if feels { next } else { next.max(target.touching_angle) }
+
+                if self.task.contact { next } else { next.max(target.touching_angle) }
             }
         };
         Gripper { pose, jaw_angle }

@@ -28,12 +28,15 @@ const DESIGNS: [GraspDesign; 2] = [GraspDesign::LivePose, GraspDesign::Compliant
 /// Organ coordinate of the grasp.
 const AT: f64 = 0.5;
 
+/// The jaws press with the given force at this modulus [Pa], and with more or less in proportion at others, so that tissue of every modulus is squeezed alike.
+const FORCE_AT: f64 = 12e3;
+
 /// The experiment's options.
 #[derive(Clone, Debug)]
 pub struct ElementQualityExperiment {
     /// The appendix.
     pub appendix: AppendixSource,
-    /// Force of the jaws [N].
+    /// Force of the jaws at 12 kPa [N]; at other moduli in proportion.
     pub jaw_force: f64,
     /// Trials at once; 0 for as many as the machine has threads.
     pub threads: usize,
@@ -50,6 +53,10 @@ pub struct ElementQualityRow {
     pub modulus_kpa: f64,
     /// The pin rule.
     pub pins: &'static str,
+    /// Force of the jaws [N].
+    pub jaw_force_n: f64,
+    /// Tissue was between the blades.
+    pub attached: bool,
     /// Most inverted elements in any frame.
     pub inverted_peak: usize,
     /// It diverged.
@@ -79,7 +86,7 @@ pub struct ElementQualityRow {
 pub struct ElementQualityResult {
     /// Every case.
     pub rows: Vec<ElementQualityRow>,
-    /// Force of the jaws [N].
+    /// Force of the jaws at 12 kPa [N].
     pub jaw_force_n: f64,
     /// Nodes of the appendix.
     pub nodes: usize,
@@ -130,7 +137,7 @@ impl ElementQualityExperiment {
             for (pins, share) in PINS {
                 for lift in LIFTS {
                     cases.extend(MODULI.map(|modulus| {
-                        let jaw_force = self.jaw_force;
+                        let jaw_force = self.jaw_force * modulus / FORCE_AT;
                         let common = GraspLift::default();
                         let task = GraspLift { at: AT, lift, design, jaw_force, lower: false, threads: 1, ..common };
                         let specimen = with_organ(specimen, |organ| {
@@ -162,6 +169,8 @@ impl Case {
             lift_mm: 1e3 * self.task.lift,
             modulus_kpa: 1e-3 * self.modulus,
             pins: self.pins,
+            jaw_force_n: self.task.jaw_force,
+            attached: s.attached,
             inverted_peak: s.inverted_peak,
             diverged: s.diverged,
             divergence: s.divergence,
@@ -191,6 +200,8 @@ pub(crate) mod tests {
                     lift_mm: 1e3 * lift,
                     modulus_kpa: 1e-3 * modulus,
                     pins,
+                    jaw_force_n: 1.0,
+                    attached: true,
                     inverted_peak: usize::from(modulus < 4e3),
                     diverged: false,
                     divergence: None,

@@ -81,7 +81,7 @@ pub struct GraspDesignsExperiment {
 pub struct ElementQualityExperiment {
     #[command(flatten)]
     pub appendix: AppendixChoice,
-    /// Force with which the jaws close [N].
+    /// Force with which the jaws close on tissue of 12 kPa [N]; on other tissue in proportion to its modulus.
     #[arg(long, default_value_t = trocar_cell::JAW_FORCE)]
     pub jaw_force: f64,
     /// Cases at once; as many as the machine has threads by default. The figures do not depend on it.

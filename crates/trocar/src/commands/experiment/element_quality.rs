@@ -46,7 +46,9 @@ fn text(r: &ElementQualityResult) -> String {
             format!("{:.2}", row.slip_mm),
             format!("{:.2}", row.peak_constraint_n),
             yes(row.held),
-            if row.torn {
+            if !row.attached {
+                "nothing in the mouth"
+            } else if row.torn {
                 "torn"
             } else if row.slipped > 0 {
                 "slid"
