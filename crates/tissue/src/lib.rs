@@ -35,7 +35,7 @@ mod untangle;
 pub use body::Body;
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};
 pub use comparator::{SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep, stable_explicit_step};
-pub use contact::{Collider, Event, Nearest, Shape, ToolForce, Wrench};
+pub use contact::{Collider, Event, Hull, Nearest, Shape, ToolForce, Wrench};
 pub use energy::Energy;
 pub use error::{Error, Result};
 pub use grasp::{Compliance, Grasp, ToolMotion};

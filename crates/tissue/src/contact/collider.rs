@@ -20,6 +20,7 @@ pub struct Collider {
 impl Collider {
     /// Says what is wrong, if anything.
     pub(crate) fn check(&self) -> Result<(), String> {
+        self.shape.check()?;
         if !(self.friction >= 0.0 && self.friction.is_finite()) {
             return Err(format!("a friction coefficient of {}; 0 or more makes sense", self.friction));
         }

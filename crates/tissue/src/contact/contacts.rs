@@ -197,7 +197,8 @@ impl Contacts {
             let Some([from, to]) = poses else { continue };
             let reach = f64::from(self.reach) + collider.rest_offset + travelled(collider, from, to);
             let p = from.inverse().transform(world);
-            if collider.shape.is_farther(p, reach) {
+            let (centre, radius) = collider.shape.bounds(reach);
+            if (p - centre).length_squared() > radius * radius {
                 continue;
             }
             let nearest = collider.shape.nearest(p);
@@ -412,7 +413,7 @@ impl Hanging {
             point: place,
             place,
             stiffness: compliance.stiffness as f32,
-            friction: Friction::Clamped((2.0 * compliance.friction * compliance.jaw_force) as f32 / grasp.nodes.len() as f32),
+            friction: Friction::Clamped((2.0 * compliance.friction * compliance.jaw_force / grasp.nodes.len() as f64) as f32),
         })
     }
 }
@@ -424,6 +425,8 @@ fn travel(motion: &ToolMotion) -> f64 {
 /// How far any point of a collider goes between two poses of its tool, at most [m].
 fn travelled(collider: &Collider, from: &Pose, to: &Pose) -> f64 {
     let turn = 2.0 * (to.rotation * from.rotation.inverse()).xyz().length().min(1.0).asin();
-    let arm = collider.shape.extent();
+    let (centre, radius) = collider.shape.bounds(0.0);
+    // How far a half-space turns is not bounded.
+    let arm = if radius.is_finite() { centre.length() + radius } else { 0.0 };
     (to.translation - from.translation).length() + turn * arm
 }

@@ -3,12 +3,14 @@
 mod collider;
 mod contacts;
 mod force;
-mod reach;
+mod hull;
 mod shape;
+mod shape_surface;
 mod touch;
 
 pub use collider::Collider;
-pub use force::{Event, ToolForce, Wrench};
 pub(crate) use contacts::{Anchor, Contacts, Hanging};
+pub use force::{Event, ToolForce, Wrench};
+pub use hull::Hull;
 pub use shape::{Nearest, Shape};
 pub(crate) use touch::Source;

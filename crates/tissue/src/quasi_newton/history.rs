@@ -33,6 +33,11 @@ impl History {
         self.count = 0;
     }
 
+    /// Forgets everything; whether there was anything.
+    pub fn forget(&mut self) -> bool {
+        std::mem::take(&mut self.count) > 0
+    }
+
     /// Learns from a step of `share` times `direction`, which changed the gradient from `before` to `after`.
     #[inline(always)]
     pub fn learn<S: Simd>(&mut self, simd: S, share: f32, direction: &[Row], before: &[Row], after: &[Row]) {

@@ -15,7 +15,7 @@ mod stress;
 mod tiles;
 mod warp;
 
-use crate::contact::Contacts;
+use crate::contact::{Contacts, Source};
 use crate::descent::DescentIntegrator;
 use crate::integrator::{Frame, Integrator};
 use crate::lanes::Row;
@@ -137,9 +137,7 @@ impl QuasiNewtonIntegrator {
         self.hold(frame, body);
         self.contacts.begin(frame, body, state);
         self.refresh_factor(frame, body, state);
-        self.history.clear();
-        self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
-        self.elements.accept();
+        self.begin_anew(simd, h);
         for substep in 1..=substeps {
             let share = substep as f64 / substeps as f64;
             let (x, number) = (&self.x, &self.layout.number);
@@ -147,21 +145,33 @@ impl QuasiNewtonIntegrator {
             self.contacts.find(frame, body, begin, share, |vertex| position(&x[number[vertex] as usize]));
             self.limits.clear();
             self.limits.resize(self.contacts.touches().len(), 0.0);
-            if !(self.usable && self.substep(simd, frame, share, h, body, report)) {
+            // What the matrix does not know of may be too stiff for it.
+            let went = self.usable && self.substep(simd, frame, share, h, body, report)
+                || self.learn_touches(frame, body, state) && {
+                    self.begin_anew(simd, h);
+                    self.substep(simd, frame, share, h, body, report)
+                };
+            if !went {
                 report.fallbacks += 1;
                 self.store(state);
                 self.fallback.begin(frame, body);
                 self.fallback.substep(frame, share, body, &self.contacts, state, report);
                 self.load(state);
-                self.history.clear();
-                self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
-                self.elements.accept();
+                self.begin_anew(simd, h);
             }
             let (x, number) = (&self.x, &self.layout.number);
             self.contacts.settle(frame, body, share, |vertex| position(&x[number[vertex] as usize]));
         }
         self.contacts.end(state);
         self.store(state);
+    }
+
+    /// Forgets the way, and looks at the elements as they are.
+    #[inline(always)]
+    fn begin_anew<S: Simd>(&mut self, simd: S, h: f32) {
+        self.history.clear();
+        self.elements.pass(simd, &self.layout, &self.x, &self.start, h);
+        self.elements.accept();
     }
 
     /// One substep, which ends when `share` of the frame is over; false if it was given up, and nothing has changed then but scratch memory.
@@ -220,6 +230,8 @@ impl QuasiNewtonIntegrator {
             match self.search(simd, h) {
                 Found::Step => stepped = true,
                 Found::Nothing if stepped => break,
+                // What an earlier substep taught may mislead where contacts have changed.
+                Found::Nothing if self.history.forget() => {}
                 Found::Nothing => return self.restore(),
             }
         }
@@ -302,6 +314,26 @@ impl QuasiNewtonIntegrator {
             self.usable = self.factor.factorise(&self.held, &self.touches_in_factor);
             self.held_in_factor.copy_from_slice(&self.held);
         }
+    }
+
+    /// Lets the matrix know of what presses where a substep began or would have gone by itself; false if it did already.
+    fn learn_touches(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
+        let (x, targets, number) = (&self.x, &self.targets, &self.layout.number);
+        let places = |vertex: u32| {
+            let i = number[vertex as usize] as usize;
+            [position(&x[i]), position(&targets[i])]
+        };
+        let mut new = false;
+        for touch in self.contacts.touches().iter().filter(|touch| !matches!(touch.source, Source::Grasp(..))) {
+            let presses = places(touch.vertex).iter().any(|x| touch.height(*x) < 0.0);
+            let known = &mut state.supported[touch.vertex as usize];
+            new |= presses && !*known;
+            *known |= presses;
+        }
+        if new {
+            self.refresh_factor(frame, body, state);
+        }
+        new && self.usable
     }
 
     fn load(&mut self, state: &BodyState) {
