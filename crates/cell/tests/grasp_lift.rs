@@ -76,3 +76,15 @@ fn displacement_since_rest_is_the_snap_of_a_rest_pose_grasp_alone() {
     assert_eq!((live.snap_mm, live.snap_mean_mm), (0.0, 0.0));
     assert!((rest.displaced_mm - live.displaced_mm).abs() < 1e-9, "the same state before the second grasp");
 }
+
+#[test]
+fn jaws_that_press_hold_by_friction_and_compliantly() {
+    for design in [GraspDesign::Friction, GraspDesign::Compliant] {
+        let s = run(&GraspLift { design, lower: false, ..GraspLift::default() }, ONE_END).summary;
+        assert!(s.attached && s.held && !s.torn && !s.diverged && s.inverted_peak == 0, "{s:?}");
+        assert!((s.closing_force_n - s.jaw_force_n).abs() < 0.1 * s.jaw_force_n, "{s:?}");
+        assert_eq!(s.snap_mm, 0.0);
+        let loose = GraspLift { design, jaw_force: 0.02, lower: false, ..GraspLift::default() };
+        assert!(!run(&loose, ONE_END).summary.held, "{design}: jaws that hardly press hold nothing");
+    }
+}
