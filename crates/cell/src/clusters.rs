@@ -18,6 +18,9 @@ const CLEARANCE: f64 = 0.005;
 const CLEARANCE_EDGES: f64 = 1.5;
 
 const CLEARANCE_HALVINGS: u32 = 3;
+/// Fewest nodes the jaws take hold of, where there are as many.
+pub(crate) const FEWEST_HELD: usize = 8;
+
 /// As many clear nodes are enough for a cluster.
 const FEWEST_CLEAR: usize = 12;
 

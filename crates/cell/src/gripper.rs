@@ -6,18 +6,22 @@
 
 use glam::{DMat3, DQuat, DVec3};
 use trocar_geometry::{Pose, TriMesh};
+use trocar_tissue::ToolMotion;
 
 /// Widest angle between the blades [rad] (SPEC: theta_max 60 degrees).
-pub(crate) const MAX_ANGLE: f64 = std::f64::consts::FRAC_PI_3;
+pub const MAX_ANGLE: f64 = std::f64::consts::FRAC_PI_3;
 
 /// Distance from the pivot at which tissue is taken [m]: the middle of the mouth.
 pub(crate) const GRIP_DISTANCE: f64 = 0.0115;
 
-const BLADE_TIP: f64 = 0.021;
-const BLADE_WIDTH: f64 = 0.005;
-const BLADE_THICKNESS: f64 = 0.0016;
-const SHAFT_RADIUS: f64 = 0.0025;
-const SHAFT_LENGTH: f64 = 0.12;
+/// The mouth begins this far beyond the pivot [m].
+pub(crate) const MOUTH_BEGIN: f64 = 0.002;
+/// The blades and the mouth end there [m].
+pub(crate) const BLADE_TIP: f64 = 0.021;
+pub(crate) const BLADE_WIDTH: f64 = 0.005;
+pub(crate) const BLADE_THICKNESS: f64 = 0.0032;
+pub(crate) const SHAFT_RADIUS: f64 = 0.0025;
+pub(crate) const SHAFT_LENGTH: f64 = 0.12;
 
 /// A gripper at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +39,18 @@ impl Gripper {
         let z = (along - along.dot(up) * up).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z));
         Self { pose: Pose { rotation, translation: point + GRIP_DISTANCE * up }, jaw_angle }
+    }
+
+    /// Frame of the blade that opens towards +y (`side` 1) or -y (`side` -1): at the pivot, x along the blade. Its inner face is the plane y = 0.
+    pub fn blade(&self, side: f64) -> Pose {
+        let swing = DQuat::from_rotation_z(0.5 * side * self.jaw_angle);
+        Pose { rotation: self.pose.rotation * swing, translation: self.pose.translation }
+    }
+
+    /// How the gripper and its two blades move in a frame at whose end they are as in `next`: the motions of tools 0, 1 (the blade towards +y) and 2.
+    pub fn motions_to(&self, next: &Self) -> [ToolMotion; 3] {
+        let blade = |side| ToolMotion { from: self.blade(side), to: next.blade(side) };
+        [ToolMotion { from: self.pose, to: next.pose }, blade(1.0), blade(-1.0)]
     }
 
     /// Half the gap between the blades at distance `r` from the pivot [m].
@@ -60,7 +76,7 @@ impl Gripper {
             let rings = [
                 section(-0.002, BLADE_THICKNESS, BLADE_WIDTH),
                 section(0.6 * BLADE_TIP, BLADE_THICKNESS, BLADE_WIDTH),
-                section(BLADE_TIP, 0.5 * BLADE_THICKNESS, 0.6 * BLADE_WIDTH),
+                section(BLADE_TIP, 0.7 * BLADE_THICKNESS, 0.7 * BLADE_WIDTH),
             ];
             loft(&mut mesh, &rings, side < 0.0);
         }

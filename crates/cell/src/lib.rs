@@ -2,17 +2,30 @@
 //!
 //! The world is the recording frame of the specimen for now: a scene file will place it in the two-arm cell.
 
+pub mod blades;
+mod calm;
 mod clusters;
+mod design;
 mod error;
 mod grasp_lift;
 mod gripper;
+mod hold;
+mod jaw;
 mod measure;
+mod mouth;
+mod phase;
+mod session;
 mod target;
 mod world;
 
 pub use clusters::{Cluster, clusters};
+pub use design::GraspDesign;
 pub use error::{Error, Result};
-pub use grasp_lift::{GraspLift, GraspLiftRun, Phase, Snapshot};
-pub use gripper::Gripper;
+pub use grasp_lift::{GraspLift, GraspLiftRun, Snapshot};
+pub use gripper::{Gripper, MAX_ANGLE};
+pub use jaw::{JAW_FORCE, Jaw};
 pub use measure::{Sample, Summary};
+pub use mouth::{CONTACT_SKIN, Mouth, Mouthful, attached};
+pub use phase::Phase;
+pub use session::Session;
 pub use world::{FRAME, VISCOSITY_TIME, World};

@@ -15,6 +15,14 @@ pub struct Sample {
     pub tissue_lift_mm: f64,
     /// Distance of the centroid in the jaw frame from where it was at activation [mm].
     pub slip_mm: f64,
+    /// Angle between the blades [degrees].
+    pub jaw_angle_deg: f64,
+    /// Force with which tissue pushes the blades apart [N]: contact.
+    pub jaw_force_n: f64,
+    /// Contact force on gripper and blades together [N].
+    pub contact_n: f64,
+    /// Pull of the held nodes at the gripper [N]: constraint.
+    pub constraint_n: f64,
     /// Largest node speed over all organs [m/s].
     pub max_speed_m_s: f64,
     /// Inverted elements over all organs.
@@ -30,6 +38,18 @@ pub struct Summary {
     pub organ: String,
     /// Organ coordinate of the grasped cluster.
     pub at: f64,
+    /// Name of the grasp design.
+    pub design: &'static str,
+    /// Force that the jaws may use [N].
+    pub jaw_force_n: f64,
+    /// How far beside the tissue's middle the gripper came [mm].
+    pub approach_offset_mm: f64,
+    /// Tissue was between the blades when they had closed.
+    pub attached: bool,
+    /// Gap between the blades then, in the middle of that tissue [mm].
+    pub gap_mm: f64,
+    /// Force with which tissue pushed the blades apart then [N].
+    pub closing_force_n: f64,
     /// Nodes held.
     pub held_nodes: usize,
     /// Rise of the cluster's centroid from activation to the end of the hold [mm].
@@ -42,6 +62,18 @@ pub struct Summary {
     pub yielded_substeps: usize,
     /// Largest distance between where the constraint first prescribes a node and where it was [mm].
     pub snap_mm: f64,
+    /// Mean of that distance over the nodes [mm].
+    pub snap_mean_mm: f64,
+    /// Mean distance of the grasped nodes from their places at rest when the jaws had closed [mm].
+    pub displaced_mm: f64,
+    /// Largest pull of held nodes at the gripper in any frame [N]: constraint.
+    pub peak_constraint_n: f64,
+    /// Largest contact force on gripper and blades in any frame [N].
+    pub peak_contact_n: f64,
+    /// Frames in which held tissue began to slide through the jaws.
+    pub slipped: usize,
+    /// The tissue tore out of the jaws.
+    pub torn: bool,
     /// Largest motion of any node in the frame of activation [mm].
     pub activation_step_mm: f64,
     /// Follow ratio at least 0.80 and slip under 3 mm.

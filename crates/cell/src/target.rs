@@ -1,14 +1,13 @@
 //! What the gripper takes hold of.
 
+use crate::clusters::FEWEST_HELD;
 use crate::{Cluster, Error, Gripper, Result, World, clusters, gripper};
+use glam::DVec3;
 
 /// Jaws hold nodes within this distance of the middle of what they pinch [m] (half a cluster and the blades' reach) ...
 const REACH: f64 = 0.009;
 /// ... or within this many median edges on a coarse mesh.
 const REACH_EDGES: f64 = 1.5;
-
-/// Fewest nodes the jaws take hold of, where there are as many.
-const FEWEST_HELD: usize = 8;
 
 /// A cluster clear of pins is preferred to one that is not, even if it is this much farther along the organ.
 const WORTH_GOING: f64 = 0.1;
@@ -19,16 +18,18 @@ pub(crate) struct Target {
     pub cluster: Cluster,
     /// Gripper over the cluster, jaws open.
     pub open: Gripper,
-    /// Angle at which the blades touch the tissue [rad].
-    pub closed_angle: f64,
+    /// Angle at which the blades touch the tissue [rad]: where jaws that feel nothing stop.
+    pub touching_angle: f64,
+    /// How far jaws reach from the middle of what they pinch [m].
+    pub reach: f64,
 }
 
 impl Target {
-    /// Chooses the cluster of organ `organ` nearest to organ coordinate `at`, clear of pins if one is near, of which jaws from above reach enough nodes.
+    /// The gripper comes `offset` [m] beside it, towards its +y. Chooses the cluster of organ `organ` nearest to organ coordinate `at`, clear of pins if one is near, of which jaws from above reach enough nodes.
     ///
     /// # Errors
     /// When the organ has no free node.
-    pub fn choose(world: &World, organ: usize, at: f64) -> Result<Self> {
+    pub fn choose(world: &World, organ: usize, at: f64, offset: f64) -> Result<Self> {
         let body = &world.model.bodies()[organ];
         let reach = REACH.max(REACH_EDGES * body.median_edge());
         let mut within: Vec<Cluster> =
@@ -46,10 +47,12 @@ impl Target {
         };
         let axis = &world.axes[organ];
         let along = axis.point_at((cluster.s + 0.05).min(1.0)) - axis.point_at((cluster.s - 0.05).max(0.0));
-        let open = Gripper::over(cluster.centroid(world, organ), world.up, along, gripper::MAX_ANGLE);
+        let mut open = Gripper::over(cluster.centroid(world, organ), world.up, along, gripper::MAX_ANGLE);
         let jaw = open.pose.inverse();
         let across = |i: &u32| jaw.transform(world.state.position(&world.model, organ, *i as usize)).y.abs();
         let half_width = cluster.nodes.iter().map(across).fold(0.0, f64::max);
-        Ok(Self { cluster, open, closed_angle: Gripper::angle_for(half_width) })
+        let touching_angle = Gripper::angle_for(half_width);
+        open.pose.translation += open.pose.rotation * (offset * DVec3::Y);
+        Ok(Self { cluster, open, touching_angle, reach })
     }
 }

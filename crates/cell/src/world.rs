@@ -5,8 +5,8 @@ use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, Schedule, State, Stepper, Support, SupportField,
-    ToolMotion, pins,
+    BodyDescription, Collider, ConstitutiveModel, Event, Material, Model, ModelBuilder, Schedule, State, Stepper,
+    Support, SupportField, ToolForce, ToolMotion, pins,
 };
 
 /// Length of a frame [s].
@@ -45,6 +45,19 @@ impl World {
     /// # Errors
     /// When a mesh, a material or the pins of an organ cannot be simulated.
     pub fn new(specimen: &Specimen, schedule: Schedule, threads: usize) -> Result<Self> {
+        Self::with_tools(specimen, Vec::new(), schedule, threads)
+    }
+
+    /// The same with tools that have `colliders`, such as [`crate::blades::colliders`].
+    ///
+    /// # Errors
+    /// As [`World::new`], and colliders that cannot be.
+    pub fn with_tools(
+        specimen: &Specimen,
+        colliders: Vec<Collider>,
+        schedule: Schedule,
+        threads: usize,
+    ) -> Result<Self> {
         let up = specimen.up.normalize();
         let mut builder = ModelBuilder::new().gravity(-GRAVITY * up);
         let mut axes = Vec::with_capacity(specimen.organs.len());
@@ -59,13 +72,26 @@ impl World {
             })?;
             axes.push(axis);
         }
+        for collider in colliders {
+            builder.collider(collider)?;
+        }
         let model = builder.build()?;
         let state = State::new(&model);
         let stepper = Stepper::new(&model, schedule, FRAME, threads)?;
         Ok(Self { model, state, axes, up, stepper })
     }
 
-    /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps.
+    /// What tissue did to each tool in the last frame, in the order of the motions that were given; shorter where nothing is felt.
+    pub fn forces(&self) -> &[ToolForce] {
+        self.stepper.forces()
+    }
+
+    /// What happened to grasps in the last frame.
+    pub fn events(&self) -> &[Event] {
+        self.stepper.events()
+    }
+
+    /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and colliders.
     pub fn step(&mut self, tools: &[ToolMotion]) -> trocar_tissue::StepReport {
         self.stepper.step(&self.model, &mut self.state, tools)
     }

@@ -2,50 +2,12 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-use glam::DVec3;
-use trocar_cell::{GraspLift, GraspLiftRun};
-use trocar_geometry::{LatticeMesher, SignedDistance, TetQuality};
+mod common;
+
+use common::{ONE_END, specimen};
+use trocar_cell::{GraspDesign, GraspLift, GraspLiftRun};
 use trocar_progress::Silent;
-use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
-
-/// A tube along x, 60 mm long and 9 mm thick: about the appendix.
-struct Tube;
-
-const RADIUS: f64 = 0.0045;
-const HALF_LENGTH: f64 = 0.030;
-
-impl SignedDistance for Tube {
-    fn distance(&self, p: DVec3) -> f64 {
-        (p - DVec3::X * p.x.clamp(RADIUS - HALF_LENGTH, HALF_LENGTH - RADIUS)).length() - RADIUS
-    }
-}
-
-/// The tube as a specimen under a camera that looks straight down.
-fn specimen(pins: Pins) -> Specimen {
-    let half = DVec3::new(HALF_LENGTH, RADIUS, RADIUS);
-    let body = LatticeMesher::uniform(2.2e-3).mesh_shape(&Tube, (-half, half)).unwrap();
-    let quality = TetQuality::of(&body);
-    let surface = body.boundary().0;
-    Specimen {
-        name: "tube".into(),
-        up: -DVec3::Z,
-        placement: trocar_geometry::Pose::IDENTITY,
-        camera: None,
-        organs: vec![Organ {
-            name: "tube".into(),
-            surface,
-            material: Material::default(),
-            pins,
-            base: -HALF_LENGTH * DVec3::X,
-            facts: OrganFacts { nodes: body.vertices.len(), inverted: quality.inverted, ..OrganFacts::default() },
-            body,
-        }],
-        background: None,
-        provenance: Provenance::default(),
-    }
-}
-
-const ONE_END: Pins = Pins::End { end: End::Base, length: 0.15, band_length: 0.0, band_share: 0.0 };
+use trocar_specimen::Pins;
 
 fn run(task: &GraspLift, pins: Pins) -> GraspLiftRun {
     task.run(&specimen(pins), &Silent).unwrap()
@@ -57,6 +19,7 @@ fn a_grasped_tube_follows_the_jaws() {
         let run = run(&GraspLift { snapshot_every: 10, ..GraspLift::default() }, pins);
         let s = &run.summary;
         assert!(s.held && !s.diverged && s.settled, "{s:?}");
+        assert!(s.attached && s.gap_mm > 1.5, "{s:?}");
         assert!((s.lift_mm - 15.0).abs() < 0.05 && s.slip_mm < 0.01, "{s:?}");
         assert_eq!(s.snap_mm, 0.0, "live-pose capture does not move the tissue");
         assert_eq!(s.pin_drift_mm, 0.0, "pinned nodes do not move");
@@ -88,5 +51,40 @@ fn bad_options_are_named() {
     assert!(unknown.contains("liver") && unknown.contains("tube"), "{unknown}");
     assert!(refuse(GraspLift { at: 1.5, ..GraspLift::default() }, ONE_END).contains("--at"));
     assert!(refuse(GraspLift { lift: f64::NAN, ..GraspLift::default() }, ONE_END).contains("--lift"));
+    assert!(refuse(GraspLift { jaw_force: 0.0, ..GraspLift::default() }, ONE_END).contains("--jaw-force"));
+    assert!(refuse(GraspLift { approach_offset: 1.0, ..GraspLift::default() }, ONE_END).contains("approach offset"));
+    assert!(refuse(GraspLift { regrasp: Some(f64::NAN), ..GraspLift::default() }, ONE_END).contains("drag"));
+    assert!("grip".parse::<GraspDesign>().unwrap_err().to_string().contains("live-pose"));
     assert!(refuse(GraspLift::default(), Pins::Band { share: 1.0 }).contains("pinned"));
+}
+
+#[test]
+fn designs_have_their_names() {
+    for design in GraspDesign::ALL {
+        assert_eq!(design.to_string().parse::<GraspDesign>().unwrap(), design);
+    }
+    assert_eq!(GraspDesign::ALL.map(GraspDesign::name), ["friction", "rest-pose", "live-pose", "compliant"]);
+}
+
+#[test]
+fn displacement_since_rest_is_the_snap_of_a_rest_pose_grasp_alone() {
+    let grasp = |design| {
+        run(&GraspLift { design, regrasp: Some(0.003), lower: false, ..GraspLift::default() }, ONE_END).summary
+    };
+    let (rest, live) = (grasp(GraspDesign::RestPose), grasp(GraspDesign::LivePose));
+    assert!((rest.snap_mean_mm - rest.displaced_mm).abs() < 0.01, "equation (5): {rest:?}");
+    assert_eq!((live.snap_mm, live.snap_mean_mm), (0.0, 0.0));
+    assert!((rest.displaced_mm - live.displaced_mm).abs() < 1e-9, "the same state before the second grasp");
+}
+
+#[test]
+fn jaws_that_press_hold_by_friction_and_compliantly() {
+    for design in [GraspDesign::Friction, GraspDesign::Compliant] {
+        let s = run(&GraspLift { design, lower: false, ..GraspLift::default() }, ONE_END).summary;
+        assert!(s.attached && s.held && !s.torn && !s.diverged && s.inverted_peak == 0, "{s:?}");
+        assert!((s.closing_force_n - s.jaw_force_n).abs() < 0.1 * s.jaw_force_n, "{s:?}");
+        assert_eq!(s.snap_mm, 0.0);
+        let loose = GraspLift { design, jaw_force: 0.02, lower: false, ..GraspLift::default() };
+        assert!(!run(&loose, ONE_END).summary.held, "{design}: jaws that hardly press hold nothing");
+    }
 }

@@ -13,15 +13,16 @@ mod truth;
 mod workflow;
 
 pub use bench::{
-    Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, ScalingBench,
-    ScalingResult, ScalingRow, Timing,
+    GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow,
+    OrganSource, OrgansBench, OrgansResult, ScalingBench, ScalingResult, ScalingRow, Timing,
 };
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{
-    ConvergenceCase, ConvergenceExperiment, ConvergenceResult, IntegratorRow, IntegratorsExperiment, IntegratorsResult,
-    PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow, SettlingExperiment,
-    SettlingOrgan, SettlingResult, SettlingRow, StepRow,
+    AppendixSource, ConvergenceCase, ConvergenceExperiment, ConvergenceResult, ElementQualityExperiment,
+    ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial,
+    IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PhantomFigures, ReconstructionExperiment,
+    ReconstructionResult, ReconstructionRow, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};

@@ -206,6 +206,10 @@ fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
                 jaw_lift_mm: lift,
                 tissue_lift_mm: 0.96 * lift,
                 slip_mm: 0.04 * lift,
+                jaw_angle_deg: 40.0,
+                jaw_force_n: 1.0,
+                contact_n: 0.5,
+                constraint_n: 0.2,
                 max_speed_m_s: 1e-5 + 0.02 * (-(t - 4.0) * (t - 4.0)).exp(),
                 inverted: 0,
                 min_volume_ratio: 1.0 - 0.01 * lift,
@@ -231,6 +235,9 @@ fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
         summary: Summary {
             organ: "appendix".into(),
             at: 0.5,
+            design: "live-pose",
+            jaw_force_n: 1.0,
+            attached: true,
             held_nodes: 23,
             lift_mm: 14.4,
             follow_ratio: 0.96,
@@ -254,6 +261,7 @@ fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
             wall_s: 2.0,
             real_time_factor: 4.0,
             state_hash: "0123456789abcdef".into(),
+            ..Summary::default()
         },
         samples: samples.clone(),
         snapshots: (0..snapshots).map(snapshot).collect(),

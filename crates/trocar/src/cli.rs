@@ -1,9 +1,11 @@
 //! What a user may type.
 
 mod comparison;
+mod grasp;
 mod solver;
 
 pub use comparison::*;
+pub use grasp::*;
 pub use solver::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -200,6 +202,10 @@ pub enum ExperimentName {
     Integrators(IntegratorsExperiment),
     /// Fig. 6(c): how fast phantoms A, B and C come to rest in the cell.
     Settling(SettlingExperiment),
+    /// Table II and Fig. 7(a) to (c): four ways to hold the appendix, at five places and from three sides, and again after a drag.
+    GraspDesigns(GraspDesignsExperiment),
+    /// Fig. 7(f): whether elements invert when the appendix is lifted 15 and 30 mm, at five moduli and with two pin rules.
+    ElementQuality(ElementQualityExperiment),
 }
 
 /// Arguments of `experiment reconstruction`.
@@ -245,6 +251,8 @@ pub enum BenchName {
     Organs(OrgansBench),
     /// Speed of the stepping from a thousand to a million elements, over threads, and of many small models at once.
     Scaling(ScalingBench),
+    /// What contact with the gripper costs in a grasp-lift of all organs.
+    Grasp(GraspBench),
 }
 
 /// Arguments of `bench meshing`.
@@ -340,6 +348,18 @@ pub struct Simulate {
     /// Lift of the jaws [mm].
     #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
     pub lift: f64,
+    /// How the jaws hold.
+    #[arg(long, value_enum, default_value_t = DesignName::Compliant)]
+    pub design: DesignName,
+    /// Force with which the jaws close [N].
+    #[arg(long, default_value_t = trocar_cell::JAW_FORCE, allow_negative_numbers = true)]
+    pub jaw_force: f64,
+    /// How far beside the organ's middle the gripper comes [mm], across the organ.
+    #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
+    pub approach_offset: f64,
+    /// First drag the tissue sideways by this much [mm], let go, and grasp again.
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    pub regrasp: Option<f64>,
     /// What steps the organs.
     #[arg(long, value_enum, default_value_t = SolverName::Fast)]
     pub schedule: SolverName,

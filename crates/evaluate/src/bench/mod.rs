@@ -1,5 +1,6 @@
 //! Measurements of speed and cost: one file each.
 
+mod grasp;
 mod machine;
 mod many;
 mod meshing;
@@ -8,9 +9,11 @@ mod pytetwild;
 mod scaling;
 mod timing;
 
+pub use grasp::{GraspBench, GraspBenchResult, GraspPhaseTiming};
 pub use machine::Machine;
 pub use many::ManyRow;
 pub use meshing::{MeshingBench, MeshingResult, MeshingRow};
 pub use organs::{OrganSource, OrgansBench, OrgansResult};
 pub use scaling::{ScalingBench, ScalingResult, ScalingRow};
 pub use timing::Timing;
+pub(crate) use timing::median;

@@ -68,7 +68,7 @@ impl Timing {
 }
 
 /// The median, and sorted values; not a number without values.
-pub(super) fn median(values: &mut [f64]) -> f64 {
+pub(crate) fn median(values: &mut [f64]) -> f64 {
     values.sort_by(f64::total_cmp);
     match values.len() {
         0 => f64::NAN,

@@ -1,14 +1,24 @@
 //! The paper's tables and figures, made anew: one file an experiment.
 
+mod appendix;
 mod convergence;
+mod element_quality;
+mod grasp_designs;
 mod integrator_forms;
 mod integrators;
-mod phantoms;
+pub(crate) mod phantoms;
 mod reconstruction;
 mod settling;
 mod step_ladder;
 
+pub use appendix::AppendixSource;
 pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult};
+#[cfg(test)]
+pub(crate) use element_quality::tests::made_up_result as made_up_element_quality;
+pub use element_quality::{ElementQualityExperiment, ElementQualityResult, ElementQualityRow};
+#[cfg(test)]
+pub(crate) use grasp_designs::tests::made_up_result as made_up_grasp_designs;
+pub use grasp_designs::{GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial, PaperGrasp};
 pub(crate) use integrators::SPEED_LIMIT;
 pub use integrators::{IntegratorRow, IntegratorsExperiment, IntegratorsResult};
 pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};

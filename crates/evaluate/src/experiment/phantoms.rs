@@ -22,7 +22,7 @@ pub(super) fn recorded(phantom: &str, options: &RecordOptions, dir: &Path, progr
 }
 
 /// `phantom` recorded into `folder/recording` and reconstructed with the default settings into `folder/specimen`.
-pub(super) fn specimen(
+pub(crate) fn specimen(
     phantom: &str,
     options: &RecordOptions,
     folder: &Path,

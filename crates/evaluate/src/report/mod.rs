@@ -5,7 +5,9 @@
 
 mod colors;
 mod convergence;
+mod element_quality;
 mod figures;
+mod grasp_designs;
 mod integrators;
 mod meshing;
 mod moving_picture;
@@ -22,7 +24,10 @@ mod truth;
 mod views;
 
 use crate::bench::{MeshingResult, ScalingResult};
-use crate::experiment::{ConvergenceResult, IntegratorsResult, ReconstructionResult, SettlingResult};
+use crate::experiment::{
+    ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult, ReconstructionResult,
+    SettlingResult,
+};
 use crate::{Error, Result};
 use moving_picture::Lift;
 use std::path::Path;
@@ -103,6 +108,22 @@ pub(crate) fn integrators(result: &IntegratorsResult) -> Result<String> {
 /// A plot that cannot be drawn.
 pub(crate) fn settling(result: &SettlingResult) -> Result<String> {
     Ok(page::page("Settling", "Phantoms released into the cell", &settling::body(result)?))
+}
+
+/// The page of the grasp designs.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn grasp_designs(result: &GraspDesignsResult) -> Result<String> {
+    Ok(page::page("Grasp designs", "Four ways to hold the appendix", &grasp_designs::body(result)?))
+}
+
+/// The page of the element-quality experiment.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn element_quality(result: &ElementQualityResult) -> Result<String> {
+    Ok(page::page("Element quality", "Lifts of the appendix against its pins", &element_quality::body(result)?))
 }
 
 /// The page of the convergence experiment.

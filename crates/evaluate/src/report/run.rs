@@ -104,6 +104,12 @@ fn cards(run: &GraspLiftRun) -> String {
         Card::new("Lift", format!("{} mm", fixed(s.lift_mm, 1)), format!("{} nodes held", count(s.held_nodes))),
         Card::new("Follow ratio", fixed(s.follow_ratio, 3), "target at least 0.80").met(s.follow_ratio >= 0.8),
         Card::new("Slip", format!("{} mm", fixed(s.slip_mm, 2)), "target under 3 mm").met(s.slip_mm < 3.0),
+        Card::new(
+            "Grasp",
+            s.design,
+            format!("jaws of {} N, {} N when they had closed", fixed(s.jaw_force_n, 2), fixed(s.closing_force_n, 2)),
+        )
+        .met(s.attached),
         Card::new("Snap", format!("{} mm", fixed(s.snap_mm, 3)), "jump at activation"),
         Card::new("Inverted, peak", count(s.inverted_peak), "elements in any frame").met(s.inverted_peak == 0),
         Card::new("Peak speed", format!("{} m/s", fixed(s.peak_speed_m_s, 2)), "any node, any frame"),
@@ -154,6 +160,14 @@ fn plots(samples: &[Sample]) -> Result<String> {
     let lift = vec![line(&|s| s.jaw_lift_mm, JAW), line(&|s| s.tissue_lift_mm, TISSUE)];
     let slip = vec![Line { filled: true, ..line(&|s| s.slip_mm, TISSUE) }];
     let names = page::legend([("jaw", JAW), ("grasped tissue", TISSUE)]);
+    let forces = vec![
+        line(&|s| s.contact_n, colors::organ(1)),
+        line(&|s| s.jaw_force_n, colors::organ(0)),
+        line(&|s| s.constraint_n, colors::organ(3)),
+    ];
+    let force_names =
+        page::legend([("contact", colors::organ(1)), ("jaw", colors::organ(0)), ("constraint", colors::organ(3))]);
+    let angle = vec![line(&|s| s.jaw_angle_deg, JAW)];
     let figures = [
         page::figure(
             &plot("lift over time", "lift [mm]", lift, &[0.0], &[], false)?,
@@ -162,6 +176,17 @@ fn plots(samples: &[Sample]) -> Result<String> {
         page::figure(
             &plot("slip over time", "slip [mm]", slip, &[0.0], &[3.0], false)?,
             "<b>Slip.</b> How far the grasped tissue has moved in the jaws [mm]; dashed: the limit of 3 mm.",
+        ),
+        page::figure(
+            &plot("forces over time", "force [N]", forces, &[0.0], &[], false)?,
+            &format!(
+                "<b>Forces</b> on the gripper [N]: contact of tissue with blades and shaft; how hard it pushes the blades apart; constraint, the pull of held nodes, which \
+                 is no tissue contact.{force_names}"
+            ),
+        ),
+        page::figure(
+            &plot("jaw angle over time", "angle [\u{b0}]", angle, &[0.0], &[], false)?,
+            "<b>Angle between the blades</b> [\u{b0}]. They close with a force, not to an angle.",
         ),
         page::figure(
             &plot(

@@ -139,8 +139,16 @@ pub(super) fn plain(head: &[&str], rows: &[Vec<String>]) -> String {
 /// Every figure of a run with what it means.
 pub(super) fn summary(s: &Summary) -> String {
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
-    let rows: [(&str, String, &str); 20] = [
+    let rows: [(&str, String, &str); 27] = [
         ("Organ", format!("{}, s = {}", s.organ, fixed(s.at, 2)), "grasped at this organ coordinate, 0 base to 1 tip"),
+        ("Grasp design", s.design.to_owned(), "friction, rest-pose, live-pose or compliant"),
+        ("Jaw force", format!("{} N", fixed(s.jaw_force_n, 2)), "what the jaws may press with"),
+        (
+            "Closed on",
+            format!("{} mm with {} N", fixed(s.gap_mm, 1), fixed(s.closing_force_n, 2)),
+            "gap between the blades and the force that pushed them apart when they had closed",
+        ),
+        ("In the mouth", yes(s.attached), "tissue on both sides of the closing plane when the jaws had closed"),
         ("Nodes held", count(s.held_nodes), "tissue nodes inside the jaws at activation"),
         ("Held", yes(s.held), "follow ratio at least 0.80 and slip under 3 mm"),
         (
@@ -155,6 +163,13 @@ pub(super) fn summary(s: &Summary) -> String {
             "motion of the cluster's centroid in the jaw frame, end of hold",
         ),
         ("Snap", format!("{} mm", fixed(s.snap_mm, 3)), "largest jump the grasp prescribes when it activates"),
+        (
+            "Peak forces",
+            format!("{} N contact, {} N constraint", fixed(s.peak_contact_n, 2), fixed(s.peak_constraint_n, 2)),
+            "of tissue on the gripper; of held nodes at it",
+        ),
+        ("Slid", count(s.slipped), "frames in which held tissue began to slide through the jaws"),
+        ("Torn", yes(s.torn), "the pull went beyond what the tissue bears"),
         (
             "Activation step",
             format!("{} mm", fixed(s.activation_step_mm, 3)),

@@ -1,6 +1,8 @@
 //! `trocar experiment`.
 
 mod convergence;
+mod element_quality;
+mod grasp_designs;
 mod integrators;
 mod settling;
 
@@ -15,6 +17,8 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
     match &arguments.name {
         ExperimentName::Convergence(arguments) => convergence::run(arguments, json, progress),
         ExperimentName::Integrators(arguments) => integrators::run(arguments, json, progress),
+        ExperimentName::GraspDesigns(arguments) => grasp_designs::run(arguments, json, progress),
+        ExperimentName::ElementQuality(arguments) => element_quality::run(arguments, json, progress),
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }

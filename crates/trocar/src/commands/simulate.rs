@@ -13,6 +13,10 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
         organ: arguments.organ.clone(),
         at: arguments.at,
         lift: arguments.lift * 1e-3,
+        design: arguments.design.into(),
+        jaw_force: arguments.jaw_force,
+        approach_offset: arguments.approach_offset * 1e-3,
+        regrasp: arguments.regrasp.map(|drag| drag * 1e-3),
         schedule: solver_named(&arguments.schedule.name())?,
         threads: arguments.threads,
         ..GraspLift::default()
@@ -25,12 +29,16 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
 /// A run in a few lines for people.
 pub fn text(s: &Summary) -> String {
     format!(
-        "{} at s = {:.2}, {} nodes held: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm: {}\n\
+        "{} at s = {:.2}, {} grasp, {} nodes held, jaws closed on {:.1} mm with {:.2} N{}: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm: {}\n\
          {:.4} m/s after 1 s, calmed for {:.2} s to {:.4} m/s, peak {:.3} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}\n\
          {:.1} s simulated in {:.1} s ({:.2}x real time), state {}",
         s.organ,
         s.at,
+        s.design,
         s.held_nodes,
+        s.gap_mm,
+        s.closing_force_n,
+        if s.attached { "" } else { " (nothing between them)" },
         s.lift_mm,
         100.0 * s.follow_ratio,
         s.slip_mm,

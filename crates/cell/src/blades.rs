@@ -1,0 +1,116 @@
+//! The gripper as tissue feels it: colliders of its blades and shaft.
+//!
+//! Three tools stand for one gripper: its own frame, which carries the shaft and whatever is held, and a frame for each blade ([`Gripper::blade`]).
+//! A blade is three thin capsules along it. With their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5 mm wide, 3.2 mm thick, and an
+//! inner face that is flat to 0.07 mm.
+
+use crate::Gripper;
+use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MOUTH_BEGIN, SHAFT_LENGTH, SHAFT_RADIUS};
+use glam::DVec3;
+use trocar_tissue::{Collider, Shape, ToolForce};
+
+/// The gripper's own frame among the tools of a step.
+pub const GRIPPER_TOOL: usize = 0;
+
+/// The blades among the tools of a step, each with the side of the closing plane to which it opens.
+pub const BLADE_TOOLS: [(usize, f64); 2] = [(1, 1.0), (2, -1.0)];
+
+/// Distance at which tissue rests on an instrument's tip [m] (SPEC C1).
+pub const REST_OFFSET: f64 = 0.0015;
+
+/// Coulomb friction of the instrument on tissue (SPEC C1).
+pub const FRICTION: f64 = 0.6;
+
+/// Radius of a blade's ridges [m]: nearly none; the rest offset makes the blade's thickness.
+const RIDGE: f64 = 0.0001;
+
+/// The colliders of one gripper whose frames are tools 0 to 2.
+pub fn colliders() -> Vec<Collider> {
+    let inset = RIDGE + REST_OFFSET;
+    let mut all = Vec::with_capacity(7);
+    for (tool, side) in BLADE_TOOLS {
+        for share in [-1.0, 0.0, 1.0] {
+            let at = |x: f64| DVec3::new(x, side * inset, share * (0.5 * BLADE_WIDTH - inset));
+            let ends = [at(MOUTH_BEGIN + inset), at(BLADE_TIP - inset)];
+            all.push(Collider {
+                name: format!("blade {tool}"),
+                tool,
+                shape: Shape::Capsule { ends, radius: RIDGE },
+                rest_offset: REST_OFFSET,
+                friction: FRICTION,
+            });
+        }
+    }
+    // The shaft ends so that it does not fill the mouth.
+    let ends = [DVec3::new(-SHAFT_LENGTH, 0.0, 0.0), DVec3::new(MOUTH_BEGIN - SHAFT_RADIUS, 0.0, 0.0)];
+    let shape = Shape::Capsule { ends, radius: SHAFT_RADIUS };
+    all.push(Collider { name: "shaft".into(), tool: GRIPPER_TOOL, shape, rest_offset: 0.0, friction: FRICTION });
+    all
+}
+
+/// How hard tissue pushes the blades of `gripper` apart [N]: the mean over the two of the force outwards across the blade, which is what one rod that drives both feels of
+/// either. `forces` are those of the step's tools; 0 where there are none.
+pub fn opening_force(gripper: &Gripper, forces: &[ToolForce]) -> f64 {
+    let of = |(tool, side): (usize, f64)| {
+        let outwards = gripper.blade(side).rotation * (side * DVec3::Y);
+        forces.get(tool).map_or(0.0, |f| f.contact.force.dot(outwards))
+    };
+    0.5 * BLADE_TOOLS.map(of).iter().sum::<f64>()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trocar_geometry::Pose;
+    use trocar_tissue::Wrench;
+
+    /// Distance of `p` [m, gripper frame] from the nearest surface at which tissue rests.
+    fn rest_distance(gripper: &Gripper, p: DVec3) -> f64 {
+        let frames = [gripper.pose, gripper.blade(1.0), gripper.blade(-1.0)];
+        let to = |c: &Collider| c.shape.nearest(frames[c.tool].inverse().transform(p)).distance - c.rest_offset;
+        colliders().iter().map(to).fold(f64::INFINITY, f64::min)
+    }
+
+    #[test]
+    fn inner_faces_meet_on_the_closing_plane_and_bound_the_wedge() {
+        let closed = Gripper { pose: Pose::IDENTITY, jaw_angle: 0.0 };
+        for x in [0.004, 0.010, 0.019] {
+            for z in [-0.0009, 0.0, 0.0005] {
+                let d = rest_distance(&closed, DVec3::new(x, 0.0, z));
+                assert!((0.0..0.0001).contains(&(d + 1e-9)), "{d} at {x}, {z}");
+            }
+        }
+        let open = Gripper { pose: Pose::IDENTITY, jaw_angle: 0.6 };
+        let r = 0.012;
+        let gap = open.half_gap(r);
+        let on_face = DVec3::new((r * r - gap * gap).sqrt(), gap, 0.0);
+        assert!(rest_distance(&open, on_face).abs() < 1e-9);
+        assert!(rest_distance(&open, on_face - 0.001 * DVec3::Y) > 0.0009);
+        assert!(rest_distance(&open, on_face + 0.001 * DVec3::Y) < -0.0009);
+    }
+
+    #[test]
+    fn blades_end_where_the_mouth_does() {
+        let closed = Gripper { pose: Pose::IDENTITY, jaw_angle: 0.0 };
+        let blade = |p: DVec3| {
+            let to = |c: &Collider| c.shape.nearest(p).distance - c.rest_offset;
+            colliders().iter().filter(|c| c.tool == 1).map(to).fold(f64::INFINITY, f64::min)
+        };
+        assert!(blade(DVec3::new(0.0211, 0.0016, 0.0)) > 0.0 && blade(DVec3::new(0.0209, 0.0016, 0.0)) < 0.0);
+        assert!(blade(DVec3::new(0.0019, 0.0016, 0.0)) > 0.0);
+        assert!(blade(DVec3::new(0.010, 0.0016, 0.00255)) > 0.0 && blade(DVec3::new(0.010, 0.0016, 0.00245)) < 0.0);
+        assert!(rest_distance(&closed, DVec3::new(-0.02, 0.0024, 0.0)) < 0.0, "the shaft is there");
+    }
+
+    #[test]
+    fn the_opening_force_is_what_pushes_outwards() {
+        let gripper = Gripper::over(DVec3::new(0.1, 0.0, 0.2), DVec3::Z, DVec3::X, 0.5);
+        let push = |side: f64, newtons: f64| {
+            let force = gripper.blade(side).rotation * (side * newtons * DVec3::Y);
+            ToolForce { contact: Wrench { force, torque: DVec3::ZERO }, ..ToolForce::default() }
+        };
+        let forces = [ToolForce::default(), push(1.0, 2.0), push(-1.0, 1.0)];
+        assert!((opening_force(&gripper, &forces) - 1.5).abs() < 1e-12);
+        assert_eq!(opening_force(&gripper, &[]), 0.0);
+    }
+}

@@ -1,0 +1,82 @@
+//! The ways in which jaws can hold tissue, by name (SPEC C4, C7; paper section IV-C and Table II).
+
+use crate::World;
+use crate::blades::{FRICTION, GRIPPER_TOOL};
+use glam::DVec3;
+use trocar_geometry::Pose;
+use trocar_tissue::{Compliance, Grasp};
+
+/// How jaws hold what is between them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum GraspDesign {
+    /// By the friction of the two blades alone.
+    Friction,
+    /// Nodes tied to the jaws where they were in the undeformed organ: whatever the organ has moved since becomes a jump (paper, equation 5).
+    RestPose,
+    /// Nodes tied to the jaws where they are when these close (paper, equation 4).
+    #[default]
+    LivePose,
+    /// As live-pose, on springs that hold no more than the friction of the jaws' force does, and tear.
+    Compliant,
+}
+
+/// Stiffness of a compliant grasp's spring over Young's modulus times the median edge, which is about what the tissue around a node resists with: far above it, so that held
+/// tissue follows the jaws.
+const SPRING: f64 = 20.0;
+
+/// Pull at which tissue tears out of the jaws [N]: a wall of 1 mm (two layers of 0.5) over the 5 mm of the blades at a strength of 1 MPa.
+const TEAR_FORCE: f64 = 5.0;
+
+impl GraspDesign {
+    /// All of them, in the paper's order.
+    pub const ALL: [Self; 4] = [Self::Friction, Self::RestPose, Self::LivePose, Self::Compliant];
+
+    /// Its name in files and on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Friction => "friction",
+            Self::RestPose => "rest-pose",
+            Self::LivePose => "live-pose",
+            Self::Compliant => "compliant",
+        }
+    }
+
+    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` [N] whose gripper is at `pose`; none for friction, which needs none.
+    pub fn grasp(self, world: &World, organ: usize, nodes: &[u32], pose: &Pose, jaw_force: f64) -> Option<Grasp> {
+        let (model, state) = (&world.model, &world.state);
+        let live = || Grasp::capture(model, state, organ, nodes, GRIPPER_TOOL, pose);
+        let body = &model.bodies()[organ];
+        match self {
+            Self::Friction => None,
+            Self::RestPose => {
+                // Offsets as authored in the undeformed organ with the gripper where it closes: the displacement since rest becomes the snap.
+                let rest: Vec<DVec3> = nodes.iter().map(|i| body.rest_positions()[*i as usize]).collect();
+                Some(Grasp::prescribe(model, organ, nodes, &rest, GRIPPER_TOOL, pose))
+            }
+            Self::LivePose => Some(live()),
+            Self::Compliant => Some(live().compliant(Compliance {
+                stiffness: SPRING * body.material().young_modulus * body.median_edge(),
+                closing: DVec3::Y,
+                jaw_force,
+                friction: FRICTION,
+                tear_force: TEAR_FORCE,
+            })),
+        }
+    }
+}
+
+impl std::fmt::Display for GraspDesign {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl std::str::FromStr for GraspDesign {
+    type Err = crate::Error;
+
+    fn from_str(name: &str) -> crate::Result<Self> {
+        let names = || Self::ALL.map(Self::name).join(", ");
+        let unknown = || crate::Error::Option(format!("no grasp design '{name}'; there are {}", names()));
+        Self::ALL.into_iter().find(|d| d.name() == name).ok_or_else(unknown)
+    }
+}

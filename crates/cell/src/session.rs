@@ -1,0 +1,387 @@
+//! A grasp-lift in progress, frame by frame.
+
+use crate::blades::{GRIPPER_TOOL, colliders, opening_force};
+use crate::calm::Calm;
+use crate::hold::{Hold, Moved};
+use crate::jaw::Jaw;
+use crate::measure::{HELD_FOLLOW_RATIO, HELD_SLIP_MM, SETTLED_SPEED};
+use crate::mouth::attached;
+use crate::target::Target;
+use crate::{
+    FRAME, GraspDesign, GraspLift, GraspLiftRun, Gripper, MAX_ANGLE, Mouth, Phase, Result, Sample, Snapshot, Summary,
+    World,
+};
+use glam::DVec3;
+use std::time::{Duration, Instant};
+use trocar_specimen::Specimen;
+use trocar_tissue::{Event, State, StepReport};
+
+/// Height from which the gripper approaches [m].
+const APPROACH_HEIGHT: f64 = 0.03;
+
+/// What the jaws do in a frame.
+enum JawCommand {
+    /// Turn to an angle [rad].
+    To(f64),
+    /// Press.
+    Squeeze,
+    /// Stay.
+    Stay,
+}
+
+/// A [`GraspLift`] in progress: [`advance`](Self::advance) until it is over, then [`finish`](Self::finish).
+pub struct Session<'a> {
+    task: &'a GraspLift,
+    organ: usize,
+    world: World,
+    start: State,
+    phases: Vec<Phase>,
+    /// Place in `phases`, and frames of that phase that are over.
+    phase: usize,
+    frame_of_phase: usize,
+    calm: Option<Calm>,
+    target: Option<Target>,
+    hold: Option<Hold>,
+    gripper: Gripper,
+    /// Where the gripper went to the side in the drag that is over.
+    dragged: f64,
+    jaw: Jaw,
+    frame: usize,
+    stepping: Duration,
+    last_step: Duration,
+    summary: Summary,
+    samples: Vec<Sample>,
+    snapshots: Vec<Snapshot>,
+}
+
+impl<'a> Session<'a> {
+    /// Prepares `task` on `specimen`.
+    ///
+    /// # Errors
+    /// Names the organ that is not there or the option out of range.
+    pub fn new(task: &'a GraspLift, specimen: &Specimen) -> Result<Self> {
+        task.validate()?;
+        let organ = task.choose_organ(specimen)?;
+        let tools = if task.contact { colliders() } else { Vec::new() };
+        let world = World::with_tools(specimen, tools, task.schedule, task.threads)?;
+        let summary = Summary {
+            organ: specimen.organs[organ].name.clone(),
+            at: task.at,
+            design: task.design.name(),
+            jaw_force_n: task.jaw_force,
+            approach_offset_mm: task.approach_offset * 1e3,
+            inverted_rest: specimen.organs.iter().map(|o| o.body.inverted()).sum(),
+            min_volume_ratio: 1.0,
+            ..Summary::default()
+        };
+        // Out of the way of every organ until there is a target.
+        let heights = specimen.organs.iter().flat_map(|o| &o.body.vertices).map(|p| p.dot(world.up));
+        let top = heights.fold(f64::NEG_INFINITY, f64::max);
+        let middle = world.state.centroid(&world.model, organ, &[0]);
+        let above = middle + (top - middle.dot(world.up) + 0.1) * world.up;
+        let gripper = Gripper::over(above, world.up, DVec3::X, MAX_ANGLE);
+        let start = world.state.clone();
+        Ok(Self {
+            task,
+            organ,
+            world,
+            start,
+            phases: Phase::sequence(task.regrasp.is_some(), task.lower),
+            phase: 0,
+            frame_of_phase: 0,
+            calm: None,
+            target: None,
+            hold: None,
+            gripper,
+            dragged: 0.0,
+            jaw: Jaw::new(task.jaw_force),
+            frame: 0,
+            stepping: Duration::ZERO,
+            last_step: Duration::ZERO,
+            summary,
+            samples: Vec::new(),
+            snapshots: Vec::new(),
+        })
+    }
+
+    /// Frames of all phases; calming comes on top.
+    pub fn frames(&self) -> usize {
+        self.phases.iter().map(|p| p.frames()).sum()
+    }
+
+    /// Whether organs that did not settle are being calmed.
+    pub fn calming(&self) -> bool {
+        self.calm.is_some()
+    }
+
+    /// Wall time of the stepping in the last frame.
+    pub fn last_step(&self) -> Duration {
+        self.last_step
+    }
+
+    /// What was measured, frame by frame, so far.
+    pub fn samples(&self) -> &[Sample] {
+        &self.samples
+    }
+
+    /// Nodes and elements of all organs.
+    pub fn size(&self) -> (usize, usize) {
+        let bodies = self.world.model.bodies();
+        (bodies.iter().map(|b| b.len()).sum(), bodies.iter().map(|b| b.tets().len()).sum())
+    }
+
+    /// Does one frame; false when there is none left, or the run has diverged.
+    ///
+    /// # Errors
+    /// When there is nothing to grasp.
+    pub fn advance(&mut self) -> Result<bool> {
+        if self.summary.diverged {
+            return Ok(false);
+        }
+        if let Some(mut calm) = self.calm.take() {
+            if !calm.done() {
+                self.step(Phase::Settle, 1.0);
+                self.summary.calmed_s += FRAME;
+                let speed = self.samples.last().map_or(0.0, |s| s.max_speed_m_s);
+                calm.after_frame(&mut self.world, speed);
+                self.calm = Some(calm);
+                return Ok(true);
+            }
+            self.summary.resting_speed_m_s = self.samples.last().map_or(0.0, |s| s.max_speed_m_s);
+            self.next_phase();
+        }
+        let Some(&phase) = self.phases.get(self.phase) else { return Ok(false) };
+        if self.frame_of_phase == 0 {
+            self.enter(phase)?;
+        }
+        self.frame_of_phase += 1;
+        self.step(phase, self.frame_of_phase as f64 / phase.frames() as f64);
+        if self.frame_of_phase == phase.frames() {
+            self.leave(phase);
+        }
+        Ok(true)
+    }
+
+    fn next_phase(&mut self) {
+        self.phase += 1;
+        self.frame_of_phase = 0;
+    }
+
+    /// What happens at the instant a phase begins.
+    fn enter(&mut self, phase: Phase) -> Result<()> {
+        match phase {
+            Phase::Approach => {
+                let (at, offset) = (self.task.at, self.task.approach_offset);
+                let target = Target::choose(&self.world, self.organ, at, offset)?;
+                self.gripper = target.open;
+                self.gripper.pose.translation += APPROACH_HEIGHT * self.world.up;
+                self.target = Some(target);
+            }
+            Phase::Drag => self.activate(GraspDesign::LivePose),
+            Phase::Lift => self.activate(self.task.design),
+            Phase::Release | Phase::Open => self.world.state.grasps.clear(),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// What is measured at the instant a phase ends.
+    fn leave(&mut self, phase: Phase) {
+        let Some(sample) = self.samples.last().copied() else { return };
+        let summary = &mut self.summary;
+        match phase {
+            Phase::Settle => {
+                summary.settled_speed_m_s = sample.max_speed_m_s;
+                summary.settled = summary.settled_speed_m_s < SETTLED_SPEED;
+                self.calm = Some(Calm::new(&self.world, summary.settled));
+                return;
+            }
+            Phase::Drag => self.dragged = self.task.regrasp.unwrap_or(0.0),
+            Phase::Hold => {
+                summary.lift_mm = sample.tissue_lift_mm;
+                summary.slip_mm = sample.slip_mm;
+                summary.follow_ratio = sample.tissue_lift_mm / sample.jaw_lift_mm;
+                summary.held = summary.attached
+                    && !summary.diverged
+                    && summary.follow_ratio >= HELD_FOLLOW_RATIO
+                    && summary.slip_mm < HELD_SLIP_MM;
+            }
+            _ => {}
+        }
+        self.next_phase();
+    }
+
+    /// One frame: move the gripper, step the world, measure. `share` of the phase is over at the frame's end.
+    fn step(&mut self, phase: Phase, share: f64) {
+        let next = self.gripper_at(phase, share);
+        let activation = phase == Phase::Lift && self.frame_of_phase == 1;
+        let before = activation.then(|| self.world.state.clone());
+        let clock = Instant::now();
+        let report = self.world.step(&self.gripper.motions_to(&next));
+        self.last_step = clock.elapsed();
+        self.stepping += self.last_step;
+        self.gripper = next;
+        self.frame += 1;
+        if let Some(before) = before {
+            self.summary.activation_step_mm = self.largest_motion_since(&before, |_, _| true);
+        }
+        self.record(phase, &report);
+    }
+
+    /// The gripper's course through a phase; `share` runs from 0 to 1.
+    fn gripper_at(&mut self, phase: Phase, share: f64) -> Gripper {
+        let Some(target) = &self.target else { return self.gripper };
+        let eased = smoothstep(share);
+        let lift = self.task.lift;
+        let (height, command) = match phase {
+            Phase::Settle => (APPROACH_HEIGHT, JawCommand::To(MAX_ANGLE)),
+            Phase::Approach => (APPROACH_HEIGHT * (1.0 - eased), JawCommand::To(MAX_ANGLE)),
+            Phase::Close => (0.0, JawCommand::Squeeze),
+            Phase::Drag => (0.0, JawCommand::Stay),
+            Phase::Release | Phase::Open => (0.0, JawCommand::To(MAX_ANGLE)),
+            Phase::Lift => (lift * eased, self.while_held()),
+            Phase::Hold => (lift, self.while_held()),
+            Phase::Lower => (lift * (1.0 - eased), self.while_held()),
+        };
+        let aside = if phase == Phase::Drag { self.task.regrasp.unwrap_or(0.0) * eased } else { self.dragged };
+        let mut pose = target.open.pose;
+        pose.translation += height * self.world.up + pose.rotation * (aside * DVec3::Y);
+        let angle = self.gripper.jaw_angle;
+        let jaw_angle = match command {
+            JawCommand::Stay => angle,
+            JawCommand::To(to) => self.jaw.turn_to(angle, to),
+            JawCommand::Squeeze => {
+                let force = opening_force(&self.gripper, self.world.forces());
+                let next = self.jaw.squeeze(angle, force);
+
+                if self.task.contact { next } else { next.max(target.touching_angle) }
+            }
+        };
+        Gripper { pose, jaw_angle }
+    }
+
+    /// Friction needs jaws that keep pressing; those that hold nodes are locked.
+    fn while_held(&self) -> JawCommand {
+        match self.task.design {
+            GraspDesign::Friction if self.summary.attached => JawCommand::Squeeze,
+            _ => JawCommand::Stay,
+        }
+    }
+
+    /// Closes the grasp on what is between the blades.
+    fn activate(&mut self, design: GraspDesign) {
+        let Some(target) = &self.target else { return };
+        let (world, organ, pose) = (&self.world, self.organ, self.gripper.pose);
+        let mouth = Mouth::of(&self.gripper);
+        let tissue = mouth.tissue_of(world, organ);
+        let cluster = tissue.and_then(|tissue| attached(world, organ, tissue.centroid, target.reach));
+        let summary = &mut self.summary;
+        summary.attached = cluster.is_some();
+        summary.gap_mm = tissue.map_or(0.0, |tissue| tissue.gap * 1e3);
+        summary.closing_force_n = opening_force(&self.gripper, world.forces());
+        // Where nothing is held, what was meant to be is followed all the same.
+        let cluster = cluster.unwrap_or_else(|| target.cluster.clone());
+        summary.at = cluster.s;
+        let mut nodes = cluster.nodes;
+        if design == GraspDesign::Friction && summary.attached {
+            let between = mouth.nodes_of(world, organ);
+            nodes = if between.is_empty() { nodes } else { between };
+        }
+        let place = |i: u32| world.state.position(&world.model, organ, i as usize);
+        let rest = world.model.bodies()[organ].rest_positions();
+        let mean =
+            |distances: &mut dyn Iterator<Item = f64>, count: usize| distances.sum::<f64>() / count.max(1) as f64;
+        let displaced = &mut nodes.iter().map(|i| place(*i).distance(rest[*i as usize]));
+        summary.displaced_mm = 1e3 * mean(displaced, nodes.len());
+        let held = if summary.attached { design.grasp(world, organ, &nodes, &pose, self.task.jaw_force) } else { None };
+        (summary.snap_mm, summary.snap_mean_mm, summary.held_nodes) = (0.0, 0.0, 0);
+        if let Some(grasp) = &held {
+            let snaps: Vec<f64> = grasp.prescribed(&pose).map(|(i, x)| x.distance(place(i))).collect();
+            summary.snap_mm = 1e3 * snaps.iter().copied().fold(0.0, f64::max);
+            summary.snap_mean_mm = 1e3 * mean(&mut snaps.iter().copied(), snaps.len());
+            summary.held_nodes = snaps.len();
+        }
+        self.hold = Some(Hold::new(world, organ, nodes, &pose));
+        self.world.state.grasps = held.into_iter().collect();
+    }
+
+    fn record(&mut self, phase: Phase, report: &StepReport) {
+        let world = &self.world;
+        let moved = self.hold.as_ref().map_or(Moved::default(), |h| h.moved(world, &self.gripper.pose));
+        let forces = world.forces();
+        let contact: DVec3 = forces.iter().map(|f| f.contact.force).sum();
+        let constraint = forces.get(GRIPPER_TOOL).map_or(DVec3::ZERO, |f| f.constraint.force);
+        let sample = Sample {
+            time_s: self.frame as f64 * FRAME,
+            phase: phase.name(),
+            jaw_lift_mm: moved.jaw_lift * 1e3,
+            tissue_lift_mm: moved.tissue_lift * 1e3,
+            slip_mm: moved.slip * 1e3,
+            jaw_angle_deg: self.gripper.jaw_angle.to_degrees(),
+            jaw_force_n: opening_force(&self.gripper, forces),
+            contact_n: contact.length(),
+            constraint_n: constraint.length(),
+            max_speed_m_s: report.max_speed,
+            inverted: report.inverted,
+            min_volume_ratio: report.min_volume_ratio,
+        };
+        let summary = &mut self.summary;
+        for event in world.events() {
+            match event {
+                Event::Slipped { .. } => summary.slipped += 1,
+                Event::Torn { .. } => summary.torn = true,
+            }
+        }
+        summary.yielded_substeps += report.grasp_limited;
+        summary.inverted_peak = summary.inverted_peak.max(sample.inverted);
+        summary.min_volume_ratio = summary.min_volume_ratio.min(sample.min_volume_ratio);
+        summary.peak_speed_m_s = summary.peak_speed_m_s.max(sample.max_speed_m_s);
+        summary.peak_contact_n = summary.peak_contact_n.max(sample.contact_n);
+        summary.peak_constraint_n = summary.peak_constraint_n.max(sample.constraint_n);
+        if let Some(why) = report.divergence {
+            summary.diverged = true;
+            summary.divergence = Some(why.to_string());
+        }
+        self.samples.push(sample);
+        if self.task.snapshot_every > 0 && self.frame.is_multiple_of(self.task.snapshot_every) {
+            let organs = 0..world.model.bodies().len();
+            self.snapshots.push(Snapshot {
+                time_s: sample.time_s,
+                phase,
+                nodes: organs.map(|k| world.state.positions(&world.model, k)).collect(),
+                gripper: self.gripper,
+            });
+        }
+    }
+
+    /// The run so far in figures.
+    pub fn finish(mut self) -> GraspLiftRun {
+        let pinned = |organ: usize, node: usize| self.world.model.bodies()[organ].pinned()[node];
+        let pin_drift_mm = self.largest_motion_since(&self.start, pinned);
+        let summary = &mut self.summary;
+        summary.pin_drift_mm = pin_drift_mm;
+        summary.simulated_s = self.frame as f64 * FRAME;
+        summary.wall_s = self.stepping.as_secs_f64();
+        summary.real_time_factor = summary.simulated_s / summary.wall_s;
+        summary.state_hash = format!("{:016x}", self.world.state.hash());
+        GraspLiftRun { summary: self.summary, samples: self.samples, snapshots: self.snapshots }
+    }
+
+    /// Largest distance [mm] that any node chosen by (organ, node) has moved since `then`.
+    fn largest_motion_since(&self, then: &State, chosen: impl Fn(usize, usize) -> bool) -> f64 {
+        let model = &self.world.model;
+        let mut largest: f64 = 0.0;
+        for organ in 0..model.bodies().len() {
+            let (now, then) = (self.world.state.positions(model, organ), then.positions(model, organ));
+            for i in (0..now.len()).filter(|i| chosen(organ, *i)) {
+                largest = largest.max((now[i] - then[i]).length());
+            }
+        }
+        largest * 1e3
+    }
+}
+
+/// 0 to 1 with zero slope at both ends, so that the tool starts and stops without a jerk.
+fn smoothstep(t: f64) -> f64 {
+    t * t * (3.0 - 2.0 * t)
+}
