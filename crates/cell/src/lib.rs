@@ -5,6 +5,7 @@
 pub mod blades;
 mod calm;
 mod clusters;
+mod cutter;
 mod design;
 mod error;
 mod grasp_lift;

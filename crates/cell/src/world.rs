@@ -35,7 +35,7 @@ pub struct World {
     pub axes: Vec<OrganAxis>,
     /// Unit vector against gravity.
     pub up: DVec3,
-    stepper: Stepper,
+    pub(crate) stepper: Stepper,
 }
 
 impl World {

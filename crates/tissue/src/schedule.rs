@@ -63,9 +63,9 @@ impl Schedule {
     /// The paper's: Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor, with our inversion guard.
     pub const PAPER: Self = Self::Descent(Descent { substeps: 8, iterations: 10, start: Start::Inertial });
 
-    /// The default: two substeps of as many quasi-Newton iterations as it takes, at most twenty.
+    /// The default: two substeps of as many quasi-Newton iterations as it takes, at most forty.
     pub const FAST: Self =
-        Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 20, memory: 8, tolerance: 3e-8, relative: 1e-2 });
+        Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 40, memory: 8, tolerance: 3e-8, relative: 1e-2 });
 
     /// Substeps a frame.
     pub fn substeps(&self) -> usize {

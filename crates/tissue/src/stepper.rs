@@ -1,6 +1,7 @@
 //! One frame of simulation: every body by its solver, bodies in parallel.
 
 use crate::comparator::ComparatorIntegrator;
+use crate::contact::Reaction;
 use crate::descent::TouchingDescent;
 use crate::integrator::{Frame, Integrator};
 use crate::oracle::NewtonIntegrator;
@@ -31,6 +32,7 @@ struct Worker {
     /// The body that the solver was made for.
     of: Body,
     integrator: Box<dyn Integrator>,
+    reaction: Reaction,
     untangler: Untangler,
     before: BodyState,
     state: BodyState,
@@ -78,6 +80,7 @@ impl Stepper {
                     body: index,
                     of: body.clone(),
                     integrator: integrator(&self.schedule, body, self.dt, alone),
+                    reaction: Reaction::new(body),
                     untangler: Untangler::new(&state),
                     before: state.clone(),
                     state,
@@ -145,7 +148,9 @@ impl Stepper {
     fn tell_tools(&mut self, state: &mut State, tools: usize) {
         self.forces.clear();
         self.forces.resize(tools, ToolForce::default());
-        for contacts in self.workers.iter().filter_map(|worker| worker.integrator.contacts()) {
+        for worker in &self.workers {
+            self.forces.iter_mut().zip(worker.reaction.forces()).for_each(|(sum, part)| sum.add(part));
+            let Some(contacts) = worker.integrator.contacts() else { continue };
             self.forces.iter_mut().zip(contacts.forces()).for_each(|(sum, part)| sum.add(part));
             for held in contacts.hanging() {
                 state.grasps[held.grasp as usize].slid[held.node as usize] = held.slid;
@@ -168,6 +173,7 @@ impl Worker {
         self.untangler.untangle(frame, body, &mut self.state);
         self.integrator.advance(frame, body, &mut self.state, &mut self.report);
         self.report.measure(frame.index, body, &self.state);
+        self.reaction.take(frame, body, &self.state);
     }
 }
 

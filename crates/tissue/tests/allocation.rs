@@ -2,11 +2,14 @@
 
 mod common;
 
-use common::{FRAME, GRAVITY, block, model, nodes, tissue};
+use common::{FRAME, GRAVITY, block, nodes, tissue};
+use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_geometry::Pose;
-use trocar_tissue::{Grasp, Material, Schedule, State, Stepper, ToolMotion};
+use trocar_tissue::{
+    BodyDescription, Collider, Compliance, Grasp, Material, ModelBuilder, Schedule, Shape, State, Stepper, ToolMotion,
+};
 
 /// The system's allocator, counting.
 struct Counting;
@@ -37,10 +40,22 @@ fn stepping_allocates_nothing() {
     // Large enough for several tasks a colour.
     let mesh = block([16, 16, 10], 2e-3);
     let material = Material { viscosity: 4.0, ..tissue(12e3) };
-    let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
+    let mut builder = ModelBuilder::new().gravity(GRAVITY);
+    let pinned = nodes(&mesh, |p| p.z == 0.0);
+    builder.body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned, supports: vec![] }).unwrap();
+    let ends = [DVec3::new(20e-3, 0.0, 21e-3), DVec3::new(20e-3, 32e-3, 21e-3)];
+    let shape = Shape::Capsule { ends, radius: 2e-3 };
+    builder.collider(Collider { name: "bar".into(), tool: 0, shape, rest_offset: 0.0, friction: 0.6 }).unwrap();
+    let model = builder.build().unwrap();
     let mut state = State::new(&model);
     let held = nodes(&mesh, |p| p.z > 19e-3 && p.x < 10e-3);
-    state.grasps = vec![Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY)];
+    let hanging = nodes(&mesh, |p| p.z > 19e-3 && p.x > 28e-3);
+    let compliance =
+        Compliance { stiffness: 200.0, closing: DVec3::Y, jaw_force: 0.01, friction: 0.6, tear_force: 5.0 };
+    state.grasps = vec![
+        Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY),
+        Grasp::capture(&model, &state, 0, &hanging, 0, &Pose::IDENTITY).compliant(compliance),
+    ];
     let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 2).unwrap();
     let still = ToolMotion { from: Pose::IDENTITY, to: Pose::IDENTITY };
     stepper.step(&model, &mut state, &[still]);

@@ -132,7 +132,7 @@ fn sweeps_converge_to_the_oracles_step() {
             off.push(rms(oracle.positions(0), &state.positions(&model, 0)) / moved);
         }
         println!("{constitutive:?}: after 10, 40, 150, 600 sweeps {off:?} of the step of {moved:.2e} m");
-        assert!(off[2] < 1e-3 && off[3] < 3e-5, "{constitutive:?}: {off:?}");
+        assert!(off[2] < 2e-3 && off[3] < 3e-5, "{constitutive:?}: {off:?}");
         // Each part of the function matters more than that.
         for (viscosity, friction) in [(50.0, 0.1), (60.0, 0.08)] {
             let other = exact(&busy(constitutive, viscosity, friction, &mesh).0);

@@ -36,7 +36,7 @@ impl ToolForce {
 pub struct ToolForce {
     /// Tissue's reaction on the tool's colliders.
     pub contact: Wrench,
-    /// What the nodes that the tool holds pull at it.
+    /// What the nodes that the tool holds pull at it; for those held rigidly without dashpots and their own inertia.
     pub constraint: Wrench,
     /// Sum of the magnitudes of the normal contact forces [N]: how hard tissue is pressed, even where forces cancel.
     pub pressing: f64,

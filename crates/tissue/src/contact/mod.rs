@@ -9,6 +9,7 @@ mod hull;
 pub(crate) mod proximity;
 #[cfg(test)]
 mod proximity_tests;
+mod reaction;
 mod shape;
 mod shape_surface;
 #[allow(dead_code, reason = "the solvers do not couple bodies yet")]
@@ -19,5 +20,6 @@ pub use collider::Collider;
 pub(crate) use contacts::{Anchor, Contacts, Hanging};
 pub use force::{Event, ToolForce, Wrench};
 pub use hull::Hull;
+pub(crate) use reaction::Reaction;
 pub use shape::{Nearest, Shape};
 pub(crate) use touch::Source;

@@ -1,0 +1,59 @@
+//! What nodes that a tool carries rigidly pull at it with.
+
+use super::force::ToolForce;
+use crate::builder::shape_gradients;
+use crate::integrator::Frame;
+use crate::state::BodyState;
+use crate::{Body, Hyperelastic};
+use glam::{DMat3, DVec3};
+
+/// Finds the constraint forces of a body's rigid grasps: the elastic forces of their nodes and their weight. Dashpots and the nodes' own inertia are left out: they vanish when the tool rests.
+pub(crate) struct Reaction {
+    psi: Box<dyn Hyperelastic>,
+    /// By node: the tool that carries it.
+    carrier: Vec<Option<usize>>,
+    forces: Vec<ToolForce>,
+}
+
+impl Reaction {
+    pub fn new(body: &Body) -> Self {
+        Self { psi: body.material.hyperelastic(), carrier: vec![None; body.len()], forces: Vec::new() }
+    }
+
+    /// What the body in `state` does to each tool.
+    pub fn forces(&self) -> &[ToolForce] {
+        &self.forces
+    }
+
+    /// Takes the forces at the end of a frame.
+    pub fn take(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
+        self.forces.clear();
+        self.forces.resize(frame.tools.len(), ToolForce::default());
+        if frame.rigid_grasps().all(|grasp| grasp.tool >= frame.tools.len()) {
+            return;
+        }
+        self.carrier.fill(None);
+        for grasp in frame.rigid_grasps().filter(|grasp| grasp.tool < frame.tools.len()) {
+            grasp.nodes.iter().for_each(|node| self.carrier[*node as usize] = Some(grasp.tool));
+        }
+        let place = |node: u32| state.x[body.internal[node as usize] as usize].as_dvec3();
+        let mut pull = |node: u32, force: DVec3| {
+            if let Some(tool) = self.carrier[node as usize] {
+                let arm = body.origin + place(node) - frame.tools[tool].to.translation;
+                self.forces[tool].constraint.add(force, arm);
+            }
+        };
+        for (t, tet) in body.rest.tets.iter().enumerate() {
+            if tet.iter().all(|node| self.carrier[*node as usize].is_none()) {
+                continue;
+            }
+            let gradients = shape_gradients(&body.rest, t);
+            let column = |c: usize| (0..4).map(|k| place(tet[k]) * gradients[k][c]).sum();
+            let stress = self.psi.stress(DMat3::from_cols(column(0), column(1), column(2))) * body.volumes[t];
+            tet.iter().zip(&gradients).for_each(|(node, m)| pull(*node, -(stress * *m)));
+        }
+        for node in 0..body.len() as u32 {
+            pull(node, body.mass(node as usize) * frame.gravity);
+        }
+    }
+}
