@@ -1,7 +1,7 @@
 //! The ways in which jaws can hold tissue, by name (SPEC C4, C7; paper section IV-C and Table II).
 
 use crate::World;
-use crate::blades::{FRICTION, GRIPPER_TOOL};
+use crate::blades::{BLADE_TOOLS, FRICTION, GRIPPER_TOOL};
 use glam::DVec3;
 use trocar_geometry::Pose;
 use trocar_tissue::{Compliance, Grasp};
@@ -14,9 +14,9 @@ pub enum GraspDesign {
     /// Nodes tied to the jaws where they were in the undeformed organ: whatever the organ has moved since becomes a jump (paper, equation 5).
     RestPose,
     /// Nodes tied to the jaws where they are when these close (paper, equation 4).
-    #[default]
     LivePose,
     /// As live-pose, on springs that hold no more than the friction of the jaws' force does, and tear.
+    #[default]
     Compliant,
 }
 
@@ -60,6 +60,7 @@ impl GraspDesign {
                 jaw_force,
                 friction: FRICTION,
                 tear_force: TEAR_FORCE,
+                blades: Some(BLADE_TOOLS.map(|(tool, _)| tool)),
             })),
         }
     }

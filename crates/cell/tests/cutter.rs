@@ -29,7 +29,8 @@ fn resect(opening: f64) -> (World, usize, f64, f64) {
     let held: Vec<u32> =
         (0..world.model.bodies()[0].len() as u32).filter(|i| world.axes[0].s[*i as usize] > 0.8).collect();
     let closing = DVec3::Y;
-    let compliance = Compliance { stiffness: 500.0, closing, jaw_force: 0.5, friction: 0.6, tear_force: 5.0 };
+    let compliance =
+        Compliance { stiffness: 500.0, closing, jaw_force: 0.5, friction: 0.6, tear_force: 5.0, blades: None };
     let grasp = Grasp::capture(&world.model, &world.state, 0, &held, 0, &holder.pose).compliant(compliance);
     world.state.grasps.push(grasp);
     let mut pose = holder.pose;

@@ -123,6 +123,17 @@ impl Body {
         Arc::ptr_eq(&self.0, &other.0)
     }
 
+    /// Whether a solver that was made for the other steps this one to the same bits.
+    pub(crate) fn is_alike(&self, other: &Self) -> bool {
+        self.is(other)
+            || (self.tets == other.tets
+                && self.rest.vertices == other.rest.vertices
+                && self.material == other.material
+                && self.pinned == other.pinned
+                && self.supports == other.supports
+                && self.contact_stiffness == other.contact_stiffness)
+    }
+
     /// Name.
     pub fn name(&self) -> &str {
         &self.name

@@ -42,8 +42,10 @@ pub struct Compliance {
     pub jaw_force: f64,
     /// Coulomb friction coefficient of a blade. There are two, so that tissue slips at twice `friction` times `jaw_force`.
     pub friction: f64,
-    /// Pull at which the tissue tears out of the jaws [N].
+    /// Force at the end of a frame, along any direction, at which the tissue tears out of the jaws [N].
     pub tear_force: f64,
+    /// The tools whose colliders are the blades: their friction on this body is the grasp's, and not counted again.
+    pub blades: Option<[usize; 2]>,
 }
 
 /// A set of nodes carried by a tool.

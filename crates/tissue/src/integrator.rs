@@ -38,9 +38,9 @@ impl Frame<'_> {
         self.grasps.iter().filter(|g| g.body == self.index && !g.torn)
     }
 
-    /// Those whose nodes follow the tool exactly.
+    /// Those whose nodes follow the tool exactly, or stay where they are because it has no motion.
     pub fn rigid_grasps(&self) -> impl Iterator<Item = &Grasp> {
-        self.grasps().filter(|g| g.compliance.is_none())
+        self.grasps().filter(|g| g.compliance.is_none() || g.tool >= self.tools.len())
     }
 
     /// Calls `place(vertex, position)` for every vertex that a tool carries rigidly, where it is to be when `share` of the frame is over, in the body's frame [m]. Vertices held

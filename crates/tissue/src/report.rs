@@ -22,7 +22,7 @@ pub enum Divergence {
         /// The body.
         body: usize,
     },
-    /// The state or the model is not the one that the stepper was made for; nothing was stepped.
+    /// The state or the model is not the one that the stepper was made for, or a grasp holds nodes that the model lacks; nothing was stepped.
     OtherModel,
     /// An edge is longer than 10 times its rest length.
     OverStretch {
@@ -39,7 +39,7 @@ pub enum Divergence {
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::OtherModel => write!(f, "the stepper was made for another model"),
+            Self::OtherModel => write!(f, "the stepper or a grasp was made for another model"),
             Self::NonFinite { body } => write!(f, "body {body} has a position that is not finite"),
             Self::OverSpeed { body } => write!(f, "a node of body {body} is at the speed limit of {SPEED_LIMIT} m/s"),
             Self::Unsolved { body } => write!(f, "no minimum was found for body {body}"),

@@ -10,7 +10,7 @@ use xxhash_rust::xxh3::Xxh3;
 pub struct State {
     /// Simulated time [s].
     pub time: f64,
-    /// The grasps in force. Adding one closes it; taking it away opens it, and its nodes are free. A node in several grasps follows the last.
+    /// The grasps in force. Adding one closes it; taking it away opens it, and its nodes are free. A node in several grasps follows the last, but a rigid one before a compliant one.
     pub grasps: Vec<Grasp>,
     /// One for each body.
     pub(crate) bodies: Vec<BodyState>,
@@ -63,6 +63,14 @@ impl State {
             }
         };
         Self { time: 0.0, grasps: Vec::new(), bodies: model.bodies.iter().map(at_rest).collect() }
+    }
+
+    /// Whether every grasp holds nodes that the model has.
+    pub(crate) fn grasps_fit(&self, model: &Model) -> bool {
+        self.grasps.iter().all(|grasp| {
+            let nodes = model.bodies.get(grasp.body).map_or(0, |body| body.len());
+            grasp.nodes.len() == grasp.captured.len() && grasp.nodes.iter().all(|i| (*i as usize) < nodes)
+        })
     }
 
     /// World position of a node [m].
@@ -133,6 +141,7 @@ impl State {
                 let (kind, number) = match anchor.source {
                     Source::Support(s) => (0u32, s),
                     Source::Collider(c) => (1, c),
+                    // No friction of a contact's.
                     Source::Grasp(g, _) => (2, g),
                 };
                 [anchor.vertex, kind, number].iter().for_each(|k| hash.update(&k.to_le_bytes()));

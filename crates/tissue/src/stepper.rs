@@ -105,12 +105,14 @@ impl Stepper {
 
     /// Advances `state` by one frame. `tools` are the motions of the tools that carry the state's grasps; what is held by a tool without a motion stays where it is.
     pub fn step(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion]) -> StepReport {
+        self.events.clear();
+        self.forces.clear();
         let nodes = |worker: &Worker| state.bodies.get(worker.body).map(|body| body.x.len());
         let known = |worker: &Worker| Some(worker.state.x.len());
         let same = self.workers.len() == model.bodies.len() && self.workers.len() == state.bodies.len();
         // A model that was built again is as good as the same; one that was cut elsewhere is not.
-        let other = |w: &Worker| !model.bodies[w.body].is(&w.of) && model.bodies[w.body].tets != w.of.tets;
-        if !same || self.workers.iter().any(|w| nodes(w) != known(w) || other(w)) {
+        let other = |w: &Worker| !model.bodies[w.body].is_alike(&w.of);
+        if !same || !state.grasps_fit(model) || self.workers.iter().any(|w| nodes(w) != known(w) || other(w)) {
             return StepReport { divergence: Some(Divergence::OtherModel), ..StepReport::default() };
         }
         for worker in &mut self.workers {
@@ -136,7 +138,6 @@ impl Stepper {
             }
             std::mem::swap(&mut worker.state, &mut state.bodies[worker.body]);
         }
-        self.events.clear();
         if !broken {
             state.time += dt;
             self.tell_tools(state, tools.len());
@@ -173,7 +174,7 @@ impl Worker {
         self.untangler.untangle(frame, body, &mut self.state);
         self.integrator.advance(frame, body, &mut self.state, &mut self.report);
         self.report.measure(frame.index, body, &self.state);
-        self.reaction.take(frame, body, &self.state);
+        self.reaction.take(frame, body, &self.state, self.integrator.contacts().is_none());
     }
 }
 

@@ -50,8 +50,14 @@ fn stepping_allocates_nothing() {
     let mut state = State::new(&model);
     let held = nodes(&mesh, |p| p.z > 19e-3 && p.x < 10e-3);
     let hanging = nodes(&mesh, |p| p.z > 19e-3 && p.x > 28e-3);
-    let compliance =
-        Compliance { stiffness: 200.0, closing: DVec3::Y, jaw_force: 0.01, friction: 0.6, tear_force: 5.0 };
+    let compliance = Compliance {
+        stiffness: 200.0,
+        closing: DVec3::Y,
+        jaw_force: 0.01,
+        friction: 0.6,
+        tear_force: 5.0,
+        blades: None,
+    };
     state.grasps = vec![
         Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY),
         Grasp::capture(&model, &state, 0, &hanging, 0, &Pose::IDENTITY).compliant(compliance),

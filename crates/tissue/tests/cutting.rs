@@ -191,7 +191,8 @@ fn a_grasp_across_a_cut_holds_both_parts() {
     let mesh = block([24, 4, 4], 2e-3);
     let model = one_body(&mesh, vec![]);
     let mut state = State::new(&model);
-    let compliance = Compliance { stiffness: 50.0, closing: DVec3::Z, jaw_force: 6.0, friction: 0.5, tear_force: 3.0 };
+    let compliance =
+        Compliance { stiffness: 50.0, closing: DVec3::Z, jaw_force: 6.0, friction: 0.5, tear_force: 3.0, blades: None };
     let capture = |state: &State, held: &[u32]| Grasp::capture(&model, state, 0, held, 0, &Pose::IDENTITY);
     // Across the cut, more of it on the right; only on the cut; off it to the right, and one layer on it.
     let across = nodes(&mesh, |p| p.x > 21e-3 && p.x < 29e-3);

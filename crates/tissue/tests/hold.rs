@@ -7,7 +7,7 @@ mod common;
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_geometry::{Pose, TetMesh};
-use trocar_tissue::{Compliance, Event, Grasp, Material, Model, Schedule, State, Stepper, ToolMotion};
+use trocar_tissue::{Compliance, Divergence, Event, Grasp, Material, Model, Schedule, State, Stepper, ToolMotion};
 
 fn at(translation: DVec3) -> Pose {
     Pose { translation, ..Pose::IDENTITY }
@@ -23,7 +23,7 @@ fn strip() -> TetMesh {
 }
 
 fn jaws(jaw_force: f64) -> Compliance {
-    Compliance { stiffness: 300.0, closing: DVec3::Y, jaw_force, friction: 0.6, tear_force: 1e3 }
+    Compliance { stiffness: 300.0, closing: DVec3::Y, jaw_force, friction: 0.6, tear_force: 1e3, blades: None }
 }
 
 fn weight(model: &Model) -> f64 {
@@ -69,6 +69,25 @@ fn the_grasp_slips_at_twice_mu_times_the_jaw_force() {
             }
         }
     }
+}
+
+/// A tool that does not say where it is stays where it is, and so does what hangs on it.
+#[test]
+fn what_hangs_on_a_tool_without_motion_stays() {
+    let mesh = strip();
+    let model = model(&mesh, viscous(12e3), vec![], GRAVITY);
+    let held = nodes(&mesh, |p| p.x < 7e-3);
+    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
+    state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(jaws(1.0)));
+    for _ in 0..60 {
+        stepper.step(&model, &mut state, &[]);
+    }
+    let fallen = held.iter().map(|i| state.position(&model, 0, *i as usize).distance(mesh.vertices[*i as usize]));
+    assert_eq!(fallen.fold(0.0, f64::max), 0.0);
+    // Nodes that no body has are no reason to panic.
+    state.grasps[0].nodes[0] = 100_000;
+    let report = stepper.step(&model, &mut state, &[still(Pose::IDENTITY)]);
+    assert_eq!(report.divergence, Some(Divergence::OtherModel));
 }
 
 /// The wrench that is reported is what hangs on the tool.

@@ -153,7 +153,7 @@ impl ElementQualityExperiment {
     }
 }
 
-/// Pins the far end as the specimen has it, and the lowest `share` of the nodes of all the rest.
+/// Pins the far end as the specimen has it, and the lowest `share` of the nodes of all the rest; an organ that is not pinned at an end stays as it is.
 fn pin(organ: &mut Organ, share: f64) {
     if let Pins::End { length, band_length, band_share, .. } = &mut organ.pins {
         *band_length = if share > 0.0 { 1.0 - *length } else { 0.0 };

@@ -58,8 +58,10 @@ pub(crate) struct Contacts {
     /// Sorted by vertex and source.
     anchors: Vec<Anchor>,
     next_anchors: Vec<Anchor>,
-    /// Poses of the colliders' tools at the beginning and the end of the substep; None: it is not there.
-    poses: Vec<Option<[Pose; 2]>>,
+    /// Where the colliders are in the substep; None: nowhere.
+    placed: Vec<Option<Placed>>,
+    /// Whether a vertex is one of `surface`.
+    outer: Vec<bool>,
     /// Vertices that touch at the frame's beginning or are about to.
     touching: Vec<bool>,
     /// Vertices that no contact moves: pinned or held rigidly.
@@ -82,7 +84,8 @@ impl Contacts {
             anchors: Vec::with_capacity(2 * surface.len()),
             next_anchors: Vec::with_capacity(2 * surface.len()),
             first: vec![0; body.len() + 1],
-            poses: Vec::new(),
+            placed: Vec::new(),
+            outer: outer(&surface, body.len()),
             touching: vec![false; body.len()],
             fixed: vec![false; body.len()],
             reach: 0.0,
@@ -99,7 +102,15 @@ impl Contacts {
         self.forces.resize(frame.tools.len(), ToolForce::default());
         self.mark_fixed(frame, body);
         self.hang(frame, body);
-        self.place_tools(frame, 0.0, 1.0);
+        self.place_tools(frame, body, 0.0, 1.0);
+        // All that a substep may ever touch, so that no step allocates but the first.
+        self.touches.clear();
+        self.places.clear();
+        let most = (self.supports.len() + frame.colliders.len()) * self.surface.len() + body.len();
+        self.touches.reserve(most);
+        self.places.reserve(most);
+        let anchors = 2 * self.surface.len();
+        state.anchors.reserve(anchors.saturating_sub(state.anchors.len()));
         self.find_near(frame, body, state);
     }
 
@@ -115,7 +126,12 @@ impl Contacts {
     /// Finds the nodes that hang on tools. A node in several grasps follows the last.
     fn hang(&mut self, frame: &Frame<'_>, body: &Body) {
         self.hanging.clear();
-        for (g, grasp) in frame.grasps.iter().enumerate().filter(|(_, g)| g.body == frame.index && g.hangs()) {
+        for (g, grasp) in frame
+            .grasps
+            .iter()
+            .enumerate()
+            .filter(|(_, g)| g.body == frame.index && g.hangs() && g.tool < frame.tools.len())
+        {
             for (k, (node, slid)) in grasp.nodes.iter().zip(&grasp.slid).enumerate() {
                 let vertex = body.internal[*node as usize];
                 if !self.fixed[vertex as usize] {
@@ -129,10 +145,16 @@ impl Contacts {
         self.hanging.dedup_by_key(|h| h.vertex);
     }
 
-    fn place_tools(&mut self, frame: &Frame<'_>, from: f64, to: f64) {
-        self.poses.clear();
-        let pose = |c: &Collider| frame.tools.get(c.tool).map(|motion| [motion.at(from), motion.at(to)]);
-        self.poses.extend(frame.colliders.iter().map(pose));
+    fn place_tools(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64) {
+        self.placed.clear();
+        let grasps = || frame.grasps.iter().filter(|g| g.body == frame.index && g.hangs());
+        let placed = |collider: &Collider| {
+            let motion = frame.tools.get(collider.tool)?;
+            let blades = |g: &crate::Grasp| g.compliance.and_then(|c| c.blades);
+            let held = grasps().filter_map(blades).any(|blades| blades.contains(&collider.tool));
+            Some(Placed::new(collider, motion.at(from), motion.at(to), body, held))
+        };
+        self.placed.extend(frame.colliders.iter().map(placed));
     }
 
     fn find_near(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
@@ -141,7 +163,8 @@ impl Contacts {
         let dt = frame.dt as f32;
         let fastest = self.surface.iter().map(|i| state.v[*i as usize].length_squared()).fold(0.0, f32::max).sqrt();
         let fall = dt * dt * frame.gravity.length() as f32;
-        let carried = frame.grasps().filter_map(|grasp| frame.tools.get(grasp.tool)).map(travel).fold(0.0, f64::max);
+        let held = |grasp: &crate::Grasp| frame.tools.get(grasp.tool).map(|motion| travel(motion, body));
+        let carried = frame.grasps().filter_map(held).fold(0.0, f64::max);
         self.reach = NEAR + carried as f32 + 2.5 * (dt * fastest + fall);
         // What nothing holds falls in this frame; of what is held it cannot be said.
         let loose = !self.fixed.contains(&true) && self.hanging.is_empty();
@@ -158,7 +181,7 @@ impl Contacts {
             let (mut near, mut touches) = (hangs, false);
             if !self.fixed[i] {
                 let (x, ahead) = (state.x[i], state.x[i] + dt * state.v[i] + drop);
-                self.for_sources(frame, body, x, |_, height, normal, point, _| {
+                self.for_sources(frame, body, x, |_, height, normal, point, _, _| {
                     near = true;
                     touches |= height < 0.0 || (ahead - point).dot(normal) < 0.0;
                 });
@@ -176,44 +199,46 @@ impl Contacts {
         }
     }
 
-    /// Calls `found` for everything within reach of a vertex at `x`: what it is, the height over it now, the plane's normal and point at the substep's end, and where the vertex is in its frame.
+    /// Calls `found` for everything within reach of a vertex at `x`: what it is, the height over it now, the plane's normal and point at the substep's end, where the vertex is in its frame, and
+    /// how many times as stiff as the vertex's contacts it is: a field's penalty is along its `up`.
+    #[inline(always)]
     fn for_sources(
         &self,
         frame: &Frame<'_>,
         body: &Body,
         x: Vec3A,
-        mut found: impl FnMut(Source, f32, Vec3A, Vec3A, Vec3A),
+        mut found: impl FnMut(Source, f32, Vec3A, Vec3A, Vec3A, f32),
     ) {
         for (s, support) in self.supports.iter().enumerate() {
             let (height, gradient) = support.touch(x);
             if height <= self.reach {
                 let steepness = gradient.length();
                 let (normal, height) = (gradient / steepness, height / steepness);
-                found(Source::Support(s as u32), height, normal, x - height * normal, x);
+                let factor = steepness * steepness;
+                found(Source::Support(s as u32), height, normal, x - height * normal, x, factor);
             }
         }
-        let world = body.origin + x.as_dvec3();
-        for (c, (collider, poses)) in frame.colliders.iter().zip(&self.poses).enumerate() {
-            let Some([from, to]) = poses else { continue };
-            let reach = f64::from(self.reach) + collider.rest_offset + travelled(collider, from, to);
-            let p = from.inverse().transform(world);
-            let (centre, radius) = collider.shape.bounds(reach);
-            if (p - centre).length_squared() > radius * radius {
+        for (c, (collider, placed)) in frame.colliders.iter().zip(&self.placed).enumerate() {
+            let Some(placed) = placed else { continue };
+            let far = self.reach + placed.reach;
+            if (x - placed.centre).length_squared() > (placed.radius + far) * (placed.radius + far) {
                 continue;
             }
+            let p = placed.from.transform(body.origin + x.as_dvec3());
             let nearest = collider.shape.nearest(p);
-            let height = nearest.distance - collider.rest_offset;
-            if nearest.distance <= reach {
-                let point = to.transform(p - height * nearest.normal) - body.origin;
-                let normal = to.rotation * nearest.normal;
-                found(Source::Collider(c as u32), height as f32, normal.as_vec3a(), point.as_vec3a(), p.as_vec3a());
+            if nearest.distance <= f64::from(far) {
+                let height = nearest.distance - collider.rest_offset;
+                let point = placed.to.transform(p - height * nearest.normal) - body.origin;
+                let normal = placed.to.rotation * nearest.normal;
+                let source = Source::Collider(c as u32);
+                found(source, height as f32, normal.as_vec3a(), point.as_vec3a(), p.as_vec3a(), 1.0);
             }
         }
     }
 
     /// Finds the touches of the substep between two shares of the frame, of a body whose vertices begin it at `x`.
     pub fn find(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64, x: impl Fn(usize) -> Vec3A) {
-        self.place_tools(frame, from, to);
+        self.place_tools(frame, body, from, to);
         let (mut touches, mut places) = (std::mem::take(&mut self.touches), std::mem::take(&mut self.places));
         touches.clear();
         places.clear();
@@ -224,9 +249,9 @@ impl Contacts {
             let i = *vertex as usize;
             let begin = touches.len();
             let held = hanging.next_if(|h| h.vertex == *vertex);
-            if self.surface.binary_search(vertex).is_ok() && !self.fixed[i] {
+            if self.outer[i] && !self.fixed[i] {
                 let stiffness = body.vertices[i].contact_stiffness;
-                self.for_sources(frame, body, x(i), |source, _, normal, point, now| {
+                self.for_sources(frame, body, x(i), |source, _, normal, point, now, factor| {
                     while self.anchors.get(anchor).is_some_and(|a| (a.vertex, a.source) < (*vertex, source)) {
                         anchor += 1;
                     }
@@ -234,9 +259,11 @@ impl Contacts {
                     let place = known.map_or(now, |a| a.place);
                     let friction = match source {
                         Source::Support(s) => self.supports[s as usize].friction(),
-                        // The grasp bears what friction would.
-                        _ if held.is_some() => 0.0,
-                        Source::Collider(c) => frame.colliders[c as usize].friction as f32,
+                        Source::Collider(c) => match &self.placed[c as usize] {
+                            // The grasp bears what friction would.
+                            Some(placed) if placed.grips => 0.0,
+                            _ => frame.colliders[c as usize].friction as f32,
+                        },
                         Source::Grasp(..) => 0.0,
                     };
                     touches.push(Touch {
@@ -245,7 +272,7 @@ impl Contacts {
                         normal,
                         point,
                         place: self.carried(source, body, place),
-                        stiffness,
+                        stiffness: factor * stiffness,
                         friction: Friction::Coulomb(friction),
                     });
                     places.push(place);
@@ -273,8 +300,8 @@ impl Contacts {
     /// A place in the frame of what is touched, in the body's at the substep's end.
     fn carried(&self, source: Source, body: &Body, place: Vec3A) -> Vec3A {
         match source {
-            Source::Collider(c) => match &self.poses[c as usize] {
-                Some([_, to]) => (to.transform(place.as_dvec3()) - body.origin).as_vec3a(),
+            Source::Collider(c) => match &self.placed[c as usize] {
+                Some(placed) => (placed.to.transform(place.as_dvec3()) - body.origin).as_vec3a(),
                 None => place,
             },
             Source::Support(_) | Source::Grasp(..) => place,
@@ -326,7 +353,7 @@ impl Contacts {
     pub fn settle(&mut self, frame: &Frame<'_>, body: &Body, share: f64, x: impl Fn(usize) -> Vec3A) {
         self.next_anchors.clear();
         self.forces.fill(ToolForce::default());
-        let mut hanging = 0;
+        let (mut hanging, mut counted) = (0, None);
         for (touch, place) in self.touches.iter().zip(&self.places) {
             let here = x(touch.vertex as usize);
             let push = touch.push(here);
@@ -348,10 +375,10 @@ impl Contacts {
             // What sticks keeps its place to the bit.
             let place = match (touch.slide(here), touch.source) {
                 (None, _) => *place,
-                (Some(by), Source::Collider(c)) => match &self.poses[c as usize] {
-                    Some([_, to]) => {
+                (Some(by), Source::Collider(c)) => match &self.placed[c as usize] {
+                    Some(placed) => {
                         let moved = (touch.place + by).as_dvec3() + body.origin;
-                        to.inverse().transform(moved).as_vec3a()
+                        placed.to.inverse().transform(moved).as_vec3a()
                     }
                     None => *place,
                 },
@@ -360,11 +387,12 @@ impl Contacts {
             self.next_anchors.push(Anchor { vertex: touch.vertex, source: touch.source, place });
             if let Source::Collider(c) = touch.source {
                 let tool = frame.colliders[c as usize].tool;
-                if let (Some(force), Some(Some([_, to]))) = (self.forces.get_mut(tool), self.poses.get(c as usize)) {
-                    let arm = body.origin + here.as_dvec3() - to.translation;
+                if let (Some(force), Some(Some(placed))) = (self.forces.get_mut(tool), self.placed.get(c as usize)) {
+                    let arm = body.origin + here.as_dvec3() - placed.to.translation;
                     force.contact.add(push.gradient.as_dvec3(), arm);
                     force.pressing += f64::from(touch.stiffness * -touch.height(here));
-                    force.touching += 1;
+                    force.touching += usize::from(counted != Some((touch.vertex, tool)));
+                    counted = Some((touch.vertex, tool));
                 }
             }
         }
@@ -408,7 +436,7 @@ impl Hanging {
         Some(Touch {
             vertex: self.vertex,
             source: Source::Grasp(self.grasp, self.node),
-            normal: (pose.rotation * compliance.closing).as_vec3a(),
+            normal: (pose.rotation * compliance.closing.normalize_or_zero()).as_vec3a(),
             point: place,
             place,
             stiffness: compliance.stiffness as f32,
@@ -419,15 +447,52 @@ impl Hanging {
     }
 }
 
-fn travel(motion: &ToolMotion) -> f64 {
-    (motion.to.translation - motion.from.translation).length()
+/// A collider in a substep.
+struct Placed {
+    /// From the world into its frame at the beginning, and out of it at the end.
+    from: Pose,
+    to: Pose,
+    /// A ball round it at the beginning, in the body's frame [m].
+    centre: Vec3A,
+    radius: f32,
+    /// How far from it a vertex may be that it touches without moving itself [m].
+    reach: f32,
+    /// Whether it is a blade of jaws that hold the body compliantly.
+    grips: bool,
 }
 
-/// How far any point of a collider goes between two poses of its tool, at most [m].
-fn travelled(collider: &Collider, from: &Pose, to: &Pose) -> f64 {
+impl Placed {
+    fn new(collider: &Collider, from: Pose, to: Pose, body: &Body, grips: bool) -> Self {
+        let (centre, radius) = collider.shape.bounds(0.0);
+        // How far a half-space turns is not bounded.
+        let arm = if radius.is_finite() { centre.length() + radius } else { 0.0 };
+        Self {
+            from: from.inverse(),
+            to,
+            centre: (from.transform(centre) - body.origin).as_vec3a(),
+            radius: radius as f32,
+            reach: (collider.rest_offset + way(&from, &to, arm)) as f32,
+            grips,
+        }
+    }
+}
+
+/// How far a point goes at most between two poses that is `arm` [m] from their origin.
+fn way(from: &Pose, to: &Pose, arm: f64) -> f64 {
     let turn = 2.0 * (to.rotation * from.rotation.inverse()).xyz().length().min(1.0).asin();
-    let (centre, radius) = collider.shape.bounds(0.0);
-    // How far a half-space turns is not bounded.
-    let arm = if radius.is_finite() { centre.length() + radius } else { 0.0 };
     (to.translation - from.translation).length() + turn * arm
+}
+
+/// How far a tool carries any part of a body at most [m].
+fn travel(motion: &ToolMotion, body: &Body) -> f64 {
+    let size = |p: &glam::DVec3| (*p - motion.from.translation).length_squared();
+    let turns = motion.from.rotation != motion.to.rotation;
+    let arm = if turns { body.rest.vertices.iter().map(size).fold(0.0, f64::max).sqrt() } else { 0.0 };
+    way(&motion.from, &motion.to, arm)
+}
+
+fn outer(surface: &[u32], vertices: usize) -> Vec<bool> {
+    let mut outer = vec![false; vertices];
+    surface.iter().for_each(|i| outer[*i as usize] = true);
+    outer
 }

@@ -31,7 +31,7 @@ impl ToolForce {
     }
 }
 
-/// What tissue does to one tool, mean over the last frame's last substep. Contact and constraint are kept apart (SPEC C8).
+/// What tissue does to one tool at the end of the last frame. Contact and constraint are kept apart (SPEC C8).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToolForce {
     /// Tissue's reaction on the tool's colliders.

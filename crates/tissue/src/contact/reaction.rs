@@ -4,7 +4,7 @@ use super::force::ToolForce;
 use crate::builder::shape_gradients;
 use crate::integrator::Frame;
 use crate::state::BodyState;
-use crate::{Body, Hyperelastic};
+use crate::{Body, Grasp, Hyperelastic};
 use glam::{DMat3, DVec3};
 
 /// Finds the constraint forces of a body's rigid grasps: the elastic forces of their nodes and their weight. Dashpots and the nodes' own inertia are left out: they vanish when the tool rests.
@@ -25,15 +25,16 @@ impl Reaction {
         &self.forces
     }
 
-    /// Takes the forces at the end of a frame.
-    pub fn take(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
+    /// Takes the forces at the end of a frame; of `all` grasps for solvers that hold all of them rigidly.
+    pub fn take(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState, all: bool) {
         self.forces.clear();
         self.forces.resize(frame.tools.len(), ToolForce::default());
-        if frame.rigid_grasps().all(|grasp| grasp.tool >= frame.tools.len()) {
+        let rigid = |grasp: &&Grasp| (all || grasp.compliance.is_none()) && grasp.tool < frame.tools.len();
+        if !frame.grasps().any(|grasp| rigid(&grasp)) {
             return;
         }
         self.carrier.fill(None);
-        for grasp in frame.rigid_grasps().filter(|grasp| grasp.tool < frame.tools.len()) {
+        for grasp in frame.grasps().filter(rigid) {
             grasp.nodes.iter().for_each(|node| self.carrier[*node as usize] = Some(grasp.tool));
         }
         let place = |node: u32| state.x[body.internal[node as usize] as usize].as_dvec3();

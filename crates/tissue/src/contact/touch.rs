@@ -1,6 +1,6 @@
 //! What a solver sees of a contact: a vertex at a plane, with Coulomb friction towards a place.
 //!
-//! The plane and the place are held during a substep, so that no vertex gets behind a tool however fast it comes. A vertex behind the plane is pushed out by a spring, and held to its place along
+//! The plane and the place are held during a substep, so that no vertex gets behind a tool in a substep. A vertex behind the plane is pushed out by a spring, and held to its place along
 //! the plane by one of the same stiffness, until that would pull harder than Coulomb's law lets it: then the place follows ([`Touch::slide`]). A load below the limit is borne at a fixed
 //! displacement; nothing creeps.
 
@@ -67,7 +67,8 @@ impl Touch {
     pub fn limit(&self, x: Vec3A) -> f32 {
         match self.friction {
             Friction::Coulomb(coefficient) => coefficient * self.stiffness * (-self.height(x)).max(0.0),
-            Friction::Clamped(force) => force,
+            // Not a number is no force.
+            Friction::Clamped(force) => force.max(0.0),
         }
     }
 

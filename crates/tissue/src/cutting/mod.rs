@@ -118,7 +118,8 @@ pub fn sever(model: &Model, state: &State, cut: &Cut) -> Result<Severed> {
     };
     cut.check().map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
     let fits = state.bodies.len() == model.bodies.len()
-        && state.bodies.iter().zip(&model.bodies).all(|(state, body)| state.x.len() == body.len());
+        && state.bodies.iter().zip(&model.bodies).all(|(state, body)| state.x.len() == body.len())
+        && state.grasps_fit(model);
     if !fits {
         return Err(Error::Model(format!("body '{}' is to be cut in a state of another model", body.name)));
     }

@@ -145,13 +145,16 @@ impl QuasiNewtonIntegrator {
             self.contacts.find(frame, body, begin, share, |vertex| position(&x[number[vertex] as usize]));
             self.limits.clear();
             self.limits.resize(self.contacts.touches().len(), 0.0);
+            let limited = report.grasp_limited;
             // What the matrix does not know of may be too stiff for it.
             let went = self.usable && self.substep(simd, frame, share, h, body, report)
                 || self.learn_touches(frame, body, state) && {
                     self.begin_anew(simd, h);
+                    report.grasp_limited = limited;
                     self.substep(simd, frame, share, h, body, report)
                 };
             if !went {
+                report.grasp_limited = limited;
                 report.fallbacks += 1;
                 self.store(state);
                 self.fallback.begin(frame, body);
