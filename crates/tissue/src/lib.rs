@@ -1,10 +1,10 @@
-//! Deformable tissue: materials, model builder, state, implicit integration, grasp.
+//! Deformable tissue: materials, model builder, state, implicit integration, contact, grasp, cutting.
 //!
 //! A [`Model`] is built once by [`ModelBuilder`] and never changes; a [`State`] is plain data that can be cloned, saved
 //! and restored exactly; a [`Stepper`] owns the scratch memory and advances a state. No robot, no camera, no files.
 //!
-//! Every step minimises implicit Euler's incremental potential 1/(2h^2) |x - y|_M^2 + E(x) by Vertex Block Descent (Chen et al. 2024): each
-//! vertex in turn takes a Newton step on its own 3x3 block, all vertices of one colour at once. [`Oracle`] finds the same minimum to double precision, slowly,
+//! Every step minimises implicit Euler's incremental potential 1/(2h^2) |x - y|_M^2 + E(x) by a warped, prefactored quasi-Newton method or by Vertex Block Descent
+//! (Chen et al. 2024): [`Schedule`] says which. [`Oracle`] finds the same minimum to double precision, slowly,
 //! for every solver to be judged by.
 
 #![forbid(unsafe_code)]

@@ -83,7 +83,8 @@ fn what_hangs_on_a_tool_without_motion_stays() {
         stepper.step(&model, &mut state, &[]);
     }
     let fallen = held.iter().map(|i| state.position(&model, 0, *i as usize).distance(mesh.vertices[*i as usize]));
-    assert_eq!(fallen.fold(0.0, f64::max), 0.0);
+    // Positions are rounded to single precision.
+    assert!(fallen.fold(0.0, f64::max) < 1e-8);
     // Nodes that no body has are no reason to panic.
     state.grasps[0].nodes[0] = 100_000;
     let report = stepper.step(&model, &mut state, &[still(Pose::IDENTITY)]);
