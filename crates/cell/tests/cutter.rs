@@ -12,9 +12,8 @@ use trocar_tissue::{Compliance, Grasp, Schedule, ToolMotion};
 /// Volume of all bodies as they are now [m3].
 fn volume(world: &World) -> f64 {
     let of = |k: usize| {
-        let mut mesh = trocar_geometry::TetMesh::default();
-        mesh.tets = world.model.bodies()[k].tets().to_vec();
-        mesh.vertices = world.state.positions(&world.model, k);
+        let (tets, vertices) = (world.model.bodies()[k].tets().to_vec(), world.state.positions(&world.model, k));
+        let mesh = trocar_geometry::TetMesh { tets, vertices };
         (0..mesh.tets.len()).map(|t| mesh.tet_volume(t)).sum::<f64>()
     };
     (0..world.model.bodies().len()).map(of).sum()
