@@ -109,7 +109,7 @@ fn busy(constitutive: ConstitutiveModel, viscosity: f64, friction: f64, mesh: &T
 fn sweeps_converge_to_the_oracles_step() {
     let mesh = block([6, 3, 3], 2e-3);
     for constitutive in ConstitutiveModel::ALL {
-        let (model, start) = busy(constitutive, 60.0, 0.1, &mesh);
+        let (model, start) = busy(constitutive, 60.0, 0.2, &mesh);
         let held = nodes(&mesh, |p| p.x > 11e-3 && p.z > 5e-3);
         let grasp = Grasp::capture(&model, &start, 0, &held, 0, &Pose::IDENTITY);
         let to = Pose { translation: DVec3::new(-1e-5, 0.0, 3e-5), ..Pose::IDENTITY };
@@ -132,9 +132,9 @@ fn sweeps_converge_to_the_oracles_step() {
             off.push(rms(oracle.positions(0), &state.positions(&model, 0)) / moved);
         }
         println!("{constitutive:?}: after 10, 40, 150, 600 sweeps {off:?} of the step of {moved:.2e} m");
-        assert!(off[2] < 2e-3 && off[3] < 3e-5, "{constitutive:?}: {off:?}");
+        assert!(off[2] < 1e-3 && off[3] < 3e-5, "{constitutive:?}: {off:?}");
         // Each part of the function matters more than that.
-        for (viscosity, friction) in [(50.0, 0.1), (60.0, 0.08)] {
+        for (viscosity, friction) in [(50.0, 0.2), (60.0, 0.15)] {
             let other = exact(&busy(constitutive, viscosity, friction, &mesh).0);
             let change = rms(other.positions(0), oracle.positions(0)) / moved;
             assert!(change > 2.0 * off[3], "{constitutive:?}, {viscosity} Pa s, friction {friction}: {change:.2e}");
