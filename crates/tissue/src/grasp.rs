@@ -150,15 +150,7 @@ impl Grasp {
 
     /// Where each held node is to be when the tool is at `tool`: (node, world position [m]).
     pub fn prescribed(&self, tool: &Pose) -> impl Iterator<Item = (u32, DVec3)> {
-        let from = &self.captured_at;
-        let turn = tool.rotation * from.rotation.inverse();
-        let shift = tool.translation - from.translation;
-        let turned = tool.rotation != from.rotation;
-        let (nodes, captured) = (self.nodes.iter(), self.captured.iter());
-        nodes.zip(captured).map(move |(i, x)| {
-            let arm = x - from.translation;
-            let swing = if turned { turn * arm - arm } else { DVec3::ZERO };
-            (*i, x + (swing + shift))
-        })
+        let tool = *tool;
+        (0..self.nodes.len()).map(move |k| self.prescribed_node(&tool, k))
     }
 }
