@@ -1,0 +1,1 @@
+//! Serial arms: their description, kinematics and dynamics.

@@ -1,0 +1,1 @@
+//! Laparoscopic instruments: shaft, jaw and what they weigh.

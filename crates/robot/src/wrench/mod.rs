@@ -1,0 +1,1 @@
+//! Forces at the tool mount: what an instrument weighs is identified and taken off.
