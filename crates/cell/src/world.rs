@@ -5,7 +5,7 @@ use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyDescription, Collider, ConstitutiveModel, Event, Material, Model, ModelBuilder, Schedule, State, Stepper,
+    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Material, Model, ModelBuilder, Schedule, State, Stepper,
     Support, SupportField, ToolForce, ToolMotion, pins,
 };
 
@@ -59,7 +59,7 @@ impl World {
         threads: usize,
     ) -> Result<Self> {
         let up = specimen.up.normalize();
-        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up);
+        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up).body_contact(BodyContact::default());
         let mut axes = Vec::with_capacity(specimen.organs.len());
         for organ in &specimen.organs {
             let axis = OrganAxis::of(&organ.body, organ.base)?;

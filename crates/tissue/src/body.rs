@@ -194,6 +194,11 @@ impl Body {
         f64::from(self.vertices[self.internal[node] as usize].mass)
     }
 
+    /// Young's modulus times the size of a vertex [N/m].
+    pub(crate) fn tissue_stiffness(&self, vertex: usize) -> f32 {
+        self.vertices[vertex].contact_stiffness / self.contact_stiffness as f32
+    }
+
     /// Free vertices of the surface (internal numbers), ascending.
     pub(crate) fn surface_vertices(&self) -> Vec<u32> {
         let free = |i: &u32| self.surface.areas[*i as usize] > 0.0 && !self.vertices[*i as usize].pinned;

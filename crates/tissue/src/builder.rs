@@ -8,7 +8,9 @@ use crate::descent::coloring::color;
 use crate::descent::elements::Elements;
 use crate::descent::groups::Groups;
 use crate::descent::strip::{Push, strip};
-use crate::{Body, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support};
+use crate::{
+    Body, BodyContact, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support,
+};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::{TetMesh, TetQuality};
 
@@ -61,6 +63,7 @@ pub struct ModelBuilder {
     contact_stiffness: f64,
     filtered: Vec<[usize; 2]>,
     colliders: Vec<Collider>,
+    body_contact: Option<BodyContact>,
 }
 
 impl Default for ModelBuilder {
@@ -79,6 +82,7 @@ impl ModelBuilder {
             contact_stiffness: CONTACT_STIFFNESS,
             filtered: Vec::new(),
             colliders: Vec::new(),
+            body_contact: None,
         }
     }
 
@@ -124,6 +128,12 @@ impl ModelBuilder {
         Ok(self.bodies.len() - 1)
     }
 
+    /// Makes the bodies touch each other, but for the pairs that are filtered. Without it they pass through each other. Solvers that are there to compare with and the oracle know nothing of it.
+    pub fn body_contact(mut self, contact: BodyContact) -> Self {
+        self.body_contact = Some(contact);
+        self
+    }
+
     /// Says that bodies `a` and `b` do not collide; `a` may be `b`, which then does not collide with itself.
     ///
     /// # Errors
@@ -153,7 +163,7 @@ impl ModelBuilder {
     /// Finishes the model.
     ///
     /// # Errors
-    /// Refuses a model without bodies, and gravity that is not finite or above 100 m/s2.
+    /// Refuses a model without bodies, gravity that is not finite or above 100 m/s2, and a contact between bodies whose numbers make no sense.
     pub fn build(self) -> Result<Model> {
         if self.bodies.is_empty() {
             return Err(Error::Model("a model needs a body".to_owned()));
@@ -161,7 +171,16 @@ impl ModelBuilder {
         if !(self.gravity.is_finite() && self.gravity.length() <= 100.0) {
             return Err(Error::Model(format!("gravity is {} m/s2; the earth's is 9.8", self.gravity)));
         }
-        Ok(Model { bodies: self.bodies, gravity: self.gravity, filtered: self.filtered, colliders: self.colliders })
+        if let Some(contact) = &self.body_contact {
+            contact.check().map_err(|reason| Error::Model(format!("contact between bodies: {reason}")))?;
+        }
+        Ok(Model {
+            bodies: self.bodies,
+            gravity: self.gravity,
+            filtered: self.filtered,
+            colliders: self.colliders,
+            body_contact: self.body_contact,
+        })
     }
 }
 

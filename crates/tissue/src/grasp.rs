@@ -5,7 +5,7 @@
 //! same map, which is exact (snap 0 to the bit) at activation.
 
 use crate::contact::Hanging;
-use crate::{Event, Model, State};
+use crate::{Body, Event, Model, State};
 use glam::{DVec3, Vec3A};
 use trocar_geometry::Pose;
 
@@ -29,6 +29,20 @@ impl ToolMotion {
             translation: self.from.translation.lerp(self.to.translation, share),
         }
     }
+
+    /// How far the tool carries any part of a body at most [m].
+    pub(crate) fn travel(&self, body: &Body) -> f64 {
+        let size = |p: &DVec3| (*p - self.from.translation).length_squared();
+        let turns = self.from.rotation != self.to.rotation;
+        let arm = if turns { body.rest.vertices.iter().map(size).fold(0.0, f64::max).sqrt() } else { 0.0 };
+        way(&self.from, &self.to, arm)
+    }
+}
+
+/// How far a point goes at most between two poses that is `arm` [m] from their origin.
+pub(crate) fn way(from: &Pose, to: &Pose, arm: f64) -> f64 {
+    let turn = 2.0 * (to.rotation * from.rotation.inverse()).xyz().length().min(1.0).asin();
+    (to.translation - from.translation).length() + turn * arm
 }
 
 /// How a grasp gives way: its nodes hang on springs, held in the jaws by Coulomb's friction.

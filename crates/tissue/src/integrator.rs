@@ -1,14 +1,19 @@
-//! What every solver is: it advances one body by one frame.
+//! What every solver is: it advances bodies by one frame, those that may touch each other together.
 
-use crate::contact::Contacts;
+use crate::contact::{Contacts, Pairs, Reaction};
 use crate::state::BodyState;
+use crate::untangle::Untangler;
 use crate::{Body, Collider, Grasp, StepReport, ToolMotion};
 use glam::{DVec3, Vec3A};
 
 /// A solver with its scratch memory for one body.
-pub(crate) trait Integrator: Send {
-    /// Advances `state` by `frame`; writes what happened on the way into `report`. It allocates nothing.
-    fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport);
+pub(crate) trait Solver: Send + Sized {
+    /// Whether bodies can touch each other.
+    const COUPLES: bool;
+
+    /// Advances the bodies of an island, which may touch each other and nothing else, by `frame`; writes what happened on the way into their reports. The first has what may touch. It
+    /// allocates nothing.
+    fn advance(island: &mut [Worker<Self>], frame: &Frame<'_>);
 
     /// What the body touched in the last frame; None for a solver that knows no tools.
     fn contacts(&self) -> Option<&Contacts> {
@@ -16,7 +21,27 @@ pub(crate) trait Integrator: Send {
     }
 }
 
+/// A body with its solver, on its way through a frame.
+pub(crate) struct Worker<S> {
+    /// The body's place in the model.
+    pub index: usize,
+    /// The body that the solver was made for.
+    pub body: Body,
+    pub solver: S,
+    pub state: BodyState,
+    pub report: StepReport,
+    /// Where the bodies of the island may touch, of its first.
+    pub pairs: Pairs,
+    /// The island.
+    pub island: usize,
+    pub reaction: Reaction,
+    pub untangler: Untangler,
+    /// The state at the frame's beginning.
+    pub before: BodyState,
+}
+
 /// What happens to a body from outside during one frame.
+#[derive(Clone, Copy)]
 pub(crate) struct Frame<'a> {
     /// Length [s].
     pub dt: f64,
@@ -33,6 +58,11 @@ pub(crate) struct Frame<'a> {
 }
 
 impl Frame<'_> {
+    /// The same for another body.
+    pub fn of(&self, index: usize) -> Self {
+        Self { index, ..*self }
+    }
+
     /// The body's grasps that hold something.
     pub fn grasps(&self) -> impl Iterator<Item = &Grasp> {
         self.grasps.iter().filter(|g| g.body == self.index && !g.torn)

@@ -1,6 +1,6 @@
 //! What never changes while stepping.
 
-use crate::{Body, Collider};
+use crate::{Body, BodyContact, Collider};
 use glam::DVec3;
 
 /// Everything that is constant over a simulation. Made by [`crate::ModelBuilder`], and out of another model by [`crate::sever`], alone, so that what was checked stays true. A clone shares
@@ -12,6 +12,7 @@ pub struct Model {
     /// Pairs that do not collide, the smaller index first, sorted.
     pub(crate) filtered: Vec<[usize; 2]>,
     pub(crate) colliders: Vec<Collider>,
+    pub(crate) body_contact: Option<BodyContact>,
 }
 
 impl Model {
@@ -28,6 +29,11 @@ impl Model {
     /// What touches the bodies, in the order they were added.
     pub fn colliders(&self) -> &[Collider] {
         &self.colliders
+    }
+
+    /// How bodies touch each other; None if they pass through each other.
+    pub fn body_contact(&self) -> Option<BodyContact> {
+        self.body_contact
     }
 
     /// Whether bodies `a` and `b` are to collide: they exist, and their pair was not filtered ([`crate::ModelBuilder::filter_pair`]).

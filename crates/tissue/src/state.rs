@@ -1,6 +1,6 @@
 //! What changes while stepping: plain data.
 
-use crate::contact::{Anchor, Source};
+use crate::contact::{Anchor, Source, Stretch};
 use crate::{Body, Grasp, Model};
 use glam::{DVec3, Vec3A};
 use xxhash_rust::xxh3::Xxh3;
@@ -29,6 +29,8 @@ pub(crate) struct BodyState {
     pub supported: Vec<bool>,
     /// Where friction holds what touches something, by vertex.
     pub anchors: Vec<Anchor>,
+    /// How far friction against other bodies is stretched, by vertex and body.
+    pub stretches: Vec<Stretch>,
     /// Whether nodes were put somewhere from outside, and elements may be inverted by it.
     pub disturbed: bool,
 }
@@ -41,6 +43,7 @@ impl BodyState {
         self.falling.copy_from_slice(&other.falling);
         self.supported.copy_from_slice(&other.supported);
         self.anchors.clone_from(&other.anchors);
+        self.stretches.clone_from(&other.stretches);
         self.disturbed = other.disturbed;
     }
 }
@@ -59,6 +62,7 @@ impl State {
                 falling: vec![0.0; body.len()],
                 supported: vec![false; body.len()],
                 anchors: Vec::with_capacity(2 * body.surface_vertices().len()),
+                stretches: Vec::new(),
                 disturbed: false,
             }
         };
@@ -141,11 +145,16 @@ impl State {
                 let (kind, number) = match anchor.source {
                     Source::Support(s) => (0u32, s),
                     Source::Collider(c) => (1, c),
-                    // No friction of a contact's.
+                    // No friction that is anchored.
                     Source::Grasp(g, _) => (2, g),
+                    Source::Body(b) => (3, b),
                 };
                 [anchor.vertex, kind, number].iter().for_each(|k| hash.update(&k.to_le_bytes()));
                 anchor.place.to_array().iter().for_each(|c| hash.update(&c.to_bits().to_le_bytes()));
+            }
+            for stretch in &body.stretches {
+                [stretch.vertex, stretch.other].iter().for_each(|k| hash.update(&k.to_le_bytes()));
+                stretch.by.to_array().iter().for_each(|c| hash.update(&c.to_bits().to_le_bytes()));
             }
             for flag in body.supported.iter().chain([&body.disturbed]) {
                 hash.update(&[u8::from(*flag)]);

@@ -1,17 +1,13 @@
-//! One frame of simulation: every body by its solver, bodies in parallel.
+//! One frame of simulation: every body by its solver, and what it did to the tools.
 
 use crate::comparator::ComparatorIntegrator;
-use crate::contact::Reaction;
+use crate::crew::{Crew, Workers};
 use crate::descent::TouchingDescent;
-use crate::integrator::{Frame, Integrator};
+use crate::integrator::Frame;
 use crate::oracle::NewtonIntegrator;
-use crate::quasi_newton::QuasiNewtonIntegrator;
+use crate::quasi_newton::QuasiNewtonSolver;
 use crate::report::Divergence;
-use crate::schedule::{Descent, Start};
-use crate::state::BodyState;
-use crate::untangle::Untangler;
-use crate::{Body, Error, Event, Model, Result, Schedule, State, StepReport, ToolForce, ToolMotion};
-use rayon::prelude::*;
+use crate::{Error, Event, Model, Result, Schedule, State, StepReport, ToolForce, ToolMotion};
 
 /// Advances states of one model; owns all scratch memory, so stepping allocates nothing.
 pub struct Stepper {
@@ -20,23 +16,9 @@ pub struct Stepper {
     threads: usize,
     /// None: the calling thread does the work.
     pool: Option<rayon::ThreadPool>,
-    /// Largest first, so that the threads end together.
-    workers: Vec<Worker>,
+    crew: Box<dyn Crew>,
     forces: Vec<ToolForce>,
     events: Vec<Event>,
-}
-
-/// A body's solver and what it reported.
-struct Worker {
-    body: usize,
-    /// The body that the solver was made for.
-    of: Body,
-    integrator: Box<dyn Integrator>,
-    reaction: Reaction,
-    untangler: Untangler,
-    before: BodyState,
-    state: BodyState,
-    report: StepReport,
 }
 
 impl Stepper {
@@ -50,8 +32,8 @@ impl Stepper {
             return Err(Error::Model(format!("a frame of {dt} s; above 0 and at most 10 s make sense")));
         }
         schedule.check()?;
-        let mut stepper =
-            Self { dt, schedule, threads, pool: None, workers: Vec::new(), forces: Vec::new(), events: Vec::new() };
+        let crew = crew(schedule, dt);
+        let mut stepper = Self { dt, schedule, threads, pool: None, crew, forces: Vec::new(), events: Vec::new() };
         stepper.follow(model)?;
         Ok(stepper)
     }
@@ -72,24 +54,7 @@ impl Stepper {
             self.pool =
                 Some(pool.map_err(|e| Error::Model(format!("{} threads cannot be started: {e}", self.threads)))?);
         }
-        let mut old = std::mem::take(&mut self.workers);
-        for (index, (state, body)) in State::new(model).bodies.into_iter().zip(&model.bodies).enumerate() {
-            let worker = match old.iter().position(|worker| worker.of.is(body)) {
-                Some(at) => Worker { body: index, ..old.swap_remove(at) },
-                None => Worker {
-                    body: index,
-                    of: body.clone(),
-                    integrator: integrator(&self.schedule, body, self.dt, alone),
-                    reaction: Reaction::new(body),
-                    untangler: Untangler::new(&state),
-                    before: state.clone(),
-                    state,
-                    report: StepReport::default(),
-                },
-            };
-            self.workers.push(worker);
-        }
-        self.workers.sort_by_key(|worker| std::cmp::Reverse(model.bodies[worker.body].tets.len()));
+        self.crew.follow(model, alone);
         Ok(())
     }
 
@@ -107,39 +72,16 @@ impl Stepper {
     pub fn step(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion]) -> StepReport {
         self.events.clear();
         self.forces.clear();
-        let nodes = |worker: &Worker| state.bodies.get(worker.body).map(|body| body.x.len());
-        let known = |worker: &Worker| Some(worker.state.x.len());
-        let same = self.workers.len() == model.bodies.len() && self.workers.len() == state.bodies.len();
-        // A model that was built again is as good as the same; one that was cut elsewhere is not.
-        let other = |w: &Worker| !model.bodies[w.body].is_alike(&w.of);
-        if !same || !state.grasps_fit(model) || self.workers.iter().any(|w| nodes(w) != known(w) || other(w)) {
+        if !self.crew.fits(model, state) || !state.grasps_fit(model) {
             return StepReport { divergence: Some(Divergence::OtherModel), ..StepReport::default() };
         }
-        for worker in &mut self.workers {
-            std::mem::swap(&mut worker.state, &mut state.bodies[worker.body]);
-        }
-        let (dt, gravity, grasps, colliders) = (self.dt, model.gravity, &state.grasps[..], &model.colliders[..]);
-        let workers = &mut self.workers;
-        let advance = |worker: &mut Worker| {
-            let frame = Frame { dt, gravity, index: worker.body, grasps, tools, colliders };
-            worker.advance(&frame, &model.bodies[worker.body]);
-        };
-        match &self.pool {
-            Some(pool) => pool.install(|| workers.par_iter_mut().with_max_len(1).for_each(advance)),
-            None => workers.iter_mut().for_each(advance),
-        }
-        let report = self.workers.iter().fold(StepReport::default(), |all, worker| all.with(&worker.report));
-        let lost = |worker: &Worker| matches!(worker.report.divergence, Some(Divergence::NonFinite { .. }));
-        let broken = self.workers.iter().any(lost);
-        for worker in &mut self.workers {
-            // The whole state is of one instant: if a body is lost, all are put back.
-            if broken {
-                worker.state.copy_from(&worker.before);
-            }
-            std::mem::swap(&mut worker.state, &mut state.bodies[worker.body]);
-        }
-        if !broken {
-            state.time += dt;
+        let grasps = std::mem::take(&mut state.grasps);
+        let (gravity, colliders) = (model.gravity, &model.colliders[..]);
+        let frame = Frame { dt: self.dt, gravity, index: 0, grasps: &grasps, tools, colliders };
+        let report = self.crew.advance(model, state, &frame, self.pool.as_ref());
+        state.grasps = grasps;
+        if !matches!(report.divergence, Some(Divergence::NonFinite { .. })) {
+            state.time += self.dt;
             self.tell_tools(state, tools.len());
         }
         report
@@ -147,51 +89,41 @@ impl Stepper {
 
     /// Sums up what the bodies did to the tools, and lets grasps slip and tear.
     fn tell_tools(&mut self, state: &mut State, tools: usize) {
-        self.forces.clear();
-        self.forces.resize(tools, ToolForce::default());
-        for worker in &self.workers {
-            self.forces.iter_mut().zip(worker.reaction.forces()).for_each(|(sum, part)| sum.add(part));
-            let Some(contacts) = worker.integrator.contacts() else { continue };
-            self.forces.iter_mut().zip(contacts.forces()).for_each(|(sum, part)| sum.add(part));
+        let Self { crew, forces, events, .. } = self;
+        forces.clear();
+        forces.resize(tools, ToolForce::default());
+        crew.for_bodies(&mut |_, reaction, contacts| {
+            forces.iter_mut().zip(reaction.forces()).for_each(|(sum, part)| sum.add(part));
+            let Some(contacts) = contacts else { return };
+            forces.iter_mut().zip(contacts.forces()).for_each(|(sum, part)| sum.add(part));
             for held in contacts.hanging() {
                 state.grasps[held.grasp as usize].slid[held.node as usize] = held.slid;
             }
-        }
+        });
         for (g, grasp) in state.grasps.iter_mut().enumerate() {
-            let body = grasp.body;
-            let workers = self.workers.iter().filter(|worker| worker.body == body);
-            let contacts = workers.filter_map(|worker| worker.integrator.contacts());
-            let held = contacts.flat_map(|contacts| contacts.hanging()).filter(|held| held.grasp as usize == g);
-            grasp.judge(held, &mut self.events);
+            crew.for_bodies(&mut |body, _, contacts| {
+                if let Some(contacts) = contacts.filter(|_| body == grasp.body) {
+                    let held = contacts.hanging().iter().filter(|held| held.grasp as usize == g);
+                    grasp.judge(held, events);
+                }
+            });
         }
     }
 }
 
-impl Worker {
-    fn advance(&mut self, frame: &Frame<'_>, body: &Body) {
-        self.report = StepReport::default();
-        self.before.copy_from(&self.state);
-        self.untangler.untangle(frame, body, &mut self.state);
-        self.integrator.advance(frame, body, &mut self.state, &mut self.report);
-        self.report.measure(frame.index, body, &self.state);
-        self.reaction.take(frame, body, &self.state, self.integrator.contacts().is_none());
-    }
-}
-
-/// The schedule's solver for a body.
-fn integrator(schedule: &Schedule, body: &Body, dt: f64, alone: bool) -> Box<dyn Integrator> {
-    let sweeps = |descent: Descent| Box::new(TouchingDescent::new(descent, body, alone));
+/// The schedule's solvers.
+fn crew(schedule: Schedule, dt: f64) -> Box<dyn Crew> {
     match schedule {
-        Schedule::QuasiNewton(method) => match QuasiNewtonIntegrator::new(*method, body, dt, alone) {
-            Some(integrator) => Box::new(integrator),
-            // Every node is pinned, or the matrix cannot be factorised: sweeps need no matrix.
-            None => {
-                sweeps(Descent { substeps: method.substeps, iterations: method.iterations, start: Start::Adaptive })
-            }
-        },
-        Schedule::Descent(descent) => sweeps(*descent),
-        Schedule::SemiImplicit(settings) => Box::new(ComparatorIntegrator::semi_implicit(*settings, body)),
-        Schedule::Xpbd(settings) => Box::new(ComparatorIntegrator::xpbd(*settings, body)),
-        Schedule::Newton(settings) => Box::new(NewtonIntegrator::new(*settings, body)),
+        Schedule::QuasiNewton(method) => {
+            Box::new(Workers::new(move |body, alone| QuasiNewtonSolver::new(method, body, dt, alone)))
+        }
+        Schedule::Descent(descent) => {
+            Box::new(Workers::new(move |body, alone| TouchingDescent::new(descent, body, alone)))
+        }
+        Schedule::SemiImplicit(settings) => {
+            Box::new(Workers::new(move |body, _| ComparatorIntegrator::semi_implicit(settings, body)))
+        }
+        Schedule::Xpbd(settings) => Box::new(Workers::new(move |body, _| ComparatorIntegrator::xpbd(settings, body))),
+        Schedule::Newton(settings) => Box::new(Workers::new(move |body, _| NewtonIntegrator::new(settings, body))),
     }
 }

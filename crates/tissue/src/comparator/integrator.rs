@@ -2,7 +2,7 @@
 
 use super::mechanics::{Mechanics, Particles, Span};
 use super::{SemiImplicit, Xpbd, semi_implicit, xpbd};
-use crate::integrator::{Frame, Integrator};
+use crate::integrator::{Frame, Solver, Worker};
 use crate::state::BodyState;
 use crate::{Body, StepReport};
 use glam::DVec3;
@@ -47,8 +47,18 @@ impl ComparatorIntegrator {
     }
 }
 
-impl Integrator for ComparatorIntegrator {
-    fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
+impl Solver for ComparatorIntegrator {
+    const COUPLES: bool = false;
+
+    fn advance(island: &mut [Worker<Self>], frame: &Frame<'_>) {
+        for Worker { index, body, solver, state, report, .. } in island {
+            solver.step(&frame.of(*index), body, state, report);
+        }
+    }
+}
+
+impl ComparatorIntegrator {
+    fn step(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
         let Self { scheme, mechanics, particles, fixed, targets } = self;
         for i in 0..state.x.len() {
             fixed[i] = body.vertices[i].pinned;

@@ -8,7 +8,7 @@ use super::touch::{Friction, Source, Touch};
 use crate::integrator::Frame;
 use crate::state::BodyState;
 use crate::support::LocalSupport;
-use crate::{Body, Collider, ToolMotion};
+use crate::{Body, Collider};
 use glam::Vec3A;
 use trocar_geometry::Pose;
 
@@ -53,6 +53,9 @@ pub(crate) struct Contacts {
     touches: Vec<Touch>,
     /// Each vertex's first touch; the next one's is their end.
     first: Vec<u32>,
+    /// What other bodies do to the vertices, as of now, and each vertex's first; for the sweeps.
+    pressed: Vec<Touch>,
+    first_pressed: Vec<u32>,
     /// Where each touch's place is in the frame of what is touched, by `touches`.
     places: Vec<Vec3A>,
     /// Sorted by vertex and source.
@@ -84,6 +87,8 @@ impl Contacts {
             anchors: Vec::with_capacity(2 * surface.len()),
             next_anchors: Vec::with_capacity(2 * surface.len()),
             first: vec![0; body.len() + 1],
+            pressed: Vec::new(),
+            first_pressed: vec![0; body.len() + 1],
             placed: Vec::new(),
             outer: outer(&surface, body.len()),
             touching: vec![false; body.len()],
@@ -163,7 +168,7 @@ impl Contacts {
         let dt = frame.dt as f32;
         let fastest = self.surface.iter().map(|i| state.v[*i as usize].length_squared()).fold(0.0, f32::max).sqrt();
         let fall = dt * dt * frame.gravity.length() as f32;
-        let held = |grasp: &crate::Grasp| frame.tools.get(grasp.tool).map(|motion| travel(motion, body));
+        let held = |grasp: &crate::Grasp| frame.tools.get(grasp.tool).map(|motion| motion.travel(body));
         let carried = frame.grasps().filter_map(held).fold(0.0, f64::max);
         self.reach = NEAR + carried as f32 + 2.5 * (dt * fastest + fall);
         // What nothing holds falls in this frame; of what is held it cannot be said.
@@ -264,7 +269,7 @@ impl Contacts {
                             Some(placed) if placed.grips => 0.0,
                             _ => frame.colliders[c as usize].friction as f32,
                         },
-                        Source::Grasp(..) => 0.0,
+                        Source::Body(_) | Source::Grasp(..) => 0.0,
                     };
                     touches.push(Touch {
                         vertex: *vertex,
@@ -304,7 +309,7 @@ impl Contacts {
                 Some(placed) => (placed.to.transform(place.as_dvec3()) - body.origin).as_vec3a(),
                 None => place,
             },
-            Source::Support(_) | Source::Grasp(..) => place,
+            Source::Support(_) | Source::Body(_) | Source::Grasp(..) => place,
         }
     }
 
@@ -324,16 +329,31 @@ impl Contacts {
         &self.touches
     }
 
-    /// A vertex's touches.
+    /// A vertex's touches, those of other bodies last.
     #[inline(always)]
-    pub fn of(&self, vertex: usize) -> &[Touch] {
-        &self.touches[self.first[vertex] as usize..self.first[vertex + 1] as usize]
+    pub fn of(&self, vertex: usize) -> impl Iterator<Item = &Touch> {
+        let range = |first: &[u32]| first[vertex] as usize..first[vertex + 1] as usize;
+        self.touches[range(&self.first)].iter().chain(&self.pressed[range(&self.first_pressed)])
     }
 
     /// Whether any vertex of a range has touches.
     #[inline(always)]
     pub fn any(&self, vertices: std::ops::Range<usize>) -> bool {
-        self.first[vertices.start] != self.first[vertices.end]
+        let any = |first: &[u32]| first[vertices.start] != first[vertices.end];
+        any(&self.first) || any(&self.first_pressed)
+    }
+
+    /// Takes over what other bodies do to the vertices, by vertex.
+    pub fn press(&mut self, pressed: &[Touch]) {
+        self.pressed.clear();
+        self.first_pressed.fill(0);
+        for touch in pressed.iter().filter(|touch| !self.fixed[touch.vertex as usize]) {
+            self.pressed.push(*touch);
+            self.first_pressed[touch.vertex as usize + 1] += 1;
+        }
+        for i in 1..self.first_pressed.len() {
+            self.first_pressed[i] += self.first_pressed[i - 1];
+        }
     }
 
     /// Whether nothing holds or touches the body.
@@ -471,24 +491,10 @@ impl Placed {
             to,
             centre: (from.transform(centre) - body.origin).as_vec3a(),
             radius: radius as f32,
-            reach: (collider.rest_offset + way(&from, &to, arm)) as f32,
+            reach: (collider.rest_offset + crate::grasp::way(&from, &to, arm)) as f32,
             grips,
         }
     }
-}
-
-/// How far a point goes at most between two poses that is `arm` [m] from their origin.
-fn way(from: &Pose, to: &Pose, arm: f64) -> f64 {
-    let turn = 2.0 * (to.rotation * from.rotation.inverse()).xyz().length().min(1.0).asin();
-    (to.translation - from.translation).length() + turn * arm
-}
-
-/// How far a tool carries any part of a body at most [m].
-fn travel(motion: &ToolMotion, body: &Body) -> f64 {
-    let size = |p: &glam::DVec3| (*p - motion.from.translation).length_squared();
-    let turns = motion.from.rotation != motion.to.rotation;
-    let arm = if turns { body.rest.vertices.iter().map(size).fold(0.0, f64::max).sqrt() } else { 0.0 };
-    way(&motion.from, &motion.to, arm)
 }
 
 fn outer(surface: &[u32], vertices: usize) -> Vec<bool> {

@@ -9,9 +9,6 @@ use crate::state::BodyState;
 use crate::{Body, Model, State};
 use glam::{Vec3, Vec3A};
 
-/// Below this distance [m] rounding blurs the direction to the foot, and the pseudonormal is used instead.
-const BLURRED: f32 = 1e-6;
-
 /// How far apart at rest, in reaches, the boxes of folded tissue are; what is nearer belongs together.
 const FOLDED: f32 = 2.0;
 
@@ -46,7 +43,8 @@ pub(crate) struct Near {
     pub vertex: u32,
     /// The triangle's body.
     pub other: u32,
-    /// The triangle's corners.
+    /// The triangle of its surface, and its corners.
+    pub at: u32,
     pub triangle: [u32; 3],
     /// Weights of the corners at the point nearest to the vertex: 0 or more, together 1.
     pub weights: [f32; 3],
@@ -114,14 +112,15 @@ impl Proximity {
         Self { limits, boxes, free, rest }
     }
 
-    /// Puts into `found` every vertex whose distance from another body it collides with is between minus [`Limits::depth`] and `reach` [m], with the nearest triangle; ordered by
-    /// body, vertex, other body. Allocates only to make `found` longer than it ever was.
-    pub fn find(&mut self, model: &Model, state: &State, reach: f32, found: &mut Vec<Near>) {
-        self.find_in(model, &state.bodies, reach, found);
-    }
-
-    /// The same for the parts of a state.
-    pub fn find_in(&mut self, model: &Model, state: &[BodyState], reach: f32, found: &mut Vec<Near>) {
+    /// Puts into `found` every vertex whose distance from another body it collides with is between minus [`Limits::depth`] and `reach` of both bodies [m], with the nearest triangle;
+    /// ordered by body, vertex, other body. Allocates only to make `found` longer than it ever was.
+    pub fn find(
+        &mut self,
+        model: &Model,
+        state: &[BodyState],
+        reach: impl Fn(usize, usize) -> f32,
+        found: &mut Vec<Near>,
+    ) {
         found.clear();
         for (a, body) in model.bodies.iter().enumerate() {
             body.surface.tree.refit(&state[a].x, &mut self.boxes[a]);
@@ -131,7 +130,7 @@ impl Proximity {
             let first = found.len();
             for b in 0..n {
                 if model.collides(a, b) && (a != b || self.limits.folds) {
-                    self.find_pair(model, state, [a, b], reach, found);
+                    self.find_pair(model, state, [a, b], reach(a, b), found);
                 }
             }
             found[first..].sort_unstable_by_key(|near| (near.vertex, near.other));
@@ -187,6 +186,7 @@ impl Proximity {
                         body: a as u32,
                         vertex: *vertex,
                         other: b as u32,
+                        at: best.triangle,
                         triangle: to.body.surface.triangles[best.triangle as usize],
                         weights: best.foot.weights,
                         normal,
@@ -241,16 +241,8 @@ impl Side<'_> {
         if best.triangle == u32::MAX {
             return None;
         }
-        let out = self.body.surface.pseudonormal(self.x, best.triangle, best.foot.weights);
-        let distance = best.squared.sqrt();
-        let height = best.foot.off.dot(out);
-        let on_face = best.foot.weights.iter().all(|w| *w > 0.0);
-        let normal = if on_face || distance < BLURRED {
-            out.try_normalize()?
-        } else {
-            best.foot.off * (1.0f32.copysign(height) / distance)
-        };
-        Some((normal.into(), distance.copysign(height)))
+        let (normal, distance) = self.body.surface.signed(self.x, best.triangle, &best.foot)?;
+        Some((normal.into(), distance))
     }
 }
 

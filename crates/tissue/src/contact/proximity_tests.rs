@@ -97,7 +97,7 @@ fn brute_force(model: &Model, state: &State, a: usize, b: usize) -> Vec<(u32, f6
 
 fn find(proximity: &mut Proximity, model: &Model, state: &State, reach: f32) -> Vec<Near> {
     let mut found = Vec::new();
-    proximity.find(model, state, reach, &mut found);
+    proximity.find(model, &state.bodies, |_, _| reach, &mut found);
     found
 }
 
@@ -231,12 +231,12 @@ fn pairs_that_are_filtered_are_not_found_and_nothing_is_allocated_anew() {
     let state = State::new(&model);
     let mut proximity = Proximity::new(&model, Limits::default());
     let mut found = Vec::new();
-    proximity.find(&model, &state, 2e-3, &mut found);
+    proximity.find(&model, &state.bodies, |_, _| 2e-3, &mut found);
     let (first, at) = (found.clone(), found.as_ptr());
-    proximity.find(&model, &state, 2e-3, &mut found);
+    proximity.find(&model, &state.bodies, |_, _| 2e-3, &mut found);
     assert!(!found.is_empty() && found == first && found.as_ptr() == at);
     model.filtered = vec![[0, 1]];
-    proximity.find(&model, &state, 2e-3, &mut found);
+    proximity.find(&model, &state.bodies, |_, _| 2e-3, &mut found);
     assert!(found.is_empty());
 }
 
@@ -365,7 +365,7 @@ fn time_of_specimen_a() {
                         let by = 1e-4 * DVec3::new((f64::from(k) * 0.1).sin(), 0.0, 0.0);
                         shift(&model, &mut state, 0, by);
                         let begun = Instant::now();
-                        proximity.find(&model, &state, reach, &mut found);
+                        proximity.find(&model, &state.bodies, |_, _| reach, &mut found);
                         begun.elapsed().as_secs_f64() * 1e3
                     })
                     .collect();

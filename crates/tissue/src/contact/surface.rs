@@ -4,6 +4,12 @@ use super::broad_phase::Tree;
 use glam::{DVec3, Vec3A};
 use trocar_geometry::TetMesh;
 
+/// Below this distance [m] rounding blurs the direction to the foot, and the pseudonormal is used instead.
+const BLURRED: f32 = 1e-6;
+
+/// Most triangles that a walk to the nearest one passes.
+const WALK: usize = 16;
+
 /// The boundary of a body. It never changes; where it is, the state says.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Surface {
@@ -74,6 +80,45 @@ impl Surface {
             [false, true, false] => self.normal_of_vertex(x, corner(1)),
             [false, false, _] => self.normal_of_vertex(x, corner(2)),
         }
+    }
+
+    /// The point of triangle `t` that is nearest to `p`, vertices at `x`.
+    pub fn at(&self, x: &[Vec3A], p: Vec3A, t: u32) -> (u32, Foot) {
+        (t, foot(p, self.triangles[t as usize].map(|i| x[i as usize])))
+    }
+
+    /// The triangle nearest to `p` as far as one comes by going from a triangle to a nearer one next to it, beginning with `t`.
+    pub fn nearest_from(&self, x: &[Vec3A], p: Vec3A, t: u32) -> (u32, Foot) {
+        let (mut at, mut best) = self.at(x, p, t);
+        for _ in 0..WALK {
+            let from = at;
+            for corner in self.triangles[from as usize] {
+                for next in self.fan(corner) {
+                    let (_, foot) = self.at(x, p, *next);
+                    if foot.off.length_squared() < best.off.length_squared() {
+                        (at, best) = (*next, foot);
+                    }
+                }
+            }
+            if at == from {
+                break;
+            }
+        }
+        (at, best)
+    }
+
+    /// Outward unit normal and signed distance at the nearest point `foot` of triangle `t`; None where there is no telling.
+    pub fn signed(&self, x: &[Vec3A], t: u32, foot: &Foot) -> Option<(Vec3A, f32)> {
+        let out = self.pseudonormal(x, t, foot.weights);
+        let distance = foot.off.length();
+        let height = foot.off.dot(out);
+        let on_face = foot.weights.iter().all(|w| *w > 0.0);
+        let normal = if on_face || distance < BLURRED {
+            out.try_normalize()?
+        } else {
+            foot.off * (1.0f32.copysign(height) / distance)
+        };
+        Some((normal, distance.copysign(height)))
     }
 
     fn fan(&self, vertex: u32) -> &[u32] {

@@ -32,6 +32,8 @@ pub(crate) enum Source {
     Support(u32),
     /// The model's collider of this number.
     Collider(u32),
+    /// The body of this number.
+    Body(u32),
     /// The grasp of this number, and its node of this number: it holds from both sides.
     Grasp(u32, u32),
 }

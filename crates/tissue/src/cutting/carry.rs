@@ -140,6 +140,8 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
         falling: from.iter().map(|i| state.falling[*i]).collect(),
         supported: from.iter().map(|i| state.supported[*i]).collect(),
         anchors: from.iter().enumerate().flat_map(|(k, i)| anchors(state, *i, k as u32)).collect(),
+        // Cut tissue settles against its neighbours anew.
+        stretches: Vec::new(),
         disturbed: state.disturbed,
     }
 }

@@ -295,7 +295,7 @@ impl LaneSweep<'_> {
         if !contacts.any(first..first + group.count as usize) {
             return 0;
         }
-        let pressed = |i: usize| contacts.of(i).iter().any(|touch| touch.push(x[i]).is_some());
+        let pressed = |i: usize| contacts.of(i).any(|touch| touch.push(x[i]).is_some());
         (0..group.count as usize).fold(0, |lanes, lane| lanes | u16::from(pressed(first + lane)) << lane)
     }
 

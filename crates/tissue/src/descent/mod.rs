@@ -10,9 +10,9 @@ mod lane_tests;
 pub(crate) mod strip;
 pub(crate) mod sweep;
 
-use crate::contact::Contacts;
+use crate::contact::{Contacts, Pairs};
 use crate::descent::sweep::{Substep, is_squeezed};
-use crate::integrator::{Frame, Integrator};
+use crate::integrator::{Frame, Solver, Worker};
 use crate::schedule::{Descent, Start};
 use crate::state::BodyState;
 use crate::{Body, Isa, StepReport};
@@ -50,23 +50,79 @@ impl TouchingDescent {
     }
 }
 
-impl Integrator for TouchingDescent {
-    fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
-        let Self { descent, contacts } = self;
-        descent.begin(frame, body);
-        contacts.begin(frame, body, state);
-        let substeps = descent.schedule.substeps;
-        for substep in 1..=substeps {
-            let share = |k: usize| k as f64 / substeps as f64;
-            contacts.find(frame, body, share(substep - 1), share(substep), |i| state.x[i]);
-            descent.substep(frame, share(substep), body, contacts, state, report);
-            contacts.settle(frame, body, share(substep), |i| state.x[i]);
+impl Solver for TouchingDescent {
+    const COUPLES: bool = true;
+
+    fn advance(island: &mut [Worker<Self>], frame: &Frame<'_>) {
+        let mut pairs = std::mem::take(&mut island[0].pairs);
+        for Worker { index, body, solver, state, .. } in island.iter_mut() {
+            solver.descent.begin(&frame.of(*index), body);
+            solver.contacts.begin(&frame.of(*index), body, state);
         }
-        contacts.end(state);
+        let substeps = island[0].solver.descent.schedule.substeps;
+        let share = |k: usize| k as f64 / substeps as f64;
+        for substep in 1..=substeps {
+            pairs.find(island, (frame.dt / substeps as f64) as f32);
+            for Worker { index, body, solver, state, .. } in island.iter_mut() {
+                let (from, to) = (share(substep - 1), share(substep));
+                solver.contacts.find(&frame.of(*index), body, from, to, |i| state.x[i]);
+            }
+            sweep_substep(island, &mut pairs, frame, share(substep));
+            for Worker { index, body, solver, state, .. } in island.iter_mut() {
+                solver.contacts.settle(&frame.of(*index), body, share(substep), |i| state.x[i]);
+            }
+            pairs.settle(island);
+        }
+        for Worker { solver, state, .. } in island.iter_mut() {
+            solver.contacts.end(state);
+        }
+        pairs.end(island);
+        island[0].pairs = pairs;
     }
 
     fn contacts(&self) -> Option<&Contacts> {
         Some(&self.contacts)
+    }
+}
+
+impl Sweeps for TouchingDescent {
+    fn sweeps(&mut self) -> (&mut DescentIntegrator, &mut Contacts) {
+        (&mut self.descent, &mut self.contacts)
+    }
+}
+
+/// A solver that can sweep.
+pub(crate) trait Sweeps: Solver {
+    fn sweeps(&mut self) -> (&mut DescentIntegrator, &mut Contacts);
+}
+
+/// One substep of implicit Euler of an island, which ends when `share` of the frame is over: predict, start, sweep body after body again and again, take the velocity.
+pub(crate) fn sweep_substep<S: Sweeps>(island: &mut [Worker<S>], pairs: &mut Pairs, frame: &Frame<'_>, share: f64) {
+    let mut iterations = 0;
+    for member in 0..island.len() {
+        let pressed = pairs.presses(island, member);
+        let Worker { index, body, solver, state, report, .. } = &mut island[member];
+        let (descent, contacts) = solver.sweeps();
+        iterations = descent.schedule.iterations;
+        contacts.press(&[]);
+        descent.start(&frame.of(*index), share, body, contacts, pressed, state, report);
+    }
+    pairs.assign();
+    for _ in 0..iterations {
+        for member in 0..island.len() {
+            if !pairs.is_empty() {
+                let pressed = pairs.on(island, member);
+                island[member].solver.sweeps().1.press(pressed);
+            }
+            let Worker { body, solver, state, .. } = &mut island[member];
+            let (descent, contacts) = solver.sweeps();
+            descent.sweep(frame, body, contacts, state);
+        }
+    }
+    for Worker { solver, state, report, .. } in island.iter_mut() {
+        let descent = solver.sweeps().0;
+        report.iterations += iterations;
+        descent.take_velocities(frame, state);
     }
 }
 
@@ -86,20 +142,26 @@ impl DescentIntegrator {
         }
     }
 
-    /// One substep of implicit Euler, which ends when `share` of the frame is over: predict, start, sweep, take the velocity.
-    pub fn substep(
+    /// A substep's length [s].
+    fn step(&self, frame: &Frame<'_>) -> f32 {
+        (frame.dt / self.schedule.substeps as f64) as f32
+    }
+
+    /// Predicts where the body is when `share` of the frame is over, and moves it to where the sweeps start from. `pressed`: by another body.
+    fn start(
         &mut self,
         frame: &Frame<'_>,
         share: f64,
         body: &Body,
         contacts: &Contacts,
+        pressed: bool,
         state: &mut BodyState,
         report: &mut StepReport,
     ) {
-        let h = (frame.dt / self.schedule.substeps as f64) as f32;
+        let h = self.step(frame);
         let gravity = frame.gravity.as_vec3a();
         self.start.copy_from_slice(&state.x);
-        let flies = self.schedule.start == Start::Adaptive && self.flies_freely(contacts);
+        let flies = self.schedule.start == Start::Adaptive && !pressed && self.flies_freely(contacts);
         // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere
         // implicit Euler's h^2 g.
         let reach = if flies { 0.5 * h * h } else { h * h };
@@ -109,9 +171,13 @@ impl DescentIntegrator {
         self.guess(flies, h, gravity, state);
         self.place_fixed(frame, share, body);
         report.grasp_limited += usize::from(!self.start_sweeps(body, state));
+    }
+
+    /// Sweeps over all vertices once.
+    fn sweep(&mut self, frame: &Frame<'_>, body: &Body, contacts: &Contacts, state: &mut BodyState) {
         let substep = Substep {
             body,
-            h,
+            h: self.step(frame),
             start: &self.start,
             predictor: &self.predictor,
             fixed: &self.fixed,
@@ -119,11 +185,7 @@ impl DescentIntegrator {
             isa: self.isa,
             alone: self.alone,
         };
-        for _ in 0..self.schedule.iterations {
-            substep.sweep(&mut state.x, &mut self.guess);
-        }
-        report.iterations += self.schedule.iterations;
-        self.take_velocities(h, gravity, state);
+        substep.sweep(&mut state.x, &mut self.guess);
     }
 
     /// Where the sweeps would like to start from.
@@ -147,7 +209,8 @@ impl DescentIntegrator {
 
     /// The velocity after the substep: v + h g + (x - y)/h. That is (x - x_start)/h for implicit Euler's predictor, and exact for the one of free
     /// flight; but the rounding of positions far from the body's origin does not enter it.
-    fn take_velocities(&self, h: f32, gravity: Vec3A, state: &mut BodyState) {
+    fn take_velocities(&self, frame: &Frame<'_>, state: &mut BodyState) {
+        let (h, gravity) = (self.step(frame), frame.gravity.as_vec3a());
         let strength = gravity.length_squared();
         let direction = if strength > 0.0 { gravity / strength } else { Vec3A::ZERO };
         for i in 0..state.x.len() {

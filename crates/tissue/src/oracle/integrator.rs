@@ -4,7 +4,7 @@ use super::newton::Solver;
 use super::potential::{Elastic, Motion, Potential};
 use super::state::Nodes;
 use super::{EARTH, Precision, friction};
-use crate::integrator::{Frame, Integrator};
+use crate::integrator::{Frame, Worker};
 use crate::report::Divergence;
 use crate::state::BodyState;
 use crate::{Body, StepReport};
@@ -33,8 +33,18 @@ impl NewtonIntegrator {
     }
 }
 
-impl Integrator for NewtonIntegrator {
-    fn advance(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
+impl crate::integrator::Solver for NewtonIntegrator {
+    const COUPLES: bool = false;
+
+    fn advance(island: &mut [Worker<Self>], frame: &Frame<'_>) {
+        for Worker { index, body, solver, state, report, .. } in island {
+            solver.step(&frame.of(*index), body, state, report);
+        }
+    }
+}
+
+impl NewtonIntegrator {
+    fn step(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
         let h = frame.dt / self.substeps as f64;
         let place = |x: glam::Vec3A| body.origin + x.as_dvec3();
         let internal = |node: usize| body.internal[node] as usize;

@@ -1,32 +1,69 @@
 //! L-BFGS: what the last steps taught about the Hessian.
 
+use super::Island;
 use crate::lanes::{Row, add_rows, dot_rows};
-use fearless_simd::Simd;
+use fearless_simd::{Level, dispatch};
 
-/// The last steps and the changes of the gradient along them.
-pub(super) struct History {
-    pairs: Vec<Pair>,
-    /// Pairs in use; the newest is `pairs[newest]`.
-    count: usize,
-    newest: usize,
-    shares: Vec<f32>,
+/// A body's part of the last steps and of the changes of the gradient along them.
+pub(super) struct Memory {
+    pairs: Vec<Taught>,
 }
 
-struct Pair {
+struct Taught {
     step: Vec<Row>,
     change: Vec<Row>,
-    /// 1 / (step . change)
-    inverse: f32,
+}
+
+/// Which of them are known, and the numbers that all bodies of an island share.
+#[derive(Default)]
+pub(super) struct History {
+    /// Pairs in use; the newest is that of this number.
+    count: usize,
+    newest: usize,
+    /// 1 / (step . change) of each pair.
+    inverses: Vec<f32>,
+    shares: Vec<f32>,
 }
 
 /// A pair whose curvature is below this share of its lengths says nothing.
 const LEAST_CURVATURE: f32 = 1e-6;
 
-impl History {
+impl Memory {
     /// Room for `pairs` of vectors of `rows`.
     pub fn new(pairs: usize, rows: usize) -> Self {
-        let pair = || Pair { step: vec![[0.0; 4]; rows], change: vec![[0.0; 4]; rows], inverse: 0.0 };
-        Self { pairs: (0..pairs).map(|_| pair()).collect(), count: 0, newest: 0, shares: vec![0.0; pairs] }
+        let pair = || Taught { step: vec![[0.0; 4]; rows], change: vec![[0.0; 4]; rows] };
+        Self { pairs: (0..pairs).map(|_| pair()).collect() }
+    }
+
+    /// Writes down a step of `share` times `direction`, which changed the gradient from `before` to `after`; step . change, step . step and change . change.
+    fn write(
+        &mut self,
+        level: Level,
+        at: usize,
+        share: f32,
+        direction: &[Row],
+        [before, after]: [&[Row]; 2],
+    ) -> [f32; 3] {
+        let pair = &mut self.pairs[at];
+        for (to, from) in pair.step.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
+            *to = share * from;
+        }
+        let values = after.as_flattened().iter().zip(before.as_flattened());
+        for (to, (after, before)) in pair.change.as_flattened_mut().iter_mut().zip(values) {
+            *to = after - before;
+        }
+        dispatch!(level, simd => [
+            dot_rows(simd, &pair.step, &pair.change),
+            dot_rows(simd, &pair.step, &pair.step),
+            dot_rows(simd, &pair.change, &pair.change),
+        ])
+    }
+}
+
+impl History {
+    /// Room for `pairs`.
+    pub fn new(pairs: usize) -> Self {
+        Self { count: 0, newest: 0, inverses: vec![0.0; pairs], shares: vec![0.0; pairs] }
     }
 
     pub fn clear(&mut self) {
@@ -38,50 +75,67 @@ impl History {
         std::mem::take(&mut self.count) > 0
     }
 
-    /// Learns from a step of `share` times `direction`, which changed the gradient from `before` to `after`.
-    #[inline(always)]
-    pub fn learn<S: Simd>(&mut self, simd: S, share: f32, direction: &[Row], before: &[Row], after: &[Row]) {
-        if self.pairs.is_empty() {
+    /// The pair that is `age` steps older than the newest.
+    fn at(&self, age: usize) -> usize {
+        (self.newest + self.inverses.len() - age) % self.inverses.len()
+    }
+}
+
+impl Island<'_> {
+    /// Learns from a step of `share` times the direction, between the gradient and the next.
+    pub(super) fn learn(&mut self, share: f32) {
+        let pairs = self.history.inverses.len();
+        if pairs == 0 {
             return;
         }
-        let next = (self.newest + 1) % self.pairs.len();
-        let pair = &mut self.pairs[next];
-        for (to, from) in pair.step.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
-            *to = share * from;
+        let next = (self.history.newest + 1) % pairs;
+        let mut sums = [0.0f32; 3];
+        for part in self.parts() {
+            let gradients = [&part.gradient[..], &part.next_gradient];
+            let products = part.memory.write(part.level, next, share, &part.direction, gradients);
+            sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
         }
-        let values = after.as_flattened().iter().zip(before.as_flattened());
-        for (to, (after, before)) in pair.change.as_flattened_mut().iter_mut().zip(values) {
-            *to = after - before;
-        }
-        let curvature = dot_rows(simd, &pair.step, &pair.change);
-        let lengths = dot_rows(simd, &pair.step, &pair.step) * dot_rows(simd, &pair.change, &pair.change);
+        let [curvature, steps, changes] = sums;
+        let lengths: f32 = steps * changes;
         if curvature > LEAST_CURVATURE * lengths.sqrt() && curvature > f32::MIN_POSITIVE {
-            pair.inverse = 1.0 / curvature;
-            self.newest = next;
-            self.count = (self.count + 1).min(self.pairs.len());
+            self.history.inverses[next] = 1.0 / curvature;
+            self.history.newest = next;
+            self.history.count = (self.history.count + 1).min(pairs);
         }
     }
 
-    /// First half of the two loops: takes out of `q` what the pairs explain, newest first.
-    #[inline(always)]
-    pub fn before<S: Simd>(&mut self, simd: S, q: &mut [Row]) {
-        for k in 0..self.count {
-            let at = (self.newest + self.pairs.len() - k) % self.pairs.len();
-            let pair = &self.pairs[at];
-            let share = pair.inverse * dot_rows(simd, &pair.step, q);
-            self.shares[at] = share;
-            add_rows(simd, q, -share, &pair.change);
+    /// First half of the two loops: takes out of the direction what the pairs explain, newest first.
+    pub(super) fn explain(&mut self) {
+        for age in 0..self.history.count {
+            let at = self.history.at(age);
+            let mut product = 0.0;
+            for part in self.parts() {
+                let (pair, direction) = (&part.memory.pairs[at], &part.direction);
+                product += dispatch!(part.level, simd => dot_rows(simd, &pair.step, direction));
+            }
+            let share = self.history.inverses[at] * product;
+            self.history.shares[at] = share;
+            for part in self.parts() {
+                let (pair, direction) = (&part.memory.pairs[at], &mut part.direction);
+                dispatch!(part.level, simd => add_rows(simd, direction, -share, &pair.change));
+            }
         }
     }
 
-    /// Second half: puts it back into the direction `r`, oldest first.
-    #[inline(always)]
-    pub fn after<S: Simd>(&self, simd: S, r: &mut [Row]) {
-        for k in (0..self.count).rev() {
-            let at = (self.newest + self.pairs.len() - k) % self.pairs.len();
-            let pair = &self.pairs[at];
-            let share = self.shares[at] - pair.inverse * dot_rows(simd, &pair.change, r);
-            add_rows(simd, r, share, &pair.step);
+    /// Second half: puts it back, oldest first.
+    pub(super) fn put_back(&mut self) {
+        for age in (0..self.history.count).rev() {
+            let at = self.history.at(age);
+            let mut product = 0.0;
+            for part in self.parts() {
+                let (pair, direction) = (&part.memory.pairs[at], &part.direction);
+                product += dispatch!(part.level, simd => dot_rows(simd, &pair.change, direction));
+            }
+            let share = self.history.shares[at] - self.history.inverses[at] * product;
+            for part in self.parts() {
+                let (pair, direction) = (&part.memory.pairs[at], &mut part.direction);
+                dispatch!(part.level, simd => add_rows(simd, direction, share, &pair.step));
+            }
         }
     }
 }

@@ -1,0 +1,71 @@
+//! Which bodies may touch in a frame, and where.
+
+use super::proximity::{Limits, Near, Proximity};
+use crate::integrator::Frame;
+use crate::{BodyContact, Model, State};
+
+/// Bodies this much further apart [m] than where they press and what they may travel in a frame and a half cannot touch in it.
+const NEAR: f32 = 5e-4;
+
+/// Finds at the beginning of every frame what may touch, and the islands of bodies that do.
+pub(crate) struct Coupling {
+    contact: BodyContact,
+    proximity: Proximity,
+    near: Vec<Near>,
+    /// How far each body may go in the frame [m].
+    ways: Vec<f32>,
+    /// A body of the same island with a smaller number, or the body itself.
+    parents: Vec<u32>,
+}
+
+impl Coupling {
+    pub fn new(model: &Model, contact: BodyContact) -> Self {
+        let limits = Limits { offset: contact.offset as f32, depth: contact.depth as f32, folds: contact.folds };
+        Self {
+            contact,
+            proximity: Proximity::new(model, limits),
+            near: Vec::new(),
+            ways: vec![0.0; model.bodies.len()],
+            parents: (0..model.bodies.len() as u32).collect(),
+        }
+    }
+
+    /// Looks over the bodies as they are at the frame's beginning.
+    pub fn find(&mut self, model: &Model, state: &State, frame: &Frame<'_>) {
+        let dt = frame.dt as f32;
+        let fall = dt * dt * frame.gravity.length() as f32;
+        for (b, (body, way)) in state.bodies.iter().zip(&mut self.ways).enumerate() {
+            let fastest = body.v.iter().map(|v| v.length_squared()).fold(0.0, f32::max).sqrt();
+            let here = frame.of(b);
+            let carried = here.grasps().filter_map(|grasp| frame.tools.get(grasp.tool));
+            let carried = carried.map(|tool| tool.travel(&model.bodies[b])).fold(0.0, f64::max);
+            *way = carried as f32 + 1.5 * (dt * fastest + fall);
+        }
+        let ways = &self.ways;
+        let reach = |a: usize, b: usize| self.contact.offset as f32 + NEAR + ways[a] + ways[b];
+        self.proximity.find(model, &state.bodies, reach, &mut self.near);
+        self.parents.iter_mut().enumerate().for_each(|(b, parent)| *parent = b as u32);
+        for k in 0..self.near.len() {
+            let (a, b) = (self.island(self.near[k].body as usize), self.island(self.near[k].other as usize));
+            self.parents[a.max(b)] = a.min(b) as u32;
+        }
+    }
+
+    /// The island that a body belongs to: its first body.
+    pub fn island(&self, body: usize) -> usize {
+        let mut at = body;
+        while self.parents[at] as usize != at {
+            at = self.parents[at] as usize;
+        }
+        at
+    }
+
+    /// What may touch, by body, vertex and other body.
+    pub fn near(&self) -> &[Near] {
+        &self.near
+    }
+
+    pub fn contact(&self) -> BodyContact {
+        self.contact
+    }
+}

@@ -1,0 +1,148 @@
+//! The bodies of a model with their solvers: those that may touch each other are stepped together, islands of them in parallel.
+
+use crate::contact::{Contacts, Coupling, Pairs, Reaction};
+use crate::integrator::{Frame, Solver, Worker};
+use crate::report::Divergence;
+use crate::untangle::Untangler;
+use crate::{Body, BodyContact, Model, State, StepReport};
+use rayon::prelude::*;
+
+/// What the stepper knows of the solvers' kind: nothing.
+pub(crate) trait Crew: Send {
+    /// Goes over to another model; what both have in common keeps its solver. `alone`: the calling thread is to do all the work.
+    fn follow(&mut self, model: &Model, alone: bool);
+
+    /// Whether the model is the one that was followed, and the state one of it.
+    fn fits(&self, model: &Model, state: &State) -> bool;
+
+    /// Advances the bodies by a frame, on the threads of a pool if there is one. Where a number is lost, all are as they were.
+    fn advance(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        frame: &Frame<'_>,
+        pool: Option<&rayon::ThreadPool>,
+    ) -> StepReport;
+
+    /// Calls `tell` for every body with what it did to the tools in the last frame.
+    fn for_bodies(&self, tell: &mut dyn FnMut(usize, &Reaction, Option<&Contacts>));
+}
+
+/// Bodies that are all stepped by the same kind of solver.
+pub(crate) struct Workers<S> {
+    /// Makes a body's solver.
+    make: Box<dyn Fn(&Body, bool) -> S + Send>,
+    /// Island by island, the largest first, so that the threads end together.
+    list: Vec<Worker<S>>,
+    coupling: Option<Coupling>,
+    /// By body: elements of the island that begins with it.
+    sizes: Vec<usize>,
+}
+
+impl<S: Solver> Workers<S> {
+    pub fn new(make: impl Fn(&Body, bool) -> S + Send + 'static) -> Self {
+        Self { make: Box::new(make), list: Vec::new(), coupling: None, sizes: Vec::new() }
+    }
+
+    /// Finds what may touch, and sorts the bodies into islands.
+    fn find_islands(&mut self, model: &Model, state: &State, frame: &Frame<'_>) {
+        let Self { list, coupling, sizes, .. } = self;
+        if let Some(coupling) = coupling {
+            coupling.find(model, state, frame);
+        }
+        sizes.fill(0);
+        for worker in list.iter_mut() {
+            worker.island = coupling.as_ref().map_or(worker.index, |coupling| coupling.island(worker.index));
+            sizes[worker.island] += worker.body.tets.len();
+        }
+        list.sort_unstable_by_key(|worker| (std::cmp::Reverse(sizes[worker.island]), worker.island, worker.index));
+    }
+}
+
+impl<S: Solver> Crew for Workers<S> {
+    fn follow(&mut self, model: &Model, alone: bool) {
+        let mut old = std::mem::take(&mut self.list);
+        for (index, (state, body)) in State::new(model).bodies.into_iter().zip(&model.bodies).enumerate() {
+            let worker = match old.iter().position(|worker| worker.body.is(body)) {
+                Some(at) => Worker { index, ..old.swap_remove(at) },
+                None => Worker {
+                    index,
+                    body: body.clone(),
+                    solver: (self.make)(body, alone),
+                    report: StepReport::default(),
+                    pairs: Pairs::default(),
+                    island: index,
+                    reaction: Reaction::new(body),
+                    untangler: Untangler::new(&state),
+                    before: state.clone(),
+                    state,
+                },
+            };
+            self.list.push(worker);
+        }
+        let couple = |contact: BodyContact| Coupling::new(model, contact);
+        self.coupling = model.body_contact.filter(|_| S::COUPLES).map(couple);
+        self.sizes = vec![0; model.bodies.len()];
+    }
+
+    fn fits(&self, model: &Model, state: &State) -> bool {
+        let counts = self.list.len() == model.bodies.len() && self.list.len() == state.bodies.len();
+        // A model that was built again is as good as the same; one that was cut elsewhere is not.
+        let same =
+            |w: &Worker<S>| state.bodies[w.index].x.len() == w.state.x.len() && model.bodies[w.index].is_alike(&w.body);
+        counts && self.list.iter().all(same)
+    }
+
+    fn advance(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        frame: &Frame<'_>,
+        pool: Option<&rayon::ThreadPool>,
+    ) -> StepReport {
+        self.find_islands(model, state, frame);
+        for worker in &mut self.list {
+            std::mem::swap(&mut worker.state, &mut state.bodies[worker.index]);
+        }
+        let Self { list, coupling, .. } = self;
+        let advance = |island: &mut [Worker<S>]| advance(island, coupling.as_ref(), frame);
+        let together = |a: &Worker<S>, b: &Worker<S>| a.island == b.island;
+        match pool {
+            Some(pool) => pool.install(|| list.par_chunk_by_mut(together).for_each(advance)),
+            None => list.chunk_by_mut(together).for_each(advance),
+        }
+        let report = list.iter().fold(StepReport::default(), |all, worker| all.with(&worker.report));
+        let broken = matches!(report.divergence, Some(Divergence::NonFinite { .. }));
+        for worker in list {
+            // The whole state is of one instant: if a body is lost, all are put back.
+            if broken {
+                worker.state.copy_from(&worker.before);
+            }
+            std::mem::swap(&mut worker.state, &mut state.bodies[worker.index]);
+        }
+        report
+    }
+
+    fn for_bodies(&self, tell: &mut dyn FnMut(usize, &Reaction, Option<&Contacts>)) {
+        self.list.iter().for_each(|worker| tell(worker.index, &worker.reaction, worker.solver.contacts()));
+    }
+}
+
+/// Advances an island by a frame.
+fn advance<S: Solver>(island: &mut [Worker<S>], coupling: Option<&Coupling>, frame: &Frame<'_>) {
+    for worker in island.iter_mut() {
+        worker.report = StepReport::default();
+        worker.before.copy_from(&worker.state);
+        worker.untangler.untangle(&frame.of(worker.index), &worker.body, &mut worker.state);
+    }
+    let mut pairs = std::mem::take(&mut island[0].pairs);
+    if let Some(coupling) = coupling {
+        pairs.begin(coupling, island);
+    }
+    island[0].pairs = pairs;
+    S::advance(island, frame);
+    for Worker { index, body, solver, state, report, reaction, .. } in island {
+        report.measure(*index, body, state);
+        reaction.take(&frame.of(*index), body, state, solver.contacts().is_none());
+    }
+}

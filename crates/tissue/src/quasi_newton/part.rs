@@ -1,0 +1,404 @@
+//! What the solver knows of one body, and does with it alone.
+
+use super::elements::Elements;
+use super::factor::Factor;
+use super::go::Guess;
+use super::history::{History, Memory};
+use super::layout::Layout;
+use super::rigid::Rigid;
+use super::warp::Warp;
+use crate::contact::{Contacts, Source};
+use crate::descent::DescentIntegrator;
+use crate::integrator::Frame;
+use crate::lanes::{Row, dot_rows};
+use crate::schedule::{Descent, QuasiNewton, Start};
+use crate::state::BodyState;
+use crate::{Body, Isa};
+use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x4};
+use glam::Vec3A;
+
+/// Sweeps a substep for a body that the quasi-Newton steps gave up.
+const FALLBACK_SWEEPS: usize = 20;
+
+/// The solver of one body.
+pub(crate) struct QuasiNewtonSolver {
+    pub(super) settings: QuasiNewton,
+    pub(super) level: Level,
+    pub(super) layout: Layout,
+    /// None if no node is free or the matrix cannot be had.
+    factor: Option<Factor>,
+    pub(super) elements: Elements,
+    /// The body's part of what the island's last steps taught.
+    pub(super) memory: Memory,
+    /// The island's, of its first body.
+    pub(super) history: History,
+    warp: Warp,
+    /// Of a body that touches others and that nothing holds.
+    pub(super) rigid: Option<Rigid>,
+    pub(super) contacts: Contacts,
+    /// Limits of friction of what is touched [N], held during a search.
+    pub(super) limits: Vec<f32>,
+    pub(super) fallback: DescentIntegrator,
+    /// Positions of all nodes [m].
+    pub(super) x: Vec<Row>,
+    /// Over free nodes: where the substep began, velocities, inertial predictor.
+    pub(super) start: Vec<Row>,
+    pub(super) v: Vec<Row>,
+    predictor: Vec<Row>,
+    pub(super) gradient: Vec<Row>,
+    pub(super) next_gradient: Vec<Row>,
+    pub(super) direction: Vec<Row>,
+    pub(super) base: Vec<Row>,
+    right: Vec<f32>,
+    /// Nodes that a tool carries, now and in the factor.
+    pub(super) held: Vec<bool>,
+    held_in_factor: Vec<bool>,
+    /// Stiffness of what free nodes touch or hang on that is in the factor [N/m].
+    touches_in_factor: Vec<f32>,
+    /// Whether the factor is that of the matrix.
+    pub(super) usable: bool,
+    /// Where the substep started from.
+    pub(super) guess: Guess,
+    /// Whether a held node could not go on in this substep because an edge would be too long.
+    pub(super) yielded: bool,
+    /// What the report said of that when the substep began.
+    pub(super) limited: usize,
+    pub(super) targets: Vec<Row>,
+}
+
+impl QuasiNewtonSolver {
+    /// For `body` stepped by frames of `dt` [s]; `alone`: the calling thread does all of it.
+    pub fn new(settings: QuasiNewton, body: &Body, dt: f64, alone: bool) -> Self {
+        let h = dt / settings.substeps as f64;
+        let mut factor = Factor::new(body, h);
+        let free: Vec<u32> = (0..body.len() as u32).filter(|i| !body.pinned[*i as usize]).collect();
+        let layout = Layout::new(body, factor.as_ref().map_or(&free, |factor| &factor.order));
+        let held = vec![false; layout.free];
+        if let Some(made) = &mut factor {
+            made.set_step(&layout.masses, h);
+            if !made.factorise(&held, &vec![0.0; layout.free]) {
+                factor = None;
+            }
+        }
+        let rows = || vec![[0.0f32; 4]; layout.rows];
+        let sweeps = Descent { substeps: settings.substeps, iterations: FALLBACK_SWEEPS, start: Start::Adaptive };
+        Self {
+            settings,
+            level: Isa::detect().level(),
+            elements: Elements::new(&layout, body),
+            memory: Memory::new(settings.memory, layout.rows),
+            history: History::new(settings.memory),
+            warp: Warp::new(&layout),
+            rigid: None,
+            contacts: Contacts::new(body),
+            limits: Vec::with_capacity(2 * body.len()),
+            fallback: DescentIntegrator::new(sweeps, body, alone),
+            x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
+            start: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
+            v: rows(),
+            predictor: rows(),
+            gradient: rows(),
+            next_gradient: rows(),
+            direction: rows(),
+            base: rows(),
+            targets: rows(),
+            right: vec![0.0; 3 * layout.rows + 16],
+            held_in_factor: held.clone(),
+            touches_in_factor: vec![0.0; layout.free],
+            usable: factor.is_some() || layout.free == 0,
+            guess: Guess::Still,
+            yielded: false,
+            limited: 0,
+            held,
+            factor,
+            layout,
+        }
+    }
+
+    /// Begins a frame.
+    pub fn begin(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
+        self.load(state);
+        self.hold(frame, body);
+        self.contacts.begin(frame, body, state);
+        self.refresh_factor(frame, body, state);
+    }
+
+    /// Finds the touches of the substep between two shares of the frame.
+    pub fn find_touches(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64) {
+        let (x, number) = (&self.x, &self.layout.number);
+        self.contacts.find(frame, body, from, to, |vertex| position(&x[number[vertex] as usize]));
+        self.limits.clear();
+        self.limits.resize(self.contacts.touches().len(), 0.0);
+    }
+
+    /// Ends the substep that ends with `share` of the frame.
+    pub fn settle(&mut self, frame: &Frame<'_>, body: &Body, share: f64) {
+        let (x, number) = (&self.x, &self.layout.number);
+        self.contacts.settle(frame, body, share, |vertex| position(&x[number[vertex] as usize]));
+    }
+
+    /// Forces and volume ratios where the nodes are; whether an element has lost too much of its accepted volume.
+    pub fn pass(&mut self, h: f32) -> bool {
+        let Self { level, elements, layout, x, start, .. } = self;
+        dispatch!(*level, simd => elements.pass(simd, layout, x, start, h))
+    }
+
+    /// Begins a substep: where nodes would be without forces but gravity. `pressed`: by another body.
+    pub fn predict(&mut self, h: f32, gravity: Row, pressed: bool) {
+        self.start.copy_from_slice(&self.x);
+        // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere implicit Euler's h^2 g.
+        let reach = if !pressed && self.flies() { 0.5 * h * h } else { h * h };
+        for i in 0..self.layout.free {
+            for c in 0..3 {
+                self.predictor[i][c] = self.x[i][c] + h * self.v[i][c] + reach * gravity[c];
+            }
+        }
+    }
+
+    /// The warp of the nodes where they are.
+    pub fn update_warp(&mut self) {
+        let Self { level, warp, layout, x, .. } = self;
+        dispatch!(*level, simd => warp.update(simd, layout, x));
+    }
+
+    /// Writes the gradient of the body's own potential into `next_gradient`, from the forces of the last pass; 0 at held nodes.
+    pub fn take_gradient(&mut self, h: f32) {
+        let level = self.level;
+        dispatch!(level, simd => self.gradient_at(simd, h));
+        for (touch, limit) in self.contacts.touches().iter().zip(&self.limits) {
+            let i = self.layout.number[touch.vertex as usize] as usize;
+            if let Some(push) = touch.push_within(position(&self.x[i]), *limit) {
+                add(&mut self.next_gradient[i], push.gradient);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn gradient_at<S: Simd>(&mut self, simd: S, h: f32) {
+        let inertia = 1.0 / (h * h);
+        for i in 0..self.layout.free {
+            if self.held[i] {
+                self.next_gradient[i] = [0.0; 4];
+                continue;
+            }
+            let x = f32x4::from_slice(simd, &self.x[i]);
+            let off = x - f32x4::from_slice(simd, &self.predictor[i]);
+            let mut sum = off * (self.layout.masses[i] * inertia);
+            let (first, end) = (self.layout.first_corner[i] as usize, self.layout.first_corner[i + 1] as usize);
+            for k in &self.layout.corners[first..end] {
+                sum += f32x4::from_slice(simd, &self.elements.corners[*k as usize]);
+            }
+            sum.store_slice(&mut self.next_gradient[i]);
+        }
+    }
+
+    /// Takes over the next gradient, and friction's limits as they are here; the gradient knows. Within a search they are held, so that there is a function to minimise.
+    pub fn accept_gradient(&mut self) {
+        std::mem::swap(&mut self.gradient, &mut self.next_gradient);
+        for (touch, limit) in self.contacts.touches().iter().zip(&mut self.limits) {
+            let i = self.layout.number[touch.vertex as usize] as usize;
+            let x = position(&self.x[i]);
+            let now = touch.limit(x);
+            if now != *limit && !self.held[i] {
+                let push = |limit| touch.push_within(x, limit).map_or(Vec3A::ZERO, |push| push.gradient);
+                add(&mut self.gradient[i], push(now) - push(*limit));
+            }
+            *limit = now;
+        }
+    }
+
+    /// Where a vertex is [m].
+    pub fn at(&self, vertex: u32) -> Vec3A {
+        position(&self.x[self.layout.number[vertex as usize] as usize])
+    }
+
+    /// Adds a force to a vertex's gradient, the accepted one or the next, if the vertex is free to move.
+    pub fn push(&mut self, next: bool, vertex: u32, force: Vec3A) {
+        let i = self.layout.number[vertex as usize] as usize;
+        if i < self.layout.free && !self.held[i] {
+            add(if next { &mut self.next_gradient[i] } else { &mut self.gradient[i] }, force);
+        }
+    }
+
+    /// The gradient's product with the direction; of the next gradient's.
+    pub fn slope(&self) -> f32 {
+        dispatch!(self.level, simd => dot_rows(simd, &self.gradient, &self.direction))
+    }
+
+    pub fn next_slope(&self) -> f32 {
+        dispatch!(self.level, simd => dot_rows(simd, &self.next_gradient, &self.direction))
+    }
+
+    /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue.
+    pub fn precondition(&mut self) {
+        let Self { level, warp, factor, direction, right, .. } = self;
+        let Some(factor) = factor else { return };
+        dispatch!(*level, simd => {
+            warp.to_rest(simd, direction, right);
+            factor.solve(simd, right);
+            warp.out_of_rest(simd, right, direction);
+        });
+    }
+
+    /// Turns the direction downhill; held nodes have none.
+    pub fn turn_downhill(&mut self) {
+        for (i, d) in self.direction.iter_mut().enumerate() {
+            *d = if self.held.get(i) == Some(&true) { [0.0; 4] } else { d.map(|d| -d) };
+        }
+    }
+
+    /// The stiffness that holds a held node [N/m].
+    pub fn holding(&self, i: usize) -> f32 {
+        self.factor.as_ref().map_or(0.0, |factor| factor.holding[i])
+    }
+
+    /// Largest coordinate of any free node [m].
+    pub fn extent(&self) -> f32 {
+        longest(&self.x[..self.layout.free])
+    }
+
+    /// Largest coordinate of the direction [m].
+    pub fn longest_step(&self) -> f32 {
+        longest(&self.direction)
+    }
+
+    /// Sum of the gradient over the nodes [N].
+    pub fn force(&self) -> Vec3A {
+        self.gradient[..self.layout.free].iter().fold(Vec3A::ZERO, |sum, row| sum + position(row))
+    }
+
+    /// Mass of the free nodes [kg].
+    pub fn mass(&self) -> f32 {
+        self.layout.masses.iter().sum()
+    }
+
+    /// Moves all nodes alike [m].
+    pub fn shift(&mut self, by: Vec3A) {
+        self.x[..self.layout.free].iter_mut().for_each(|row| add(row, by));
+    }
+
+    /// How far any coordinate is from where the node would have gone by itself [m]: what the substep was found to be about, without any rigid motion.
+    pub fn way(&self) -> f32 {
+        let mut way = 0.0f32;
+        for i in (0..self.layout.free).filter(|i| !self.held[*i]) {
+            for c in 0..3 {
+                way = way.max((self.x[i][c] - self.targets[i][c]).abs());
+            }
+        }
+        way
+    }
+
+    /// Puts the substep's beginning back.
+    pub fn restore(&mut self) {
+        let free = self.layout.free;
+        self.x[..free].copy_from_slice(&self.start[..free]);
+    }
+
+    /// The velocities after the substep.
+    pub fn take_velocities(&mut self, h: f32, gravity: Row) {
+        for i in 0..self.layout.free {
+            for c in 0..3 {
+                let v = self.v[i][c] + h * gravity[c] + (self.x[i][c] - self.predictor[i][c]) / h;
+                self.v[i][c] = if self.held[i] { 0.0 } else { v };
+            }
+        }
+    }
+
+    /// Whether no tool and no support holds or touches the body.
+    pub fn flies(&self) -> bool {
+        self.is_free() && self.contacts.flies(|vertex| position(&self.x[self.layout.number[vertex] as usize]))
+    }
+
+    /// Marks the nodes that tools carry; a factor in which others are held is made anew.
+    fn hold(&mut self, frame: &Frame<'_>, body: &Body) {
+        self.held.fill(false);
+        for grasp in frame.rigid_grasps() {
+            for node in &grasp.nodes {
+                let i = self.layout.number[body.internal[*node as usize] as usize] as usize;
+                if i < self.layout.free {
+                    self.held[i] = true;
+                }
+            }
+        }
+    }
+
+    /// Makes the factor anew if it is not the one for the nodes that are held, pressed or hang on a tool.
+    fn refresh_factor(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
+        let Some(factor) = &mut self.factor else { return };
+        let mut stale = !self.usable || self.held != self.held_in_factor;
+        for i in 0..self.layout.free {
+            let stiffness = self.contacts.stiffness(frame, body, state, self.layout.vertex[i] as usize);
+            stale |= stiffness != self.touches_in_factor[i];
+            self.touches_in_factor[i] = stiffness;
+        }
+        if stale {
+            self.usable = factor.factorise(&self.held, &self.touches_in_factor);
+            self.held_in_factor.copy_from_slice(&self.held);
+        }
+    }
+
+    /// Lets the matrix know of what presses where a substep began or would have gone by itself; false if it did already.
+    pub fn learn_touches(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
+        let (x, targets, number) = (&self.x, &self.targets, &self.layout.number);
+        let places = |vertex: u32| {
+            let i = number[vertex as usize] as usize;
+            [position(&x[i]), position(&targets[i])]
+        };
+        let mut new = false;
+        for touch in self.contacts.touches().iter().filter(|touch| !matches!(touch.source, Source::Grasp(..))) {
+            let presses = places(touch.vertex).iter().any(|x| touch.height(*x) < 0.0);
+            let known = &mut state.supported[touch.vertex as usize];
+            new |= presses && !*known;
+            *known |= presses;
+        }
+        if new {
+            self.refresh_factor(frame, body, state);
+        }
+        new
+    }
+
+    pub fn load(&mut self, state: &BodyState) {
+        for (i, vertex) in self.layout.vertex.iter().enumerate() {
+            self.x[i] = state.x[*vertex as usize].extend(0.0).to_array();
+        }
+        for i in 0..self.layout.free {
+            self.v[i] = state.v[self.layout.vertex[i] as usize].extend(0.0).to_array();
+        }
+    }
+
+    pub fn store(&self, state: &mut BodyState) {
+        for i in 0..self.layout.free {
+            let vertex = self.layout.vertex[i] as usize;
+            state.x[vertex] = position(&self.x[i]);
+            state.v[vertex] = position(&self.v[i]);
+            // The sweeps' start is none of this solver's; a body that goes over to them starts afresh.
+            state.falling[vertex] = 0.0;
+        }
+        for vertex in &self.layout.vertex[self.layout.free..] {
+            state.v[*vertex as usize] = Vec3A::ZERO;
+        }
+    }
+}
+
+/// The place of a row [m].
+pub(super) fn position(row: &Row) -> Vec3A {
+    Vec3A::new(row[0], row[1], row[2])
+}
+
+/// Largest coordinate of any row; not a number counts as infinite.
+fn longest(rows: &[Row]) -> f32 {
+    let mut most = [0.0f32; 4];
+    let mut sane = true;
+    for row in rows {
+        for c in 0..4 {
+            most[c] = most[c].max(row[c].abs());
+        }
+        sane &= row[0].is_finite() & row[1].is_finite() & row[2].is_finite();
+    }
+    if sane { most[0].max(most[1]).max(most[2]) } else { f32::INFINITY }
+}
+
+/// Adds to a row.
+pub(super) fn add(row: &mut Row, by: Vec3A) {
+    row.iter_mut().zip(by.to_array()).for_each(|(sum, part)| *sum += part);
+}

@@ -1,0 +1,292 @@
+//! Bodies that touch each other: how deep, with what force, and that nothing is gained or lost by it.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
+
+mod common;
+
+use common::{FRAME, GRAVITY, block, nodes, schedules, tissue};
+use glam::{DQuat, DVec3};
+use trocar_geometry::TetMesh;
+use trocar_tissue::{Body, BodyContact, BodyDescription, Material, Model, ModelBuilder, Schedule, State, Stepper};
+
+/// A ball of `cells` cubes across, of radius `radius` [m], round `centre`.
+fn ball(cells: usize, radius: f64, centre: DVec3) -> TetMesh {
+    let mut mesh = block([cells; 3], 2.0 / cells as f64);
+    for p in &mut mesh.vertices {
+        let q = *p - 1.0;
+        // A cube's shells become spheres.
+        let shell = q.abs().max_element();
+        *p = centre + radius * if shell > 0.0 { q * (shell / q.length()) } else { q };
+    }
+    mesh
+}
+
+fn moved(mut mesh: TetMesh, by: impl Fn(DVec3) -> DVec3) -> TetMesh {
+    mesh.vertices.iter_mut().for_each(|p| *p = by(*p));
+    mesh
+}
+
+struct Part {
+    mesh: TetMesh,
+    material: Material,
+    pinned: Vec<u32>,
+}
+
+fn scene(parts: &[Part], contact: BodyContact, gravity: DVec3) -> Model {
+    let mut builder = ModelBuilder::new().gravity(gravity).body_contact(contact);
+    for (k, Part { mesh, material, pinned }) in parts.iter().enumerate() {
+        let (name, pinned) = (format!("part {k}"), pinned.clone());
+        builder.body(BodyDescription { name, mesh, material: *material, pinned, supports: vec![] }).unwrap();
+    }
+    builder.build().unwrap()
+}
+
+fn centroid(model: &Model, state: &State, body: usize) -> DVec3 {
+    let mass = |i: usize| model.bodies()[body].mass(i);
+    let n = model.bodies()[body].len();
+    let sum: DVec3 = (0..n).map(|i| mass(i) * state.position(model, body, i)).sum();
+    sum / (0..n).map(mass).sum::<f64>()
+}
+
+fn momentum(model: &Model, state: &State) -> DVec3 {
+    let of =
+        |b: usize, body: &Body| -> DVec3 { (0..body.len()).map(|i| body.mass(i) * state.velocity(model, b, i)).sum() };
+    model.bodies().iter().enumerate().map(|(b, body)| of(b, body)).sum()
+}
+
+/// How deep the deepest node of a body is inside another: brute force over all elements and boundary triangles, in double precision.
+fn depth(model: &Model, state: &State, [a, b]: [usize; 2], meshes: [&TetMesh; 2]) -> f64 {
+    let x = state.positions(model, b);
+    let (boundary, at) = meshes[1].boundary();
+    let inside = |p: DVec3| {
+        meshes[1].tets.iter().any(|tet| {
+            let [q, r, s, t] = tet.map(|i| x[i as usize]);
+            let volume = |q: DVec3, r: DVec3, s: DVec3, t: DVec3| (r - q).cross(s - q).dot(t - q);
+            [volume(p, r, s, t), volume(q, p, s, t), volume(q, r, p, t), volume(q, r, s, p)].iter().all(|v| *v > 0.0)
+        })
+    };
+    let to_surface = |p: DVec3| {
+        let triangle = |t: &[u32; 3]| t.map(|i| x[at[i as usize] as usize]);
+        boundary.triangles.iter().map(|t| distance(p, triangle(t))).fold(f64::INFINITY, f64::min)
+    };
+    let nodes = state.positions(model, a);
+    nodes.into_iter().filter(|p| inside(*p)).map(to_surface).fold(0.0, f64::max)
+}
+
+/// Distance of a point from a triangle: by projecting into it, or else onto its edges.
+fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
+    let normal = (b - a).cross(c - a).normalize();
+    let within = [(a, b), (b, c), (c, a)].iter().all(|(u, v)| (v - u).cross(p - u).dot(normal) >= 0.0);
+    if within {
+        return (p - a).dot(normal).abs();
+    }
+    let edge = |u: DVec3, v: DVec3| {
+        let t = ((p - u).dot(v - u) / (v - u).length_squared()).clamp(0.0, 1.0);
+        (p - u.lerp(v, t)).length()
+    };
+    edge(a, b).min(edge(b, c)).min(edge(c, a))
+}
+
+/// One organ falls 20 mm onto another that lies on pins: neither enters the other by more than the contact offset, ever, and they come to rest.
+#[test]
+fn dropped_on_each_other_they_stay_outside() {
+    let (radius, contact) = (12e-3, BodyContact::default());
+    let below = ball(10, radius, DVec3::ZERO);
+    let above = ball(8, 0.8 * radius, DVec3::new(3e-3, 1e-3, 1.8 * radius + 20e-3));
+    let pinned = nodes(&below, |p| p.z < -0.5 * radius);
+    let material = |young_modulus| Material { viscosity: 4.0, ..tissue(young_modulus) };
+    let parts = [
+        Part { mesh: below.clone(), material: material(12e3), pinned },
+        Part { mesh: above.clone(), material: material(5e3), pinned: vec![] },
+    ];
+    let model = scene(&parts, contact, GRAVITY);
+    for judged in schedules().into_iter().filter(|judged| judged.name != "many sweeps") {
+        let mut state = State::new(&model);
+        let mut stepper = Stepper::new(&model, judged.schedule, FRAME, 1).unwrap();
+        let (mut deepest, mut iterations, mut fallbacks, mut lowest) = (0.0f64, 0, 0, f64::INFINITY);
+        let clock = std::time::Instant::now();
+        for _ in 0..30 {
+            let report = stepper.step(&model, &mut state, &[]);
+            assert!(report.divergence.is_none() && report.inverted == 0, "{}: {report:?}", judged.name);
+            iterations += report.iterations;
+            fallbacks += report.fallbacks;
+            deepest = deepest.max(depth(&model, &state, [1, 0], [&above, &below]));
+            deepest = deepest.max(depth(&model, &state, [0, 1], [&below, &above]));
+            lowest = lowest.min(centroid(&model, &state, 1).z);
+        }
+        println!(
+            "{}: {:.2} mm deep, as low as {:.2} mm, {iterations} iterations, {fallbacks} fallbacks, {:.0} ms",
+            judged.name,
+            1e3 * deepest,
+            1e3 * lowest,
+            1e3 * clock.elapsed().as_secs_f64()
+        );
+        // Where the surfaces would be a gap of 1.5 mm apart.
+        assert!(lowest < 1.8 * radius + 1.5e-3, "{}: it did not fall as far as the other", judged.name);
+        assert!(deepest <= contact.offset, "{}: {:.2} mm deep", judged.name, 1e3 * deepest);
+    }
+}
+
+/// Two that fly into each other, off centre, keep their momentum, and gain no energy.
+#[test]
+fn momentum_is_kept() {
+    for judged in schedules() {
+        let meshes = [ball(6, 10e-3, DVec3::ZERO), ball(6, 8e-3, DVec3::new(22e-3, 4e-3, 2e-3))];
+        let parts = meshes.map(|mesh| Part { mesh, material: tissue(8e3), pinned: vec![] });
+        let model = scene(&parts, BodyContact::default(), DVec3::ZERO);
+        let mut state = State::new(&model);
+        for i in 0..model.bodies()[1].len() {
+            state.set_velocity(&model, 1, i, DVec3::new(-0.4, 0.0, 0.0));
+        }
+        let (before, energy) = (momentum(&model, &state), state.kinetic_energy(&model));
+        let mut stepper = Stepper::new(&model, judged.schedule, FRAME, 1).unwrap();
+        let (mut fallbacks, mut iterations) = (0, 0);
+        for _ in 0..30 {
+            let report = stepper.step(&model, &mut state, &[]);
+            assert!(report.divergence.is_none() && report.inverted == 0, "{report:?}");
+            fallbacks += report.fallbacks;
+            iterations += report.iterations;
+        }
+        let (after, left) = (momentum(&model, &state), state.kinetic_energy(&model));
+        let lost = (after - before).length() / before.length();
+        let passed_on = (0..model.bodies()[0].len()).map(|i| state.velocity(&model, 0, i).x).fold(0.0, f64::min);
+        println!(
+            "{}: {lost:.1e} of the momentum lost, {:.3} of the energy left, {fallbacks} fallbacks, {iterations} iterations",
+            judged.name,
+            left / energy
+        );
+        assert!(passed_on < -0.05, "{}: nothing was hit", judged.name);
+        if judged.name == "fast" {
+            assert!(lost < 1e-4, "{lost} of the momentum is lost");
+            assert!(left < energy, "{left} J of {energy} J");
+        }
+    }
+}
+
+/// A block on a pinned slope of tissue stays below the angle of friction and slides above it.
+#[test]
+fn coulomb_holds_between_bodies() {
+    let contact = BodyContact::default();
+    for (share, slides) in [(0.95, false), (1.1, true)] {
+        let angle = (share * contact.friction).atan();
+        let turn = DQuat::from_rotation_y(angle);
+        let ground = block([24, 6, 2], 2.5e-3);
+        let above = moved(block([4, 4, 2], 2.5e-3), |p| p + DVec3::new(4e-3, 2.5e-3, 5e-3 + contact.offset));
+        let pinned = nodes(&ground, |p| p.z < 1e-9);
+        let (ground, above) = (moved(ground, |p| turn * p), moved(above, |p| turn * p));
+        let material = Material { viscosity: 20.0, ..tissue(30e3) };
+        let parts = [Part { mesh: ground, material, pinned }, Part { mesh: above, material, pinned: vec![] }];
+        let model = scene(&parts, contact, GRAVITY);
+        let mut state = State::new(&model);
+        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut run = |frames: usize| {
+            let (mut fallbacks, mut iterations) = (0, 0);
+            for _ in 0..frames {
+                let report = stepper.step(&model, &mut state, &[]);
+                assert_eq!((report.inverted, report.divergence), (0, None));
+                fallbacks += report.fallbacks;
+                iterations += report.iterations;
+            }
+            println!("{frames} frames: {fallbacks} fallbacks, {iterations} iterations");
+            let speeds = (0..model.bodies()[1].len()).map(|i| state.velocity(&model, 1, i));
+            (centroid(&model, &state, 1), speeds.sum::<DVec3>() / model.bodies()[1].len() as f64)
+        };
+        if slides {
+            let ((_, before), (_, after)) = (run(4), run(12));
+            let (gained, free) =
+                ((after - before).length(), 9.81 * (angle.sin() - contact.friction * angle.cos()) * 0.2);
+            println!("at {share} of the angle of friction: {gained:.4} m/s gained, {free:.4} by Coulomb's law");
+            assert!((gained / free - 1.0).abs() < 0.08, "{gained} m/s gained, {free} by Coulomb's law");
+        } else {
+            let ((settled, _), (later, _)) = (run(60), run(120));
+            let way = (later - settled).length();
+            println!("at {share} of the angle of friction: {:.6} mm in two seconds", 1e3 * way);
+            assert!(way < 1e-6, "it crept {way} m in two seconds");
+        }
+    }
+}
+
+/// Two equal blocks pressed together each give way by half, as one block of both heights would.
+#[test]
+fn two_blocks_press_as_one() {
+    let contact = BodyContact { friction: 0.0, ..BodyContact::default() };
+    let (edge, n) = (2.5e-3, 4);
+    let height = n as f64 * edge;
+    let low = block([n, n, n], edge);
+    let high = moved(low.clone(), |p| p + DVec3::Z * (height + contact.offset));
+    let material = Material { poisson_ratio: 0.0, viscosity: 10.0, ..tissue(10e3) };
+    let fixed = |p: DVec3| p.z < 1e-9 || p.z > 2.0 * height + contact.offset - 1e-9;
+    let (pinned_low, pinned_high) = (nodes(&low, fixed), nodes(&high, fixed));
+    let parts = [
+        Part { mesh: low.clone(), material, pinned: pinned_low },
+        Part { mesh: high.clone(), material, pinned: pinned_high.clone() },
+    ];
+    let model = scene(&parts, contact, DVec3::ZERO);
+    let mut state = State::new(&model);
+    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let pressed = 1e-3;
+    for k in 1..=30 {
+        for i in &pinned_high {
+            let p = high.vertices[*i as usize] - DVec3::Z * (pressed * k as f64 / 30.0);
+            state.set_position(&model, 1, *i as usize, p);
+        }
+        let report = stepper.step(&model, &mut state, &[]);
+        assert_eq!((report.inverted, report.divergence), (0, None));
+        assert!(report.iterations < 120, "{} iterations", report.iterations);
+    }
+    (0..60).for_each(|_| assert!(stepper.step(&model, &mut state, &[]).divergence.is_none()));
+    let face = |body: usize, mesh: &TetMesh, z: f64| {
+        let on = nodes(mesh, |p| (p.z - z).abs() < 1e-9);
+        on.iter().map(|i| state.position(&model, body, *i as usize).z).sum::<f64>() / on.len() as f64
+    };
+    let below = height - face(0, &low, height);
+    let above = face(1, &high, height + contact.offset) - (height + contact.offset - pressed);
+    // All in a row: each block's elasticity, and the springs of both faces' nodes.
+    let spring = |i: u32| {
+        let around = low.tets.iter().enumerate().filter(|(_, tet)| tet.contains(&i));
+        contact.stiffness * 10e3 * around.map(|(t, _)| 0.25 * low.tet_volume(t)).sum::<f64>().cbrt()
+    };
+    let springs: f64 = nodes(&low, |p| p.z > height - 1e-9).into_iter().map(spring).sum::<f64>()
+        + nodes(&low, |p| p.z < 1e-9).into_iter().map(spring).sum::<f64>();
+    let block = 10e3 * (n as f64 * edge).powi(2) / height;
+    let expected = pressed / (2.0 + block / springs);
+    println!(
+        "pressed {:.3} mm: {:.4} below, {:.4} above, {:.4} expected",
+        1e3 * pressed,
+        1e3 * below,
+        1e3 * above,
+        1e3 * expected
+    );
+    assert!((below - above).abs() < 0.002 * pressed, "{below} m and {above} m");
+    assert!((below - expected).abs() < 0.02 * pressed, "{below} m, {expected} m expected");
+}
+
+/// The same bits on one thread and on two, and after a state was put back.
+#[test]
+fn bits_repeat() {
+    let meshes = [
+        ball(6, 10e-3, DVec3::ZERO),
+        ball(6, 8e-3, DVec3::new(4e-3, 0.0, 21e-3)),
+        ball(5, 8e-3, DVec3::new(60e-3, 0.0, 0.0)),
+        ball(5, 7e-3, DVec3::new(60e-3, 2e-3, 18e-3)),
+    ];
+    let pins = |mesh: &TetMesh| nodes(mesh, |p| p.z < -5e-3);
+    let parts = meshes.map(|mesh| Part { pinned: pins(&mesh), mesh, material: tissue(8e3) });
+    let model = scene(&parts, BodyContact::default(), GRAVITY);
+    for schedule in [Schedule::FAST, Schedule::PAPER] {
+        let run = |threads: usize| {
+            let mut state = State::new(&model);
+            let mut stepper = Stepper::new(&model, schedule, FRAME, threads).unwrap();
+            (0..12).for_each(|_| assert!(stepper.step(&model, &mut state, &[]).divergence.is_none()));
+            let saved = state.clone();
+            (0..8).for_each(|_| assert!(stepper.step(&model, &mut state, &[]).divergence.is_none()));
+            (saved, state.hash())
+        };
+        let (saved, hash) = run(1);
+        assert_eq!(run(2).1, hash);
+        let mut again = saved;
+        let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
+        (0..8).for_each(|_| assert!(stepper.step(&model, &mut again, &[]).divergence.is_none()));
+        assert_eq!(again.hash(), hash);
+    }
+}
