@@ -1,56 +1,14 @@
-//! Description files: what they say is read, what is wrong is told, damaged ones never panic.
+//! Description files: what they say is read, what is wrong is told.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
+mod common;
+
+use common::files::{MJCF, URDF};
 use glam::DVec3;
 use std::path::Path;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_robot::Error;
 use trocar_robot::chain::{JointKind, Joints, SerialArm};
-
-#[global_allocator]
-static ALLOCATOR: &Peak = &PEAK;
-
-/// The file, its text and the parser's tree.
-const ALLOWANCE: Allowance = Allowance { fixed: 1 << 20, per_byte: 100 };
-
-const URDF: &str = r#"<?xml version="1.0"?>
-<robot name="two">
-  <link name="world"/>
-  <link name="a"><inertial><origin xyz="0.1 0 0" rpy="0 0 1.5707963267948966"/><mass value="2"/>
-    <inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.025"/></inertial></link>
-  <link name="box"><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
-  <link name="b"><inertial><mass value="1"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
-  <link name="tool"/>
-  <joint name="j1" type="revolute"><parent link="world"/><child link="a"/><origin xyz="0 0 0.5"/><axis xyz="0 0 2"/>
-    <limit lower="-1" upper="2" velocity="3" effort="40"/><dynamics damping="0.1" friction="0.2"/></joint>
-  <joint name="fix" type="fixed"><parent link="a"/><child link="box"/><origin xyz="0.3 0 0"/></joint>
-  <joint name="j2" type="prismatic"><parent link="a"/><child link="b"/><origin xyz="0.2 0 0"/><axis xyz="1 0 0"/>
-    <limit lower="0" upper="0.3" velocity="1" effort="50"/></joint>
-  <joint name="end" type="fixed"><parent link="b"/><child link="tool"/><origin xyz="0.1 0 0"/></joint>
-</robot>"#;
-
-const MJCF: &str = r#"<mujoco model="two">
-  <compiler angle="degree" autolimits="true"/>
-  <option gravity="0 0 -9.7"/>
-  <default><joint damping="0.5"/><default class="arm"><joint armature="0.1" frictionloss="0.3"/>
-    <default class="hand"><joint damping="0.7"/></default></default></default>
-  <worldbody>
-    <body name="base" pos="0 0 0.5" childclass="arm">
-      <body name="a">
-        <inertial pos="0.1 0 0" mass="2" diaginertia="0.02 0.01 0.025" euler="0 0 90"/>
-        <joint name="j1" axis="0 0 2" range="-60 120" actuatorfrcrange="-40 40"/>
-        <body name="box" pos="0.3 0 0"><inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/></body>
-        <body name="b" pos="0.2 0 0">
-          <inertial pos="0 0 0" mass="1" fullinertia="0.01 0.01 0.01 0 0 0"/>
-          <joint name="j2" class="hand" type="slide" axis="1 0 0" range="0 0.3"/>
-          <site name="tool" pos="0.1 0 0"/>
-        </body>
-      </body>
-    </body>
-  </worldbody>
-  <keyframe><key name="home" qpos="0.2 0.1"/></keyframe>
-</mujoco>"#;
 
 fn write(name: &str, text: &str) -> (tempfile::TempDir, std::path::PathBuf) {
     let folder = tempfile::tempdir().unwrap();
@@ -116,7 +74,11 @@ fn what_is_wrong_is_told() {
         (r#"<mass value="2"/>"#, "", "without <mass>"),
         (r#"<mass value="2"/>"#, r#"<mass value="-2"/>"#, "must be positive"),
         (r#"<mass value="2"/>"#, r#"<mass value="2e999"/>"#, "not a finite number"),
-        (r#"ixx="0.01" ixy="0" ixz="0" iyy="0.02""#, r#"ixx="9" ixy="0" ixz="0" iyy="0.02""#, "no body has this inertia"),
+        (
+            r#"ixx="0.01" ixy="0" ixz="0" iyy="0.02""#,
+            r#"ixx="9" ixy="0" ixz="0" iyy="0.02""#,
+            "no body has this inertia",
+        ),
         (r#"ixx="0.01" ixy="0" ixz="0" iyy="0.02""#, r#"ixx="0.01" ixz="0" iyy="0.02""#, "ixy"),
         (r#"<parent link="b"/>"#, r#"<parent link="tool"/>"#, "loop"),
         (r#"<parent link="b"/>"#, r#"<parent link="bb"/>"#, "no link"),
@@ -182,30 +144,8 @@ fn files_made_to_hurt_are_refused() {
     let huge = format!("<mujoco>{}</mujoco>", " ".repeat(17 << 20));
     assert!(mjcf(&huge).unwrap_err().to_string().contains("MiB"));
     assert!(urdf("").is_err() && mjcf("\u{feff}").is_err());
-    let many = URDF.replace("<limit lower", &"x".repeat(10_000)).replace("friction=\"0.2\"", &format!("friction=\"{}\"", "9".repeat(10_000)));
+    let many = URDF
+        .replace("<limit lower", &"x".repeat(10_000))
+        .replace("friction=\"0.2\"", &format!("friction=\"{}\"", "9".repeat(10_000)));
     assert!(urdf(&many).unwrap_err().to_string().len() < 500);
-}
-
-#[test]
-fn damaged_files_give_an_answer_or_an_error() {
-    let seeds = [("arm.urdf".to_owned(), URDF.as_bytes().to_vec()), ("arm.xml".to_owned(), MJCF.as_bytes().to_vec())];
-    let folder = tempfile::tempdir().unwrap();
-    assault(&seeds, ALLOWANCE, |name, bytes| {
-        let path = folder.path().join(name);
-        std::fs::write(&path, bytes).unwrap();
-        let read = if name.ends_with("urdf") {
-            SerialArm::from_urdf(&path, None, Some("tool"))
-        } else {
-            SerialArm::from_mjcf(&path, "tool")
-        };
-        match read {
-            // What was accepted can be worked with.
-            Ok(arm) => assert!(arm.mass_matrix(&arm.home()).factor().is_some()),
-            Err(error) => {
-                let message = error.to_string();
-                assert!(message.contains(name), "the file is not named: {message}");
-                assert!(!message.contains('\n'), "more than a line: {message}");
-            }
-        }
-    });
 }

@@ -79,7 +79,8 @@ fn compare(arm: &SerialArm, python: &Path, model: &Path, names: [&str; 2]) -> [f
         positions.extend(turns);
         positions.extend(flange.translation.to_array());
         let jacobian = frames.flange_jacobian();
-        let by_row = |columns: &[DVec3]| (0..3).flat_map(|a| columns.iter().map(move |c| c[a]).collect::<Vec<_>>()).collect();
+        let by_row =
+            |columns: &[DVec3]| (0..3).flat_map(|a| columns.iter().map(move |c| c[a]).collect::<Vec<_>>()).collect();
         let mass = (0..n).flat_map(|i| dynamics.mass_matrix.row(i).to_vec()).collect();
         let linear: Vec<f64> = by_row(jacobian.linear());
         let angular: Vec<f64> = by_row(jacobian.angular());
@@ -95,7 +96,16 @@ fn compare(arm: &SerialArm, python: &Path, model: &Path, names: [&str; 2]) -> [f
         }
         assert_eq!(at, answer.len());
     }
-    println!("{}: frames {:.1e}, J {:.1e} {:.1e}, M {:.1e}, bias {:.1e}, gravity {:.1e}", arm.name(), worst[0], worst[1], worst[2], worst[3], worst[4], worst[5]);
+    println!(
+        "{}: frames {:.1e}, J {:.1e} {:.1e}, M {:.1e}, bias {:.1e}, gravity {:.1e}",
+        arm.name(),
+        worst[0],
+        worst[1],
+        worst[2],
+        worst[3],
+        worst[4],
+        worst[5]
+    );
     worst
 }
 
@@ -119,7 +129,8 @@ fn as_mjcf(arm: &SerialArm) -> String {
         let [low, high] = j.limits.position;
         let limits = if low.is_finite() { format!("range=\"{low:e} {high:e}\"") } else { String::new() };
         let effort = j.limits.effort;
-        let drive = if effort.is_finite() { format!("actuatorfrcrange=\"{:e} {effort:e}\"", -effort) } else { String::new() };
+        let drive =
+            if effort.is_finite() { format!("actuatorfrcrange=\"{:e} {effort:e}\"", -effort) } else { String::new() };
         let own = if i == 0 {
             let p = arm.base();
             Pose { rotation: p.rotation * j.placement.rotation, translation: p.transform(j.placement.translation) }
@@ -234,18 +245,17 @@ fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str
     off
 }
 
-/// Both semi-implicit Euler with implicit damping. Without friction they are the same to rounding at any step; MuJoCo's friction is a soft constraint, so
-/// that the motions with friction agree as far as that is made hard.
+/// Both semi-implicit Euler with implicit damping and the same step. Without friction they are the same to rounding at 480 Hz. MuJoCo's friction is a soft
+/// constraint, which creeps under a load; it is made as hard as its step allows, at 4,800 Hz.
 #[test]
 fn a_driven_arm_moves_as_mujocos() {
     let (Some(model), Some(python)) = (menagerie(), python()) else { return };
     let arm = SerialArm::from_mjcf(&model, "attachment_site").unwrap();
     let damping: Vec<_> = arm.segments().iter().map(|s| s.joint.damping).collect();
-    let slippery = arm.clone().with_friction(&[0.0; 7], &damping).unwrap().with_limits(&[JointLimits::NONE; 7]).unwrap();
+    let slippery =
+        arm.clone().with_friction(&[0.0; 7], &damping).unwrap().with_limits(&[JointLimits::NONE; 7]).unwrap();
     let off = drift(&slippery, &python, &model, 1.0 / 480.0, "none");
     assert!(off < 1e-9, "{off}");
-    let soft = drift(&arm, &python, &model, 1.0 / 4800.0, "soft");
-    let _ = soft;
     let hard = drift(&arm, &python, &model, 1.0 / 4800.0, "hard");
     assert!(hard < 1e-4, "{hard}");
 }

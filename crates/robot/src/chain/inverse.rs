@@ -15,6 +15,8 @@ use trocar_geometry::Pose;
 const LEVER: f64 = 0.3;
 /// Damping that is always there [m2]: singular values below its root are not trusted.
 const FLOOR: f64 = 1e-6;
+/// The least share of the damping, after steps that went well.
+const CAUTION: f64 = 1e-2;
 /// No joint moves further in one iteration [rad or m].
 const STRIDE: f64 = 0.6;
 
@@ -85,7 +87,9 @@ impl SerialArm {
     pub fn inverse(&self, target: &Pose, start: &Joints, options: &InverseOptions) -> Result<Reached> {
         let unit = (target.rotation.length() - 1.0).abs() < 1e-3;
         if !(target.translation.is_finite() && unit && start.is_finite()) {
-            return Err(Error::NotFinite { what: "the target pose or the start, or the target's rotation is no rotation:" });
+            return Err(Error::NotFinite {
+                what: "the target pose or the start, or the target's rotation is no rotation:",
+            });
         }
         let preferred = options.preferred.unwrap_or(self.home());
         if start.len() != self.dof() || preferred.len() != self.dof() || !preferred.is_finite() {
@@ -94,16 +98,20 @@ impl SerialArm {
         }
         let target = Pose { rotation: target.rotation.normalize(), ..*target };
         let search = Search { arm: self, options, target, preferred, start: *start };
-        let mut best = search.run(start);
+        let mut best = search.run(start, true);
         let mut used = best.iterations;
         for k in 0..options.restarts {
             if best.reached {
                 break;
             }
-            let from = if k == 0 { preferred } else { search.scattered(k) };
-            let other = search.run(&from);
+            // The pose first, whatever the elbow: its wish would lead all starts to the same place.
+            let other = search.run(&if k == 0 { preferred } else { search.scattered(k) }, false);
             used += other.iterations;
-            if other.reached || other.cost() < best.cost() {
+            if other.reached {
+                let nicer = search.run(&other.q, true);
+                used += nicer.iterations;
+                best = if nicer.reached { nicer } else { other };
+            } else if other.cost() < best.cost() {
                 best = other;
             }
         }
@@ -156,27 +164,29 @@ impl Search<'_> {
         (self.target.translation - flange.translation, turn(self.target.rotation * flange.rotation.inverse()))
     }
 
-    fn run(&self, from: &Joints) -> Reached {
+    /// One descent; `elbow`: whether the preferred posture counts.
+    fn run(&self, from: &Joints, elbow: bool) -> Reached {
         let n = self.arm.dof();
-        let ranges: [[f64; 2]; super::MAX_JOINTS] = std::array::from_fn(|i| if i < n { self.range(i) } else { [0.0; 2] });
+        let ranges: [[f64; 2]; super::MAX_JOINTS] =
+            std::array::from_fn(|i| if i < n { self.range(i) } else { [0.0; 2] });
         let mut q = Joints::from_fn(n, |i| from[i].clamp(ranges[i][0], ranges[i][1]));
         let mut frames = self.arm.frames(&q);
         let mut missing = self.missing(&frames);
         let [close, straight] = self.options.tolerance;
         let near = |m: &(DVec3, DVec3)| m.0.length() <= close && m.1.length() <= straight;
         let square = |m: &(DVec3, DVec3)| m.0.length_squared() + (LEVER * m.1).length_squared();
-        // How much shorter than Newton's the steps are to be, after one that led away.
+        let mut wishes = elbow;
+        // How much shorter than usual the steps are to be, after one that led away; and for how many none came much nearer.
         let (mut caution, mut stride, mut stalled) = (1.0, STRIDE, 0);
         let mut iterations = 0;
         while iterations < self.options.iterations {
             iterations += 1;
-            let there = near(&missing);
-            let (mut step, elbow) = self.advance(&q, &frames, &missing, &ranges, caution);
-            if there && elbow <= self.options.posture_tolerance {
+            let (mut step, still) = self.advance(&q, &frames, &missing, &ranges, caution, wishes);
+            if near(&missing) && still <= self.options.posture_tolerance {
                 break;
             }
             let longest = step.max_abs();
-            if longest < 1e-13 {
+            if longest < 1e-12 {
                 break;
             }
             if longest > stride {
@@ -187,19 +197,23 @@ impl Search<'_> {
             let new_missing = self.missing(&new_frames);
             let (before, after) = (square(&missing), square(&new_missing));
             // A step of the elbow may cost a little, which the next one makes good.
-            if after > before + 1e-2 * longest.min(stride).powi(2) {
+            let costs = if wishes { 1e-2 * longest.min(stride).powi(2) } else { 0.0 };
+            if after > before + costs && !near(&new_missing) {
                 stride = (0.35 * longest.min(stride)).max(1e-6);
-                caution *= 4.0;
-                if caution > 1e8 {
+                caution *= 8.0;
+                if caution > 1e9 {
                     break;
                 }
                 continue;
             }
-            stalled = if after > 0.999 * before && !near(&new_missing) { stalled + 1 } else { 0 };
+            stalled = if after > 0.8 * before && !near(&new_missing) { stalled + 1 } else { 0 };
             (q, frames, missing) = (new, new_frames, new_missing);
             stride = (2.0 * stride).min(STRIDE);
-            caution = f64::max(0.5 * caution, 1.0);
-            if stalled > 8 {
+            caution = f64::max(0.25 * caution, CAUTION);
+            if stalled > 4 && wishes {
+                // Near a singularity the wish pulls the flange along; the pose comes first.
+                (wishes, stalled) = (false, 0);
+            } else if stalled > 12 {
                 break;
             }
         }
@@ -222,6 +236,7 @@ impl Search<'_> {
         missing: &(DVec3, DVec3),
         ranges: &[[f64; 2]],
         caution: f64,
+        wishes: bool,
     ) -> (Joints, f64) {
         let n = q.len();
         let jacobian = frames.flange_jacobian();
@@ -236,53 +251,63 @@ impl Search<'_> {
         let turn = LEVER * missing.1;
         let error = [missing.0.x, missing.0.y, missing.0.z, turn.x, turn.y, turn.z];
         let square = error.iter().map(|e| e * e).sum::<f64>();
-        let wish = Joints::from_fn(n, |i| self.wish(i, q[i]));
         let mut held = JointSet::default();
         let mut step = Joints::zeros(n);
-        let mut elbow = 0.0;
-        // Each pass holds at least one more joint at its bound.
+        // The flange first. Each pass holds at least one more joint at its bound.
         for _ in 0..=n {
             let mut left = error;
-            let mut free = Joints::from_fn(n, |_| 1.0);
             for i in held.iter() {
-                free[i] = 0.0;
                 for (l, r) in left.iter_mut().zip(&rows) {
                     *l -= r[i] * step[i];
                 }
             }
-            let mut gram = JointMatrix::zeros(TASK);
-            for a in 0..TASK {
-                for b in 0..=a {
-                    gram.set(a, b, (0..n).map(|i| rows[a][i] * rows[b][i] * free[i]).sum());
-                }
-            }
-            let task = solve(&rows, &gram, &free, left, caution * (FLOOR + 0.5 * square), 2);
-            let wanted = Joints::from_fn(n, |i| wish[i] * free[i]);
-            let moved: [f64; TASK] = std::array::from_fn(|a| rows[a].dot(&wanted));
-            let undo = solve(&rows, &gram, &free, moved, FLOOR, 3);
-            elbow = 0.0;
+            let task = solve(&rows, held, left, caution * (FLOOR + 0.5 * square), 2);
             let mut over = false;
-            for i in 0..n {
-                if held.contains(i) {
-                    continue;
-                }
-                let still = wanted[i] - undo[i];
-                step[i] = task[i] + still;
-                elbow = f64::max(elbow, still.abs());
-            }
-            for i in 0..n {
+            for i in (0..n).filter(|&i| !held.contains(i)) {
                 let [low, high] = ranges[i];
-                if !held.contains(i) && !(q[i] + step[i] >= low && q[i] + step[i] <= high) {
+                step[i] = task[i];
+                if !(q[i] + step[i] >= low && q[i] + step[i] <= high) {
                     step[i] = (q[i] + step[i]).clamp(low, high) - q[i];
                     held.insert(i);
                     over = true;
+                    // The others anew, without it.
+                    break;
                 }
             }
             if !over {
                 break;
             }
         }
-        (step, elbow)
+        if !wishes {
+            return (step, 0.0);
+        }
+        // Then what leaves it in place, as far as the room that is left allows: a wish must never push the flange away.
+        let mut elbow = Joints::zeros(n);
+        let room = |i: usize, way: f64| {
+            let end = if way > 0.0 { ranges[i][1] } else { ranges[i][0] };
+            (end - q[i] - step[i]) / way
+        };
+        for _ in 0..=n {
+            let wanted = Joints::from_fn(n, |i| if held.contains(i) { 0.0 } else { self.wish(i, q[i]) });
+            let moved: [f64; TASK] = std::array::from_fn(|a| rows[a].dot(&wanted));
+            let undo = solve(&rows, held, moved, FLOOR, 3);
+            elbow = Joints::from_fn(n, |i| wanted[i] - undo[i]);
+            let before = held;
+            for i in 0..n {
+                if elbow[i].abs() > 1e-12 && room(i, elbow[i]) < 1e-3 {
+                    held.insert(i);
+                }
+            }
+            if held == before {
+                break;
+            }
+        }
+        let share = (0..n).filter(|&i| elbow[i].abs() > 1e-12).fold(1.0, |s: f64, i| s.min(room(i, elbow[i])));
+        for i in 0..n {
+            elbow[i] *= share.max(0.0);
+            step[i] += elbow[i];
+        }
+        (step, elbow.max_abs())
     }
 
     /// Where joint `i` would go if it were free: half way to the preferred posture, and off a limit that is near.
@@ -294,28 +319,30 @@ impl Search<'_> {
     }
 }
 
-/// J^T (J J^T + damping)^-1 e over the free joints, made better `rounds - 1` times with what is still missing (iterated Tikhonov), so that
-/// damping costs accuracy only where the arm is singular.
-fn solve(
-    rows: &[Joints; TASK],
-    gram: &JointMatrix,
-    free: &Joints,
-    mut error: [f64; TASK],
-    damping: f64,
-    rounds: usize,
-) -> Joints {
-    let n = free.len();
-    let mut damped = *gram;
-    (0..TASK).for_each(|a| damped.add_diagonal(a, damping));
+/// J^T (J J^T + damping)^-1 e over the joints that are not held, made better `rounds - 1` times with what is still missing (iterated
+/// Tikhonov), so that damping costs accuracy only where the arm is singular.
+fn solve(rows: &[Joints; TASK], held: JointSet, mut error: [f64; TASK], damping: f64, rounds: usize) -> Joints {
+    let n = rows[0].len();
+    let mut free = *rows;
+    for r in &mut free {
+        held.iter().for_each(|i| r[i] = 0.0);
+    }
+    let mut gram = JointMatrix::zeros(TASK);
+    for a in 0..TASK {
+        for b in 0..=a {
+            gram.set(a, b, free[a].dot(&free[b]));
+        }
+        gram.add_diagonal(a, damping);
+    }
     let mut step = Joints::zeros(n);
-    let Some(factor) = damped.factor() else { return step };
+    let Some(factor) = gram.factor() else { return step };
     for _ in 0..rounds {
         let y = factor.solve(&Joints::from_fn(TASK, |a| error[a]));
-        let part = Joints::from_fn(n, |i| free[i] * (0..TASK).map(|a| rows[a][i] * y[a]).sum::<f64>());
+        let part = Joints::from_fn(n, |i| (0..TASK).map(|a| free[a][i] * y[a]).sum::<f64>());
         for i in 0..n {
             step[i] += part[i];
         }
-        for (e, r) in error.iter_mut().zip(rows) {
+        for (e, r) in error.iter_mut().zip(&free) {
             *e -= r.dot(&part);
         }
     }

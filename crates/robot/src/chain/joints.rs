@@ -50,7 +50,7 @@ impl Joints {
 
     /// The sum of the products.
     pub fn dot(&self, other: &Self) -> f64 {
-        self.values.iter().zip(&other.values).map(|(a, b)| a * b).sum()
+        self.iter().zip(other.iter()).map(|(a, b)| a * b).sum()
     }
 
     /// The largest magnitude; NaN where one is NaN.

@@ -65,7 +65,9 @@ impl MassProperties {
         // published tables are rounded, hence the tolerance.
         let half = 0.5 * (m.x_axis.x + m.y_axis.y + m.z_axis.z);
         if !semidefinite(DMat3::from_diagonal(DVec3::splat(half)) - m, 1e-3 * size) {
-            return fail("no body has this inertia: a principal moment is negative or exceeds the sum of the others".into());
+            return fail(
+                "no body has this inertia: a principal moment is negative or exceeds the sum of the others".into(),
+            );
         }
         if self.mass == 0.0 && size > 0.0 {
             return fail("inertia without mass".into());

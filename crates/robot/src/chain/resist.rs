@@ -17,10 +17,10 @@ use super::matrix::JointMatrix;
 
 /// Most rounds: far more than are ever needed, so that nothing hangs.
 const ROUNDS: usize = 60;
-/// Changes of velocity below this share of the greatest are rounding.
+/// Changes of velocity below this share of the greatest do not matter.
 const TOLERANCE: f64 = 1e-12;
-/// Speeds are compared with at least this [rad/s or m/s].
-const SLOW: f64 = 1e-6;
+/// Changes of impulse below this share of those that are summed are rounding.
+const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
 /// A resistance along one direction in joint space: an impulse `-(offset + slope u)` at the speed u = row . v, within bounds.
 #[derive(Clone, Copy, Debug)]
@@ -101,10 +101,14 @@ impl Problem<'_> {
         let curvature = Joints::from_fn(n, |i| {
             self.h.at(i, i) + self.rows.iter().map(|r| r.slope * r.row.at(i) * r.row.at(i)).sum::<f64>()
         });
+        let rounding = Joints::from_fn(n, |i| {
+            let springs: f64 = self.rows.iter().map(|r| (r.offset * r.row.at(i)).abs()).sum();
+            ROUNDING * (self.b[i].abs() + springs) / self.h.at(i, i)
+        });
         for _ in 0..ROUNDS {
             let g = self.gradient(v);
-            let tolerance = TOLERANCE * v.max_abs().max(SLOW);
-            let wrong = |i: usize| (self.proximal(i, v[i], g[i], self.h.at(i, i)) - v[i]).abs() > tolerance;
+            let slow = TOLERANCE * v.max_abs();
+            let wrong = |i: usize| (self.proximal(i, v[i], g[i], self.h.at(i, i)) - v[i]).abs() > slow.max(rounding[i]);
             if !(0..n).any(wrong) {
                 return true;
             }

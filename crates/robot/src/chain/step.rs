@@ -177,7 +177,6 @@ impl SerialArm {
         h: f64,
         report: &mut StepReport,
     ) -> Result<()> {
-        let n = self.dof();
         let dynamics = self.dynamics(&state.q, &state.qd);
         let mut b = dynamics.mass_matrix.times(&state.qd);
         let mut matrix = dynamics.mass_matrix;
@@ -224,8 +223,7 @@ impl SerialArm {
             }
         }
         let rows = &rows[..count];
-        let resisting =
-            Problem { h: &matrix, b: &b, friction: &friction, low: &low, high: &high, rows }.gradient(&v);
+        let resisting = Problem { h: &matrix, b: &b, friction: &friction, low: &low, high: &high, rows }.gradient(&v);
         for (k, r) in rows.iter().enumerate() {
             impulses[k] += r.impulse(&v);
             displacements[k] += h * r.row.dot(&v);
@@ -246,10 +244,11 @@ impl SerialArm {
             }
         }
         state.qd = v;
-        if !(state.q.is_finite() && state.qd.is_finite() && displacements.iter().all(|d| d.is_finite())) {
+        // A minimum that is none, of numbers too large, shows in the gradient.
+        let solved = state.q.is_finite() && state.qd.is_finite() && resisting.is_finite();
+        if !(solved && displacements.iter().all(|d| d.is_finite())) {
             return Err(Error::NotFinite { what: "the arm's state after the step" });
         }
-        debug_assert!(n == state.q.len());
         Ok(())
     }
 

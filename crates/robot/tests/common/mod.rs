@@ -2,6 +2,8 @@
 
 #![allow(dead_code, clippy::unwrap_used, reason = "helper functions of tests")]
 
+pub mod files;
+
 use glam::{DMat3, DVec3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::Rng;

@@ -5,7 +5,7 @@
     python mujoco_arm.py MODEL TIP FLANGE trajectory FILE STEP FRICTION EVERY
                                                            first line "q qd", then torques a step -> a line "q qd" each EVERY steps
 
-FRICTION is "soft" (MuJoCo's defaults), "hard" (its constraint as stiff as the step allows) or "none".
+FRICTION is "hard" (MuJoCo's constraint as stiff as the step allows) or "none".
 """
 
 import sys

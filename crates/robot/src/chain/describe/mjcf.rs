@@ -28,7 +28,9 @@ impl SerialArm {
         let document = source.parse(&text, "mujoco")?;
         let root = document.root_element();
         if let Some(include) = root.descendants().find(|n| n.has_tag_name("include")) {
-            return Err(source.fail(format!("{}: included files are not read; save the model as one file", place(include))));
+            return Err(
+                source.fail(format!("{}: included files are not read; save the model as one file", place(include)))
+            );
         }
         let compiler = Compiler::read(&source, root)?;
         Reader { source, root, compiler }.arm(tip)
@@ -96,7 +98,11 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
                 [] => {}
                 [joint] => {
                     let (joint, anchor) = self.joint(joint, &here, segments.len())?;
-                    segments.push(Segment { link: name(body, "link", segments.len()), joint, mass: MassProperties::NONE });
+                    segments.push(Segment {
+                        link: name(body, "link", segments.len()),
+                        joint,
+                        mass: MassProperties::NONE,
+                    });
                     here = Pose { translation: -anchor, ..Pose::IDENTITY };
                 }
                 _ => return Err(self.at(body, "has several joints, a link of an arm has one")),
@@ -212,7 +218,8 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         let inertia = if let Some([xx, yy, zz, xy, xz, yz]) = self.source.numbers::<6>(node, "fullinertia")? {
             DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz])
         } else {
-            let diagonal = self.source.vector(node, "diaginertia")?.ok_or_else(|| need("diaginertia or fullinertia"))?;
+            let diagonal =
+                self.source.vector(node, "diaginertia")?.ok_or_else(|| need("diaginertia or fullinertia"))?;
             let r = DMat3::from_quat(self.rotation(node)?);
             r * DMat3::from_diagonal(diagonal) * r.transpose()
         };
@@ -290,7 +297,11 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
                     }
                 }
                 None if class == "main" => {}
-                None => return Err(self.at(joint, &format!("is of the class '{}', which no <default> makes", shown(class)))),
+                None => {
+                    return Err(
+                        self.at(joint, &format!("is of the class '{}', which no <default> makes", shown(class)))
+                    );
+                }
             }
         }
         let top: Vec<_> = children(self.root, "default").collect();

@@ -105,7 +105,11 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
             let Some(&joint) = self.by_child.get(at) else {
                 match base {
                     Some(b) => {
-                        return Err(self.source.fail(format!("'{}' is not between '{}' and the root", shown(b), shown(tip))));
+                        return Err(self.source.fail(format!(
+                            "'{}' is not between '{}' and the root",
+                            shown(b),
+                            shown(tip)
+                        )));
                     }
                     None => break,
                 }
@@ -193,7 +197,10 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
             *value = need(node, name)?;
         }
         if mass <= 0.0 {
-            return Err(self.at(link, &format!("has a mass of {mass} kg, must be positive; leave <inertial> out if there is none")));
+            return Err(self.at(
+                link,
+                &format!("has a mass of {mass} kg, must be positive; leave <inertial> out if there is none"),
+            ));
         }
         let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
         let placed = MassProperties { mass, center: DVec3::ZERO, inertia }.placed(&self.origin(inertial)?);

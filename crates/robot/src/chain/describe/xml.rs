@@ -63,9 +63,8 @@ impl<'p> Source<'p> {
         let mut count = 0;
         for word in text.split_whitespace() {
             let value = word.parse::<f64>().ok().filter(|v| v.is_finite());
-            let value = value.ok_or_else(|| {
-                self.fail(format!("{place}: '{}' in {name} is not a finite number", shown(word)))
-            })?;
+            let value = value
+                .ok_or_else(|| self.fail(format!("{place}: '{}' in {name} is not a finite number", shown(word))))?;
             if let Some(slot) = values.get_mut(count) {
                 *slot = value;
             }
