@@ -194,7 +194,7 @@ fn the_built_in_fr3_is_mujocos() {
         let rest = |j: &trocar_robot::chain::Joint| [j.armature, j.damping, j.friction];
         assert_eq!(rest(&a.joint), rest(&b.joint));
     }
-    assert_eq!(arm.home(), theirs.home());
+    assert!(arm.home().iter().zip(theirs.home().iter()).all(|(a, b)| (a - b).abs() < 2e-4), "theirs is rounded");
 }
 
 /// Largest distance of joints over 2 s of the same torques [rad].

@@ -172,10 +172,11 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// The same arm with every link's mass and inertia times `factor`, the payload's too: what a controller that is mistaken believes.
+    /// The same arm with every link's mass and inertia times `links` and the payload's times `payload`: what a controller that is mistaken
+    /// believes. Rotors stay as they are.
     ///
     /// # Errors
-    /// A factor that is not positive or so small that nothing resists a joint.
+    /// A factor that is not positive (the payload's may be zero) or so small that nothing resists a joint.
     pub fn with_mass_scaled(mut self, links: f64, payload: f64) -> Result<Self> {
         if !(links > 0.0 && links.is_finite() && payload >= 0.0 && payload.is_finite()) {
             return Err(Error::invalid("mass factor", "must be positive and finite"));
@@ -327,11 +328,11 @@ fn check_joint(joint: &mut Joint) -> Result<()> {
     };
     joint.axis = axis;
     let JointLimits { position: [low, high], velocity, effort, acceleration } = joint.limits;
-    if !(low < high) || low == f64::INFINITY || high == f64::NEG_INFINITY {
+    if low.is_nan() || high.is_nan() || low >= high {
         return Err(Error::invalid(what, format!("position limits {low} to {high}, the first must be the lower")));
     }
     for (value, name) in [(velocity, "velocity"), (effort, "effort"), (acceleration, "acceleration")] {
-        if !(value > 0.0) {
+        if value.is_nan() || value <= 0.0 {
             return Err(Error::invalid(what, format!("a {name} limit of {value}, must be positive")));
         }
     }

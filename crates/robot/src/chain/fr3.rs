@@ -4,7 +4,7 @@ use super::arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
 use super::mass::MassProperties;
 use crate::Result;
 use glam::{DMat3, DQuat, DVec3};
-use std::f64::consts::FRAC_PI_2;
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use trocar_geometry::Pose;
 
 /// A joint's figures and its link's.
@@ -168,7 +168,7 @@ const ACCELERATION: f64 = 10.0;
 /// From the last joint to the flange, along its axis [m].
 const FLANGE: f64 = 0.107;
 /// The posture in which the arm is delivered: elbow up, hand down.
-const HOME: [f64; 7] = [0.0, 0.0, 0.0, -1.57079, 0.0, 1.57079, -0.7853];
+const HOME: [f64; 7] = [0.0, 0.0, 0.0, -FRAC_PI_2, 0.0, FRAC_PI_2, -FRAC_PI_4];
 
 impl SerialArm {
     /// A Franka Research 3 without hand, its base at the world's origin.

@@ -236,7 +236,8 @@ impl SerialArm {
             // Rounding must not carry it over the stop.
             state.q[i] = to.max(limits.position[0].min(from)).min(limits.position[1].max(from));
             let stopped = (v[i] == low[i] && v[i] > -limits.velocity) || (v[i] == high[i] && v[i] < limits.velocity);
-            if stopped && resisting[i] != 0.0 {
+            // At rest against a stop friction may be all that holds it.
+            if stopped && (v[i] != 0.0 || resisting[i].abs() > friction[i]) {
                 report.at_position_limit.insert(i);
             }
             if v[i].abs() == limits.velocity {

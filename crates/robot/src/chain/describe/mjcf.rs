@@ -65,10 +65,10 @@ impl Compiler {
                     ("inertiafromgeom", "auto" | "false") | ("coordinate", "local") => {}
                     ("angle" | "autolimits" | "inertiafromgeom" | "coordinate", _) => return odd(name, value),
                     ("balanceinertia", "true") => return odd(name, value),
-                    ("boundmass" | "boundinertia" | "settotalmass", _) => {
-                        if source.number(node, name)?.is_some_and(|v| v > 0.0) {
-                            return odd(name, value);
-                        }
+                    ("boundmass" | "boundinertia" | "settotalmass", _)
+                        if source.number(node, name)?.is_some_and(|v| v > 0.0) =>
+                    {
+                        return odd(name, value);
                     }
                     _ => {}
                 }
