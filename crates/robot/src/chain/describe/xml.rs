@@ -20,8 +20,10 @@ pub(super) struct Source<'p> {
 }
 
 impl<'p> Source<'p> {
+    /// The complaint as one line, whatever of the file is quoted in it.
     pub fn fail(&self, reason: impl Into<String>) -> Error {
-        Error::Description { path: self.path.to_owned(), reason: reason.into() }
+        let reason = reason.into().replace(char::is_control, " ");
+        Error::Description { path: self.path.to_owned(), reason }
     }
 
     /// The file's text.
