@@ -321,3 +321,61 @@ fn a_step_is_cheap() {
     );
     assert!(share < 0.03, "{share}");
 }
+
+/// Couplings of any stiffness in any number, at random: solved, within what their laws allow, and never won from (no drive, no gravity).
+#[test]
+fn random_couplings_are_solved_and_give_no_energy() {
+    let arm = loaded().with_gravity(DVec3::ZERO).unwrap();
+    let mut rng = Pcg64Mcg::new(31);
+    let mut unsolved = 0;
+    const STEPS: usize = 3000;
+    for _ in 0..STEPS {
+        let qd = noise(7, 1.0, &mut rng);
+        let mut state = ArmState { q: posture(&arm, &mut rng), qd };
+        let frames = arm.frames(&state.q);
+        let jacobian = frames.flange_jacobian();
+        let count = 1 + (between(&mut rng, 0.0, 6.0) as usize);
+        let mut couplings: Vec<Coupling> = (0..count)
+            .map(|k| {
+                let way = DVec3::from_array(std::array::from_fn(|_| between(&mut rng, -1.0, 1.0))).normalize();
+                let law = match (k, between(&mut rng, 0.0, 3.0) as usize) {
+                    (1.., 0) => CouplingLaw::Friction { of: 0, coefficient: 0.5 },
+                    (_, 1) => CouplingLaw::Bilateral,
+                    _ => CouplingLaw::Push,
+                };
+                let stiffness = 10f64.powf(between(&mut rng, 1.0, 9.0));
+                Coupling {
+                    damping: between(&mut rng, 0.0, 50.0),
+                    ..Coupling::new(jacobian.row(way), 0.0, stiffness, law)
+                }
+            })
+            .collect();
+        let law = couplings[0].law;
+        if matches!(law, CouplingLaw::Friction { .. }) {
+            continue;
+        }
+        let before = arm.energy(&state.q, &state.qd).0;
+        let still = Drive { torque: arm.zeros(), external: arm.zeros() };
+        // The mass matrix of the step is that of its beginning.
+        let matrix = arm.mass_matrix(&state.q);
+        let bias = arm.bias(&state.q, &state.qd);
+        let report = arm.step(&mut state, &Drive { external: bias, ..still }, &mut couplings, DT, 1).unwrap();
+        unsolved += usize::from(!report.converged);
+        let after = 0.5 * state.qd.dot(&matrix.times(&state.qd));
+        assert!(after <= before * (1.0 + 1e-9), "{after} {before}");
+        for c in &couplings {
+            match c.law {
+                CouplingLaw::Push => assert!(c.force >= 0.0),
+                CouplingLaw::Friction { .. } => {
+                    assert!(c.force.abs() <= 0.5 * couplings[0].force.abs() * (1.0 + 1e-3) + 1e-6 * before);
+                }
+                CouplingLaw::Bilateral => {
+                    let expected = -(c.stiffness * c.displacement + c.damping * c.row.dot(&state.qd));
+                    assert!((c.force - expected).abs() < 1e-6 * (1.0 + expected.abs()), "{} {expected}", c.force);
+                }
+            }
+        }
+    }
+    println!("{unsolved} of {STEPS} not solved to rounding");
+    assert!(unsolved < STEPS / 50, "{unsolved}");
+}

@@ -16,7 +16,7 @@ use super::joints::{JointSet, Joints, MAX_JOINTS};
 use super::matrix::JointMatrix;
 
 /// Most rounds: far more than are ever needed, so that nothing hangs.
-const ROUNDS: usize = 60;
+const ROUNDS: usize = 200;
 /// Changes of velocity below this share of the greatest do not matter.
 const TOLERANCE: f64 = 1e-12;
 /// Changes of impulse below this share of those that are summed are rounding.
@@ -108,7 +108,7 @@ impl Problem<'_> {
         for _ in 0..ROUNDS {
             let g = self.gradient(v);
             let slow = TOLERANCE * v.max_abs();
-            let wrong = |i: usize| (self.proximal(i, v[i], g[i], self.h.at(i, i)) - v[i]).abs() > slow.max(rounding[i]);
+            let wrong = |i: usize| (self.proximal(i, v[i], g[i], curvature[i]) - v[i]).abs() > slow.max(rounding[i]);
             if !(0..n).any(wrong) {
                 return true;
             }

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// The most couplings a step may have.
 pub const MAX_COUPLINGS: usize = 16;
 /// Rounds in which the limit of friction follows the force that presses.
-const FRICTION_ROUNDS: usize = 12;
+const FRICTION_ROUNDS: usize = 36;
 
 /// Where an arm's joints are and how fast they move. Plain data: a copy is an exact snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -97,7 +97,8 @@ pub struct StepReport {
     pub at_velocity_limit: JointSet,
     /// Joints that friction held still at the end of the step.
     pub stuck: JointSet,
-    /// Whether the velocities solved their equations to rounding in every sub-step.
+    /// Whether the velocities solved their equations to rounding in every sub-step. Where they did not, which takes touches of very
+    /// different stiffness, they are finite and within limits, and the step may be repeated with more sub-steps.
     pub converged: bool,
 }
 
@@ -207,8 +208,10 @@ impl SerialArm {
             let mut changed = false;
             for (k, c) in couplings.iter().enumerate() {
                 if let CouplingLaw::Friction { of, coefficient } = c.law {
-                    let limit = coefficient * rows[of].impulse(&v).abs();
-                    changed |= (limit - rows[k].bounds[1]).abs() > 1e-9 * limit;
+                    let (last, now) = (rows[k].bounds[1], coefficient * rows[of].impulse(&v).abs());
+                    changed |= (now - last).abs() > 1e-7 * now;
+                    // Half way where the two chase each other.
+                    let limit = if round < FRICTION_ROUNDS / 3 { now } else { 0.5 * (last + now) };
                     rows[k].bounds = [-limit, limit];
                 }
             }
@@ -221,6 +224,7 @@ impl SerialArm {
             if !rubs {
                 break;
             }
+            report.converged &= round + 1 < FRICTION_ROUNDS;
         }
         let rows = &rows[..count];
         let resisting = Problem { h: &matrix, b: &b, friction: &friction, low: &low, high: &high, rows }.gradient(&v);
