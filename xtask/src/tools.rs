@@ -1,4 +1,4 @@
-//! What some tests compare with and is not part of the project: ONNX Runtime's library, the TetGen program. Without them these
+//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, the TetGen program. Without them these
 //! tests are skipped, and say so.
 
 use std::path::Path;
@@ -7,12 +7,12 @@ use std::process::{Command, Stdio};
 /// A Python environment of the project's own, beside what cargo builds.
 const ENVIRONMENT: &str = "target/tools";
 /// Python packages and their versions.
-const PACKAGES: [&str; 1] = ["onnxruntime>=1.23"];
+const PACKAGES: [&str; 2] = ["onnxruntime>=1.23", "mujoco>=4.0"];
 
 /// Fetches what is missing. A machine without network or Python is no error.
 pub fn fetch() {
     let python = Path::new(ENVIRONMENT).join("bin/python");
-    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime"]));
+    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime, mujoco"]));
     if !import() {
         eprintln!("== tools: {} into {ENVIRONMENT}", PACKAGES.join(" "));
         let made = quiet(Command::new("python3").args(["-m", "venv", ENVIRONMENT]))

@@ -1,0 +1,69 @@
+//! Random numbers and states for the tests of arms.
+
+#![allow(dead_code, clippy::unwrap_used, reason = "helper functions of tests")]
+
+pub mod files;
+
+use glam::{DMat3, DVec3};
+use rand_pcg::Pcg64Mcg;
+use rand_pcg::rand_core::Rng;
+use trocar_geometry::Pose;
+use trocar_robot::chain::{Joint, JointKind, JointLimits, Joints, MassProperties, Segment, SerialArm};
+
+/// A number between.
+pub fn between(rng: &mut Pcg64Mcg, low: f64, high: f64) -> f64 {
+    low + (high - low) * (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+}
+
+/// A posture within the limits.
+pub fn posture(arm: &SerialArm, rng: &mut Pcg64Mcg) -> Joints {
+    Joints::from_fn(arm.dof(), |i| {
+        let [low, high] = arm.segments()[i].joint.limits.position;
+        between(rng, low.max(-3.0), high.min(3.0))
+    })
+}
+
+/// Numbers of either sign.
+pub fn noise(n: usize, size: f64, rng: &mut Pcg64Mcg) -> Joints {
+    Joints::from_fn(n, |_| between(rng, -size, size))
+}
+
+/// A rod of this mass [kg] and half length [m] along its x.
+pub fn rod(mass: f64, half: f64) -> MassProperties {
+    let across = mass * half * half / 3.0;
+    MassProperties {
+        mass,
+        center: DVec3::X * half,
+        inertia: DMat3::from_diagonal(DVec3::new(0.01 * across, across, across)),
+    }
+}
+
+/// Joints that turn and slide about skewed axes, without friction, limits or rotors.
+pub fn skewed(n: usize) -> SerialArm {
+    let segment = |i: usize| {
+        let slides = i % 3 == 2;
+        let turn = glam::DQuat::from_euler(glam::EulerRot::XYZ, 0.4 + 0.3 * i as f64, -0.2, 0.7 * i as f64);
+        Segment {
+            link: format!("link{i}"),
+            joint: Joint {
+                name: format!("joint{i}"),
+                kind: if slides { JointKind::Prismatic } else { JointKind::Revolute },
+                placement: Pose { rotation: turn, translation: DVec3::new(0.2, 0.05 * i as f64, 0.1) },
+                axis: DVec3::new(0.2, 1.0, 0.3 * i as f64),
+                limits: JointLimits::NONE,
+                armature: 0.0,
+                damping: 0.0,
+                friction: 0.0,
+            },
+            mass: rod(1.0 + 0.2 * i as f64, 0.15),
+        }
+    };
+    SerialArm::new("skewed", (0..n).map(segment).collect(), Pose::IDENTITY).unwrap()
+}
+
+/// The FR3 with nothing that takes energy: no friction, damping or limits.
+pub fn free_fr3() -> SerialArm {
+    let arm = SerialArm::franka_fr3().unwrap();
+    let nothing = vec![0.0; arm.dof()];
+    arm.with_friction(&nothing, &nothing).unwrap().with_limits(&[JointLimits::NONE; 7]).unwrap()
+}
