@@ -3,6 +3,9 @@
 //! Knows nothing of tissue, cameras or files of scenes. SI units and radians; all in double precision.
 
 pub mod chain;
+mod error;
 pub mod instrument;
 pub mod port;
 pub mod wrench;
+
+pub use error::{Error, Result};
