@@ -121,8 +121,7 @@ impl Port {
     /// does not fit, minus infinity from 90 degrees on.
     pub fn clearance(&self, radius: f64, tilt: f64) -> f64 {
         let cos = tilt.cos();
-        // `!(>)`: NaN is no clearance either.
-        if !(cos > 1e-9) {
+        if cos.is_nan() || cos <= 1e-9 {
             return f64::NEG_INFINITY;
         }
         0.5 * (self.hole_diameter - 2.0 * radius / cos - self.thickness * tilt.abs().tan())

@@ -14,8 +14,8 @@
 //! ((k cx)^(2/3) + cy^(2/3))^(3/2); the root below that b is the minimum. Inside the sheet the distance is a concave function along z, so both edges of
 //! a thick sheet are all that can touch.
 //!
-//! The two minima of an edge merge when the axis is far enough to one side. That is outside the hole's clearance up to tilts of acos(sqrt(r/R)) (24.1 degrees for 5 in 6 mm), and beyond
-//! that only where both press deeper than r - R cos(tilt)^2; there the force changes by a step.
+//! The two minima of an edge merge when the axis is far enough to one side. Up to tilts of acos(sqrt(r/R)) (24.1 degrees for 5 in 6 mm) neither
+//! touches by then; beyond, both may press, each deeper than r - R cos(tilt)^2, and there the force changes by a step.
 
 use super::kinematics::LEAST_COS;
 use super::{Port, Shaft};
@@ -56,8 +56,8 @@ impl Port {
         let mut found = [None; 4];
         let inverse = self.pose.inverse();
         let (base, u) = (inverse.transform(shaft.base), inverse.rotation * shaft.direction);
-        // `!(>=)`: a shaft that is not finite touches nothing.
-        if !(u.z.abs() >= LEAST_COS) || !base.is_finite() {
+        // A shaft that is not finite touches nothing.
+        if u.z.abs() < LEAST_COS || !u.is_finite() || !base.is_finite() {
             return found;
         }
         let half = 0.5 * self.thickness;

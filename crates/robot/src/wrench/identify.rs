@@ -11,8 +11,8 @@ pub const PARAMETERS: usize = 10;
 /// Fewest poses: with two, a turn about the line between their gravities leaves the centre of mass open.
 const FEWEST: usize = 3;
 
-/// Condition number from which the orientations are too alike: gravities within about two degrees.
-const WORST_CONDITION: f64 = 1e4;
+/// Condition number from which the orientations are too alike to tell weight from bias: all within about two degrees of one another.
+const WORST_CONDITION: f64 = 100.0;
 
 /// A reading at rest, touching nothing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +101,7 @@ pub fn identify(poses: &[StaticReading], noise: &SensorNoise, gravity: DVec3) ->
 fn solve(mut equations: DMatrix<f64>, readings: &DVector<f64>) -> Result<Identification> {
     let alike = |condition: f64| {
         let reason = format!(
-            "their orientations are too alike (condition number {condition:.1e}, at most {WORST_CONDITION:.0e}); tilt the instrument by 20 degrees or more to several sides"
+            "their orientations are too alike (condition number {condition:.1e}, at most {WORST_CONDITION}); tilt the instrument by 20 degrees or more to several sides"
         );
         Error::invalid("static poses", reason)
     };
@@ -120,8 +120,7 @@ fn solve(mut equations: DMatrix<f64>, readings: &DVector<f64>) -> Result<Identif
         ));
     };
     let condition = values.max() / values.min();
-    // `!(<)`: NaN is refused too.
-    if !(condition < WORST_CONDITION) {
+    if condition.is_nan() || condition >= WORST_CONDITION {
         return Err(alike(condition));
     }
     let projected = (u.transpose() * readings).component_div(&values);
