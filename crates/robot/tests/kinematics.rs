@@ -7,7 +7,7 @@ use common::Random;
 use glam::{DQuat, DVec3};
 use trocar_geometry::Pose;
 use trocar_robot::instrument::{Coordinates, Instrument, Limits};
-use trocar_robot::port::Port;
+use trocar_robot::port::{Port, Twist};
 
 fn port() -> Port {
     Port::new(DVec3::new(0.1, 0.46, 0.2), DVec3::new(0.1, 0.2, -1.0), DVec3::X).unwrap()
@@ -179,6 +179,32 @@ fn a_shaft_beside_the_centre_is_measured() {
         // The deviation is in the port's plane, not the least distance to the axis.
         assert!((m.deviation() - beside.length()).abs() < 1e-14);
     }
+}
+
+#[test]
+fn rates_are_those_of_the_measured_coordinates() {
+    let (port, limits) = (port(), limits());
+    let mut random_numbers = Random(6);
+    let mut instrument = Instrument::grasper();
+    instrument.mount.translation = DVec3::new(0.03, -0.02, 0.05);
+    for _ in 0..200 {
+        let c = Coordinates { roll: random_numbers.between(-2.0, 2.0), ..random(&mut random_numbers, &limits) };
+        let mut flange = port.flange(&instrument, &c);
+        flange.translation += 1e-3 * random_numbers.vector();
+        let motion = Twist { linear: random_numbers.vector(), angular: random_numbers.vector() };
+        let at = |t: f64| {
+            let rotation = (DQuat::from_scaled_axis(t * motion.angular) * flange.rotation).normalize();
+            let moved = Pose { rotation, translation: flange.translation + t * motion.linear };
+            port.measure(&instrument, &moved, 0.0).unwrap().coordinates.to_action()
+        };
+        let (h, rates) = (1e-5, port.rates(&instrument, &flange, &motion).unwrap());
+        let (a, b) = (at(-h), at(h));
+        for k in 0..4 {
+            assert!(((b[k] - a[k]) / (2.0 * h) - rates[k]).abs() < 1e-7 * (1.0 + rates[k].abs()), "{k} {rates:?}");
+        }
+    }
+    let flange = port.flange(&instrument, &Coordinates { insertion: 0.1, ..Coordinates::default() });
+    assert!(port.rates(&instrument, &flange, &Twist { linear: DVec3::NAN, ..Twist::default() }).is_err());
 }
 
 #[test]

@@ -15,7 +15,7 @@ pub(super) fn body(r: &PortBudgetResult) -> Result<String> {
     let lead = format!(
         "A {} mm shaft in a {} mm hole of a sheet {} mm thick. By the formula: (D \u{2212} d/cos \u{2212} t tan)/2 at each tilt, the paper\u{2019}s where t is 0. Measured: a shaft pushed sideways through \
          the contact model until the rim pushes back.",
-        r.hole_mm, r.shaft_mm, r.thickness_mm
+        r.shaft_mm, r.hole_mm, r.thickness_mm
     );
     let figures = [clearance(r)?, sections(r), around(r)?, loaded(r)?];
     Ok(page::section("Port budget", &lead, &(cards(r) + &page::grid(Columns::Two, &figures))) + &starts(r) + &rows(r))
@@ -43,12 +43,12 @@ fn start_color(k: usize) -> [u8; 3] {
 
 fn clearance(r: &PortBudgetResult) -> Result<String> {
     let (formula, measured) = (colors::organ(1), colors::organ(4));
-    let pale = |k: usize| colors::mix(formula, [150, 156, 162], 0.4 + 0.3 * k as f64);
+    let thick = |k: usize| colors::organ([2, 7][k % 2]);
     let mut lines: Vec<Line> = (0..SHEETS.len())
         .rev()
         .map(|k| {
             let points = r.rows.iter().map(|row| (row.tilt_deg, row.thicker_mm[k]));
-            Line { points: points.filter(|p| p.1 > -0.15).collect(), color: pale(k), filled: false }
+            Line { points: points.filter(|p| p.1 > -0.15).collect(), color: thick(k), filled: false }
         })
         .collect();
     let points = r.rows.iter().map(|row| (row.tilt_deg, row.clearance_mm)).collect();
@@ -78,7 +78,7 @@ fn clearance(r: &PortBudgetResult) -> Result<String> {
     let starts: Vec<String> = r.starts.iter().map(|s| format!("{} start, {}\u{b0}", s.arm, s.tilt_deg)).collect();
     let entries = [(sheet.as_str(), formula), ("measured (dashes)", measured)]
         .into_iter()
-        .chain(thicker.iter().enumerate().map(|(k, t)| (t.as_str(), pale(k))))
+        .chain(thicker.iter().enumerate().map(|(k, t)| (t.as_str(), thick(k))))
         .chain(starts.iter().enumerate().map(|(k, s)| (s.as_str(), start_color(k))));
     let caption = format!("<b>Lateral clearance</b> in the direction of the tilt.{}", page::legend(entries));
     Ok(page::figure(&plot.svg()?, &caption))
@@ -234,7 +234,12 @@ mod tests {
         let html = super::body(&measured_port_budget()).unwrap();
         assert_eq!(html.matches("<svg").count(), 4);
         assert_eq!(html.matches("card good").count(), 2, "both starts are the paper's");
-        assert!(html.contains("0.43") && html.contains("33.56\u{b0}") && !html.contains("NaN"));
+        assert!(
+            html.contains("A 5 mm shaft in a 6 mm hole")
+                && html.contains("0.43")
+                && html.contains("33.56\u{b0}")
+                && !html.contains("NaN")
+        );
         assert_eq!(html.matches("<ellipse").count(), 5);
     }
 }

@@ -101,6 +101,30 @@ impl Port {
         Ok(Measured { coordinates, tilt, offset: DVec2::new(crossing.x, crossing.y), tip })
     }
 
+    /// How fast the two pivots [rad/s], the insertion [m/s] and the roll [rad/s] that [`Port::measure`] gives change, for a flange at `flange` that moves by `motion` (at
+    /// its origin, in the cell).
+    ///
+    /// # Errors
+    /// As [`Port::measure`]; a motion that is not finite.
+    pub fn rates(&self, instrument: &Instrument, flange: &Pose, motion: &Twist) -> Result<[f64; 4]> {
+        self.measure(instrument, flange, 0.0)?;
+        let shaft = Shaft::of(instrument, flange);
+        let inverse = self.pose.inverse();
+        let (base, u) = (inverse.transform(shaft.base), inverse.rotation * shaft.direction);
+        let angular = inverse.rotation * motion.angular;
+        let linear = inverse.rotation * motion.at(flange.translation, shaft.base);
+        if !angular.is_finite() || !linear.is_finite() {
+            return Err(Error::invalid("flange", "its motion must be finite"));
+        }
+        let swing = angular.cross(u);
+        let square = u.y * u.y + u.z * u.z;
+        let first = (u.y * swing.z - u.z * swing.y) / square;
+        let second = swing.x / square.sqrt();
+        let insertion = (linear.z * u.z - base.z * swing.z) / (u.z * u.z);
+        // The second pivot's axis is across the shaft, the first's is the port's x.
+        Ok([first, second, insertion, angular.dot(u) - first * u.x])
+    }
+
     /// The nearest that an instrument within `limits` comes to `wanted`, a pose of its tip in the cell. Position goes first: two pivots and the insertion
     /// meet it, the roll comes as near to the orientation as it can, and what is left is told. The roll is the one nearest to `near.roll`, so the long way
     /// round is never taken; `near.pivots` say where to tilt where the position leaves it open, and `near.jaw` is taken over.
