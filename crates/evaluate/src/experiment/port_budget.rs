@@ -210,6 +210,11 @@ impl Pushing {
         let radius = 0.5 * experiment.shaft;
         let instrument = trocar_robot::instrument::Instrument::grasper();
         trocar_robot::instrument::Instrument { shaft_radius: radius, ..instrument }.check()?;
+        if experiment.shaft >= experiment.hole {
+            let (shaft, hole) = (1e3 * experiment.shaft, 1e3 * experiment.hole);
+            let reason = format!("{shaft} mm do not go through a hole of {hole} mm; it must be thinner");
+            return Err(trocar_robot::Error::Invalid { what: "shaft".into(), reason }.into());
+        }
         if !(experiment.push.is_finite() && experiment.push > 0.0) {
             let reason = format!("{} N must be above 0", experiment.push);
             return Err(trocar_robot::Error::Invalid { what: "push".into(), reason }.into());
@@ -310,11 +315,6 @@ pub(crate) mod tests {
         assert!(refused(PortBudgetExperiment { hole: f64::NAN, ..good }).contains("hole_diameter"));
         assert!(refused(PortBudgetExperiment { shaft: -1.0, ..good }).contains("shaft_radius"));
         assert!(refused(PortBudgetExperiment { push: 0.0, ..good }).contains("push"));
-        // Too thick a shaft is a result, not an error.
-        let thick = PortBudgetExperiment { shaft: 7e-3, ..good };
-        let r = thick.measure(&Pushing::new(&thick).unwrap(), &Silent).unwrap();
-        assert!(
-            r.limit_deg.is_none() && r.measured_limit_deg.is_none() && r.rows.iter().all(|r| r.measured_mm.is_none())
-        );
+        assert!(refused(PortBudgetExperiment { shaft: 7e-3, ..good }).contains("7 mm do not go through"));
     }
 }
