@@ -91,6 +91,9 @@ pub enum Error {
     /// A recording is unusable.
     #[error(transparent)]
     Recording(#[from] trocar_recording::Error),
+    /// A port, an instrument or a measurement of force is unusable.
+    #[error(transparent)]
+    Robot(#[from] trocar_robot::Error),
     /// Something cannot be found in a picture.
     #[error(transparent)]
     Segment(#[from] trocar_segment::Error),

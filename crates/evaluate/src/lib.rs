@@ -21,8 +21,10 @@ pub use error::{Error, Result};
 pub use experiment::{
     AppendixSource, ConvergenceCase, ConvergenceExperiment, ConvergenceResult, ElementQualityExperiment,
     ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial,
-    IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PhantomFigures, ReconstructionExperiment,
-    ReconstructionResult, ReconstructionRow, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
+    IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PhantomFigures, PortBudgetExperiment,
+    PortBudgetResult, PortBudgetRow, PortRoom, PortStart, ReconstructionExperiment, ReconstructionResult,
+    ReconstructionRow, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow, WrenchExperiment,
+    WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};

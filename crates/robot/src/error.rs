@@ -46,3 +46,11 @@ impl Error {
         Self::Invalid { what: what.into(), reason: reason.into() }
     }
 }
+
+/// `value` of `what`, if it is finite and within `low..=high`; `unit` is for the message.
+pub(crate) fn within(what: &str, value: f64, low: f64, high: f64, unit: &str) -> Result<f64> {
+    if value.is_finite() && (low..=high).contains(&value) {
+        return Ok(value);
+    }
+    Err(Error::invalid(what, format!("{value} {unit} is not between {low} and {high} {unit}")))
+}

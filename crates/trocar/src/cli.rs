@@ -2,10 +2,12 @@
 
 mod comparison;
 mod grasp;
+mod port;
 mod solver;
 
 pub use comparison::*;
 pub use grasp::*;
+pub use port::*;
 pub use solver::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -206,6 +208,10 @@ pub enum ExperimentName {
     GraspDesigns(GraspDesignsExperiment),
     /// Fig. 7(f): whether elements invert when the appendix is lifted 15 and 30 mm, at five moduli and with two pin rules.
     ElementQuality(ElementQualityExperiment),
+    /// Fig. 5: how far a shaft may lie beside its port's centre at each tilt, by the formula and by the contact model.
+    PortBudget(PortBudgetExperiment),
+    /// The instrument weighed in 54 noisy poses, many times over; and a touch of tens of millinewtons after the tare.
+    Wrench(WrenchExperiment),
 }
 
 /// Arguments of `experiment reconstruction`.

@@ -6,10 +6,13 @@ mod element_quality;
 mod grasp_designs;
 mod integrator_forms;
 mod integrators;
+mod normal;
 pub(crate) mod phantoms;
+mod port_budget;
 mod reconstruction;
 mod settling;
 mod step_ladder;
+mod wrench;
 
 pub use appendix::AppendixSource;
 pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult};
@@ -21,10 +24,18 @@ pub(crate) use grasp_designs::tests::made_up_result as made_up_grasp_designs;
 pub use grasp_designs::{GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial, PaperGrasp};
 pub(crate) use integrators::SPEED_LIMIT;
 pub use integrators::{IntegratorRow, IntegratorsExperiment, IntegratorsResult};
+pub(crate) use port_budget::SHEETS;
+#[cfg(test)]
+pub(crate) use port_budget::tests::measured as measured_port_budget;
+pub use port_budget::{PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart};
 pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
 pub(crate) use settling::SETTLED;
 pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
 pub use step_ladder::StepRow;
+#[cfg(test)]
+pub(crate) use wrench::tests::measured as measured_wrench;
+pub(crate) use wrench::{CHI_SQUARED_95, chi_squared_10};
+pub use wrench::{WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt};
 
 use crate::{Error, Result};
 use std::path::Path;

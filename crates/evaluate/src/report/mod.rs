@@ -14,6 +14,7 @@ mod moving_picture;
 mod overlays;
 mod page;
 mod plots;
+mod port_budget;
 mod reconstruction_experiment;
 mod run;
 mod scaling;
@@ -22,11 +23,12 @@ mod settling;
 mod table;
 mod truth;
 mod views;
+mod wrench;
 
 use crate::bench::{MeshingResult, ScalingResult};
 use crate::experiment::{
-    ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult, ReconstructionResult,
-    SettlingResult,
+    ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult, PortBudgetResult,
+    ReconstructionResult, SettlingResult, WrenchResult,
 };
 use crate::{Error, Result};
 use moving_picture::Lift;
@@ -133,6 +135,22 @@ pub(crate) fn element_quality(result: &ElementQualityResult) -> Result<String> {
 pub(crate) fn convergence(result: &ConvergenceResult) -> Result<String> {
     let subtitle = "Position and energy error of one substep, over iterations and over time";
     Ok(page::page("Convergence", subtitle, &convergence::body(result)?))
+}
+
+/// The page of the port budget.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn port_budget(result: &PortBudgetResult) -> Result<String> {
+    Ok(page::page("Port budget", "How far a shaft may lie beside its port's centre", &port_budget::body(result)?))
+}
+
+/// The page of the wrench experiment.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn wrench(result: &WrenchResult) -> Result<String> {
+    Ok(page::page("Force at the tool mount", "An instrument weighed, tared and touched", &wrench::body(result)?))
 }
 
 /// The page of a specimen made from a ready surface.

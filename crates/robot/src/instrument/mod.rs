@@ -1,1 +1,249 @@
 //! Laparoscopic instruments: shaft, jaw and what they weigh.
+//!
+//! ```text
+//!   flange        shaft base                                     shaft end   jaw pivot
+//!     |  motor head   |================= shaft =======================|---o<  blades
+//!     +---> z         +---> z (along the shaft)                           +---> x (along the closed blades)
+//! ```
+//!
+//! Three frames: the *flange* (the arm's tool mount), the *shaft frame* with its origin at the shaft's base and z along the shaft, and the *tip
+//! frame*, which is the gripper's of `trocar-cell`: origin at the jaw's pivot, x along the shaft, y across the closing plane, z along the hinge.
+
+pub(crate) mod coordinates;
+mod mass;
+
+pub use coordinates::{Coordinates, Excess, Limits};
+pub use mass::MassProperties;
+
+use crate::error::within;
+use crate::{Error, Result};
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
+use trocar_geometry::Pose;
+
+/// Standard gravity as all of Trocar uses it [m/s2].
+pub const GRAVITY: f64 = 9.81;
+
+/// What the paper's instruments weigh [N] (SPEC C8).
+pub const WEIGHT: f64 = 4.7;
+
+/// An instrument on a tool mount.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Instrument {
+    /// Its name.
+    pub name: String,
+    /// Radius of the shaft [m].
+    pub shaft_radius: f64,
+    /// Length of the shaft [m], from its base to its end.
+    pub shaft_length: f64,
+    /// Pose of the shaft frame in the flange's.
+    pub mount: Pose,
+    /// Distance from the shaft's end to the jaw's pivot [m], along the shaft.
+    pub pivot_offset: f64,
+    /// The jaw.
+    pub jaw: Jaw,
+    /// Mass, its centre and inertia, in the shaft frame.
+    pub mass: MassProperties,
+}
+
+/// A jaw of two blades.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Jaw {
+    /// Full angle between the blades wide open [rad].
+    pub max_angle: f64,
+    /// Length of the blades beyond the pivot [m].
+    pub blade_length: f64,
+    /// Greatest speed of the angle between the blades [rad/s].
+    pub speed: f64,
+}
+
+impl Jaw {
+    /// The angle between the blades [rad] at an opening 0 to 1; openings outside are clamped, NaN is closed.
+    pub fn angle(&self, opening: f64) -> f64 {
+        self.max_angle * share(opening)
+    }
+
+    /// The opening 0 to 1 after `seconds` on the way from `opening` to `target`, no faster than the jaw.
+    pub fn toward(&self, opening: f64, target: f64, seconds: f64) -> f64 {
+        let most = (self.speed * seconds / self.max_angle).max(0.0);
+        share(opening + (share(target) - opening).max(-most).min(most))
+    }
+}
+
+impl Instrument {
+    /// Names of the built-in instruments.
+    pub const NAMES: [&'static str; 2] = ["grasper", "cutter"];
+
+    /// A built-in instrument: 5 mm shaft of 330 mm, jaw of 60 degrees with blades of 21 mm, 4.7 N.
+    ///
+    /// # Errors
+    /// Another name.
+    pub fn named(name: &str) -> Result<Self> {
+        match name {
+            "grasper" => Ok(Self::grasper()),
+            "cutter" => Ok(Self::cutter()),
+            _ => Err(Error::invalid(format!("instrument '{name}'"), "is not built in; grasper and cutter are")),
+        }
+    }
+
+    /// The motorised grasper of the left arm. The jaw opens fully in 0.3 s.
+    pub fn grasper() -> Self {
+        let head = Head { radius: 0.028, length: 0.09, aside: 0.006 };
+        Self::motorised("grasper", &head, FRAC_PI_3 / 0.3)
+    }
+
+    /// The motorised cutter of the right arm: as the grasper, with the motor farther to the side and a faster jaw.
+    pub fn cutter() -> Self {
+        let head = Head { radius: 0.026, length: 0.09, aside: 0.009 };
+        Self::motorised("cutter", &head, FRAC_PI_3 / 0.2)
+    }
+
+    fn motorised(name: &str, head: &Head, jaw_speed: f64) -> Self {
+        const STEEL: f64 = 7850.0;
+        let (shaft_radius, bore, shaft_length) = (2.5e-3, 1.8e-3, 0.33);
+        let tube = PI * (shaft_radius * shaft_radius - bore * bore) * shaft_length * STEEL;
+        let shaft = MassProperties::tube(tube, shaft_radius, bore, shaft_length, DVec3::Z * (0.5 * shaft_length));
+        let centre = DVec3::new(head.aside, 0.0, -0.5 * head.length);
+        let motor = MassProperties::tube(WEIGHT / GRAVITY - tube, head.radius, 0.0, head.length, centre);
+        Self {
+            name: name.to_owned(),
+            shaft_radius,
+            shaft_length,
+            mount: Pose { rotation: DQuat::IDENTITY, translation: DVec3::Z * head.length },
+            pivot_offset: 8e-3,
+            jaw: Jaw { max_angle: FRAC_PI_3, blade_length: 0.021, speed: jaw_speed },
+            mass: shaft.with(&motor),
+        }
+    }
+
+    /// Distance from the shaft's base to the jaw's pivot [m].
+    pub fn reach(&self) -> f64 {
+        self.shaft_length + self.pivot_offset
+    }
+
+    /// Pose of the tip frame in the flange's.
+    pub fn tip_in_flange(&self) -> Pose {
+        let in_shaft = Pose { rotation: shaft_to_tip(), translation: DVec3::Z * self.reach() };
+        compose(&self.mount, &in_shaft)
+    }
+
+    /// Pose of the tip in the cell for a flange's pose there.
+    pub fn tip(&self, flange: &Pose) -> Pose {
+        compose(flange, &self.tip_in_flange())
+    }
+
+    /// Pose of the flange in the cell for a tip's pose there.
+    pub fn flange(&self, tip: &Pose) -> Pose {
+        compose(tip, &self.tip_in_flange().inverse())
+    }
+
+    /// Mass, centre and inertia in the flange's frame.
+    pub fn mass_in_flange(&self) -> MassProperties {
+        self.mass.moved(&self.mount)
+    }
+
+    /// Weight [N].
+    pub fn weight(&self) -> f64 {
+        self.mass.mass * GRAVITY
+    }
+
+    /// Says whether the description can be used.
+    ///
+    /// # Errors
+    /// A length, angle or mass that is no instrument's, a number that is not finite, an inertia that no body has.
+    pub fn check(&self) -> Result<()> {
+        let what = |field: &str| format!("instrument '{}', {field}", self.name);
+        within(&what("shaft_radius"), self.shaft_radius, 5e-4, 0.02, "m")?;
+        within(&what("shaft_length"), self.shaft_length, 0.02, 2.0, "m")?;
+        within(&what("pivot_offset"), self.pivot_offset, 0.0, 0.2, "m")?;
+        within(&what("jaw.max_angle"), self.jaw.max_angle, 1e-3, PI, "rad")?;
+        within(&what("jaw.blade_length"), self.jaw.blade_length, 1e-3, 0.2, "m")?;
+        within(&what("jaw.speed"), self.jaw.speed, 1e-3, 1e3, "rad/s")?;
+        if !self.mount.translation.is_finite() || self.mount.translation.length() > 1.0 {
+            return Err(Error::invalid(what("mount"), "its translation must be finite and under 1 m"));
+        }
+        if !self.mount.rotation.is_normalized() {
+            return Err(Error::invalid(what("mount"), "its rotation must be a quaternion of length 1"));
+        }
+        self.mass.check(&what("mass"))
+    }
+}
+
+/// `value` within 0 and 1, NaN as 0.
+pub(crate) fn share(value: f64) -> f64 {
+    if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
+}
+
+/// The motor's housing, a cylinder behind the shaft.
+struct Head {
+    radius: f64,
+    length: f64,
+    /// How far its mass lies beside the shaft's axis [m].
+    aside: f64,
+}
+
+/// Turns the tip's x to the shaft's z and keeps y.
+pub(crate) fn shaft_to_tip() -> DQuat {
+    DQuat::from_rotation_y(-FRAC_PI_2)
+}
+
+/// `outer` after `inner`.
+pub(crate) fn compose(outer: &Pose, inner: &Pose) -> Pose {
+    Pose { rotation: (outer.rotation * inner.rotation).normalize(), translation: outer.transform(inner.translation) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn built_ins_weigh_what_the_paper_says() {
+        for name in Instrument::NAMES {
+            let i = Instrument::named(name).unwrap();
+            i.check().unwrap();
+            assert!((i.weight() - 4.7).abs() < 1e-12);
+            assert!((i.jaw.angle(1.0).to_degrees() - 60.0).abs() < 1e-12);
+            assert!(i.mass.centre.z < 0.0, "the motor outweighs the shaft");
+        }
+        assert!(Instrument::named("stapler").unwrap_err().to_string().contains("grasper and cutter"));
+    }
+
+    #[test]
+    fn the_tip_is_the_grippers_frame() {
+        let i = Instrument::grasper();
+        let tip = i.tip(&Pose::IDENTITY);
+        assert!((tip.rotation * DVec3::X - DVec3::Z).length() < 1e-15, "x runs along the shaft");
+        assert!((tip.rotation * DVec3::Y - DVec3::Y).length() < 1e-15);
+        assert!((tip.translation - DVec3::Z * (0.09 + 0.33 + 0.008)).length() < 1e-15);
+        let back = i.flange(&tip);
+        assert!(back.translation.length() < 1e-15 && back.rotation.angle_between(DQuat::IDENTITY) < 1e-7);
+    }
+
+    #[test]
+    fn the_jaw_keeps_its_speed_and_its_ends() {
+        let jaw = Instrument::grasper().jaw;
+        assert!((jaw.toward(0.0, 1.0, 0.03) - 0.1).abs() < 1e-12);
+        assert_eq!(jaw.toward(0.95, 7.0, 1.0), 1.0);
+        assert_eq!(jaw.toward(0.02, -1.0, 1.0), 0.0);
+        assert!(!jaw.toward(0.5, f64::NAN, 0.1).is_nan());
+    }
+
+    #[test]
+    fn unusable_descriptions_are_refused_by_name() {
+        let refused = |change: &dyn Fn(&mut Instrument), field: &str| {
+            let mut i = Instrument::cutter();
+            change(&mut i);
+            let e = i.check().unwrap_err().to_string();
+            assert!(e.contains("cutter") && e.contains(field), "{e}");
+        };
+        refused(&|i| i.shaft_radius = f64::NAN, "shaft_radius");
+        refused(&|i| i.shaft_length = 0.0, "shaft_length");
+        refused(&|i| i.jaw.max_angle = 4.0, "jaw.max_angle");
+        refused(&|i| i.mass.mass = -1.0, "mass");
+        refused(&|i| i.mass.inertia.x_axis.x = -1.0, "inertia");
+        refused(&|i| i.mass.inertia.z_axis.z = 1.0, "inertia");
+        refused(&|i| i.mount.rotation = DQuat::from_xyzw(0.0, 0.0, 0.0, 2.0), "mount");
+        refused(&|i| i.mount.translation.x = f64::INFINITY, "mount");
+    }
+}

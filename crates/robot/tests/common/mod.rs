@@ -3,6 +3,10 @@
 #![allow(dead_code, clippy::unwrap_used, reason = "helper functions of tests")]
 
 pub mod files;
+pub mod random;
+
+#[allow(unused_imports, reason = "each test file uses its own part")]
+pub use random::Random;
 
 use glam::{DMat3, DVec3};
 use rand_pcg::Pcg64Mcg;

@@ -4,7 +4,9 @@ mod convergence;
 mod element_quality;
 mod grasp_designs;
 mod integrators;
+mod port_budget;
 mod settling;
+mod wrench;
 
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
@@ -19,6 +21,8 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
         ExperimentName::Integrators(arguments) => integrators::run(arguments, json, progress),
         ExperimentName::GraspDesigns(arguments) => grasp_designs::run(arguments, json, progress),
         ExperimentName::ElementQuality(arguments) => element_quality::run(arguments, json, progress),
+        ExperimentName::PortBudget(arguments) => port_budget::run(arguments, json, progress),
+        ExperimentName::Wrench(arguments) => wrench::run(arguments, json, progress),
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }

@@ -1,0 +1,33 @@
+//! Random numbers that are the same on every machine.
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+/// SplitMix64 (Steele, Lea, Flood 2014).
+pub struct Random(pub u64);
+
+impl Random {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform between `low` and `high`.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * ((self.next() >> 11) as f64 / (1_u64 << 53) as f64)
+    }
+
+    /// Normal with standard deviation 1 (Box and Muller).
+    pub fn normal(&mut self) -> f64 {
+        let radius = (-2.0 * self.between(f64::MIN_POSITIVE, 1.0).ln()).sqrt();
+        radius * self.between(0.0, std::f64::consts::TAU).cos()
+    }
+
+    pub fn vector(&mut self) -> glam::DVec3 {
+        glam::DVec3::new(self.normal(), self.normal(), self.normal())
+    }
+
+    pub fn rotation(&mut self) -> glam::DQuat {
+        glam::DQuat::from_xyzw(self.normal(), self.normal(), self.normal(), self.normal()).normalize()
+    }
+}
