@@ -72,7 +72,8 @@ fn test() -> ExitCode {
 /// Runs the tests named `damage_never_panics` of all crates; each takes its share of the cases.
 fn fuzz(cases: usize) -> ExitCode {
     /// Crates with such a test.
-    const CRATES: [&str; 4] = ["trocar-geometry", "trocar-messages", "trocar-recording", "trocar-specimen"];
+    const CRATES: [&str; 5] =
+        ["trocar-geometry", "trocar-messages", "trocar-recording", "trocar-scene", "trocar-specimen"];
     let share = cases.div_ceil(CRATES.len()).to_string();
     for name in CRATES {
         eprintln!("\n== {name}: {share} cases");

@@ -1,6 +1,6 @@
 //! The specimen, what is said of its organs, and their tissue.
 
-use super::{Checked, join, name, number, numbers, one_of, point, problem, quaternion};
+use super::{Checked, Problem, join, name, number, numbers, one_of, point, problem, quaternion};
 use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source};
 use trocar_specimen::{End, Material};
 
@@ -66,11 +66,17 @@ fn material(at: &str, said: &MaterialOverride) -> Checked {
         }
     }
     // The specimen's own ranges, should they become narrower than these.
-    said.applied_to(Material::default()).validate().map_err(|reason| problem(at, format!(".{reason}")))
+    said.applied_to(Material::default()).validate().map_err(|reason| field_of(at, &reason))
+}
+
+/// The specimen's own checks say "field is value; what would be right".
+fn field_of(at: &str, reason: &str) -> Problem {
+    let (key, rest) = reason.split_once(' ').unwrap_or((reason, ""));
+    problem(join(at, key), format!(" {rest}"))
 }
 
 fn pins(at: &str, rule: &PinRule) -> Checked {
-    rule.pins(End::Base).validate().map_err(|reason| problem(at, format!(".{reason}")))?;
+    rule.pins(End::Base).validate().map_err(|reason| field_of(at, &reason))?;
     match *rule {
         PinRule::End { length, band_length, .. } if length + band_length > 1.0 => {
             let reason = format!(" has a length and a band_length of {} together; at most 1", length + band_length);
