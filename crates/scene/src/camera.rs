@@ -145,8 +145,8 @@ impl CellCamera {
             oblique_deg: 0.0,
             depth: false,
         };
-        let endoscope = View::LookAt { eye_m: [0.0, 0.385, 0.1], target_m: [0.0, 0.46, 0.035], up: [0.0, 0.0, 1.0] };
-        let above = View::LookAt { eye_m: [0.0, 0.46, 0.45], target_m: [0.0, 0.46, 0.13], up: [0.0, 1.0, 0.0] };
+        let endoscope = View::LookAt { eye_m: [0.0, 0.42, 0.115], target_m: [0.0, 0.456, 0.035], up: [0.0, 0.0, 1.0] };
+        let above = View::LookAt { eye_m: [0.0, 0.46, 0.45], target_m: [0.0, 0.46, 0.16], up: [0.0, 1.0, 0.0] };
         let d405 = Lens::FieldOfView { width_deg: 87.0, height_deg: 56.489 };
         vec![
             Self {

@@ -83,9 +83,10 @@ impl Rates {
     }
 }
 
-/// The recording camera looks straight down on the middle below the ports, its image's top away from the arms. A phantom's bed, 150 mm below it, is then at z = 0.02.
+/// The recording camera looks straight down, its image's top away from the arms, such that the middle of phantom A's appendix lies below the ports' midpoint. The phantom's bed, 150 mm
+/// below the camera, is at z = 0.02.
 fn placement() -> Frame {
-    Frame { position_m: [0.0, 0.46, 0.17], rotation_wxyz: [0.0, 1.0, 0.0, 0.0] }
+    Frame { position_m: [-0.012, 0.48, 0.17], rotation_wxyz: [0.0, 1.0, 0.0, 0.0] }
 }
 
 fn arms() -> Vec<Arm> {
@@ -94,7 +95,7 @@ fn arms() -> Vec<Arm> {
 }
 
 fn ports() -> Vec<Port> {
-    vec![Port::paper(Side::Left, [-0.05, 0.46, 0.13]), Port::paper(Side::Right, [0.05, 0.46, 0.13])]
+    vec![Port::paper(Side::Left, [-0.045, 0.46, 0.16]), Port::paper(Side::Right, [0.045, 0.46, 0.16])]
 }
 
 fn instruments() -> Vec<Instrument> {

@@ -23,7 +23,7 @@ pub struct Start {
 
 impl Default for Start {
     fn default() -> Self {
-        Self { tilt_deg: 13.3, azimuth_deg: 0.0, insertion_mm: 70.0, roll_deg: 0.0, jaw: 0.5 }
+        Self { tilt_deg: 13.3, azimuth_deg: 0.0, insertion_mm: 100.0, roll_deg: 0.0, jaw: 0.5 }
     }
 }
 

@@ -82,7 +82,7 @@ fn units() {
             "port[0].hole_diameter_mm is 0.006; 1 to 50 mm; 0.006 m is 6 mm",
         ),
         Case(
-            "centre_m = [-0.05, 0.46, 0.13]",
+            "centre_m = [-0.045, 0.46, 0.16]",
             "centre_m = [-50, 460, 130]§",
             "port[0].centre_m[0] is -50; -5 to 5 m; -50 mm is -0.05 m",
         ),
@@ -122,7 +122,7 @@ fn units() {
             "organ.cecum.material.density_kg_m3 is 1.2; 100 to 30000 kg/m3; 1.2 g/cm3 is 1200 kg/m3",
         ),
         Case(
-            "insertion_mm = 70.0 ",
+            "insertion_mm = 100.0",
             "insertion_mm = 0.07§ ",
             "arm[0].start.insertion_mm is 0.07; 21 to 321 mm; 0.07 m is 70 mm",
         ),
@@ -139,10 +139,14 @@ fn units() {
 fn numbers() {
     check(&[
         Case("episode_s = 40.0", "episode_s = nan§", "task.episode_s is NaN; 0.1 to 3600 s"),
-        Case("centre_m = [0.05, 0.46, 0.13]", "centre_m = [0.05, inf, 0.13]§", "port[1].centre_m[1] is inf; -5 to 5 m"),
         Case(
-            "position_m = [0.0, 0.46, 0.17]",
-            "position_m = [0.0, 0.46, nan]§",
+            "centre_m = [0.045, 0.46, 0.16]",
+            "centre_m = [0.045, inf, 0.16]§",
+            "port[1].centre_m[1] is inf; -5 to 5 m",
+        ),
+        Case(
+            "position_m = [-0.012, 0.48, 0.17]",
+            "position_m = [-0.012, 0.48, nan]§",
             "placement.position_m[2] is NaN; -5 to 5 m",
         ),
         Case("lift_mm = 8.0", "lift_mm = -8.0§", "task.gates.lift_mm is -8; 0.1 to 100 mm"),
@@ -188,8 +192,8 @@ fn numbers() {
             "camera[0].lens.distortion has 2 coefficients; k1 k2 p1 p2 [k3 [k4 k5 k6]]: 4, 5 or 8",
         ),
         Case(
-            "target_m = [0.0, 0.46, 0.035]",
-            "target_m = [0.0, 0.385, 0.1]§",
+            "target_m = [0.0, 0.456, 0.035]",
+            "target_m = [0.0, 0.42, 0.115]§",
             "camera[0].view.target_m is where eye_m is; another point",
         ),
         Case(
@@ -332,9 +336,9 @@ fn parts_fit() {
             "arm[1].start.tilt_deg is 33; 0, or 1 to 33.5 degrees, where the shaft fills the hole, less the variation of 1",
         ),
         Case(
-            "centre_m = [-0.05, 0.46, 0.13]",
-            "centre_m = [-0.05, 0.96, 0.13]",
-            "@port = \"left\"@arm[0].port is 'left', which is out of reach: the flange would start 1.02 m from the shoulder; at most 0.855 m",
+            "centre_m = [-0.045, 0.46, 0.16]",
+            "centre_m = [-0.045, 0.96, 0.16]",
+            "@port = \"left\"@arm[0].port is 'left', which is out of reach: the flange would start 1.024 m from the shoulder; at most 0.855 m",
         ),
         Case(
             "position_m = [0.45, 0.0, 0.0]",
@@ -342,8 +346,8 @@ fn parts_fit() {
             "arm[1].base.position_m is 0.15 m from that of arm[0]; bases are 0.2 m or more apart",
         ),
         Case(
-            "centre_m = [0.05, 0.46, 0.13]",
-            "centre_m = [-0.048, 0.46, 0.13]§",
+            "centre_m = [0.045, 0.46, 0.16]",
+            "centre_m = [-0.043, 0.46, 0.16]§",
             "port[1].centre_m is 2 mm from that of port[0]; holes do not overlap",
         ),
         Case("port = \"right\"", "port = \"left\"§", "arm[1].port is 'left', which arm[0] has; each its own"),

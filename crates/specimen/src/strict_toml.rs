@@ -62,8 +62,14 @@ pub fn line_of(text: &str, path: &str) -> Option<usize> {
     line
 }
 
+/// What a parser said on one line, which is short: it may repeat a value, and that may be the whole file.
 fn one_line(message: &str) -> String {
-    message.split_whitespace().collect::<Vec<_>>().join(" ")
+    const LONGEST: usize = 1000;
+    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{} ...", &line[..end]),
+        None => line,
+    }
 }
 
 /// "; did you mean ..." for serde's "unknown field `a`, expected one of `b`, `c`".
@@ -149,5 +155,7 @@ mod tests {
         assert!(reason("rate_hz = 30\n[inner]\nwidth = 1").contains("height"));
         let r = reason("rate_hz = = 3");
         assert!(r.contains("line 1") && !r.contains('\n'), "{r}");
+        let r = reason(&format!("rate_hz = '{}'", "long ".repeat(1000)));
+        assert!(r.starts_with("line 1: rate_hz: invalid type") && r.ends_with(" ...") && r.len() < 1100, "{r}");
     }
 }
