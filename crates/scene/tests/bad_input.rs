@@ -368,6 +368,18 @@ fn parts_fit() {
 }
 
 #[test]
+fn long_lists() {
+    let camera =
+        |i| format!("[[camera]]\nname = 'c{i}'\nview = {{ kind = 'recording' }}\nlens = {{ kind = 'recording' }}\n");
+    let scene = |n: usize| {
+        let cameras: String = (0..n).map(camera).collect();
+        format!("name = 'many'\n[specimen]\nphantom = 'phantom-a'\n{cameras}")
+    };
+    Scene::parse(&scene(16), "scene.toml", "".as_ref()).unwrap();
+    assert_eq!(said(&scene(17), "".as_ref()), "scene.toml: line 4: camera has more than 16 entries; 16 or fewer");
+}
+
+#[test]
 fn files() {
     let root = tempfile::tempdir().unwrap();
     let path = root.path().join("scene.toml");

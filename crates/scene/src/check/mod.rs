@@ -99,10 +99,16 @@ fn name(field: &str, value: &str) -> Checked {
     Err(problem(field, format!(" is '{shown}'; lower-case letters, digits, '-' and '_', 1 to 64 of them")))
 }
 
-/// The names of a list are names, and each is used once.
+/// Most entries of a list: more cameras, ports or instruments than a cell has room for.
+const MOST_ENTRIES: usize = 16;
+
+/// The names of a list are names, each is used once, and there are not too many.
 fn names<'a>(list: &str, all: impl Iterator<Item = &'a str>) -> Checked {
     let mut seen: Vec<&str> = Vec::new();
     for (i, value) in all.enumerate() {
+        if i == MOST_ENTRIES {
+            return Err(problem(list, format!(" has more than {MOST_ENTRIES} entries; {MOST_ENTRIES} or fewer")));
+        }
         let field = format!("{list}[{i}].name");
         name(&field, value)?;
         if let Some(first) = seen.iter().position(|s| *s == value) {
