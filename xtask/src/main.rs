@@ -73,7 +73,7 @@ fn test() -> ExitCode {
 fn fuzz(cases: usize) -> ExitCode {
     /// Crates with such a test.
     const CRATES: [&str; 5] =
-        ["trocar-geometry", "trocar-messages", "trocar-recording", "trocar-robot", "trocar-specimen"];
+        ["trocar-geometry", "trocar-messages", "trocar-recording", "trocar-robot", "trocar-scene", "trocar-specimen"];
     let share = cases.div_ceil(CRATES.len()).to_string();
     for name in CRATES {
         eprintln!("\n== {name}: {share} cases");

@@ -97,6 +97,9 @@ pub enum Error {
     /// Something cannot be found in a picture.
     #[error(transparent)]
     Segment(#[from] trocar_segment::Error),
+    /// A scene cannot be read or written.
+    #[error(transparent)]
+    Scene(#[from] trocar_scene::Error),
     /// A specimen cannot be read or written.
     #[error(transparent)]
     Specimen(#[from] trocar_specimen::Error),

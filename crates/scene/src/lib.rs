@@ -1,1 +1,33 @@
 //! Scene files: the whole cell in one TOML file, checked before anything is built from it.
+//!
+//! A [`Scene`] says which specimen lies where, how its tissue is stepped, which arms hold which instruments through which ports, what the cameras see, and what the task asks for.
+//! [`Scene::read`] takes a file or the name of a built-in scene, refuses unknown keys and values that cannot be meant, and says in one line where and why.
+//!
+//! One rule for units: a key ends in its unit. Where things are in the cell is in metres (`_m`); how large things are and how far they may go is in millimetres (`_mm`);
+//! angles are in degrees (`_deg`), pressures in pascals (`_pa`), forces in newtons (`_n`). Shares, organ coordinates and jaw openings run from 0 to 1 and have no unit.
+
+mod anatomy;
+mod builtin;
+mod camera;
+mod cell;
+mod check;
+mod error;
+mod phantoms;
+mod read;
+mod scene;
+mod schema;
+mod start;
+mod task;
+
+pub use anatomy::{
+    FIELD, MaterialOverride, OrganOverride, PinEnd, PinRule, ScheduleName, Source, SpecimenSource, Support,
+    SupportKind, Tissue,
+};
+pub use builtin::{BUILTINS, Builtin};
+pub use camera::{CellCamera, Lens, View};
+pub use cell::{Arm, ArmModel, Controller, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Port, Side};
+pub use error::{Error, Result};
+pub use phantoms::{PHANTOMS, Phantom};
+pub use scene::{Rates, Scene};
+pub use start::Start;
+pub use task::{Gates, GraspDesignName, Safety, Task, TaskName, Variation};

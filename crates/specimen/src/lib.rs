@@ -19,4 +19,4 @@ pub use error::{Error, Result};
 pub use organ::{End, Material, MaterialModel, Organ, OrganFacts, Pins, check_name};
 pub use specimen::{Provenance, Specimen};
 pub use staged::StagedFolder;
-pub use strict_toml::{nearest, read_toml};
+pub use strict_toml::{line_of, nearest, parse_toml, read_toml};

@@ -87,18 +87,21 @@ impl Specimen {
         std::fs::write(&path, text).map_err(|source| Error::Io { path, source })
     }
 
+    /// The names of a specimen folder's organs, without their meshes.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), for the meshes aside.
+    pub fn organ_names(dir: &Path) -> Result<Vec<String>> {
+        Ok(read_document(dir)?.organs.into_iter().map(|organ| organ.name).collect())
+    }
+
     /// Reads and checks a specimen folder. Unknown keys are errors that name the nearest right key; meshes are checked.
     ///
     /// # Errors
     /// Names the file and field that is missing or wrong.
     pub fn read(dir: &Path) -> Result<Self> {
-        let path = dir.join(MARKER);
         let invalid = |path: &Path, reason: String| Error::Invalid { path: path.to_owned(), reason };
-        if !path.is_file() {
-            return Err(invalid(&path, "no such file; a specimen is a folder with a specimen.toml".into()));
-        }
-        let mut document: Document = read_toml(&path)?;
-        document.validate().map_err(|r| invalid(&path, r))?;
+        let document = read_document(dir)?;
         let mut organs = Vec::with_capacity(document.organs.len());
         for entry in &document.organs {
             let body_file = dir.join(format!("{}.msh", entry.name));
@@ -115,6 +118,20 @@ impl Specimen {
             specimen.background = Some(ColorImage::read(&background)?);
         }
         Ok(specimen)
+    }
+}
+
+/// `specimen.toml` in `dir`, checked.
+fn read_document(dir: &Path) -> Result<Document> {
+    let path = dir.join(MARKER);
+    if !path.is_file() {
+        let reason = "no such file; a specimen is a folder with a specimen.toml".into();
+        return Err(Error::Invalid { path, reason });
+    }
+    let mut document: Document = read_toml(&path)?;
+    match document.validate() {
+        Ok(()) => Ok(document),
+        Err(reason) => Err(Error::Invalid { path, reason }),
     }
 }
 

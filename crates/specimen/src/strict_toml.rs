@@ -13,14 +13,13 @@ pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T> {
     parse_toml(&text).map_err(|reason| Error::Invalid { path: path.to_owned(), reason })
 }
 
-fn parse_toml<T: DeserializeOwned>(text: &str) -> std::result::Result<T, String> {
-    let line = |e: &toml::de::Error| match e.span() {
-        Some(span) => {
-            let before = &text.as_bytes()[..span.start.min(text.len())];
-            format!("line {}: ", 1 + before.iter().filter(|b| **b == b'\n').count())
-        }
-        None => String::new(),
-    };
+/// [`read_toml`] for text that is at hand.
+///
+/// # Errors
+/// "line: field: what is wrong with it", one line, as far as they are known.
+pub fn parse_toml<T: DeserializeOwned>(text: &str) -> std::result::Result<T, String> {
+    let line =
+        |e: &toml::de::Error| e.span().map_or_else(String::new, |s| format!("line {}: ", line_at(text, s.start)));
     let document = toml::Deserializer::parse(text).map_err(|e| format!("{}{}", line(&e), one_line(e.message())))?;
     serde_path_to_error::deserialize(document).map_err(|e| {
         let field = e.path().to_string();
@@ -30,8 +29,47 @@ fn parse_toml<T: DeserializeOwned>(text: &str) -> std::result::Result<T, String>
     })
 }
 
+fn line_at(text: &str, byte: usize) -> usize {
+    1 + text.as_bytes()[..byte.min(text.len())].iter().filter(|b| **b == b'\n').count()
+}
+
+/// The line, from 1, of the field `path`, such as `organ[1].pins.share`; where it is not in the text, of the innermost part that is. `None` where not even the first is, or the text is no
+/// TOML.
+pub fn line_of(text: &str, path: &str) -> Option<usize> {
+    let document = toml::de::DeTable::parse(text).ok()?;
+    let mut table = Some(document.get_ref());
+    let mut array: Option<&toml::de::DeArray<'_>> = None;
+    let mut line = None;
+    for step in path.split(['.', '[']) {
+        let (value, start) = match (step.strip_suffix(']'), table, array) {
+            (Some(index), _, Some(array)) => match index.parse().ok().and_then(|i: usize| array.get(i)) {
+                Some(value) => (value, value.span().start),
+                None => break,
+            },
+            (None, Some(table), _) => match table.get_key_value(step) {
+                // A key stands where its value begins or above; a table's key is repeated in every header below it.
+                Some((key, value)) => {
+                    (value, if value.get_ref().is_table() { value.span().start } else { key.span().start })
+                }
+                None => break,
+            },
+            _ => break,
+        };
+        line = Some(line_at(text, start));
+        table = value.get_ref().as_table();
+        array = value.get_ref().as_array();
+    }
+    line
+}
+
+/// What a parser said on one line, which is short: it may repeat a value, and that may be the whole file.
 fn one_line(message: &str) -> String {
-    message.split_whitespace().collect::<Vec<_>>().join(" ")
+    const LONGEST: usize = 1000;
+    let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
+    match line.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{} ...", &line[..end]),
+        None => line,
+    }
 }
 
 /// "; did you mean ..." for serde's "unknown field `a`, expected one of `b`, `c`".
@@ -85,6 +123,27 @@ mod tests {
     }
 
     #[test]
+    fn fields_are_found_by_their_paths() {
+        let text = "a = 1\n[[b]]\nc = [1,\n  2]\n\n[[b]]\nd = { e = 1 }\n[f.g]\nh = 1\n[f.i]\n";
+        let lines = [
+            ("a", 1),
+            ("b[0].c", 3),
+            ("b[0].c[1]", 4),
+            ("b[1].d.e", 7),
+            ("b[1].absent", 6),
+            ("b[7]", 2),
+            ("f.g", 8),
+            ("f.g.h", 9),
+            ("f.i.absent", 10),
+        ];
+        for (path, line) in lines {
+            assert_eq!(line_of(text, path), Some(line), "{path}");
+        }
+        assert_eq!(line_of(text, "absent.a"), None);
+        assert_eq!(line_of("= 1", "a"), None);
+    }
+
+    #[test]
     fn mistakes_name_the_field_and_the_nearest_key() {
         assert!(parse_toml::<Outer>("rate_hz = 30\n[inner]\nwidth = 1\nheight = 2").is_ok());
         let r = reason("rate_hz = 30\n[inner]\nwidht = 1\nheight = 2");
@@ -96,5 +155,7 @@ mod tests {
         assert!(reason("rate_hz = 30\n[inner]\nwidth = 1").contains("height"));
         let r = reason("rate_hz = = 3");
         assert!(r.contains("line 1") && !r.contains('\n'), "{r}");
+        let r = reason(&format!("rate_hz = '{}'", "long ".repeat(1000)));
+        assert!(r.starts_with("line 1: rate_hz: invalid type") && r.ends_with(" ...") && r.len() < 1100, "{r}");
     }
 }

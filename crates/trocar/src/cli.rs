@@ -3,11 +3,13 @@
 mod comparison;
 mod grasp;
 mod port;
+mod scene;
 mod solver;
 
 pub use comparison::*;
 pub use grasp::*;
 pub use port::*;
+pub use scene::*;
 pub use solver::*;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
@@ -41,6 +43,8 @@ pub enum Command {
     Segment(Segment),
     /// Turn an RGB-D recording, or a ready surface, into watertight tetrahedral organs.
     Reconstruct(Reconstruct),
+    /// List, print and check scene files: the whole two-arm cell in one TOML file.
+    Scene(Scene),
     /// Run a scripted task on a specimen without a window.
     Simulate(Simulate),
     /// Make a table or figure of the paper anew, beside the paper's numbers.

@@ -6,6 +6,7 @@ mod experiment;
 mod inspect;
 mod reconstruct;
 mod record;
+mod scene;
 mod segment;
 mod simulate;
 
@@ -22,6 +23,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Record(arguments) => record::run(arguments, cli.json, progress),
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress),
         Command::Experiment(arguments) => experiment::run(arguments, cli.json, progress),
+        Command::Scene(arguments) => scene::run(arguments, cli.json),
         Command::Segment(arguments) => segment::run(arguments, cli.json, progress),
         Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress),
     }

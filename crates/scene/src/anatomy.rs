@@ -1,0 +1,228 @@
+//! The organs of a scene: where they come from, what is said otherwise than in the specimen, and how their tissue is stepped.
+
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
+use serde::{Deserialize, Serialize};
+use trocar_specimen::{End, Material, MaterialModel, Pins};
+
+/// The name, in a filtered pair, of what the organs lie on. No organ may have it.
+pub const FIELD: &str = "field";
+
+/// The specimen: a folder, or a built-in phantom. One of `path` and `phantom`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SpecimenSource {
+    /// Specimen folder, relative to the scene file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub path: Option<String>,
+    /// Built-in phantom: phantom-a, phantom-b (rabbits) or phantom-c (a pig's liver and gallbladder).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub phantom: Option<String>,
+    /// Seed of the phantom's anatomy.
+    #[serde(default = "first_seed")]
+    pub seed: u32,
+}
+
+fn first_seed() -> u32 {
+    1
+}
+
+/// What a [`SpecimenSource`] names.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Source<'a> {
+    /// A folder as the scene file names it; see [`Scene::resolve`](crate::Scene::resolve).
+    Folder(&'a str),
+    /// A phantom and its seed.
+    Phantom(&'a str, u32),
+}
+
+impl SpecimenSource {
+    /// A phantom.
+    pub fn phantom(name: &str, seed: u32) -> Self {
+        Self { path: None, phantom: Some(name.to_owned()), seed }
+    }
+
+    /// What it names; the folder where both are given, `None` where neither is. A checked scene has exactly one.
+    pub fn source(&self) -> Option<Source<'_>> {
+        match (&self.path, &self.phantom) {
+            (Some(path), _) => Some(Source::Folder(path)),
+            (None, Some(name)) => Some(Source::Phantom(name, self.seed)),
+            (None, None) => None,
+        }
+    }
+}
+
+/// What the scene says of an organ otherwise than the specimen does.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OrganOverride {
+    /// Material; what is left out stays as the specimen has it.
+    pub material: MaterialOverride,
+    /// Which nodes are held where they were recorded; the specimen's rule if left out.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub pins: Option<PinRule>,
+}
+
+/// Parts of a material that differ from the specimen's.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct MaterialOverride {
+    /// Constitutive model.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(schema_with = "material_models")]
+    pub model: Option<MaterialModel>,
+    /// Young's modulus [Pa]; soft tissue has about 12000.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub young_modulus_pa: Option<f64>,
+    /// Poisson's ratio, 0 to 0.4999.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub poisson_ratio: Option<f64>,
+    /// Density [kg/m3]; the paper's cell has 1200.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub density_kg_m3: Option<f64>,
+}
+
+/// The models by the names that the specimen's own format gives them.
+fn material_models(_: &mut SchemaGenerator) -> Schema {
+    let all = [MaterialModel::StableNeoHookean, MaterialModel::StVenantKirchhoff, MaterialModel::Corotated];
+    json_schema!({ "enum": all })
+}
+
+impl MaterialOverride {
+    /// The specimen's `material` with what the scene says otherwise.
+    pub fn applied_to(&self, material: Material) -> Material {
+        Material {
+            model: self.model.unwrap_or(material.model),
+            young_modulus_pa: self.young_modulus_pa.unwrap_or(material.young_modulus_pa),
+            poisson_ratio: self.poisson_ratio.unwrap_or(material.poisson_ratio),
+            density_kg_m3: self.density_kg_m3.unwrap_or(material.density_kg_m3),
+        }
+    }
+}
+
+/// One end of a tubular organ, possibly one that only the cell knows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PinEnd {
+    /// s = 0.
+    Base,
+    /// s = 1.
+    Tip,
+    /// The end farther from the port of the arm that grasps.
+    Far,
+}
+
+/// Which nodes of an organ are held where they were recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "rule", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum PinRule {
+    /// None.
+    None {},
+    /// The lowest share of the nodes by height.
+    Band {
+        /// Share of all nodes, 0 to 1; the paper's cell has 0.42.
+        share: f64,
+    },
+    /// One end, and a band along the part next to it.
+    End {
+        /// Which end.
+        end: PinEnd,
+        /// Organ coordinate distance from that end within which every node is held, 0 to 1.
+        length: f64,
+        /// Organ coordinate length of the part next to the end in which the lowest nodes are held too.
+        #[serde(default)]
+        band_length: f64,
+        /// Share of that part's nodes, lowest first.
+        #[serde(default)]
+        band_share: f64,
+    },
+}
+
+impl PinRule {
+    /// The specimen's rule for it; `far` is the end farther from the port of the arm that grasps.
+    pub fn pins(&self, far: End) -> Pins {
+        match *self {
+            Self::None {} => Pins::None,
+            Self::Band { share } => Pins::Band { share },
+            Self::End { end, length, band_length, band_share } => {
+                let end = match end {
+                    PinEnd::Base => End::Base,
+                    PinEnd::Tip => End::Tip,
+                    PinEnd::Far => far,
+                };
+                Pins::End { end, length, band_length, band_share }
+            }
+        }
+    }
+}
+
+/// How tissue is stepped, by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ScheduleName {
+    /// The quasi-Newton method to a tolerance.
+    #[default]
+    Fast,
+    /// Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor.
+    Paper,
+    /// The same with the adaptive start.
+    Adaptive,
+}
+
+/// How tissue is stepped and what it feels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Tissue {
+    /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
+    pub schedule: ScheduleName,
+    /// Distance at which contact between organs is looked for [mm].
+    pub contact_offset_mm: f64,
+    /// Distance at which tissue rests on the tips of instruments [mm].
+    pub tip_rest_offset_mm: f64,
+    /// Coulomb friction of tissue on tissue and of instruments on tissue.
+    pub friction: f64,
+    /// Pairs that do not touch: two organs, or an organ and `field`, what the organs lie on.
+    pub filtered_pairs: Vec<[String; 2]>,
+    /// What the organs lie on.
+    pub support: Support,
+}
+
+impl Default for Tissue {
+    /// The paper's figures (section IV-C).
+    fn default() -> Self {
+        Self {
+            schedule: ScheduleName::Fast,
+            contact_offset_mm: 1.5,
+            tip_rest_offset_mm: 1.5,
+            friction: 0.6,
+            filtered_pairs: Vec::new(),
+            support: Support::default(),
+        }
+    }
+}
+
+/// What the organs lie on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Support {
+    /// Its kind: imprint or none.
+    pub kind: SupportKind,
+    /// Coulomb friction of tissue on it.
+    pub friction: f64,
+}
+
+impl Default for Support {
+    fn default() -> Self {
+        Self { kind: SupportKind::Imprint, friction: 0.6 }
+    }
+}
+
+/// Kinds of support.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SupportKind {
+    /// A surface under each organ that has its imprint.
+    #[default]
+    Imprint,
+    /// None: only pins hold the organs.
+    None,
+}

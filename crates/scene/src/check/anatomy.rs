@@ -1,0 +1,124 @@
+//! The specimen, what is said of its organs, and their tissue.
+
+use super::{Checked, Problem, join, name, number, numbers, one_of, point, problem, quaternion};
+use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source};
+use trocar_specimen::{End, Material};
+
+pub(super) fn check(scene: &Scene) -> Checked {
+    specimen(scene)?;
+    point("placement.position_m", scene.placement.position_m)?;
+    quaternion("placement.rotation_wxyz", scene.placement.rotation_wxyz)?;
+    for (organ, said) in &scene.organs {
+        let at = format!("organ.{organ}");
+        name(&at, organ)?;
+        if organ == FIELD {
+            return Err(problem(at, format!(" is no organ; '{FIELD}' is what the organs lie on")));
+        }
+        material(&join(&at, "material"), &said.material)?;
+        if let Some(rule) = &said.pins {
+            pins(&join(&at, "pins"), rule)?;
+        }
+    }
+    let t = &scene.tissue;
+    numbers(
+        "tissue",
+        &[
+            ("contact_offset_mm", t.contact_offset_mm, 0.01..=20.0),
+            ("tip_rest_offset_mm", t.tip_rest_offset_mm, 0.0..=20.0),
+            ("friction", t.friction, 0.0..=5.0),
+            ("support.friction", t.support.friction, 0.0..=5.0),
+        ],
+    )
+}
+
+fn specimen(scene: &Scene) -> Checked {
+    let given = &scene.specimen;
+    match (given.path.is_some(), given.phantom.is_some()) {
+        (true, true) => return Err(problem("specimen", " has a path and a phantom; one of them".into())),
+        (false, false) => {
+            return Err(problem("specimen", " has neither a path nor a phantom; one of them".into()));
+        }
+        _ => {}
+    }
+    match given.source() {
+        Some(Source::Phantom(name, _)) => {
+            one_of("specimen.phantom", name, "the phantoms are", &PHANTOMS.map(|p| p.name))
+        }
+        Some(Source::Folder(path)) if !scene.resolve(path).join("specimen.toml").is_file() => {
+            let folder = scene.resolve(path);
+            let reason = format!(" is {}, which is no specimen; a folder with a specimen.toml", folder.display());
+            Err(problem("specimen.path", reason.replace(['\n', '\r'], " ")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn material(at: &str, said: &MaterialOverride) -> Checked {
+    let fields = [
+        // Nothing in a body is softer than 100 Pa, but 12 for 12 kPa is often meant.
+        ("young_modulus_pa", said.young_modulus_pa, 100.0..=1e9),
+        ("poisson_ratio", said.poisson_ratio, 0.0..=0.4999),
+        ("density_kg_m3", said.density_kg_m3, 100.0..=30_000.0),
+    ];
+    for (key, value, range) in fields {
+        if let Some(value) = value {
+            number(&join(at, key), value, &range)?;
+        }
+    }
+    // The specimen's own ranges, should they become narrower than these.
+    said.applied_to(Material::default()).validate().map_err(|reason| field_of(at, &reason))
+}
+
+/// The specimen's own checks say "field is value; what would be right".
+fn field_of(at: &str, reason: &str) -> Problem {
+    let (key, rest) = reason.split_once(' ').unwrap_or((reason, ""));
+    problem(join(at, key), format!(" {rest}"))
+}
+
+fn pins(at: &str, rule: &PinRule) -> Checked {
+    rule.pins(End::Base).validate().map_err(|reason| field_of(at, &reason))?;
+    match *rule {
+        PinRule::End { length, band_length, .. } if length + band_length > 1.0 => {
+            let reason = format!(" has a length and a band_length of {} together; at most 1", length + band_length);
+            Err(problem(at, reason))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// What is said of organs is said of the specimen's, whose names are `organs`.
+pub(crate) fn check_organs(scene: &Scene, organs: &[String]) -> Checked {
+    let known: Vec<&str> = organs.iter().map(String::as_str).collect();
+    for organ in scene.organs.keys() {
+        one_of(&format!("organ.{organ}"), organ, "the specimen's organs are", &known)
+            .map_err(|p| problem(p.field, p.reason.replacen(" is ", " names ", 1)))?;
+    }
+    let mut touching = known.clone();
+    touching.push(FIELD);
+    for (i, pair) in scene.tissue.filtered_pairs.iter().enumerate() {
+        let at = format!("tissue.filtered_pairs[{i}]");
+        for (k, member) in pair.iter().enumerate() {
+            one_of(&format!("{at}[{k}]"), member, "a pair is of the specimen's organs and the field", &touching)?;
+        }
+        if pair[0] == pair[1] && pair[0] == FIELD {
+            return Err(problem(at, format!(" is '{FIELD}' twice; two organs, or an organ and the field")));
+        }
+        let same = |other: &[String; 2]| {
+            (&other[0], &other[1]) == (&pair[0], &pair[1]) || (&other[0], &other[1]) == (&pair[1], &pair[0])
+        };
+        if let Some(first) = scene.tissue.filtered_pairs[..i].iter().position(same) {
+            return Err(problem(at, format!(" is the pair of tissue.filtered_pairs[{first}] again; once is enough")));
+        }
+    }
+    let far = |rule: &PinRule| matches!(rule, PinRule::End { end: PinEnd::Far, .. });
+    for (organ, said) in &scene.organs {
+        if said.pins.as_ref().is_some_and(far) && scene.grasping_arm().is_none() {
+            let reason = " is 'far', from the arm that grasps, but no arm has a grasper; base or tip".to_owned();
+            return Err(problem(format!("organ.{organ}.pins.end"), reason));
+        }
+    }
+    if scene.task.needs_organ() {
+        one_of("task.organ", &scene.task.organ, "the specimen's organs are", &known)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,249 @@
+//! Arms, ports and instruments: each in its range, all there, and such that they fit.
+
+use super::unit::{hint, show};
+use super::{Checked, join, name, names, number, numbers, one_of, point, problem, quaternion, unit};
+use crate::{Arm, ArmModel, Frame, Instrument, Port, Scene, Start};
+use glam::DVec3;
+
+/// Height of the FR3's shoulder above its base, and how far its flange gets from there [m] (Franka's data sheet: reach 855 mm).
+const FR3_SHOULDER: f64 = 0.333;
+const FR3_REACH: f64 = 0.855;
+
+/// Limits of the FR3's joints [rad] (Franka's data sheet).
+const FR3_LIMITS: [(f64, f64); 7] = [
+    (-2.7437, 2.7437),
+    (-1.7837, 1.7837),
+    (-2.9007, 2.9007),
+    (-3.0421, -0.1518),
+    (-2.8065, 2.8065),
+    (0.5445, 4.5169),
+    (-3.0159, 3.0159),
+];
+
+/// Bases nearer to each other than this are in the same place [m]: the FR3's is 0.2 m wide.
+const BASE_WIDTH: f64 = 0.2;
+
+/// A tilt below this that is not 0 was meant in radians [degrees].
+const LEAST_TILT: f64 = 1.0;
+
+/// Most joints of an arm.
+const MOST_JOINTS: usize = 16;
+
+pub(super) fn check(scene: &Scene) -> Checked {
+    rates(scene)?;
+    names("port", scene.ports.iter().map(|p| p.name.as_str()))?;
+    names("instrument", scene.instruments.iter().map(|i| i.name.as_str()))?;
+    for (i, p) in scene.ports.iter().enumerate() {
+        port(&format!("port[{i}]"), p)?;
+    }
+    for (i, one) in scene.instruments.iter().enumerate() {
+        instrument(&format!("instrument[{i}]"), one)?;
+    }
+    let g = &scene.gravity_error;
+    numbers(
+        "gravity_error",
+        &[
+            ("link_mass_share", g.link_mass_share, -0.5..=0.5),
+            ("instrument_mass_share", g.instrument_mass_share, -0.5..=0.5),
+            ("joint_friction_nm", g.joint_friction_nm, 0.0..=20.0),
+        ],
+    )?;
+    if !(1..=2).contains(&scene.arms.len()) {
+        return Err(problem("arm", format!(" is a list of {}; one or two arms", scene.arms.len())));
+    }
+    names("arm", scene.arms.iter().map(|a| a.name.name()))?;
+    for (i, one) in scene.arms.iter().enumerate() {
+        arm(&format!("arm[{i}]"), one, scene)?;
+    }
+    apart(scene)
+}
+
+fn rates(scene: &Scene) -> Checked {
+    let rates = scene.rates;
+    let (control, physics) = (f64::from(rates.control_hz), f64::from(rates.physics_hz));
+    numbers("rates", &[("control_hz", control, 1.0..=1000.0), ("physics_hz", physics, 1.0..=100_000.0)])?;
+    if rates.physics_hz.is_multiple_of(rates.control_hz) {
+        return Ok(());
+    }
+    let below = (rates.physics_hz / rates.control_hz).max(1) * rates.control_hz;
+    let reason = format!(
+        " is {}, no multiple of control_hz, {}; a multiple, such as {below}",
+        rates.physics_hz, rates.control_hz
+    );
+    Err(problem("rates.physics_hz", reason))
+}
+
+fn port(at: &str, p: &Port) -> Checked {
+    point(&join(at, "centre_m"), p.centre_m)?;
+    unit(&join(at, "normal"), &p.normal, "a unit vector")?;
+    numbers(
+        at,
+        &[
+            ("hole_diameter_mm", p.hole_diameter_mm, 1.0..=50.0),
+            ("sheet_thickness_mm", p.sheet_thickness_mm, 0.0..=50.0),
+        ],
+    )
+}
+
+fn instrument(at: &str, one: &Instrument) -> Checked {
+    numbers(
+        at,
+        &[
+            ("shaft_diameter_mm", one.shaft_diameter_mm, 0.5..=50.0),
+            ("shaft_length_mm", one.shaft_length_mm, 20.0..=1000.0),
+            ("blade_length_mm", one.blade_length_mm, 2.0..=100.0),
+            ("mass_kg", one.mass_kg, 0.005..=10.0),
+            ("jaw_max_angle_deg", one.jaw_max_angle_deg, 5.0..=120.0),
+            ("jaw_force_n", one.jaw_force_n, 0.01..=40.0),
+        ],
+    )?;
+    for (k, v) in one.centre_of_mass_mm.iter().enumerate() {
+        number(&format!("{at}.centre_of_mass_mm[{k}]"), *v, &(-1000.0..=1000.0))?;
+    }
+    frame(&join(at, "mount"), &one.mount)
+}
+
+fn frame(at: &str, frame: &Frame) -> Checked {
+    point(&join(at, "position_m"), frame.position_m)?;
+    quaternion(&join(at, "rotation_wxyz"), frame.rotation_wxyz)
+}
+
+fn arm(at: &str, one: &Arm, scene: &Scene) -> Checked {
+    model(at, one, scene)?;
+    frame(&join(at, "base"), &one.base)?;
+    posture(&join(at, "posture_deg"), one)?;
+    name(&join(at, "controller.name"), &one.controller.name)?;
+    for (gain, value) in &one.controller.gains {
+        let field = format!("{at}.controller.gains.{gain}");
+        name(&format!("{at}.controller.gains"), gain)?;
+        // Gains are in units of their controller: no range fits all of them.
+        if !(0.0..=1e12).contains(value) {
+            return Err(problem(field, format!(" is {}; 0 or more, and finite", show(*value))));
+        }
+    }
+    let ports: Vec<&str> = scene.ports.iter().map(|p| p.name.as_str()).collect();
+    one_of(&join(at, "port"), &one.port, "the ports are", &ports)?;
+    let held: Vec<&str> = scene.instruments.iter().map(|i| i.name.as_str()).collect();
+    one_of(&join(at, "instrument"), &one.instrument, "the instruments are", &held)?;
+    match (scene.port(&one.port), scene.instrument(&one.instrument)) {
+        (Some(port), Some(instrument)) => fits(at, one, port, instrument, scene.task.variation.tilt_deg),
+        _ => Ok(()),
+    }
+}
+
+fn model(at: &str, one: &Arm, scene: &Scene) -> Checked {
+    let field = join(at, "model");
+    let shown: String = one.model.chars().take(200).flat_map(char::escape_default).collect();
+    match one.source() {
+        None => Err(problem(field, format!(" is '{shown}'; franka_fr3, or a file that ends in .urdf, .xml or .mjcf"))),
+        Some(ArmModel::Urdf(file) | ArmModel::Mjcf(file)) if !scene.resolve(file).is_file() => {
+            let path = scene.resolve(file).display().to_string().replace(['\n', '\r'], " ");
+            Err(problem(field, format!(" is {path}, which is no file; a path from the scene file's folder")))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn posture(field: &str, one: &Arm) -> Checked {
+    let given = &one.posture_deg;
+    if given.is_empty() {
+        return Ok(());
+    }
+    let fr3 = one.source() == Some(ArmModel::FrankaFr3);
+    if fr3 && given.len() != FR3_LIMITS.len() || given.len() > MOST_JOINTS {
+        let right = if fr3 { "an FR3 has 7 joints".to_owned() } else { format!("at most {MOST_JOINTS}") };
+        return Err(problem(field, format!(" has {} angles; {right}", given.len())));
+    }
+    for (k, angle) in given.iter().enumerate() {
+        let (low, high) = if fr3 { FR3_LIMITS[k] } else { (-2.0 * std::f64::consts::PI, 2.0 * std::f64::consts::PI) };
+        number(&format!("{field}[{k}]"), *angle, &(low.to_degrees()..=high.to_degrees()))?;
+    }
+    Ok(())
+}
+
+/// The instrument goes through the port, leans no farther than the hole lets it, and the arm gets there.
+fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f64) -> Checked {
+    let (shaft, hole) = (instrument.shaft_diameter_mm, port.hole_diameter_mm);
+    let Some(limit) = port.tilt_limit(shaft) else {
+        let reason = format!(
+            " is '{}', whose shaft of {} mm does not go through the hole of {} mm of port '{}'; a thinner shaft or a larger hole",
+            instrument.name,
+            show(shaft),
+            show(hole),
+            port.name
+        );
+        return Err(problem(join(at, "instrument"), reason));
+    };
+    let at = join(at, "start");
+    start(&at, &one.start, limit.to_degrees(), varies_deg, instrument)?;
+    if one.source() != Some(ArmModel::FrankaFr3) {
+        return Ok(());
+    }
+    // The flange is at the instrument's other end; a mount of its own moves it by no more than its length.
+    let flange = one.start.tip(port) - instrument.length() * one.start.direction(port);
+    let shoulder = one.base.pose().transform(FR3_SHOULDER * DVec3::Z);
+    let far = flange.distance(shoulder) - DVec3::from(instrument.mount.position_m).length();
+    if far > FR3_REACH {
+        let reason = format!(
+            " is '{}', which is out of reach: the flange would start {} m from the shoulder; at most {FR3_REACH} m",
+            port.name,
+            show((far * 1e3).round() / 1e3)
+        );
+        return Err(problem(join(at.trim_end_matches(".start"), "port"), reason));
+    }
+    Ok(())
+}
+
+fn start(at: &str, start: &Start, limit_deg: f64, varies_deg: f64, instrument: &Instrument) -> Checked {
+    let most = limit_deg - varies_deg;
+    let tilt = start.tilt_deg;
+    if tilt != 0.0 && !(LEAST_TILT..=most).contains(&tilt) {
+        let limit = (limit_deg * 10.0).floor() / 10.0;
+        let why = if varies_deg > 0.0 {
+            format!(
+                "{} degrees, where the shaft fills the hole, less the variation of {}",
+                show(limit),
+                show(varies_deg)
+            )
+        } else {
+            format!("{} degrees, where the shaft fills the hole", show(limit))
+        };
+        let reason =
+            format!(" is {}; 0, or {LEAST_TILT} to {why}{}", show(tilt), hint("degrees", tilt, &(LEAST_TILT..=most)));
+        return Err(problem(join(at, "tilt_deg"), reason));
+    }
+    numbers(
+        at,
+        &[
+            ("azimuth_deg", start.azimuth_deg, -360.0..=360.0),
+            ("roll_deg", start.roll_deg, -360.0..=360.0),
+            ("insertion_mm", start.insertion_mm, instrument.blade_length_mm..=1e3 * instrument.length()),
+            ("jaw", start.jaw, 0.0..=1.0),
+        ],
+    )
+}
+
+/// No two arms share a place, a port or an instrument, and no two holes overlap.
+fn apart(scene: &Scene) -> Checked {
+    for (i, port) in scene.ports.iter().enumerate() {
+        for (k, other) in scene.ports[..i].iter().enumerate() {
+            let far = 1e3 * DVec3::from(port.centre_m).distance(other.centre_m.into());
+            if far < 0.5 * (port.hole_diameter_mm + other.hole_diameter_mm) {
+                let reason = format!(" is {} mm from that of port[{k}]; holes do not overlap", show(far));
+                return Err(problem(format!("port[{i}].centre_m"), reason));
+            }
+        }
+    }
+    let [one, other] = scene.arms.as_slice() else { return Ok(()) };
+    let far = DVec3::from(one.base.position_m).distance(other.base.position_m.into());
+    if far < BASE_WIDTH {
+        let reason = format!(" is {} m from that of arm[0]; bases are {BASE_WIDTH} m or more apart", show(far));
+        return Err(problem("arm[1].base.position_m", reason));
+    }
+    for (key, first, second) in [("port", &one.port, &other.port), ("instrument", &one.instrument, &other.instrument)] {
+        if first == second {
+            return Err(problem(format!("arm[1].{key}"), format!(" is '{second}', which arm[0] has; each its own")));
+        }
+    }
+    Ok(())
+}

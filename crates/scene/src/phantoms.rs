@@ -1,0 +1,26 @@
+//! The phantoms that a scene may name, with their organs.
+//!
+//! Kept here and not asked of the crate that films them, so that a cell does not depend on recordings; a test holds the two together.
+
+/// A phantom as scenes know it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Phantom {
+    /// Its name.
+    pub name: &'static str,
+    /// Its organs, in the specimen's order.
+    pub organs: &'static [&'static str],
+}
+
+/// The phantoms there are.
+pub const PHANTOMS: [Phantom; 3] = [
+    Phantom { name: "phantom-a", organs: &["cecum", "bowel-1", "bowel-2", "bowel-3", "stomach", "appendix"] },
+    Phantom { name: "phantom-b", organs: &["cecum", "small-bowel", "bowel-bloc", "stomach", "appendix"] },
+    Phantom { name: "phantom-c", organs: &["liver", "gallbladder"] },
+];
+
+impl Phantom {
+    /// The phantom of that name.
+    pub fn named(name: &str) -> Option<&'static Self> {
+        PHANTOMS.iter().find(|p| p.name == name)
+    }
+}

@@ -1,0 +1,108 @@
+//! Reading scenes: files and built-in ones, checked whole.
+
+use crate::check::{Problem, check};
+use crate::{Builtin, Error, Phantom, Result, Scene, Source};
+use std::io::Read;
+use std::path::Path;
+use trocar_specimen::{Specimen, line_of, nearest, parse_toml};
+
+/// Largest scene file [bytes]; the paper's has about 8,000.
+const MOST_BYTES: u64 = 1 << 20;
+
+impl Scene {
+    /// The scene of that path or built-in name, checked whole: what it names by path is there, and what it says of organs is said of organs that the specimen has.
+    ///
+    /// # Errors
+    /// Names the file, the line and the field, what is wrong and what would be right; see [`Error`].
+    pub fn read(path_or_name: &str) -> Result<Self> {
+        if Builtin::named(path_or_name).is_some() {
+            return Self::builtin(path_or_name);
+        }
+        let path = Path::new(path_or_name);
+        if !path.exists() && !path_or_name.contains(['/', '\\', '.']) {
+            return Err(unknown(path_or_name));
+        }
+        Self::read_file(path)
+    }
+
+    /// The scene in a file; see [`read`](Self::read).
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn read_file(path: &Path) -> Result<Self> {
+        let io = |source| Error::Io { path: path.to_owned(), source };
+        let mut text = String::new();
+        let file = std::fs::File::open(path).map_err(io)?;
+        file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        let name = path.display().to_string();
+        if text.len() as u64 > MOST_BYTES {
+            let reason = format!("larger than {MOST_BYTES} bytes; a scene is a few thousand");
+            return Err(Error::Invalid { file: name, reason });
+        }
+        Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")))
+    }
+
+    /// The built-in scene of that name.
+    ///
+    /// # Errors
+    /// An unknown name.
+    pub fn builtin(name: &str) -> Result<Self> {
+        let builtin = Builtin::named(name).ok_or_else(|| unknown(name))?;
+        Self::parse(builtin.text, name, Path::new(""))
+    }
+
+    /// The scene in `text`, which errors call `file`; its paths start from `folder`.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, file: &str, folder: &Path) -> Result<Self> {
+        let invalid = |reason| Error::Invalid { file: file.to_owned(), reason };
+        let mut scene: Self = parse_toml(text).map_err(invalid)?;
+        scene.folder = folder.to_owned();
+        let placed = |problem: Problem| {
+            let line = line_of(text, &problem.field).map_or_else(String::new, |n| format!("line {n}: "));
+            invalid(format!("{line}{}{}", problem.field, problem.reason))
+        };
+        check(&scene).map_err(placed)?;
+        let organs = scene.organ_names()?;
+        crate::check::check_organs(&scene, &organs).map_err(placed)?;
+        Ok(scene)
+    }
+
+    /// Checks a scene that was put together or changed by a program, as [`read`](Self::read) checks a file.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), without lines.
+    pub fn validate(&self) -> Result<()> {
+        let invalid = |p: Problem| Error::Invalid {
+            file: format!("scene '{}'", self.name),
+            reason: format!("{}{}", p.field, p.reason),
+        };
+        check(self).map_err(invalid)?;
+        crate::check::check_organs(self, &self.organ_names()?).map_err(invalid)
+    }
+
+    /// The names of the specimen's organs.
+    ///
+    /// # Errors
+    /// When the specimen's folder is unusable.
+    pub fn organ_names(&self) -> Result<Vec<String>> {
+        match self.specimen.source() {
+            Some(Source::Folder(path)) => Ok(Specimen::organ_names(&self.resolve(path))?),
+            Some(Source::Phantom(name, _)) => {
+                let organs = Phantom::named(name).map_or(&[][..], |p| p.organs);
+                Ok(organs.iter().map(|&o| o.to_owned()).collect())
+            }
+            None => Ok(Vec::new()),
+        }
+    }
+}
+
+fn unknown(name: &str) -> Error {
+    let names = || crate::BUILTINS.iter().map(|b| b.name);
+    Error::Unknown {
+        name: name.to_owned(),
+        known: names().collect::<Vec<_>>().join(", "),
+        nearest: nearest(name, names()).map(str::to_owned),
+    }
+}

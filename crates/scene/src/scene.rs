@@ -1,0 +1,190 @@
+//! The scene: everything that a cell is built from.
+
+use crate::{
+    Arm, CellCamera, Error, Frame, GravityError, Instrument, InstrumentKind, OrganOverride, Port, Result, Safety, Side,
+    Source, SpecimenSource, Start, Task, Tissue,
+};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use xxhash_rust::xxh3::Xxh3;
+
+/// A Trocar scene: the whole two-arm cell. The cell frame is right-handed with z up; its origin is midway between the arms' bases on their mounting plane, x runs from the left base to the
+/// right, y towards the phantom.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Scene {
+    /// Name of the scene: lower-case letters, digits, `-` and `_`.
+    pub name: String,
+    /// What it shows, for people.
+    #[serde(default)]
+    pub description: String,
+    /// The specimen.
+    pub specimen: SpecimenSource,
+    /// Pose of the specimen, which is that of its recording camera, in the cell frame.
+    #[serde(default = "placement")]
+    pub placement: Frame,
+    /// What is said of organs otherwise than in the specimen, by their names.
+    #[serde(default, rename = "organ")]
+    pub organs: BTreeMap<String, OrganOverride>,
+    /// How tissue is stepped and what it feels.
+    #[serde(default)]
+    pub tissue: Tissue,
+    /// How often things happen.
+    #[serde(default)]
+    pub rates: Rates,
+    /// The arms, one or two; the paper's two if left out.
+    #[serde(default = "arms", rename = "arm")]
+    pub arms: Vec<Arm>,
+    /// The ports; the paper's two if left out.
+    #[serde(default = "ports", rename = "port")]
+    pub ports: Vec<Port>,
+    /// The instruments; the paper's two if left out.
+    #[serde(default = "instruments", rename = "instrument")]
+    pub instruments: Vec<Instrument>,
+    /// What the controllers believe wrongly.
+    #[serde(default)]
+    pub gravity_error: GravityError,
+    /// The cameras; the paper's three if left out.
+    #[serde(default = "CellCamera::paper", rename = "camera")]
+    pub cameras: Vec<CellCamera>,
+    /// What an episode asks for.
+    #[serde(default)]
+    pub task: Task,
+    /// What is unsafe.
+    #[serde(default)]
+    pub safety: Safety,
+    /// The folder that paths in the scene start from; not in the file.
+    #[serde(skip)]
+    pub folder: PathBuf,
+}
+
+/// How often things happen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Rates {
+    /// Actions and observations a second [Hz].
+    pub control_hz: u32,
+    /// Steps of the arms a second [Hz]; a multiple of `control_hz`.
+    pub physics_hz: u32,
+}
+
+impl Default for Rates {
+    fn default() -> Self {
+        Self { control_hz: 30, physics_hz: 480 }
+    }
+}
+
+impl Rates {
+    /// Steps of the arms an action.
+    pub fn substeps(&self) -> u32 {
+        self.physics_hz / self.control_hz.max(1)
+    }
+}
+
+/// The recording camera looks straight down, its image's top away from the arms, such that the middle of phantom A's appendix lies below the ports' midpoint. The phantom's bed, 150 mm
+/// below the camera, is at z = 0.02.
+fn placement() -> Frame {
+    Frame { position_m: [-0.012, 0.48, 0.17], rotation_wxyz: [0.0, 1.0, 0.0, 0.0] }
+}
+
+fn arms() -> Vec<Arm> {
+    let start = Start { tilt_deg: 18.3, azimuth_deg: 180.0, ..Start::default() };
+    vec![Arm::paper(Side::Left, -0.45, "grasper", Start::default()), Arm::paper(Side::Right, 0.45, "cutter", start)]
+}
+
+fn ports() -> Vec<Port> {
+    vec![Port::paper(Side::Left, [-0.045, 0.46, 0.16]), Port::paper(Side::Right, [0.045, 0.46, 0.16])]
+}
+
+fn instruments() -> Vec<Instrument> {
+    vec![Instrument::of(InstrumentKind::Grasper), Instrument::of(InstrumentKind::Cutter)]
+}
+
+impl Scene {
+    /// The paper's cell around a specimen, with every default; paths start from the working directory.
+    pub fn new(name: &str, specimen: SpecimenSource) -> Self {
+        Self {
+            name: name.to_owned(),
+            description: String::new(),
+            specimen,
+            placement: placement(),
+            organs: BTreeMap::new(),
+            tissue: Tissue::default(),
+            rates: Rates::default(),
+            arms: arms(),
+            ports: ports(),
+            instruments: instruments(),
+            gravity_error: GravityError::default(),
+            cameras: CellCamera::paper(),
+            task: Task::default(),
+            safety: Safety::default(),
+            folder: PathBuf::new(),
+        }
+    }
+
+    /// A path of the scene as the system understands it: relative ones start from the scene file's folder.
+    pub fn resolve(&self, path: &str) -> PathBuf {
+        self.folder.join(path)
+    }
+
+    /// The port of that name.
+    pub fn port(&self, name: &str) -> Option<&Port> {
+        self.ports.iter().find(|p| p.name == name)
+    }
+
+    /// The instrument of that name.
+    pub fn instrument(&self, name: &str) -> Option<&Instrument> {
+        self.instruments.iter().find(|i| i.name == name)
+    }
+
+    /// The arms, the left one first, each with its port and instrument. A checked scene has them all.
+    pub fn stations(&self) -> Vec<(&Arm, &Port, &Instrument)> {
+        let mut all = Vec::new();
+        for arm in &self.arms {
+            if let (Some(port), Some(instrument)) = (self.port(&arm.port), self.instrument(&arm.instrument)) {
+                all.push((arm, port, instrument));
+            }
+        }
+        all.sort_by_key(|(arm, _, _)| arm.name);
+        all
+    }
+
+    /// The first arm, the left one before the right one, whose instrument is of that kind.
+    pub fn arm_with(&self, kind: InstrumentKind) -> Option<&Arm> {
+        self.stations().into_iter().find(|(_, _, instrument)| instrument.kind == kind).map(|(arm, _, _)| arm)
+    }
+
+    /// The arm that grasps: see [`PinEnd::Far`](crate::PinEnd::Far).
+    pub fn grasping_arm(&self) -> Option<&Arm> {
+        self.arm_with(InstrumentKind::Grasper)
+    }
+
+    /// The scene as TOML with every value, in a fixed order: the same scene always gives the same text.
+    ///
+    /// # Errors
+    /// When a value has no place in TOML; none that a file could hold.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self).map_err(|e| Error::Write(e.to_string()))
+    }
+
+    /// What replays know the scene by: xxh3 of its canonical form and of `contents`, the hashes of what it names by path or as a phantom (the specimen, then the arms' model files in
+    /// order). The description and the specimen folder's path do not count, so that a scene may be explained better and a folder may move.
+    ///
+    /// # Errors
+    /// As [`to_toml`](Self::to_toml).
+    pub fn hash(&self, contents: &[u64]) -> Result<u64> {
+        let mut scene = self.clone();
+        scene.description.clear();
+        if let Some(Source::Folder(_)) = self.specimen.source() {
+            scene.specimen = SpecimenSource { path: Some(String::new()), phantom: None, seed: 0 };
+        }
+        let mut hash = Xxh3::new();
+        hash.update(scene.to_toml()?.as_bytes());
+        for content in contents {
+            hash.update(&content.to_le_bytes());
+        }
+        Ok(hash.digest())
+    }
+}

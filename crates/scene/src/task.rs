@@ -1,0 +1,165 @@
+//! What an episode asks for, when its stages count as done, and what is unsafe.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Tasks by name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TaskName {
+    /// Grasp, lift, positioning, jaw on tissue, cut.
+    #[default]
+    AppendixResection,
+    /// Grasp and lift with one arm.
+    GraspLift,
+    /// Free motion of the instruments in their ports.
+    PortReach,
+}
+
+impl TaskName {
+    /// Its name in files.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::AppendixResection => "appendix-resection",
+            Self::GraspLift => "grasp-lift",
+            Self::PortReach => "port-reach",
+        }
+    }
+}
+
+/// Grasp designs by name; they are those of the cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum GraspDesignName {
+    /// Friction between jaws that close, and nothing else.
+    Friction,
+    /// Offsets as authored in the undeformed organ.
+    RestPose,
+    /// Offsets captured where the tissue is.
+    LivePose,
+    /// The same, through a spring that slips and tears.
+    #[default]
+    Compliant,
+}
+
+/// What an episode asks for.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Task {
+    /// appendix-resection, grasp-lift or port-reach.
+    pub name: TaskName,
+    /// The organ it is about.
+    pub organ: String,
+    /// Longest episode [s].
+    pub episode_s: f64,
+    /// How the grasper holds: friction, rest-pose, live-pose or compliant.
+    pub grasp: GraspDesignName,
+    /// A cut parts the tissue.
+    pub sever: bool,
+    /// When stages count as done.
+    pub gates: Gates,
+    /// How episodes differ by their seed.
+    pub variation: Variation,
+}
+
+impl Default for Task {
+    fn default() -> Self {
+        Self {
+            name: TaskName::default(),
+            organ: "appendix".to_owned(),
+            episode_s: 40.0,
+            grasp: GraspDesignName::default(),
+            sever: false,
+            gates: Gates::default(),
+            variation: Variation::default(),
+        }
+    }
+}
+
+impl Task {
+    /// Whether the task is about an organ.
+    pub fn needs_organ(&self) -> bool {
+        self.name != TaskName::PortReach
+    }
+}
+
+/// When the stages of the resection count as done (SPEC, stage gates), in their order.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Gates {
+    /// Grasp: attached at this organ coordinate or beyond.
+    pub grasp_from: f64,
+    /// Grasp: and at this one or before.
+    pub grasp_to: f64,
+    /// Lift: the held cluster's centroid rises by this much [mm] ...
+    pub lift_mm: f64,
+    /// ... for this long [s].
+    pub lift_s: f64,
+    /// Positioning: the cutter's tip is this near to the tissue between grasp and base [mm].
+    pub positioning_mm: f64,
+    /// Cut: the jaw first opens beyond this (0 closed to 1) ...
+    pub cut_open: f64,
+    /// ... then closes below this, with tissue in the mouth all the while.
+    pub cut_closed: f64,
+}
+
+impl Default for Gates {
+    fn default() -> Self {
+        Self {
+            grasp_from: 0.30,
+            grasp_to: 0.70,
+            lift_mm: 8.0,
+            lift_s: 0.5,
+            positioning_mm: 10.0,
+            cut_open: 0.50,
+            cut_closed: 0.15,
+        }
+    }
+}
+
+/// How episodes differ by their seed: each figure is the most that a value goes to either side, all values equally likely. All 0 for the same start every time.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Variation {
+    /// Tilt of the instruments [degrees].
+    pub tilt_deg: f64,
+    /// Azimuth of the instruments [degrees].
+    pub azimuth_deg: f64,
+    /// Insertion of the instruments [mm].
+    pub insertion_mm: f64,
+    /// Roll of the instruments [degrees].
+    pub roll_deg: f64,
+    /// Shift of the specimen along the cell's x and along its y [mm].
+    pub specimen_shift_mm: f64,
+    /// Turn of the specimen about the vertical [degrees].
+    pub specimen_turn_deg: f64,
+}
+
+impl Default for Variation {
+    fn default() -> Self {
+        Self {
+            tilt_deg: 1.0,
+            azimuth_deg: 5.0,
+            insertion_mm: 5.0,
+            roll_deg: 10.0,
+            specimen_shift_mm: 0.0,
+            specimen_turn_deg: 0.0,
+        }
+    }
+}
+
+/// What is unsafe (SPEC E2).
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Safety {
+    /// RCM deviation that episodes are scored against [mm].
+    pub rcm_threshold_mm: f64,
+    /// RCM deviation at which the hardware stops [mm].
+    pub rcm_abort_mm: f64,
+}
+
+impl Default for Safety {
+    fn default() -> Self {
+        Self { rcm_threshold_mm: 3.0, rcm_abort_mm: 5.0 }
+    }
+}

@@ -1,0 +1,417 @@
+//! Each mistake in a scene gives exactly its one-line message.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::path::Path;
+use trocar_scene::{Builtin, Scene};
+
+/// Marks, in the changed text, the line that the message names.
+const HERE: char = '§';
+
+/// What is changed in cell-a, into what, and what is then said after the file and the line. Where another line is named than the changed one, it goes before, between two `@`.
+struct Case(&'static str, &'static str, &'static str);
+
+fn said(text: &str, folder: &Path) -> String {
+    Scene::parse(text, "scene.toml", folder).unwrap_err().to_string()
+}
+
+fn check(cases: &[Case]) {
+    let cell = Builtin::named("cell-a").unwrap().text;
+    let mut wrong = Vec::new();
+    for Case(from, to, expected) in cases {
+        assert!(cell.contains(from), "cell-a has no '{from}'");
+        let text = cell.replacen(from, to, 1);
+        let (at, expected) = match expected.strip_prefix('@').and_then(|rest| rest.split_once('@')) {
+            Some((elsewhere, expected)) => (text.find(elsewhere).unwrap(), expected),
+            None => (text.find(HERE).unwrap(), *expected),
+        };
+        let line = 1 + text[..at].matches('\n').count();
+        let expected = format!("scene.toml: line {line}: {expected}");
+        let said = said(&text.replace(HERE, ""), "".as_ref());
+        if said != expected {
+            wrong.push(format!("expected {expected}\n     got {said}"));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn form() {
+    check(&[
+        Case("[rates]", "[rate§s", "unclosed table, expected `]`"),
+        Case(
+            "[safety]",
+            "[safty§]",
+            "safty: unknown field `safty`, expected one of `name`, `description`, `specimen`, `placement`, `organ`, `tissue`, `rates`, `arm`, `port`, `instrument`, `gravity_error`, `camera`, `task`, `safety`; did you mean `safety`?",
+        ),
+        Case(
+            "hole_diameter_mm = 6.0",
+            "hole_diamter_mm = 6.0§",
+            "port[0].hole_diamter_mm: unknown field `hole_diamter_mm`, expected one of `name`, `centre_m`, `normal`, `hole_diameter_mm`, `sheet_thickness_mm`; did you mean `hole_diameter_mm`?",
+        ),
+        Case(
+            "control_hz = 30 ",
+            "control_hz = 30.5§ ",
+            "rates.control_hz: invalid type: floating point `30.5`, expected u32",
+        ),
+        Case("control_hz = 30 ", "control_hz = -30§ ", "rates.control_hz: invalid value: integer `-30`, expected u32"),
+        Case("seed = 1", "seed = 1\nseed = 2§", "duplicate key"),
+        Case(
+            "name = \"cutter\"\nkind = \"cutter\"",
+            "name = \"cutter\"\nkind = \"scissors\"§",
+            "instrument[1].kind: unknown variant `scissors`, expected `grasper` or `cutter`; did you mean `cutter`?",
+        ),
+        Case(
+            "normal = [0.0, 0.0, 1.0]        #",
+            "normal = [0.0, 1.0]§ #",
+            "port[0].normal: invalid length 2, expected an array of length 3",
+        ),
+        Case(
+            "name = \"left\"\nmodel",
+            "name = \"middle\"§\nmodel",
+            "arm[0].name: unknown variant `middle`, expected `left` or `right`; did you mean `right`?",
+        ),
+    ]);
+}
+
+#[test]
+fn units() {
+    check(&[
+        Case(
+            "hole_diameter_mm = 6.0",
+            "hole_diameter_mm = 0.006§",
+            "port[0].hole_diameter_mm is 0.006; 1 to 50 mm; 0.006 m is 6 mm",
+        ),
+        Case(
+            "centre_m = [-0.045, 0.46, 0.16]",
+            "centre_m = [-50, 460, 130]§",
+            "port[0].centre_m[0] is -50; -5 to 5 m; -50 mm is -0.05 m",
+        ),
+        Case(
+            "tilt_deg = 13.3",
+            "tilt_deg = 0.2321§",
+            "arm[0].start.tilt_deg is 0.2321; 0, or 1 to 33.5 degrees, where the shaft fills the hole, less the variation of 1; 0.2321 rad is 13.2984 degrees",
+        ),
+        Case(
+            "jaw_max_angle_deg = 60.0",
+            "jaw_max_angle_deg = 1.0472§",
+            "instrument[0].jaw_max_angle_deg is 1.0472; 5 to 120 degrees; 1.0472 rad is 60.0001 degrees",
+        ),
+        Case(
+            "width_deg = 86.2",
+            "width_deg = 1.5045§",
+            "camera[0].lens.width_deg is 1.5045; 5 to 170 degrees; 1.5045 rad is 86.2015 degrees",
+        ),
+        Case(
+            "mass_kg = 0.4793",
+            "mass_kg = 479.3§",
+            "instrument[0].mass_kg is 479.3; 0.005 to 10 kg; 479.3 g is 0.4793 kg",
+        ),
+        Case(
+            "joint_friction_nm = 0.2",
+            "joint_friction_nm = 200§",
+            "gravity_error.joint_friction_nm is 200; 0 to 20 N m; 200 N mm is 0.2 N m",
+        ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.material]\nyoung_modulus_pa = 30§\n[organ.cecum.pins]",
+            "organ.cecum.material.young_modulus_pa is 30; 100 to 1e9 Pa; 30 kPa is 30000 Pa",
+        ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.cecum.material]\ndensity_kg_m3 = 1.2§\n[organ.cecum.pins]",
+            "organ.cecum.material.density_kg_m3 is 1.2; 100 to 30000 kg/m3; 1.2 g/cm3 is 1200 kg/m3",
+        ),
+        Case(
+            "insertion_mm = 100.0",
+            "insertion_mm = 0.07§ ",
+            "arm[0].start.insertion_mm is 0.07; 21 to 321 mm; 0.07 m is 70 mm",
+        ),
+        Case("episode_s = 40.0", "episode_s = 40000§", "task.episode_s is 40000; 0.1 to 3600 s; 40000 ms is 40 s"),
+        Case(
+            "model = \"franka_fr3\"            #",
+            "model = \"franka_fr3\"\nposture_deg = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]§ #",
+            "arm[0].posture_deg[3] is -2.356; -174.299 to -8.6975 degrees; -2.356 rad is -134.989 degrees",
+        ),
+    ]);
+}
+
+#[test]
+fn numbers() {
+    check(&[
+        Case("episode_s = 40.0", "episode_s = nan§", "task.episode_s is NaN; 0.1 to 3600 s"),
+        Case(
+            "centre_m = [0.045, 0.46, 0.16]",
+            "centre_m = [0.045, inf, 0.16]§",
+            "port[1].centre_m[1] is inf; -5 to 5 m",
+        ),
+        Case(
+            "position_m = [-0.012, 0.48, 0.17]",
+            "position_m = [-0.012, 0.48, nan]§",
+            "placement.position_m[2] is NaN; -5 to 5 m",
+        ),
+        Case("lift_mm = 8.0", "lift_mm = -8.0§", "task.gates.lift_mm is -8; 0.1 to 100 mm"),
+        Case(
+            "sheet_thickness_mm = 2.0",
+            "sheet_thickness_mm = 1e300§",
+            "port[0].sheet_thickness_mm is 1e300; 0 to 50 mm",
+        ),
+        Case("jaw_force_n = 0.5", "jaw_force_n = 0§", "instrument[0].jaw_force_n is 0; 0.01 to 40 N"),
+        Case("friction = 0.6\nfiltered", "friction = -0.6§\nfiltered", "tissue.friction is -0.6; 0 to 5"),
+        Case("jaw = 0.5", "jaw = 30§", "arm[0].start.jaw is 30; 0 to 1"),
+        Case("control_hz = 30 ", "control_hz = 0§ ", "rates.control_hz is 0; 1 to 1000 Hz"),
+        Case("size_px = [848, 480]", "size_px = [0, 480]§", "camera[1].size_px[0] is 0; 1 to 8192 px"),
+        Case("link_mass_share = 0.02", "link_mass_share = 2§", "gravity_error.link_mass_share is 2; -0.5 to 0.5"),
+        Case(
+            "rotation_wxyz = [0.0, 1.0, 0.0, 0.0]",
+            "rotation_wxyz = [0.0, 2.0, 0.0, 0.0]§",
+            "placement.rotation_wxyz has length 2; a unit quaternion, scalar first: [0, 1, 0, 0]",
+        ),
+        Case(
+            "rotation_wxyz = [0.0, 1.0, 0.0, 0.0]",
+            "rotation_wxyz = [0.0, 0.0, 0.0, 0.0]§",
+            "placement.rotation_wxyz has length 0; a unit quaternion, scalar first",
+        ),
+        Case(
+            "rotation_wxyz = [0.7071067811865476, 0.0, 0.0, 0.7071067811865476]   #",
+            "rotation_wxyz = [nan, 0.0, 0.0, 1.0]§ #",
+            "arm[0].base.rotation_wxyz has length NaN; a unit quaternion, scalar first",
+        ),
+        Case(
+            "normal = [0.0, 0.0, 1.0]        #",
+            "normal = [0.0, 1.0, 1.0]§ #",
+            "port[0].normal has length 1.41421; a unit vector: [0, 0.707107, 0.707107]",
+        ),
+        Case(
+            "lens = { kind = \"field-of-view\", width_deg = 86.2, height_deg = 54.6 }",
+            "lens = { kind = \"opencv\", fx_px = -700, fy_px = 700, cx_px = 640, cy_px = 360 }§",
+            "camera[0].lens.fx_px is -700; 1 to 1000000 px",
+        ),
+        Case(
+            "lens = { kind = \"field-of-view\", width_deg = 86.2, height_deg = 54.6 }",
+            "lens = { kind = \"opencv\", fx_px = 700, fy_px = 700, cx_px = 640, cy_px = 360, distortion = [0.1, 0.2] }§",
+            "camera[0].lens.distortion has 2 coefficients; k1 k2 p1 p2 [k3 [k4 k5 k6]]: 4, 5 or 8",
+        ),
+        Case(
+            "target_m = [0.0, 0.456, 0.035]",
+            "target_m = [0.0, 0.42, 0.115]§",
+            "camera[0].view.target_m is where eye_m is; another point",
+        ),
+        Case(
+            "up = [0.0, 1.0, 0.0]",
+            "up = [0.0, 0.0, 1.0]§",
+            "camera[1].view.up has no direction across the view; the direction of the image's top",
+        ),
+        Case("share = 0.42", "share = 42§", "organ.cecum.pins.share is 42; 0 to 1"),
+        Case(
+            "length = 0.14",
+            "length = 0.84",
+            "@[organ.appendix.pins]@organ.appendix.pins has a length and a band_length of 1.14 together; at most 1",
+        ),
+        Case(
+            "name = \"default\"",
+            "name = \"default\"\ngains = { stiffness = -1.0 }§",
+            "arm[0].controller.gains.stiffness is -1; 0 or more, and finite",
+        ),
+    ]);
+}
+
+#[test]
+fn names() {
+    check(&[
+        Case(
+            "name = \"cell-a\"",
+            "name = \"Cell A\"§",
+            "name is 'Cell A'; lower-case letters, digits, '-' and '_', 1 to 64 of them",
+        ),
+        Case(
+            "phantom = \"phantom-a\"",
+            "phantom = \"phantom-q\"§",
+            "specimen.phantom is 'phantom-q'; the phantoms are: phantom-a, phantom-b, phantom-c; did you mean 'phantom-a'?",
+        ),
+        Case(
+            "phantom = \"phantom-a\" ",
+            "path = \"here\"\nphantom = \"phantom-a\" ",
+            "@[specimen]@specimen has a path and a phantom; one of them",
+        ),
+        Case("phantom = \"phantom-a\" ", "", "@[specimen]@specimen has neither a path nor a phantom; one of them"),
+        Case(
+            "phantom = \"phantom-a\" ",
+            "path = \"nowhere\"§ ",
+            "specimen.path is nowhere, which is no specimen; a folder with a specimen.toml",
+        ),
+        Case(
+            "[organ.cecum.pins]",
+            "[organ.caecum.pins]§",
+            "organ.caecum names 'caecum'; the specimen's organs are: cecum, bowel-1, bowel-2, bowel-3, stomach, appendix; did you mean 'cecum'?",
+        ),
+        Case(
+            "filtered_pairs = []",
+            "filtered_pairs = [[\"stomach\", \"fild\"]]§",
+            "tissue.filtered_pairs[0][1] is 'fild'; a pair is of the specimen's organs and the field: cecum, bowel-1, bowel-2, bowel-3, stomach, appendix, field; did you mean 'field'?",
+        ),
+        Case(
+            "filtered_pairs = []",
+            "filtered_pairs = [[\"stomach\", \"field\"], [\"field\", \"stomach\"]]§",
+            "tissue.filtered_pairs[1] is the pair of tissue.filtered_pairs[0] again; once is enough",
+        ),
+        Case(
+            "filtered_pairs = []",
+            "filtered_pairs = [[\"field\", \"field\"]]§",
+            "tissue.filtered_pairs[0] is 'field' twice; two organs, or an organ and the field",
+        ),
+        Case(
+            "organ = \"appendix\"",
+            "organ = \"apendix\"§",
+            "task.organ is 'apendix'; the specimen's organs are: cecum, bowel-1, bowel-2, bowel-3, stomach, appendix; did you mean 'appendix'?",
+        ),
+        Case(
+            "port = \"left\"",
+            "port = \"lft\"§",
+            "arm[0].port is 'lft'; the ports are: left, right; did you mean 'left'?",
+        ),
+        Case(
+            "instrument = \"cutter\"",
+            "instrument = \"cuter\"§",
+            "arm[1].instrument is 'cuter'; the instruments are: grasper, cutter; did you mean 'cutter'?",
+        ),
+        Case(
+            "name = \"right\"\ncentre",
+            "name = \"left\"§\ncentre",
+            "port[1].name is 'left', as that of port[0] is; names are unique",
+        ),
+        Case(
+            "name = \"cutter\"\nkind",
+            "name = \"grasper\"§\nkind",
+            "instrument[1].name is 'grasper', as that of instrument[0] is; names are unique",
+        ),
+        Case(
+            "name = \"right\"\nmodel",
+            "name = \"left\"§\nmodel",
+            "arm[1].name is 'left', as that of arm[0] is; names are unique",
+        ),
+        Case(
+            "name = \"d405\"",
+            "name = \"endoscope\"§",
+            "camera[1].name is 'endoscope', as that of camera[0] is; names are unique",
+        ),
+        Case(
+            "model = \"franka_fr3\"            #",
+            "model = \"franka_fr4\"§ #",
+            "arm[0].model is 'franka_fr4'; franka_fr3, or a file that ends in .urdf, .xml or .mjcf",
+        ),
+        Case(
+            "model = \"franka_fr3\"            #",
+            "model = \"../arms/absent.urdf\"§ #",
+            "arm[0].model is ../arms/absent.urdf, which is no file; a path from the scene file's folder",
+        ),
+        Case(
+            "model = \"franka_fr3\"            #",
+            "model = \"franka_fr3\"\nposture_deg = [0.0]§ #",
+            "arm[0].posture_deg has 1 angles; an FR3 has 7 joints",
+        ),
+    ]);
+}
+
+#[test]
+fn parts_fit() {
+    check(&[
+        Case(
+            "physics_hz = 480",
+            "physics_hz = 500§",
+            "rates.physics_hz is 500, no multiple of control_hz, 30; a multiple, such as 480",
+        ),
+        Case(
+            "shaft_diameter_mm = 5.0",
+            "shaft_diameter_mm = 8.0",
+            "@instrument = \"grasper\"@arm[0].instrument is 'grasper', whose shaft of 8 mm does not go through the hole of 6 mm of port 'left'; a thinner shaft or a larger hole",
+        ),
+        Case(
+            "tilt_deg = 18.3",
+            "tilt_deg = 34§",
+            "arm[1].start.tilt_deg is 34; 0, or 1 to 33.5 degrees, where the shaft fills the hole, less the variation of 1",
+        ),
+        Case(
+            "tilt_deg = 18.3",
+            "tilt_deg = 33§",
+            "arm[1].start.tilt_deg is 33; 0, or 1 to 33.5 degrees, where the shaft fills the hole, less the variation of 1",
+        ),
+        Case(
+            "centre_m = [-0.045, 0.46, 0.16]",
+            "centre_m = [-0.045, 0.96, 0.16]",
+            "@port = \"left\"@arm[0].port is 'left', which is out of reach: the flange would start 1.024 m from the shoulder; at most 0.855 m",
+        ),
+        Case(
+            "position_m = [0.45, 0.0, 0.0]",
+            "position_m = [-0.3, 0.0, 0.0]§",
+            "arm[1].base.position_m is 0.15 m from that of arm[0]; bases are 0.2 m or more apart",
+        ),
+        Case(
+            "centre_m = [0.045, 0.46, 0.16]",
+            "centre_m = [-0.043, 0.46, 0.16]§",
+            "port[1].centre_m is 2 mm from that of port[0]; holes do not overlap",
+        ),
+        Case("port = \"right\"", "port = \"left\"§", "arm[1].port is 'left', which arm[0] has; each its own"),
+        Case(
+            "instrument = \"cutter\"",
+            "instrument = \"grasper\"§",
+            "arm[1].instrument is 'grasper', which arm[0] has; each its own",
+        ),
+        Case(
+            "kind = \"cutter\"",
+            "kind = \"grasper\"",
+            "@name = \"appendix-resection\"@task.name is 'appendix-resection', but no arm has a cutter; an arm with a cutter",
+        ),
+        Case("grasp_to = 0.70", "grasp_to = 0.20§", "task.gates.grasp_to is 0.2; above grasp_from, 0.3"),
+        Case("cut_open = 0.50", "cut_open = 0.10§", "task.gates.cut_open is 0.1; above cut_closed, 0.15"),
+        Case("rcm_abort_mm = 5.0", "rcm_abort_mm = 2.0§", "safety.rcm_abort_mm is 2; above rcm_threshold_mm, 3"),
+    ]);
+}
+
+#[test]
+fn long_lists() {
+    let camera =
+        |i| format!("[[camera]]\nname = 'c{i}'\nview = {{ kind = 'recording' }}\nlens = {{ kind = 'recording' }}\n");
+    let scene = |n: usize| {
+        let cameras: String = (0..n).map(camera).collect();
+        format!("name = 'many'\n[specimen]\nphantom = 'phantom-a'\n{cameras}")
+    };
+    Scene::parse(&scene(16), "scene.toml", "".as_ref()).unwrap();
+    assert_eq!(said(&scene(17), "".as_ref()), "scene.toml: line 4: camera has more than 16 entries; 16 or fewer");
+}
+
+#[test]
+fn files() {
+    let root = tempfile::tempdir().unwrap();
+    let path = root.path().join("scene.toml");
+    let read = |content: &[u8]| {
+        std::fs::write(&path, content).unwrap();
+        Scene::read_file(&path).unwrap_err().to_string().replace(&root.path().display().to_string(), "")
+    };
+    assert_eq!(read(&[b' '; (1 << 20) + 1]), "/scene.toml: larger than 1048576 bytes; a scene is a few thousand");
+    assert_eq!(read(&[0xff, 0xfe]), "/scene.toml: stream did not contain valid UTF-8");
+    assert_eq!(read(b""), "/scene.toml: line 1: missing field `name`");
+    let unknown = "no scene 'cell-b'; a TOML file, or one of the built-in scenes cell-a; did you mean 'cell-a'?";
+    assert_eq!(Scene::read("cell-b").unwrap_err().to_string(), unknown);
+    let absent = Scene::read("absent/scene.toml").unwrap_err().to_string();
+    assert_eq!(absent, "absent/scene.toml: No such file or directory (os error 2)");
+    // What a scene names starts from its own folder, and its organs are known.
+    let specimen = root.path().join("specimens/rabbit");
+    std::fs::create_dir_all(&specimen).unwrap();
+    std::fs::create_dir_all(root.path().join("scenes")).unwrap();
+    let facts = "{ nodes = 4, tets = 1, watertight = true, inverted = 0, min_dihedral_deg = 60.0, median_dihedral_deg = 60.0, median_edge_mm = 2.0, volume_cm3 = 1.0 }";
+    let text = format!(
+        "name = 'rabbit'\nup = [0, 0, -1]\nplacement = {{ rotation_wxyz = [1, 0, 0, 0], translation_m = [0, 0, 0] }}\nprovenance = {{ source = 's', input_hash = '0', program = 'p' }}\n[[organ]]\nname = 'appendix'\nbase_m = [0, 0, 0]\nmaterial = {{ young_modulus_pa = 12e3, poisson_ratio = 0.45, density_kg_m3 = 1200 }}\npins = {{ rule = 'none' }}\nfacts = {facts}\n"
+    );
+    std::fs::write(specimen.join("specimen.toml"), text).unwrap();
+    let scene = |rest: &str| format!("name = 'mine'\n[specimen]\npath = '../specimens/rabbit'\n{rest}");
+    let folder = root.path().join("scenes");
+    let good = Scene::parse(&scene(""), "scene.toml", &folder).unwrap();
+    assert_eq!(good.organ_names().unwrap(), ["appendix"]);
+    assert_eq!(
+        said(&scene("[organ.apendix.pins]\nrule = 'none'\n"), &folder),
+        "scene.toml: line 4: organ.apendix names 'apendix'; the specimen's organs are: appendix; did you mean 'appendix'?"
+    );
+    std::fs::write(specimen.join("specimen.toml"), "name = 3").unwrap();
+    let spoiled = Scene::parse(&scene(""), "scene.toml", &folder).unwrap_err().to_string();
+    assert!(spoiled.contains("specimen.toml: line 1: name: invalid type"), "{spoiled}");
+}

@@ -1,0 +1,53 @@
+//! `trocar scene`: what it prints is right for people and for machines, and mistakes give one line and exit code 2.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+use std::process::{Command, Output};
+
+fn trocar(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_trocar")).args(arguments).output().unwrap()
+}
+
+fn printed(arguments: &[&str]) -> String {
+    let output = trocar(arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+#[test]
+fn what_is_shown_is_in_order() {
+    assert!(printed(&["scene", "list"]).starts_with("cell-a: "));
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("mine.toml");
+    let path = file.to_str().unwrap();
+    for form in [&["scene", "show", "cell-a"][..], &["scene", "show", "cell-a", "--canonical"]] {
+        std::fs::write(&file, printed(form)).unwrap();
+        let text = printed(&["scene", "check", path]);
+        assert!(text.contains("is in order: scene 'cell-a', task appendix-resection"), "{text}");
+        let checked: serde_json::Value = serde_json::from_str(&printed(&["scene", "check", path, "--json"])).unwrap();
+        assert_eq!(checked["arms"], serde_json::json!(["left", "right"]));
+        assert_eq!(checked["organs"].as_array().unwrap().len(), 6);
+    }
+    let shown: serde_json::Value = serde_json::from_str(&printed(&["scene", "show", path, "--json"])).unwrap();
+    assert_eq!(shown["port"][0]["hole_diameter_mm"], 6.0);
+    let schema: serde_json::Value = serde_json::from_str(&printed(&["scene", "schema"])).unwrap();
+    assert!(schema["properties"]["arm"].is_object());
+}
+
+#[test]
+fn mistakes_are_one_line() {
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("bad.toml");
+    let text = "name = 'bad'\n[specimen]\nphantom = 'phantom-a'\n[safety]\nrcm_abort_mm = 0.005\n";
+    std::fs::write(&file, text).unwrap();
+    let path = file.to_str().unwrap();
+    let expected = format!("error: {path}: line 5: safety.rcm_abort_mm is 0.005; 0.01 to 50 mm; 0.005 m is 5 mm\n");
+    for action in ["check", "show"] {
+        let output = trocar(&["scene", action, path]);
+        assert_eq!(output.status.code(), Some(2));
+        assert_eq!(String::from_utf8_lossy(&output.stderr), expected);
+        assert!(output.stdout.is_empty());
+    }
+    let unknown = trocar(&["scene", "show", "cell-b"]);
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("did you mean 'cell-a'?"));
+}
