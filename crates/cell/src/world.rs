@@ -13,7 +13,7 @@ use trocar_tissue::{
 pub const FRAME: f64 = 1.0 / 60.0;
 
 /// Standard gravity [m/s2].
-const GRAVITY: f64 = 9.80665;
+pub(crate) const GRAVITY: f64 = 9.80665;
 
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
