@@ -175,7 +175,11 @@ impl Resection {
         let name = world.model.bodies()[organ].name().to_owned();
         if pieces.is_empty() {
             r.outcome = "no tissue";
-            let why = if r.between_blades_mm3 > 0.0 { "too little of it lies beyond them" } else { "they met no tissue of it" };
+            let why = if r.between_blades_mm3 > 0.0 {
+                "too little of it lies beyond them"
+            } else {
+                "they met no tissue of it"
+            };
             r.said = format!("the blades closed at s = {:.2} of the {name} and nothing was cut: {why}", r.aimed_at);
             return Ok(());
         }
@@ -226,12 +230,12 @@ impl Resection {
         self.through = cut.parts(end(|a, b| a < b), end(|a, b| a > b));
         (r.outcome, r.said) = said(&name, r, self.through);
         self.cut = Some(cut);
-        self.carry(world, hold, jaws);
+        self.start_counting(world, hold, jaws);
         Ok(())
     }
 
     /// From here on rise and slip are counted.
-    pub fn carry(&mut self, world: &World, hold: &Hold, jaws: &Pose) {
+    fn start_counting(&mut self, world: &World, hold: &Hold, jaws: &Pose) {
         self.jaw_height = jaws.translation.dot(world.up);
         self.held_height = hold.now(world).dot(world.up);
         self.held_in_jaw = jaws.inverse().transform(hold.now(world));

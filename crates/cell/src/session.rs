@@ -194,11 +194,6 @@ impl<'a> Session<'a> {
                     self.resection = Some(Resection::plan(&self.world, hold, at, target.reach)?);
                 }
             }
-            Phase::Carry => {
-                if let (Some(resection), Some(hold)) = (&mut self.resection, &self.hold) {
-                    resection.carry(&self.world, hold, &self.gripper.pose);
-                }
-            }
             _ => {}
         }
         Ok(())

@@ -10,6 +10,7 @@ pub(crate) mod phantoms;
 mod reconstruction;
 mod settling;
 mod step_ladder;
+mod trials;
 
 pub use appendix::AppendixSource;
 pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult};
@@ -25,6 +26,7 @@ pub use reconstruction::{PhantomFigures, ReconstructionExperiment, Reconstructio
 pub(crate) use settling::SETTLED;
 pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
 pub use step_ladder::StepRow;
+pub use trials::Resumed;
 
 use crate::{Error, Result};
 use std::path::Path;
