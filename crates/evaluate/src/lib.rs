@@ -22,7 +22,8 @@ pub use experiment::{
     AppendixSource, ConvergenceCase, ConvergenceExperiment, ConvergenceResult, ElementQualityExperiment,
     ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial,
     IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PhantomFigures, ReconstructionExperiment,
-    ReconstructionResult, ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
+    ReconstructionResult, ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow,
+    StepRow,
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};

@@ -393,7 +393,7 @@ fn a_cut_is_shown_with_its_pieces() {
     // Its base is at the far left.
     s.organs[0].base -= 0.036 * DVec3::X;
     s.organs[0].pins = Pins::End { end: End::Base, length: 0.2, band_length: 0.0, band_share: 0.0 };
-    let task = GraspLift { at: 0.8, sever: Some(SeverAt::Between), snapshot_every: 8, ..GraspLift::default() };
+    let task = GraspLift { at: 0.8, sever: Some(SeverAt::Between), snapshot_every: 20, ..GraspLift::default() };
     let run = task.run(&s, &Silent).unwrap();
     let sever = run.summary.sever.as_ref().unwrap();
     assert_eq!(sever.outcome, "severed", "{sever:?}");
@@ -407,8 +407,6 @@ fn a_cut_is_shown_with_its_pieces() {
     let mut torn = run.clone();
     torn.snapshots.last_mut().unwrap().nodes[0].pop();
     assert!(report::grasp_lift(&s, &torn, None).unwrap_err().to_string().contains("not of specimen"));
-    torn.snapshots.clear();
-    assert!(report::grasp_lift(&s, &torn, None).unwrap().contains("appendix.1"), "figures need no pictures");
 }
 
 #[test]

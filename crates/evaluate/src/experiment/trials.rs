@@ -256,10 +256,17 @@ mod tests {
         let items: Vec<usize> = (0..12).collect();
         let count = AtomicUsize::new(0);
         let trials = Trials::open(folder, "test", settings).unwrap();
-        let outcome = trials.run("trials", &items, |k| format!("trial {k}"), 2, progress, |k, _| {
-            count.fetch_add(1, Ordering::SeqCst);
-            Ok(row(*k))
-        });
+        let outcome = trials.run(
+            "trials",
+            &items,
+            |k| format!("trial {k}"),
+            2,
+            progress,
+            |k, _| {
+                count.fetch_add(1, Ordering::SeqCst);
+                Ok(row(*k))
+            },
+        );
         (outcome, count.into_inner())
     }
 

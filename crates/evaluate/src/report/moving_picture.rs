@@ -6,7 +6,7 @@ use super::views::{self, Directions, View};
 use crate::{Error, Result};
 use color_quant::NeuQuant;
 use glam::DVec3;
-use trocar_cell::{CutOrgan, GraspLiftRun, Gripper, Snapshot};
+use trocar_cell::{CUT_OPENED, CutOrgan, GraspLiftRun, Gripper, Snapshot};
 use trocar_geometry::Skin;
 use trocar_render::{Instance, Scene, Shading};
 use trocar_specimen::Specimen;
@@ -107,9 +107,10 @@ impl<'a> Lift<'a> {
         self.run.snapshots.last().unwrap_or(&self.run.snapshots[0])
     }
 
-    /// The last snapshot before the cutter's blades begin to close.
+    /// The last snapshot before the cut in which the cutter's blades are open.
     pub(super) fn before_cut(&self) -> Option<&'a Snapshot> {
-        self.run.snapshots.iter().rfind(|s| phase_at(self.run, s.time_s) == Some("reach"))
+        let open = |s: &&Snapshot| !s.cut && s.cutter.is_some_and(|cutter| cutter.jaw_angle > CUT_OPENED);
+        self.run.snapshots.iter().rfind(open)
     }
 
     /// The organ that was cut, if it is in pieces in `snapshot`.

@@ -91,10 +91,7 @@ impl Plot<'_> {
             .margin_right(14)
             .x_label_area_size(46)
             .y_label_area_size(60)
-            .build_cartesian_2d(
-                Axis::new(self.log_x, x0, x1, 9),
-                Axis::new(self.log_y, y0, y1, 6),
-            )
+            .build_cartesian_2d(Axis::new(self.log_x, x0, x1, 9), Axis::new(self.log_y, y0, y1, 6))
             .map_err(|e| e.to_string())?;
         for (i, band) in self.bands.iter().enumerate().filter(|(_, b)| b.to > b.from) {
             let (a, b) = (band.from.clamp(x0, x1), band.to.clamp(x0, x1));

@@ -58,7 +58,17 @@ pub(super) fn sections(s: &Specimen, run: &GraspLiftRun) -> Result<(String, Stri
     if let Some(lift) = &lift {
         let gif = lift.gif()?;
         let (w, h) = moving_picture::SIZE;
-        let moving = figures::img_of_bytes("gif", &gif, w, h, if run.summary.sever.is_some() { "the organ is grasped, lifted, held and cut" } else { "the organ is grasped, lifted, held and lowered" });
+        let moving = figures::img_of_bytes(
+            "gif",
+            &gif,
+            w,
+            h,
+            if run.summary.sever.is_some() {
+                "the organ is grasped, lifted, held and cut"
+            } else {
+                "the organ is grasped, lifted, held and lowered"
+            },
+        );
         let pace = lift.pace();
         let pace = if (pace - 1.0).abs() < 0.1 {
             "in real time".to_owned()
@@ -97,7 +107,10 @@ pub(super) fn sections(s: &Specimen, run: &GraspLiftRun) -> Result<(String, Stri
     } else {
         "The gripper closes on the organ, lifts it, holds it, lowers it and lets go."
     };
-    let lead = run.summary.force_advice().map_or(lead.to_owned(), |advice| format!("{lead} <b>Note:</b> {}.", page::escape(&advice)));
+    let lead = run
+        .summary
+        .force_advice()
+        .map_or(lead.to_owned(), |advice| format!("{lead} <b>Note:</b> {}.", page::escape(&advice)));
     let mut after = String::new();
     if let Some(sever) = &run.summary.sever {
         after = severed::section(s, sever, lift.as_ref())?;

@@ -60,9 +60,8 @@ impl<'a> CutSkin<'a> {
         let bared = sorted(&cut.faces);
         let (shell, nodes) = body.boundary();
         let faces = shell.triangles.iter().map(|t| t.map(|v| nodes[v as usize]));
-        let rim: Vec<[u32; 3]> = faces
-            .filter(|f| f.iter().all(|i| rim_node[*i as usize]) && !bared.contains(&key(f)))
-            .collect();
+        let rim: Vec<[u32; 3]> =
+            faces.filter(|f| f.iter().all(|i| rim_node[*i as usize]) && !bared.contains(&key(f))).collect();
         let mut tint = vec![color; cut.parents.len()];
         if organ.surface.colors.len() == organ.surface.vertices.len() {
             let mut wanted: Vec<u32> = rim.iter().flatten().copied().collect();
@@ -132,13 +131,37 @@ fn add(mesh: &mut TriMesh, faces: &[[u32; 3]], nodes: &[DVec3], color: impl Fn(u
 pub(super) fn section(specimen: &Specimen, s: &Severance, lift: Option<&Lift<'_>>) -> Result<String> {
     let went_through = s.outcome == "severed";
     let mut body = page::cards(&[
-        Card::new("Outcome", s.outcome, format!("at s = {}", fixed(if s.faces > 0 { s.at } else { s.aimed_at }, 2))).met(went_through),
-        Card::new("Pieces", count(s.pieces.len().max(1)), s.pieces.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join(", ")),
-        Card::new("Held on", if s.held { "yes" } else { "no" }, format!("jaws rose {} mm, tissue in them {} mm", fixed(s.jaw_rise_mm, 1), fixed(s.held_rise_mm, 1))).met(s.held),
-        Card::new("Cut face", format!("{} mm\u{b2}", fixed(s.area_mm2, 0)), format!("{} faces, one side", count(s.faces))),
-        Card::new("Volume kept", format!("{:.0e}", s.volume_error), format!("{} mm\u{b3} before; off by this share", fixed(s.volume_before_mm3, 0))).met(s.volume_error < 1e-6),
-        Card::new("Inverted since", count(s.inverted_after.max(s.inverted_peak)), "elements in any frame").met(s.inverted_after.max(s.inverted_peak) == 0),
-        Card::new("Blades", format!("{} to {} rad", fixed(s.opened_rad, 2), fixed(s.closed_rad, 2)), format!("closed {} s into the run", fixed(s.time_s, 2))),
+        Card::new("Outcome", s.outcome, format!("at s = {}", fixed(if s.faces > 0 { s.at } else { s.aimed_at }, 2)))
+            .met(went_through),
+        Card::new(
+            "Pieces",
+            count(s.pieces.len().max(1)),
+            s.pieces.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join(", "),
+        ),
+        Card::new(
+            "Held on",
+            if s.held { "yes" } else { "no" },
+            format!("jaws rose {} mm, tissue in them {} mm", fixed(s.jaw_rise_mm, 1), fixed(s.held_rise_mm, 1)),
+        )
+        .met(s.held),
+        Card::new(
+            "Cut face",
+            format!("{} mm\u{b2}", fixed(s.area_mm2, 0)),
+            format!("{} faces, one side", count(s.faces)),
+        ),
+        Card::new(
+            "Volume kept",
+            if s.volume_error > 0.0 { format!("to {:.0e}", s.volume_error) } else { "to the bit".to_owned() },
+            format!("{} mm\u{b3} before and after", fixed(s.volume_before_mm3, 0)),
+        )
+        .met(s.volume_error < 1e-6),
+        Card::new("Inverted since", count(s.inverted_after.max(s.inverted_peak)), "elements in any frame")
+            .met(s.inverted_after.max(s.inverted_peak) == 0),
+        Card::new(
+            "Blades",
+            format!("{} to {} rad", fixed(s.opened_rad, 2), fixed(s.closed_rad, 2)),
+            format!("closed {} s into the run", fixed(s.time_s, 2)),
+        ),
         Card::new("Cost", format!("{} ms", fixed(s.cut_ms, 0)), "wall time of the cut, once"),
     ]);
     if let Some(lift) = lift {
@@ -147,11 +170,26 @@ pub(super) fn section(specimen: &Specimen, s: &Severance, lift: Option<&Lift<'_>
     if !s.pieces.is_empty() {
         body += &pieces(s);
     }
-    Ok(page::section("The cut", &page::escape(&format!("{}.", s.said)), &body))
+    // A sentence begins with a capital on the page.
+    let mut said = s.said.clone();
+    if let Some(first) = said.get_mut(..1) {
+        first.make_ascii_uppercase();
+    }
+    Ok(page::section("The cut", &page::escape(&format!("{said}.")), &body))
 }
 
 fn pieces(s: &Severance) -> String {
-    let head = ["Piece", "s", "Nodes", "Pinned", "In the jaws", "Elements", "Volume before [mm\u{b3}]", "after [mm\u{b3}]", "Rose since [mm]"];
+    let head = [
+        "Piece",
+        "s",
+        "Nodes",
+        "Pinned",
+        "In the jaws",
+        "Elements",
+        "Volume before [mm\u{b3}]",
+        "after [mm\u{b3}]",
+        "Rose since [mm]",
+    ];
     let row = |p: &trocar_cell::SeveredPiece| {
         vec![
             p.name.clone(),
@@ -177,13 +215,20 @@ fn pictures(specimen: &Specimen, lift: &Lift<'_>, s: &Severance) -> Result<Strin
         all.push(page::figure(&img(&view, lift.surfaces(open), "the open cutter at the lifted organ")?, &caption));
     }
     let last = lift.last();
-    let end = if s.pieces.is_empty() { "<b>At the end.</b>" } else { "<b>At the end.</b> Dark red: what the cut laid bare." };
+    let end =
+        if s.pieces.is_empty() { "<b>At the end.</b>" } else { "<b>At the end.</b> Dark red: what the cut laid bare." };
     all.push(page::figure(&img(&view, lift.surfaces(last), "the organ at the end of the run")?, end));
     if let Some(cut) = lift.cut().filter(|_| last.cut) {
-        all.push(page::figure(&img(&view, lift.wires(last), "elements at the end of the run")?, "<b>Elements at the end;</b> faces that opened are reddish."));
+        all.push(page::figure(
+            &img(&view, lift.wires(last), "elements at the end of the run")?,
+            "<b>Elements at the end;</b> faces that opened are reddish.",
+        ));
         if let Some(view) = close_up(specimen, cut, last) {
             let picture = img(&view, lift.organs(last), "the stump's cut face, close up")?;
-            all.push(page::figure(&picture, "<b>Close up:</b> the face of what stayed behind, without the instruments."));
+            all.push(page::figure(
+                &picture,
+                "<b>Close up:</b> the face of what stayed behind, without the instruments.",
+            ));
         }
     }
     Ok(page::grid(Columns::Two, &all))

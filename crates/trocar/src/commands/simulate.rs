@@ -59,7 +59,7 @@ fn cut(s: &Severance) -> String {
         })
         .collect();
     format!(
-        "{}: s = {:.2} to {:.2}, {:.2} s into the run, {:.2} to {:.2} rad; volume {:.1} mm3 before, {:.1} after (off by {:.0e}); {} inverted; jaws went up {:.1} mm, tissue in them {:.1} mm: {}\n{}",
+        "{}: s = {:.2} to {:.2}, {:.2} s into the run, {:.2} to {:.2} rad; volume {:.1} mm3 before, {:.1} after (off by {:.0e} of it); {} inverted; jaws went up {:.1} mm, tissue in them {:.1} mm: {}\n{}",
         s.said,
         s.at_least,
         s.at_most,
