@@ -234,7 +234,7 @@ mod tests {
     fn row(item: usize) -> Row {
         // Values that decimal digits do not give exactly.
         let value = (item as f64 + 0.1).sqrt() * 1e-7;
-        Row { item, value, note: (item % 2 == 0).then(|| "ein \"Satz\"\nmit Umbruch".to_owned()) }
+        Row { item, value, note: item.is_multiple_of(2).then(|| "ein \"Satz\"\nmit Umbruch".to_owned()) }
     }
 
     /// Asks to stop once `0` trials are done.
@@ -296,7 +296,7 @@ mod tests {
         let lines = |bytes: &[u8]| bytes.iter().filter(|b| **b == b'\n').count();
         for length in 0..whole.len() {
             // Every place in the first lines, and some in all the others.
-            if length > 400 && length % 37 != 0 {
+            if length > 400 && !length.is_multiple_of(37) {
                 continue;
             }
             std::fs::write(&file, &whole[..length]).unwrap();
