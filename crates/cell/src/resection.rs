@@ -281,29 +281,45 @@ impl Resection {
 fn between(world: &World, organ: usize, held: &[u32]) -> Result<f64> {
     let (body, axis) = (&world.model.bodies()[organ], &world.axes[organ]);
     let of = |i: usize| axis.s[i];
-    let middle = held.iter().map(|i| of(*i as usize)).sum::<f64>() / held.len().max(1) as f64;
+    let held: Vec<f64> = held.iter().map(|i| of(*i as usize)).collect();
     let pins: Vec<f64> = (0..body.len()).filter(|i| body.pinned()[*i]).map(of).collect();
+    place(&held, &pins, axis.length).map_err(|room| {
+        Error::Option(format!(
+            "no room to cut the {} between the grasp at s = {:.2} and what holds it: {:.1} mm, and {:.0} are needed; grasp farther away with --at, or say where to cut with --sever=S",
+            body.name(),
+            mean(&held),
+            1e3 * room,
+            1e3 * LEAST_ROOM
+        ))
+    })
+}
+
+/// The same for organ coordinates of held and pinned nodes and the organ's length [m]; the room there is [m] where that is too little.
+fn place(held: &[f64], pins: &[f64], length: f64) -> std::result::Result<f64, f64> {
+    let middle = mean(held);
     let towards_base = pins.iter().filter(|s| **s < middle).count();
     let towards_tip = pins.iter().filter(|s| **s > middle).count();
     let to_base = towards_base >= towards_tip;
-    // Counted from the grasp towards what holds the organ.
-    let along = |s: f64| if to_base { middle - s } else { s - middle } * axis.length;
-    let begins = held.iter().map(|i| along(of(*i as usize))).fold(0.0, f64::max) + LEAST_ROOM;
+    // Counted from the grasp towards what holds the organ [m].
+    let along = |s: f64| if to_base { middle - s } else { s - middle } * length;
+    let grasp_ends = held.iter().map(|s| along(*s)).fold(0.0, f64::max);
     let end = along(if to_base { 0.0 } else { 1.0 });
-    let one_sided = towards_base == 0 || towards_tip == 0;
-    let nearest_pin = pins.iter().map(|s| along(*s)).filter(|d| *d > 0.0).fold(end, f64::min);
-    let (ends, wanted) =
-        if one_sided { (nearest_pin, 0.5 * (begins - LEAST_ROOM + nearest_pin)) } else { (end, begins + BESIDE) };
-    if begins > ends {
-        return Err(Error::Option(format!(
-            "no room to cut the {} between the grasp at s = {middle:.2} and what holds it: {:.1} mm, and {:.0} are needed; grasp farther away with --at, or say where to cut with --sever=S",
-            body.name(),
-            1e3 * (ends - begins + LEAST_ROOM).max(0.0),
-            1e3 * LEAST_ROOM
-        )));
+    let (room_ends, wanted) = if towards_base == 0 || towards_tip == 0 {
+        let pin = pins.iter().map(|s| along(*s)).filter(|d| *d > 0.0).fold(end, f64::min);
+        (pin, 0.5 * (grasp_ends + pin))
+    } else {
+        (end, grasp_ends + LEAST_ROOM + BESIDE)
+    };
+    if grasp_ends + LEAST_ROOM > room_ends {
+        return Err((room_ends - grasp_ends).max(0.0));
     }
-    let at = wanted.clamp(begins, ends) / axis.length;
+    let at = wanted.clamp(grasp_ends + LEAST_ROOM, room_ends) / length;
     Ok((middle + if to_base { -at } else { at }).clamp(0.0, 1.0))
+}
+
+/// The mean; 0 of nothing.
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// Name of the outcome, and a sentence of it.
@@ -325,4 +341,25 @@ fn said(name: &str, r: &Severance, through: bool) -> (&'static str, String) {
         r.pieces.len()
     );
     ("severed", text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_cut_lies_between_the_grasp_and_what_holds_the_organ() {
+        let held = [0.65, 0.75];
+        let near = |found: std::result::Result<f64, f64>, right: f64| found.is_ok_and(|s| (s - right).abs() < 1e-9);
+        // 100 mm long; half way to the nearest pin on the one side that has any.
+        assert!(near(place(&held, &[0.1, 0.45], 0.1), 0.55));
+        assert!(near(place(&held, &[0.95], 0.1), 0.85));
+        assert!(near(place(&held, &[], 0.1), 0.325), "unpinned, on its base's side");
+        // Pinned on both sides: 11 mm from the tissue in the jaws, or at the end.
+        assert!(near(place(&held, &[0.1, 0.5, 0.6, 0.9], 0.1), 0.54));
+        assert!(near(place(&[0.04, 0.06], &[0.02, 0.03, 0.9], 0.1), 0.0));
+        // 2 mm of room are too few.
+        assert!(place(&held, &[0.63], 0.1).is_err_and(|room| (room - 0.002).abs() < 1e-9));
+        assert!(near(place(&held, &[0.61], 0.1), 0.62), "3 mm from the grasp at least");
+    }
 }
