@@ -72,7 +72,7 @@ fn test() -> ExitCode {
 /// Runs the tests named `damage_never_panics` of all crates; each takes its share of the cases.
 fn fuzz(cases: usize) -> ExitCode {
     /// Crates with such a test.
-    const CRATES: [&str; 5] =
+    const CRATES: [&str; 6] =
         ["trocar-geometry", "trocar-messages", "trocar-recording", "trocar-robot", "trocar-scene", "trocar-specimen"];
     let share = cases.div_ceil(CRATES.len()).to_string();
     for name in CRATES {

@@ -1,12 +1,40 @@
 //! Scissors: what blades that close through tissue part.
 //!
 //! A cutter has the gripper's blades. Its cut is in the plane in which they swing, over their length and as wide as they were open. A tube across the blades is cut through where the mouth holds all of
-//! it, and in part otherwise.
+//! it, and in part otherwise. Its edges have no width: they push no tissue.
 
 use crate::gripper::{BLADE_TIP, MOUTH_BEGIN};
 use crate::{Gripper, Result, World};
 use glam::DVec3;
 use trocar_tissue::{Cut, Piece, sever};
+
+/// Blades that were open wider than this [rad] are ready to cut (SPEC E1) ...
+pub const CUT_OPENED: f64 = 0.50;
+
+/// ... and cut when they close to less than this [rad].
+pub const CUT_CLOSED: f64 = 0.15;
+
+/// Watches the blades of a cutter: a cut is made by blades that were open and close.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Scissors {
+    /// Widest angle [rad] since the last cut, if that is wide enough for the next.
+    opened: Option<f64>,
+}
+
+impl Scissors {
+    /// The cutter is at `gripper` now. When its blades have closed, after they were open, the gripper there with the blades as wide as they were: what lies between those is
+    /// cut ([`Gripper::cut`]). None otherwise; blades that close again without having opened cut nothing.
+    pub fn follow(&mut self, gripper: &Gripper) -> Option<Gripper> {
+        let angle = gripper.jaw_angle;
+        if angle < CUT_CLOSED {
+            return self.opened.take().map(|jaw_angle| Gripper { jaw_angle, ..*gripper });
+        }
+        if angle > CUT_OPENED {
+            self.opened = Some(self.opened.map_or(angle, |widest| widest.max(angle)));
+        }
+        None
+    }
+}
 
 impl Gripper {
     /// What its blades cut of body `body` when they close from where they are now.
@@ -46,5 +74,24 @@ impl World {
         }
         (self.model, self.state) = (severed.model, severed.state);
         Ok(severed.pieces)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MAX_ANGLE;
+
+    #[test]
+    fn scissors_cut_once_where_they_close_after_they_were_open() {
+        let at = |jaw_angle: f64| Gripper::over(DVec3::ZERO, DVec3::Z, DVec3::X, jaw_angle);
+        let cuts = |angles: &[f64]| {
+            let mut scissors = Scissors::default();
+            angles.iter().filter_map(|a| scissors.follow(&at(*a))).map(|g| g.jaw_angle).collect::<Vec<_>>()
+        };
+        assert_eq!(cuts(&[0.0, 0.49, 0.1, 0.0]), [0.0; 0], "never open");
+        assert_eq!(cuts(&[0.51, 0.15, 0.3]), [0.0; 0], "never closed");
+        assert_eq!(cuts(&[0.6, MAX_ANGLE, 0.7, 0.3, 0.149, 0.0, 0.2, 0.0]), [MAX_ANGLE], "as wide as they were, once");
+        assert_eq!(cuts(&[0.6, 0.0, 0.8, 0.0]), [0.6, 0.8]);
     }
 }

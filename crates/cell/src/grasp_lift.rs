@@ -1,10 +1,10 @@
 //! The grasp-lift task: settle, approach, close, lift 15 mm in 1 s, hold 1 s, lower, open.
 //!
 //! The gripper moves freely. Its blades and shaft touch the tissue; its jaws close with a force, and hold what is between them by one of the designs of
-//! [`GraspDesign`].
+//! [`GraspDesign`]. With a cut asked for, a second instrument parts the organ after the hold, and what came loose is lifted on.
 
 use crate::jaw::JAW_FORCE;
-use crate::{Error, GraspDesign, Gripper, Phase, Result, Sample, Session, Summary};
+use crate::{CutOrgan, Error, GraspDesign, Gripper, Phase, Result, Sample, Session, Summary};
 use glam::DVec3;
 use trocar_progress::Progress;
 use trocar_specimen::Specimen;
@@ -38,6 +38,8 @@ pub struct GraspLift {
     pub regrasp: Option<f64>,
     /// After the hold, lower what was lifted and let go of it.
     pub lower: bool,
+    /// After the hold, cut the organ between the grasp and what holds it, and lift on instead of lowering.
+    pub sever: Option<SeverAt>,
     /// Blades and shaft touch the tissue. Without, jaws stop where they would touch it.
     pub contact: bool,
     /// How a frame is stepped.
@@ -59,12 +61,22 @@ impl Default for GraspLift {
             approach_offset: 0.0,
             regrasp: None,
             lower: true,
+            sever: None,
             contact: true,
             schedule: Schedule::default(),
             threads: 0,
             snapshot_every: 0,
         }
     }
+}
+
+/// Where the organ is cut.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum SeverAt {
+    /// Half way between the grasp and the pinned part.
+    Between,
+    /// At an organ coordinate, 0 to 1.
+    S(f64),
 }
 
 /// Shapes at one instant, for pictures.
@@ -74,10 +86,14 @@ pub struct Snapshot {
     pub time_s: f64,
     /// Phase of the task.
     pub phase: Phase,
-    /// Node positions of each organ [m].
+    /// Node positions of each organ [m]; those of an organ that has been cut are [`CutOrgan::parents`]' copies.
     pub nodes: Vec<Vec<DVec3>>,
     /// The gripper.
     pub gripper: Gripper,
+    /// The cutter, while it is there.
+    pub cutter: Option<Gripper>,
+    /// The cut of [`GraspLiftRun::cut`] has been made.
+    pub cut: bool,
 }
 
 /// A finished run.
@@ -89,6 +105,8 @@ pub struct GraspLiftRun {
     pub samples: Vec<Sample>,
     /// Shapes, if asked for.
     pub snapshots: Vec<Snapshot>,
+    /// The organ that was cut, if any was.
+    pub cut: Option<CutOrgan>,
 }
 
 impl GraspLift {
@@ -132,6 +150,11 @@ impl GraspLift {
                 "--at is {}; the organ coordinate runs from 0 (base) to 1 (tip)",
                 self.at
             )));
+        }
+        if let Some(SeverAt::S(s)) = self.sever
+            && !(0.0..=1.0).contains(&s)
+        {
+            return Err(Error::Option(format!("--sever is {s}; the organ coordinate runs from 0 (base) to 1 (tip)")));
         }
         if !(self.lift > 0.0 && self.lift <= 0.1) {
             return Err(Error::Option(format!("--lift is {} mm; more than 0 and at most 100 mm", self.lift * 1e3)));

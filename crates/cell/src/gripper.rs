@@ -20,6 +20,8 @@ pub(crate) const MOUTH_BEGIN: f64 = 0.002;
 pub(crate) const BLADE_TIP: f64 = 0.021;
 pub(crate) const BLADE_WIDTH: f64 = 0.005;
 pub(crate) const BLADE_THICKNESS: f64 = 0.0032;
+/// Width of a cutter's blade [m].
+const CUTTER_WIDTH: f64 = 0.0012;
 pub(crate) const SHAFT_RADIUS: f64 = 0.0025;
 pub(crate) const SHAFT_LENGTH: f64 = 0.12;
 
@@ -65,18 +67,28 @@ impl Gripper {
 
     /// Surface of the shaft and the two blades in the world [m], for pictures.
     pub fn surface(&self) -> TriMesh {
+        self.surface_of(BLADE_WIDTH, BLADE_THICKNESS, 0.0)
+    }
+
+    /// The same of a cutter: two thin blades that pass each other.
+    pub fn cutter_surface(&self) -> TriMesh {
+        self.surface_of(CUTTER_WIDTH, BLADE_THICKNESS, 0.5 * CUTTER_WIDTH)
+    }
+
+    /// Blades of a width and thickness [m], each shifted by `aside` [m] along z, and the shaft.
+    fn surface_of(&self, width: f64, thickness: f64, aside: f64) -> TriMesh {
         let mut mesh = TriMesh::default();
         for side in [1.0, -1.0] {
             let swing = DQuat::from_rotation_z(side * 0.5 * self.jaw_angle);
             // The blade's inner face lies on the line from the pivot to the gap's edge; it narrows towards the tip.
             let section = |x: f64, thickness: f64, width: f64| {
                 [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 1.0)]
-                    .map(|(t, w)| swing * DVec3::new(x, side * t * thickness, 0.5 * w * width))
+                    .map(|(t, w)| swing * DVec3::new(x, side * t * thickness, 0.5 * w * width + side * aside))
             };
             let rings = [
-                section(-0.002, BLADE_THICKNESS, BLADE_WIDTH),
-                section(0.6 * BLADE_TIP, BLADE_THICKNESS, BLADE_WIDTH),
-                section(BLADE_TIP, 0.7 * BLADE_THICKNESS, 0.7 * BLADE_WIDTH),
+                section(-0.002, thickness, width),
+                section(0.6 * BLADE_TIP, thickness, width),
+                section(BLADE_TIP, 0.7 * thickness, 0.7 * width),
             ];
             loft(&mut mesh, &rings, side < 0.0);
         }

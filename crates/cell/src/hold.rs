@@ -3,6 +3,7 @@
 use crate::World;
 use glam::DVec3;
 use trocar_geometry::Pose;
+use trocar_tissue::Piece;
 
 /// The tissue that was in the jaws when they closed, and where it was.
 pub(crate) struct Hold {
@@ -29,9 +30,42 @@ impl Hold {
         Self { organ, nodes, centroid, centroid_in_jaw, jaw: pose.translation }
     }
 
+    /// The organ has been cut into `pieces` of bodies in `world`: goes on with the piece that has the most of the nodes. `pose` is the gripper's now, `was` their centroid before the cut [m].
+    pub fn follow(&mut self, world: &World, pieces: &[Piece], pose: &Pose, was: DVec3) {
+        let mut held = self.nodes.clone();
+        held.sort_unstable();
+        let of = |piece: &Piece| -> Vec<u32> {
+            let among = |k: &u32| held.binary_search(&piece.nodes[*k as usize]).is_ok();
+            (0..piece.nodes.len() as u32).filter(among).collect()
+        };
+        let mut most: Option<(usize, Vec<u32>)> = None;
+        for piece in pieces {
+            let nodes = of(piece);
+            if most.as_ref().is_none_or(|(_, best)| nodes.len() > best.len()) {
+                most = Some((piece.body, nodes));
+            }
+        }
+        let Some((organ, nodes)) = most.filter(|(_, nodes)| !nodes.is_empty()) else { return };
+        (self.organ, self.nodes) = (organ, nodes);
+        // Nodes that were left to other pieces do not count as motion.
+        let shift = self.now(world) - was;
+        self.centroid += shift;
+        self.centroid_in_jaw += pose.rotation.inverse() * shift;
+    }
+
+    /// Centroid of the tissue now [m].
+    pub fn now(&self, world: &World) -> DVec3 {
+        world.state.centroid(&world.model, self.organ, &self.nodes)
+    }
+
+    /// The tissue's body and nodes.
+    pub fn tissue(&self) -> (usize, &[u32]) {
+        (self.organ, &self.nodes)
+    }
+
     /// How far all has moved by the time that the gripper is at `pose`.
     pub fn moved(&self, world: &World, pose: &Pose) -> Moved {
-        let centroid = world.state.centroid(&world.model, self.organ, &self.nodes);
+        let centroid = self.now(world);
         Moved {
             jaw_lift: (pose.translation - self.jaw).dot(world.up),
             tissue_lift: (centroid - self.centroid).dot(world.up),

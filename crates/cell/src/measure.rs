@@ -1,5 +1,7 @@
 //! What a grasp-lift is measured by. Words as in the specification: lift, follow ratio, slip, snap, held, settled.
 
+use crate::blades::FRICTION;
+use crate::{GraspDesign, Severance};
 use serde::Serialize;
 
 /// What was measured in one frame.
@@ -7,7 +9,7 @@ use serde::Serialize;
 pub struct Sample {
     /// Time at the end of the frame [s].
     pub time_s: f64,
-    /// Phase: settle, approach, close, lift, hold, lower, open.
+    /// Phase: settle, approach, close, lift, hold, lower, open; with a cut reach, snip, carry, keep instead of the last two.
     pub phase: &'static str,
     /// Rise of the jaw since activation [mm].
     pub jaw_lift_mm: f64,
@@ -50,6 +52,8 @@ pub struct Summary {
     pub gap_mm: f64,
     /// Force with which tissue pushed the blades apart then [N].
     pub closing_force_n: f64,
+    /// Weight of the whole organ [N].
+    pub organ_weight_n: f64,
     /// Nodes held.
     pub held_nodes: usize,
     /// Rise of the cluster's centroid from activation to the end of the hold [mm].
@@ -108,6 +112,35 @@ pub struct Summary {
     pub real_time_factor: f64,
     /// Hash of the final state, hexadecimal.
     pub state_hash: String,
+    /// The cut, where one was asked for and the run came so far.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sever: Option<Severance>,
+}
+
+impl Summary {
+    /// For a grasp that pressed and yet did not hold: a sentence on the jaw force that would bear the organ's weight. None for one that held, and for designs that tie nodes, which
+    /// no force of the jaws makes hold.
+    pub fn force_advice(&self) -> Option<String> {
+        let presses = [GraspDesign::Friction, GraspDesign::Compliant].iter().any(|d| d.name() == self.design);
+        if self.held || self.diverged || !self.attached || self.torn || !presses || self.lift_mm <= 0.0 {
+            return None;
+        }
+        let (bears, weight) = (2.0 * FRICTION * self.jaw_force_n, self.organ_weight_n);
+        let needs = weight / (2.0 * FRICTION);
+        Some(if needs > self.jaw_force_n {
+            // Rounded up, so that what is named is enough.
+            let force = (20.0 * needs).ceil() / 20.0;
+            format!(
+                "it slipped: the {} weighs {weight:.2} N and jaws of {} N bear 2 x {FRICTION} x {} = {bears:.2} N; --jaw-force {force:.2} or more bears its weight (and what its pins pull comes on top)",
+                self.organ, self.jaw_force_n, self.jaw_force_n
+            )
+        } else {
+            format!(
+                "it slipped: jaws of {} N bear 2 x {FRICTION} x {} = {bears:.2} N, more than the {}'s weight of {weight:.2} N, so its pins hold it back; lift less, grasp farther from the pins, or raise --jaw-force",
+                self.jaw_force_n, self.jaw_force_n, self.organ
+            )
+        })
+    }
 }
 
 /// Least share of the jaw's lift that held tissue follows.

@@ -23,6 +23,14 @@ pub enum Phase {
     Lower,
     /// They open and the tissue is free again.
     Open,
+    /// With a cut: the open cutter comes to the tissue between the grasp and what holds the organ.
+    Reach,
+    /// Its blades close.
+    Snip,
+    /// What came loose is lifted on; the cutter withdraws.
+    Carry,
+    /// All stay where they are.
+    Keep,
 }
 
 impl Phase {
@@ -38,17 +46,23 @@ impl Phase {
             Self::Hold => "hold",
             Self::Lower => "lower",
             Self::Open => "open",
+            Self::Reach => "reach",
+            Self::Snip => "snip",
+            Self::Carry => "carry",
+            Self::Keep => "keep",
         }
     }
 
-    /// The phases of a task that drags and grasps again or does not, and lowers what it lifted or ends with the hold.
-    pub(crate) fn sequence(regrasp: bool, lower: bool) -> Vec<Self> {
+    /// The phases of a task that drags and grasps again or does not, and cuts what it lifted, lowers it, or ends with the hold.
+    pub(crate) fn sequence(regrasp: bool, lower: bool, sever: bool) -> Vec<Self> {
         let mut all = vec![Self::Settle, Self::Approach, Self::Close];
         if regrasp {
             all.extend([Self::Drag, Self::Release, Self::Close]);
         }
         all.extend([Self::Lift, Self::Hold]);
-        if lower {
+        if sever {
+            all.extend([Self::Reach, Self::Snip, Self::Carry, Self::Keep]);
+        } else if lower {
             all.extend([Self::Lower, Self::Open]);
         }
         all
@@ -57,9 +71,9 @@ impl Phase {
     /// How long it takes [s].
     fn seconds(self) -> f64 {
         match self {
-            Self::Settle | Self::Lift | Self::Hold | Self::Lower => 1.0,
+            Self::Settle | Self::Lift | Self::Hold | Self::Lower | Self::Carry => 1.0,
             Self::Approach => 0.25,
-            Self::Close | Self::Drag | Self::Release | Self::Open => 0.5,
+            Self::Close | Self::Drag | Self::Release | Self::Open | Self::Reach | Self::Snip | Self::Keep => 0.5,
         }
     }
 

@@ -6,10 +6,12 @@ use crate::hold::{Hold, Moved};
 use crate::jaw::Jaw;
 use crate::measure::{HELD_FOLLOW_RATIO, HELD_SLIP_MM, SETTLED_SPEED};
 use crate::mouth::attached;
+use crate::resection::{CARRY, Resection};
 use crate::target::Target;
+use crate::world::GRAVITY;
 use crate::{
-    FRAME, GraspDesign, GraspLift, GraspLiftRun, Gripper, MAX_ANGLE, Mouth, Phase, Result, Sample, Snapshot, Summary,
-    World,
+    CutOrgan, FRAME, GraspDesign, GraspLift, GraspLiftRun, Gripper, MAX_ANGLE, Mouth, Phase, Result, Sample, Snapshot,
+    Summary, World,
 };
 use glam::DVec3;
 use std::time::{Duration, Instant};
@@ -34,7 +36,8 @@ pub struct Session<'a> {
     task: &'a GraspLift,
     organ: usize,
     world: World,
-    start: State,
+    /// Where every node was at first, organ by organ [m], and whether it is pinned.
+    pins: Vec<(Vec<DVec3>, Vec<bool>)>,
     phases: Vec<Phase>,
     /// Place in `phases`, and frames of that phase that are over.
     phase: usize,
@@ -46,6 +49,7 @@ pub struct Session<'a> {
     /// Where the gripper went to the side in the drag that is over.
     dragged: f64,
     jaw: Jaw,
+    resection: Option<Resection>,
     frame: usize,
     stepping: Duration,
     last_step: Duration,
@@ -80,13 +84,17 @@ impl<'a> Session<'a> {
         let middle = world.state.centroid(&world.model, organ, &[0]);
         let above = middle + (top - middle.dot(world.up) + 0.1) * world.up;
         let gripper = Gripper::over(above, world.up, DVec3::X, MAX_ANGLE);
-        let start = world.state.clone();
+        let of = |k: usize| (world.state.positions(&world.model, k), world.model.bodies()[k].pinned().to_vec());
+        let pins = (0..world.model.bodies().len()).map(of).collect();
+        let body = &world.model.bodies()[organ];
+        let organ_weight_n = GRAVITY * (0..body.len()).map(|i| body.mass(i)).sum::<f64>();
+        let summary = Summary { organ_weight_n, ..summary };
         Ok(Self {
             task,
             organ,
             world,
-            start,
-            phases: Phase::sequence(task.regrasp.is_some(), task.lower),
+            pins,
+            phases: Phase::sequence(task.regrasp.is_some(), task.lower, task.sever.is_some()),
             phase: 0,
             frame_of_phase: 0,
             calm: None,
@@ -95,6 +103,7 @@ impl<'a> Session<'a> {
             gripper,
             dragged: 0.0,
             jaw: Jaw::new(task.jaw_force),
+            resection: None,
             frame: 0,
             stepping: Duration::ZERO,
             last_step: Duration::ZERO,
@@ -133,14 +142,14 @@ impl<'a> Session<'a> {
     /// Does one frame; false when there is none left, or the run has diverged.
     ///
     /// # Errors
-    /// When there is nothing to grasp.
+    /// When there is nothing to grasp, or no room for a cut.
     pub fn advance(&mut self) -> Result<bool> {
         if self.summary.diverged {
             return Ok(false);
         }
         if let Some(mut calm) = self.calm.take() {
             if !calm.done() {
-                self.step(Phase::Settle, 1.0);
+                self.step(Phase::Settle, 1.0)?;
                 self.summary.calmed_s += FRAME;
                 let speed = self.samples.last().map_or(0.0, |s| s.max_speed_m_s);
                 calm.after_frame(&mut self.world, speed);
@@ -155,7 +164,7 @@ impl<'a> Session<'a> {
             self.enter(phase)?;
         }
         self.frame_of_phase += 1;
-        self.step(phase, self.frame_of_phase as f64 / phase.frames() as f64);
+        self.step(phase, self.frame_of_phase as f64 / phase.frames() as f64)?;
         if self.frame_of_phase == phase.frames() {
             self.leave(phase);
         }
@@ -180,6 +189,11 @@ impl<'a> Session<'a> {
             Phase::Drag => self.activate(GraspDesign::LivePose),
             Phase::Lift => self.activate(self.task.design),
             Phase::Release | Phase::Open => self.world.state.grasps.clear(),
+            Phase::Reach => {
+                if let (Some(at), Some(target), Some(hold)) = (self.task.sever, &self.target, &self.hold) {
+                    self.resection = Some(Resection::plan(&self.world, hold, at, target.reach)?);
+                }
+            }
             _ => {}
         }
         Ok(())
@@ -212,7 +226,7 @@ impl<'a> Session<'a> {
     }
 
     /// One frame: move the gripper, step the world, measure. `share` of the phase is over at the frame's end.
-    fn step(&mut self, phase: Phase, share: f64) {
+    fn step(&mut self, phase: Phase, share: f64) -> Result<()> {
         let next = self.gripper_at(phase, share);
         let activation = phase == Phase::Lift && self.frame_of_phase == 1;
         let before = activation.then(|| self.world.state.clone());
@@ -223,9 +237,14 @@ impl<'a> Session<'a> {
         self.gripper = next;
         self.frame += 1;
         if let Some(before) = before {
-            self.summary.activation_step_mm = self.largest_motion_since(&before, |_, _| true);
+            self.summary.activation_step_mm = self.largest_motion_since(&before);
+        }
+        if let (Some(resection), Some(hold)) = (&mut self.resection, &mut self.hold) {
+            let time = self.frame as f64 * FRAME;
+            resection.advance(&mut self.world, hold, &self.gripper.pose, phase, share, time)?;
         }
         self.record(phase, &report);
+        Ok(())
     }
 
     /// The gripper's course through a phase; `share` runs from 0 to 1.
@@ -240,7 +259,9 @@ impl<'a> Session<'a> {
             Phase::Drag => (0.0, JawCommand::Stay),
             Phase::Release | Phase::Open => (0.0, JawCommand::To(MAX_ANGLE)),
             Phase::Lift => (lift * eased, self.while_held()),
-            Phase::Hold => (lift, self.while_held()),
+            Phase::Hold | Phase::Reach | Phase::Snip => (lift, self.while_held()),
+            Phase::Carry => (lift + self.carried() * eased, self.while_held()),
+            Phase::Keep => (lift + self.carried(), self.while_held()),
             Phase::Lower => (lift * (1.0 - eased), self.while_held()),
         };
         let aside = if phase == Phase::Drag { self.task.regrasp.unwrap_or(0.0) * eased } else { self.dragged };
@@ -258,6 +279,11 @@ impl<'a> Session<'a> {
             }
         };
         Gripper { pose, jaw_angle }
+    }
+
+    /// How far the jaws rise after a cut [m]: not where what they hold still hangs on to the rest.
+    fn carried(&self) -> f64 {
+        if self.resection.as_ref().is_some_and(Resection::freed) { CARRY } else { 0.0 }
     }
 
     /// Friction needs jaws that keep pressing; those that hold nodes are locked.
@@ -343,37 +369,60 @@ impl<'a> Session<'a> {
             summary.divergence = Some(why.to_string());
         }
         self.samples.push(sample);
+        if let (Some(resection), Some(hold)) = (&mut self.resection, &self.hold) {
+            resection.measure(world, hold, &self.gripper.pose, report);
+        }
         if self.task.snapshot_every > 0 && self.frame.is_multiple_of(self.task.snapshot_every) {
-            let organs = 0..world.model.bodies().len();
+            let cut = self.resection.as_ref().and_then(Resection::cut);
             self.snapshots.push(Snapshot {
                 time_s: sample.time_s,
                 phase,
-                nodes: organs.map(|k| world.state.positions(&world.model, k)).collect(),
+                nodes: (0..self.pins.len()).map(|k| positions(world, k, cut)).collect(),
                 gripper: self.gripper,
+                cutter: self.resection.as_ref().map(Resection::cutter),
+                cut: cut.is_some(),
             });
         }
     }
 
     /// The run so far in figures.
     pub fn finish(mut self) -> GraspLiftRun {
-        let pinned = |organ: usize, node: usize| self.world.model.bodies()[organ].pinned()[node];
-        let pin_drift_mm = self.largest_motion_since(&self.start, pinned);
+        let pin_drift_mm = self.pin_drift();
         let summary = &mut self.summary;
         summary.pin_drift_mm = pin_drift_mm;
         summary.simulated_s = self.frame as f64 * FRAME;
         summary.wall_s = self.stepping.as_secs_f64();
         summary.real_time_factor = summary.simulated_s / summary.wall_s;
         summary.state_hash = format!("{:016x}", self.world.state.hash());
-        GraspLiftRun { summary: self.summary, samples: self.samples, snapshots: self.snapshots }
+        let (sever, cut) = self.resection.map(Resection::finish).unzip();
+        summary.sever = sever;
+        GraspLiftRun { summary: self.summary, samples: self.samples, snapshots: self.snapshots, cut: cut.flatten() }
     }
 
-    /// Largest distance [mm] that any node chosen by (organ, node) has moved since `then`.
-    fn largest_motion_since(&self, then: &State, chosen: impl Fn(usize, usize) -> bool) -> f64 {
+    /// Largest distance [mm] that any pinned node has moved since the start.
+    fn pin_drift(&self) -> f64 {
+        let cut = self.resection.as_ref().and_then(Resection::cut);
+        let mut largest: f64 = 0.0;
+        for (organ, (then, pinned)) in self.pins.iter().enumerate() {
+            let now = positions(&self.world, organ, cut);
+            let parent = |i: usize| match cut {
+                Some(cut) if cut.organ == organ => cut.parents[i] as usize,
+                _ => i,
+            };
+            for (i, x) in now.iter().enumerate().filter(|(i, _)| pinned[parent(*i)]) {
+                largest = largest.max(x.distance(then[parent(i)]));
+            }
+        }
+        largest * 1e3
+    }
+
+    /// Largest distance [mm] that any node has moved since `then`, a state of the same model.
+    fn largest_motion_since(&self, then: &State) -> f64 {
         let model = &self.world.model;
         let mut largest: f64 = 0.0;
         for organ in 0..model.bodies().len() {
             let (now, then) = (self.world.state.positions(model, organ), then.positions(model, organ));
-            for i in (0..now.len()).filter(|i| chosen(organ, *i)) {
+            for i in 0..now.len() {
                 largest = largest.max((now[i] - then[i]).length());
             }
         }
@@ -381,7 +430,15 @@ impl<'a> Session<'a> {
     }
 }
 
+/// Where the nodes of organ `organ` of the specimen are now [m], those of a cut organ numbered through its pieces.
+fn positions(world: &World, organ: usize, cut: Option<&CutOrgan>) -> Vec<DVec3> {
+    match cut {
+        Some(cut) if cut.organ == organ => cut.positions(world),
+        _ => world.state.positions(&world.model, organ),
+    }
+}
+
 /// 0 to 1 with zero slope at both ends, so that the tool starts and stops without a jerk.
-fn smoothstep(t: f64) -> f64 {
+pub(crate) fn smoothstep(t: f64) -> f64 {
     t * t * (3.0 - 2.0 * t)
 }

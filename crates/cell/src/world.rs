@@ -5,15 +5,15 @@ use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Material, Model, ModelBuilder, Schedule, State, Stepper,
-    Support, SupportField, ToolForce, ToolMotion, pins,
+    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Material, Model, ModelBuilder, Schedule, State,
+    Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
 };
 
 /// Length of a frame [s].
 pub const FRAME: f64 = 1.0 / 60.0;
 
 /// Standard gravity [m/s2].
-const GRAVITY: f64 = 9.80665;
+pub(crate) const GRAVITY: f64 = 9.80665;
 
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;

@@ -23,8 +23,8 @@ pub use experiment::{
     ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial,
     IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PhantomFigures, PortBudgetExperiment,
     PortBudgetResult, PortBudgetRow, PortRoom, PortStart, ReconstructionExperiment, ReconstructionResult,
-    ReconstructionRow, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow, WrenchExperiment,
-    WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
+    ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
+    WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};

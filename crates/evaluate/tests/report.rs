@@ -5,12 +5,13 @@ use base64::{Engine, engine::general_purpose::STANDARD};
 use glam::{DQuat, DVec3};
 use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
-use trocar_cell::{GraspLiftRun, Gripper, Phase, Sample, Snapshot, Summary};
+use trocar_cell::{GraspLift, GraspLiftRun, Gripper, Phase, Sample, SeverAt, Snapshot, Summary};
 use trocar_evaluate::report;
 use trocar_geometry::{Pose, RepairReport, TetMesh, TetQuality, TriMesh};
+use trocar_progress::Silent;
 use trocar_reconstruct::{CompositeTimes, OrganView, Reconstruction};
 use trocar_render::{Instance, Scene, Shading};
-use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
+use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 /// A name that would break a page that does not escape it.
 const HOSTILE: &str = "<script>alert('x')</script>&\"";
@@ -229,6 +230,8 @@ fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
             phase: Phase::Lift,
             nodes,
             gripper: Gripper { pose: Pose { rotation, translation }, jaw_angle: 0.3 },
+            cutter: None,
+            cut: false,
         }
     };
     GraspLiftRun {
@@ -265,6 +268,7 @@ fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
         },
         samples: samples.clone(),
         snapshots: (0..snapshots).map(snapshot).collect(),
+        cut: None,
     }
 }
 
@@ -378,6 +382,31 @@ fn a_run_is_shown_with_its_lift() {
         frames += 1;
     }
     assert_eq!(frames, 45);
+}
+
+#[test]
+fn a_cut_is_shown_with_its_pieces() {
+    let mut s = specimen();
+    s.name = "tube".into();
+    s.organs.swap(0, 2);
+    s.organs.truncate(1);
+    // Its base is at the far left.
+    s.organs[0].base -= 0.036 * DVec3::X;
+    s.organs[0].pins = Pins::End { end: End::Base, length: 0.2, band_length: 0.0, band_share: 0.0 };
+    let task = GraspLift { at: 0.8, sever: Some(SeverAt::Between), snapshot_every: 20, ..GraspLift::default() };
+    let run = task.run(&s, &Silent).unwrap();
+    let sever = run.summary.sever.as_ref().unwrap();
+    assert_eq!(sever.outcome, "severed", "{sever:?}");
+    let html = report::grasp_lift(&s, &run, None).unwrap();
+    keep("severed.html", &html);
+    // 4 of the organs, 4 of the lift, 4 of the cut.
+    assert_eq!(check(&html), 12);
+    for text in ["The cut", "appendix.1", "Dark red", "Close up", "lift and cut", "snip"] {
+        assert!(html.contains(text), "{text}");
+    }
+    let mut torn = run.clone();
+    torn.snapshots.last_mut().unwrap().nodes[0].pop();
+    assert!(report::grasp_lift(&s, &torn, None).unwrap_err().to_string().contains("not of specimen"));
 }
 
 #[test]

@@ -352,9 +352,9 @@ pub struct Simulate {
     /// Organ to grasp; the appendix, or else the first, by default.
     #[arg(long)]
     pub organ: Option<String>,
-    /// Where along the organ, 0 (base) to 1 (tip).
-    #[arg(long, default_value_t = 0.5, allow_negative_numbers = true)]
-    pub at: f64,
+    /// Where along the organ, 0 (base) to 1 (tip); 0.5 by default, and 0.7 with --sever, which needs room on the base's side.
+    #[arg(long, allow_negative_numbers = true)]
+    pub at: Option<f64>,
     /// Lift of the jaws [mm].
     #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
     pub lift: f64,
@@ -370,6 +370,9 @@ pub struct Simulate {
     /// First drag the tissue sideways by this much [mm], let go, and grasp again.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub regrasp: Option<f64>,
+    /// After the hold, cut the organ between the grasp and its pins with a second instrument and lift on what comes loose; --sever=S cuts at organ coordinate S.
+    #[arg(long, value_name = "S", num_args = 0..=1, require_equals = true, allow_negative_numbers = true)]
+    pub sever: Option<Option<f64>>,
     /// What steps the organs.
     #[arg(long, value_enum, default_value_t = SolverName::Fast)]
     pub schedule: SolverName,
@@ -384,6 +387,6 @@ pub struct Simulate {
 /// Tasks by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Task {
-    /// Settle, grasp, lift, hold, lower, open.
+    /// Settle, grasp, lift, hold, lower, open; with --sever cut and lift on after the hold.
     GraspLift,
 }

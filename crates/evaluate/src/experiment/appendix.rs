@@ -7,6 +7,7 @@ use std::path::{Path, PathBuf};
 use trocar_phantom::RecordOptions;
 use trocar_progress::Progress;
 use trocar_specimen::{Organ, Specimen};
+use xxhash_rust::xxh3::Xxh3;
 
 /// Where the appendix comes from.
 #[derive(Clone, Debug)]
@@ -40,17 +41,31 @@ pub(super) fn with_organ(specimen: &Specimen, change: impl Fn(&mut Organ)) -> Sp
     changed
 }
 
-/// Does `run` for every item, several at once on `threads` threads (0: all there are); the outcomes are in the items' order.
+/// Everything of a specimen that a trial depends on, in a few words.
+pub(super) fn fingerprint(specimen: &Specimen) -> String {
+    let mut hasher = Xxh3::new();
+    let mut number = |value: f64| hasher.update(&value.to_bits().to_le_bytes());
+    for organ in &specimen.organs {
+        organ.body.vertices.iter().flat_map(|p| p.to_array()).for_each(&mut number);
+        organ.body.tets.iter().flatten().for_each(|i| number(f64::from(*i)));
+    }
+    let organ = |o: &Organ| format!("{} {:?} {:?} {:?}", o.name, o.material, o.pins, o.base);
+    let organs: Vec<String> = specimen.organs.iter().map(organ).collect();
+    format!("{:016x} {:?} {}", hasher.digest(), specimen.up, organs.join("; "))
+}
+
+/// Does `run` for every item, several at once on `threads` threads (0: all there are), after `finished` others; the outcomes are in the items' order.
 pub(super) fn side_by_side<T: Sync, R: Send>(
     stage: &str,
     items: &[T],
-    threads: usize,
+    (finished, threads): (usize, usize),
     progress: &dyn Progress,
     run: impl Fn(&T, &dyn Progress) -> Result<R> + Sync,
 ) -> Result<Vec<R>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
     let pool = pool.map_err(|e| Error::Mismatch(format!("{threads} threads cannot be started: {e}")))?;
-    progress.begin(stage, items.len() as u64);
+    progress.begin(stage, (finished + items.len()) as u64);
+    progress.advance(finished as u64);
     let quiet = Quiet(progress);
     let outcomes = pool.install(|| {
         let each = items.par_iter().with_max_len(1).map(|item| {

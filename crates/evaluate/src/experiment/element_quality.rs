@@ -1,9 +1,10 @@
 //! Fig. 7(f): do elements invert, and does anything diverge, when a cluster of the appendix is carried high against what holds the rest?
 
-use super::appendix::{AppendixSource, side_by_side, with_organ};
+use super::appendix::{AppendixSource, fingerprint, with_organ};
+use super::trials::{Outcomes, Resumed, Trials};
 use crate::workflow::REPORT;
 use crate::{Error, Result, report};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 use trocar_cell::{GraspDesign, GraspLift};
@@ -43,16 +44,16 @@ pub struct ElementQualityExperiment {
 }
 
 /// One case.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ElementQualityRow {
     /// The grasp design's name.
-    pub design: &'static str,
+    pub design: String,
     /// Jaw lift [mm].
     pub lift_mm: f64,
     /// Young's modulus [kPa].
     pub modulus_kpa: f64,
     /// The pin rule.
-    pub pins: &'static str,
+    pub pins: String,
     /// Force of the jaws [N].
     pub jaw_force_n: f64,
     /// Tissue was between the blades.
@@ -92,6 +93,8 @@ pub struct ElementQualityResult {
     pub nodes: usize,
     /// Its elements.
     pub tets: usize,
+    /// What an earlier run had finished.
+    pub resumed: Resumed,
     /// Wall time of everything [s].
     pub seconds: f64,
     /// The report's path.
@@ -107,7 +110,7 @@ struct Case {
 }
 
 impl ElementQualityExperiment {
-    /// Runs everything into the folder `output`: the phantom's recording and specimen, the figures and the report.
+    /// Runs everything into the folder `output`: the phantom's recording and specimen, the figures and the report. Cases that an earlier run in the folder finished are not run again.
     ///
     /// # Errors
     /// A specimen without an appendix, an option out of range, a folder that cannot be written, an interruption.
@@ -116,12 +119,16 @@ impl ElementQualityExperiment {
         super::claim(output, MARKER)?;
         let specimen = self.appendix.appendix(output, progress)?;
         let cases = self.cases(&specimen);
-        let rows = side_by_side("cases", &cases, self.threads, progress, |case, progress| case.run(progress))?;
+        let settings = format!("{} N, {}", self.jaw_force, fingerprint(&specimen));
+        let store = Trials::open(output, "element-quality", &settings)?;
+        let one = |case: &Case, progress: &dyn Progress| case.run(progress);
+        let Outcomes { rows, resumed } = store.run("cases", &cases, Case::key, self.threads, progress, one)?;
         let result = ElementQualityResult {
             rows,
             jaw_force_n: self.jaw_force,
             nodes: specimen.organs[0].body.vertices.len(),
             tets: specimen.organs[0].body.tets.len(),
+            resumed,
             seconds: clock.elapsed().as_secs_f64(),
             report: output.join(REPORT).display().to_string(),
         };
@@ -162,13 +169,18 @@ fn pin(organ: &mut Organ, share: f64) {
 }
 
 impl Case {
+    /// Its name among all.
+    fn key(&self) -> String {
+        format!("{} {} m, {}, {} Pa", self.task.design, self.task.lift, self.pins, self.modulus)
+    }
+
     fn run(&self, progress: &dyn Progress) -> Result<ElementQualityRow> {
         let s = self.task.run(&self.specimen, progress)?.summary;
         Ok(ElementQualityRow {
-            design: self.task.design.name(),
+            design: self.task.design.name().to_owned(),
             lift_mm: 1e3 * self.task.lift,
             modulus_kpa: 1e-3 * self.modulus,
-            pins: self.pins,
+            pins: self.pins.to_owned(),
             jaw_force_n: self.task.jaw_force,
             attached: s.attached,
             inverted_peak: s.inverted_peak,
@@ -196,10 +208,10 @@ pub(crate) mod tests {
         for (pins, _) in PINS {
             for (design, modulus) in DESIGNS.iter().flat_map(|d| MODULI.map(|m| (*d, m))) {
                 rows.extend(LIFTS.map(|lift| ElementQualityRow {
-                    design: design.name(),
+                    design: design.name().to_owned(),
                     lift_mm: 1e3 * lift,
                     modulus_kpa: 1e-3 * modulus,
-                    pins,
+                    pins: pins.to_owned(),
                     jaw_force_n: 1.0,
                     attached: true,
                     inverted_peak: usize::from(modulus < 4e3),
@@ -216,6 +228,14 @@ pub(crate) mod tests {
                 }));
             }
         }
-        ElementQualityResult { rows, jaw_force_n: 1.0, nodes: 1, tets: 1, seconds: 1.0, report: String::new() }
+        ElementQualityResult {
+            rows,
+            jaw_force_n: 1.0,
+            nodes: 1,
+            tets: 1,
+            resumed: Resumed::default(),
+            seconds: 1.0,
+            report: String::new(),
+        }
     }
 }

@@ -1,9 +1,10 @@
 //! Table II and Fig. 7(a) to (c): four ways to hold the appendix, at five places and from three sides, and once more after it was dragged.
 
-use super::appendix::{AppendixSource, side_by_side, with_organ};
+use super::appendix::{AppendixSource, fingerprint, with_organ};
+use super::trials::{Outcomes, Resumed, Trials};
 use crate::workflow::REPORT;
 use crate::{Error, Result, report};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 use trocar_cell::{GraspDesign, GraspLift, GraspLiftRun, World, clusters};
@@ -77,10 +78,10 @@ pub struct GraspDesignsExperiment {
 }
 
 /// One trial.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspTrial {
     /// The design's name.
-    pub design: &'static str,
+    pub design: String,
     /// Organ coordinate asked for.
     pub asked: f64,
     /// Organ coordinate of the grasped cluster.
@@ -181,6 +182,8 @@ pub struct GraspDesignsResult {
     pub nodes: usize,
     /// Its elements.
     pub tets: usize,
+    /// What an earlier run had finished.
+    pub resumed: Resumed,
     /// Wall time of everything [s].
     pub seconds: f64,
     /// The report's path.
@@ -188,7 +191,7 @@ pub struct GraspDesignsResult {
 }
 
 impl GraspDesignsExperiment {
-    /// Runs everything into the folder `output`: the phantom's recording and specimen, the figures and the report.
+    /// Runs everything into the folder `output`: the phantom's recording and specimen, the figures and the report. Trials that an earlier run in the folder finished are not run again.
     ///
     /// # Errors
     /// A specimen without an appendix, an option out of range, a folder that cannot be written, an interruption.
@@ -200,9 +203,12 @@ impl GraspDesignsExperiment {
         let material = Material { model: specimen.organs[0].material.model, ..Material::default() };
         let specimen = with_organ(&specimen, |organ| organ.material = material);
         let tasks = self.tasks(&locations(&specimen)?);
-        let trials = side_by_side("trials", &tasks, self.threads, progress, |task, progress| {
+        let settings = format!("{} N, {} m, {}", self.jaw_force, self.lift, fingerprint(&specimen));
+        let store = Trials::open(output, "grasp-designs", &settings)?;
+        let one = |task: &GraspLift, progress: &dyn Progress| -> Result<GraspTrial> {
             Ok(trial(task, &task.run(&specimen, progress)?))
-        })?;
+        };
+        let Outcomes { rows: trials, resumed } = store.run("trials", &tasks, key, self.threads, progress, one)?;
         let result = GraspDesignsResult {
             rows: rows(&trials),
             trials,
@@ -212,6 +218,7 @@ impl GraspDesignsExperiment {
             density_kg_m3: material.density_kg_m3,
             nodes: specimen.organs[0].body.vertices.len(),
             tets: specimen.organs[0].body.tets.len(),
+            resumed,
             seconds: clock.elapsed().as_secs_f64(),
             report: output.join(REPORT).display().to_string(),
         };
@@ -255,13 +262,18 @@ fn locations(specimen: &Specimen) -> Result<Vec<f64>> {
     Ok((0..LOCATIONS).map(|k| first + (last - first) * k as f64 / (LOCATIONS - 1) as f64).collect())
 }
 
+/// A trial's name among all.
+fn key(task: &GraspLift) -> String {
+    format!("{} at {}, offset {} m, drag {:?} m", task.design, task.at, task.approach_offset, task.regrasp)
+}
+
 fn trial(task: &GraspLift, run: &GraspLiftRun) -> GraspTrial {
     let s = &run.summary;
     let ties = task.design != GraspDesign::Friction;
     let lifted = || run.samples.iter().filter(|s| s.phase == "lift" || s.phase == "hold");
     let start = lifted().next().map_or(0.0, |s| s.time_s);
     GraspTrial {
-        design: task.design.name(),
+        design: task.design.name().to_owned(),
         asked: task.at,
         at: s.at,
         offset_mm: s.approach_offset_mm,
@@ -330,7 +342,7 @@ pub(crate) mod tests {
         let value = k as f64;
         let ties = design != GraspDesign::Friction;
         GraspTrial {
-            design: design.name(),
+            design: design.name().to_owned(),
             asked: 0.5 + 0.1 * (k / 3) as f64,
             at: 0.5 + 0.1 * (k / 3) as f64,
             offset_mm: 2.0 * (k % 3) as f64 - 2.0,
@@ -374,6 +386,7 @@ pub(crate) mod tests {
             density_kg_m3: 1200.0,
             nodes: 1,
             tets: 1,
+            resumed: Resumed::default(),
             seconds: 1.0,
             report: String::new(),
         }

@@ -12,6 +12,7 @@ mod port_budget;
 mod reconstruction;
 mod settling;
 mod step_ladder;
+mod trials;
 mod wrench;
 
 pub use appendix::AppendixSource;
@@ -32,6 +33,7 @@ pub use reconstruction::{PhantomFigures, ReconstructionExperiment, Reconstructio
 pub(crate) use settling::SETTLED;
 pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
 pub use step_ladder::StepRow;
+pub use trials::Resumed;
 #[cfg(test)]
 pub(crate) use wrench::tests::measured as measured_wrench;
 pub(crate) use wrench::{CHI_SQUARED_95, chi_squared_10};

@@ -25,8 +25,8 @@ pub(super) fn body(r: &ElementQualityResult) -> Result<String> {
     ]);
     let mut pins: Vec<&str> = Vec::new();
     r.rows.iter().for_each(|row| {
-        if !pins.contains(&row.pins) {
-            pins.push(row.pins);
+        if !pins.contains(&row.pins.as_str()) {
+            pins.push(&row.pins);
         }
     });
     let figures = pins.iter().map(|pins| volumes(r, pins)).collect::<Result<Vec<_>>>()?;
@@ -94,8 +94,8 @@ fn rows(r: &ElementQualityResult) -> String {
             row.torn.then(|| "torn".to_owned()),
         ];
         vec![
-            row.design.to_owned(),
-            row.pins.to_owned(),
+            row.design.clone(),
+            row.pins.clone(),
             fixed(row.lift_mm, 0),
             fixed(row.modulus_kpa, 0),
             fixed(row.jaw_force_n, 2),

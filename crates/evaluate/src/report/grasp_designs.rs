@@ -184,7 +184,7 @@ fn trials(r: &GraspDesignsResult) -> String {
             (t.inverted_peak > 0).then(|| format!("{} inverted", t.inverted_peak)),
         ];
         vec![
-            t.design.to_owned(),
+            t.design.clone(),
             fixed(t.at, 2),
             fixed(t.offset_mm, 0),
             t.drag_mm.map_or(String::new(), |d| fixed(d, 0)),

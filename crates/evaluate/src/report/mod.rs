@@ -3,6 +3,7 @@
 //! [`reconstruction`] shows how a recording became organs, [`surface`] what became of a ready surface, [`grasp_lift`] how
 //! the organs behaved when they were lifted.
 
+mod axis;
 mod colors;
 mod convergence;
 mod element_quality;
@@ -20,6 +21,7 @@ mod run;
 mod scaling;
 mod seen;
 mod settling;
+mod severed;
 mod table;
 mod truth;
 mod views;
@@ -196,7 +198,8 @@ pub fn grasp_lift(s: &Specimen, run: &GraspLiftRun, before: Option<&str>) -> Res
         Some(before) => outcome + before + &details,
         None => outcome + &run::bodies(s, s.camera.is_some())? + &details,
     };
-    let title = format!("{}: grasp and lift of the {}", s.name, run.summary.organ);
+    let done = if run.summary.sever.is_some() { "grasp, lift and cut" } else { "grasp and lift" };
+    let title = format!("{}: {done} of the {}", s.name, run.summary.organ);
     Ok(page::page(&title, &made_from(s, "Specimen"), &(body + &provenance(s))))
 }
 

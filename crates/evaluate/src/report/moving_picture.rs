@@ -1,11 +1,12 @@
 //! The lift as a moving picture (GIF) and as stills from the same view.
 
-use super::colors::{METAL, VIEW_GROUND};
+use super::colors::{self, METAL, VIEW_GROUND};
+use super::severed::{self, CutSkin};
 use super::views::{self, Directions, View};
 use crate::{Error, Result};
 use color_quant::NeuQuant;
 use glam::DVec3;
-use trocar_cell::{GraspLiftRun, Snapshot};
+use trocar_cell::{CUT_OPENED, CutOrgan, GraspLiftRun, Gripper, Snapshot};
 use trocar_geometry::Skin;
 use trocar_render::{Instance, Scene, Shading};
 use trocar_specimen::Specimen;
@@ -30,6 +31,8 @@ pub(super) struct Lift<'a> {
     specimen: &'a Specimen,
     run: &'a GraspLiftRun,
     skins: Vec<Skin>,
+    /// The organ that was cut, in its pieces.
+    cut: Option<CutSkin<'a>>,
     grasped: usize,
     view: View,
 }
@@ -44,18 +47,28 @@ impl<'a> Lift<'a> {
             return Ok(None);
         }
         for snapshot in &run.snapshots {
+            let nodes = |k: usize| match run.cut.as_ref().filter(|cut| snapshot.cut && cut.organ == k) {
+                Some(cut) => cut.parents.len(),
+                None => specimen.organs[k].body.vertices.len(),
+            };
+            let of_organ = |cut: &CutOrgan| specimen.organs.get(cut.organ).is_some_and(|o| is_of(cut, o));
             let fits = snapshot.nodes.len() == specimen.organs.len()
-                && snapshot.nodes.iter().zip(&specimen.organs).all(|(n, o)| n.len() == o.body.vertices.len());
+                && snapshot.nodes.iter().enumerate().all(|(k, n)| n.len() == nodes(k))
+                && run.cut.as_ref().is_none_or(of_organ);
             if !fits {
                 let time = snapshot.time_s;
                 let name = &specimen.name;
                 return Err(Error::Mismatch(format!("the snapshot at {time} s is not of specimen '{name}'")));
             }
         }
-        let skins = specimen.organs.iter().map(|o| Skin::bind(&o.surface, &o.body)).collect();
+        let skins: Vec<Skin> = specimen.organs.iter().map(|o| Skin::bind(&o.surface, &o.body)).collect();
+        let bound = |cut: &'a CutOrgan| {
+            CutSkin::new(&specimen.organs[cut.organ], &skins[cut.organ], cut, colors::organ(cut.organ))
+        };
+        let cut = run.cut.as_ref().map(bound);
         let grasped = specimen.organs.iter().position(|o| o.name == run.summary.organ).unwrap_or(0);
         let view = View::framing(&[], DVec3::Z, DVec3::Z, SIZE);
-        let mut lift = Self { specimen, run, skins, grasped, view };
+        let mut lift = Self { specimen, run, skins, cut, grasped, view };
         lift.view = lift.best_view();
         Ok(Some(lift))
     }
@@ -84,28 +97,68 @@ impl<'a> Lift<'a> {
         view
     }
 
-    /// The deformed surfaces and the gripper.
+    /// The organ that was cut, if one was.
+    pub(super) fn cut(&self) -> Option<&'a CutOrgan> {
+        self.run.cut.as_ref()
+    }
+
+    /// The last snapshot.
+    pub(super) fn last(&self) -> &'a Snapshot {
+        self.run.snapshots.last().unwrap_or(&self.run.snapshots[0])
+    }
+
+    /// The last snapshot before the cut in which the cutter's blades are open.
+    pub(super) fn before_cut(&self) -> Option<&'a Snapshot> {
+        let open = |s: &&Snapshot| !s.cut && s.cutter.is_some_and(|cutter| cutter.jaw_angle > CUT_OPENED);
+        self.run.snapshots.iter().rfind(open)
+    }
+
+    /// The organ that was cut, if it is in pieces in `snapshot`.
+    fn in_pieces(&self, snapshot: &Snapshot) -> Option<(usize, &CutSkin<'a>)> {
+        let cut = self.run.cut.as_ref().filter(|_| snapshot.cut)?;
+        Some((cut.organ, self.cut.as_ref()?))
+    }
+
+    /// The deformed surfaces and the instruments.
     pub(super) fn surfaces(&self, snapshot: &Snapshot) -> Vec<Instance> {
-        let mut instances = views::surfaces(self.specimen);
-        for (i, organ) in self.specimen.organs.iter().enumerate() {
-            self.skins[i].deform(&organ.body, &snapshot.nodes[i], &mut instances[i].mesh.vertices);
-        }
-        instances.push(self.gripper(snapshot));
+        let mut instances = self.organs(snapshot);
+        instances.extend(self.instruments(snapshot));
         instances
     }
 
-    /// The deformed elements as wires and the gripper.
+    /// The deformed surfaces alone.
+    pub(super) fn organs(&self, snapshot: &Snapshot) -> Vec<Instance> {
+        let mut instances = views::surfaces(self.specimen);
+        let in_pieces = self.in_pieces(snapshot);
+        for (i, organ) in self.specimen.organs.iter().enumerate() {
+            let nodes = &snapshot.nodes[i];
+            match in_pieces {
+                Some((cut, skin)) if cut == i => {
+                    let mesh = skin.surface(organ, &self.skins[i], nodes, colors::organ(i));
+                    instances[i] = severed::instance(i, mesh, instances[i].shading.gloss, false);
+                }
+                _ => self.skins[i].deform(&organ.body, nodes, &mut instances[i].mesh.vertices),
+            }
+        }
+        instances
+    }
+
+    /// The deformed elements as wires and the instruments.
     pub(super) fn wires(&self, snapshot: &Snapshot) -> Vec<Instance> {
         let mut instances = views::wires(self.specimen, &snapshot.nodes, None);
-        instances.push(self.gripper(snapshot));
+        if let Some((i, skin)) = self.in_pieces(snapshot) {
+            let mesh = skin.wires(&snapshot.nodes[i], colors::organ(i));
+            instances[i] = severed::instance(i, mesh, 0.0, true);
+        }
+        instances.extend(self.instruments(snapshot));
         instances
     }
 
-    fn gripper(&self, snapshot: &Snapshot) -> Instance {
-        let mut mesh = snapshot.gripper.surface();
-        mesh.colors.clear();
+    fn instruments(&self, snapshot: &Snapshot) -> Vec<Instance> {
+        let meshes = [Some(snapshot.gripper.surface()), snapshot.cutter.as_ref().map(Gripper::cutter_surface)];
         let shading = Shading { color: METAL, gloss: 0.9, wireframe: false };
-        Instance { mesh, label: views::label(self.specimen.organs.len()), shading }
+        let label = views::label(self.specimen.organs.len());
+        meshes.into_iter().flatten().map(|mesh| Instance { mesh, label, shading }).collect()
     }
 
     /// Frames the grasped organ in rest and at the top, seen from where most of it is visible.
@@ -116,13 +169,16 @@ impl<'a> Lift<'a> {
         let mut points = vec![tip(first), tip(top)];
         points.truncate(if (tip(first) - tip(top)).length() < 0.05 { 2 } else { 0 });
         points.push(tip(top));
-        for s in [first, top] {
+        // What is cut off is carried on, out of the picture otherwise.
+        let last = self.run.cut.is_some().then(|| self.last());
+        points.extend(last.map(tip));
+        for s in [Some(first), Some(top), last].into_iter().flatten() {
             points.extend(s.nodes.get(self.grasped).into_iter().flatten());
         }
         let d = Directions::of(self.specimen);
         let sideways = [-0.9, -0.35, 0.35, 0.9];
         let heights = [0.45, 0.75];
-        let instances = self.surfaces(top);
+        let instances = self.surfaces(last.unwrap_or(top));
         let scene = Scene::new(instances, None, VIEW_GROUND);
         let mut best: Option<(usize, View)> = None;
         for height in heights {
@@ -205,6 +261,17 @@ impl<'a> Lift<'a> {
     fn light(&self) -> DVec3 {
         self.view.pose.rotation * DVec3::new(-0.45, -0.8, -0.9)
     }
+}
+
+/// Whether `cut` is a cut of `organ`: as many elements, and no node that it has not.
+fn is_of(cut: &CutOrgan, organ: &trocar_specimen::Organ) -> bool {
+    let (nodes, copies) = (organ.body.vertices.len(), cut.parents.len());
+    let known = |i: &u32| (*i as usize) < copies;
+    cut.tets.len() == organ.body.tets.len()
+        && cut.piece.len() == copies
+        && cut.parents.iter().all(|i| (*i as usize) < nodes)
+        && cut.tets.iter().flatten().all(known)
+        && cut.faces.iter().flatten().all(known)
 }
 
 /// Up to 255 colours that serve all frames, and one entry to spare for [`UNCHANGED`].

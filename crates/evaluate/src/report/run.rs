@@ -5,7 +5,7 @@ use super::page::{self, Card, Columns};
 use super::plots::{Band, Line, Plot};
 use super::table::{self, count, fixed};
 use super::views::{self, Directions, View};
-use super::{colors, figures};
+use super::{colors, figures, severed};
 use crate::Result;
 use glam::DVec3;
 use trocar_cell::{GraspLiftRun, Sample};
@@ -58,7 +58,17 @@ pub(super) fn sections(s: &Specimen, run: &GraspLiftRun) -> Result<(String, Stri
     if let Some(lift) = &lift {
         let gif = lift.gif()?;
         let (w, h) = moving_picture::SIZE;
-        let moving = figures::img_of_bytes("gif", &gif, w, h, "the organ is grasped, lifted, held and lowered");
+        let moving = figures::img_of_bytes(
+            "gif",
+            &gif,
+            w,
+            h,
+            if run.summary.sever.is_some() {
+                "the organ is grasped, lifted, held and cut"
+            } else {
+                "the organ is grasped, lifted, held and lowered"
+            },
+        );
         let pace = lift.pace();
         let pace = if (pace - 1.0).abs() < 0.1 {
             "in real time".to_owned()
@@ -92,10 +102,22 @@ pub(super) fn sections(s: &Specimen, run: &GraspLiftRun) -> Result<(String, Stri
         outcome += "<p class=\"lead\">This run kept no snapshots, so there is no moving picture of it.</p>\n";
     }
     let title = if run.summary.diverged { "The lift (diverged)" } else { "The lift" };
-    let lead = "The gripper closes on the organ, lifts it, holds it, lowers it and lets go.";
+    let lead = if run.summary.sever.is_some() {
+        "The gripper closes on the organ, lifts it and holds it; a second instrument cuts it, and what came loose is lifted on."
+    } else {
+        "The gripper closes on the organ, lifts it, holds it, lowers it and lets go."
+    };
+    let lead = run
+        .summary
+        .force_advice()
+        .map_or(lead.to_owned(), |advice| format!("{lead} <b>Note:</b> {}.", page::escape(&advice)));
+    let mut after = String::new();
+    if let Some(sever) = &run.summary.sever {
+        after = severed::section(s, sever, lift.as_ref())?;
+    }
     let details = page::section("Frame by frame", "Shaded: the phases of the task.", &(plots(&run.samples)? + &stills))
         + &page::section("All figures of the run", "", &table::summary(&run.summary));
-    Ok((page::section(title, lead, &outcome), details))
+    Ok((page::section(title, &lead, &outcome) + &after, details))
 }
 
 fn cards(run: &GraspLiftRun) -> String {

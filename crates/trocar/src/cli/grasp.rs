@@ -71,7 +71,8 @@ pub struct GraspDesignsExperiment {
     /// Trials at once; as many as the machine has threads by default. The figures do not depend on it.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder for recording, specimen and report; a finished recording in it is used again.
+    /// Folder for recording, specimen, trials and report. A finished recording in it is used again, and so are finished trials of the same settings: a run that was interrupted
+    /// goes on where it stopped.
     #[arg(short, long, default_value = "trocar-experiment/grasp-designs")]
     pub output: PathBuf,
 }
@@ -87,7 +88,8 @@ pub struct ElementQualityExperiment {
     /// Cases at once; as many as the machine has threads by default. The figures do not depend on it.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder for recording, specimen and report; a finished recording in it is used again.
+    /// Folder for recording, specimen, trials and report. A finished recording in it is used again, and so are finished trials of the same settings: a run that was interrupted
+    /// goes on where it stopped.
     #[arg(short, long, default_value = "trocar-experiment/element-quality")]
     pub output: PathBuf,
 }

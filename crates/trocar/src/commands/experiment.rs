@@ -10,7 +10,7 @@ mod wrench;
 
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
-use trocar_evaluate::{ReconstructionResult, Result};
+use trocar_evaluate::{ReconstructionResult, Result, Resumed};
 use trocar_phantom::RecordOptions;
 use trocar_progress::Progress;
 use trocar_reconstruct::Settings;
@@ -26,6 +26,15 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }
+}
+
+/// What was taken from an earlier run, in words that follow a time.
+fn resumed(resumed: &Resumed, what: &str) -> String {
+    let earlier = match resumed.trials {
+        0 => String::new(),
+        n => format!(", {n} {what} taken from an earlier run"),
+    };
+    earlier + &resumed.put_aside.as_ref().map_or(String::new(), |why| format!("; {why}"))
 }
 
 fn reconstruction(arguments: &ReconstructionExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

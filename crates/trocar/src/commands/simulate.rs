@@ -2,21 +2,26 @@
 
 use crate::cli::{Simulate, Task};
 use crate::output;
-use trocar_cell::{GraspLift, Summary};
+use trocar_cell::{GraspLift, SeverAt, Severance, Summary};
 use trocar_evaluate::scenes::solver_named;
 use trocar_evaluate::{Result, SimulatedRun, simulate};
 use trocar_progress::Progress;
+
+/// Organ coordinate of the grasp unless the user says otherwise, and where a cut needs room on the base's side.
+const AT: f64 = 0.5;
+const AT_WITH_CUT: f64 = 0.7;
 
 pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<()> {
     let Task::GraspLift = arguments.task;
     let task = GraspLift {
         organ: arguments.organ.clone(),
-        at: arguments.at,
+        at: arguments.at.unwrap_or(if arguments.sever.is_some() { AT_WITH_CUT } else { AT }),
         lift: arguments.lift * 1e-3,
         design: arguments.design.into(),
         jaw_force: arguments.jaw_force,
         approach_offset: arguments.approach_offset * 1e-3,
         regrasp: arguments.regrasp.map(|drag| drag * 1e-3),
+        sever: arguments.sever.map(|at| at.map_or(SeverAt::Between, SeverAt::S)),
         schedule: solver_named(&arguments.schedule.name())?,
         threads: arguments.threads,
         ..GraspLift::default()
@@ -28,6 +33,52 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
 
 /// A run in a few lines for people.
 pub fn text(s: &Summary) -> String {
+    let mut text = figures(s);
+    if let Some(advice) = s.force_advice() {
+        text += &format!("\n{advice}");
+    }
+    if let Some(sever) = &s.sever {
+        text += &format!("\n{}", cut(sever));
+    }
+    text
+}
+
+/// A cut in a few lines for people.
+fn cut(s: &Severance) -> String {
+    if s.pieces.is_empty() {
+        return s.said.clone();
+    }
+    let pieces: Vec<String> = s
+        .pieces
+        .iter()
+        .map(|p| {
+            format!(
+                "  {}: s {:.2} to {:.2}, {} nodes ({} pinned, {} in the jaws), {} elements, {:.1} mm3, moved up {:+.1} mm",
+                p.name, p.s_from, p.s_to, p.nodes, p.pinned, p.held, p.elements, p.volume_after_mm3, p.rise_mm
+            )
+        })
+        .collect();
+    format!(
+        "{}: s = {:.2} to {:.2}, {:.2} s into the run, {:.2} to {:.2} rad; volume {:.1} mm3 before, {:.1} after (off by {:.0e} of it); {} inverted; jaws went up {:.1} mm, tissue in them {:.1} mm: {}\n{}",
+        s.said,
+        s.at_least,
+        s.at_most,
+        s.time_s,
+        s.opened_rad,
+        s.closed_rad,
+        s.volume_before_mm3,
+        s.volume_after_mm3,
+        s.volume_error,
+        s.inverted_after.max(s.inverted_peak),
+        s.jaw_rise_mm,
+        s.held_rise_mm,
+        if s.held { "held" } else { "NOT held" },
+        pieces.join("\n")
+    )
+}
+
+/// The lift in figures.
+fn figures(s: &Summary) -> String {
     format!(
         "{} at s = {:.2}, {} grasp, {} nodes held, jaws closed on {:.1} mm with {:.2} N{}: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm: {}\n\
          {:.4} m/s after 1 s, calmed for {:.2} s to {:.4} m/s, peak {:.3} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}\n\

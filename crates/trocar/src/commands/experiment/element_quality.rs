@@ -34,8 +34,8 @@ fn text(r: &ElementQualityResult) -> String {
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
     let row = |row: &ElementQualityRow| {
         vec![
-            row.design.to_owned(),
-            row.pins.to_owned(),
+            row.design.clone(),
+            row.pins.clone(),
             format!("{:.0}", row.lift_mm),
             format!("{:.0}", row.modulus_kpa),
             row.inverted_peak.to_string(),
@@ -59,12 +59,13 @@ fn text(r: &ElementQualityResult) -> String {
         ]
     };
     format!(
-        "{}\nappendix alone, {} nodes, {} tets; jaws of {} N; {:.0} s; report {}",
+        "{}\nappendix alone, {} nodes, {} tets; jaws of {} N; {:.0} s{}; report {}",
         output::table(&header, &r.rows.iter().map(row).collect::<Vec<_>>()),
         r.nodes,
         r.tets,
         r.jaw_force_n,
         r.seconds,
+        super::resumed(&r.resumed, "cases"),
         r.report
     )
 }

@@ -53,7 +53,7 @@ fn text(r: &GraspDesignsResult) -> String {
     };
     let rows: Vec<Vec<String>> = r.rows.iter().flat_map(|row| std::iter::once(ours(row)).chain(paper(row))).collect();
     format!(
-        "{}\nappendix alone, {} nodes, {} tets, {} kPa, {} kg/m3; {} mm lift, jaws of {} N; {:.0} s; report {}",
+        "{}\nappendix alone, {} nodes, {} tets, {} kPa, {} kg/m3; {} mm lift, jaws of {} N; {:.0} s{}; report {}",
         output::table(&header, &rows),
         r.nodes,
         r.tets,
@@ -62,6 +62,7 @@ fn text(r: &GraspDesignsResult) -> String {
         r.lift_mm,
         r.jaw_force_n,
         r.seconds,
+        super::resumed(&r.resumed, "trials"),
         r.report
     )
 }
