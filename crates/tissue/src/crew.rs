@@ -1,7 +1,7 @@
 //! The bodies of a model with their solvers: those that may touch each other are stepped together, islands of them in parallel.
 
 use crate::contact::{Contacts, Coupling, Pairs, Reaction};
-use crate::integrator::{Frame, Solver, Worker};
+use crate::integrator::{Frame, Solver, Worker, for_each};
 use crate::report::Divergence;
 use crate::untangle::Untangler;
 use crate::{Body, BodyContact, Model, State, StepReport};
@@ -130,19 +130,19 @@ impl<S: Solver> Crew for Workers<S> {
 
 /// Advances an island by a frame.
 fn advance<S: Solver>(island: &mut [Worker<S>], coupling: Option<&Coupling>, frame: &Frame<'_>) {
-    for worker in island.iter_mut() {
+    for_each(island, frame, |worker| {
         worker.report = StepReport::default();
         worker.before.copy_from(&worker.state);
         worker.untangler.untangle(&frame.of(worker.index), &worker.body, &mut worker.state);
-    }
+    });
     let mut pairs = std::mem::take(&mut island[0].pairs);
     if let Some(coupling) = coupling {
         pairs.begin(coupling, island);
     }
     island[0].pairs = pairs;
     S::advance(island, frame);
-    for Worker { index, body, solver, state, report, reaction, .. } in island {
+    for_each(island, frame, |Worker { index, body, solver, state, report, reaction, .. }| {
         report.measure(*index, body, state);
         reaction.take(&frame.of(*index), body, state, solver.contacts().is_none());
-    }
+    });
 }

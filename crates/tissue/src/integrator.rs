@@ -5,6 +5,7 @@ use crate::state::BodyState;
 use crate::untangle::Untangler;
 use crate::{Body, Collider, Grasp, StepReport, ToolMotion};
 use glam::{DVec3, Vec3A};
+use rayon::prelude::*;
 
 /// A solver with its scratch memory for one body.
 pub(crate) trait Solver: Send + Sized {
@@ -55,6 +56,21 @@ pub(crate) struct Frame<'a> {
     pub tools: &'a [ToolMotion],
     /// What touches bodies.
     pub colliders: &'a [Collider],
+    /// Whether the calling thread is to do all the work.
+    pub alone: bool,
+}
+
+/// Does the same with every body of an island, in parallel.
+pub(crate) fn for_each<S: Solver>(
+    island: &mut [Worker<S>],
+    frame: &Frame<'_>,
+    work: impl Fn(&mut Worker<S>) + Send + Sync,
+) {
+    if frame.alone || island.len() < 2 {
+        island.iter_mut().for_each(work);
+    } else {
+        island.par_iter_mut().with_max_len(1).for_each(work);
+    }
 }
 
 impl Frame<'_> {

@@ -77,7 +77,8 @@ impl Stepper {
         }
         let grasps = std::mem::take(&mut state.grasps);
         let (gravity, colliders) = (model.gravity, &model.colliders[..]);
-        let frame = Frame { dt: self.dt, gravity, index: 0, grasps: &grasps, tools, colliders };
+        let alone = self.pool.is_none();
+        let frame = Frame { dt: self.dt, gravity, index: 0, grasps: &grasps, tools, colliders, alone };
         let report = self.crew.advance(model, state, &frame, self.pool.as_ref());
         state.grasps = grasps;
         if !matches!(report.divergence, Some(Divergence::NonFinite { .. })) {

@@ -261,6 +261,105 @@ fn two_blocks_press_as_one() {
     assert!((below - expected).abs() < 0.02 * pressed, "{below} m, {expected} m expected");
 }
 
+/// A soft flap that hangs over another part of its own body sinks onto it, and through it if folds are not looked for.
+#[test]
+fn folded_tissue_touches_itself() {
+    let edge = 2.5e-3;
+    let whole = block([8, 2, 8], edge);
+    let middle = |tet: &[u32; 4]| tet.iter().map(|i| whole.vertices[*i as usize]).sum::<DVec3>() / (4.0 * edge);
+    let kept = |tet: &&[u32; 4]| middle(tet).x < 2.0 || !(2.0..6.0).contains(&middle(tet).z);
+    let tets: Vec<[u32; 4]> = whole.tets.iter().filter(kept).copied().collect();
+    let mut used: Vec<u32> = tets.iter().flatten().copied().collect();
+    used.sort_unstable();
+    used.dedup();
+    let place = |i: u32| used.binary_search(&i).unwrap() as u32;
+    let mesh = TetMesh {
+        vertices: used.iter().map(|i| whole.vertices[*i as usize]).collect(),
+        tets: tets.iter().map(|tet| tet.map(place)).collect(),
+    };
+    let pinned = nodes(&mesh, |p| p.z < 2.1 * edge || p.x < 1.1 * edge);
+    let [top, bottom] = [2.0, 6.0].map(|z| nodes(&mesh, |p| p.x > 3.0 * edge && (p.z / edge - z).abs() < 1e-6));
+    for schedule in [Schedule::FAST, Schedule::PAPER] {
+        let gap = |folds: bool| {
+            let contact = BodyContact { folds, ..BodyContact::default() };
+            let material = Material { viscosity: 10.0, ..tissue(800.0) };
+            let part = Part { mesh: mesh.clone(), material, pinned: pinned.clone() };
+            let model = scene(&[part], contact, GRAVITY);
+            let mut state = State::new(&model);
+            let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+            for _ in 0..60 {
+                let report = stepper.step(&model, &mut state, &[]);
+                assert_eq!((report.inverted, report.divergence), (0, None));
+            }
+            let height = |i: &u32| state.position(&model, 0, *i as usize).z;
+            let lowest = bottom.iter().map(height).fold(f64::INFINITY, f64::min);
+            lowest - top.iter().map(height).fold(f64::NEG_INFINITY, f64::max)
+        };
+        let (with, without) = (gap(true), gap(false));
+        println!("gap {:.2} mm, {:.2} mm without", 1e3 * with, 1e3 * without);
+        assert!(with > -0.5e-3 && with < 4e-3, "a gap of {with} m");
+        assert!(without < -3e-3, "the flap did not reach the other side: a gap of {without} m");
+    }
+}
+
+/// A body of which every node is pinned is an obstacle like any other.
+#[test]
+fn a_rigid_body_is_an_obstacle() {
+    let low = block([6, 6, 2], 2.5e-3);
+    let high = moved(block([3, 3, 3], 2.5e-3), |p| p + DVec3::new(3e-3, 4e-3, 8e-3));
+    let all = nodes(&low, |_| true);
+    let material = Material { viscosity: 20.0, ..tissue(10e3) };
+    let parts = [Part { mesh: low, material, pinned: all }, Part { mesh: high, material, pinned: vec![] }];
+    let contact = BodyContact::default();
+    let model = scene(&parts, contact, GRAVITY);
+    for schedule in [Schedule::FAST, Schedule::PAPER] {
+        let mut state = State::new(&model);
+        let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+        for _ in 0..60 {
+            let report = stepper.step(&model, &mut state, &[]);
+            assert_eq!((report.fallbacks, report.inverted, report.divergence), (0, 0, None));
+        }
+        let height = centroid(&model, &state, 1).z - 0.5 * 7.5e-3 - 5e-3;
+        println!("{:.3} mm above it", 1e3 * height);
+        assert!((height - contact.offset).abs() < 0.2e-3, "{height} m above it");
+    }
+}
+
+/// Bodies of a filtered pair, and bodies of a model without contact between them, pass through each other.
+#[test]
+fn only_pairs_that_collide_touch() {
+    let parts = [ball(5, 8e-3, DVec3::ZERO), ball(5, 8e-3, DVec3::Z * 20e-3)];
+    for filtered in [false, true] {
+        let mut builder = ModelBuilder::new().body_contact(BodyContact::default());
+        for (k, mesh) in parts.iter().enumerate() {
+            let (name, material) = (format!("part {k}"), tissue(8e3));
+            builder.body(BodyDescription { name, mesh, material, pinned: vec![], supports: vec![] }).unwrap();
+        }
+        if filtered {
+            builder.filter_pair(0, 1).unwrap();
+        }
+        let model = builder.build().unwrap();
+        let mut state = State::new(&model);
+        (0..model.bodies()[1].len()).for_each(|i| state.set_velocity(&model, 1, i, DVec3::Z * -0.3));
+        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        (0..12).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
+        let moved = centroid(&model, &state, 0).length();
+        assert_eq!(moved < 1e-9, filtered, "the other went {moved} m");
+    }
+    for contact in [
+        BodyContact { offset: -1e-3, ..BodyContact::default() },
+        BodyContact { friction: f64::NAN, ..BodyContact::default() },
+        BodyContact { stiffness: 0.0, ..BodyContact::default() },
+        BodyContact { depth: 1.0, ..BodyContact::default() },
+    ] {
+        let mut builder = ModelBuilder::new().body_contact(contact);
+        let (name, mesh, material) = ("part".to_owned(), &parts[0], tissue(8e3));
+        builder.body(BodyDescription { name, mesh, material, pinned: vec![], supports: vec![] }).unwrap();
+        let said = builder.build().unwrap_err().to_string();
+        assert!(said.starts_with("contact between bodies: ") && said.contains("make"), "{said}");
+    }
+}
+
 /// The same bits on one thread and on two, and after a state was put back.
 #[test]
 fn bits_repeat() {

@@ -317,7 +317,15 @@ impl Contacts {
     #[cfg(test)]
     pub fn of_everything(body: &Body, x: &[Vec3A]) -> Self {
         let mut contacts = Self::new(body);
-        let frame = Frame { dt: 1.0, gravity: glam::DVec3::ZERO, index: 0, grasps: &[], tools: &[], colliders: &[] };
+        let frame = Frame {
+            dt: 1.0,
+            gravity: glam::DVec3::ZERO,
+            index: 0,
+            grasps: &[],
+            tools: &[],
+            colliders: &[],
+            alone: true,
+        };
         contacts.reach = f32::INFINITY;
         contacts.near.clone_from(&contacts.surface);
         contacts.find(&frame, body, 0.0, 1.0, |i| x[i]);

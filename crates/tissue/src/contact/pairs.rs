@@ -9,6 +9,9 @@ use super::touch::{Friction, Push, Source, Touch};
 use crate::integrator::{Solver, Worker};
 use glam::Vec3A;
 
+/// What is this much further away [m] than where it presses and twice what it goes in a substep is left out of it.
+const LIKELY: f32 = 3e-4;
+
 /// How far friction's spring between a vertex and another body is stretched.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Stretch {
@@ -32,6 +35,8 @@ pub(crate) struct Pair {
     pub touch: Touch,
     /// Limit of friction [N], held during a search.
     pub limit: f32,
+    /// Which of those that may touch in the frame it is.
+    candidate: u32,
     /// The triangle's number.
     triangle: u32,
     /// Distance at which nothing presses [m].
@@ -40,6 +45,8 @@ pub(crate) struct Pair {
     shift: Vec3A,
     /// At the substep's beginning [m].
     stretch: Vec3A,
+    /// Whether the vertex was outside when it was last looked at.
+    outside: bool,
 }
 
 /// A vertex that takes part in a pair.
@@ -55,6 +62,9 @@ struct Role {
 /// What may touch in an island during a frame.
 #[derive(Default)]
 pub(crate) struct Pairs {
+    /// In the frame.
+    candidates: Vec<Pair>,
+    /// In the substep.
     list: Vec<Pair>,
     /// Sorted; for the sweeps.
     roles: Vec<Role>,
@@ -85,7 +95,7 @@ impl Pair {
 impl Pairs {
     /// Begins a frame of an island: takes over what `coupling` found.
     pub fn begin<S: Solver>(&mut self, coupling: &Coupling, island: &[Worker<S>]) {
-        self.list.clear();
+        self.candidates.clear();
         let Some(first) = island.first() else { return };
         let contact = coupling.contact();
         let member = |body: u32| island.iter().position(|worker| worker.index == body as usize);
@@ -98,7 +108,7 @@ impl Pairs {
             let stiffness = |worker: &Worker<S>, vertex: u32| worker.body.tissue_stiffness(vertex as usize);
             let theirs: f32 = near.triangle.iter().zip(near.weights).map(|(c, w)| w * stiffness(two, *c)).sum();
             let ours = stiffness(one, near.vertex);
-            self.list.push(Pair {
+            self.candidates.push(Pair {
                 member: a,
                 other: b,
                 vertex: near.vertex,
@@ -115,18 +125,22 @@ impl Pairs {
                     friction: Friction::Coulomb(contact.friction as f32),
                 },
                 limit: 0.0,
+                candidate: self.candidates.len() as u32,
                 triangle: near.at,
                 free: near.free,
                 shift: (one.body.origin - two.body.origin).as_vec3a(),
                 stretch: known.map_or(Vec3A::ZERO, |k| stretches[k].by),
+                outside: near.distance > 0.0,
             });
         }
     }
 
+    /// Whether nothing can touch in the frame.
     pub fn is_empty(&self) -> bool {
-        self.list.is_empty()
+        self.candidates.is_empty()
     }
 
+    /// What may touch in the substep.
     pub fn list(&self) -> &[Pair] {
         &self.list
     }
@@ -138,23 +152,30 @@ impl Pairs {
     /// Finds the places and planes of a substep of `h` [s] that begins with the states as they are. They are those that the vertex will have come to along the surface: planes of where it is would
     /// be steps in its way wherever it goes over an edge.
     pub fn find<S: Solver>(&mut self, island: &[Worker<S>], h: f32) {
-        for pair in &mut self.list {
+        self.list.clear();
+        for pair in &mut self.candidates {
             let (one, two) = (&island[pair.member], &island[pair.other]);
             let (surface, x, v) = (&two.body.surface, &two.state.x[..], &two.state.v[..]);
             let p = one.state.x[pair.vertex as usize] + pair.shift;
+            let (triangle, foot) = surface.at(x, p, pair.triangle);
+            let theirs = |t: u32, weights: [f32; 3]| -> Vec3A {
+                (0..3).map(|k| weights[k] * v[surface.triangles[t as usize][k] as usize]).sum()
+            };
+            let way = h * (one.state.v[pair.vertex as usize] - theirs(triangle, foot.weights));
+            let reach = pair.free + LIKELY + 2.0 * way.length();
+            if pair.stretch == Vec3A::ZERO && foot.off.length_squared() > reach * reach && pair.outside {
+                continue;
+            }
             // Nearer triangles of a vertex's own body are its neighbourhood.
             let own = pair.member == pair.other;
-            let nearest =
-                |p: Vec3A, from: u32| if own { surface.at(x, p, from) } else { surface.nearest_from(x, p, from) };
-            let (triangle, foot) = nearest(p, pair.triangle);
+            let nearest = |p: Vec3A, t: u32| if own { surface.at(x, p, t) } else { surface.nearest_from(x, p, t) };
+            let (triangle, foot) = nearest(p, triangle);
             let Some((normal, _)) = surface.signed(x, triangle, &foot) else { continue };
-            let theirs: Vec3A =
-                (0..3).map(|k| foot.weights[k] * v[surface.triangles[triangle as usize][k] as usize]).sum();
-            let way = h * (one.state.v[pair.vertex as usize] - theirs);
             let ahead = p + (way - way.dot(normal) * normal);
             let (triangle, foot) = nearest(ahead, triangle);
-            let normal = surface.signed(x, triangle, &foot).map_or(normal, |(normal, _)| normal);
+            let (normal, distance) = surface.signed(x, triangle, &foot).unwrap_or((normal, 0.0));
             pair.triangle = triangle;
+            pair.outside = distance > 0.0;
             pair.corners = surface.triangles[triangle as usize];
             pair.weights = foot.weights;
             let along = pair.stretch - pair.stretch.dot(normal) * normal;
@@ -163,6 +184,7 @@ impl Pairs {
             pair.touch.point = pair.free * normal;
             pair.touch.place = foot.off - (ahead - p) - pair.stretch;
             pair.limit = 0.0;
+            self.list.push(*pair);
         }
     }
 
@@ -176,9 +198,9 @@ impl Pairs {
     /// Ends a substep with the states as they are: friction's places follow what slips.
     pub fn settle<S: Solver>(&mut self, island: &[Worker<S>]) {
         let x = |m: usize, vertex: u32| island[m].state.x[vertex as usize];
-        for pair in &mut self.list {
+        for pair in &self.list {
             let offset = pair.offset(x);
-            pair.stretch = if pair.touch.push(offset).is_some() {
+            self.candidates[pair.candidate as usize].stretch = if pair.touch.push(offset).is_some() {
                 let normal = pair.touch.normal;
                 let off = offset - pair.touch.place - pair.touch.slide(offset).unwrap_or(Vec3A::ZERO);
                 off - off.dot(normal) * normal
@@ -191,7 +213,7 @@ impl Pairs {
     /// Ends a frame: the states remember.
     pub fn end<S: Solver>(&self, island: &mut [Worker<S>]) {
         island.iter_mut().for_each(|worker| worker.state.stretches.clear());
-        for pair in self.list.iter().filter(|pair| pair.stretch != Vec3A::ZERO) {
+        for pair in self.candidates.iter().filter(|pair| pair.stretch != Vec3A::ZERO) {
             let other = island[pair.other].index as u32;
             let stretch = Stretch { vertex: pair.vertex, other, by: pair.stretch };
             island[pair.member].state.stretches.push(stretch);

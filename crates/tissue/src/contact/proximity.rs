@@ -9,6 +9,9 @@ use crate::state::BodyState;
 use crate::{Body, Model, State};
 use glam::{Vec3, Vec3A};
 
+/// What is within the reach of folded tissue, at most, in offsets.
+const CLOSE: f32 = 4.0 / 3.0;
+
 /// How far apart at rest, in reaches, the boxes of folded tissue are; what is nearer belongs together.
 const FOLDED: f32 = 2.0;
 
@@ -66,6 +69,18 @@ pub(crate) struct Proximity {
     free: Vec<Vec<f32>>,
     /// Rest positions by internal number and boxes round them, of bodies that are searched for folds.
     rest: Vec<(Vec<Vec3A>, Vec<Aabb>)>,
+    /// Where the bodies were at the last call, and whether they moved since the one before.
+    seen: Vec<Vec<Vec3A>>,
+    moved: Vec<bool>,
+    /// Of each ordered pair, what was found.
+    known: Vec<Known>,
+}
+
+/// What was found of a pair, within what reach.
+#[derive(Clone, Debug, Default)]
+struct Known {
+    reach: f32,
+    near: Vec<Near>,
 }
 
 /// A body's surface where it is now.
@@ -109,11 +124,13 @@ impl Proximity {
         let folds = |a: usize| limits.folds && model.collides(a, a);
         let kept = |(a, s): (usize, BodyState)| if folds(a) { (s.x, boxes[a].clone()) } else { Default::default() };
         let rest = rest.into_iter().enumerate().map(kept).collect();
-        Self { limits, boxes, free, rest }
+        let (seen, known) = (vec![Vec::new(); n], vec![Known::default(); n * n]);
+        Self { limits, boxes, free, rest, seen, moved: vec![true; n], known }
     }
 
     /// Puts into `found` every vertex whose distance from another body it collides with is between minus [`Limits::depth`] and `reach` of both bodies [m], with the nearest triangle;
-    /// ordered by body, vertex, other body. Allocates only to make `found` longer than it ever was.
+    /// ordered by body, vertex, other body. Pairs of bodies of which neither moved since the last call are not looked at again. Allocates only to make lists
+    /// longer than they ever were.
     pub fn find(
         &mut self,
         model: &Model,
@@ -123,15 +140,28 @@ impl Proximity {
     ) {
         found.clear();
         for (a, body) in model.bodies.iter().enumerate() {
-            body.surface.tree.refit(&state[a].x, &mut self.boxes[a]);
+            self.moved[a] = self.seen[a] != state[a].x;
+            if self.moved[a] {
+                self.seen[a].clone_from(&state[a].x);
+                body.surface.tree.refit(&state[a].x, &mut self.boxes[a]);
+            }
         }
         let n = model.bodies.len();
         for a in 0..n {
             let first = found.len();
-            for b in 0..n {
-                if model.collides(a, b) && (a != b || self.limits.folds) {
-                    self.find_pair(model, state, [a, b], reach(a, b), found);
+            for b in (0..n).filter(|b| model.collides(a, *b)) {
+                if a == b && !self.limits.folds {
+                    continue;
                 }
+                let reach = reach(a, b);
+                let mut known = std::mem::take(&mut self.known[a * n + b]);
+                if self.moved[a] || self.moved[b] || known.reach != reach {
+                    known.reach = reach;
+                    known.near.clear();
+                    self.find_pair(model, state, [a, b], reach, &mut known.near);
+                }
+                found.extend_from_slice(&known.near);
+                self.known[a * n + b] = known;
             }
             found[first..].sort_unstable_by_key(|near| (near.vertex, near.other));
         }
@@ -142,6 +172,8 @@ impl Proximity {
         let Limits { offset, depth, .. } = self.limits;
         // Folds are not looked for deep inside, where the tissue's own surface is.
         let depth = if a == b { depth.min(reach) } else { depth };
+        // However fast the tissue is: what belongs together does so all the same.
+        let close = reach.min(CLOSE * offset);
         let search = reach.max(depth);
         let side = |k: usize| Side { body: &model.bodies[k], x: &state[k].x, boxes: &self.boxes[k] };
         let (from, to) = (side(a), side(b));
@@ -162,13 +194,13 @@ impl Proximity {
             if !to.body.surface.tree.reaches(to.boxes, &place) {
                 return;
             }
-            let around = rest_boxes.get(leaf as usize).map(|b| b.moved(Vec3A::ZERO, FOLDED * reach));
+            let around = rest_boxes.get(leaf as usize).map(|b| b.moved(Vec3A::ZERO, FOLDED * close));
             let apart = |near: u32| around.is_none_or(|around| !rest_boxes[near as usize].meets(&around));
             for vertex in owned {
                 let p = from.x[*vertex as usize] + shift;
                 let mut best = Best::within(search * search);
                 if a == b {
-                    let skip = |t: u32| is_squeezed(from.body, rest, *vertex, t, OTHER_SIDE * reach);
+                    let skip = |t: u32| is_squeezed(from.body, rest, *vertex, t, OTHER_SIDE * close);
                     to.nearest(p, &mut best, apart, skip);
                 } else {
                     // The vertices before are neighbours, mostly: where they ended bounds the search.

@@ -64,7 +64,7 @@ impl QuasiNewtonSolver {
             self.targets[i] = to;
         }
         let (targets, layout, start) = (&mut self.targets, &self.layout, &self.start);
-        let mut yielded = false;
+        let (mut yielded, mut carried) = (false, false);
         frame.for_held(body, share, |vertex, x| {
             let i = layout.number[vertex] as usize;
             if i >= free {
@@ -75,9 +75,11 @@ impl QuasiNewtonSolver {
                 return;
             }
             targets[i] = x.extend(0.0).to_array();
-            moves |= targets[i] != start[i];
+            carried |= targets[i] != start[i];
         });
+        moves |= carried;
         self.yielded = yielded;
+        self.carried = carried || yielded;
         if !moves {
             self.pass(h);
             return Guess::Still;

@@ -22,7 +22,7 @@ mod warp;
 
 use crate::contact::{Contacts, Pairs};
 use crate::descent::{DescentIntegrator, Sweeps, sweep_substep};
-use crate::integrator::{Frame, Solver, Worker};
+use crate::integrator::{Frame, Solver, Worker, for_each};
 use glam::Vec3A;
 use go::{Guess, Pulled};
 use history::History;
@@ -59,6 +59,9 @@ impl Sweeps for QuasiNewtonSolver {
     }
 }
 
+/// Gravity on earth [m/s2].
+const EARTH: f32 = 9.81;
+
 /// Times a minimum is looked for, each with friction's limits as they were at the last.
 const ROUNDS: usize = 4;
 
@@ -73,14 +76,21 @@ struct Island<'a> {
 }
 
 impl Island<'_> {
+    /// The bodies that take part in the search.
     fn parts(&mut self) -> impl Iterator<Item = &mut QuasiNewtonSolver> {
+        self.workers.iter_mut().map(|worker| &mut worker.solver).filter(|part| part.active)
+    }
+
+    /// All bodies.
+    fn all(&mut self) -> impl Iterator<Item = &mut QuasiNewtonSolver> {
         self.workers.iter_mut().map(|worker| &mut worker.solver)
     }
 
     fn begin(&mut self) {
-        for Worker { index, body, solver, state, .. } in self.workers.iter_mut() {
-            solver.begin(&self.frame.of(*index), body, state);
-        }
+        let frame = self.frame;
+        for_each(self.workers, frame, |Worker { index, body, solver, state, .. }| {
+            solver.begin(&frame.of(*index), body, state);
+        });
         self.begin_anew();
     }
 
@@ -88,18 +98,20 @@ impl Island<'_> {
     fn begin_anew(&mut self) {
         self.history.clear();
         let h = self.h;
-        self.parts().for_each(|part| {
-            part.pass(h);
-            part.elements.accept();
+        for_each(self.workers, self.frame, |Worker { solver, .. }| {
+            solver.active = true;
+            solver.pass(h);
+            solver.elements.accept();
         });
     }
 
     /// One substep, between two shares of the frame.
     fn advance(&mut self, from: f64, to: f64) {
         self.pairs.find(self.workers, self.h);
-        for Worker { index, body, solver, .. } in self.workers.iter_mut() {
-            solver.find_touches(&self.frame.of(*index), body, from, to);
-        }
+        let frame = self.frame;
+        for_each(self.workers, frame, |Worker { index, body, solver, .. }| {
+            solver.find_touches(&frame.of(*index), body, from, to);
+        });
         self.note_limited();
         // What the matrices do not know of may be too stiff for them.
         let usable = self.workers.iter().all(|worker| worker.solver.usable);
@@ -120,13 +132,14 @@ impl Island<'_> {
             self.workers.iter_mut().for_each(|worker| worker.solver.load(&worker.state));
             self.begin_anew();
         }
-        for Worker { index, body, solver, .. } in self.workers.iter_mut() {
-            solver.settle(&self.frame.of(*index), body, to);
-        }
-        if !self.pairs.is_empty() {
-            self.workers.iter_mut().for_each(|worker| worker.solver.store(&mut worker.state));
-            self.pairs.settle(self.workers);
-        }
+        let coupled = !self.pairs.is_empty();
+        for_each(self.workers, frame, |Worker { index, body, solver, state, .. }| {
+            solver.settle(&frame.of(*index), body, to);
+            if coupled {
+                solver.store(state);
+            }
+        });
+        self.pairs.settle(self.workers);
     }
 
     fn end(&mut self) {
@@ -157,21 +170,20 @@ impl Island<'_> {
     /// One substep, which ends when `share` of the frame is over; false if it was given up, and nothing has changed then but scratch memory.
     fn substep(&mut self, share: f64) -> bool {
         let (h, gravity) = (self.h, self.frame.gravity.as_vec3a().extend(0.0).to_array());
-        let (mut moved, mut behind) = (false, false);
+        let alone = self.pairs.is_empty();
         for member in 0..self.workers.len() {
-            let pressed = self.pairs.presses(self.workers, member);
-            let Worker { index, body, solver, report, .. } = &mut self.workers[member];
-            solver.predict(h, gravity, pressed);
-            solver.guess = solver.guess(&self.frame.of(*index), share, h, body);
+            self.workers[member].solver.pressed = self.pairs.presses(self.workers, member);
+        }
+        let frame = self.frame;
+        for_each(self.workers, frame, |Worker { index, body, solver, report, .. }| {
+            solver.predict(h, gravity);
+            solver.guess = solver.guess(&frame.of(*index), share, h, body);
             solver.update_warp();
             report.grasp_limited += usize::from(solver.yielded);
-            moved |= solver.guess != Guess::Still;
-            behind |= solver.guess == Guess::Behind;
-        }
-        self.take_gradient();
-        self.accept_gradient();
-        self.refresh_limits();
-        let alone = self.pairs.is_empty();
+        });
+        let moved = self.all().any(|part| part.guess != Guess::Still);
+        let behind = self.all().any(|part| part.guess == Guess::Behind);
+        self.choose_active(alone);
         let (mut stepped, mut rounds) = (false, 0);
         if behind {
             stepped = self.pull();
@@ -183,6 +195,10 @@ impl Island<'_> {
             if gravity == [0.0; 4] { f32::INFINITY } else { 1e-4 * h * h * self.frame.gravity.length() as f32 };
         let (tolerance, relative) = ((settings.tolerance as f32).max(rounding), settings.relative as f32);
         for iteration in usize::from(behind)..settings.iterations {
+            if self.parts().next().is_none() {
+                // Nothing moves, and nothing did.
+                return true;
+            }
             self.find_direction();
             self.count();
             let longest = self.parts().map(|part| part.longest_step()).fold(0.0, f32::max);
@@ -190,7 +206,7 @@ impl Island<'_> {
             if longest <= tolerance.max(relative * way) {
                 if iteration > 0 || moved {
                     rounds += 1;
-                    if alone || rounds == ROUNDS || !self.refresh_limits() {
+                    if alone || rounds == ROUNDS || !(self.wake() | self.refresh_limits()) {
                         break;
                     }
                     continue;
@@ -217,9 +233,55 @@ impl Island<'_> {
         true
     }
 
+    /// Finds the gradient where the substep starts from, and which bodies take part: among others, one that neither moves nor would by what pushes it is left where it is.
+    fn choose_active(&mut self, alone: bool) {
+        let (h, still) = (self.h, self.still());
+        self.all().for_each(|part| part.resting = !std::mem::replace(&mut part.active, true));
+        self.take_gradient();
+        self.accept_gradient();
+        self.refresh_limits();
+        if alone {
+            return;
+        }
+        for_each(self.workers, self.frame, |Worker { solver, .. }| {
+            if solver.is_quiet(h, still) && solver.correction() <= still {
+                solver.rest();
+            }
+        });
+        if self.all().any(|part| part.resting == part.active) {
+            self.history.clear();
+        }
+    }
+
+    /// What bodies at rest do not move in a substep [m]: a small share of what gravity would move them.
+    fn still(&self) -> f32 {
+        1e-4 * self.h * self.h * EARTH
+    }
+
+    /// Lets the bodies at rest take part that the others have begun to push; whether there is one.
+    fn wake(&mut self) -> bool {
+        let still = self.still();
+        if self.workers.iter().all(|worker| worker.solver.active) {
+            return false;
+        }
+        self.all().for_each(|part| part.resting = !std::mem::replace(&mut part.active, true));
+        self.take_gradient();
+        for_each(self.workers, self.frame, |Worker { solver, .. }| {
+            if solver.resting {
+                std::mem::swap(&mut solver.gradient, &mut solver.next_gradient);
+                solver.active = solver.correction() > still;
+            }
+        });
+        let woken = self.all().any(|part| part.resting && part.active);
+        if woken {
+            self.history.clear();
+        }
+        woken
+    }
+
     /// Takes out of an island that nothing holds what is left of the sum of all forces: moving all of it alike changes none of those between its parts.
     fn keep_momentum(&mut self) {
-        if self.pairs.is_empty() || !self.parts().all(|part| part.flies()) {
+        if self.pairs.is_empty() || !self.all().all(|part| part.active && part.flies()) {
             return;
         }
         let force = self.parts().map(|part| part.force()).fold(Vec3A::ZERO, |sum, part| sum + part);
@@ -230,14 +292,16 @@ impl Island<'_> {
 
     /// Counts an iteration.
     fn count(&mut self) {
-        self.workers.iter_mut().for_each(|worker| worker.report.iterations += 1);
+        let active = self.workers.iter_mut().filter(|worker| worker.solver.active);
+        active.for_each(|worker| worker.report.iterations += 1);
     }
 
     /// Goes on where bodies would not bear to be moved to where they go by themselves; whether anything moved.
     fn pull(&mut self) -> bool {
         let h = self.h;
         let mut stepped = false;
-        for Worker { solver, report, .. } in self.workers.iter_mut().filter(|w| w.solver.guess == Guess::Behind) {
+        let behind = |solver: &QuasiNewtonSolver| solver.active && solver.guess == Guess::Behind;
+        for Worker { solver, report, .. } in self.workers.iter_mut().filter(|worker| behind(&worker.solver)) {
             report.iterations += 1;
             let pulled = solver.pull(h);
             stepped |= pulled != Pulled::Nowhere;

@@ -57,6 +57,16 @@ pub(crate) struct QuasiNewtonSolver {
     touches_in_factor: Vec<f32>,
     /// Whether the factor is that of the matrix.
     pub(super) usable: bool,
+    /// Whether the body takes part in the search: one that is at rest among others is left alone until they push it.
+    pub(super) active: bool,
+    /// Whether it bore the last step along a direction.
+    pub(super) went: bool,
+    /// Whether another body presses it when a substep begins.
+    pub(super) pressed: bool,
+    /// Whether it did not when that was last looked at.
+    pub(super) resting: bool,
+    /// Whether a tool carries held nodes on in this substep.
+    pub(super) carried: bool,
     /// Where the substep started from.
     pub(super) guess: Guess,
     /// Whether a held node could not go on in this substep because an edge would be too long.
@@ -106,6 +116,11 @@ impl QuasiNewtonSolver {
             held_in_factor: held.clone(),
             touches_in_factor: vec![0.0; layout.free],
             usable: factor.is_some() || layout.free == 0,
+            active: true,
+            went: true,
+            pressed: false,
+            resting: false,
+            carried: false,
             guess: Guess::Still,
             yielded: false,
             limited: 0,
@@ -143,11 +158,11 @@ impl QuasiNewtonSolver {
         dispatch!(*level, simd => elements.pass(simd, layout, x, start, h))
     }
 
-    /// Begins a substep: where nodes would be without forces but gravity. `pressed`: by another body.
-    pub fn predict(&mut self, h: f32, gravity: Row, pressed: bool) {
+    /// Begins a substep: where nodes would be without forces but gravity.
+    pub fn predict(&mut self, h: f32, gravity: Row) {
         self.start.copy_from_slice(&self.x);
         // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere implicit Euler's h^2 g.
-        let reach = if !pressed && self.flies() { 0.5 * h * h } else { h * h };
+        let reach = if !self.pressed && self.flies() { 0.5 * h * h } else { h * h };
         for i in 0..self.layout.free {
             for c in 0..3 {
                 self.predictor[i][c] = self.x[i][c] + h * self.v[i][c] + reach * gravity[c];
@@ -286,6 +301,25 @@ impl QuasiNewtonSolver {
             }
         }
         way
+    }
+
+    /// Whether no node goes farther than `way` [m] by itself in a substep of `h` [s], and no tool carries any.
+    pub fn is_quiet(&self, h: f32, way: f32) -> bool {
+        !self.carried && h * longest(&self.v) <= way
+    }
+
+    /// How far the gradient would move any node [m], without what was learnt. The direction is lost.
+    pub fn correction(&mut self) -> f32 {
+        self.direction.copy_from_slice(&self.gradient);
+        self.precondition();
+        longest(&self.direction)
+    }
+
+    /// Leaves the body where the substep began.
+    pub fn rest(&mut self) {
+        self.restore();
+        self.v.fill([0.0; 4]);
+        self.active = false;
     }
 
     /// Puts the substep's beginning back.

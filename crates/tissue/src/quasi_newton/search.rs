@@ -1,6 +1,8 @@
 //! Where an island goes in an iteration: downhill, as far as it takes for the slope to become small.
 
 use super::Island;
+use super::part::QuasiNewtonSolver;
+use crate::integrator::{Worker, for_each};
 use glam::Vec3A;
 
 /// A slope of this share of the first one, falling or rising, is small enough.
@@ -24,15 +26,31 @@ impl Island<'_> {
     /// Writes the gradient of all bodies' potential into their next gradients, from the forces of the last passes.
     pub(super) fn take_gradient(&mut self) {
         let h = self.h;
-        self.parts().for_each(|part| part.take_gradient(h));
+        self.for_active(|part| part.take_gradient(h));
         let Self { workers, pairs, .. } = self;
         for pair in pairs.list() {
+            if !workers[pair.member].solver.active && !workers[pair.other].solver.active {
+                continue;
+            }
             let offset = pair.offset(|m, vertex| workers[m].solver.at(vertex));
             if let Some(push) = pair.push(offset) {
                 for (m, vertex, share) in pair.shares() {
                     workers[m].solver.push(true, vertex, share * push.gradient);
                 }
             }
+        }
+    }
+
+    /// Does the same with every body that takes part, in parallel if there are several.
+    fn for_active(&mut self, work: impl Fn(&mut QuasiNewtonSolver) + Send + Sync) {
+        if self.parts().nth(1).is_none() {
+            self.parts().for_each(work);
+        } else {
+            for_each(self.workers, self.frame, |Worker { solver, .. }| {
+                if solver.active {
+                    work(solver);
+                }
+            });
         }
     }
 
@@ -69,7 +87,7 @@ impl Island<'_> {
         self.assemble_rigid();
         self.parts().for_each(|part| part.direction.copy_from_slice(&part.gradient));
         self.explain();
-        self.parts().for_each(|part| {
+        self.for_active(|part| {
             part.take_rigid();
             part.precondition();
             part.add_rigid();
@@ -103,7 +121,8 @@ impl Island<'_> {
         let (mut share, mut below, mut above) = (1.0f32, (0.0f32, slope), None);
         for attempt in 0..=MOST_SHARES {
             let h = self.h;
-            if !self.parts().all(|part| part.go(share, h)) {
+            self.for_active(|part| part.went = part.go(share, h));
+            if !self.parts().all(|part| part.went) {
                 return self.turn_back();
             }
             // Steps of squeezed elements' nodes may have been cut.
