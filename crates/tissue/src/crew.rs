@@ -28,10 +28,12 @@ pub(crate) trait Crew: Send {
     fn for_bodies(&self, tell: &mut dyn FnMut(usize, &Reaction, Option<&Contacts>));
 }
 
+/// Makes the solver of a body; the flag says whether the calling thread is to do all the work.
+type Make<S> = Box<dyn Fn(&Body, bool) -> S + Send>;
+
 /// Bodies that are all stepped by the same kind of solver.
 pub(crate) struct Workers<S> {
-    /// Makes a body's solver.
-    make: Box<dyn Fn(&Body, bool) -> S + Send>,
+    make: Make<S>,
     /// Island by island, the largest first, so that the threads end together.
     list: Vec<Worker<S>>,
     coupling: Option<Coupling>,

@@ -34,6 +34,8 @@ pub(crate) struct DescentIntegrator {
     guess: Vec<Vec3A>,
     fixed: Vec<bool>,
     held: Vec<bool>,
+    /// Whether another body presses it when a substep begins.
+    pressed: bool,
     isa: Isa,
     alone: bool,
 }
@@ -105,7 +107,8 @@ pub(crate) fn sweep_substep<S: Sweeps>(island: &mut [Worker<S>], pairs: &mut Pai
         let (descent, contacts) = solver.sweeps();
         iterations = descent.schedule.iterations;
         contacts.press(&[]);
-        descent.start(&frame.of(*index), share, body, contacts, pressed, state, report);
+        descent.pressed = pressed;
+        descent.start(&frame.of(*index), share, body, contacts, state, report);
     }
     pairs.assign();
     for _ in 0..iterations {
@@ -137,6 +140,7 @@ impl DescentIntegrator {
             guess: zeros,
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
+            pressed: false,
             isa: Isa::detect(),
             alone,
         }
@@ -147,21 +151,20 @@ impl DescentIntegrator {
         (frame.dt / self.schedule.substeps as f64) as f32
     }
 
-    /// Predicts where the body is when `share` of the frame is over, and moves it to where the sweeps start from. `pressed`: by another body.
+    /// Predicts where the body is when `share` of the frame is over, and moves it to where the sweeps start from.
     fn start(
         &mut self,
         frame: &Frame<'_>,
         share: f64,
         body: &Body,
         contacts: &Contacts,
-        pressed: bool,
         state: &mut BodyState,
         report: &mut StepReport,
     ) {
         let h = self.step(frame);
         let gravity = frame.gravity.as_vec3a();
         self.start.copy_from_slice(&state.x);
-        let flies = self.schedule.start == Start::Adaptive && !pressed && self.flies_freely(contacts);
+        let flies = self.schedule.start == Start::Adaptive && !self.pressed && self.flies_freely(contacts);
         // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere
         // implicit Euler's h^2 g.
         let reach = if flies { 0.5 * h * h } else { h * h };
