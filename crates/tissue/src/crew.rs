@@ -34,16 +34,26 @@ type Make<S> = Box<dyn Fn(&Body, bool) -> S + Send>;
 /// Bodies that are all stepped by the same kind of solver.
 pub(crate) struct Workers<S> {
     make: Make<S>,
-    /// Island by island, the largest first, so that the threads end together.
+    /// Island by island, the largest first.
     list: Vec<Worker<S>>,
     coupling: Option<Coupling>,
+    /// What of the model the coupling was made for.
+    contact: Option<BodyContact>,
+    filtered: Vec<[usize; 2]>,
     /// By body: elements of the island that begins with it.
     sizes: Vec<usize>,
 }
 
 impl<S: Solver> Workers<S> {
     pub fn new(make: impl Fn(&Body, bool) -> S + Send + 'static) -> Self {
-        Self { make: Box::new(make), list: Vec::new(), coupling: None, sizes: Vec::new() }
+        Self {
+            make: Box::new(make),
+            list: Vec::new(),
+            coupling: None,
+            contact: None,
+            filtered: Vec::new(),
+            sizes: Vec::new(),
+        }
     }
 
     /// Finds what may touch, and sorts the bodies into islands.
@@ -82,13 +92,16 @@ impl<S: Solver> Crew for Workers<S> {
             };
             self.list.push(worker);
         }
+        self.contact = model.body_contact;
+        self.filtered.clone_from(&model.filtered);
         let couple = |contact: BodyContact| Coupling::new(model, contact);
         self.coupling = model.body_contact.filter(|_| S::COUPLES).map(couple);
         self.sizes = vec![0; model.bodies.len()];
     }
 
     fn fits(&self, model: &Model, state: &State) -> bool {
-        let counts = self.list.len() == model.bodies.len() && self.list.len() == state.bodies.len();
+        let contact = self.coupling.is_none() || self.contact == model.body_contact && self.filtered == model.filtered;
+        let counts = contact && self.list.len() == model.bodies.len() && self.list.len() == state.bodies.len();
         // A model that was built again is as good as the same; one that was cut elsewhere is not.
         let same =
             |w: &Worker<S>| state.bodies[w.index].x.len() == w.state.x.len() && model.bodies[w.index].is_alike(&w.body);
@@ -102,6 +115,12 @@ impl<S: Solver> Crew for Workers<S> {
         frame: &Frame<'_>,
         pool: Option<&rayon::ThreadPool>,
     ) -> StepReport {
+        for worker in &mut self.list {
+            let (body, state) = (&worker.body, &mut state.bodies[worker.index]);
+            worker.report = StepReport::default();
+            worker.before.copy_from(state);
+            worker.untangler.untangle(&frame.of(worker.index), body, state);
+        }
         self.find_islands(model, state, frame);
         for worker in &mut self.list {
             std::mem::swap(&mut worker.state, &mut state.bodies[worker.index]);
@@ -130,16 +149,27 @@ impl<S: Solver> Crew for Workers<S> {
     }
 }
 
+/// Hands what other bodies do to rigidly held nodes on to the tools.
+fn press_tools<S: Solver>(island: &mut [Worker<S>], frame: &Frame<'_>) {
+    let pairs = std::mem::take(&mut island[0].pairs);
+    for pair in pairs.list() {
+        let offset = pair.offset(|m, vertex| island[m].state.x[vertex as usize]);
+        if let Some(push) = pair.touch.push(offset) {
+            for (m, vertex, share) in pair.shares() {
+                let Worker { body, state, reaction, .. } = &mut island[m];
+                let force = (-share * push.gradient).as_dvec3();
+                reaction.press(frame, body, state, vertex as usize, force);
+            }
+        }
+    }
+    island[0].pairs = pairs;
+}
+
 /// Advances an island by a frame.
 fn advance<S: Solver>(island: &mut [Worker<S>], coupling: Option<&Coupling>, frame: &Frame<'_>) {
-    for_each(island, frame, |worker| {
-        worker.report = StepReport::default();
-        worker.before.copy_from(&worker.state);
-        worker.untangler.untangle(&frame.of(worker.index), &worker.body, &mut worker.state);
-    });
     let mut pairs = std::mem::take(&mut island[0].pairs);
     if let Some(coupling) = coupling {
-        pairs.begin(coupling, island);
+        pairs.begin(coupling, frame, island);
     }
     island[0].pairs = pairs;
     S::advance(island, frame);
@@ -147,4 +177,5 @@ fn advance<S: Solver>(island: &mut [Worker<S>], coupling: Option<&Coupling>, fra
         report.measure(*index, body, state);
         reaction.take(&frame.of(*index), body, state, solver.contacts().is_none());
     });
+    press_tools(island, frame);
 }

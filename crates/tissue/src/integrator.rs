@@ -13,7 +13,7 @@ pub(crate) trait Solver: Send + Sized {
     const COUPLES: bool;
 
     /// Advances the bodies of an island, which may touch each other and nothing else, by `frame`; writes what happened on the way into their reports. The first has what may touch. It
-    /// allocates nothing.
+    /// allocates nothing, but for longer lists of what touches.
     fn advance(island: &mut [Worker<Self>], frame: &Frame<'_>);
 
     /// What the body touched in the last frame; None for a solver that knows no tools.
@@ -77,6 +77,22 @@ impl Frame<'_> {
     /// The same for another body.
     pub fn of(&self, index: usize) -> Self {
         Self { index, ..*self }
+    }
+
+    /// How far colliders that may come near the body may push it in the frame [m]; `around`: a box round the body, in its frame.
+    pub fn pushes(&self, body: &Body, around: Option<(Vec3A, Vec3A)>) -> f64 {
+        let Some((low, high)) = around else { return 0.0 };
+        let (middle, half) = ((0.5 * (low + high)).as_dvec3(), (0.5 * (high - low)).length());
+        let way = |collider: &Collider| {
+            let motion = self.tools.get(collider.tool)?;
+            let (centre, radius) = collider.shape.bounds(collider.rest_offset);
+            let far = motion.from.transform(centre).distance(body.origin + middle);
+            // How far a half-space turns is not bounded: what matters of it is near the body.
+            let arm = if radius.is_finite() { centre.length() + radius } else { far + f64::from(half) };
+            let way = crate::grasp::way(&motion.from, &motion.to, arm);
+            (far <= radius + f64::from(half) + way).then_some(way)
+        };
+        self.colliders.iter().filter_map(way).fold(0.0, f64::max)
     }
 
     /// The body's grasps that hold something.

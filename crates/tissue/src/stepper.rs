@@ -9,7 +9,7 @@ use crate::quasi_newton::QuasiNewtonSolver;
 use crate::report::Divergence;
 use crate::{Error, Event, Model, Result, Schedule, State, StepReport, ToolForce, ToolMotion};
 
-/// Advances states of one model; owns all scratch memory, so stepping allocates nothing.
+/// Advances states of one model; owns all scratch memory, so stepping allocates nothing, but for lists of what bodies touch that get longer than they ever were.
 pub struct Stepper {
     dt: f64,
     schedule: Schedule,

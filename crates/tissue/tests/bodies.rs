@@ -4,10 +4,13 @@
 
 mod common;
 
-use common::{FRAME, GRAVITY, block, nodes, schedules, tissue};
+use common::{FRAME, GRAVITY, block, many_sweeps, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
-use trocar_geometry::TetMesh;
-use trocar_tissue::{Body, BodyContact, BodyDescription, Material, Model, ModelBuilder, Schedule, State, Stepper};
+use trocar_geometry::{Pose, TetMesh};
+use trocar_tissue::{
+    Body, BodyContact, BodyDescription, Divergence, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper,
+    ToolMotion,
+};
 
 /// A ball of `cells` cubes across, of radius `radius` [m], round `centre`.
 fn ball(cells: usize, radius: f64, centre: DVec3) -> TetMesh {
@@ -87,7 +90,7 @@ fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     edge(a, b).min(edge(b, c)).min(edge(c, a))
 }
 
-/// One organ falls 20 mm onto another that lies on pins: neither enters the other by more than the contact offset, ever, and they come to rest.
+/// One organ falls 20 mm onto another that lies on pins: neither enters the other by more than the contact offset, ever. The fast solver's comes to rest on it; the paper's sweeps lose momentum, and it slides off.
 #[test]
 fn dropped_on_each_other_they_stay_outside() {
     let (radius, contact) = (12e-3, BodyContact::default());
@@ -123,11 +126,18 @@ fn dropped_on_each_other_they_stay_outside() {
         );
         // Where the surfaces would be a gap of 1.5 mm apart.
         assert!(lowest < 1.8 * radius + 1.5e-3, "{}: it did not fall as far as the other", judged.name);
+        if judged.name == "fast" {
+            let fastest =
+                (0..model.bodies()[1].len()).map(|i| state.velocity(&model, 1, i).length()).fold(0.0, f64::max);
+            let height = centroid(&model, &state, 1).z;
+            println!("{height:.4} m high, {fastest:.4} m/s");
+            assert!(height > 1.2 * radius, "{height} m");
+        }
         assert!(deepest <= contact.offset, "{}: {:.2} mm deep", judged.name, 1e3 * deepest);
     }
 }
 
-/// Two that fly into each other, off centre, keep their momentum, and gain no energy.
+/// Two that fly into each other, off centre, keep their momentum, and gain no energy: by the fast solver. Ten sweeps a substep do neither; 150 lose 4% of the momentum.
 #[test]
 fn momentum_is_kept() {
     for judged in schedules() {
@@ -159,6 +169,12 @@ fn momentum_is_kept() {
         if judged.name == "fast" {
             assert!(lost < 1e-4, "{lost} of the momentum is lost");
             assert!(left < energy, "{left} J of {energy} J");
+        } else if judged.converges {
+            assert!(
+                lost < 0.06 && left < energy,
+                "{}: {lost} of the momentum lost, {left} J of {energy} J",
+                judged.name
+            );
         }
     }
 }
@@ -325,12 +341,105 @@ fn a_rigid_body_is_an_obstacle() {
     }
 }
 
+/// In a row of bodies at rest that touch, a blow to the first is felt by the last, and no momentum is lost on the way.
+#[test]
+fn a_blow_goes_through_a_row() {
+    let contact = BodyContact::default();
+    let step = 12e-3 + contact.offset;
+    let meshes: Vec<TetMesh> = (0..5).map(|k| ball(4, 6e-3, DVec3::X * (k as f64 * step))).collect();
+    let parts: Vec<Part> =
+        meshes.into_iter().map(|mesh| Part { mesh, material: tissue(20e3), pinned: vec![] }).collect();
+    let model = scene(&parts, contact, DVec3::ZERO);
+    let mut state = State::new(&model);
+    (0..model.bodies()[0].len()).for_each(|i| state.set_velocity(&model, 0, i, DVec3::X * 0.4));
+    let before = momentum(&model, &state);
+    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 2).unwrap();
+    for _ in 0..20 {
+        let report = stepper.step(&model, &mut state, &[]);
+        assert_eq!((report.inverted, report.divergence, report.fallbacks), (0, None, 0));
+    }
+    let lost = (momentum(&model, &state) - before).length() / before.length();
+    let last = (0..model.bodies()[4].len()).map(|i| state.velocity(&model, 4, i).x).sum::<f64>()
+        / model.bodies()[4].len() as f64;
+    println!("{lost:.1e} of the momentum lost; the last goes at {last:.3} m/s");
+    assert!(lost < 0.02, "{lost} of the momentum is lost");
+    assert!(last > 0.05, "the last goes at {last} m/s");
+}
+
+/// At 30 frames a second a block that is just out of reach falls through the whole offset in one: it is found all the same.
+#[test]
+fn long_frames_find_what_falls() {
+    let low = block([6, 6, 4], 2.5e-3);
+    let high = moved(block([3, 3, 3], 2.5e-3), |p| p + DVec3::new(3e-3, 4e-3, 12.01e-3));
+    let pinned = nodes(&low, |p| p.z < 1e-9);
+    let material = Material { viscosity: 20.0, ..tissue(10e3) };
+    let parts = [Part { mesh: low, material, pinned }, Part { mesh: high, material, pinned: vec![] }];
+    let model = scene(&parts, BodyContact::default(), GRAVITY);
+    let mut state = State::new(&model);
+    let mut stepper = Stepper::new(&model, Schedule::FAST, 1.0 / 30.0, 1).unwrap();
+    for _ in 0..30 {
+        let report = stepper.step(&model, &mut state, &[]);
+        assert_eq!((report.inverted, report.divergence), (0, None));
+        let height = centroid(&model, &state, 1).z - 0.5 * 7.5e-3 - 10e-3;
+        assert!(height > 0.0, "{height} m above it");
+    }
+}
+
+/// A tool that holds one body rigidly bears what another lays on it: the weight of both, and no more.
+#[test]
+fn tools_feel_what_presses_what_they_hold() {
+    let low = block([4, 4, 2], 2.5e-3);
+    let high = moved(block([3, 3, 3], 2.5e-3), |p| p + DVec3::new(1.5e-3, 1e-3, 5e-3 + 1.4e-3));
+    let material = Material { viscosity: 20.0, ..tissue(10e3) };
+    let held = nodes(&low, |_| true);
+    let parts = [Part { mesh: low, material, pinned: vec![] }, Part { mesh: high, material, pinned: vec![] }];
+    let model = scene(&parts, BodyContact::default(), GRAVITY);
+    let weight: f64 =
+        model.bodies().iter().map(|body| (0..body.len()).map(|i| body.mass(i)).sum::<f64>()).sum::<f64>() * 9.81;
+    for schedule in [Schedule::FAST, many_sweeps()] {
+        let mut state = State::new(&model);
+        state.grasps = vec![Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY)];
+        let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+        let still = ToolMotion { from: Pose::IDENTITY, to: Pose::IDENTITY };
+        for _ in 0..90 {
+            assert_eq!(stepper.step(&model, &mut state, &[still]).divergence, None);
+        }
+        let force = stepper.forces()[0].constraint.force;
+        println!("{:.6} N of {weight:.6} N", -force.z);
+        assert!((force + DVec3::Z * weight).length() < 0.02 * weight, "{force} N, {weight} N of weight");
+    }
+}
+
+/// A model that was built again with another contact is not the one that a stepper was made for.
+#[test]
+fn another_contact_is_another_model() {
+    let build = |friction: f64, filtered: bool| {
+        let mut builder = ModelBuilder::new().body_contact(BodyContact { friction, ..BodyContact::default() });
+        for k in 0..2 {
+            let (name, mesh) = (format!("part {k}"), ball(4, 6e-3, DVec3::X * 0.1 * f64::from(k)));
+            let material = tissue(8e3);
+            builder.body(BodyDescription { name, mesh: &mesh, material, pinned: vec![], supports: vec![] }).unwrap();
+        }
+        if filtered {
+            builder.filter_pair(0, 1).unwrap();
+        }
+        builder.build().unwrap()
+    };
+    let model = build(0.6, false);
+    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    for (other, refused) in [(build(0.6, false), false), (build(0.1, false), true), (build(0.6, true), true)] {
+        let mut state = State::new(&other);
+        assert_eq!(stepper.step(&other, &mut state, &[]).divergence == Some(Divergence::OtherModel), refused);
+    }
+}
+
 /// Bodies of a filtered pair, and bodies of a model without contact between them, pass through each other.
 #[test]
 fn only_pairs_that_collide_touch() {
     let parts = [ball(5, 8e-3, DVec3::ZERO), ball(5, 8e-3, DVec3::Z * 20e-3)];
-    for filtered in [false, true] {
-        let mut builder = ModelBuilder::new().body_contact(BodyContact::default());
+    for [contact, filtered] in [[true, false], [true, true], [false, false]] {
+        let builder = ModelBuilder::new();
+        let mut builder = if contact { builder.body_contact(BodyContact::default()) } else { builder };
         for (k, mesh) in parts.iter().enumerate() {
             let (name, material) = (format!("part {k}"), tissue(8e3));
             builder.body(BodyDescription { name, mesh, material, pinned: vec![], supports: vec![] }).unwrap();
@@ -344,7 +453,7 @@ fn only_pairs_that_collide_touch() {
         let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
         (0..12).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
         let moved = centroid(&model, &state, 0).length();
-        assert_eq!(moved < 1e-9, filtered, "the other went {moved} m");
+        assert_eq!(moved < 1e-9, filtered || !contact, "the other went {moved} m");
     }
     for contact in [
         BodyContact { offset: -1e-3, ..BodyContact::default() },
@@ -360,7 +469,7 @@ fn only_pairs_that_collide_touch() {
     }
 }
 
-/// The same bits on one thread and on two, and after a state was put back.
+/// The same bits on one thread and on two, and after a state was put back, in the same stepper and in another.
 #[test]
 fn bits_repeat() {
     let meshes = [
@@ -370,12 +479,19 @@ fn bits_repeat() {
         ball(5, 7e-3, DVec3::new(60e-3, 2e-3, 18e-3)),
     ];
     let pins = |mesh: &TetMesh| nodes(mesh, |p| p.z < -5e-3);
-    let parts = meshes.map(|mesh| Part { pinned: pins(&mesh), mesh, material: tissue(8e3) });
+    let material = Material { viscosity: 20.0, ..tissue(8e3) };
+    let parts = meshes.map(|mesh| Part { pinned: pins(&mesh), mesh, material });
     let model = scene(&parts, BodyContact::default(), GRAVITY);
     for schedule in [Schedule::FAST, Schedule::PAPER] {
         let run = |threads: usize| {
             let mut state = State::new(&model);
             let mut stepper = Stepper::new(&model, schedule, FRAME, threads).unwrap();
+            // What went before in a stepper leaves nothing behind.
+            if threads == 2 {
+                let mut other = State::new(&model);
+                (0..3).for_each(|k| (0..40).for_each(|i| other.set_velocity(&model, k, i, DVec3::new(0.1, 0.2, -0.3))));
+                (0..5).for_each(|_| assert!(stepper.step(&model, &mut other, &[]).divergence.is_none()));
+            }
             (0..12).for_each(|_| assert!(stepper.step(&model, &mut state, &[]).divergence.is_none()));
             let saved = state.clone();
             (0..8).for_each(|_| assert!(stepper.step(&model, &mut state, &[]).divergence.is_none()));

@@ -10,7 +10,7 @@ pub struct BodyContact {
     /// Stiffness of a node against another body, over Young's modulus times the node's size. Half of it lets a pressure of a tenth of Young's modulus close the gap by a fifth of an edge;
     /// much more makes the solvers take many more iterations.
     pub stiffness: f64,
-    /// Nodes deeper inside another body than this [m] are left alone.
+    /// Nodes this much deeper inside another body [m] than its surface, or than where they were inside it at rest, are left alone.
     pub depth: f64,
     /// Whether folded tissue touches itself.
     pub folds: bool,

@@ -4,8 +4,7 @@ use super::proximity::{Limits, Near, Proximity};
 use crate::integrator::Frame;
 use crate::{BodyContact, Model, State};
 
-/// Bodies this much further apart [m] than where they press and what they travel in a frame are not looked at. What comes nearer all the same, because it got faster, is found in the next frame: no
-/// body that was at rest falls as far as the offset in one.
+/// Bodies this much further apart [m] than where they press and what they travel in a frame are not looked at.
 const NEAR: f32 = 5e-4;
 
 /// Finds at the beginning of every frame what may touch, and the islands of bodies that do.
@@ -34,12 +33,18 @@ impl Coupling {
     /// Looks over the bodies as they are at the frame's beginning.
     pub fn find(&mut self, model: &Model, state: &State, frame: &Frame<'_>) {
         let dt = frame.dt as f32;
+        let fall = dt * dt * frame.gravity.length() as f32;
+        self.proximity.refit(model, &state.bodies);
         for (b, (body, way)) in state.bodies.iter().zip(&mut self.ways).enumerate() {
             let fastest = body.v.iter().map(|v| v.length_squared()).fold(0.0, f32::max).sqrt();
             let here = frame.of(b);
             let carried = here.grasps().filter_map(|grasp| frame.tools.get(grasp.tool));
             let carried = carried.map(|tool| tool.travel(&model.bodies[b])).fold(0.0, f64::max);
-            *way = carried as f32 + dt * fastest;
+            let model = &model.bodies[b];
+            // What is pinned does not fall.
+            let falls = if model.pinned.contains(&true) { 0.0 } else { fall };
+            let pushed = here.pushes(model, self.proximity.around(b)) as f32;
+            *way = carried.max(f64::from(pushed)) as f32 + dt * fastest + falls;
         }
         let ways = &self.ways;
         let reach = |a: usize, b: usize| self.contact.offset as f32 + NEAR + ways[a] + ways[b];

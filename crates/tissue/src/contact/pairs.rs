@@ -6,7 +6,7 @@
 
 use super::coupling::Coupling;
 use super::touch::{Friction, Push, Source, Touch};
-use crate::integrator::{Solver, Worker};
+use crate::integrator::{Frame, Solver, Worker};
 use glam::Vec3A;
 
 /// What is this much further away [m] than where it presses and twice what it goes in a substep is left out of it.
@@ -62,6 +62,8 @@ struct Role {
 /// What may touch in an island during a frame.
 #[derive(Default)]
 pub(crate) struct Pairs {
+    /// How far tools carry held nodes of each body in the frame [m].
+    carried: Vec<f32>,
     /// In the frame.
     candidates: Vec<Pair>,
     /// In the substep.
@@ -94,8 +96,15 @@ impl Pair {
 
 impl Pairs {
     /// Begins a frame of an island: takes over what `coupling` found.
-    pub fn begin<S: Solver>(&mut self, coupling: &Coupling, island: &[Worker<S>]) {
+    pub fn begin<S: Solver>(&mut self, coupling: &Coupling, frame: &Frame<'_>, island: &[Worker<S>]) {
         self.candidates.clear();
+        self.list.clear();
+        self.carried.clear();
+        for Worker { index, body, .. } in island {
+            let here = frame.of(*index);
+            let tools = here.rigid_grasps().filter_map(|grasp| frame.tools.get(grasp.tool));
+            self.carried.push(tools.map(|tool| tool.travel(body)).fold(0.0, f64::max) as f32);
+        }
         let Some(first) = island.first() else { return };
         let contact = coupling.contact();
         let member = |body: u32| island.iter().position(|worker| worker.index == body as usize);
@@ -162,7 +171,8 @@ impl Pairs {
                 (0..3).map(|k| weights[k] * v[surface.triangles[t as usize][k] as usize]).sum()
             };
             let way = h * (one.state.v[pair.vertex as usize] - theirs(triangle, foot.weights));
-            let reach = pair.free + LIKELY + 2.0 * way.length();
+            let carried = self.carried[pair.member] + self.carried[pair.other];
+            let reach = (pair.free + LIKELY + 2.0 * way.length() + carried).max(0.0);
             if pair.stretch == Vec3A::ZERO && foot.off.length_squared() > reach * reach && pair.outside {
                 continue;
             }
@@ -225,7 +235,8 @@ impl Pairs {
         self.roles.clear();
         for (k, pair) in self.list.iter().enumerate() {
             for (corner, (member, vertex, share)) in pair.shares().into_iter().enumerate() {
-                if share != 0.0 {
+                // What hardly counts is no touch: sweeps divide by it.
+                if share.abs() > 1e-6 {
                     // The vertex itself comes first among the shares.
                     let corner = (corner as u32 + 3) % 4;
                     self.roles.push(Role { member: member as u32, vertex, pair: k as u32, corner });

@@ -26,12 +26,13 @@ const FACING: f32 = 0.2;
 pub(crate) struct Limits {
     /// Gap at which surfaces begin to press [m] (SPEC C1: 1.5 mm). Where they were nearer at rest, it is the gap at rest.
     pub offset: f32,
-    /// Vertices deeper inside than this [m] are left alone.
+    /// Vertices deeper inside than this [m], or than this from where they were at rest if they were inside then, are left alone.
     pub depth: f32,
     /// Whether bodies that collide with themselves are searched for folds.
     pub folds: bool,
 }
 
+#[cfg(test)]
 impl Default for Limits {
     fn default() -> Self {
         Self { offset: 1.5e-3, depth: 5e-3, folds: false }
@@ -69,9 +70,9 @@ pub(crate) struct Proximity {
     free: Vec<Vec<f32>>,
     /// Rest positions by internal number and boxes round them, of bodies that are searched for folds.
     rest: Vec<(Vec<Vec3A>, Vec<Aabb>)>,
-    /// Where the bodies were at the last call, and whether they moved since the one before.
+    /// Where the bodies were when they were last looked at, and how often they had moved by then.
     seen: Vec<Vec<Vec3A>>,
-    moved: Vec<bool>,
+    versions: Vec<u64>,
     /// Of each ordered pair, what was found.
     known: Vec<Known>,
 }
@@ -80,6 +81,7 @@ pub(crate) struct Proximity {
 #[derive(Clone, Debug, Default)]
 struct Known {
     reach: f32,
+    versions: [u64; 2],
     near: Vec<Near>,
 }
 
@@ -125,10 +127,26 @@ impl Proximity {
         let kept = |(a, s): (usize, BodyState)| if folds(a) { (s.x, boxes[a].clone()) } else { Default::default() };
         let rest = rest.into_iter().enumerate().map(kept).collect();
         let (seen, known) = (vec![Vec::new(); n], vec![Known::default(); n * n]);
-        Self { limits, boxes, free, rest, seen, moved: vec![true; n], known }
+        Self { limits, boxes, free, rest, seen, versions: vec![0; n], known }
     }
 
-    /// Puts into `found` every vertex whose distance from another body it collides with is between minus [`Limits::depth`] and `reach` of both bodies [m], with the nearest triangle;
+    /// Fits the boxes to bodies that moved.
+    pub fn refit(&mut self, model: &Model, state: &[BodyState]) {
+        for (a, body) in model.bodies.iter().enumerate() {
+            if self.seen[a] != state[a].x {
+                self.seen[a].clone_from(&state[a].x);
+                self.versions[a] += 1;
+                body.surface.tree.refit(&state[a].x, &mut self.boxes[a]);
+            }
+        }
+    }
+
+    /// Corners of the box round a body's surface, in its frame [m]; None without a surface.
+    pub fn around(&self, body: usize) -> Option<(Vec3A, Vec3A)> {
+        self.boxes[body].first().map(|b| (b.low, b.high))
+    }
+
+    /// Puts into `found` every vertex whose distance from another body it collides with is between [`Limits::depth`] deeper than where it presses and `reach` of both bodies [m], with the nearest triangle;
     /// ordered by body, vertex, other body. Pairs of bodies of which neither moved since the last call are not looked at again. Allocates only to make lists
     /// longer than they ever were.
     pub fn find(
@@ -139,13 +157,7 @@ impl Proximity {
         found: &mut Vec<Near>,
     ) {
         found.clear();
-        for (a, body) in model.bodies.iter().enumerate() {
-            self.moved[a] = self.seen[a] != state[a].x;
-            if self.moved[a] {
-                self.seen[a].clone_from(&state[a].x);
-                body.surface.tree.refit(&state[a].x, &mut self.boxes[a]);
-            }
-        }
+        self.refit(model, state);
         let n = model.bodies.len();
         for a in 0..n {
             let first = found.len();
@@ -155,8 +167,9 @@ impl Proximity {
                 }
                 let reach = reach(a, b);
                 let mut known = std::mem::take(&mut self.known[a * n + b]);
-                if self.moved[a] || self.moved[b] || known.reach != reach {
-                    known.reach = reach;
+                let versions = [self.versions[a], self.versions[b]];
+                if known.versions != versions || known.reach != reach {
+                    (known.reach, known.versions) = (reach, versions);
                     known.near.clear();
                     self.find_pair(model, state, [a, b], reach, &mut known.near);
                 }
@@ -173,8 +186,9 @@ impl Proximity {
         // Folds are not looked for deep inside, where the tissue's own surface is.
         let depth = if a == b { depth.min(reach) } else { depth };
         // However fast the tissue is: what belongs together does so all the same.
-        let close = reach.min(CLOSE * offset);
-        let search = reach.max(depth);
+        let close = CLOSE * offset;
+        let least = self.free[a * n + b].iter().copied().fold(0.0, f32::min);
+        let search = reach.max(depth - least);
         let side = |k: usize| Side { body: &model.bodies[k], x: &state[k].x, boxes: &self.boxes[k] };
         let (from, to) = (side(a), side(b));
         // From a's frame to b's.
@@ -213,7 +227,8 @@ impl Proximity {
                 let Some((normal, distance)) = to.signed(&best) else {
                     continue;
                 };
-                if distance <= reach && distance >= -depth {
+                let free = free.get(*vertex as usize).copied().unwrap_or(offset);
+                if distance <= reach && distance >= free.min(0.0) - depth {
                     found.push(Near {
                         body: a as u32,
                         vertex: *vertex,
@@ -223,7 +238,7 @@ impl Proximity {
                         weights: best.foot.weights,
                         normal,
                         distance,
-                        free: free.get(*vertex as usize).copied().unwrap_or(offset),
+                        free,
                     });
                 }
             }

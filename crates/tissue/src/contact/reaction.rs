@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 /// Finds the constraint forces of a body's rigid grasps: the elastic forces of their nodes and their weight. Dashpots and the nodes' own inertia are left out: they vanish when the tool rests.
 pub(crate) struct Reaction {
     psi: Box<dyn Hyperelastic>,
-    /// By node: the tool that carries it.
+    /// By vertex: the tool that carries it.
     carrier: Vec<Option<usize>>,
     forces: Vec<ToolForce>,
 }
@@ -30,22 +30,23 @@ impl Reaction {
         self.forces.clear();
         self.forces.resize(frame.tools.len(), ToolForce::default());
         let rigid = |grasp: &&Grasp| (all || grasp.compliance.is_none()) && grasp.tool < frame.tools.len();
+        self.carrier.fill(None);
         if !frame.grasps().any(|grasp| rigid(&grasp)) {
             return;
         }
-        self.carrier.fill(None);
+        let vertex = |node: u32| body.internal[node as usize] as usize;
         for grasp in frame.grasps().filter(rigid) {
-            grasp.nodes.iter().for_each(|node| self.carrier[*node as usize] = Some(grasp.tool));
+            grasp.nodes.iter().for_each(|node| self.carrier[vertex(*node)] = Some(grasp.tool));
         }
-        let place = |node: u32| state.x[body.internal[node as usize] as usize].as_dvec3();
+        let place = |node: u32| state.x[vertex(node)].as_dvec3();
         let mut pull = |node: u32, force: DVec3| {
-            if let Some(tool) = self.carrier[node as usize] {
+            if let Some(tool) = self.carrier[vertex(node)] {
                 let arm = body.origin + place(node) - frame.tools[tool].to.translation;
                 self.forces[tool].constraint.add(force, arm);
             }
         };
         for (t, tet) in body.rest.tets.iter().enumerate() {
-            if tet.iter().all(|node| self.carrier[*node as usize].is_none()) {
+            if tet.iter().all(|node| self.carrier[vertex(*node)].is_none()) {
                 continue;
             }
             let gradients = shape_gradients(&body.rest, t);
@@ -55,6 +56,14 @@ impl Reaction {
         }
         for node in 0..body.len() as u32 {
             pull(node, body.mass(node as usize) * frame.gravity);
+        }
+    }
+
+    /// Adds what another body does to a vertex that a tool carries [N]; nothing if none does.
+    pub fn press(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState, vertex: usize, force: DVec3) {
+        if let Some(tool) = self.carrier[vertex] {
+            let arm = body.origin + state.x[vertex].as_dvec3() - frame.tools[tool].to.translation;
+            self.forces[tool].constraint.add(force, arm);
         }
     }
 }

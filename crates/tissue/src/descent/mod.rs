@@ -103,11 +103,13 @@ pub(crate) fn sweep_substep<S: Sweeps>(island: &mut [Worker<S>], pairs: &mut Pai
     let mut iterations = 0;
     for member in 0..island.len() {
         let pressed = pairs.presses(island, member);
+        island[member].solver.sweeps().0.pressed = pressed;
+    }
+    for member in 0..island.len() {
         let Worker { index, body, solver, state, report, .. } = &mut island[member];
         let (descent, contacts) = solver.sweeps();
         iterations = descent.schedule.iterations;
         contacts.press(&[]);
-        descent.pressed = pressed;
         descent.start(&frame.of(*index), share, body, contacts, state, report);
     }
     pairs.assign();

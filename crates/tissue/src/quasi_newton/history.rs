@@ -101,6 +101,9 @@ impl Island<'_> {
             self.history.inverses[next] = 1.0 / curvature;
             self.history.newest = next;
             self.history.count = (self.history.count + 1).min(pairs);
+        } else {
+            // The oldest pair was written over.
+            self.history.count = self.history.count.min(pairs - 1);
         }
     }
 

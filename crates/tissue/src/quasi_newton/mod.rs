@@ -59,8 +59,8 @@ impl Sweeps for QuasiNewtonSolver {
     }
 }
 
-/// Gravity on earth [m/s2].
-const EARTH: f32 = 9.81;
+/// What a body goes at least, as a share of what another of its island goes, when it is asked how exact its place has to be.
+const BESIDE: f32 = 0.1;
 
 /// Times a minimum is looked for, each with friction's limits as they were at the last.
 const ROUNDS: usize = 4;
@@ -115,6 +115,9 @@ impl Island<'_> {
         self.note_limited();
         // What the matrices do not know of may be too stiff for them.
         let usable = self.workers.iter().all(|worker| worker.solver.usable);
+        if !usable {
+            self.all().for_each(|part| part.aim_nowhere());
+        }
         let went = usable && self.substep(to)
             || self.learn_touches() && {
                 self.begin_anew();
@@ -167,7 +170,7 @@ impl Island<'_> {
         self.workers.iter_mut().for_each(|worker| worker.report.grasp_limited = worker.solver.limited);
     }
 
-    /// One substep, which ends when `share` of the frame is over; false if it was given up, and nothing has changed then but scratch memory.
+    /// One substep, which ends when `share` of the frame is over; false if it was given up, and nothing has changed then but scratch memory, and that bodies at rest have no velocity.
     fn substep(&mut self, share: f64) -> bool {
         let (h, gravity) = (self.h, self.frame.gravity.as_vec3a().extend(0.0).to_array());
         let alone = self.pairs.is_empty();
@@ -190,7 +193,7 @@ impl Island<'_> {
         }
         let settings = self.workers[0].solver.settings;
         // Neither what positions cannot hold nor, at rest, what gravity does in a short substep is a correction.
-        let rounding = 2.0 * f32::EPSILON * self.parts().map(|part| part.extent()).fold(0.0, f32::max);
+        let rounding = self.rounding();
         let settled =
             if gravity == [0.0; 4] { f32::INFINITY } else { 1e-4 * h * h * self.frame.gravity.length() as f32 };
         let (tolerance, relative) = ((settings.tolerance as f32).max(rounding), settings.relative as f32);
@@ -202,11 +205,13 @@ impl Island<'_> {
             self.find_direction();
             self.count();
             let longest = self.parts().map(|part| part.longest_step()).fold(0.0, f32::max);
-            let way = if iteration > 0 { self.parts().map(|part| part.way()).fold(0.0, f32::max) } else { 0.0 };
-            if longest <= tolerance.max(relative * way) {
+            if self.is_solved(tolerance, if iteration > 0 { relative } else { 0.0 }) {
                 if iteration > 0 || moved {
+                    if !alone && self.wake() {
+                        continue;
+                    }
                     rounds += 1;
-                    if alone || rounds == ROUNDS || !(self.wake() | self.refresh_limits()) {
+                    if alone || rounds == ROUNDS || !self.refresh_limits() {
                         break;
                     }
                     continue;
@@ -219,6 +224,7 @@ impl Island<'_> {
             }
             match self.search() {
                 Found::Step => stepped = true,
+                Found::Nothing if stepped && !alone && self.wake() => {}
                 Found::Nothing if stepped => break,
                 // What an earlier substep taught may mislead where contacts have changed.
                 Found::Nothing if self.history.forget() => {}
@@ -236,7 +242,7 @@ impl Island<'_> {
     /// Finds the gradient where the substep starts from, and which bodies take part: among others, one that neither moves nor would by what pushes it is left where it is.
     fn choose_active(&mut self, alone: bool) {
         let (h, still) = (self.h, self.still());
-        self.all().for_each(|part| part.resting = !std::mem::replace(&mut part.active, true));
+        self.all().for_each(|part| part.was_resting = !std::mem::replace(&mut part.active, true));
         self.take_gradient();
         self.accept_gradient();
         self.refresh_limits();
@@ -245,17 +251,22 @@ impl Island<'_> {
         }
         for_each(self.workers, self.frame, |Worker { solver, .. }| {
             if solver.is_quiet(h, still) && solver.correction() <= still {
-                solver.rest();
+                solver.rest(h);
             }
         });
-        if self.all().any(|part| part.resting == part.active) {
+        if self.all().any(|part| part.was_resting == part.active) {
             self.history.clear();
         }
     }
 
-    /// What bodies at rest do not move in a substep [m]: a small share of what gravity would move them.
-    fn still(&self) -> f32 {
-        1e-4 * self.h * self.h * EARTH
+    /// What bodies at rest do not move in a substep [m]: what positions cannot hold, or a small share of what gravity would move them.
+    fn still(&mut self) -> f32 {
+        (1e-4 * self.h * self.h * self.frame.gravity.length() as f32).max(self.rounding())
+    }
+
+    /// What positions cannot hold [m].
+    fn rounding(&mut self) -> f32 {
+        2.0 * f32::EPSILON * self.parts().map(|part| part.extent()).fold(0.0, f32::max)
     }
 
     /// Lets the bodies at rest take part that the others have begun to push; whether there is one.
@@ -264,15 +275,15 @@ impl Island<'_> {
         if self.workers.iter().all(|worker| worker.solver.active) {
             return false;
         }
-        self.all().for_each(|part| part.resting = !std::mem::replace(&mut part.active, true));
+        self.all().for_each(|part| part.was_resting = !std::mem::replace(&mut part.active, true));
         self.take_gradient();
         for_each(self.workers, self.frame, |Worker { solver, .. }| {
-            if solver.resting {
+            if solver.was_resting {
                 std::mem::swap(&mut solver.gradient, &mut solver.next_gradient);
                 solver.active = solver.correction() > still;
             }
         });
-        let woken = self.all().any(|part| part.resting && part.active);
+        let woken = self.all().any(|part| part.was_resting && part.active);
         if woken {
             self.history.clear();
         }
@@ -288,6 +299,15 @@ impl Island<'_> {
         let mass: f32 = self.parts().map(|part| part.mass()).sum();
         let by = force * (-self.h * self.h / mass);
         self.parts().for_each(|part| part.shift(by));
+    }
+
+    /// Whether no step is longer than `tolerance` [m] or a share `relative` of how far its body went. One that hardly moves beside one that does is not held to nearly nothing.
+    fn is_solved(&mut self, tolerance: f32, relative: f32) -> bool {
+        if relative == 0.0 {
+            return self.parts().all(|part| part.longest_step() <= tolerance);
+        }
+        let farthest = self.parts().map(|part| part.way()).fold(0.0, f32::max);
+        self.parts().all(|part| part.longest_step() <= tolerance.max(relative * part.way().max(BESIDE * farthest)))
     }
 
     /// Counts an iteration.

@@ -59,12 +59,12 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) usable: bool,
     /// Whether the body takes part in the search: one that is at rest among others is left alone until they push it.
     pub(super) active: bool,
+    /// Whether it took no part when that was last looked at.
+    pub(super) was_resting: bool,
     /// Whether it bore the last step along a direction.
     pub(super) went: bool,
     /// Whether another body presses it when a substep begins.
     pub(super) pressed: bool,
-    /// Whether it did not when that was last looked at.
-    pub(super) resting: bool,
     /// Whether a tool carries held nodes on in this substep.
     pub(super) carried: bool,
     /// Where the substep started from.
@@ -119,7 +119,7 @@ impl QuasiNewtonSolver {
             active: true,
             went: true,
             pressed: false,
-            resting: false,
+            was_resting: false,
             carried: false,
             guess: Guess::Still,
             yielded: false,
@@ -315,9 +315,18 @@ impl QuasiNewtonSolver {
         longest(&self.direction)
     }
 
+    /// Forgets where nodes would have gone by themselves.
+    pub fn aim_nowhere(&mut self) {
+        let free = self.layout.free;
+        self.targets[..free].copy_from_slice(&self.x[..free]);
+    }
+
     /// Leaves the body where the substep began.
-    pub fn rest(&mut self) {
+    pub fn rest(&mut self, h: f32) {
         self.restore();
+        for (y, v) in self.predictor.iter_mut().zip(&self.v) {
+            (0..3).for_each(|c| y[c] -= h * v[c]);
+        }
         self.v.fill([0.0; 4]);
         self.active = false;
     }

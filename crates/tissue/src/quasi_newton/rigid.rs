@@ -157,8 +157,8 @@ impl Island<'_> {
     pub(super) fn assemble_rigid(&mut self) {
         let h = self.h;
         let coupled = !self.pairs.is_empty();
-        for part in self.parts() {
-            part.rigid = (coupled && part.is_free()).then(|| Rigid::of(part, h));
+        for part in self.all() {
+            part.rigid = (coupled && part.active && part.is_free()).then(|| Rigid::of(part, h));
         }
         let Self { workers, pairs, .. } = self;
         for Worker { solver, .. } in workers.iter_mut() {
