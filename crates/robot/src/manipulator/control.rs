@@ -15,6 +15,9 @@ const QUIET: [f64; 2] = [8e-5, 1e-4];
 /// They take it up again from here, or when its reference moves.
 const AWAKE: [f64; 2] = [1.6e-4, 1e-3];
 
+/// Damping of the task's error in joints [m2]: near postures in which the arm loses a direction the joints' own error is better.
+const TRUSTED: f64 = 1e-4;
+
 /// What a controller remembers between steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
@@ -130,14 +133,18 @@ impl Plan<'_> {
     }
 
     /// The acceleration that brings an error back: w^2 e + 2 z w e' where it is small. A torque that may change by no more than r a second gives a joint of inertia m no more
-    /// jerk than j = r/m, and a loop of bandwidth w that asks for more swings up. So the speed of the way back stays under j/w^2 and its acceleration under j/w.
+    /// jerk than j = r/m, and a loop that asks for more swings up. So the speed of the way back, and its acceleration, grow with the root alone from where
+    /// to bring them to zero again at the loop's pace would take half that jerk.
     fn correction(&self, error: f64, slower: f64, inertia: f64) -> f64 {
         let g = &self.settings.gains;
+        let w = g.bandwidth;
         let jerk = self.settings.torque_rate / inertia.max(1e-6);
-        let (w, damping) = (g.bandwidth, 2.0 * g.damping * g.bandwidth);
-        let most = jerk / (w * w);
-        let back = if damping > 0.0 { (w * w * error / damping).clamp(-most, most) * damping } else { w * w * error };
-        (back + damping * slower).clamp(-jerk / w, jerk / w)
+        if g.damping <= 0.0 {
+            return w * w * error;
+        }
+        let most = jerk / (4.0 * g.damping * w);
+        let back = rooted(w / (2.0 * g.damping) * error, g.damping * most / w);
+        rooted(2.0 * g.damping * w * (back + slower), most)
     }
 
     fn effort(&self, i: usize) -> f64 {
@@ -171,7 +178,12 @@ impl Plan<'_> {
         let weighed = [0.0, 0.0, 0.0, (weight - 1.0) * task[3], (weight - 1.0) * task[4], 0.0];
         // The joints' error already holds the task's to first order; what is added is the rest of it and the port's weight.
         let extra: [f64; TASK] = std::array::from_fn(|a| task[a] - rows[a].dot(behind) + weighed[a]);
-        let add = solve(&rows, JointSet::default(), extra, 1e-8, 2);
+        let add = solve(&rows, JointSet::default(), extra, TRUSTED, 1);
         Joints::from_fn(n, |i| behind[i] + add[i])
     }
+}
+
+/// `x` up to `limit`, from there on growing as a root does, with no kink.
+fn rooted(x: f64, limit: f64) -> f64 {
+    if x.abs() <= limit { x } else { limit.copysign(x) * (2.0 * x.abs() / limit - 1.0).sqrt() }
 }

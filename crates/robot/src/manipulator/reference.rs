@@ -38,8 +38,11 @@ const ROUNDING: f64 = 1e-9;
 const CLOSE: f64 = 1e-9;
 /// Beyond that the arm does not reach the pose [m].
 const FAR: f64 = 2e-6;
-/// How fast the elbow goes where it likes to be [1/s], and the speed below which it does not bother [rad/s or m/s]: a joint that creeps would stick and slip.
-const ELBOW: (f64, f64) = (4.0, 2e-3);
+/// How fast the elbow goes where it likes to be [1/s].
+const ELBOW: f64 = 4.0;
+/// It moves only while the instrument does, with all of that from this speed on (a coordinate a second, insertions five times as much): a joint that creeps while
+/// the instrument rests would stick and slip.
+const MOVING: f64 = 0.02;
 /// Joints are pushed off their limits from this far away [rad or m].
 const MARGIN: f64 = 0.1;
 /// The reference's joints keep this far from their limits [rad or m], which leaves room for the error of the arm behind it.
@@ -244,8 +247,11 @@ impl Reference {
         let target = ways.port.flange(ways.instrument, &unpack(&self.value, 0.0));
         let mut q = before.q;
         let mut far = f64::INFINITY;
+        let speed = |i: usize| (self.value.at(i) - before.value.at(i)).abs() / dt;
+        let fastest = speed(0).max(speed(1)).max(5.0 * speed(2)).max(speed(3));
+        let drifts = dt * (fastest / MOVING).min(1.0);
         for round in 0..3 {
-            let (step, distance) = newton(ways.arm, &q, &target, (round == 0).then_some(dt));
+            let (step, distance) = newton(ways.arm, &q, &target, (round == 0 && drifts > 0.0).then_some(drifts));
             far = distance;
             if round > 0 && distance < CLOSE {
                 break;
@@ -258,8 +264,8 @@ impl Reference {
     }
 }
 
-/// The joints' step towards a pose of the flange, with the elbow's drift over `dt` [s] if there is one, and how far the flange is from the pose [m].
-fn newton(arm: &SerialArm, q: &Joints, target: &Pose, dt: Option<f64>) -> (Joints, f64) {
+/// The joints' step towards a pose of the flange, with the elbow's drift over `drifts` [s] if there is one, and how far the flange is from the pose [m].
+fn newton(arm: &SerialArm, q: &Joints, target: &Pose, drifts: Option<f64>) -> (Joints, f64) {
     let n = q.len();
     let frames = arm.frames(q);
     let flange = frames.flange();
@@ -267,7 +273,7 @@ fn newton(arm: &SerialArm, q: &Joints, target: &Pose, dt: Option<f64>) -> (Joint
         (target.translation - flange.translation, LEVER * turn(target.rotation * flange.rotation.inverse()));
     let error = [away.x, away.y, away.z, angle.x, angle.y, angle.z];
     let far = error.iter().map(|e| e * e).sum::<f64>().sqrt();
-    if dt.is_none() && far < CLOSE {
+    if drifts.is_none() && far < CLOSE {
         return (Joints::zeros(n), far);
     }
     let jacobian = frames.flange_jacobian();
@@ -280,23 +286,20 @@ fn newton(arm: &SerialArm, q: &Joints, target: &Pose, dt: Option<f64>) -> (Joint
         }
     }
     let free = crate::chain::JointSet::default();
-    let Some(dt) = dt else { return (solve(&rows, free, error, 1e-10, 2), far) };
+    let Some(drifts) = drifts else { return (solve(&rows, free, error, 1e-10, 2), far) };
     let wish = Joints::from_fn(n, |i| {
         let [low, high] = arm.segments()[i].joint.limits.position;
         let margin = MARGIN.min(0.25 * (high - low));
         let off = (low + margin - q[i]).max(0.0) - (q[i] - (high - margin)).max(0.0);
-        ELBOW.0 * (0.5 * (arm.home()[i] - q[i]) + off)
+        ELBOW * (0.5 * (arm.home()[i] - q[i]) + off)
     });
-    // The wish less what of it moves the flange, and the way to the pose, by one solution: J+ (error - dt J wish) + dt wish, with the part that is too slow to
-    // bother taken off the difference.
+    // The wish less what of it moves the flange.
     let moved: [f64; TASK] = std::array::from_fn(|a| rows[a].dot(&wish));
     let undo = solve(&rows, free, moved, 1e-10, 2);
     let mut step = solve(&rows, free, error, 1e-10, 2);
     let drift = Joints::from_fn(n, |i| wish[i] - undo[i]);
-    let fast = drift.max_abs();
-    let share = if fast > ELBOW.1 { 1.0 - ELBOW.1 / fast } else { 0.0 };
     for i in 0..n {
-        step[i] += dt * share.max(0.0) * drift[i];
+        step[i] += drifts * drift[i];
     }
     (step, far)
 }

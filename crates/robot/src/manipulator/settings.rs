@@ -121,9 +121,9 @@ const FR3_TORQUE_RATE: f64 = 1000.0;
 impl Default for Settings {
     /// The controller that `trocar experiment controller-grid` chose.
     fn default() -> Self {
-        let gains = Gains { bandwidth: 60.0, damping: 1.0, integral: 10.0, observer: 40.0, port: 2.0 };
+        let gains = Gains { bandwidth: 60.0, damping: 1.0, integral: 15.0, observer: 45.0, port: 2.0 };
         Self {
-            law: Law::Observer,
+            law: Law::RcmImpedance,
             gains,
             error: ModelError::default(),
             command_rate: 30.0,
