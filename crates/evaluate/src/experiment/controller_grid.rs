@@ -226,7 +226,7 @@ pub(crate) mod tests {
                     droop_mm: 0.5 / size,
                     torque_peak: 50.0,
                     torque_share: 0.6,
-                    rough_rcm_mm: 1.0,
+                    rough_rcm_mm: Some(1.0),
                     restless_rad_s: 0.0,
                     stable: k != 5,
                 },

@@ -82,8 +82,9 @@ pub struct ControllerFigures {
     pub torque_peak: f64,
     /// Largest torque as a share of its joint's limit.
     pub torque_share: f64,
-    /// RCM deviation when the tip is knocked with 25 N for 50 ms and the command then leaps, peak [mm].
-    pub rough_rcm_mm: f64,
+    /// RCM deviation when the tip is knocked with 25 N for 50 ms and the command then leaps, peak [mm]; none where it does not
+    /// come back.
+    pub rough_rcm_mm: Option<f64>,
     /// Fastest joint at rest against its reference, RMS over the end of the rest [rad/s].
     pub restless_rad_s: f64,
     /// Whether the shaft stayed within the hardware's limit, knocked too, and the arms came to rest.
@@ -297,8 +298,7 @@ pub(super) fn judge(settings: &Settings) -> Result<ControllerFigures> {
         droop_mm: 1e3 * droop,
         torque_peak: torque,
         torque_share: share,
-        // A row is kept as a line of JSON, which knows no infinity.
-        rough_rcm_mm: 1e3 * jolt.min(1.0),
+        rough_rcm_mm: jolt.is_finite().then_some(1e3 * jolt),
         restless_rad_s: restless,
         stable: stable && restless < RESTLESS,
     })

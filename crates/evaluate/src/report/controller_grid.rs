@@ -226,7 +226,7 @@ fn best(r: &ControllerGridResult) -> String {
                 fixed(f.tracking_rms_mm, 4),
                 fixed(f.droop_mm, 4),
                 fixed(1e3 * f.lag_s, 2),
-                fixed(f.rough_rcm_mm, 2),
+                fixed(f.rough_rcm_mm.unwrap_or(f64::NAN), 2),
                 fixed(f.torque_peak, 1),
                 percent(f.torque_share, 0),
                 percent(row.share_of_bars(), 0),

@@ -23,7 +23,7 @@ pub enum Law {
     /// momentum observer of De Luca and Mattone (2003).
     Observer,
     /// As [`Law::Observer`], with errors where they matter: the tip's place, the shaft's distance from the port's centre (weighed by
-    /// `port`) and the roll, the elbow in what these leave free.
+    /// `port`) and the roll, the elbow in what these leave free. It halves the RCM deviation and bears no knocks: above 60 rad/s it does not come back from 25 N.
     RcmImpedance,
 }
 
@@ -121,9 +121,9 @@ const FR3_TORQUE_RATE: f64 = 1000.0;
 impl Default for Settings {
     /// The controller that `trocar experiment controller-grid` chose.
     fn default() -> Self {
-        let gains = Gains { bandwidth: 60.0, damping: 1.0, integral: 15.0, observer: 45.0, port: 2.0 };
+        let gains = Gains { bandwidth: 80.0, damping: 1.0, integral: 15.0, observer: 45.0, port: 2.0 };
         Self {
-            law: Law::RcmImpedance,
+            law: Law::Observer,
             gains,
             error: ModelError::default(),
             command_rate: 30.0,
