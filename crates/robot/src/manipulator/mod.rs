@@ -14,15 +14,14 @@ mod control;
 mod measure;
 mod reference;
 mod settings;
+mod touch;
 
 pub use measure::JointReadings;
 pub use settings::{Gains, Law, ModelError, Settings};
 
-use crate::chain::{
-    self, ArmState, Coupling, CouplingLaw, Drive, Frames, InverseOptions, JointSet, Joints, MAX_COUPLINGS, SerialArm,
-};
+use crate::chain::{self, ArmState, CouplingLaw, Drive, InverseOptions, JointSet, Joints, SerialArm};
 use crate::instrument::{Coordinates, Excess, Instrument, Limits, share};
-use crate::port::{Port, RimState, Shaft, Twist};
+use crate::port::{Port, RimState, Shaft};
 use crate::wrench::Wrench;
 use crate::{Error, Result};
 use control::{Memory, Plan};
@@ -31,8 +30,6 @@ use reference::{Reference, Ways};
 use serde::{Deserialize, Serialize};
 use trocar_geometry::Pose;
 
-/// The shaft touches the rim within a step only where it is nearer than this [m].
-const NEAR: f64 = 2e-3;
 /// The longest physics step [s].
 const LONGEST: f64 = 0.02;
 /// The flange is at a commanded pose when it is this near [m, rad].
@@ -377,58 +374,5 @@ impl Manipulator {
             if reaches(&reference::between(&from, to, middle))? { low = middle } else { high = middle }
         }
         Ok((reference::between(&from, to, low), low))
-    }
-
-    /// Where the shaft touches the rim, or may within the step, as couplings: a push and friction along the shaft at each place.
-    fn touches(&self, frames: &Frames, state: &ArmState) -> Touches {
-        let flange = frames.flange();
-        let shaft = Shaft::of(&self.instrument, &flange);
-        let none = Coupling::new(self.arm.zeros(), 0.0, 0.0, CouplingLaw::Push);
-        let mut touches =
-            Touches { couplings: [none; MAX_COUPLINGS], places: [(DVec3::ZERO, DVec3::ZERO); MAX_COUPLINGS], count: 0 };
-        let (linear, angular) = frames.jacobian(self.arm.dof(), shaft.base).velocity(&state.qd);
-        let contacts = self.port.contacts(&shaft, &Twist { linear, angular }, &self.state.rim);
-        for contact in contacts.iter().filter(|c| c.at.gap < NEAR) {
-            let jacobian = frames.jacobian(self.arm.dof(), contact.at.point);
-            let of = touches.count;
-            touches.add(
-                Coupling {
-                    damping: if contact.at.gap < 0.0 { self.port.damping } else { 0.0 },
-                    ..Coupling::new(
-                        jacobian.row(contact.at.normal),
-                        contact.at.gap,
-                        self.port.stiffness,
-                        CouplingLaw::Push,
-                    )
-                },
-                (contact.at.point, contact.at.normal),
-            );
-            let law = CouplingLaw::Friction { of, coefficient: self.port.friction };
-            let row = jacobian.row(shaft.direction);
-            touches.add(
-                Coupling {
-                    damping: self.port.friction_damping,
-                    ..Coupling::new(row, contact.stretch, self.port.friction_stiffness, law)
-                },
-                (contact.at.point, shaft.direction),
-            );
-        }
-        touches
-    }
-}
-
-/// Couplings of a shaft and its rim: where they act and along what.
-struct Touches {
-    couplings: [Coupling; MAX_COUPLINGS],
-    places: [(DVec3, DVec3); MAX_COUPLINGS],
-    count: usize,
-}
-
-impl Touches {
-    fn add(&mut self, coupling: Coupling, place: (DVec3, DVec3)) {
-        if self.count < MAX_COUPLINGS {
-            (self.couplings[self.count], self.places[self.count]) = (coupling, place);
-            self.count += 1;
-        }
     }
 }

@@ -304,7 +304,7 @@ fn newton(arm: &SerialArm, q: &Joints, target: &Pose, drifts: Option<f64>) -> (J
     (step, far)
 }
 
-/// The nearest tilt and so on that a vector of coordinates keeps, jaw aside.
+/// A share of the way between coordinates; the jaw is the target's.
 pub(super) fn between(from: &Coordinates, to: &Coordinates, share: f64) -> Coordinates {
     let mix = |a: f64, b: f64| a + share * (b - a);
     Coordinates {

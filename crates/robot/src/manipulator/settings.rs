@@ -23,7 +23,7 @@ pub enum Law {
     /// momentum observer of De Luca and Mattone (2003).
     Observer,
     /// As [`Law::Observer`], with errors where they matter: the tip's place, the shaft's distance from the port's centre (weighed by
-    /// `port`) and the roll, the elbow in what these leave free. It halves the RCM deviation and bears no knocks: above 60 rad/s it does not come back from 25 N.
+    /// `port`) and the roll, the elbow in what these leave free. It halves the RCM deviation and bears no knocks: from 60 rad/s on it does not come back from 25 N.
     RcmImpedance,
 }
 
