@@ -19,12 +19,13 @@ pub use bench::{
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{
-    AppendixSource, ConvergenceCase, ConvergenceExperiment, ConvergenceResult, ElementQualityExperiment,
-    ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial,
-    IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PhantomFigures, PortBudgetExperiment,
-    PortBudgetResult, PortBudgetRow, PortRoom, PortStart, ReconstructionExperiment, ReconstructionResult,
-    ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
-    WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
+    AppendixSource, ControllerBars, ControllerFigures, ControllerGridExperiment, ControllerGridResult,
+    ControllerInstant, ControllerRow, ConvergenceCase, ConvergenceExperiment, ConvergenceResult,
+    ElementQualityExperiment, ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment,
+    GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp,
+    PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
+    ReconstructionExperiment, ReconstructionResult, ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan,
+    SettlingResult, SettlingRow, StepRow, WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};

@@ -214,6 +214,8 @@ pub enum ExperimentName {
     ElementQuality(ElementQualityExperiment),
     /// Fig. 5: how far a shaft may lie beside its port's centre at each tilt, by the formula and by the contact model.
     PortBudget(PortBudgetExperiment),
+    /// The arms' controller chosen out of 182 configurations: RCM deviation, tracking and droop under a wrong model and friction.
+    ControllerGrid(ControllerGridExperiment),
     /// The instrument weighed in 54 noisy poses, many times over; and a touch of tens of millinewtons after the tare.
     Wrench(WrenchExperiment),
 }

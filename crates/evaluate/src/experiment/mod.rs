@@ -1,6 +1,8 @@
 //! The paper's tables and figures, made anew: one file an experiment.
 
 mod appendix;
+mod controller_grid;
+mod controller_motion;
 mod convergence;
 mod element_quality;
 mod grasp_designs;
@@ -16,6 +18,11 @@ mod trials;
 mod wrench;
 
 pub use appendix::AppendixSource;
+pub(crate) use controller_grid::IN_HAND;
+#[cfg(test)]
+pub(crate) use controller_grid::tests::made_up_result as made_up_controller_grid;
+pub use controller_grid::{ControllerBars, ControllerGridExperiment, ControllerGridResult, ControllerRow};
+pub use controller_motion::{ControllerFigures, ControllerInstant};
 pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult};
 #[cfg(test)]
 pub(crate) use element_quality::tests::made_up_result as made_up_element_quality;

@@ -5,6 +5,7 @@
 
 mod axis;
 mod colors;
+mod controller_grid;
 mod convergence;
 mod element_quality;
 mod figures;
@@ -29,8 +30,8 @@ mod wrench;
 
 use crate::bench::{MeshingResult, ScalingResult};
 use crate::experiment::{
-    ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult, PortBudgetResult,
-    ReconstructionResult, SettlingResult, WrenchResult,
+    ControllerGridResult, ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult,
+    PortBudgetResult, ReconstructionResult, SettlingResult, WrenchResult,
 };
 use crate::{Error, Result};
 use moving_picture::Lift;
@@ -145,6 +146,15 @@ pub(crate) fn convergence(result: &ConvergenceResult) -> Result<String> {
 /// A plot that cannot be drawn.
 pub(crate) fn port_budget(result: &PortBudgetResult) -> Result<String> {
     Ok(page::page("Port budget", "How far a shaft may lie beside its port's centre", &port_budget::body(result)?))
+}
+
+/// The page of the controllers' grid.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn controller_grid(result: &ControllerGridResult) -> Result<String> {
+    let subtitle = "182 configurations on the same motion, and the one that is chosen";
+    Ok(page::page("Controllers", subtitle, &controller_grid::body(result)?))
 }
 
 /// The page of the wrench experiment.

@@ -1,4 +1,4 @@
-//! Arguments of the commands that measure ports and the force at the tool mount.
+//! Arguments of the commands that measure ports, the force at the tool mount and the control of arms.
 
 use clap::Args;
 use std::path::PathBuf;
@@ -46,5 +46,16 @@ pub struct WrenchExperiment {
     pub seed: u64,
     /// Folder for the report.
     #[arg(short, long, default_value = "trocar-experiment/wrench")]
+    pub output: PathBuf,
+}
+
+/// Arguments of `experiment controller-grid`.
+#[derive(Debug, Args)]
+pub struct ControllerGridExperiment {
+    /// Configurations at once; as many as the machine has threads by default. The figures do not depend on it.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Folder for the report; finished configurations in it are used again.
+    #[arg(short, long, default_value = "trocar-experiment/controller-grid")]
     pub output: PathBuf,
 }

@@ -1,5 +1,6 @@
 //! `trocar experiment`.
 
+mod controller_grid;
 mod convergence;
 mod element_quality;
 mod grasp_designs;
@@ -22,6 +23,7 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
         ExperimentName::GraspDesigns(arguments) => grasp_designs::run(arguments, json, progress),
         ExperimentName::ElementQuality(arguments) => element_quality::run(arguments, json, progress),
         ExperimentName::PortBudget(arguments) => port_budget::run(arguments, json, progress),
+        ExperimentName::ControllerGrid(arguments) => controller_grid::run(arguments, json, progress),
         ExperimentName::Wrench(arguments) => wrench::run(arguments, json, progress),
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),

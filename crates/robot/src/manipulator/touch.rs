@@ -1,0 +1,64 @@
+//! The shaft at the port's rim, as couplings for the arm's step.
+
+use super::Manipulator;
+use crate::chain::{ArmState, Coupling, CouplingLaw, Frames, MAX_COUPLINGS};
+use crate::port::{Shaft, Twist};
+use glam::DVec3;
+
+/// The shaft touches the rim within a step only where it is nearer than this [m].
+const NEAR: f64 = 2e-3;
+
+impl Manipulator {
+    /// Where the shaft touches the rim, or may within the step, as couplings: a push and friction along the shaft at each place.
+    pub(super) fn touches(&self, frames: &Frames, state: &ArmState) -> Touches {
+        let flange = frames.flange();
+        let shaft = Shaft::of(&self.instrument, &flange);
+        let none = Coupling::new(self.arm.zeros(), 0.0, 0.0, CouplingLaw::Push);
+        let mut touches =
+            Touches { couplings: [none; MAX_COUPLINGS], places: [(DVec3::ZERO, DVec3::ZERO); MAX_COUPLINGS], count: 0 };
+        let (linear, angular) = frames.jacobian(self.arm.dof(), shaft.base).velocity(&state.qd);
+        let contacts = self.port.contacts(&shaft, &Twist { linear, angular }, &self.state.rim);
+        for contact in contacts.iter().filter(|c| c.at.gap < NEAR) {
+            let jacobian = frames.jacobian(self.arm.dof(), contact.at.point);
+            let of = touches.count;
+            touches.add(
+                Coupling {
+                    damping: if contact.at.gap < 0.0 { self.port.damping } else { 0.0 },
+                    ..Coupling::new(
+                        jacobian.row(contact.at.normal),
+                        contact.at.gap,
+                        self.port.stiffness,
+                        CouplingLaw::Push,
+                    )
+                },
+                (contact.at.point, contact.at.normal),
+            );
+            let law = CouplingLaw::Friction { of, coefficient: self.port.friction };
+            let row = jacobian.row(shaft.direction);
+            touches.add(
+                Coupling {
+                    damping: self.port.friction_damping,
+                    ..Coupling::new(row, contact.stretch, self.port.friction_stiffness, law)
+                },
+                (contact.at.point, shaft.direction),
+            );
+        }
+        touches
+    }
+}
+
+/// Couplings of a shaft and its rim: where they act and along what.
+pub(super) struct Touches {
+    pub couplings: [Coupling; MAX_COUPLINGS],
+    pub places: [(DVec3, DVec3); MAX_COUPLINGS],
+    pub count: usize,
+}
+
+impl Touches {
+    fn add(&mut self, coupling: Coupling, place: (DVec3, DVec3)) {
+        if self.count < MAX_COUPLINGS {
+            (self.couplings[self.count], self.places[self.count]) = (coupling, place);
+            self.count += 1;
+        }
+    }
+}
