@@ -29,4 +29,4 @@ pub use light::Light;
 pub use material::{Look, SurfaceKind};
 pub use picture::{Picture, Settings, render};
 pub use scene::{Frame, Instance, Scene, Shading, label_mask};
-pub use stage::{BodyId, ShapeId, Stage};
+pub use stage::{BodyId, Meeting, ShapeId, Stage};

@@ -80,7 +80,7 @@ pub(crate) fn radiance(stage: &Stage, origin: Vec3A, direction: Vec3A, bounces: 
         };
         direction = place.frame.world(towards);
         // A smooth normal may send it below the triangle.
-        if !(chosen > 0.0) || direction.dot(place.surface.flat) <= 0.0 {
+        if chosen.is_nan() || chosen <= 0.0 || direction.dot(place.surface.flat) <= 0.0 {
             return sum;
         }
         throughput *= factor / chosen;
@@ -88,7 +88,7 @@ pub(crate) fn radiance(stage: &Stage, origin: Vec3A, direction: Vec3A, bounces: 
         origin = place.surface.position + place.surface.flat * offset(place.surface.position);
         if bounce >= SURE {
             let survives = throughput.max_element().min(0.95);
-            if !(key.draw(bounce, END)[0] < survives) {
+            if survives.is_nan() || key.draw(bounce, END)[0] >= survives {
                 return sum;
             }
             throughput /= survives;
@@ -193,7 +193,7 @@ fn wander(stage: &Stage, touch: &Touch, seen: &Place, material: &Material, key: 
     };
     let each = Vec3A::new(profile(lengths.x), profile(lengths.y), profile(lengths.z));
     let mean = (each.x + each.y + each.z) / 3.0;
-    if !(mean > 0.0) || !radius.is_finite() {
+    if mean.is_nan() || mean <= 0.0 || !radius.is_finite() {
         return None;
     }
     let normal = seen.surface.flat;

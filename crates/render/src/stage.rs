@@ -5,7 +5,7 @@ use crate::material::{Look, Material};
 use crate::tree::{Bounds, Boxes, Ray, Tree, Visitor};
 use crate::{Error, Result, srgb};
 use fearless_simd::{Level, Simd, dispatch};
-use glam::{DVec3, Mat3A, Quat, Vec3A};
+use glam::{DVec3, Mat3A, Quat, Vec3, Vec3A};
 use trocar_camera::Pose;
 use trocar_geometry::TriMesh;
 
@@ -58,6 +58,17 @@ struct Body {
     still: bool,
     rotation: Mat3A,
     translation: Vec3A,
+}
+
+/// What [`Stage::cast`] found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Meeting {
+    /// Distance in units of the ray's direction.
+    pub t: f32,
+    /// The body.
+    pub body: BodyId,
+    /// Index among its shape's triangles.
+    pub triangle: u32,
 }
 
 /// Where a ray first meets the stage.
@@ -192,6 +203,13 @@ impl Stage {
     /// Number of triangles over all bodies.
     pub fn triangles(&self) -> usize {
         self.bodies.iter().map(|b| self.shapes[b.shape].triangles.len()).sum()
+    }
+
+    /// The first surface along a ray, `direction` of any length; `None` where it meets nothing.
+    pub fn cast(&mut self, origin: Vec3, direction: Vec3) -> Option<Meeting> {
+        self.settle();
+        let touch = self.first(origin.into(), direction.into(), f32::INFINITY)?;
+        Some(Meeting { t: touch.t, body: BodyId(touch.body as usize), triangle: touch.triangle })
     }
 
     /// Brings the tree over the bodies up to date.

@@ -3,11 +3,11 @@
 //!
 //! Nothing is fused and lanes never meet, so every instruction set gives the same bits.
 
+mod build;
+
+use build::{build, fit, whole};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 use glam::Vec3A;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::{Bvh2, builder::build_bvh2};
-use obvhs::{Boundable, BvhBuildParams};
 
 /// Children of a node, triangles of a leaf.
 const WIDE: usize = 8;
@@ -114,12 +114,6 @@ impl Bounds {
     }
 }
 
-impl Boundable for Bounds {
-    fn aabb(&self) -> Aabb {
-        Aabb { min: self.low, max: self.high }
-    }
-}
-
 impl Ray {
     pub fn new(origin: Vec3A, direction: Vec3A) -> Self {
         let d = direction.to_array();
@@ -139,7 +133,7 @@ impl Boxes {
         let mut order = Vec::new();
         let mut nodes = build(bounds, 1, &mut order);
         let of = |leaf: u32| bounds[order[leaf as usize][0] as usize];
-        fit(&mut nodes, |leaf| of(leaf));
+        fit(&mut nodes, of);
         for child in nodes.iter_mut().flat_map(|n| &mut n.child).filter(|c| **c != NONE && **c & LEAF != 0) {
             *child = LEAF | order[(*child & !LEAF) as usize][0];
         }
@@ -349,127 +343,6 @@ fn bounds_of(positions: &[Vec3A], triangle: &[u32; 3]) -> Option<Bounds> {
     Some(corners_of(positions, triangle)?.into_iter().fold(Bounds::EMPTY, Bounds::with))
 }
 
-/// Nodes over the boxes that are not empty; parents come before children. `leaves` gets the boxes of each leaf, at most `most`.
-fn build(bounds: &[Bounds], most: usize, leaves: &mut Vec<Vec<u32>>) -> Vec<Node> {
-    let used: Vec<u32> =
-        (0..bounds.len() as u32).filter(|i| bounds[*i as usize].low.x <= bounds[*i as usize].high.x).collect();
-    let all = used.iter().fold(Bounds::EMPTY, |b, i| b.with(bounds[*i as usize].low).with(bounds[*i as usize].high));
-    if used.is_empty() {
-        return Vec::new();
-    }
-    // obvhs has absolute tolerances: it gets the unit cube.
-    let middle = 0.5 * (all.low + all.high);
-    let scale = 2.0 / (all.high - all.low).max_element().max(1e-12);
-    let scaled: Vec<Bounds> = used
-        .iter()
-        .map(|i| {
-            let Bounds { low, high } = bounds[*i as usize];
-            Bounds { low: (low - middle) * scale, high: (high - middle) * scale }
-        })
-        .collect();
-    let parameters = BvhBuildParams { max_prims_per_leaf: most as u32, ..BvhBuildParams::medium_build() };
-    let two = build_bvh2(&scaled, parameters, &mut std::time::Duration::default());
-    if let Some(nodes) = collapse(&two, &used, most, leaves) {
-        return nodes;
-    }
-    leaves.clear();
-    let ordered: Vec<u32> = two.primitive_indices.iter().map(|i| used[*i as usize]).collect();
-    by_order(&ordered, most, leaves)
-}
-
-/// Takes two-way nodes together to eight-way ones, the largest boxes opened first; `None` where that becomes too deep.
-fn collapse(two: &Bvh2, used: &[u32], most: usize, leaves: &mut Vec<Vec<u32>>) -> Option<Vec<Node>> {
-    let mut nodes = vec![EMPTY_NODE];
-    // Two-way node, its eight-way node, depth.
-    let mut open = vec![(0_usize, 0_usize, 1_usize)];
-    while let Some((root, at, depth)) = open.pop() {
-        if depth > DEEPEST {
-            return None;
-        }
-        let mut members = vec![root];
-        while members.len() < WIDE {
-            let area = |i: usize| two.nodes[i].aabb().half_area();
-            let widest = (0..members.len())
-                .filter(|m| !two.nodes[members[*m]].is_leaf())
-                .max_by(|a, b| area(members[*a]).total_cmp(&area(members[*b])));
-            let Some(widest) = widest else { break };
-            let first = two.nodes[members[widest]].first_index as usize;
-            members[widest] = first;
-            members.push(first + 1);
-        }
-        for (lane, member) in members.into_iter().enumerate() {
-            let node = &two.nodes[member];
-            nodes[at].child[lane] = if node.is_leaf() {
-                let first = node.first_index as usize;
-                let held = two.primitive_indices.get(first..first + node.prim_count as usize)?;
-                if held.len() > most {
-                    return None;
-                }
-                leaves.push(held.iter().map(|i| used[*i as usize]).collect());
-                LEAF | (leaves.len() as u32 - 1)
-            } else {
-                nodes.push(EMPTY_NODE);
-                open.push((member, nodes.len() - 1, depth + 1));
-                nodes.len() as u32 - 1
-            };
-        }
-    }
-    Some(nodes)
-}
-
-/// A balanced tree over boxes in their given order.
-fn by_order(order: &[u32], most: usize, leaves: &mut Vec<Vec<u32>>) -> Vec<Node> {
-    leaves.extend(order.chunks(most).map(<[u32]>::to_vec));
-    let mut nodes = vec![EMPTY_NODE];
-    let mut open = vec![(0..leaves.len(), 0_usize)];
-    while let Some((range, at)) = open.pop() {
-        let part = range.len().div_ceil(WIDE).max(1);
-        for lane in 0..WIDE {
-            let start = range.start + lane * part;
-            let held = start..range.end.min(start + part);
-            nodes[at].child[lane] = match held.len() {
-                0 => NONE,
-                1 => LEAF | start as u32,
-                _ => {
-                    nodes.push(EMPTY_NODE);
-                    open.push((held, nodes.len() - 1));
-                    nodes.len() as u32 - 1
-                }
-            };
-            if start + part >= range.end {
-                break;
-            }
-        }
-    }
-    nodes
-}
-
-const EMPTY_NODE: Node = Node { bounds: [[f32::NAN; WIDE]; 6], child: [NONE; WIDE] };
-
-/// Fills in the boxes from the leaves up: children come after their parents.
-fn fit(nodes: &mut [Node], mut leaf_bounds: impl FnMut(u32) -> Bounds) {
-    for at in (0..nodes.len()).rev() {
-        for lane in 0..WIDE {
-            let bounds = match nodes[at].child[lane] {
-                NONE => Bounds::EMPTY,
-                leaf if leaf & LEAF != 0 => leaf_bounds(leaf & !LEAF),
-                inner => whole(&nodes[inner as usize]),
-            };
-            for k in 0..3 {
-                nodes[at].bounds[k][lane] = bounds.low[k];
-                nodes[at].bounds[k + 3][lane] = bounds.high[k];
-            }
-        }
-    }
-}
-
-/// The box around a node's children.
-fn whole(node: &Node) -> Bounds {
-    let least = |k: usize| node.bounds[k].iter().copied().fold(f32::INFINITY, f32::min);
-    let most = |k: usize| node.bounds[k].iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    Bounds { low: Vec3A::new(least(0), least(1), least(2)), high: Vec3A::new(most(3), most(4), most(5)) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -574,7 +447,7 @@ mod tests {
         }
         let order: Vec<u32> = (0..1000).collect();
         let mut leaves = Vec::new();
-        let nodes = by_order(&order, WIDE, &mut leaves);
+        let nodes = build::by_order(&order, WIDE, &mut leaves);
         let held = nodes.iter().flat_map(|n| n.child).filter(|c| *c != NONE && c & LEAF != 0).count();
         assert_eq!((held, leaves.len()), (125, 125));
         assert!(Tree::new(&[], &[]).bounds().low.x > 0.0);

@@ -101,6 +101,9 @@ fn a_placed_body_is_as_if_its_vertices_had_been_moved() {
     let mut baked = Stage::new();
     baked.add_mesh(&moved, 2, &Look::steel()).unwrap();
     let (a, b) = (preview(&mut placed, &eye, &Pose::IDENTITY), preview(&mut baked, &eye, &Pose::IDENTITY));
+    let meeting = placed.cast(glam::Vec3::ZERO, glam::Vec3::new(0.02, -0.01, 0.25)).unwrap();
+    assert!(meeting.body != body && meeting.t < 1.0);
+    assert_eq!(placed.cast(glam::Vec3::ZERO, glam::Vec3::X), None);
     let differ = (0..a.labels.len()).filter(|i| a.labels[*i] != b.labels[*i]).count();
     assert!(differ <= 4, "{differ} pixels");
     let off = a.depth.depth.iter().zip(&b.depth.depth).filter(|(x, y)| (*x - *y).abs() > 1e-6).count();
