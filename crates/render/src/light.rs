@@ -58,19 +58,50 @@ impl Light {
             outer: 62.0_f64.to_radians(),
         }
     }
+}
+
+/// A light made ready for rendering.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Lamp {
+    Spot { position: Vec3A, direction: Vec3A, intensity: Vec3A, bright: f32, dark: f32 },
+    Panel { corner: Vec3A, along: Vec3A, across: Vec3A, normal: Vec3A, area: f32, radiance: Vec3A },
+}
+
+impl Lamp {
+    pub fn new(light: &Light) -> Self {
+        match *light {
+            Light::Spot { position, direction, intensity, inner, outer } => Self::Spot {
+                position: position.as_vec3a(),
+                direction: direction.normalize_or_zero().as_vec3a(),
+                intensity: intensity.into(),
+                bright: inner.cos() as f32,
+                // Below any cosine, where it shines to all sides.
+                dark: if outer >= std::f64::consts::PI { f32::NEG_INFINITY } else { outer.cos() as f32 },
+            },
+            Light::Panel { corner, along, across, radiance } => {
+                let normal = along.cross(across).as_vec3a();
+                let (along, across) = (along.as_vec3a(), across.as_vec3a());
+                let (corner, area) = (corner.as_vec3a(), normal.length());
+                Self::Panel { corner, along, across, normal, area, radiance: radiance.into() }
+            }
+        }
+    }
 
     /// What arrives at `point` from the place of the light that two random numbers choose; `None` where nothing does.
-    pub(crate) fn arriving(&self, point: Vec3A, [a, b]: [f32; 2]) -> Option<Arriving> {
+    pub fn arriving(&self, point: Vec3A, [a, b]: [f32; 2]) -> Option<Arriving> {
         match *self {
-            Self::Spot { position, direction, intensity, inner, outer } => {
-                let to_light = position.as_vec3a() - point;
+            Self::Spot { position, direction, intensity, bright, dark } => {
+                let to_light = position - point;
                 let distance = to_light.length();
                 let towards = to_light / distance.max(1e-12);
-                let angle = (-towards.dot(direction.normalize_or_zero().as_vec3a())).clamp(-1.0, 1.0);
-                let (bright, dark) = (inner.cos() as f32, outer.cos() as f32);
-                let share = ((angle - dark) / (bright - dark).max(1e-6)).clamp(0.0, 1.0);
-                let share = if outer >= std::f64::consts::PI { 1.0 } else { share * share * (3.0 - 2.0 * share) };
-                let light = Vec3A::from(intensity) * (share / (distance * distance).max(1e-12));
+                let cos = -towards.dot(direction);
+                let share = if dark == f32::NEG_INFINITY {
+                    1.0
+                } else {
+                    let x = ((cos - dark) / (bright - dark).max(1e-6)).clamp(0.0, 1.0);
+                    x * x * (3.0 - 2.0 * x)
+                };
+                let light = intensity * (share / (distance * distance).max(1e-12));
                 (share > 0.0 && light.is_finite()).then_some(Arriving {
                     direction: towards,
                     distance,
@@ -78,47 +109,41 @@ impl Light {
                     density: 0.0,
                 })
             }
-            Self::Panel { corner, along, across, radiance } => {
-                let normal = along.cross(across).as_vec3a();
-                let area = normal.length();
-                let place = corner.as_vec3a() + a * along.as_vec3a() + b * across.as_vec3a();
-                let to_light = place - point;
+            Self::Panel { corner, along, across, normal, area, radiance } => {
+                let to_light = corner + a * along + b * across - point;
                 let distance = to_light.length();
                 let towards = to_light / distance.max(1e-12);
                 let cos = -towards.dot(normal) / area;
-                if !(cos > 0.0 && distance > 0.0) {
+                if cos.is_nan() || cos <= 0.0 || distance <= 0.0 {
                     return None;
                 }
                 let density = distance * distance / (cos * area);
-                Some(Arriving { direction: towards, distance, light: Vec3A::from(radiance) / density, density })
+                Some(Arriving { direction: towards, distance, light: radiance / density, density })
             }
         }
     }
 
     /// Distance along a ray at which a panel is met from its bright side before `reach`, its radiance, and the density with which
     /// [`Self::arriving`] chooses that direction.
-    pub(crate) fn met(&self, ray: &Ray, reach: f32) -> Option<(f32, Vec3A, f32)> {
-        let Self::Panel { corner, along, across, radiance } = self else { return None };
-        let (along, across) = (along.as_vec3a(), across.as_vec3a());
-        let normal = along.cross(across);
+    pub fn met(&self, ray: &Ray, reach: f32) -> Option<(f32, Vec3A, f32)> {
+        let Self::Panel { corner, along, across, normal, area, radiance } = *self else { return None };
         let slope = ray.direction.dot(normal);
         if slope >= 0.0 {
             return None;
         }
-        let to_corner = corner.as_vec3a() - ray.origin;
+        let to_corner = corner - ray.origin;
         let t = to_corner.dot(normal) / slope;
         if !(t > 0.0 && t < reach) {
             return None;
         }
         let inside = ray.direction * t - to_corner;
-        let area2 = normal.length_squared();
-        let a = inside.cross(across).dot(normal) / area2;
-        let b = along.cross(inside).dot(normal) / area2;
+        let a = inside.cross(across).dot(normal) / (area * area);
+        let b = along.cross(inside).dot(normal) / (area * area);
         if !((0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b)) {
             return None;
         }
         let length = ray.direction.length();
         let density = (t * length) * (t * length) * length / -slope;
-        Some((t, Vec3A::from(*radiance), density))
+        Some((t, radiance, density))
     }
 }

@@ -5,7 +5,7 @@ use crate::material::{Material, body_direction};
 use crate::preview::{Frame, offset};
 use crate::random::numbers;
 use crate::stage::{Stage, Surface, Touch};
-use crate::tree::Ray;
+use crate::tree::{Ray, Stacks};
 use glam::Vec3A;
 
 /// Bounces after which paths are ended at random.
@@ -41,16 +41,22 @@ struct Place {
     weight: Vec3A,
 }
 
-/// Radiance that comes back along one path from `origin` along `direction`, of at most `bounces` bounces. `first` is where it
-/// first meets the stage, if that is known.
-pub(crate) fn radiance(stage: &Stage, origin: Vec3A, direction: Vec3A, bounces: u32, key: Key) -> Vec3A {
+/// Radiance that comes back along one path from `origin` along `direction`, of at most `bounces` bounces.
+pub(crate) fn radiance(
+    stage: &Stage,
+    origin: Vec3A,
+    direction: Vec3A,
+    bounces: u32,
+    key: Key,
+    stacks: &mut Stacks,
+) -> Vec3A {
     let (mut origin, mut direction) = (origin, direction);
     let mut throughput = Vec3A::ONE;
     let mut sum = Vec3A::ZERO;
     // Density with which the last bounce chose this direction; none other could for the eye's.
     let mut density = f32::INFINITY;
     for bounce in 0..=bounces {
-        let touch = stage.first(origin, direction, f32::INFINITY);
+        let touch = stage.first(origin, direction, f32::INFINITY, stacks);
         let reach = touch.map_or(f32::INFINITY, |t| t.t);
         if let Some(light) = panel(stage, origin, direction, reach, density) {
             return sum + throughput * light;
@@ -63,9 +69,9 @@ pub(crate) fn radiance(stage: &Stage, origin: Vec3A, direction: Vec3A, bounces: 
         let material = stage.material(&touch);
         let seen = Place { surface, frame: Frame::new(surface.smooth), weight: Vec3A::ONE };
         let to_eye = seen.frame.local(-direction.normalize());
-        let below = if bounce == 0 { wander(stage, &touch, &seen, material, key) } else { None };
+        let below = if bounce == 0 { wander(stage, &touch, &seen, material, key, stacks) } else { None };
         let share = material.gloss_share(surface.albedo, to_eye);
-        sum += throughput * from_lights(stage, &seen, below.as_ref(), material, to_eye, share, bounce, key);
+        sum += throughput * from_lights(stage, &seen, below.as_ref(), material, to_eye, share, bounce, key, stacks);
 
         let [choice, a, b, _] = key.draw(bounce, GO_ON);
         let (place, towards, factor, chosen) = if choice < share {
@@ -101,9 +107,9 @@ pub(crate) fn radiance(stage: &Stage, origin: Vec3A, direction: Vec3A, bounces: 
 fn panel(stage: &Stage, origin: Vec3A, direction: Vec3A, reach: f32, density: f32) -> Option<Vec3A> {
     let ray = Ray::new(origin, direction);
     let mut nearest: Option<(f32, Vec3A)> = None;
-    for light in &stage.lights {
+    for lamp in stage.lamps() {
         let limit = nearest.map_or(reach, |n| n.0);
-        if let Some((t, radiance, joined)) = light.met(&ray, limit) {
+        if let Some((t, radiance, joined)) = lamp.met(&ray, limit) {
             let weight = if density.is_infinite() { 1.0 } else { heuristic(density, joined) };
             nearest = Some((t, radiance * weight));
         }
@@ -122,12 +128,13 @@ fn from_lights(
     share: f32,
     bounce: u32,
     key: Key,
+    stacks: &mut Stacks,
 ) -> Vec3A {
     let mut sum = Vec3A::ZERO;
-    for (index, light) in stage.lights.iter().enumerate() {
+    for (index, lamp) in stage.lamps().iter().enumerate() {
         let [a, b, ..] = key.draw(bounce, LIGHTS + (index as u32 & 0x7f));
         let mut gather = |place: &Place, gloss: bool, body: bool| {
-            let Some(arriving) = light.arriving(place.surface.position, [a, b]) else { return };
+            let Some(arriving) = lamp.arriving(place.surface.position, [a, b]) else { return };
             if arriving.direction.dot(place.surface.flat) <= 0.0 {
                 return;
             }
@@ -144,7 +151,7 @@ fn from_lights(
                 return;
             }
             let origin = place.surface.position + place.surface.flat * offset(place.surface.position);
-            if !stage.blocked(origin, arriving.direction, arriving.distance * (1.0 - 1e-4)) {
+            if !stage.blocked(origin, arriving.direction, arriving.distance * (1.0 - 1e-4), stacks) {
                 sum += back * arriving.light;
             }
         };
@@ -173,7 +180,14 @@ fn heuristic(chosen: f32, other: f32) -> f32 {
 /// Where light that comes out at `seen` went in: Burley's profile of normalised diffusion (Christensen and Burley 2015,
 /// "Approximate Reflectance Profiles for Efficient Subsurface Scattering"), found by a short ray through the same body. The
 /// profile integrates to 1 for each colour, so no light is lost or made on a flat surface.
-fn wander(stage: &Stage, touch: &Touch, seen: &Place, material: &Material, key: Key) -> Option<Place> {
+fn wander(
+    stage: &Stage,
+    touch: &Touch,
+    seen: &Place,
+    material: &Material,
+    key: Key,
+    stacks: &mut Stacks,
+) -> Option<Place> {
     let lengths = material.wander;
     if lengths == Vec3A::ZERO {
         return None;
@@ -201,7 +215,7 @@ fn wander(stage: &Stage, touch: &Touch, seen: &Place, material: &Material, key: 
     let (sin, cos) = (std::f32::consts::TAU * turn).sin_cos();
     let height = radius + 0.5 * length;
     let above = seen.surface.position + (x * cos + y * sin) * radius + normal * height;
-    let found = stage.first_of(touch.body, above, -normal, 2.0 * height);
+    let found = stage.first_of(touch.body, above, -normal, 2.0 * height, stacks);
     let surface = match found {
         Some(found) => stage.surface(&found, -normal),
         // Beside a rim: it comes out where it went in.

@@ -5,6 +5,7 @@ use crate::film::Film;
 use crate::path::{Key, LENS, radiance};
 use crate::preview;
 use crate::stage::{Stage, rotation_of};
+use crate::tree::Stacks;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 use trocar_camera::{ColorImage, DepthImage, Pose};
@@ -74,10 +75,11 @@ pub fn render(stage: &mut Stage, eye: &Eye, pose: &Pose, settings: &Settings, fi
     let mut pixels = vec![Pixel::default(); width * height];
     let shot = Shot { stage, eye, rotation: rotation_of(pose), origin: pose.translation.as_vec3a(), settings };
     pixels.par_chunks_mut((width * TILE).max(1)).enumerate().for_each(|(band, rows)| {
+        let mut stacks = Stacks::new();
         for left in (0..width).step_by(TILE) {
             for (row, line) in rows.chunks_mut(width).enumerate() {
                 for u in left..width.min(left + TILE) {
-                    line[u] = shot.pixel((band * TILE + row) * width + u);
+                    line[u] = shot.pixel((band * TILE + row) * width + u, &mut stacks);
                 }
             }
         }
@@ -101,11 +103,11 @@ struct Shot<'a> {
 }
 
 impl Shot<'_> {
-    fn pixel(&self, index: usize) -> Pixel {
+    fn pixel(&self, index: usize, stacks: &mut Stacks) -> Pixel {
         let mut pixel = Pixel::default();
         let Some(ray) = self.eye.centre(index) else { return pixel };
         let direction = self.rotation * ray;
-        let touch = self.stage.first(self.origin, direction, f32::INFINITY);
+        let touch = self.stage.first(self.origin, direction, f32::INFINITY, stacks);
         let mut direct = Vec3A::from(self.stage.environment);
         if let Some(touch) = touch {
             let surface = self.stage.surface(&touch, direction);
@@ -114,7 +116,7 @@ impl Shot<'_> {
             pixel.normal = (self.rotation.transpose() * surface.smooth).to_array();
             if let Settings::Preview { shadows } = *self.settings {
                 let to_eye = -direction.normalize();
-                direct = preview::light(self.stage, &surface, self.stage.material(&touch), to_eye, shadows);
+                direct = preview::light(self.stage, &surface, self.stage.material(&touch), to_eye, shadows, stacks);
             }
         }
         pixel.light = match *self.settings {
@@ -126,7 +128,7 @@ impl Shot<'_> {
                     let key = Key { seed, pixel: index as u32, sample };
                     let [a, b, ..] = key.draw(0, LENS);
                     if let Some(ray) = self.eye.within(index, a, b) {
-                        sum += radiance(self.stage, self.origin, self.rotation * ray, bounces, key);
+                        sum += radiance(self.stage, self.origin, self.rotation * ray, bounces, key, stacks);
                     }
                 }
                 (sum / samples as f32).to_array()

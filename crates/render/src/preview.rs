@@ -2,15 +2,23 @@
 
 use crate::material::Material;
 use crate::stage::{Stage, Surface};
+use crate::tree::Stacks;
 use glam::Vec3A;
 
 /// Light towards the eye from the lights alone and, evenly, from the environment. Panels shine from their middles.
-pub(crate) fn light(stage: &Stage, surface: &Surface, material: &Material, to_eye: Vec3A, shadows: bool) -> Vec3A {
+pub(crate) fn light(
+    stage: &Stage,
+    surface: &Surface,
+    material: &Material,
+    to_eye: Vec3A,
+    shadows: bool,
+    stacks: &mut Stacks,
+) -> Vec3A {
     let frame = Frame::new(surface.smooth);
     let out = frame.local(to_eye);
     let mut sum = surface.albedo * Vec3A::from(stage.environment);
-    for light in &stage.lights {
-        let Some(arriving) = light.arriving(surface.position, [0.5; 2]) else { continue };
+    for lamp in stage.lamps() {
+        let Some(arriving) = lamp.arriving(surface.position, [0.5; 2]) else { continue };
         let towards = frame.local(arriving.direction);
         let parts = material.parts(surface.albedo, out, towards);
         let mut back = parts.gloss + parts.body;
@@ -26,7 +34,7 @@ pub(crate) fn light(stage: &Stage, surface: &Surface, material: &Material, to_ey
         }
         if shadows {
             let origin = surface.position + surface.flat * offset(surface.position);
-            if stage.blocked(origin, arriving.direction, arriving.distance * (1.0 - 1e-4)) {
+            if stage.blocked(origin, arriving.direction, arriving.distance * (1.0 - 1e-4), stacks) {
                 continue;
             }
         }

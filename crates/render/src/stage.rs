@@ -1,8 +1,8 @@
 //! What is on stage: shapes, some of which deform, and the bodies that show them, each at its pose.
 
-use crate::light::Light;
+use crate::light::{Lamp, Light};
 use crate::material::{Look, Material};
-use crate::tree::{Bounds, Boxes, Ray, Tree, Visitor};
+use crate::tree::{Bounds, Boxes, ROOT, Ray, Stack, Stacks, Tree, Visitor};
 use crate::{Error, Result, srgb};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DVec3, Mat3A, Quat, Vec3, Vec3A};
@@ -11,6 +11,11 @@ use trocar_geometry::TriMesh;
 
 /// Triangles beyond which a mesh is refused.
 const MOST_TRIANGLES: usize = 1 << 27;
+
+/// A body enters the tree over all bodies by one node for so many leaves of its own.
+const LEAVES_AN_ENTRY: usize = 32;
+/// But by no more than this.
+const MOST_ENTRIES: usize = 64;
 
 /// A shape of a [`Stage`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,6 +34,9 @@ pub struct Stage {
     shapes: Vec<Shape>,
     bodies: Vec<Body>,
     top: Boxes,
+    /// Body and node of its shape's tree, by leaf of the tree over the bodies.
+    entries: Vec<(u32, u32)>,
+    lamps: Vec<Lamp>,
     stale: bool,
     level: Level,
     /// Lights, in the world's frame.
@@ -107,6 +115,8 @@ impl Stage {
             shapes: Vec::new(),
             bodies: Vec::new(),
             top: Boxes::default(),
+            entries: Vec::new(),
+            lamps: Vec::new(),
             stale: true,
             level: Level::new(),
             lights: Vec::new(),
@@ -208,49 +218,81 @@ impl Stage {
     /// The first surface along a ray, `direction` of any length; `None` where it meets nothing.
     pub fn cast(&mut self, origin: Vec3, direction: Vec3) -> Option<Meeting> {
         self.settle();
-        let touch = self.first(origin.into(), direction.into(), f32::INFINITY)?;
+        let touch = self.first(origin.into(), direction.into(), f32::INFINITY, &mut Stacks::new())?;
         Some(Meeting { t: touch.t, body: BodyId(touch.body as usize), triangle: touch.triangle })
     }
 
-    /// Brings the tree over the bodies up to date.
+    /// Brings lamps and the tree over the bodies up to date. Large bodies enter it by many of their nodes, so that rays need not
+    /// go down into every body whose box they cross (Benthin and others 2017, "Improved Two-Level BVHs using Partial Re-Braiding").
     pub(crate) fn settle(&mut self) {
-        if self.stale {
-            let bounds: Vec<Bounds> = self.bodies.iter().map(|b| b.bounds(&self.shapes[b.shape].tree)).collect();
-            self.top = Boxes::over(&bounds);
-            self.stale = false;
+        self.lamps = self.lights.iter().map(Lamp::new).collect();
+        if !self.stale {
+            return;
         }
+        self.entries.clear();
+        let mut bounds = Vec::new();
+        for (index, body) in self.bodies.iter().enumerate() {
+            let tree = &self.shapes[body.shape].tree;
+            for (entry, held) in tree.entries((tree.leaves() / LEAVES_AN_ENTRY).clamp(1, MOST_ENTRIES)) {
+                self.entries.push((index as u32, entry));
+                bounds.push(body.bounds(held));
+            }
+        }
+        self.top = Boxes::over(&bounds);
+        self.stale = false;
+    }
+
+    /// The lights, prepared.
+    pub(crate) fn lamps(&self) -> &[Lamp] {
+        &self.lamps
     }
 
     /// The first surface along a ray.
-    pub(crate) fn first(&self, origin: Vec3A, direction: Vec3A, reach: f32) -> Option<Touch> {
-        dispatch!(self.level, simd => self.first_in(simd, origin, direction, reach))
+    pub(crate) fn first(&self, origin: Vec3A, direction: Vec3A, reach: f32, stacks: &mut Stacks) -> Option<Touch> {
+        dispatch!(self.level, simd => self.first_in(simd, origin, direction, reach, stacks))
     }
 
     /// Whether anything lies on the ray before `reach`.
-    pub(crate) fn blocked(&self, origin: Vec3A, direction: Vec3A, reach: f32) -> bool {
-        dispatch!(self.level, simd => self.blocked_in(simd, origin, direction, reach))
+    pub(crate) fn blocked(&self, origin: Vec3A, direction: Vec3A, reach: f32, stacks: &mut Stacks) -> bool {
+        dispatch!(self.level, simd => self.blocked_in(simd, origin, direction, reach, stacks))
     }
 
     /// The first surface of one body along a ray.
-    pub(crate) fn first_of(&self, body: u32, origin: Vec3A, direction: Vec3A, reach: f32) -> Option<Touch> {
+    pub(crate) fn first_of(
+        &self,
+        body: u32,
+        origin: Vec3A,
+        direction: Vec3A,
+        reach: f32,
+        stacks: &mut Stacks,
+    ) -> Option<Touch> {
         let held = &self.bodies[body as usize];
         let ray = held.local(&Ray::new(origin, direction));
         let tree = &self.shapes[held.shape].tree;
-        let hit = dispatch!(self.level, simd => tree.first(simd, &ray, 0.0, reach))?;
+        let hit = dispatch!(self.level, simd => tree.first(simd, &ray, ROOT, reach, &mut stacks.below))?;
         Some(Touch { t: hit.t, body, triangle: hit.triangle, u: hit.u, v: hit.v })
     }
 
     #[inline(always)]
-    fn first_in<S: Simd>(&self, simd: S, origin: Vec3A, direction: Vec3A, reach: f32) -> Option<Touch> {
-        let mut nearest = Nearest { stage: self, best: None };
-        self.top.walk(simd, &Ray::new(origin, direction), reach, &mut nearest);
+    fn first_in<S: Simd>(
+        &self,
+        simd: S,
+        origin: Vec3A,
+        direction: Vec3A,
+        reach: f32,
+        stacks: &mut Stacks,
+    ) -> Option<Touch> {
+        let Stacks { top, below } = stacks;
+        let mut nearest = Nearest { stage: self, stack: below, best: None };
+        self.top.walk(simd, &Ray::new(origin, direction), ROOT, reach, top, &mut nearest);
         nearest.best
     }
 
     #[inline(always)]
-    fn blocked_in<S: Simd>(&self, simd: S, origin: Vec3A, direction: Vec3A, reach: f32) -> bool {
-        let mut any = Any { stage: self, found: false };
-        self.top.walk(simd, &Ray::new(origin, direction), reach, &mut any);
+    fn blocked_in<S: Simd>(&self, simd: S, origin: Vec3A, direction: Vec3A, reach: f32, stacks: &mut Stacks) -> bool {
+        let Stacks { top, below } = stacks;
+        let mut any = Any { stage: self, stack: below, found: false };
+        self.top.walk(simd, &Ray::new(origin, direction), ROOT, reach, top, &mut any);
         any.found
     }
 
@@ -298,24 +340,31 @@ impl Stage {
 /// Looks for the first surface of all bodies.
 struct Nearest<'a> {
     stage: &'a Stage,
+    stack: &'a mut Stack,
     best: Option<Touch>,
 }
 
 /// Looks for any surface.
 struct Any<'a> {
     stage: &'a Stage,
+    stack: &'a mut Stack,
     found: bool,
 }
 
 impl<S: Simd> Visitor<S> for Nearest<'_> {
     #[inline(always)]
     fn leaf(&mut self, simd: S, ray: &Ray, leaf: u32, reach: f32) -> f32 {
-        let body = &self.stage.bodies[leaf as usize];
+        let (index, entry) = self.stage.entries[leaf as usize];
+        let body = &self.stage.bodies[index as usize];
         let tree = &self.stage.shapes[body.shape].tree;
-        let local = body.local(ray);
-        match tree.first(simd, &local, 0.0, reach) {
+        let hit = if body.still {
+            tree.first(simd, ray, entry, reach, self.stack)
+        } else {
+            tree.first(simd, &body.local(ray), entry, reach, self.stack)
+        };
+        match hit {
             Some(hit) => {
-                self.best = Some(Touch { t: hit.t, body: leaf, triangle: hit.triangle, u: hit.u, v: hit.v });
+                self.best = Some(Touch { t: hit.t, body: index, triangle: hit.triangle, u: hit.u, v: hit.v });
                 hit.t
             }
             None => reach,
@@ -326,10 +375,10 @@ impl<S: Simd> Visitor<S> for Nearest<'_> {
 impl<S: Simd> Visitor<S> for Any<'_> {
     #[inline(always)]
     fn leaf(&mut self, simd: S, ray: &Ray, leaf: u32, reach: f32) -> f32 {
-        let body = &self.stage.bodies[leaf as usize];
+        let (index, entry) = self.stage.entries[leaf as usize];
+        let body = &self.stage.bodies[index as usize];
         let tree = &self.stage.shapes[body.shape].tree;
-        let local = body.local(ray);
-        self.found = tree.any(simd, &local, 0.0, reach);
+        self.found = tree.any(simd, &body.local(ray), entry, reach, self.stack);
         if self.found { -1.0 } else { reach }
     }
 }
@@ -345,9 +394,9 @@ impl Body {
         Ray::new(back * (ray.origin - self.translation), back * ray.direction)
     }
 
-    /// The box of the body in the world's frame.
-    fn bounds(&self, tree: &Tree) -> Bounds {
-        let Bounds { low, high } = tree.bounds();
+    /// A box of the shape in the world's frame.
+    fn bounds(&self, held: Bounds) -> Bounds {
+        let Bounds { low, high } = held;
         if self.still || low.x > high.x {
             return Bounds { low, high };
         }

@@ -17,6 +17,24 @@ const NONE: u32 = u32::MAX;
 const LEAF: u32 = 1 << 31;
 /// Room for what is still to be visited: a walk leaves at most seven siblings behind on each level.
 const STACK: usize = 128;
+/// The entry to a whole tree.
+pub(crate) const ROOT: u32 = 0;
+
+/// What is still to be visited in a walk. Kept between rays, for to clear it would cost as much as a quarter of a walk.
+pub(crate) type Stack = [u64; STACK];
+
+/// Stacks for a tree of bodies and the trees below it.
+#[derive(Clone)]
+pub(crate) struct Stacks {
+    pub top: Stack,
+    pub below: Stack,
+}
+
+impl Stacks {
+    pub fn new() -> Self {
+        Self { top: [0; STACK], below: [0; STACK] }
+    }
+}
 /// Deeper trees, which only hostile meshes give, are built anew without looking at the boxes.
 const DEEPEST: usize = STACK / (WIDE - 1) - 1;
 /// Growth of the far end of boxes: covers the rounding of three operations.
@@ -87,14 +105,12 @@ pub(crate) trait Visitor<S: Simd> {
 /// Looks for the first triangle.
 struct Nearest<'a> {
     blocks: &'a [Block],
-    start: f32,
     best: Option<Hit>,
 }
 
 /// Looks for any triangle.
 struct Any<'a> {
     blocks: &'a [Block],
-    start: f32,
     found: bool,
 }
 
@@ -107,6 +123,12 @@ pub(crate) struct Bounds {
 
 impl Bounds {
     pub const EMPTY: Self = Self { low: Vec3A::INFINITY, high: Vec3A::NEG_INFINITY };
+
+    /// Half the surface [m2].
+    pub fn half_area(&self) -> f32 {
+        let d = self.high - self.low;
+        d.x * d.y + d.y * d.z + d.z * d.x
+    }
 
     /// Grown by a point; one that is no number changes nothing.
     pub fn with(self, p: Vec3A) -> Self {
@@ -140,9 +162,18 @@ impl Boxes {
         Self { nodes }
     }
 
-    /// Has `visitor` see the leaves whose boxes the ray meets before `reach`, the nearer first.
+    /// Has `visitor` see the leaves below `entry` (a child of some node; [`ROOT`] for all) whose boxes the ray meets before
+    /// `reach`, the nearer first.
     #[inline(always)]
-    pub fn walk<S: Simd, V: Visitor<S>>(&self, simd: S, ray: &Ray, mut reach: f32, visitor: &mut V) {
+    pub fn walk<S: Simd, V: Visitor<S>>(
+        &self,
+        simd: S,
+        ray: &Ray,
+        entry: u32,
+        mut reach: f32,
+        stack: &mut Stack,
+        visitor: &mut V,
+    ) {
         if self.nodes.is_empty() {
             return;
         }
@@ -150,9 +181,8 @@ impl Boxes {
         let origin = [f32x8::splat(simd, ox), f32x8::splat(simd, oy), f32x8::splat(simd, oz)];
         let [ix, iy, iz] = ray.inverse;
         let inverse = [f32x8::splat(simd, ix), f32x8::splat(simd, iy), f32x8::splat(simd, iz)];
-        let mut stack = [(0_u32, 0.0_f32); STACK];
         let mut top = 0;
-        let mut at = 0_u32;
+        let mut at = entry;
         loop {
             if at & LEAF != 0 {
                 reach = visitor.leaf(simd, ray, at & !LEAF, reach);
@@ -172,20 +202,28 @@ impl Boxes {
                 let mut met = near.simd_le(far).to_bitmask();
                 if met != 0 {
                     let distances: [f32; WIDE] = near.into();
+                    let lane = met.trailing_zeros() as usize & (WIDE - 1);
+                    met &= met - 1;
+                    let mut nearest = waiting(node.child[lane], distances[lane]);
                     let bottom = top;
                     while met != 0 {
                         let lane = met.trailing_zeros() as usize & (WIDE - 1);
                         met &= met - 1;
-                        // Sorted as it is filled, the nearest on top.
-                        let entry = (node.child[lane], distances[lane]);
+                        let mut next = waiting(node.child[lane], distances[lane]);
+                        if next < nearest {
+                            (next, nearest) = (nearest, next);
+                        }
+                        // The others are sorted as they come, the nearest on top.
                         let mut place = top;
-                        while place > bottom && stack[(place - 1) & (STACK - 1)].1 < entry.1 {
+                        while place > bottom && stack[(place - 1) & (STACK - 1)] < next {
                             stack[place & (STACK - 1)] = stack[(place - 1) & (STACK - 1)];
                             place -= 1;
                         }
-                        stack[place & (STACK - 1)] = entry;
+                        stack[place & (STACK - 1)] = next;
                         top += 1;
                     }
+                    at = nearest as u32;
+                    continue;
                 }
             }
             loop {
@@ -193,14 +231,20 @@ impl Boxes {
                     return;
                 }
                 top -= 1;
-                let (child, distance) = stack[top & (STACK - 1)];
-                if distance <= reach {
-                    at = child;
+                let next = stack[top & (STACK - 1)];
+                if f32::from_bits((next >> 32) as u32) <= reach {
+                    at = next as u32;
                     break;
                 }
             }
         }
     }
+}
+
+/// A child to be visited, and where the ray enters it; as whole numbers they sort by distance, for it is not negative.
+#[inline(always)]
+fn waiting(child: u32, distance: f32) -> u64 {
+    u64::from(distance.to_bits()) << 32 | u64::from(child)
 }
 
 impl Tree {
@@ -243,19 +287,47 @@ impl Tree {
         self.boxes.nodes.first().map_or(Bounds::EMPTY, whole)
     }
 
-    /// The first triangle that the ray meets in (`start`, `reach`).
+    /// Entries that together hold all triangles, at most `most` (but a node's children stay together), with their boxes: the
+    /// largest boxes are opened first.
+    pub fn entries(&self, most: usize) -> Vec<(u32, Bounds)> {
+        let mut open = vec![(ROOT, self.bounds())];
+        loop {
+            let inner = (0..open.len()).filter(|i| open[*i].0 & LEAF == 0);
+            let Some(widest) = inner.max_by(|a, b| open[*a].1.half_area().total_cmp(&open[*b].1.half_area())) else {
+                return open;
+            };
+            let Some(node) = self.boxes.nodes.get(open[widest].0 as usize) else { return Vec::new() };
+            let children = || (0..WIDE).filter(|lane| node.child[*lane] != NONE);
+            if open.len() + children().count() > most + 1 {
+                return open;
+            }
+            open.swap_remove(widest);
+            open.extend(children().map(|lane| {
+                let bound = |k: usize| node.bounds[k][lane];
+                let low = Vec3A::new(bound(0), bound(1), bound(2));
+                (node.child[lane], Bounds { low, high: Vec3A::new(bound(3), bound(4), bound(5)) })
+            }));
+        }
+    }
+
+    /// Leaves of the tree.
+    pub fn leaves(&self) -> usize {
+        self.blocks.len()
+    }
+
+    /// The first triangle below `entry` that the ray meets before `reach`.
     #[inline(always)]
-    pub fn first<S: Simd>(&self, simd: S, ray: &Ray, start: f32, reach: f32) -> Option<Hit> {
-        let mut nearest = Nearest { blocks: &self.blocks, start, best: None };
-        self.boxes.walk(simd, ray, reach, &mut nearest);
+    pub fn first<S: Simd>(&self, simd: S, ray: &Ray, entry: u32, reach: f32, stack: &mut Stack) -> Option<Hit> {
+        let mut nearest = Nearest { blocks: &self.blocks, best: None };
+        self.boxes.walk(simd, ray, entry, reach, stack, &mut nearest);
         nearest.best
     }
 
-    /// Whether the ray meets anything in (`start`, `reach`).
+    /// Whether the ray meets anything below `entry` before `reach`.
     #[inline(always)]
-    pub fn any<S: Simd>(&self, simd: S, ray: &Ray, start: f32, reach: f32) -> bool {
-        let mut any = Any { blocks: &self.blocks, start, found: false };
-        self.boxes.walk(simd, ray, reach, &mut any);
+    pub fn any<S: Simd>(&self, simd: S, ray: &Ray, entry: u32, reach: f32, stack: &mut Stack) -> bool {
+        let mut any = Any { blocks: &self.blocks, found: false };
+        self.boxes.walk(simd, ray, entry, reach, stack, &mut any);
         any.found
     }
 }
@@ -263,7 +335,7 @@ impl Tree {
 impl<S: Simd> Visitor<S> for Nearest<'_> {
     #[inline(always)]
     fn leaf(&mut self, simd: S, ray: &Ray, leaf: u32, reach: f32) -> f32 {
-        match self.blocks[leaf as usize].meet(simd, ray, self.start, reach) {
+        match self.blocks[leaf as usize].meet(simd, ray, reach) {
             Some(hit) => {
                 self.best = Some(hit);
                 hit.t
@@ -276,16 +348,16 @@ impl<S: Simd> Visitor<S> for Nearest<'_> {
 impl<S: Simd> Visitor<S> for Any<'_> {
     #[inline(always)]
     fn leaf(&mut self, simd: S, ray: &Ray, leaf: u32, reach: f32) -> f32 {
-        self.found = self.blocks[leaf as usize].meet(simd, ray, self.start, reach).is_some();
+        self.found = self.blocks[leaf as usize].meet(simd, ray, reach).is_some();
         if self.found { -1.0 } else { reach }
     }
 }
 
 impl Block {
-    /// The nearest of eight triangles in (`start`, `reach`), both sides, without gaps between neighbours: Woop, Benthin and
+    /// The nearest of eight triangles before `reach`, both sides, without gaps between neighbours: Woop, Benthin and
     /// Wald, "Watertight Ray/Triangle Intersection" (2013).
     #[inline(always)]
-    fn meet<S: Simd>(&self, simd: S, ray: &Ray, start: f32, reach: f32) -> Option<Hit> {
+    fn meet<S: Simd>(&self, simd: S, ray: &Ray, reach: f32) -> Option<Hit> {
         let [kx, ky, kz] = ray.axes;
         let [sx, sy, sz] = ray.shear;
         let (sx, sy, sz) = (f32x8::splat(simd, sx), f32x8::splat(simd, sy), f32x8::splat(simd, sz));
@@ -313,7 +385,7 @@ impl Block {
         }
         let sum = a + b + c;
         let t = (a * z[0] + b * z[1] + c * z[2]) / sum;
-        let hit = inside & t.simd_gt(f32x8::splat(simd, start)) & t.simd_lt(f32x8::splat(simd, reach));
+        let hit = inside & t.simd_gt(zero) & t.simd_lt(f32x8::splat(simd, reach));
         let mut lanes = hit.to_bitmask();
         if lanes == 0 {
             return None;
@@ -393,10 +465,13 @@ mod tests {
         let (mut hits, mut differ) = (0, 0);
         for _ in 0..2000 {
             let ray = Ray::new(2.0 * Vec3A::new(r(), r(), r()), Vec3A::new(r(), r(), r()));
-            let ours = dispatch!(Level::new(), simd => tree.first(simd, &ray, 0.0, f32::INFINITY));
-            assert_eq!(ours, dispatch!(Level::baseline(), simd => tree.first(simd, &ray, 0.0, f32::INFINITY)));
+            let ours = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
+            assert_eq!(
+                ours,
+                dispatch!(Level::baseline(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]))
+            );
             let theirs = by_hand(&positions, &triangles, &ray);
-            let any = dispatch!(Level::new(), simd => tree.any(simd, &ray, 0.0, f32::INFINITY));
+            let any = dispatch!(Level::new(), simd => tree.any(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
             assert_eq!(any, ours.is_some());
             match (ours, theirs) {
                 (Some(a), Some(b)) if (f64::from(a.t) - b.0).abs() < 1e-5 * (1.0 + b.0) => hits += 1,
@@ -422,7 +497,8 @@ mod tests {
         let level = Level::new();
         for _ in 0..2000 {
             let ray = Ray::new(2.0 * Vec3A::new(r(), r(), r()), Vec3A::new(r(), r(), r()));
-            let hits = [&tree, &anew].map(|t| dispatch!(level, simd => t.first(simd, &ray, 0.0, f32::INFINITY)));
+            let hits = [&tree, &anew]
+                .map(|t| dispatch!(level, simd => t.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK])));
             assert_eq!(hits[0], hits[1]);
         }
     }
@@ -440,10 +516,12 @@ mod tests {
         triangles.push([0, 1, 99_999]);
         let tree = Tree::new(&positions, &triangles);
         let ray = Ray::new(Vec3A::splat(-1.0), Vec3A::ONE);
-        assert!(dispatch!(Level::new(), simd => tree.first(simd, &ray, 0.0, f32::INFINITY)).is_some());
+        assert!(
+            dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK])).is_some()
+        );
         for bad in [Vec3A::ZERO, Vec3A::NAN, Vec3A::INFINITY] {
             let ray = Ray::new(bad, bad);
-            let _ = dispatch!(Level::new(), simd => tree.first(simd, &ray, 0.0, f32::INFINITY));
+            let _ = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
         }
         let order: Vec<u32> = (0..1000).collect();
         let mut leaves = Vec::new();
