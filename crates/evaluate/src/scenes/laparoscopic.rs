@@ -32,7 +32,7 @@ impl LaparoscopicScene {
     pub(crate) fn instrument_pose(&self, right: bool, t: f64) -> Pose {
         let side = if right { 1.0 } else { -1.0 };
         let tip = DVec3::new(side * (0.012 + 0.004 * (2.0 * t).sin()), -0.012, 0.022);
-        let port = DVec3::new(side * 0.09, -0.12, 0.14);
+        let port = DVec3::new(side * 0.085, -0.11, 0.105);
         Pose { rotation: DQuat::from_rotation_arc(DVec3::Z, (port - tip).normalize()), translation: tip }
     }
 }
@@ -61,10 +61,13 @@ fn bowel(index: usize, rings: usize, sides: usize) -> TriMesh {
             let angle = std::f64::consts::TAU * j as f64 / sides as f64;
             let ripple = 1.0 + 0.03 * (3.0 * angle + 20.0 * s).sin();
             mesh.vertices.push(centre(s) + (x * angle.cos() + y * angle.sin()) * gathered * ripple);
-            // Vessels: thin dark red branches on pink.
-            let vessel = ((40.0 * s + 2.0 * (2.0 * angle).sin() + place).sin().abs() * 6.0).min(1.0);
-            let mix = |dark: f64, light: f64| (dark + (light - dark) * vessel) as u8;
-            mesh.colors.push([mix(165.0, 214.0), mix(52.0, 128.0), mix(50.0, 112.0)]);
+            // Vessels: a net of thin dark red lines on pink, with veins between.
+            let warp = angle + 0.8 * (31.0 * s + place).sin() + 0.3 * (83.0 * s).sin();
+            let field = (2.0 * warp + 24.0 * s).sin() + 0.8 * (61.0 * s + 2.0 * (2.0 * angle + place).sin()).sin();
+            let line = (field.abs() / 0.16).min(1.0);
+            let fine = 0.85 + 0.15 * ((7.0 * warp + 140.0 * s).sin().abs() / 0.3).min(1.0);
+            let mix = |dark: f64, light: f64| ((dark + (light - dark) * line) * fine) as u8;
+            mesh.colors.push([mix(176.0, 219.0), mix(70.0, 138.0), mix(66.0, 124.0)]);
         }
     }
     for i in 0..rings {
@@ -84,11 +87,14 @@ fn bed(cells: usize) -> TriMesh {
     for j in 0..=cells {
         for i in 0..=cells {
             let (x, y) = (side(i), side(j));
-            let z = -0.008 + 0.006 * (30.0 * x).sin() * (25.0 * y).cos() + 0.9 * (x * x + y * y);
+            // Lobules of fat.
+            let lobes = |k: f64| (k * x + 2.0 * (0.7 * k * y).sin()).sin() * (k * y + 2.0 * (0.8 * k * x).sin()).sin();
+            let height = 0.004 * lobes(75.0).abs().sqrt() + 0.0012 * lobes(230.0).abs().sqrt();
+            let z = -0.012 + 0.006 * (30.0 * x).sin() * (25.0 * y).cos() + 0.9 * (x * x + y * y) + height;
             mesh.vertices.push(DVec3::new(x, y, z));
-            let fat = (40.0 * x + 9.0 * (31.0 * y).sin()).sin() * 0.5 + 0.5;
+            let fat = (height / 0.004).min(1.0) * (0.75 + 0.25 * (19.0 * x - 23.0 * y).sin());
             let mix = |a: f64, b: f64| (a + (b - a) * fat) as u8;
-            mesh.colors.push([mix(168.0, 214.0), mix(64.0, 150.0), mix(56.0, 84.0)]);
+            mesh.colors.push([mix(158.0, 226.0), mix(58.0, 176.0), mix(48.0, 104.0)]);
         }
     }
     for j in 0..cells {

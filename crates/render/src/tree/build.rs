@@ -30,7 +30,15 @@ pub(super) fn build(bounds: &[Bounds], most: usize, leaves: &mut Vec<Vec<u32>>) 
             Bounds { low: (low - middle) * scale, high: (high - middle) * scale }
         })
         .collect();
-    let parameters = BvhBuildParams { max_prims_per_leaf: most as u32, ..BvhBuildParams::medium_build() };
+    // Fuller leaves than obvhs makes of itself, for eight triangles cost no more than one. Trees over bodies are built each frame.
+    let better = BvhBuildParams {
+        reinsertion_batch_ratio: 0.15,
+        post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
+        collapse_traversal_cost: 6.0,
+        ..BvhBuildParams::medium_build()
+    };
+    let base = if most > 1 { better } else { BvhBuildParams::fast_build() };
+    let parameters = BvhBuildParams { max_prims_per_leaf: most as u32, ..base };
     let two = build_bvh2(&scaled, parameters, &mut std::time::Duration::default());
     if let Some(nodes) = collapse(&two, &used, most, leaves) {
         return nodes;
