@@ -4,7 +4,7 @@ use crate::eye::Eye;
 use crate::film::Film;
 use crate::path::{Key, LENS, radiance};
 use crate::preview;
-use crate::stage::{Stage, rotation_of};
+use crate::stage::{Stage, Touch, rotation_of};
 use crate::tree::Stacks;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
@@ -75,13 +75,9 @@ pub fn render(stage: &mut Stage, eye: &Eye, pose: &Pose, settings: &Settings, fi
     let mut pixels = vec![Pixel::default(); width * height];
     let shot = Shot { stage, eye, rotation: rotation_of(pose), origin: pose.translation.as_vec3a(), settings };
     pixels.par_chunks_mut((width * TILE).max(1)).enumerate().for_each(|(band, rows)| {
-        let mut stacks = Stacks::new();
+        let mut hand = Hand { stacks: Stacks::new(), rays: Vec::new(), directions: Vec::new(), ahead: Vec::new() };
         for left in (0..width).step_by(TILE) {
-            for (row, line) in rows.chunks_mut(width).enumerate() {
-                for u in left..width.min(left + TILE) {
-                    line[u] = shot.pixel((band * TILE + row) * width + u, &mut stacks);
-                }
-            }
+            shot.tile(rows, band * TILE * width, left..width.min(left + TILE), &mut hand);
         }
     });
     let colors = pixels.par_iter().with_min_len(4096).enumerate().map(|(i, p)| film.develop(eye, i, p.light)).collect();
@@ -102,12 +98,37 @@ struct Shot<'a> {
     settings: &'a Settings,
 }
 
+/// What a worker keeps from tile to tile.
+struct Hand {
+    stacks: Stacks,
+    /// Of each pixel of a tile that sees something: its place among the band's pixels, and its ray.
+    rays: Vec<(usize, Vec3A)>,
+    directions: Vec<Vec3A>,
+    ahead: Vec<(f32, u32)>,
+}
+
 impl Shot<'_> {
-    fn pixel(&self, index: usize, stacks: &mut Stacks) -> Pixel {
+    /// Renders the pixels of some columns of a band of rows, whose first pixel is the image's `first`.
+    fn tile(&self, band: &mut [Pixel], first: usize, columns: std::ops::Range<usize>, hand: &mut Hand) {
+        let width = self.eye.width();
+        let Hand { stacks, rays, directions, ahead } = hand;
+        rays.clear();
+        for row in 0..band.len() / width {
+            let pixels = columns.clone().map(|u| row * width + u);
+            rays.extend(pixels.filter_map(|i| self.eye.centre(first + i).map(|ray| (i, ray))));
+        }
+        directions.clear();
+        directions.extend(rays.iter().map(|(_, ray)| self.rotation * *ray));
+        self.stage.ahead(self.origin, directions, ahead);
+        for ((i, ray), direction) in rays.iter().zip(directions.iter()) {
+            let touch = self.stage.first_ahead(ahead, self.origin, *direction, stacks);
+            band[*i] = self.pixel(first + i, *ray, *direction, touch, stacks);
+        }
+    }
+
+    /// A pixel whose centre's ray meets `touch`.
+    fn pixel(&self, index: usize, ray: Vec3A, direction: Vec3A, touch: Option<Touch>, stacks: &mut Stacks) -> Pixel {
         let mut pixel = Pixel::default();
-        let Some(ray) = self.eye.centre(index) else { return pixel };
-        let direction = self.rotation * ray;
-        let touch = self.stage.first(self.origin, direction, f32::INFINITY, stacks);
         let mut direct = Vec3A::from(self.stage.environment);
         if let Some(touch) = touch {
             let surface = self.stage.surface(&touch, direction);

@@ -252,6 +252,43 @@ impl Stage {
         dispatch!(self.level, simd => self.first_in(simd, origin, direction, reach, stacks))
     }
 
+    /// What rays from `origin` in any of `directions` may meet; for [`Self::first_ahead`].
+    pub(crate) fn ahead(&self, origin: Vec3A, directions: &[Vec3A], found: &mut Vec<(f32, u32)>) {
+        self.top.beam(origin, directions, found);
+    }
+
+    /// The first surface along one of the rays of which [`Self::ahead`] knows.
+    pub(crate) fn first_ahead(
+        &self,
+        ahead: &[(f32, u32)],
+        origin: Vec3A,
+        direction: Vec3A,
+        stacks: &mut Stacks,
+    ) -> Option<Touch> {
+        dispatch!(self.level, simd => self.first_ahead_in(simd, ahead, origin, direction, stacks))
+    }
+
+    #[inline(always)]
+    fn first_ahead_in<S: Simd>(
+        &self,
+        simd: S,
+        ahead: &[(f32, u32)],
+        origin: Vec3A,
+        direction: Vec3A,
+        stacks: &mut Stacks,
+    ) -> Option<Touch> {
+        let ray = Ray::new(origin, direction);
+        let mut nearest = Nearest { stage: self, stack: &mut stacks.below, best: None };
+        let mut reach = f32::INFINITY;
+        for (near, leaf) in ahead {
+            if *near > reach {
+                break;
+            }
+            reach = nearest.leaf(simd, &ray, *leaf, reach);
+        }
+        nearest.best
+    }
+
     /// Whether anything lies on the ray before `reach`.
     pub(crate) fn blocked(&self, origin: Vec3A, direction: Vec3A, reach: f32, stacks: &mut Stacks) -> bool {
         dispatch!(self.level, simd => self.blocked_in(simd, origin, direction, reach, stacks))

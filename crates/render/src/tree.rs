@@ -3,6 +3,7 @@
 //!
 //! Nothing is fused and lanes never meet, so every instruction set gives the same bits.
 
+mod beam;
 mod build;
 
 use build::{build, fit, whole};

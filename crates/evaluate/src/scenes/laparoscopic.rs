@@ -54,7 +54,9 @@ fn bowel(index: usize, rings: usize, sides: usize) -> TriMesh {
     for i in 0..=rings {
         let s = i as f64 / rings as f64;
         let along = (centre(s + 1e-4) - centre(s - 1e-4)).normalize();
-        let (x, y) = along.any_orthonormal_pair();
+        // Axes that turn with the tube and never flip.
+        let x = along.cross(DVec3::Z).normalize();
+        let y = x.cross(along);
         // Haustra: the tube is gathered every few centimetres.
         let gathered = 0.0115 * (1.0 + 0.10 * (110.0 * s + place).sin() + 0.03 * (190.0 * s).sin());
         for j in 0..sides {
