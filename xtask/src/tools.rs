@@ -1,5 +1,5 @@
-//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, the TetGen program. Without them these
-//! tests are skipped, and say so.
+//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, the TetGen program.
+//! Without them these tests are skipped, and say so.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -7,12 +7,12 @@ use std::process::{Command, Stdio};
 /// A Python environment of the project's own, beside what cargo builds.
 const ENVIRONMENT: &str = "target/tools";
 /// Python packages and their versions.
-const PACKAGES: [&str; 2] = ["onnxruntime>=1.23", "mujoco>=4.0"];
+const PACKAGES: [&str; 4] = ["onnxruntime>=1.23", "mujoco>=4.0", "opencv-python-headless>=4.10", "embreex>=4.4"];
 
 /// Fetches what is missing. A machine without network or Python is no error.
 pub fn fetch() {
     let python = Path::new(ENVIRONMENT).join("bin/python");
-    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime, mujoco"]));
+    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime, mujoco, cv2, embreex"]));
     if !import() {
         eprintln!("== tools: {} into {ENVIRONMENT}", PACKAGES.join(" "));
         let made = quiet(Command::new("python3").args(["-m", "venv", ENVIRONMENT]))

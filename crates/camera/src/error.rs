@@ -16,6 +16,14 @@ pub enum Error {
         /// What is wrong and what would be right.
         reason: String,
     },
+    /// A calibration file could not be read, understood or written.
+    #[error("{path}: {reason}", path = path.display())]
+    Calibration {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong and what would be right.
+        reason: String,
+    },
     /// The camera's numbers make no sense.
     #[error("{0}")]
     Camera(String),

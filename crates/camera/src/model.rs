@@ -1,7 +1,7 @@
 //! The pinhole camera with OpenCV's lens distortion.
 
-use crate::{Error, Result};
-use glam::{DMat2, DVec2, DVec3};
+use crate::{Distortion, Error, Result};
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
 /// A pinhole camera; lengths of the image in pixels.
@@ -23,72 +23,6 @@ pub struct Camera {
     /// Lens distortion; none by default.
     #[serde(default, skip_serializing_if = "Distortion::is_none")]
     pub distortion: Distortion,
-}
-
-/// OpenCV's rational distortion, coefficients in its order: k1 k2 p1 p2 k3 k4 k5 k6 (4, 5 or 8 of them in a file).
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
-pub struct Distortion(pub [f64; 8]);
-
-impl Distortion {
-    /// True when the lens does not distort.
-    pub fn is_none(&self) -> bool {
-        self.0 == [0.0; 8]
-    }
-
-    /// Where an ideal image point (x, y) = (X/Z, Y/Z) really lands (OpenCV documentation, "camera calibration").
-    fn apply(&self, p: DVec2) -> DVec2 {
-        let [k1, k2, p1, p2, k3, k4, k5, k6] = self.0;
-        let r2 = p.length_squared();
-        let radial = (1.0 + r2 * (k1 + r2 * (k2 + r2 * k3))) / (1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)));
-        let xy = p.x * p.y;
-        DVec2::new(
-            p.x * radial + 2.0 * p1 * xy + p2 * (r2 + 2.0 * p.x * p.x),
-            p.y * radial + p1 * (r2 + 2.0 * p.y * p.y) + 2.0 * p2 * xy,
-        )
-    }
-
-    /// The ideal image point that lands at `q`, by Newton's method (a fixed-point iteration diverges on wide lenses). The
-    /// Jacobian is a central difference: its error only slows the last digit.
-    fn undo(&self, q: DVec2) -> DVec2 {
-        const ITERATIONS: usize = 20;
-        const H: f64 = 1e-6;
-        let mut p = q;
-        for _ in 0..ITERATIONS {
-            let residual = q - self.apply(p);
-            if residual.length_squared() < 1e-26 {
-                break;
-            }
-            let column = |d: DVec2| (self.apply(p + d) - self.apply(p - d)) / (2.0 * H);
-            let jacobian = DMat2::from_cols(column(DVec2::new(H, 0.0)), column(DVec2::new(0.0, H)));
-            p += jacobian.inverse() * residual;
-        }
-        p
-    }
-}
-
-impl TryFrom<Vec<f64>> for Distortion {
-    type Error = String;
-
-    fn try_from(v: Vec<f64>) -> std::result::Result<Self, String> {
-        if !matches!(v.len(), 0 | 4 | 5 | 8) {
-            return Err(format!(
-                "distortion has {} coefficients; OpenCV's k1 k2 p1 p2 [k3 [k4 k5 k6]] has 4, 5 or 8",
-                v.len()
-            ));
-        }
-        let mut k = [0.0; 8];
-        for (k, v) in k.iter_mut().zip(v) {
-            *k = v;
-        }
-        Ok(Self(k))
-    }
-}
-
-impl From<Distortion> for Vec<f64> {
-    fn from(d: Distortion) -> Self {
-        d.0.to_vec()
-    }
 }
 
 impl Camera {

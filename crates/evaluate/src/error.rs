@@ -55,6 +55,9 @@ pub enum Error {
         /// The output.
         output: PathBuf,
     },
+    /// Something does not fit on the renderer's stage.
+    #[error(transparent)]
+    Render(#[from] trocar_render::Error),
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,

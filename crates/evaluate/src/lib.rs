@@ -14,7 +14,8 @@ mod workflow;
 
 pub use bench::{
     GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow,
-    OrganSource, OrgansBench, OrgansResult, ScalingBench, ScalingResult, ScalingRow, Timing,
+    OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench, RenderBenchResult, ScalingBench, ScalingResult,
+    ScalingRow, Timing,
 };
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};

@@ -1,30 +1,14 @@
 //! Pictures of shapes whose pictures are known.
 
+mod common;
+
+use common::sphere;
 use glam::{DQuat, DVec3};
 use trocar_camera::{Camera, Pose};
 use trocar_geometry::TriMesh;
 use trocar_render::{Frame, Instance, Scene, Shading, label_mask};
 
 const PLAIN: Shading = Shading { color: [200, 120, 110], gloss: 0.3, wireframe: false };
-
-fn sphere(centre: DVec3, radius: f64, rings: u32) -> TriMesh {
-    let sides = 2 * rings;
-    let mut mesh = TriMesh::default();
-    for i in 0..=rings {
-        let (sin, cos) = (std::f64::consts::PI * f64::from(i) / f64::from(rings)).sin_cos();
-        for j in 0..sides {
-            let (y, x) = (std::f64::consts::TAU * f64::from(j) / f64::from(sides)).sin_cos();
-            mesh.vertices.push(centre + radius * DVec3::new(sin * x, sin * y, cos));
-        }
-    }
-    for i in 0..rings {
-        for j in 0..sides {
-            let (a, b) = (i * sides + j, i * sides + (j + 1) % sides);
-            mesh.triangles.extend([[a, a + sides, b], [b, a + sides, b + sides]]);
-        }
-    }
-    mesh
-}
 
 /// A square of n x n cells across the axes `x` and `y`.
 fn sheet(centre: DVec3, x: DVec3, y: DVec3, n: u32) -> TriMesh {

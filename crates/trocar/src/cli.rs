@@ -265,6 +265,8 @@ pub enum BenchName {
     Scaling(ScalingBench),
     /// What contact with the gripper costs in a grasp-lift of all organs.
     Grasp(GraspBench),
+    /// What pictures cost: a preview for policies, a path-traced frame, rays beside Embree.
+    Render(RenderBench),
 }
 
 /// Arguments of `bench meshing`.
@@ -284,6 +286,26 @@ pub struct MeshingBench {
     /// Folder for the report.
     #[arg(short, long, default_value = "trocar-bench/meshing")]
     pub output: PathBuf,
+}
+
+/// Arguments of `bench render`.
+#[derive(Debug, Args)]
+pub struct RenderBench {
+    /// Triangles of the organs, about; a fifth of them deform.
+    #[arg(long, default_value_t = 100_000)]
+    pub triangles: usize,
+    /// Paths a pixel of the large picture; 0 leaves it out.
+    #[arg(long, default_value_t = 64)]
+    pub samples: u32,
+    /// Side of the square image of rays that are cast beside Embree.
+    #[arg(long, default_value_t = 1024)]
+    pub rays: usize,
+    /// Python that has the package embreex.
+    #[arg(long, default_value = "python3")]
+    pub python: PathBuf,
+    /// Where to write the large picture (PNG).
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
 }
 
 /// Models of the unseen back by name.

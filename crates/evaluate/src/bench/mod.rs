@@ -1,11 +1,13 @@
 //! Measurements of speed and cost: one file each.
 
+mod embree;
 mod grasp;
 mod machine;
 mod many;
 mod meshing;
 mod organs;
 mod pytetwild;
+mod render;
 mod scaling;
 mod timing;
 
@@ -14,6 +16,7 @@ pub use machine::Machine;
 pub use many::ManyRow;
 pub use meshing::{MeshingBench, MeshingResult, MeshingRow};
 pub use organs::{OrganSource, OrgansBench, OrgansResult};
+pub use render::{RayRow, RenderBench, RenderBenchResult};
 pub use scaling::{ScalingBench, ScalingResult, ScalingRow};
 pub use timing::Timing;
 pub(crate) use timing::median;

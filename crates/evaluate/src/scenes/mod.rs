@@ -4,6 +4,7 @@
 //! [`Scene::drag`], [`Scene::shake`], [`Scene::moving`], [`Scene::tube`], [`Scene::fall`]. [`Run`] steps it by a schedule, [`OracleRun`] by the oracle.
 
 mod error_norms;
+mod laparoscopic;
 mod organs;
 mod run;
 mod scene;
@@ -11,6 +12,7 @@ mod shapes;
 mod solvers;
 
 pub use error_norms::{mean_error, rms_error};
+pub(crate) use laparoscopic::{LaparoscopicScene, view as endoscope_view};
 pub use organs::{Organ, Organs};
 pub use run::{OracleRun, Run};
 pub(crate) use run::{grasps, rest_positions, tools};

@@ -2,6 +2,7 @@
 
 mod grasp;
 mod organs;
+mod render;
 mod scaling;
 
 use crate::cli::{Bench, BenchName, MeshingBench};
@@ -14,6 +15,7 @@ pub fn run(arguments: &Bench, json: bool, progress: &dyn Progress) -> Result<()>
         BenchName::Meshing(arguments) => meshing(arguments, json, progress),
         BenchName::Grasp(arguments) => grasp::run(arguments, json, progress),
         BenchName::Organs(arguments) => organs::run(arguments, json, progress),
+        BenchName::Render(arguments) => render::run(arguments, json, progress),
         BenchName::Scaling(arguments) => scaling::run(arguments, json, progress),
     }
 }

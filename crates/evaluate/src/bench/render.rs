@@ -1,0 +1,323 @@
+//! What pictures cost: a policy's preview with an organ refitted, a path-traced frame, and rays a second beside Embree.
+
+use super::Machine;
+use super::embree::{Embree, EmbreeRows};
+use super::median;
+use crate::scenes::{LaparoscopicScene, endoscope_view};
+use crate::{Error, Result};
+use glam::Vec3;
+use rayon::ThreadPoolBuilder;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+use trocar_camera::{Camera, Endoscope, Pose};
+use trocar_geometry::TriMesh;
+use trocar_progress::Progress;
+use trocar_render::{BodyId, Eye, Film, Light, Look, Settings, ShapeId, Stage, render};
+
+/// The organ that deforms.
+const MOVING: usize = 1;
+/// Frames that are timed, after a tenth as many that are not.
+const FRAMES: usize = 60;
+/// Times that rays are cast; the fastest counts, for the machine may be shared.
+const TRIES: usize = 5;
+
+/// The benchmark's options.
+#[derive(Clone, Debug)]
+pub struct RenderBench {
+    /// Triangles of all organs, about; a fifth of them deform.
+    pub triangles: usize,
+    /// Paths a pixel of the large picture; 0 leaves it out.
+    pub samples: u32,
+    /// Side of the square image of rays for the comparison with Embree.
+    pub rays: usize,
+    /// Python with `embreex`.
+    pub python: PathBuf,
+    /// Where to write the large picture (PNG); nowhere if left out.
+    pub picture: Option<PathBuf>,
+}
+
+/// The benchmark's outcome.
+#[derive(Clone, Debug, Serialize)]
+pub struct RenderBenchResult {
+    /// Triangles on the stage.
+    pub triangles: usize,
+    /// Triangles that are refitted each frame.
+    pub refitted_triangles: usize,
+    /// Median of a frame of 224 x 224 with colour, depth and labels, the refit and moved instruments included, hard shadows [ms].
+    pub preview_224_ms: f64,
+    /// The same without shadows [ms].
+    pub preview_224_unshadowed_ms: f64,
+    /// The fastest frame with shadows [ms]: what the machine can do when it is left alone.
+    pub preview_224_best_ms: f64,
+    /// Median of the refit alone [ms].
+    pub refit_ms: f64,
+    /// Building all trees anew [ms].
+    pub build_ms: f64,
+    /// One frame of 1280 x 720 at `samples` paths a pixel [ms]; left out with 0 samples.
+    pub path_720p_ms: Option<f64>,
+    /// Paths a pixel of it.
+    pub samples: u32,
+    /// Rays on one thread, by kind of ray, beside Embree.
+    pub rays: Vec<RayRow>,
+    /// Why Embree was not measured.
+    pub embree_failure: Option<String>,
+    /// Worker threads for pictures.
+    pub threads: usize,
+    /// Where this was measured.
+    pub machine: Machine,
+}
+
+/// First hits of one kind of ray on one thread.
+#[derive(Clone, Debug, Serialize)]
+pub struct RayRow {
+    /// `camera` (neighbours alike) or `scattered` (to all sides from where camera rays hit).
+    pub kind: &'static str,
+    /// Rays.
+    pub rays: usize,
+    /// Ours a second.
+    pub rays_per_second: f64,
+    /// Embree's a second.
+    pub embree_rays_per_second: Option<f64>,
+    /// Ours over Embree's.
+    pub ratio: Option<f64>,
+    /// Rays that only one of the two has hitting, away from edges of the picture.
+    pub differing: Option<usize>,
+    /// Rays looked at for that: all but those at edges.
+    pub compared: Option<usize>,
+    /// Largest difference of hits there [m].
+    pub largest_difference_m: Option<f64>,
+}
+
+/// The scene on a stage.
+struct Set {
+    scene: LaparoscopicScene,
+    stage: Stage,
+    moving: ShapeId,
+    instruments: [BodyId; 2],
+    view: Pose,
+}
+
+impl Set {
+    fn new(triangles: usize) -> Result<Self> {
+        let scene = LaparoscopicScene::new(triangles / 5);
+        let view = endoscope_view();
+        let mut stage = Stage::new();
+        let mut shapes = Vec::new();
+        for (i, organ) in scene.organs.iter().enumerate() {
+            shapes.push(stage.add_mesh(organ, i as u16 + 1, &Look::tissue([200, 110, 100]))?.0);
+        }
+        let instrument = stage.add_shape(&scene.instrument)?;
+        let mut place =
+            |right: bool, label| stage.add_body(instrument, &scene.instrument_pose(right, 0.0), label, &Look::steel());
+        let instruments = [place(false, 101)?, place(true, 102)?];
+        stage.lights.push(Light::endoscope(&view, 0.006, 0.11));
+        stage.environment = [0.02; 3];
+        Ok(Self { moving: shapes[MOVING], scene, stage, instruments, view })
+    }
+
+    /// Median and least time of a frame [ms].
+    fn preview(&mut self, shadows: bool) -> Result<(f64, f64)> {
+        let Endoscope { camera, .. } = Endoscope::thirty_degrees();
+        // The square middle of the endoscope's picture.
+        let scale = 224.0 / camera.height as f64;
+        let policy = Camera {
+            width: 224,
+            height: 224,
+            fx: camera.fx * scale,
+            fy: camera.fy * scale,
+            cx: 111.5,
+            cy: 111.5,
+            ..camera
+        };
+        let eye = Eye::new(policy);
+        let film = Film::endoscope();
+        let mut times = Vec::with_capacity(FRAMES);
+        for frame in 0..FRAMES + FRAMES / 10 {
+            let t = frame as f64 / 30.0;
+            let positions = self.scene.moved(MOVING, t);
+            let poses = [false, true].map(|right| self.scene.instrument_pose(right, t));
+            let clock = Instant::now();
+            self.stage.deform(self.moving, &positions)?;
+            for (body, pose) in self.instruments.iter().zip(&poses) {
+                self.stage.place(*body, pose)?;
+            }
+            let picture = render(&mut self.stage, &eye, &self.view, &Settings::Preview { shadows }, &film);
+            let took = 1e3 * clock.elapsed().as_secs_f64();
+            std::hint::black_box(picture);
+            if frame >= FRAMES / 10 {
+                times.push(took);
+            }
+        }
+        Ok((median(&mut times), times[0]))
+    }
+
+    fn refit(&mut self) -> Result<f64> {
+        let mut times = Vec::with_capacity(FRAMES);
+        for frame in 0..FRAMES {
+            let positions = self.scene.moved(MOVING, frame as f64 / 30.0);
+            let clock = Instant::now();
+            self.stage.deform(self.moving, &positions)?;
+            times.push(1e3 * clock.elapsed().as_secs_f64());
+        }
+        Ok(median(&mut times))
+    }
+}
+
+impl RenderBench {
+    /// Runs everything.
+    ///
+    /// # Errors
+    /// An interruption, or a picture that cannot be written. Embree that cannot be run is told in the result.
+    pub fn run(&self, progress: &dyn Progress) -> Result<RenderBenchResult> {
+        let machine = Machine::here();
+        progress.begin("measurements", 5);
+        let step = || {
+            progress.advance(1);
+            if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+        };
+        let clock = Instant::now();
+        let mut set = Set::new(self.triangles)?;
+        let build_ms = 1e3 * clock.elapsed().as_secs_f64();
+        let (preview_224_ms, preview_224_best_ms) = set.preview(true)?;
+        let (preview_224_unshadowed_ms, _) = set.preview(false)?;
+        step()?;
+        let refit_ms = set.refit()?;
+        step()?;
+        let whole = merged(&set.scene.organs);
+        let (mut rays, embree_failure) = self.rays(&whole, &set.view)?;
+        rays.shrink_to_fit();
+        step()?;
+        let path_720p_ms = if self.samples > 0 { Some(self.path(&mut set)?) } else { None };
+        step()?;
+        progress.end();
+        Ok(RenderBenchResult {
+            triangles: set.stage.triangles(),
+            refitted_triangles: set.scene.organs[MOVING].triangles.len(),
+            preview_224_ms,
+            preview_224_unshadowed_ms,
+            preview_224_best_ms,
+            refit_ms,
+            build_ms,
+            path_720p_ms,
+            samples: self.samples,
+            rays,
+            embree_failure,
+            threads: rayon::current_num_threads(),
+            machine,
+        })
+    }
+
+    fn path(&self, set: &mut Set) -> Result<f64> {
+        let eye = Eye::new(Endoscope::thirty_degrees().camera);
+        let clock = Instant::now();
+        let picture = render(&mut set.stage, &eye, &set.view, &Settings::path(self.samples), &Film::endoscope());
+        let took = 1e3 * clock.elapsed().as_secs_f64();
+        if let Some(path) = &self.picture {
+            picture.color.write_png(path)?;
+        }
+        Ok(took)
+    }
+
+    /// Both kinds of rays, by us and by Embree.
+    fn rays(&self, mesh: &TriMesh, view: &Pose) -> Result<(Vec<RayRow>, Option<String>)> {
+        let mut stage = Stage::new();
+        stage.add_mesh(mesh, 1, &Look::matte([128; 3]))?;
+        let camera = Camera::centred(self.rays, self.rays, 1.2);
+        let eye = view.translation.as_vec3();
+        let ahead: Vec<(Vec3, Vec3)> = (0..self.rays * self.rays)
+            .map(|i| (eye, (view.rotation * camera.ray((i % self.rays) as f64, (i / self.rays) as f64)).as_vec3()))
+            .collect();
+        let away: Vec<(Vec3, Vec3)> = ahead
+            .iter()
+            .enumerate()
+            .map(|(i, (o, d))| {
+                let t = stage.cast(*o, *d).map_or(0.1, |m| m.t);
+                // A millimetre back, to where a golden spiral over the sphere points, far from its neighbour's.
+                let turn = i as f32 * 2.399_963_2;
+                let z = 1.0 - 2.0 * ((i * 7_919) % 10_007) as f32 / 10_007.0;
+                let r = (1.0 - z * z).max(0.0).sqrt();
+                (*o + *d * (t - 1e-3 / d.length()), Vec3::new(r * turn.cos(), r * turn.sin(), z))
+            })
+            .collect();
+        let one = ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::Format(e.to_string()))?;
+        let mut rows = Vec::new();
+        let mut failure = None;
+        for (kind, rays) in [("camera", &ahead), ("scattered", &away)] {
+            let mut seconds = f64::INFINITY;
+            let mut ours = Vec::new();
+            for _ in 0..TRIES {
+                let clock = Instant::now();
+                ours = one.install(|| {
+                    rays.iter().map(|(o, d)| stage.cast(*o, *d).map_or(f32::INFINITY, |m| m.t)).collect::<Vec<_>>()
+                });
+                seconds = seconds.min(clock.elapsed().as_secs_f64());
+            }
+            let mut row = RayRow {
+                kind,
+                rays: rays.len(),
+                rays_per_second: rays.len() as f64 / seconds,
+                embree_rays_per_second: None,
+                ratio: None,
+                differing: None,
+                compared: None,
+                largest_difference_m: None,
+            };
+            match (Embree { python: &self.python, tries: TRIES }).cast(mesh, rays) {
+                Ok(theirs) => row.compare(rays, &ours, &theirs, self.rays),
+                Err(why) => failure = Some(why),
+            }
+            rows.push(row);
+        }
+        Ok((rows, failure))
+    }
+}
+
+impl RayRow {
+    fn compare(&mut self, rays: &[(Vec3, Vec3)], ours: &[f32], theirs: &EmbreeRows, width: usize) {
+        let per_second = rays.len() as f64 / theirs.seconds;
+        self.embree_rays_per_second = Some(per_second);
+        self.ratio = Some(self.rays_per_second / per_second);
+        // An edge of the picture: a neighbour misses, or is nearer or farther by more than a twentieth.
+        let inner = |i: usize| {
+            let (u, v) = (i % width, i / width);
+            if u == 0 || v == 0 || u + 1 == width || v + 1 == width {
+                return false;
+            }
+            let here = theirs.distances[i];
+            let alike = |j: usize| {
+                let there = theirs.distances[j];
+                here.is_finite() == there.is_finite() && (here.is_infinite() || (here - there).abs() < 0.05 * here)
+            };
+            [i - width - 1, i - width, i - width + 1, i - 1, i + 1, i + width - 1, i + width, i + width + 1]
+                .into_iter()
+                .all(alike)
+        };
+        let camera = self.kind == "camera";
+        let (mut compared, mut differing, mut largest) = (0, 0, 0.0_f64);
+        for i in 0..rays.len() {
+            if camera && !inner(i) {
+                continue;
+            }
+            compared += 1;
+            let (a, b) = (ours[i], theirs.distances[i]);
+            if a.is_finite() != b.is_finite() {
+                differing += 1;
+            } else if a.is_finite() {
+                largest = largest.max(f64::from((a - b).abs() * rays[i].1.length()));
+            }
+        }
+        (self.compared, self.differing, self.largest_difference_m) = (Some(compared), Some(differing), Some(largest));
+    }
+}
+
+/// All organs as one mesh.
+fn merged(organs: &[TriMesh]) -> TriMesh {
+    let mut whole = TriMesh::default();
+    for organ in organs {
+        let first = whole.vertices.len() as u32;
+        whole.vertices.extend(&organ.vertices);
+        whole.triangles.extend(organ.triangles.iter().map(|t| t.map(|v| v + first)));
+    }
+    whole
+}

@@ -1,0 +1,149 @@
+//! Lights. Radiance is linear and relative: 1 is what a sensor at exposure 1 shows as white.
+
+use crate::tree::Ray;
+use glam::{DVec3, Vec3A};
+use trocar_camera::Pose;
+
+/// A light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Light {
+    /// A point that shines into a cone, its light falling off with the square of the distance.
+    Spot {
+        /// Where it is [m].
+        position: DVec3,
+        /// The cone's axis.
+        direction: DVec3,
+        /// Linear radiant intensity on the axis: radiance times square metres.
+        intensity: [f32; 3],
+        /// Half the angle up to which it is as bright as on the axis [rad].
+        inner: f64,
+        /// Half the angle beyond which it is dark [rad]; pi for a light to all sides.
+        outer: f64,
+    },
+    /// A rectangle that shines to the side of `along` x `across`, and is seen.
+    Panel {
+        /// One corner [m].
+        corner: DVec3,
+        /// One edge from it [m].
+        along: DVec3,
+        /// The other edge from it [m].
+        across: DVec3,
+        /// Linear radiance.
+        radiance: [f32; 3],
+    },
+}
+
+/// What a light sends to a point.
+pub(crate) struct Arriving {
+    /// Unit direction towards the light.
+    pub direction: Vec3A,
+    /// Distance to it [m].
+    pub distance: f32,
+    /// Radiance, over the probability of this sample where there was a choice.
+    pub light: Vec3A,
+    /// Density of that probability over solid angle; 0 for a point, which no other sampling finds.
+    pub density: f32,
+}
+
+impl Light {
+    /// The light of an endoscope: beside the lens by `beside` [m] towards the picture's top, warm white, wide. A white matte
+    /// surface `white_at` [m] before it, facing it, has radiance 1.
+    pub fn endoscope(view: &Pose, beside: f64, white_at: f64) -> Self {
+        let power = std::f32::consts::PI * (white_at * white_at) as f32;
+        Self::Spot {
+            position: view.transform(DVec3::new(0.0, -beside, 0.0)),
+            direction: view.rotation * DVec3::Z,
+            intensity: [power, 0.965 * power, 0.91 * power],
+            inner: 25.0_f64.to_radians(),
+            outer: 62.0_f64.to_radians(),
+        }
+    }
+}
+
+/// A light made ready for rendering.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Lamp {
+    Spot { position: Vec3A, direction: Vec3A, intensity: Vec3A, bright: f32, dark: f32 },
+    Panel { corner: Vec3A, along: Vec3A, across: Vec3A, normal: Vec3A, area: f32, radiance: Vec3A },
+}
+
+impl Lamp {
+    pub fn new(light: &Light) -> Self {
+        match *light {
+            Light::Spot { position, direction, intensity, inner, outer } => Self::Spot {
+                position: position.as_vec3a(),
+                direction: direction.normalize_or_zero().as_vec3a(),
+                intensity: intensity.into(),
+                bright: inner.cos() as f32,
+                // Below any cosine, where it shines to all sides.
+                dark: if outer >= std::f64::consts::PI { f32::NEG_INFINITY } else { outer.cos() as f32 },
+            },
+            Light::Panel { corner, along, across, radiance } => {
+                let normal = along.cross(across).as_vec3a();
+                let (along, across) = (along.as_vec3a(), across.as_vec3a());
+                let (corner, area) = (corner.as_vec3a(), normal.length());
+                Self::Panel { corner, along, across, normal, area, radiance: radiance.into() }
+            }
+        }
+    }
+
+    /// What arrives at `point` from the place of the light that two random numbers choose; `None` where nothing does.
+    pub fn arriving(&self, point: Vec3A, [a, b]: [f32; 2]) -> Option<Arriving> {
+        match *self {
+            Self::Spot { position, direction, intensity, bright, dark } => {
+                let to_light = position - point;
+                let distance = to_light.length();
+                let towards = to_light / distance.max(1e-12);
+                let cos = -towards.dot(direction);
+                let share = if dark == f32::NEG_INFINITY {
+                    1.0
+                } else {
+                    let x = ((cos - dark) / (bright - dark).max(1e-6)).clamp(0.0, 1.0);
+                    x * x * (3.0 - 2.0 * x)
+                };
+                let light = intensity * (share / (distance * distance).max(1e-12));
+                (share > 0.0 && light.is_finite()).then_some(Arriving {
+                    direction: towards,
+                    distance,
+                    light,
+                    density: 0.0,
+                })
+            }
+            Self::Panel { corner, along, across, normal, area, radiance } => {
+                let to_light = corner + a * along + b * across - point;
+                let distance = to_light.length();
+                let towards = to_light / distance.max(1e-12);
+                let cos = -towards.dot(normal) / area;
+                if cos.is_nan() || cos <= 0.0 || distance <= 0.0 {
+                    return None;
+                }
+                let density = distance * distance / (cos * area);
+                Some(Arriving { direction: towards, distance, light: radiance / density, density })
+            }
+        }
+    }
+
+    /// Distance along a ray at which a panel is met from its bright side before `reach`, its radiance, and the density with which
+    /// [`Self::arriving`] chooses that direction.
+    pub fn met(&self, ray: &Ray, reach: f32) -> Option<(f32, Vec3A, f32)> {
+        let Self::Panel { corner, along, across, normal, area, radiance } = *self else { return None };
+        let slope = ray.direction.dot(normal);
+        if slope >= 0.0 {
+            return None;
+        }
+        let to_corner = corner - ray.origin;
+        let t = to_corner.dot(normal) / slope;
+        if !(t > 0.0 && t < reach) {
+            return None;
+        }
+        let inside = ray.direction * t - to_corner;
+        let a = inside.cross(across).dot(normal) / (area * area);
+        let b = along.cross(inside).dot(normal) / (area * area);
+        if !((0.0..=1.0).contains(&a) && (0.0..=1.0).contains(&b)) {
+            return None;
+        }
+        let length = ray.direction.length();
+        let density = (t * length) * (t * length) * length / -slope;
+        Some((t, radiance, density))
+    }
+}

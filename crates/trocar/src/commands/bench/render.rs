@@ -1,0 +1,61 @@
+//! `trocar bench render`.
+
+use crate::cli::RenderBench;
+use crate::output;
+use trocar_evaluate::{RenderBenchResult, Result};
+use trocar_progress::Progress;
+
+pub fn run(arguments: &RenderBench, json: bool, progress: &dyn Progress) -> Result<()> {
+    let bench = trocar_evaluate::RenderBench {
+        triangles: arguments.triangles,
+        samples: arguments.samples,
+        rays: arguments.rays,
+        python: arguments.python.clone(),
+        picture: arguments.picture.clone(),
+    };
+    output::print(json, &bench.run(progress)?, text);
+    Ok(())
+}
+
+fn text(r: &RenderBenchResult) -> String {
+    let million = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{:.2}", 1e-6 * x));
+    let rows: Vec<Vec<String>> = r
+        .rays
+        .iter()
+        .map(|row| {
+            vec![
+                row.kind.to_owned(),
+                row.rays.to_string(),
+                million(Some(row.rays_per_second)),
+                million(row.embree_rays_per_second),
+                row.ratio.map_or("-".into(), |x| format!("{x:.2}")),
+                row.differing.map_or("-".into(), |x| x.to_string()),
+                row.largest_difference_m.map_or("-".into(), |x| format!("{:.2}", 1e6 * x)),
+            ]
+        })
+        .collect();
+    let header = ["rays", "count", "ours M/s", "Embree M/s", "ratio", "differ", "most um"];
+    let mut out = format!(
+        "{} triangles, {} of them refitted; {} threads ({} cores{})\n\
+         preview 224 x 224: {:.1} ms a frame with shadows (best {:.1}), {:.1} without, refit included\n\
+         refit {:.2} ms, all trees anew {:.0} ms\n",
+        r.triangles,
+        r.refitted_triangles,
+        r.threads,
+        r.machine.cores,
+        r.machine.load.map_or(String::new(), |l| format!(", load {l:.1}")),
+        r.preview_224_ms,
+        r.preview_224_best_ms,
+        r.preview_224_unshadowed_ms,
+        r.refit_ms,
+        r.build_ms,
+    );
+    if let Some(ms) = r.path_720p_ms {
+        out += &format!("paths 1280 x 720, {} a pixel: {:.1} s\n", r.samples, 1e-3 * ms);
+    }
+    out += &output::table(&header, &rows);
+    if let Some(why) = &r.embree_failure {
+        out += &format!("\nEmbree: {why}");
+    }
+    out
+}
