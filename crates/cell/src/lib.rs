@@ -4,6 +4,7 @@
 
 pub mod blades;
 mod calm;
+mod clasp;
 mod clusters;
 mod cutter;
 mod design;
@@ -33,4 +34,4 @@ pub use mouth::{CONTACT_SKIN, Mouth, Mouthful, attached};
 pub use phase::Phase;
 pub use session::Session;
 pub use severance::{CutOrgan, Severance, SeveredPiece};
-pub use world::{FRAME, VISCOSITY_TIME, World};
+pub use world::{FRAME, Surroundings, VISCOSITY_TIME, World};
