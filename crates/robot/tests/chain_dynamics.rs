@@ -4,9 +4,8 @@
 
 mod common;
 
-use common::{free_fr3, noise, posture, rod, skewed};
+use common::{Random, free_fr3, noise, posture, rod, skewed};
 use glam::{DQuat, DVec3};
-use rand_pcg::Pcg64Mcg;
 use trocar_geometry::Pose;
 use trocar_robot::chain::{ArmState, Drive, JointFactor, Joints, LinkLoad, SerialArm};
 
@@ -18,7 +17,7 @@ fn arms() -> Vec<SerialArm> {
 
 #[test]
 fn jacobians_are_the_derivatives_of_the_frames() {
-    let mut rng = Pcg64Mcg::new(1);
+    let mut rng = Random(1);
     for arm in arms() {
         for _ in 0..50 {
             let q = posture(&arm, &mut rng);
@@ -47,7 +46,7 @@ fn jacobians_are_the_derivatives_of_the_frames() {
 
 #[test]
 fn the_mass_matrix_is_symmetric_and_positive_and_gives_the_inverse_dynamics() {
-    let mut rng = Pcg64Mcg::new(2);
+    let mut rng = Random(2);
     for arm in arms() {
         let n = arm.dof();
         for _ in 0..100 {
@@ -85,7 +84,7 @@ fn the_mass_matrix_is_symmetric_and_positive_and_gives_the_inverse_dynamics() {
 /// The kinetic energy is that of its links, whose speeds come from the Jacobians.
 #[test]
 fn gravity_is_the_slope_of_the_potential_energy() {
-    let mut rng = Pcg64Mcg::new(3);
+    let mut rng = Random(3);
     for arm in arms() {
         for _ in 0..20 {
             let q = posture(&arm, &mut rng);
@@ -107,7 +106,7 @@ fn gravity_is_the_slope_of_the_potential_energy() {
 #[test]
 fn an_undriven_arm_keeps_its_energy() {
     let arm = free_fr3().with_payload(rod(0.5, 0.2)).unwrap();
-    let start = ArmState { q: arm.home(), qd: noise(7, 1.0, &mut Pcg64Mcg::new(4)) };
+    let start = ArmState { q: arm.home(), qd: noise(7, 1.0, &mut Random(4)) };
     let drive = Drive { torque: arm.zeros(), external: arm.zeros() };
     let energy = |s: &ArmState| {
         let (kinetic, potential) = arm.energy(&s.q, &s.qd);
@@ -139,7 +138,7 @@ fn a_payload_is_as_a_heavier_last_link() {
     let last = segments.last_mut().unwrap();
     last.mass = last.mass.joined(&payload.placed(&arm.flange()));
     let heavy = SerialArm::new("heavy", segments, arm.flange()).unwrap();
-    let q = posture(&arm, &mut Pcg64Mcg::new(5));
+    let q = posture(&arm, &mut Random(5));
     assert_eq!(loaded.gravity_torque(&q), heavy.gravity_torque(&q));
     assert_eq!(loaded.mass_matrix(&q), heavy.mass_matrix(&q));
     // What hangs 0.2 m beyond the flange is felt at the wrist.

@@ -4,9 +4,8 @@
 
 mod common;
 
-use common::{between, noise, posture, skewed};
+use common::{Random, between, noise, posture, skewed};
 use glam::{DQuat, DVec3};
-use rand_pcg::Pcg64Mcg;
 use std::time::Instant;
 use trocar_geometry::Pose;
 use trocar_robot::chain::{InverseOptions, Joints, SerialArm};
@@ -23,7 +22,7 @@ fn gap(a: &Pose, b: &Pose) -> (f64, f64) {
 #[test]
 fn every_reachable_pose_is_reached_again() {
     let arm = SerialArm::franka_fr3().unwrap();
-    let mut rng = Pcg64Mcg::new(21);
+    let mut rng = Random(21);
     let options = InverseOptions { restarts: 300, ..InverseOptions::default() };
     let (mut near, mut worst, mut used) = (0, (0.0f64, 0.0f64), 0);
     for _ in 0..1000 {
@@ -51,7 +50,7 @@ fn every_reachable_pose_is_reached_again() {
 #[test]
 fn from_nearby_no_restart_is_needed_and_it_is_quick() {
     let arm = SerialArm::franka_fr3().unwrap();
-    let mut rng = Pcg64Mcg::new(22);
+    let mut rng = Random(22);
     let options = InverseOptions::default();
     // A 30 Hz motion of an arm at work: some millimetres and a degree or so a call.
     let mut q = Joints::new(&[0.0, -0.2, 0.0, -2.2, 0.0, 2.0, 0.0]).unwrap();
@@ -83,12 +82,12 @@ fn from_nearby_no_restart_is_needed_and_it_is_quick() {
 #[test]
 fn the_elbow_does_not_depend_on_the_way() {
     let arm = SerialArm::franka_fr3().unwrap();
-    let mut rng = Pcg64Mcg::new(23);
+    let mut rng = Random(23);
     let options = InverseOptions { posture_tolerance: 1e-7, iterations: 200, ..InverseOptions::default() };
     for _ in 0..50 {
         let near = noise(7, 0.3, &mut rng);
         let target = arm.frames(&Joints::from_fn(7, |i| arm.home()[i] + near[i])).flange();
-        let from = |rng: &mut Pcg64Mcg| {
+        let from = |rng: &mut Random| {
             let off = noise(7, 0.3, rng);
             arm.inverse(&target, &Joints::from_fn(7, |i| arm.home()[i] + off[i]), &options).unwrap()
         };
@@ -166,7 +165,7 @@ fn limits_bind_and_are_told() {
 
 #[test]
 fn arms_of_other_sizes_are_served() {
-    let mut rng = Pcg64Mcg::new(24);
+    let mut rng = Random(24);
     for n in [1, 3, 6, 12] {
         let arm = skewed(n);
         for _ in 0..20 {

@@ -5,9 +5,8 @@
 
 mod common;
 
-use common::{between, noise, posture};
+use common::{Random, between, noise, posture};
 use glam::DVec3;
-use rand_pcg::Pcg64Mcg;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -60,7 +59,7 @@ fn push(table: &mut String, parts: &[&Joints]) {
 /// The largest relative difference of each quantity over random states.
 fn compare(arm: &SerialArm, python: &Path, model: &Path, names: [&str; 2]) -> [f64; 6] {
     let n = arm.dof();
-    let mut rng = Pcg64Mcg::new(7);
+    let mut rng = Random(7);
     let states: Vec<_> = (0..STATES).map(|_| (posture(arm, &mut rng), noise(n, 2.5, &mut rng))).collect();
     let mut table = String::new();
     states.iter().for_each(|(q, qd)| push(&mut table, &[q, qd]));
@@ -178,7 +177,7 @@ fn the_built_in_fr3_is_mujocos() {
         assert!(worst.iter().all(|w| *w < 1e-9), "{worst:?}");
         // And our reader reads what MuJoCo read.
         let read = SerialArm::from_mjcf(&file, "flange").unwrap();
-        let q = posture(&arm, &mut Pcg64Mcg::new(1));
+        let q = posture(&arm, &mut Random(1));
         let off = (read.frames(&q).flange().translation - arm.frames(&q).flange().translation).length();
         assert!(off < 1e-12, "{off}");
     }
@@ -202,7 +201,7 @@ fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str
     let n = arm.dof();
     let steps = (2.0 / step).round() as usize;
     let every = steps / 100;
-    let mut rng = Pcg64Mcg::new(3);
+    let mut rng = Random(3);
     let start = Joints::from_fn(n, |i| [0.2, -0.3, 0.1, -1.8, 0.3, 1.6, 0.2][i]);
     let qd = noise(n, 0.3, &mut rng);
     // The torques of a controller that swings the joints about, recorded; then they are played to both.

@@ -4,9 +4,8 @@
 
 mod common;
 
-use common::{between, noise, posture, rod, skewed};
+use common::{Random, between, noise, posture, rod, skewed};
 use glam::DVec3;
-use rand_pcg::Pcg64Mcg;
 use std::time::Instant;
 use trocar_robot::chain::{ArmState, Coupling, CouplingLaw, Drive, JointLimits, Joints, SerialArm};
 
@@ -83,7 +82,7 @@ fn friction_slows_a_joint_as_coulomb_says() {
 #[test]
 fn limits_hold_under_any_torque() {
     let arm = loaded();
-    let mut rng = Pcg64Mcg::new(11);
+    let mut rng = Random(11);
     let mut seen = [0; 3];
     for _ in 0..40 {
         let mut state = ArmState::at_rest(posture(&arm, &mut rng));
@@ -326,7 +325,7 @@ fn a_step_is_cheap() {
 #[test]
 fn random_couplings_are_solved_and_give_no_energy() {
     let arm = loaded().with_gravity(DVec3::ZERO).unwrap();
-    let mut rng = Pcg64Mcg::new(31);
+    let mut rng = Random(31);
     let mut unsolved = 0;
     const STEPS: usize = 3000;
     for _ in 0..STEPS {

@@ -20,6 +20,13 @@ impl MassProperties {
     /// Nothing.
     pub const NONE: Self = Self { mass: 0.0, center: DVec3::ZERO, inertia: DMat3::ZERO };
 
+    /// A tube of `mass` [kg] along z around `center`; with `inner` 0 it is solid. Radii and length in metres.
+    pub fn tube(mass: f64, outer: f64, inner: f64, length: f64, center: DVec3) -> Self {
+        let square = outer * outer + inner * inner;
+        let across = mass * (3.0 * square + length * length) / 12.0;
+        Self { mass, center, inertia: DMat3::from_diagonal(DVec3::new(across, across, 0.5 * mass * square)) }
+    }
+
     /// The same body, its axes at `pose` in those that are wanted.
     pub fn placed(&self, pose: &Pose) -> Self {
         let r = DMat3::from_quat(pose.rotation);
@@ -88,4 +95,27 @@ fn semidefinite(m: DMat3, slack: f64) -> bool {
     let (x, y, z) = (a.x_axis, a.y_axis, a.z_axis);
     let minors = [x.x * y.y - x.y * y.x, x.x * z.z - x.z * z.x, y.y * z.z - y.z * z.y];
     [x.x, y.y, z.z].iter().chain(&minors).all(|&v| v >= 0.0) && a.determinant() >= 0.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn halves_make_a_whole() {
+        let half = |z: f64| MassProperties::tube(0.5, 0.01, 0.004, 0.1, DVec3::Z * z);
+        let whole = MassProperties::tube(1.0, 0.01, 0.004, 0.2, DVec3::ZERO);
+        let both = half(0.05).joined(&half(-0.05));
+        assert!(both.center.length() < 1e-15);
+        assert!(both.inertia.abs_diff_eq(whole.inertia, 1e-12), "{both:?} {whole:?}");
+    }
+
+    #[test]
+    fn turning_keeps_the_moments() {
+        let rod = MassProperties::tube(1.0, 0.01, 0.0, 0.3, DVec3::X * 0.1);
+        let frame = Pose { rotation: glam::DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2), translation: DVec3::Y };
+        let turned = rod.placed(&frame);
+        assert!((turned.inertia.x_axis.x - rod.inertia.z_axis.z).abs() < 1e-15);
+        assert!((turned.center - DVec3::new(0.0, 1.0, -0.1)).length() < 1e-15);
+    }
 }

@@ -10,11 +10,10 @@
 //! frame*, which is the gripper's of `trocar-cell`: origin at the jaw's pivot, x along the shaft, y across the closing plane, z along the hinge.
 
 pub(crate) mod coordinates;
-mod mass;
 
 pub use coordinates::{Coordinates, Excess, Limits};
-pub use mass::MassProperties;
 
+use crate::chain::MassProperties;
 use crate::error::within;
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
@@ -113,7 +112,7 @@ impl Instrument {
             mount: Pose { rotation: DQuat::IDENTITY, translation: DVec3::Z * head.length },
             pivot_offset: 8e-3,
             jaw: Jaw { max_angle: FRAC_PI_3, blade_length: 0.021, speed: jaw_speed },
-            mass: shaft.with(&motor),
+            mass: shaft.joined(&motor),
         }
     }
 
@@ -140,7 +139,7 @@ impl Instrument {
 
     /// Mass, centre and inertia in the flange's frame.
     pub fn mass_in_flange(&self) -> MassProperties {
-        self.mass.moved(&self.mount)
+        self.mass.placed(&self.mount)
     }
 
     /// Weight [N].
@@ -166,7 +165,11 @@ impl Instrument {
         if !self.mount.rotation.is_normalized() {
             return Err(Error::invalid(what("mount"), "its rotation must be a quaternion of length 1"));
         }
-        self.mass.check(&what("mass"))
+        within(&what("mass"), self.mass.mass, 1e-4, 100.0, "kg")?;
+        if self.mass.center.length() > 2.0 {
+            return Err(Error::invalid(what("mass.center"), "must be within 2 m"));
+        }
+        self.mass.validate(&what("mass, inertia"))
     }
 }
 
@@ -204,7 +207,7 @@ mod tests {
             i.check().unwrap();
             assert!((i.weight() - 4.7).abs() < 1e-12);
             assert!((i.jaw.angle(1.0).to_degrees() - 60.0).abs() < 1e-12);
-            assert!(i.mass.centre.z < 0.0, "the motor outweighs the shaft");
+            assert!(i.mass.center.z < 0.0, "the motor outweighs the shaft");
         }
         assert!(Instrument::named("stapler").unwrap_err().to_string().contains("grasper and cutter"));
     }

@@ -88,7 +88,7 @@ impl LoadModel {
     /// That of an instrument on a sensor with `bias`.
     pub fn of(instrument: &Instrument, bias: Wrench) -> Self {
         let mass = instrument.mass_in_flange();
-        Self { mass: mass.mass, first_moment: mass.mass * mass.centre, bias }
+        Self { mass: mass.mass, first_moment: mass.mass * mass.center, bias }
     }
 
     /// Weight [N] under `gravity` [m/s2].

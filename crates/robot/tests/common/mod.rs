@@ -9,18 +9,16 @@ pub mod random;
 pub use random::Random;
 
 use glam::{DMat3, DVec3};
-use rand_pcg::Pcg64Mcg;
-use rand_pcg::rand_core::Rng;
 use trocar_geometry::Pose;
 use trocar_robot::chain::{Joint, JointKind, JointLimits, Joints, MassProperties, Segment, SerialArm};
 
 /// A number between.
-pub fn between(rng: &mut Pcg64Mcg, low: f64, high: f64) -> f64 {
-    low + (high - low) * (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
+pub fn between(rng: &mut Random, low: f64, high: f64) -> f64 {
+    rng.between(low, high)
 }
 
 /// A posture within the limits.
-pub fn posture(arm: &SerialArm, rng: &mut Pcg64Mcg) -> Joints {
+pub fn posture(arm: &SerialArm, rng: &mut Random) -> Joints {
     Joints::from_fn(arm.dof(), |i| {
         let [low, high] = arm.segments()[i].joint.limits.position;
         between(rng, low.max(-3.0), high.min(3.0))
@@ -28,7 +26,7 @@ pub fn posture(arm: &SerialArm, rng: &mut Pcg64Mcg) -> Joints {
 }
 
 /// Numbers of either sign.
-pub fn noise(n: usize, size: f64, rng: &mut Pcg64Mcg) -> Joints {
+pub fn noise(n: usize, size: f64, rng: &mut Random) -> Joints {
     Joints::from_fn(n, |_| between(rng, -size, size))
 }
 
