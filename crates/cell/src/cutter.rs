@@ -35,6 +35,16 @@ impl Scissors {
         Self { angles: [opened, closed], opened: None }
     }
 
+    /// How wide they are or were [rad], if they are ready to cut.
+    pub fn opened(&self) -> Option<f64> {
+        self.opened
+    }
+
+    /// The numbers of their state.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        self.angles.into_iter().chain([self.opened.unwrap_or(-1.0)])
+    }
+
     /// Forgets that they were open: nothing was between them for a while.
     pub fn rest(&mut self) {
         self.opened = None;

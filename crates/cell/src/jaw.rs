@@ -70,6 +70,12 @@ impl Jaw {
         (angle - step.copysign(missing)).clamp(0.0, self.max_angle)
     }
 
+    /// The numbers of its state.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let (angle, force) = self.last.unwrap_or((-1.0, 0.0));
+        [self.budget, self.stiffness, angle, force].into_iter()
+    }
+
     /// The angle [rad] at the end of the next frame on the way to `target` at full speed.
     pub fn turn_to(&mut self, angle: f64, target: f64) -> f64 {
         self.last = None;

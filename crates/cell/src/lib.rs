@@ -1,9 +1,11 @@
-//! Specimen and tools in one stepped world, and the scripted tasks in it.
+//! Specimen and tools in one stepped world, the two-arm cell around it, and the scripted tasks in both.
 //!
-//! The world is the recording frame of the specimen for now: a scene file will place it in the two-arm cell.
+//! A [`World`] is a specimen in its own recording frame, in which a [`Session`] moves a free gripper. A [`Cell`] is the whole of a scene file in the cell frame: it takes actions and reports
+//! observations, and tissue feels and loads two dynamic arms in their ports.
 
 pub mod blades;
 mod calm;
+mod cell;
 mod clasp;
 mod clusters;
 mod cutter;
@@ -22,6 +24,10 @@ mod severance;
 mod target;
 mod world;
 
+pub use cell::{
+    Action, ActionSpace, ArmObservation, Cell, CellEvent, CellReport, CellState, JointReading, MOST_LOAD, Placed, ROLL_SPEED, SWING_SPEED,
+    TIP_SPEED, TaggedForce, Timing, TissueObservation,
+};
 pub use clusters::{Cluster, clusters};
 pub use cutter::{CUT_CLOSED, CUT_OPENED, Scissors};
 pub use design::GraspDesign;
