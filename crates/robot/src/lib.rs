@@ -5,6 +5,7 @@
 pub mod chain;
 mod error;
 pub mod instrument;
+pub mod manipulator;
 pub mod port;
 pub mod wrench;
 

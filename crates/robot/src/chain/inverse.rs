@@ -12,7 +12,7 @@ use glam::{DQuat, DVec3};
 use trocar_geometry::Pose;
 
 /// Rotations are weighed against translations as if at this distance [m]: about an instrument's length.
-const LEVER: f64 = 0.3;
+pub(crate) const LEVER: f64 = 0.3;
 /// Damping that is always there [m2]: singular values below its root are not trusted.
 const FLOOR: f64 = 1e-6;
 /// The least share of the damping, after steps that went well.
@@ -129,7 +129,7 @@ struct Search<'a> {
 }
 
 /// The rows of the task: three of translation, three of rotation at the lever's length.
-const TASK: usize = 6;
+pub(crate) const TASK: usize = 6;
 
 impl Search<'_> {
     /// The range that joint `i` may be in.
@@ -321,7 +321,13 @@ impl Search<'_> {
 
 /// J^T (J J^T + damping)^-1 e over the joints that are not held, made better `rounds - 1` times with what is still missing (iterated
 /// Tikhonov), so that damping costs accuracy only where the arm is singular.
-fn solve(rows: &[Joints; TASK], held: JointSet, mut error: [f64; TASK], damping: f64, rounds: usize) -> Joints {
+pub(crate) fn solve(
+    rows: &[Joints; TASK],
+    held: JointSet,
+    mut error: [f64; TASK],
+    damping: f64,
+    rounds: usize,
+) -> Joints {
     let n = rows[0].len();
     let mut free = *rows;
     for r in &mut free {
@@ -350,7 +356,7 @@ fn solve(rows: &[Joints; TASK], held: JointSet, mut error: [f64; TASK], damping:
 }
 
 /// A rotation as axis times angle, the short way [rad].
-fn turn(q: DQuat) -> DVec3 {
+pub(crate) fn turn(q: DQuat) -> DVec3 {
     let (v, w) = (DVec3::new(q.x, q.y, q.z), q.w);
     let (v, w) = if w < 0.0 { (-v, -w) } else { (v, w) };
     let s = v.length();

@@ -23,6 +23,7 @@ pub use arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
 pub use dynamics::{Dynamics, LinkLoad};
 pub use frames::{Frames, Jacobian};
 pub use inverse::{InverseOptions, Reached};
+pub(crate) use inverse::{LEVER, TASK, solve, turn};
 pub use joints::{JointSet, Joints, MAX_JOINTS};
 pub use mass::MassProperties;
 pub use matrix::{JointFactor, JointMatrix};

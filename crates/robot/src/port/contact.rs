@@ -53,6 +53,8 @@ pub struct RimContact {
     pub normal: ContactRow,
     /// Friction, along the shaft's direction.
     pub friction: ContactRow,
+    /// How far the shaft has moved along its direction from where friction holds it [m]; 0 where it is not touched.
+    pub stretch: f64,
     /// Whether friction is at its limit.
     pub sliding: bool,
 }
@@ -99,6 +101,7 @@ impl Port {
     fn contact(&self, at: RimPoint, shaft: &Shaft, motion: &Twist, state: &RimState) -> RimContact {
         let row = |direction| ContactRow { point: at.point, direction, ..ContactRow::default() };
         let (mut normal, mut friction, mut sliding) = (row(at.normal), row(shaft.direction), false);
+        let mut stretch = 0.0;
         if at.gap < 0.0 {
             let velocity = motion.at(shaft.base, at.point);
             let force = -self.stiffness * at.gap - self.damping * velocity.dot(at.normal);
@@ -106,7 +109,7 @@ impl Port {
             if force > 0.0 {
                 normal = ContactRow { force, stiffness: self.stiffness, damping: self.damping, ..normal };
             }
-            let stretch = state.mark_for(&at).map_or(0.0, |m| self.stretch(shaft, m));
+            stretch = state.mark_for(&at).map_or(0.0, |m| self.stretch(shaft, m));
             let wanted = -self.friction_stiffness * stretch - self.friction_damping * velocity.dot(shaft.direction);
             let limit = self.friction * normal.force;
             sliding = wanted.abs() > limit;
@@ -115,7 +118,7 @@ impl Port {
                 (friction.stiffness, friction.damping) = (self.friction_stiffness, self.friction_damping);
             }
         }
-        RimContact { at, normal, friction, sliding }
+        RimContact { at, normal, friction, stretch, sliding }
     }
 
     /// How far the shaft has moved along its direction since the mark was set [m].

@@ -11,6 +11,9 @@ pub use random::Random;
 use glam::{DMat3, DVec3};
 use trocar_geometry::Pose;
 use trocar_robot::chain::{Joint, JointKind, JointLimits, Joints, MassProperties, Segment, SerialArm};
+use trocar_robot::instrument::{Coordinates, Instrument};
+use trocar_robot::manipulator::{Manipulator, Settings};
+use trocar_robot::port::Port;
 
 /// A number between.
 pub fn between(rng: &mut Random, low: f64, high: f64) -> f64 {
@@ -68,4 +71,31 @@ pub fn free_fr3() -> SerialArm {
     let arm = SerialArm::franka_fr3().unwrap();
     let nothing = vec![0.0; arm.dof()];
     arm.with_friction(&nothing, &nothing).unwrap().with_limits(&[JointLimits::NONE; 7]).unwrap()
+}
+
+/// An arm of the paper's cell: the left with the grasper at 13.3 degrees, the right with the cutter at 18.3, in a sheet without thickness.
+pub fn cell(side: usize, settings: Settings) -> Manipulator {
+    let x = [-1.0, 1.0][side.min(1)];
+    let base = Pose {
+        rotation: glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
+        translation: DVec3::new(0.45 * x, 0.0, 0.0),
+    };
+    let arm = SerialArm::franka_fr3().unwrap().with_base(base).unwrap();
+    let instrument = [Instrument::grasper(), Instrument::cutter()][side.min(1)].clone();
+    let port = Port::new(DVec3::new(0.045 * x, 0.46, 0.16), -DVec3::Z, DVec3::X).unwrap();
+    Manipulator::new(arm, instrument, port, settings, start(side)).unwrap()
+}
+
+/// Where they start.
+pub fn start(side: usize) -> Coordinates {
+    let tilt = [13.3_f64, 18.3][side.min(1)].to_radians();
+    Coordinates { pivots: [0.0, [1.0, -1.0][side.min(1)] * tilt], insertion: 0.1, roll: 0.0, jaw: 0.5 }
+}
+
+/// A tip on a circle of 15 mm across the port's normal, from rest and back to it in 4 s.
+pub fn tip_circle(m: &Manipulator, start: &Coordinates, t: f64) -> Pose {
+    let s = (t / 4.0).clamp(0.0, 1.0);
+    let a = std::f64::consts::TAU * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
+    let tip = m.port().tip(start);
+    Pose { translation: tip.translation + 0.015 * DVec3::new(a.cos() - 1.0, a.sin(), 0.5 * a.sin()), ..tip }
 }

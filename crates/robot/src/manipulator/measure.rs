@@ -1,0 +1,167 @@
+//! What a manipulator's sensors and its controller say, in CRTK's words.
+
+use super::{Manipulator, reference};
+use crate::chain::{ArmState, Frames, Joints};
+use crate::instrument::{Coordinates, compose};
+use crate::port::{Measured, Shaft, Twist};
+use crate::wrench::Wrench;
+use glam::{DMat3, DVec3};
+use trocar_geometry::Pose;
+
+/// What is read at the joints.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JointReadings {
+    /// Positions [rad or m].
+    pub position: Joints,
+    /// Rates [rad/s or m/s].
+    pub velocity: Joints,
+    /// Torques of the drives [N m or N].
+    pub effort: Joints,
+}
+
+impl Manipulator {
+    /// The joints as they are.
+    pub fn measured_js(&self) -> JointReadings {
+        let s = &self.state;
+        JointReadings { position: s.arm.q, velocity: s.arm.qd, effort: s.memory.torque }
+    }
+
+    /// The joints as the controller wants them; effort is the last torque's.
+    pub fn setpoint_js(&self) -> JointReadings {
+        let s = &self.state;
+        JointReadings { position: s.reference.q, velocity: s.reference.qd, effort: s.memory.torque }
+    }
+
+    /// Pose of the tip in the cell.
+    pub fn measured_cp(&self) -> Pose {
+        self.instrument.tip(&self.flange())
+    }
+
+    /// Pose of the tip that the controller is given now: the reference, which is behind the command by its filter.
+    pub fn setpoint_cp(&self) -> Pose {
+        self.instrument.tip(&self.arm.frames(&self.state.reference.q).flange())
+    }
+
+    /// How the tip moves, at the jaw's pivot, in the cell.
+    pub fn measured_cv(&self) -> Twist {
+        let frames = self.arm.frames(&self.state.arm.q);
+        let tip = self.instrument.tip(&frames.flange()).translation;
+        let (linear, angular) = frames.jacobian(self.arm.dof(), tip).velocity(&self.state.arm.qd);
+        Twist { linear, angular }
+    }
+
+    /// What a six-axis sensor at the mount reads, mean over the last step: what the instrument does to the mount, with its weight, its inertia, the load on its
+    /// tip and the rim's forces; in the flange's frame, torque about its origin, as [`LoadModel`](crate::wrench::LoadModel) has it.
+    pub fn measured_cf(&self) -> Wrench {
+        let turn = self.flange().rotation.inverse();
+        let [force, torque] = self.state.mount;
+        Wrench { force: turn * force, torque: turn * torque }
+    }
+
+    /// Pose of the flange in the cell.
+    pub fn flange(&self) -> Pose {
+        self.arm.frames(&self.state.arm.q).flange()
+    }
+
+    /// The shaft in the cell.
+    pub fn shaft(&self) -> Shaft {
+        Shaft::of(&self.instrument, &self.flange())
+    }
+
+    /// The instrument's coordinates as measured, and their rates: pivots [rad/s], insertion [m/s], roll [rad/s], jaw [1/s]. Where the shaft does not point into the body
+    /// any more, which takes joint commands, they are those of the reference at rest.
+    pub fn coordinates(&self) -> (Coordinates, [f64; 5]) {
+        let frames = self.arm.frames(&self.state.arm.q);
+        let flange = frames.flange();
+        let (linear, angular) = frames.flange_jacobian().velocity(&self.state.arm.qd);
+        let jaw = self.state.jaw;
+        let measured = self.port.measure(&self.instrument, &flange, jaw[0]);
+        let rates = self.port.rates(&self.instrument, &flange, &Twist { linear, angular });
+        match (measured, rates) {
+            (Ok(m), Ok([a, b, c, d])) => (m.coordinates, [a, b, c, d, jaw[1]]),
+            _ => (self.setpoint_coordinates(), [0.0; 5]),
+        }
+    }
+
+    /// The instrument in its port. None where the shaft does not point into the body.
+    pub fn in_port(&self) -> Option<Measured> {
+        self.port.measure(&self.instrument, &self.flange(), self.state.jaw[0]).ok()
+    }
+
+    /// The coordinates that the controller is given now; the jaw's is the commanded one.
+    pub fn setpoint_coordinates(&self) -> Coordinates {
+        let (r, jaw) = (&self.state.reference, self.state.jaw[2]);
+        let own = reference::unpack(&r.value, jaw);
+        if !r.in_joints() {
+            return own;
+        }
+        let flange = self.arm.frames(&r.q).flange();
+        match self.port.measure(&self.instrument, &flange, jaw) {
+            Ok(m) => self.limits.clamp(&m.coordinates).0,
+            // A shaft that joint commands have drawn out comes back upright.
+            Err(_) => Coordinates { insertion: self.limits.insertion[0], jaw, ..Coordinates::default() },
+        }
+    }
+
+    /// The coordinates that were commanded last, after limits.
+    pub fn commanded(&self) -> Coordinates {
+        let (r, jaw) = (&self.state.reference, self.state.jaw[2]);
+        if r.in_joints() { self.setpoint_coordinates() } else { reference::unpack(&r.target, jaw) }
+    }
+
+    /// Distance from the port's centre to the shaft's axis, in the port's plane [m].
+    pub fn rcm_deviation(&self) -> f64 {
+        self.deviation(&self.arm.frames(&self.state.arm.q))
+    }
+
+    /// Angle between shaft and port normal [rad].
+    pub fn tilt(&self) -> f64 {
+        self.shaft().direction.angle_between(self.port.normal())
+    }
+
+    /// The jaw's opening, 0 to 1.
+    pub fn jaw(&self) -> f64 {
+        self.state.jaw[0]
+    }
+
+    pub(super) fn deviation(&self, frames: &Frames) -> f64 {
+        let flange = frames.flange();
+        match self.port.measure(&self.instrument, &flange, 0.0) {
+            Ok(m) => m.deviation(),
+            // A shaft along the plane may never cross it: its distance from the centre.
+            Err(_) => {
+                let shaft = Shaft::of(&self.instrument, &flange);
+                (self.port.centre() - shaft.base).cross(shaft.direction).length()
+            }
+        }
+    }
+
+    /// What the instrument does to the mount: its weight and what touches it (`outer`: force, and torque about the flange's origin at the
+    /// step's beginning) less what its momentum took (Newton and Euler). In the cell's axes.
+    pub(super) fn mount_reading(
+        &self,
+        before: &ArmState,
+        after: &ArmState,
+        frames: &Frames,
+        outer: [DVec3; 2],
+        dt: f64,
+    ) -> [DVec3; 2] {
+        let earlier = self.arm.frames(&before.q);
+        let mass = self.instrument.mass_in_flange();
+        let momentum = |frames: &Frames, qd: &Joints| {
+            let flange = frames.flange();
+            let body = mass.placed(&compose(&flange, &Pose::IDENTITY));
+            let turn = DMat3::from_quat(flange.rotation);
+            let inertia = turn * mass.inertia * turn.transpose();
+            let (linear, angular) = frames.jacobian(self.arm.dof(), body.center).velocity(qd);
+            (body.center, mass.mass * linear, inertia * angular)
+        };
+        let (center, p0, l0) = momentum(&earlier, &before.qd);
+        let (_, p1, l1) = momentum(frames, &after.qd);
+        let (push, spin) = ((p1 - p0) / dt, (l1 - l0) / dt);
+        let at = center - earlier.flange().translation;
+        let weight = mass.mass * self.arm.gravity();
+        let force = weight + outer[0] - push;
+        [force, outer[1] + at.cross(weight - push) - spin]
+    }
+}
