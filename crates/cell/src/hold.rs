@@ -56,7 +56,7 @@ impl Hold {
 
     /// The numbers of its state.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let vectors = [self.centroid, self.centroid_in_jaw, self.jaw].map(DVec3::to_array);
+        let vectors = [self.centroid, self.centroid_in_jaw, self.jaw].map(|v| v.to_array());
         vectors.into_iter().flatten().chain([self.organ as f64]).chain(self.nodes.iter().map(|n| f64::from(*n)))
     }
 

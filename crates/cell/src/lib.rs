@@ -6,6 +6,7 @@
 pub mod blades;
 mod calm;
 mod cell;
+mod cell_lift;
 mod clasp;
 mod clusters;
 mod cutter;
@@ -18,6 +19,7 @@ mod jaw;
 mod measure;
 mod mouth;
 mod phase;
+mod policy;
 mod resection;
 mod session;
 mod severance;
@@ -25,9 +27,10 @@ mod target;
 mod world;
 
 pub use cell::{
-    Action, ActionSpace, ArmObservation, Cell, CellEvent, CellReport, CellState, JointReading, MOST_LOAD, Placed, ROLL_SPEED, SWING_SPEED,
-    TIP_SPEED, TaggedForce, Timing, TissueObservation,
+    Action, ActionSpace, ArmObservation, Cell, CellEvent, CellReport, CellState, MOST_LOAD, Placed, ROLL_SPEED,
+    SWING_SPEED, TIP_SPEED, TaggedForce, Timing, TissueObservation,
 };
+pub use cell_lift::{CellLift, CellLiftPolicy, CellLiftRun, CellLiftSample, CellLiftSummary};
 pub use clusters::{Cluster, clusters};
 pub use cutter::{CUT_CLOSED, CUT_OPENED, Scissors};
 pub use design::GraspDesign;
@@ -38,6 +41,7 @@ pub use jaw::{JAW_FORCE, Jaw};
 pub use measure::{Sample, Summary};
 pub use mouth::{CONTACT_SKIN, Mouth, Mouthful, attached};
 pub use phase::Phase;
+pub use policy::Policy;
 pub use session::Session;
 pub use severance::{CutOrgan, Severance, SeveredPiece};
 pub use world::{FRAME, Surroundings, VISCOSITY_TIME, World};

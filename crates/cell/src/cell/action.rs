@@ -82,7 +82,8 @@ impl Checker<'_> {
         if !right || tilt > self.limits.tilt + 1e-9 {
             let k = usize::from(n[1].abs() > n[0].abs());
             let (is, most) = (tilt.to_degrees(), self.limits.tilt.to_degrees());
-            let reason = format!("is {:.4} rad, with which the shaft tilts by {is:.1} degrees; at most {most:.1}", n[k]);
+            let reason =
+                format!("is {:.4} rad, with which the shaft tilts by {is:.1} degrees; at most {most:.1}", n[k]);
             return Err(self.refuse(k, reason));
         }
         self.within(2, n[2], self.limits.insertion, " m")?;

@@ -86,7 +86,8 @@ fn station(
     let start = start(&arm.start, port, &hole, &blades);
     let (start, beyond) = limits.clamp(&start);
     if let Some((limit, excess)) = beyond.binding().next() {
-        let reason = format!("is beyond the {limit} that the port and the tissue below it allow, by {excess:.4} (m or rad)");
+        let reason =
+            format!("is beyond the {limit} that the port and the tissue below it allow, by {excess:.4} (m or rad)");
         return Err(wrong("start", reason));
     }
     let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
@@ -114,8 +115,8 @@ fn station(
     let gates = &scene.task.gates;
     let scissors = Scissors::new(gates.cut_open * blades.max_angle, gates.cut_closed * blades.max_angle);
     let jaw = Jaw::sized(held.jaw_force_n, blades.max_angle, closing);
-    let now = Moving::new(manipulator, &fixed, start, design(scene.task.grasp), jaw, scissors);
-    Ok(Station { fixed, now })
+    let now = Moving::new(manipulator.measured_cp(), &fixed, start, design(scene.task.grasp), jaw, scissors);
+    Ok(Station { fixed, manipulator, now })
 }
 
 /// The scene's port for the arm: normal into the body.
@@ -167,8 +168,15 @@ fn start(start: &trocar_scene::Start, port: &trocar_scene::Port, hole: &Port, bl
 fn chain(scene: &Scene, arm: &trocar_scene::Arm) -> Result<SerialArm> {
     let flange = arm.flange.as_deref();
     let model = match arm.source() {
-        Some(ArmModel::Urdf(file)) => SerialArm::read_urdf(&scene.resolve(file), flange)?,
-        Some(ArmModel::Mjcf(file)) => SerialArm::read_mjcf(&scene.resolve(file), flange)?,
+        Some(ArmModel::Urdf(file)) => SerialArm::from_urdf(&scene.resolve(file), None, flange)?,
+        Some(ArmModel::Mjcf(file)) => {
+            let tip = flange.ok_or_else(|| Error::Scene {
+                scene: scene.name.clone(),
+                field: format!("arm '{}', flange", arm.name.name()),
+                reason: "is missing; an MJCF file needs it: the body or site that carries the instrument".to_owned(),
+            })?;
+            SerialArm::from_mjcf(&scene.resolve(file), tip)?
+        }
         Some(ArmModel::FrankaFr3) | None => SerialArm::franka_fr3()?,
     };
     let posture: Vec<f64> = arm.posture_deg.iter().map(|d| d.to_radians()).collect();

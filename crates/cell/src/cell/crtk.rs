@@ -1,23 +1,14 @@
 //! Reads and commands of one arm, in the words of the Collaborative Robotics Toolkit (CRTK). Commands are taken at once and carried out by [`Cell::advance`] or the next [`Cell::step`].
 
+use super::Cell;
 use super::report::TaggedForce;
 use super::station::{Station, Wanted};
-use super::Cell;
 use crate::{Error, GraspDesign, Gripper, Result};
 use glam::DVec3;
 use trocar_geometry::Pose;
 use trocar_robot::instrument::{Coordinates, Limits};
+use trocar_robot::manipulator::JointReadings;
 use trocar_robot::port::{Port, Solution};
-use trocar_robot::chain::Joints;
-
-/// Joints of an arm.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JointReading {
-    /// Positions [rad or m].
-    pub position: Joints,
-    /// Rates [rad/s or m/s].
-    pub velocity: Joints,
-}
 
 impl Cell {
     fn place(&self, arm: &str) -> Result<usize> {
@@ -48,9 +39,8 @@ impl Cell {
     ///
     /// # Errors
     /// An arm that is not there.
-    pub fn measured_js(&self, arm: &str) -> Result<JointReading> {
-        let state = self.arm(arm)?.now.manipulator.measured_js();
-        Ok(JointReading { position: state.q, velocity: state.qd })
+    pub fn measured_js(&self, arm: &str) -> Result<JointReadings> {
+        Ok(self.arm(arm)?.manipulator.measured_js())
     }
 
     /// Measured pose of the tip frame in the cell.
@@ -58,7 +48,7 @@ impl Cell {
     /// # Errors
     /// An arm that is not there.
     pub fn measured_cp(&self, arm: &str) -> Result<Pose> {
-        Ok(self.arm(arm)?.now.manipulator.measured_cp())
+        Ok(self.arm(arm)?.manipulator.measured_cp())
     }
 
     /// What a sensor at the tool mount reads, in the mount's frame, weight and inertia of the instrument included; tagged with what the tissue's part of it is.
@@ -67,7 +57,7 @@ impl Cell {
     /// An arm that is not there.
     pub fn measured_cf(&self, arm: &str) -> Result<TaggedForce> {
         let station = self.arm(arm)?;
-        Ok(TaggedForce { kind: station.force_kind(), wrench: station.now.manipulator.measured_cf() })
+        Ok(TaggedForce { kind: station.force_kind(), wrench: station.manipulator.measured_cf() })
     }
 
     /// The instrument with its jaws as tissue meets it.
@@ -107,7 +97,7 @@ impl Cell {
     /// # Errors
     /// An arm that is not there.
     pub fn joint_limits(&self, arm: &str) -> Result<Vec<[f64; 2]>> {
-        let chain = self.arm(arm)?.now.manipulator.arm();
+        let chain = self.arm(arm)?.manipulator.arm();
         Ok(chain.segments().iter().map(|s| s.joint.limits.position).collect())
     }
 
@@ -137,7 +127,7 @@ impl Cell {
     /// An arm that is not there, not a number a joint, one that is not finite. Nothing has changed then.
     pub fn servo_jp(&mut self, arm: &str, joints: &[f64]) -> Result<()> {
         let station = self.arm_mut(arm)?;
-        station.now.manipulator.servo_jp(joints)?;
+        station.manipulator.servo_jp(joints)?;
         station.now.wanted = Wanted::Joints(station.now.wanted_jaw());
         Ok(())
     }
@@ -161,6 +151,14 @@ impl Cell {
     pub fn set_grasp_design(&mut self, arm: &str, design: GraspDesign) -> Result<()> {
         self.arm_mut(arm)?.now.design = design;
         Ok(())
+    }
+
+    /// How an arm's jaws hold what they close on.
+    ///
+    /// # Errors
+    /// An arm that is not there.
+    pub fn grasp_design(&self, arm: &str) -> Result<GraspDesign> {
+        Ok(self.arm(arm)?.now.design)
     }
 
     /// Organ, organ coordinate and centroid [m, cell frame] of what an arm's jaws hold.

@@ -71,7 +71,7 @@ impl Exchange {
 
     /// The numbers of the state.
     pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let vectors = [self.load.force, self.load.torque, self.at].map(DVec3::to_array);
+        let vectors = [self.load.force, self.load.torque, self.at].map(|v| v.to_array());
         vectors.into_iter().flatten().chain([self.stiffness, f64::from(u8::from(self.limited))])
     }
 }

@@ -14,7 +14,6 @@ mod state;
 mod station;
 
 pub use action::{Action, ActionSpace, ROLL_SPEED, SWING_SPEED, TIP_SPEED};
-pub use crtk::JointReading;
 pub use exchange::MOST_LOAD;
 pub use placed::Placed;
 pub use report::{ArmObservation, CellEvent, CellReport, TaggedForce, TissueObservation};
@@ -215,7 +214,8 @@ fn rates(scene: &Scene) -> Result<(u32, u32)> {
     let rates = scene.rates;
     let wrong = |field: &str, reason: String| Error::Scene { scene: scene.name.clone(), field: field.into(), reason };
     if rates.control_hz == 0 || !FRAMES_HZ.is_multiple_of(rates.control_hz) {
-        let reason = format!("is {}; it must divide {FRAMES_HZ}, tissue's frames a second: 30, 20, 60", rates.control_hz);
+        let reason =
+            format!("is {}; it must divide {FRAMES_HZ}, tissue's frames a second: 30, 20, 60", rates.control_hz);
         return Err(wrong("rates.control_hz", reason));
     }
     if rates.physics_hz == 0 || !rates.physics_hz.is_multiple_of(FRAMES_HZ) {

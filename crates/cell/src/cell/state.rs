@@ -4,13 +4,14 @@ use super::Cell;
 use super::station::Moving;
 use crate::Result;
 use crate::world::WorldState;
+use trocar_robot::manipulator::ManipulatorState;
 use xxhash_rust::xxh3::Xxh3;
 
 /// Everything of a [`Cell`] that changes: tissue with its cuts and grasps, arms, controllers, jaws, loads, time. Plain data.
 #[derive(Clone, Debug)]
 pub struct CellState {
     world: WorldState,
-    arms: Vec<Moving>,
+    arms: Vec<(Moving, ManipulatorState)>,
     periods: u64,
 }
 
@@ -20,9 +21,9 @@ impl CellState {
         let mut hash = Xxh3::new();
         hash.update(&self.periods.to_le_bytes());
         hash.update(&self.world.hash().to_le_bytes());
-        for arm in &self.arms {
+        for (arm, manipulator) in &self.arms {
             // Printed numbers are as exact as their bits: the shortest text that reads back as the same.
-            hash.update(format!("{:?}", arm.manipulator.state()).as_bytes());
+            hash.update(format!("{:?}", manipulator).as_bytes());
             for number in arm.numbers() {
                 hash.update(&number.to_bits().to_le_bytes());
             }
@@ -34,7 +35,7 @@ impl CellState {
 impl Cell {
     /// The state as it is now.
     pub fn save(&self) -> CellState {
-        let arms = self.stations.iter().map(|s| s.now.clone()).collect();
+        let arms = self.stations.iter().map(|s| (s.now.clone(), s.manipulator.state())).collect();
         CellState { world: self.world.save(), arms, periods: self.periods }
     }
 
@@ -48,7 +49,8 @@ impl Cell {
             return Err(crate::Error::Option(format!("the state has {given} arms, the cell {here}")));
         }
         self.world.restore(&state.world)?;
-        for (station, now) in self.stations.iter_mut().zip(&state.arms) {
+        for (station, (now, manipulator)) in self.stations.iter_mut().zip(&state.arms) {
+            station.manipulator.restore(manipulator)?;
             station.now.clone_from(now);
         }
         self.periods = state.periods;

@@ -46,7 +46,7 @@ pub(super) struct Fixed {
 pub(super) enum Wanted {
     /// Coordinates, and what is left of the orientation that was asked for.
     Coordinates(Coordinates, DVec3),
-    /// Joints: the manipulator knows them. The jaw's opening.
+    /// Joints, which the manipulator knows, and the jaw's opening.
     Joints(f64),
 }
 
@@ -69,10 +69,9 @@ pub(super) struct Held {
     opening: f64,
 }
 
-/// What changes of an arm: plain data.
+/// What changes of an arm beside its manipulator's state: plain data.
 #[derive(Clone, Debug)]
 pub(super) struct Moving {
-    pub manipulator: Manipulator,
     pub wanted: Wanted,
     /// The coordinates that were commanded last.
     pub commanded: Coordinates,
@@ -95,21 +94,20 @@ pub(super) struct Moving {
 #[derive(Clone, Debug)]
 pub(super) struct Station {
     pub fixed: Fixed,
+    pub manipulator: Manipulator,
     pub now: Moving,
 }
 
 impl Moving {
     pub fn new(
-        manipulator: Manipulator,
+        pose: Pose,
         fixed: &Fixed,
         start: Coordinates,
         design: GraspDesign,
         jaw: Jaw,
         scissors: Scissors,
     ) -> Self {
-        let pose = manipulator.measured_cp();
         Self {
-            manipulator,
             wanted: Wanted::Coordinates(start, DVec3::ZERO),
             commanded: start,
             held_back: false,
@@ -150,31 +148,40 @@ impl Station {
         }
     }
 
-    /// The nearest coordinates to a pose of the tip.
+    /// The nearest coordinates to a pose of the tip, above the floor.
     pub fn solve(&self, tip: &Pose, near: &Coordinates) -> Result<Solution> {
-        Ok(self.fixed.port.solve(&self.fixed.instrument, &self.fixed.limits, tip, near)?)
+        let Fixed { port, instrument, limits, .. } = &self.fixed;
+        let mut solution = port.solve(instrument, limits, tip, near)?;
+        let room = self.fixed.deepest(&solution.coordinates);
+        if solution.coordinates.insertion > room {
+            solution.excess.insertion += solution.coordinates.insertion - room;
+            solution.coordinates.insertion = room;
+            solution.tip = port.tip(&solution.coordinates);
+            solution.flange = instrument.flange(&solution.tip);
+            solution.rejected_translation = tip.translation - solution.tip.translation;
+        }
+        Ok(solution)
     }
 
     /// A control period begins.
     pub fn command(&mut self) -> Result<()> {
-        let now = &mut self.now;
+        let Self { fixed, manipulator, now } = self;
         now.rcm_peak = 0.0;
         let Wanted::Coordinates(wanted, _) = now.wanted else { return Ok(()) };
-        let (mut next, far) = paced(&now.commanded, &wanted, self.fixed.period);
-        let room = self.fixed.deepest(&next);
+        let (mut next, far) = paced(&now.commanded, &wanted, fixed.period);
+        let room = fixed.deepest(&next);
         let low = next.insertion > room;
         next.insertion = next.insertion.min(room);
-        now.manipulator.servo_cp(&next)?;
-        (now.commanded, now.held_back) = (next, far || low);
+        let commanded = manipulator.servo_cp(&next)?;
+        (now.commanded, now.held_back) = (commanded.coordinates, far || low || commanded.reach < 1.0);
         Ok(())
     }
 
     /// One physics step of the arm.
     pub fn step(&mut self, dt: f64) -> Result<()> {
-        let now = &mut self.now;
-        let at = now.manipulator.measured_cp().translation;
-        now.manipulator.step(now.exchange.load(at), dt)?;
-        now.rcm_peak = now.rcm_peak.max(now.manipulator.rcm_deviation());
+        let at = self.manipulator.measured_cp().translation;
+        let report = self.manipulator.step(self.now.exchange.load(at), dt)?;
+        self.now.rcm_peak = self.now.rcm_peak.max(report.rcm_deviation);
         Ok(())
     }
 
@@ -193,7 +200,7 @@ impl Station {
         } else {
             now.jaw.turn_to(angle, target)
         };
-        let next = Gripper { pose: now.manipulator.measured_cp(), jaw_angle: next_angle };
+        let next = Gripper { pose: self.manipulator.measured_cp(), jaw_angle: next_angle };
         let motions = now.gripper.motions_to(&next);
         now.jaw_rate = (next_angle - angle) / (self.fixed.blades.max_angle * dt);
         now.gripper = next;
@@ -202,7 +209,7 @@ impl Station {
 
     /// A tissue frame is over: takes its forces, and lets the jaws take hold and let go. What a cutter closed through: the organ, and the cutter as wide as it was open.
     pub fn after_frame(&mut self, world: &mut World, events: &mut Vec<CellEvent>) -> Option<(usize, Gripper)> {
-        let Self { fixed, now } = self;
+        let Self { fixed, now, .. } = self;
         now.forces = fixed.tools.forces(world.forces());
         now.exchange.after_frame(now.gripper.pose.translation, &now.forces);
         for event in world.events() {
@@ -257,15 +264,14 @@ impl Station {
         let (wanted, opening) = (self.now.wanted.jaw(), self.opening());
         if let Some(held) = &self.now.held {
             let opens = wanted > held.opening + MEANT;
-            let lost =
-                self.now.design == GraspDesign::Friction && self.mouth().tissue_of(world, held.organ).is_none();
+            let lost = self.now.design == GraspDesign::Friction && self.mouth().tissue_of(world, held.organ).is_none();
             if opens || lost {
                 self.let_go(world, events);
             }
             return;
         }
-        let presses = opening_force(&self.now.gripper, Tools::of(0), &self.now.forces)
-            >= PRESSING * self.now.jaw.budget;
+        let presses =
+            opening_force(&self.now.gripper, Tools::of(0), &self.now.forces) >= PRESSING * self.now.jaw.budget;
         if wanted < opening - MEANT && presses {
             self.take_hold(world, events);
         }
@@ -273,7 +279,7 @@ impl Station {
 
     fn take_hold(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let (mouth, opening) = (self.mouth(), self.opening());
-        let Self { fixed, now } = self;
+        let Self { fixed, now, .. } = self;
         let Some((organ, tissue)) = mouth.fullest(world) else { return };
         let Some(clasp) = Clasp::on(world, organ, &mouth, tissue, reach_into(world, organ), now.design) else { return };
         let pose = now.gripper.pose;
@@ -340,20 +346,21 @@ impl Station {
 
     /// What is measured at the end of a control period.
     pub fn observe(&self) -> ArmObservation {
-        let Self { fixed, now } = self;
+        let Self { fixed, now, .. } = self;
         let contact: DVec3 = now.forces.iter().map(|f| f.contact.force).sum();
         let constraint: DVec3 = now.forces.iter().map(|f| f.constraint.force).sum();
         let sum = |part: fn(&ToolForce) -> trocar_tissue::Wrench| {
-            now.forces.iter().map(part).fold(Wrench::default(), |sum, w| {
-                sum + Wrench { force: w.force, torque: w.torque }
-            })
+            now.forces
+                .iter()
+                .map(part)
+                .fold(Wrench::default(), |sum, w| sum + Wrench { force: w.force, torque: w.torque })
         };
         let kind = self.force_kind();
         let wrench = match kind {
             ForceKind::Constraint => sum(|f| f.constraint),
             ForceKind::Contact => sum(|f| f.contact),
         };
-        let (measured, rates) = now.manipulator.coordinates();
+        let (measured, rates) = self.manipulator.coordinates();
         let rejected_rotation = match now.wanted {
             Wanted::Coordinates(_, rejected) => rejected,
             Wanted::Joints(_) => DVec3::ZERO,
@@ -362,12 +369,12 @@ impl Station {
             side: fixed.side,
             coordinates: Coordinates { jaw: self.opening(), ..measured },
             rates: [rates[0], rates[1], rates[2], rates[3], now.jaw_rate],
-            tip: now.manipulator.measured_cp(),
-            rcm_deviation: now.manipulator.rcm_deviation(),
+            tip: self.manipulator.measured_cp(),
+            rcm_deviation: self.manipulator.rcm_deviation(),
             rcm_peak: now.rcm_peak,
             rcm_over_threshold: now.rcm_peak > fixed.rcm[0],
             rcm_over_abort: now.rcm_peak > fixed.rcm[1],
-            tilt: now.manipulator.tilt(),
+            tilt: self.manipulator.tilt(),
             commanded: now.commanded,
             rejected_rotation,
             held_back: now.held_back,
@@ -437,7 +444,9 @@ impl Moving {
             }
             all.extend([f.pressing, f.touching as f64]);
         }
-        all.extend([self.held_back, self.rcm_told[0], self.rcm_told[1], self.held.is_some()].map(|b| f64::from(u8::from(b))));
+        all.extend(
+            [self.held_back, self.rcm_told[0], self.rcm_told[1], self.held.is_some()].map(|b| f64::from(u8::from(b))),
+        );
         all.push(GraspDesign::ALL.iter().position(|d| *d == self.design).unwrap_or(0) as f64);
         if let Some(held) = &self.held {
             all.extend([held.organ as f64, held.s, held.opening]);
