@@ -12,6 +12,7 @@ use serde::Serialize;
 use trocar_geometry::Pose;
 use trocar_progress::Progress;
 use trocar_robot::instrument::Coordinates;
+use trocar_robot::port::Solution;
 
 /// Way along the shaft from which the open jaws come [m].
 const BACK: f64 = 0.025;
@@ -23,7 +24,7 @@ const APPROACH_SPEED: f64 = 0.03;
 const LONGEST_CLOSE: f64 = 1.5;
 
 /// Most that the jaws may miss the place by [m]: on flat organs the blades' tips reach the cell's floor first.
-const MISSED: f64 = 5e-3;
+const MISSED: f64 = 8e-3;
 
 /// Load is counted as a jump within this time of the grasp [s].
 const JUMP_TIME: f64 = 0.3;
@@ -173,10 +174,11 @@ impl CellLiftPolicy {
             let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
             Pose { rotation, translation: at - GRIP_DISTANCE * x }
         };
-        // The blades are alike: of the two ways round, the one with the smaller roll.
-        let near = Coordinates { roll: 0.0, jaw: 1.0, ..self.from };
+        // The blades are alike: of the two ways round, the one that the wrist reaches with less of a turn.
+        let near = Coordinates { jaw: 1.0, ..self.from };
+        let turn = |s: &Solution| (s.coordinates.roll - near.roll).abs() + 10.0 * s.excess.roll.abs();
         let (a, b) = (cell.solve(arm, &pose(hinge), &near)?, cell.solve(arm, &pose(-hinge), &near)?);
-        let best = if a.coordinates.roll.abs() <= b.coordinates.roll.abs() { a } else { b };
+        let best = if turn(&a) <= turn(&b) { a } else { b };
         if best.rejected_translation.length() > MISSED {
             return Err(Error::Option(format!(
                 "the {arm} arm does not reach the tissue at s = {s:.2}: its tip stays {:.1} mm away; grasp elsewhere or move the port",

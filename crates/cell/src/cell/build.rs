@@ -4,7 +4,7 @@ use super::station::{Fixed, Moving, Station};
 use crate::blades::{Blades, Tools};
 use crate::{Error, GraspDesign, Jaw, Result, Scissors};
 use glam::DVec3;
-use trocar_robot::chain::{MassProperties, SerialArm};
+use trocar_robot::chain::{InverseOptions, Joints, MassProperties, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument, Jaw as JawDrive, Limits};
 use trocar_robot::manipulator::{Manipulator, ModelError, Settings};
 use trocar_robot::port::Port;
@@ -25,6 +25,11 @@ const HOUSING: [f64; 2] = [0.028, 0.09];
 
 /// Time that a grasper's and a cutter's jaws take from open to closed [s].
 const CLOSING: [f64; 2] = [0.3, 0.2];
+
+/// Postures from which the start is searched, and steps of a way along which arms are followed.
+const STARTS: usize = 24;
+/// See there.
+const WALK: u32 = 24;
 
 /// Shaft that tissue may touch [m]: more than goes into the body.
 const TOUCHING_SHAFT: f64 = 0.2;
@@ -76,7 +81,7 @@ fn station(
         friction: scene.tissue.friction,
     };
     let floor = floor + ABOVE_FLOOR;
-    let limits = limits(&hole, &instrument, &blades, floor)?;
+    let mut limits = limits(&hole, &instrument, &blades, floor)?;
     let period = 1.0 / f64::from(scene.rates.control_hz);
     let wrong = |field: &str, reason: String| Error::Scene {
         scene: scene.name.clone(),
@@ -90,6 +95,8 @@ fn station(
             format!("is beyond the {limit} that the port and the tissue below it allow, by {excess:.4} (m or rad)");
         return Err(wrong("start", reason));
     }
+    let chain = chain(scene, arm)?;
+    limits.roll = roll_of(&chain, &hole, &instrument, &limits, &start)?;
     let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
     let error = scene.gravity_error;
     settings.error = ModelError {
@@ -111,7 +118,7 @@ fn station(
         rcm: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
         period,
     };
-    let manipulator = Manipulator::new(chain(scene, arm)?, instrument, hole, settings, start)?;
+    let manipulator = Manipulator::new(chain, instrument, hole, settings, start)?;
     let gates = &scene.task.gates;
     let scissors = Scissors::new(gates.cut_open * blades.max_angle, gates.cut_closed * blades.max_angle);
     let jaw = Jaw::sized(held.jaw_force_n, blades.max_angle, closing);
@@ -163,6 +170,59 @@ fn start(start: &trocar_scene::Start, port: &trocar_scene::Port, hole: &Port, bl
     let roll = start.roll_deg.to_radians();
     let roll = roll - std::f64::consts::TAU * (roll / std::f64::consts::TAU).round();
     Coordinates { pivots, insertion: 1e-3 * start.insertion_mm - blades.length, roll, jaw: start.jaw }
+}
+
+/// The rolls [rad] to which an arm gets from its start without a joint at a limit, wherever the shaft leans: the wrist's range less what the shaft's turn takes of it. Where the arm does not get
+/// even at the start's roll is left out: commands there are held back.
+fn roll_of(
+    arm: &SerialArm,
+    port: &Port,
+    instrument: &Instrument,
+    limits: &Limits,
+    start: &Coordinates,
+) -> Result<[f64; 2]> {
+    let options = InverseOptions { tolerance: [1e-6, 1e-5], posture_tolerance: 1e-2, ..InverseOptions::default() };
+    let first = InverseOptions { restarts: STARTS, ..options };
+    let posture = arm.inverse(&port.flange(instrument, start), &arm.home(), &first)?;
+    let mut range = limits.roll;
+    // Steps towards `to`, each from the posture of the one before: the last posture, and the share of the way that was gone.
+    let walk = |from: &Coordinates, q: &Joints, to: &Coordinates| -> Result<(Joints, f64)> {
+        let (mut q, mut share) = (*q, 0.0);
+        for step in 1..=WALK {
+            let s = f64::from(step) / f64::from(WALK);
+            let mix = |a: f64, b: f64| a + s * (b - a);
+            let at = Coordinates {
+                pivots: [mix(from.pivots[0], to.pivots[0]), mix(from.pivots[1], to.pivots[1])],
+                insertion: mix(from.insertion, to.insertion),
+                roll: mix(from.roll, to.roll),
+                jaw: 0.0,
+            };
+            let found = arm.inverse(&port.flange(instrument, &at), &q, &options)?;
+            if !found.reached || !found.at_limit.is_empty() {
+                break;
+            }
+            (q, share) = (found.q, s);
+        }
+        Ok((q, share))
+    };
+    let lean = 0.9 * limits.tilt;
+    let [shallow, deep] = limits.insertion;
+    let insertions = [start.insertion, deep.min(shallow.max(0.5 * (start.insertion + deep)))];
+    for pivots in [start.pivots, [lean, 0.0], [-lean, 0.0], [0.0, lean], [0.0, -lean]] {
+        for insertion in insertions {
+            let there = Coordinates { pivots, insertion, ..*start };
+            let (q, share) = walk(start, &posture.q, &there)?;
+            if share < 1.0 {
+                continue;
+            }
+            for (k, end) in limits.roll.into_iter().enumerate() {
+                let (_, share) = walk(&there, &q, &Coordinates { roll: end, ..there })?;
+                let reached = start.roll + share * (end - start.roll);
+                range[k] = if k == 0 { range[0].max(reached) } else { range[1].min(reached) };
+            }
+        }
+    }
+    Ok(range)
 }
 
 fn chain(scene: &Scene, arm: &trocar_scene::Arm) -> Result<SerialArm> {
