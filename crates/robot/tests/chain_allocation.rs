@@ -1,4 +1,4 @@
-//! Stepping an arm, its kinematics and its inverse kinematics allocate nothing.
+//! Stepping an arm, its kinematics, its inverse kinematics and its control allocate nothing.
 
 mod common;
 
@@ -48,6 +48,23 @@ fn stepping_and_searching_allocate_nothing() {
         arm.inverse(&flange, &arm.home(), &options).unwrap();
     }
     let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
+    let mut controlled = common::cell(0, trocar_robot::manipulator::Settings::default());
+    let start = controlled.commanded();
+    let made = ALLOCATIONS.load(Ordering::Relaxed);
+    for k in 0..480 {
+        if k % 16 == 0 {
+            let tip = common::tip_circle(&controlled, &start, f64::from(k) / 480.0);
+            controlled.servo_tip(&tip, 0.5).unwrap();
+            controlled.servo_cp(&trocar_robot::instrument::Coordinates { roll: 3.0, ..start }).unwrap();
+        }
+        let state = controlled.state();
+        controlled.restore(&state).unwrap();
+        controlled.step(trocar_robot::wrench::Wrench::default(), 1.0 / 480.0).unwrap();
+        pushed += controlled.measured_cf().force.length() + controlled.coordinates().0.insertion;
+    }
+    let controlling = ALLOCATIONS.load(Ordering::Relaxed) - made;
+    assert_eq!(controlling, 0, "allocations of a manipulator");
+
     assert!(pushed > 0.0);
     assert_eq!(during, 0, "allocations");
 }

@@ -9,8 +9,11 @@ use serde::{Deserialize, Serialize};
 
 /// Most torque that integral action or observer may add, as a share of the joint's limit: what is more is no error of a model.
 const CORRECTION_SHARE: f64 = 0.3;
-/// Integral action and observer leave a joint alone that stands still this near to its reference [rad or m; rad/s or m/s]: with friction they would move it to and fro for ever.
-const QUIET: [f64; 2] = [2e-5, 1e-4];
+/// Integral action and observer leave a joint alone that stands still this near to its reference [rad or m; rad/s or m/s]: with friction they would wind up
+/// and move it to and fro for ever. A touch over 0.05 mm at the tip.
+const QUIET: [f64; 2] = [8e-5, 1e-4];
+/// They take it up again from here, or when its reference moves.
+const AWAKE: [f64; 2] = [1.6e-4, 1e-3];
 
 /// What a controller remembers between steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -19,6 +22,27 @@ pub(super) struct Memory {
     pub torque: Joints,
     /// Integral of the error [rad s or m s], or what the observer found: torques that the model does not know [N m or N].
     pub correction: Joints,
+    /// Joints that stand still where they should.
+    pub asleep: JointSet,
+}
+
+impl Memory {
+    /// At rest under these torques.
+    pub fn at_rest(torque: Joints) -> Self {
+        Self { torque, correction: Joints::zeros(torque.len()), asleep: JointSet::default() }
+    }
+
+    /// Says anew which joints need no correction.
+    fn watch(&mut self, error: &Joints, rate: &Joints, wanted: &Joints) {
+        let mut asleep = JointSet::default();
+        for i in 0..error.len() {
+            let [near, slow] = if self.asleep.contains(i) { AWAKE } else { QUIET };
+            if error[i].abs() < near && rate[i].abs() < slow && wanted[i].abs() < slow {
+                asleep.insert(i);
+            }
+        }
+        self.asleep = asleep;
+    }
 }
 
 /// What does not change.
@@ -44,22 +68,23 @@ impl Plan<'_> {
     ) -> Joints {
         let n = measured.q.len();
         let (law, g) = (self.settings.law, &self.settings.gains);
-        let (stiffness, damping) = (g.bandwidth * g.bandwidth, 2.0 * g.damping * g.bandwidth);
+        let stiffness = g.bandwidth * g.bandwidth;
         let behind = Joints::from_fn(n, |i| from.q[i] - measured.q[i]);
         let slower = Joints::from_fn(n, |i| from.qd[i] - measured.qd[i]);
         let error = match law {
             Law::RcmImpedance => self.task_error(&behind, dynamics, from),
             _ => behind,
         };
+        memory.watch(&behind, &measured.qd, &from.qd);
         let mut wanted = to.qdd;
         if law != Law::JointImpedance {
             for i in 0..n {
-                wanted[i] += stiffness * error[i] + damping * slower[i];
+                wanted[i] += self.correction(error[i], slower[i], dynamics.mass_matrix.row(i)[i]);
             }
         }
         if law == Law::Integral {
             for i in 0..n {
-                if error[i].abs() > QUIET[0] || measured.qd[i].abs() > QUIET[1] {
+                if !memory.asleep.contains(i) {
                     // No more than a share of the joint's torque.
                     let most = CORRECTION_SHARE * self.effort(i)
                         / (stiffness * g.integral * dynamics.mass_matrix.row(i)[i]).max(1e-9);
@@ -72,7 +97,7 @@ impl Plan<'_> {
         for i in 0..n {
             torque[i] += dynamics.bias[i];
             if law == Law::JointImpedance {
-                torque[i] += self.inertia[i] * (stiffness * error[i] + damping * slower[i]);
+                torque[i] += self.inertia[i] * self.correction(error[i], slower[i], self.inertia[i]);
             }
             if law.observes() {
                 torque[i] += memory.correction[i];
@@ -86,15 +111,7 @@ impl Plan<'_> {
     }
 
     /// Learns from a step of `dt` [s] what torque it took beyond what the model says.
-    pub fn learn(
-        &self,
-        memory: &mut Memory,
-        dynamics: &Dynamics,
-        before: &ArmState,
-        after: &ArmState,
-        to: &Reference,
-        dt: f64,
-    ) {
+    pub fn learn(&self, memory: &mut Memory, dynamics: &Dynamics, before: &ArmState, after: &ArmState, dt: f64) {
         if !self.settings.law.observes() {
             return;
         }
@@ -103,13 +120,24 @@ impl Plan<'_> {
         let inertial = dynamics.mass_matrix.times(&rate);
         let share = 1.0 - (-self.settings.gains.observer * dt).exp();
         for i in 0..n {
-            if after.qd[i].abs() < QUIET[1] && (to.q[i] - after.q[i]).abs() < QUIET[0] {
+            if memory.asleep.contains(i) {
                 continue;
             }
             let missing = memory.torque[i] - inertial[i] - dynamics.bias[i];
             let most = CORRECTION_SHARE * self.effort(i);
             memory.correction[i] = (memory.correction[i] + share * (missing - memory.correction[i])).clamp(-most, most);
         }
+    }
+
+    /// The acceleration that brings an error back: w^2 e + 2 z w e' where it is small. A torque that may change by no more than r a second gives a joint of inertia m no more
+    /// jerk than j = r/m, and a loop of bandwidth w that asks for more swings up. So the speed of the way back stays under j/w^2 and its acceleration under j/w.
+    fn correction(&self, error: f64, slower: f64, inertia: f64) -> f64 {
+        let g = &self.settings.gains;
+        let jerk = self.settings.torque_rate / inertia.max(1e-6);
+        let (w, damping) = (g.bandwidth, 2.0 * g.damping * g.bandwidth);
+        let most = jerk / (w * w);
+        let back = if damping > 0.0 { (w * w * error / damping).clamp(-most, most) * damping } else { w * w * error };
+        (back + damping * slower).clamp(-jerk / w, jerk / w)
     }
 
     fn effort(&self, i: usize) -> f64 {

@@ -151,11 +151,10 @@ impl Manipulator {
         }
         let dynamics = believed.dynamics(&found.q, &arm.zeros());
         let inertia = Joints::from_fn(n, |i| dynamics.mass_matrix.row(i)[i]);
-        let still = arm.zeros();
         let state = ManipulatorState {
             arm: ArmState::at_rest(found.q),
-            reference: Reference::at_rest(found.q, &kept),
-            memory: Memory { torque: dynamics.bias, correction: still },
+            reference: Reference::at_rest(found.q, &kept, 1.0 / settings.command_rate),
+            memory: Memory::at_rest(dynamics.bias),
             rim: RimState::default(),
             jaw: [kept.jaw, 0.0, kept.jaw],
             mount: [DVec3::ZERO; 2],
@@ -211,7 +210,7 @@ impl Manipulator {
     /// Not a number a joint, one that is not finite or beyond its limits: nothing is changed.
     pub fn servo_jp(&mut self, target: &[f64]) -> Result<()> {
         let target = self.arm.posture(target)?;
-        self.state.reference.to_joints(&target, self.period());
+        self.state.reference.command_joints(&target, self.period());
         Ok(())
     }
 
@@ -257,7 +256,7 @@ impl Manipulator {
             dt,
             self.settings.substeps,
         )?;
-        plan.learn(&mut next.memory, &dynamics, &before, &next.arm, &next.reference, dt);
+        plan.learn(&mut next.memory, &dynamics, &before, &next.arm, dt);
         let frames = self.arm.frames(&next.arm.q);
         self.port.advance(&Shaft::of(&self.instrument, &frames.flange()), &mut next.rim);
         // Force and torque about the flange's origin of what touches the instrument.
@@ -272,6 +271,9 @@ impl Manipulator {
             }
         }
         next.mount = self.mount_reading(&before, &next.arm, &frames, outer, dt);
+        if !next.mount.iter().all(|v| v.is_finite()) {
+            return Err(Error::NotFinite { what: "the force at the mount" });
+        }
         let opening = self.instrument.jaw.toward(next.jaw[0], next.jaw[2], dt);
         next.jaw = [opening, (opening - next.jaw[0]) / dt, next.jaw[2]];
         self.state = next;
@@ -353,7 +355,7 @@ impl Manipulator {
 
     fn send(&mut self, to: &Coordinates) {
         let now = self.setpoint_coordinates();
-        self.state.reference.to_coordinates(to, &now);
+        self.state.reference.command_coordinates(to, &now);
         self.state.jaw[2] = to.jaw;
     }
 

@@ -16,21 +16,30 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_geometry::Pose;
 
-/// Highest speed and acceleration of the control points: the two pivots [rad/s, rad/s2], insertion [m/s, m/s2], roll [rad/s, rad/s2]. Motions that stay below
-/// acceleration times command period (0.4 rad/s, 0.13 m/s, 1.3 rad/s) pass unchanged.
-const COORDINATE_LIMITS: [[f64; 2]; 4] = [[1.0, 12.0], [1.0, 12.0], [0.25, 4.0], [3.0, 40.0]];
+/// Highest speed and acceleration of the control points: the two pivots [rad/s, rad/s2], insertion [m/s, m/s2], roll [rad/s, rad/s2]. Commands that stay below both
+/// pass unchanged.
+const COORDINATE_LIMITS: [[f64; 2]; 4] = [[0.6, 3.0], [0.6, 3.0], [0.15, 1.0], [2.0, 10.0]];
 /// Share of a joint's highest speed that the reference may use.
-const SPEED_SHARE: f64 = 0.9;
+const SPEED_SHARE: f64 = 0.5;
+/// With what acceleration joints come to rest at their limits [rad/s2 or m/s2].
+const BRAKING: f64 = 8.0;
+/// How long the spline takes to come back to its pace [s], and the pace below which it stands still.
+const RECOVERY: f64 = 0.3;
+const STANDSTILL: f64 = 0.04;
+/// Below this pace the joints' highest speeds fall with it: where the arm is nearly stretched it comes to rest instead of running into its end.
+const EASE: f64 = 0.7;
+/// No joint of the reference gains speed faster [rad/s2 or m/s2]; far above what motions away from singular postures take.
+const QUICKEST: f64 = 25.0;
 /// Acceleration of joint commands where the arm has no limit of its own [rad/s2 or m/s2].
 const JOINT_ACCELERATION: f64 = 10.0;
-/// Shares of a step that are tried in turn.
-const SLOWER: [f64; 4] = [1.0, 0.5, 0.125, 0.0];
+/// Share of a period by which a sum of steps may be off.
+const ROUNDING: f64 = 1e-9;
 /// The flange is where it should be [m, with angles at a lever].
 const CLOSE: f64 = 1e-9;
 /// Beyond that the arm does not reach the pose [m].
 const FAR: f64 = 2e-6;
 /// How fast the elbow goes where it likes to be [1/s], and the speed below which it does not bother [rad/s or m/s]: a joint that creeps would stick and slip.
-const ELBOW: (f64, f64) = (4.0, 1e-3);
+const ELBOW: (f64, f64) = (4.0, 2e-3);
 /// Joints are pushed off their limits from this far away [rad or m].
 const MARGIN: f64 = 0.1;
 /// The reference's joints keep this far from their limits [rad or m], which leaves room for the error of the arm behind it.
@@ -49,6 +58,8 @@ pub(super) struct Reference {
     goal: Goal,
     /// The last command: four coordinates or the joints.
     pub target: Joints,
+    /// The command at the last control point.
+    previous: Joints,
     points: [Joints; 3],
     /// Time since the last control point was made [s].
     phase: f64,
@@ -85,11 +96,11 @@ pub(super) fn unpack(v: &Joints, jaw: f64) -> Coordinates {
 
 impl Reference {
     /// At rest.
-    pub fn at_rest(q: Joints, at: &Coordinates) -> Self {
+    pub fn at_rest(q: Joints, at: &Coordinates, period: f64) -> Self {
         let (value, still) = (pack(at), Joints::zeros(q.len()));
         let points = [value; 3];
         let goal = Goal::Coordinates;
-        Self { goal, target: value, points, phase: 0.0, value, q, qd: still, qdd: still, pace: 1.0 }
+        Self { goal, target: value, previous: value, points, phase: period, value, q, qd: still, qdd: still, pace: 1.0 }
     }
 
     /// Whether the joints are commanded.
@@ -98,20 +109,20 @@ impl Reference {
     }
 
     /// Commands coordinates. `now` are those of the reference, where it followed joints before.
-    pub fn to_coordinates(&mut self, target: &Coordinates, now: &Coordinates) {
+    pub fn command_coordinates(&mut self, target: &Coordinates, now: &Coordinates) {
         if self.goal == Goal::Joints {
             let value = pack(now);
-            (self.goal, self.points, self.value) = (Goal::Coordinates, [value; 3], value);
+            (self.goal, self.points, self.value, self.previous) = (Goal::Coordinates, [value; 3], value, value);
         }
         self.target = pack(target);
     }
 
     /// Commands joints. The reference goes on with its speed.
-    pub fn to_joints(&mut self, target: &Joints, period: f64) {
+    pub fn command_joints(&mut self, target: &Joints, period: f64) {
         if self.goal == Goal::Coordinates {
             let (q, qd) = (self.q, self.qd);
             let beside = |s: f64| Joints::from_fn(q.len(), |i| q[i] + s * period * qd[i]);
-            (self.goal, self.value) = (Goal::Joints, q);
+            (self.goal, self.value, self.previous) = (Goal::Joints, q, q);
             // The next control point is made at once.
             (self.points, self.phase) = ([beside(-1.0), beside(-0.5), beside(0.5)], period);
         }
@@ -121,37 +132,47 @@ impl Reference {
     /// Goes on by `dt` [s].
     pub fn advance(&mut self, ways: &Ways<'_>, dt: f64) {
         let (before, rate) = (*self, self.qd);
-        for share in SLOWER {
+        let mut pace = (before.pace + dt / RECOVERY).min(1.0);
+        let ease = (before.pace / EASE).min(1.0);
+        // At the pace that it may have, then as much slower as the joints need, then not at all.
+        for attempt in 0..3 {
+            let stands = attempt == 2 || pace < STANDSTILL;
             *self = before;
-            self.pace = share;
-            self.run(ways, share * dt);
-            let last = share == 0.0;
-            if last {
+            self.pace = if stands { 0.0 } else { pace };
+            if stands {
                 // The next step asks for the command anew, from rest.
                 (self.points, self.phase) = ([self.value; 3], ways.period);
+            } else {
+                self.run(ways, pace * dt);
             }
             let (wanted, far) = self.posture(ways, &before, dt);
             let mut slower: f64 = 1.0;
-            let mut inside = true;
             for (i, s) in ways.arm.segments().iter().enumerate() {
-                let ([low, high], way) = (s.joint.limits.position, (wanted[i] - before.q[i]).abs());
-                let most = SPEED_SHARE * s.joint.limits.velocity * dt;
-                if way > most {
-                    slower = slower.min(most / way);
-                }
+                let (from, way) = (before.q[i], wanted[i] - before.q[i]);
+                let [low, high] = s.joint.limits.position;
                 let keep = KEEP.min(0.25 * (high - low));
-                // A joint that was nearer may stay, not go on.
-                let deeper = (wanted[i] < low + keep && wanted[i] < before.q[i])
-                    || (wanted[i] > high - keep && wanted[i] > before.q[i]);
-                inside &= !deeper;
+                let room = if way > 0.0 { high - keep - from } else { from - low - keep };
+                let had = (rate[i] * way.signum()).max(0.0);
+                let fastest = (2.0 * BRAKING * room.max(0.0))
+                    .sqrt()
+                    .min(ease * SPEED_SHARE * s.joint.limits.velocity)
+                    .min(had + QUICKEST * dt);
+                if way.abs() > fastest * dt {
+                    slower = slower.min(fastest * dt / way.abs());
+                }
             }
-            if last || (slower == 1.0 && inside && far < FAR) {
+            // What is still too fast at the second attempt is the path's curvature.
+            if stands || (far < FAR && (slower == 1.0 || attempt == 1)) {
                 for (i, s) in ways.arm.segments().iter().enumerate() {
                     let [low, high] = s.joint.limits.position;
                     self.q[i] = (before.q[i] + slower * (wanted[i] - before.q[i])).clamp(low, high);
                 }
+                if stands {
+                    self.pace = 2.0 * STANDSTILL;
+                }
                 break;
             }
+            pace = if far < FAR { slower * pace } else { 0.0 };
         }
         for i in 0..self.q.len() {
             self.qd[i] = (self.q[i] - before.q[i]) / dt;
@@ -162,17 +183,25 @@ impl Reference {
     /// Moves the spline on.
     fn run(&mut self, ways: &Ways<'_>, time: f64) {
         let period = ways.period;
+        // A control point is made when the first step after its instant begins, so that a command that was given in between is in it.
+        while self.phase >= period * (1.0 - ROUNDING) {
+            self.renew(ways);
+        }
         self.phase += time;
-        // A step is at most a few periods; the rounding of a sum of steps is far below this.
-        while self.phase > period * (1.0 - 1e-9) {
-            self.phase -= period;
-            let next = self.next(ways);
-            self.points = [self.points[1], self.points[2], next];
+        while self.phase > period * (1.0 + ROUNDING) {
+            self.renew(ways);
         }
         let u = (self.phase / period).clamp(0.0, 1.0);
         let w = [0.5 * (1.0 - u) * (1.0 - u), 0.5 + u - u * u, 0.5 * u * u];
         let [a, b, c] = &self.points;
         self.value = Joints::from_fn(a.len(), |i| w[0] * a[i] + w[1] * b[i] + w[2] * c[i]);
+    }
+
+    fn renew(&mut self, ways: &Ways<'_>) {
+        self.phase -= ways.period;
+        let next = self.next(ways);
+        self.points = [self.points[1], self.points[2], next];
+        self.previous = self.target;
     }
 
     /// The next control point.
@@ -187,9 +216,13 @@ impl Reference {
                 }
             };
             let (left, step) = (self.target.at(i) - last[i], last[i] - before[i]);
+            let moves = self.target.at(i) - self.previous.at(i);
+            // What moves away need not be stopped at.
+            let away = if moves * left > 0.0 { moves.abs().min(left.abs()) } else { 0.0 };
             // The speed from which it can still be stopped at the target, by steps of a period.
             let half = 0.5 * acceleration * period;
-            let most = ((half * half + 2.0 * acceleration * left.abs()).sqrt() - half).min(speed) * period;
+            let most = ((half * half + 2.0 * acceleration * left.abs()).sqrt() - half) * period + away;
+            let most = most.min(speed * period);
             let change = acceleration * period * period;
             last[i] + left.clamp(-most, most).clamp(step - change, step + change)
         });
@@ -209,7 +242,7 @@ impl Reference {
         }
         let n = self.q.len();
         let target = ways.port.flange(ways.instrument, &unpack(&self.value, 0.0));
-        let mut q = Joints::from_fn(n, |i| before.q[i] + self.pace * dt * before.qd[i]);
+        let mut q = before.q;
         let mut far = f64::INFINITY;
         for round in 0..3 {
             let (step, distance) = newton(ways.arm, &q, &target, (round == 0).then_some(dt));
