@@ -26,6 +26,12 @@ const HOUSING: [f64; 2] = [0.028, 0.09];
 /// Time that a grasper's and a cutter's jaws take from open to closed [s].
 const CLOSING: [f64; 2] = [0.3, 0.2];
 
+/// Kept from the end of the wrist [rad].
+const MARGIN_OF_ROLL: f64 = 0.2;
+
+/// Tilt up to which all rolls are reached [rad]: the task's.
+const LEAN: f64 = 0.35;
+
 /// Postures from which the start is searched, and steps of a way along which arms are followed.
 const STARTS: usize = 24;
 /// See there.
@@ -172,7 +178,7 @@ fn start(start: &trocar_scene::Start, port: &trocar_scene::Port, hole: &Port, bl
     Coordinates { pivots, insertion: 1e-3 * start.insertion_mm - blades.length, roll, jaw: start.jaw }
 }
 
-/// The rolls [rad] to which an arm gets from its start without a joint at a limit, wherever the shaft leans: the wrist's range less what the shaft's turn takes of it. Where the arm does not get
+/// The rolls [rad] to which an arm gets from its start without a joint at a limit, wherever the shaft leans by up to [`LEAN`]: the wrist's range less what the shaft's turn takes of it. Where the arm does not get
 /// even at the start's roll is left out: commands there are held back.
 fn roll_of(
     arm: &SerialArm,
@@ -205,7 +211,7 @@ fn roll_of(
         }
         Ok((q, share))
     };
-    let lean = 0.9 * limits.tilt;
+    let lean = LEAN.min(0.9 * limits.tilt);
     let [shallow, deep] = limits.insertion;
     let insertions = [start.insertion, deep.min(shallow.max(0.5 * (start.insertion + deep)))];
     for pivots in [start.pivots, [lean, 0.0], [-lean, 0.0], [0.0, lean], [0.0, -lean]] {
@@ -222,7 +228,10 @@ fn roll_of(
             }
         }
     }
-    Ok(range)
+    // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now and then.
+    let ends = [0, 1]
+        .map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - MARGIN_OF_ROLL.copysign(range[k]) });
+    Ok([ends[0].min(start.roll), ends[1].max(start.roll)])
 }
 
 fn chain(scene: &Scene, arm: &trocar_scene::Arm) -> Result<SerialArm> {

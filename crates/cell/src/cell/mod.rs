@@ -8,6 +8,7 @@ mod action;
 mod build;
 mod crtk;
 mod exchange;
+mod overstretch;
 mod placed;
 mod report;
 mod state;
@@ -23,6 +24,7 @@ use crate::hold::Moved;
 use crate::{Error, FRAME, Gripper, Result, World};
 use action::NUMBERS;
 use glam::DVec3;
+use overstretch::{CRUSHED, Edges, MOST, REST, ROUND};
 use station::{Station, Wanted};
 use std::time::{Duration, Instant};
 use trocar_scene::Scene;
@@ -54,6 +56,7 @@ pub struct Cell {
     physics_steps: u32,
     sever: bool,
     motions: Vec<ToolMotion>,
+    edges: Edges,
     timing: Timing,
 }
 
@@ -84,8 +87,9 @@ impl Cell {
         let schedule = build::schedule(scene.tissue.schedule);
         let world = World::surrounded(&specimen, &surroundings, colliders, schedule, threads)?;
         Ok(Self {
-            world,
             motions: Vec::with_capacity(3 * stations.len()),
+            edges: Edges::of(&world),
+            world,
             stations,
             periods: 0,
             control_hz: scene.rates.control_hz,
@@ -150,11 +154,40 @@ impl Cell {
                     self.cut(k, organ, &open, &mut events)?;
                 }
             }
+            self.unhook(report.min_volume_ratio, &mut events);
         }
         self.periods += 1;
         let arms = self.stations.iter().map(Station::observe).collect();
         self.timing.all += clock.elapsed();
         Ok(CellReport { time: self.time(), arms, tissue, events })
+    }
+
+    /// Unhooks instruments from tissue that is stretched or crushed beyond what it bears, and lets tissue feel them again when it no longer is. `least` is the smallest share of its rest
+    /// volume that an element has.
+    fn unhook(&mut self, least: f64, events: &mut Vec<CellEvent>) {
+        if !self.stations.iter().any(Station::meets_tissue) {
+            return;
+        }
+        let Some(worst) = self.edges.worst(&self.world) else { return };
+        if worst.stretch < REST && least > ROUND {
+            self.stations.iter_mut().for_each(|s| s.now.unhooked = false);
+        }
+        let (body, at) = if worst.stretch > MOST {
+            (worst.body, worst.at)
+        } else if least < CRUSHED {
+            let Some(crushed) = overstretch::most_crushed(&self.world) else { return };
+            crushed
+        } else {
+            return;
+        };
+        let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked);
+        let nearest = felt.map(|s| (s.distance(at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+        if let Some((_, station)) = nearest {
+            let organ = self.world.model.bodies()[body].name().to_owned();
+            station.unhook(&mut self.world, events);
+            let (arm, stretch) = (station.fixed.side, worst.stretch);
+            events.push(CellEvent::Unhooked { arm, organ, stretch, volume: least });
+        }
     }
 
     /// The cutter of arm `k`, as wide as it is in `open`, has closed through `organ`.

@@ -143,6 +143,17 @@ pub enum CellEvent {
         /// Pieces that the organ now is in: 1 where the scene parts nothing.
         pieces: usize,
     },
+    /// The instrument had hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until the tissue has come back.
+    Unhooked {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+        /// Length of its most stretched edge over that at rest.
+        stretch: f64,
+        /// Least volume of an element over that at rest.
+        volume: f64,
+    },
     /// The RCM deviation went beyond the scene's threshold.
     RcmThreshold {
         /// The arm.

@@ -20,6 +20,9 @@ use trocar_tissue::{Event, Piece, ToolForce, ToolMotion};
 /// Jaws that press with this share of their force have closed on what is between them.
 const PRESSING: f64 = 0.95;
 
+/// Height at which tissue feels an instrument no more [m].
+const FAR: f64 = 100.0;
+
 /// Jaws are told to close, or to open, when the opening asked for is beyond the one they have by this much.
 const MEANT: f64 = 0.02;
 
@@ -85,6 +88,8 @@ pub(super) struct Moving {
     pub forces: [ToolForce; 3],
     scissors: Scissors,
     pub held: Option<Held>,
+    /// Tissue does not feel the instrument for now.
+    pub unhooked: bool,
     rcm_peak: f64,
     /// Which of the deviations have been told and are still exceeded.
     rcm_told: [bool; 2],
@@ -119,6 +124,7 @@ impl Moving {
             forces: [ToolForce::default(); 3],
             scissors,
             held: None,
+            unhooked: false,
             rcm_peak: 0.0,
             rcm_told: [false; 2],
         }
@@ -182,6 +188,7 @@ impl Station {
         let at = self.manipulator.measured_cp().translation;
         let report = self.manipulator.step(self.now.exchange.load(at), dt)?;
         self.now.rcm_peak = self.now.rcm_peak.max(report.rcm_deviation);
+        self.now.held_back |= report.pace < 1.0;
         Ok(())
     }
 
@@ -204,7 +211,30 @@ impl Station {
         let motions = now.gripper.motions_to(&next);
         now.jaw_rate = (next_angle - angle) / (self.fixed.blades.max_angle * dt);
         now.gripper = next;
+        if now.unhooked {
+            // At rest, far from everything.
+            let away = Pose { translation: FAR * DVec3::Z, ..Pose::IDENTITY };
+            return [ToolMotion { from: away, to: away }; 3];
+        }
         motions
+    }
+
+    /// Whether it may have to do with the tissue's stretch.
+    pub fn meets_tissue(&self) -> bool {
+        self.now.unhooked || self.now.held.is_some() || self.now.forces.iter().any(|f| f.touching > 0)
+    }
+
+    /// Distance of a point from the instrument's axis, from the blades' tips up its shaft [m].
+    pub fn distance(&self, p: DVec3) -> f64 {
+        let q = self.now.gripper.pose.inverse().transform(p);
+        let along = q.x.clamp(-self.fixed.blades.shaft_length, self.fixed.blades.length);
+        q.distance(along * DVec3::X)
+    }
+
+    /// Lets go, and is not felt for now.
+    pub fn unhook(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
+        self.let_go(world, events);
+        self.now.unhooked = true;
     }
 
     /// A tissue frame is over: takes its forces, and lets the jaws take hold and let go. What a cutter closed through: the organ, and the cutter as wide as it was open.
@@ -445,7 +475,8 @@ impl Moving {
             all.extend([f.pressing, f.touching as f64]);
         }
         all.extend(
-            [self.held_back, self.rcm_told[0], self.rcm_told[1], self.held.is_some()].map(|b| f64::from(u8::from(b))),
+            [self.unhooked, self.held_back, self.rcm_told[0], self.rcm_told[1], self.held.is_some()]
+                .map(|b| f64::from(u8::from(b))),
         );
         all.push(GraspDesign::ALL.iter().position(|d| *d == self.design).unwrap_or(0) as f64);
         if let Some(held) = &self.held {
