@@ -70,18 +70,16 @@ impl Cell {
         Self::with_contact(scene, specimen, threads, true)
     }
 
-    /// The same, with nothing touching anything but the bed where `contact` is false: for measuring what contact costs.
+    /// The same with organs that pass through each other where `organ_contact` is false: for measuring what their contact costs.
     ///
     /// # Errors
     /// As [`Cell::new`].
-    pub fn with_contact(scene: &Scene, specimen: &Specimen, threads: usize, contact: bool) -> Result<Self> {
+    pub fn with_contact(scene: &Scene, specimen: &Specimen, threads: usize, organ_contact: bool) -> Result<Self> {
         let (frames, physics_steps) = rates(scene)?;
         let Placed { specimen, mut surroundings, floor } = Placed::new(scene, specimen)?;
         let stations = build::stations(scene, floor)?;
-        let mut colliders = Vec::new();
-        if contact {
-            colliders.extend(stations.iter().flat_map(|s| s.fixed.blades.colliders(s.fixed.tools)));
-        } else {
+        let colliders = stations.iter().flat_map(|s| s.fixed.blades.colliders(s.fixed.tools)).collect();
+        if !organ_contact {
             surroundings.body_contact = None;
         }
         let schedule = build::schedule(scene.tissue.schedule);

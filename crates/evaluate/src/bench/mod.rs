@@ -1,5 +1,6 @@
 //! Measurements of speed and cost: one file each.
 
+mod cell;
 mod grasp;
 mod machine;
 mod many;
@@ -9,6 +10,7 @@ mod pytetwild;
 mod scaling;
 mod timing;
 
+pub use cell::{CellBench, CellBenchResult};
 pub use grasp::{GraspBench, GraspBenchResult, GraspPhaseTiming};
 pub use machine::Machine;
 pub use many::ManyRow;
