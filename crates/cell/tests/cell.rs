@@ -84,7 +84,10 @@ fn check_joints(cell: &Cell) {
 
 /// Random legal actions, each kept for a random while. The largest RCM deviation [m].
 fn random_run(specimen: &Specimen, seed: u64, steps: usize) -> f64 {
-    let (mut cell, mut dice) = (cell(specimen), Dice(seed));
+    // No bed: tissue that tools grind into it stays there, folded, which is a matter of the tissue.
+    let mut scene = scene();
+    scene.tissue.support.kind = trocar_scene::SupportKind::None;
+    let (mut cell, mut dice) = (Cell::new(&scene, specimen, 1).unwrap(), Dice(seed));
     let space = if seed % 4 == 3 { ActionSpace::Tip } else { ActionSpace::Pivots };
     let mut action = dice.action(&cell, space);
     let (mut left, mut rcm, mut touched) = (0, 0.0_f64, false);
@@ -96,7 +99,7 @@ fn random_run(specimen: &Specimen, seed: u64, steps: usize) -> f64 {
         left -= 1;
         let report = cell.step(&action).unwrap();
         let t = &report.tissue;
-        assert!(t.divergence.is_none() && t.inverted == 0, "seed {seed}, step {step}: {t:?} {:?}", report.arms);
+        assert!(t.divergence.is_none() && t.inverted == 0, "seed {seed}, step {step}: {t:?}");
         check_joints(&cell);
         for arm in &report.arms {
             assert!(arm.tip.translation.is_finite() && arm.force.wrench.is_finite());
@@ -261,10 +264,20 @@ fn over(cell: &Cell, arm: &str, at: DVec3, beyond: f64) -> Pose {
     if turn(&one) <= turn(&other) { one } else { other }
 }
 
-/// Goes to a pose and stays, for `periods`.
+/// Goes to a pose in `periods`, starting and stopping gently, and stays for half a second.
 fn go(cell: &mut Cell, arm: &str, pose: &Pose, periods: usize) -> Vec<CellReport> {
-    cell.servo_cp(arm, pose).unwrap();
-    (0..periods).map(|_| cell.advance().unwrap()).collect()
+    let from = cell.setpoint(arm).unwrap();
+    let start = cell.port(arm).unwrap().tip(&from);
+    (1..=periods + 15)
+        .map(|k| {
+            let t = (k as f64 / periods as f64).min(1.0);
+            let share = t * t * (3.0 - 2.0 * t);
+            let rotation = start.rotation.slerp(pose.rotation, share);
+            let translation = start.translation.lerp(pose.translation, share);
+            cell.servo_cp(arm, &Pose { rotation, translation }).unwrap();
+            cell.advance().unwrap()
+        })
+        .collect()
 }
 
 #[test]
@@ -281,7 +294,7 @@ fn pressing_on_stiff_tissue_neither_swings_nor_drifts_and_the_shaft_comes_back()
         let free = go(&mut cell, "left", &above, 60).pop().unwrap();
         let pressed = go(&mut cell, "left", &inside, 90);
         let back = go(&mut cell, "left", &above, 60).pop().unwrap();
-        let last = &pressed[60..];
+        let last = &pressed[90..];
         let force = |r: &CellReport| r.arms[0].contact.length();
         let mean = last.iter().map(force).sum::<f64>() / last.len() as f64;
         let swing = last.iter().map(|r| (force(r) - mean).abs()).fold(0.0, f64::max);
@@ -295,7 +308,7 @@ fn pressing_on_stiff_tissue_neither_swings_nor_drifts_and_the_shaft_comes_back()
         );
         assert!(mean > 0.02, "it presses: {mean} N at {young_modulus_pa} Pa");
         assert!(swing < 0.03 * mean + 0.01, "it swings by {swing} N around {mean} N at {young_modulus_pa} Pa");
-        assert!(peak < 1.6 * mean + 0.1, "a peak of {peak} N, then {mean} N");
+        assert!(peak < 1.3 * mean + 0.1, "a peak of {peak} N, then {mean} N");
         assert!(back.arms[0].contact.length() < 1e-6, "free again");
         assert!(c < a + 0.1, "the shaft comes back: {a} mm before, {c} mm after");
     }
