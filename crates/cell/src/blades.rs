@@ -2,18 +2,72 @@
 //!
 //! Three tools stand for one gripper: its own frame, which carries the shaft and whatever is held, and a frame for each blade ([`Gripper::blade`]).
 //! A blade is three thin capsules along it. With their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5 mm wide, 3.2 mm thick, and an
-//! inner face that is flat to 0.07 mm.
+//! inner face that is flat to 0.07 mm. A cutter's blade is a single capsule.
 
 use crate::Gripper;
-use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MOUTH_BEGIN, SHAFT_LENGTH, SHAFT_RADIUS};
+use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MAX_ANGLE, MOUTH_BEGIN, SHAFT_LENGTH, SHAFT_RADIUS};
 use glam::DVec3;
 use trocar_tissue::{Collider, Shape, ToolForce};
 
-/// The gripper's own frame among the tools of a step.
-pub const GRIPPER_TOOL: usize = 0;
+/// The places, among the tools of a step, of the three that stand for one gripper.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Tools {
+    /// Its own frame.
+    pub gripper: usize,
+    /// The blade that opens towards +y, and the one towards -y.
+    pub blades: [usize; 2],
+}
 
-/// The blades among the tools of a step, each with the side of the closing plane to which it opens.
-pub const BLADE_TOOLS: [(usize, f64); 2] = [(1, 1.0), (2, -1.0)];
+impl Tools {
+    /// Those of gripper number `k`, three a gripper in the order of [`Gripper::motions_to`].
+    pub const fn of(k: usize) -> Self {
+        Self { gripper: 3 * k, blades: [3 * k + 1, 3 * k + 2] }
+    }
+
+    /// The blades, each with the side of the closing plane to which it opens.
+    pub fn sides(self) -> [(usize, f64); 2] {
+        [(self.blades[0], 1.0), (self.blades[1], -1.0)]
+    }
+
+    /// The forces on the three of them; zero where `forces` has none.
+    pub fn forces(self, forces: &[ToolForce]) -> [ToolForce; 3] {
+        [self.gripper, self.blades[0], self.blades[1]].map(|t| forces.get(t).copied().unwrap_or_default())
+    }
+}
+
+/// Size and surface of an instrument's end.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Blades {
+    /// Length beyond the pivot [m].
+    pub length: f64,
+    /// Ridges across a blade: three make it 5 mm wide, one is a cutter's.
+    pub ridges: usize,
+    /// Widest angle between the blades [rad].
+    pub max_angle: f64,
+    /// Radius of the shaft [m].
+    pub shaft_radius: f64,
+    /// Length of the shaft behind the pivot that tissue may touch [m].
+    pub shaft_length: f64,
+    /// Distance at which tissue rests on the blades [m].
+    pub rest_offset: f64,
+    /// Coulomb friction on tissue.
+    pub friction: f64,
+}
+
+impl Default for Blades {
+    /// The paper's grasper.
+    fn default() -> Self {
+        Self {
+            length: BLADE_TIP,
+            ridges: 3,
+            max_angle: MAX_ANGLE,
+            shaft_radius: SHAFT_RADIUS,
+            shaft_length: SHAFT_LENGTH,
+            rest_offset: REST_OFFSET,
+            friction: FRICTION,
+        }
+    }
+}
 
 /// Distance at which tissue rests on an instrument's tip [m] (SPEC C1).
 pub const REST_OFFSET: f64 = 0.0015;
@@ -24,38 +78,50 @@ pub const FRICTION: f64 = 0.6;
 /// Radius of a blade's ridges [m]: nearly none; the rest offset makes the blade's thickness.
 const RIDGE: f64 = 0.0001;
 
-/// The colliders of one gripper whose frames are tools 0 to 2.
+/// The colliders of one gripper of the paper's size whose frames are tools 0 to 2.
 pub fn colliders() -> Vec<Collider> {
-    let inset = RIDGE + REST_OFFSET;
-    let mut all = Vec::with_capacity(7);
-    for (tool, side) in BLADE_TOOLS {
-        for share in [-1.0, 0.0, 1.0] {
-            let at = |x: f64| DVec3::new(x, side * inset, share * (0.5 * BLADE_WIDTH - inset));
-            let ends = [at(MOUTH_BEGIN + inset), at(BLADE_TIP - inset)];
-            all.push(Collider {
-                name: format!("blade {tool}"),
-                tool,
-                shape: Shape::Capsule { ends, radius: RIDGE },
-                rest_offset: REST_OFFSET,
-                friction: FRICTION,
-            });
+    Blades::default().colliders(Tools::of(0))
+}
+
+impl Blades {
+    /// The colliders of an instrument whose frames are `tools`.
+    pub fn colliders(&self, tools: Tools) -> Vec<Collider> {
+        let inset = RIDGE + self.rest_offset;
+        let mut all = Vec::with_capacity(7);
+        for (tool, side) in tools.sides() {
+            for ridge in 0..self.ridges {
+                // -1, 0 and 1 of three; 0 of one.
+                let share = ridge as f64 - 0.5 * (self.ridges as f64 - 1.0);
+                let aside = share * (0.5 * BLADE_WIDTH - inset).max(0.0);
+                let (begin, end) = (MOUTH_BEGIN + inset, self.length - inset);
+                let middle = 0.5 * (begin + end);
+                let at = |x: f64| DVec3::new(x, side * inset, aside);
+                all.push(Collider {
+                    name: format!("blade {tool}"),
+                    tool,
+                    shape: Shape::Capsule { ends: [at(begin.min(middle)), at(end.max(middle))], radius: RIDGE },
+                    rest_offset: self.rest_offset,
+                    friction: self.friction,
+                });
+            }
         }
+        // The shaft ends so that it does not fill the mouth.
+        let ends = [DVec3::new(-self.shaft_length, 0.0, 0.0), DVec3::new(MOUTH_BEGIN - self.shaft_radius, 0.0, 0.0)];
+        let shape = Shape::Capsule { ends, radius: self.shaft_radius };
+        let (tool, friction) = (tools.gripper, self.friction);
+        all.push(Collider { name: "shaft".into(), tool, shape, rest_offset: 0.0, friction });
+        all
     }
-    // The shaft ends so that it does not fill the mouth.
-    let ends = [DVec3::new(-SHAFT_LENGTH, 0.0, 0.0), DVec3::new(MOUTH_BEGIN - SHAFT_RADIUS, 0.0, 0.0)];
-    let shape = Shape::Capsule { ends, radius: SHAFT_RADIUS };
-    all.push(Collider { name: "shaft".into(), tool: GRIPPER_TOOL, shape, rest_offset: 0.0, friction: FRICTION });
-    all
 }
 
 /// How hard tissue pushes the blades of `gripper` apart [N]: the mean over the two of the force outwards across the blade, which is what one rod that drives both feels of
-/// either. `forces` are those of the step's tools; 0 where there are none.
-pub fn opening_force(gripper: &Gripper, forces: &[ToolForce]) -> f64 {
+/// either. `forces` are those of the step's tools, of which `tools` are the gripper's; 0 where there are none.
+pub fn opening_force(gripper: &Gripper, tools: Tools, forces: &[ToolForce]) -> f64 {
     let of = |(tool, side): (usize, f64)| {
         let outwards = gripper.blade(side).rotation * (side * DVec3::Y);
         forces.get(tool).map_or(0.0, |f| f.contact.force.dot(outwards))
     };
-    0.5 * BLADE_TOOLS.map(of).iter().sum::<f64>()
+    0.5 * tools.sides().map(of).iter().sum::<f64>()
 }
 
 #[cfg(test)]
@@ -103,6 +169,14 @@ mod tests {
     }
 
     #[test]
+    fn a_cutters_blades_meet_on_the_closing_plane_too() {
+        let all = Blades { ridges: 1, ..Blades::default() }.colliders(Tools::of(1));
+        assert_eq!(all.iter().map(|c| c.tool).collect::<Vec<_>>(), [4, 5, 3]);
+        let d = all[0].shape.nearest(DVec3::new(0.01, 0.0, 0.0)).distance - all[0].rest_offset;
+        assert!(d.abs() < 1e-12, "{d}");
+    }
+
+    #[test]
     fn the_opening_force_is_what_pushes_outwards() {
         let gripper = Gripper::over(DVec3::new(0.1, 0.0, 0.2), DVec3::Z, DVec3::X, 0.5);
         let push = |side: f64, newtons: f64| {
@@ -110,7 +184,7 @@ mod tests {
             ToolForce { contact: Wrench { force, torque: DVec3::ZERO }, ..ToolForce::default() }
         };
         let forces = [ToolForce::default(), push(1.0, 2.0), push(-1.0, 1.0)];
-        assert!((opening_force(&gripper, &forces) - 1.5).abs() < 1e-12);
-        assert_eq!(opening_force(&gripper, &[]), 0.0);
+        assert!((opening_force(&gripper, Tools::of(0), &forces) - 1.5).abs() < 1e-12);
+        assert_eq!(opening_force(&gripper, Tools::of(0), &[]), 0.0);
     }
 }

@@ -15,21 +15,49 @@ pub const CUT_OPENED: f64 = 0.50;
 pub const CUT_CLOSED: f64 = 0.15;
 
 /// Watches the blades of a cutter: a cut is made by blades that were open and close.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scissors {
+    /// Blades wider than the first angle are ready to cut, and do when they close to less than the second [rad].
+    angles: [f64; 2],
     /// Widest angle [rad] since the last cut, if that is wide enough for the next.
     opened: Option<f64>,
 }
 
+impl Default for Scissors {
+    fn default() -> Self {
+        Self::new(CUT_OPENED, CUT_CLOSED)
+    }
+}
+
 impl Scissors {
+    /// Scissors that cut once they have been open wider than `opened` [rad] and close to less than `closed` [rad].
+    pub fn new(opened: f64, closed: f64) -> Self {
+        Self { angles: [opened, closed], opened: None }
+    }
+
+    /// How wide they are or were [rad], if they are ready to cut.
+    pub fn opened(&self) -> Option<f64> {
+        self.opened
+    }
+
+    /// The numbers of their state.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        self.angles.into_iter().chain([self.opened.unwrap_or(-1.0)])
+    }
+
+    /// Forgets that they were open: nothing was between them for a while.
+    pub fn rest(&mut self) {
+        self.opened = None;
+    }
+
     /// The cutter is at `gripper` now. When its blades have closed, after they were open, the gripper there with the blades as wide as they were: what lies between those is
     /// cut ([`Gripper::cut`]). None otherwise; blades that close again without having opened cut nothing.
     pub fn follow(&mut self, gripper: &Gripper) -> Option<Gripper> {
         let angle = gripper.jaw_angle;
-        if angle < CUT_CLOSED {
+        if angle < self.angles[1] {
             return self.opened.take().map(|jaw_angle| Gripper { jaw_angle, ..*gripper });
         }
-        if angle > CUT_OPENED {
+        if angle > self.angles[0] {
             self.opened = Some(self.opened.map_or(angle, |widest| widest.max(angle)));
         }
         None
@@ -39,14 +67,19 @@ impl Scissors {
 impl Gripper {
     /// What its blades cut of body `body` when they close from where they are now.
     pub fn cut(&self, body: usize) -> Cut {
+        self.cut_along(body, BLADE_TIP)
+    }
+
+    /// The same for blades of another `length` [m].
+    pub fn cut_along(&self, body: usize, length: f64) -> Cut {
         let turned = |axis: DVec3| self.pose.rotation * axis;
-        let middle = 0.5 * (MOUTH_BEGIN + BLADE_TIP);
+        let middle = 0.5 * (MOUTH_BEGIN + length);
         Cut {
             body,
             point: self.pose.transform(middle * DVec3::X),
             normal: turned(DVec3::Z),
             along: turned(DVec3::X),
-            half_extents: [0.5 * (BLADE_TIP - MOUTH_BEGIN), self.half_gap(BLADE_TIP)],
+            half_extents: [0.5 * (length - MOUTH_BEGIN), self.half_gap(length)],
         }
     }
 }
@@ -73,6 +106,7 @@ impl World {
             }
         }
         (self.model, self.state) = (severed.model, severed.state);
+        self.cuts += 1;
         Ok(severed.pieces)
     }
 }

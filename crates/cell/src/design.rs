@@ -1,7 +1,7 @@
 //! The ways in which jaws can hold tissue, by name (SPEC C4, C7; paper section IV-C and Table II).
 
 use crate::World;
-use crate::blades::{BLADE_TOOLS, FRICTION, GRIPPER_TOOL};
+use crate::blades::{FRICTION, Tools};
 use glam::DVec3;
 use trocar_geometry::Pose;
 use trocar_tissue::{Compliance, Grasp};
@@ -41,17 +41,25 @@ impl GraspDesign {
         }
     }
 
-    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` [N] whose gripper is at `pose`; none for friction, which needs none.
-    pub fn grasp(self, world: &World, organ: usize, nodes: &[u32], pose: &Pose, jaw_force: f64) -> Option<Grasp> {
+    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` [N] whose gripper, `tools` of the step, is at `pose`; none for friction, which needs none.
+    pub fn grasp(
+        self,
+        world: &World,
+        organ: usize,
+        nodes: &[u32],
+        tools: Tools,
+        pose: &Pose,
+        jaw_force: f64,
+    ) -> Option<Grasp> {
         let (model, state) = (&world.model, &world.state);
-        let live = || Grasp::capture(model, state, organ, nodes, GRIPPER_TOOL, pose);
+        let live = || Grasp::capture(model, state, organ, nodes, tools.gripper, pose);
         let body = &model.bodies()[organ];
         match self {
             Self::Friction => None,
             Self::RestPose => {
                 // Offsets as authored in the undeformed organ with the gripper where it closes: the displacement since rest becomes the snap.
                 let rest: Vec<DVec3> = nodes.iter().map(|i| body.rest_positions()[*i as usize]).collect();
-                Some(Grasp::prescribe(model, organ, nodes, &rest, GRIPPER_TOOL, pose))
+                Some(Grasp::prescribe(model, organ, nodes, &rest, tools.gripper, pose))
             }
             Self::LivePose => Some(live()),
             Self::Compliant => Some(live().compliant(Compliance {
@@ -60,7 +68,7 @@ impl GraspDesign {
                 jaw_force,
                 friction: FRICTION,
                 tear_force: TEAR_FORCE,
-                blades: Some(BLADE_TOOLS.map(|(tool, _)| tool)),
+                blades: Some(tools.blades),
             })),
         }
     }

@@ -17,6 +17,37 @@ pub enum Error {
     /// An option is out of range, or nothing can be grasped there.
     #[error("{0}")]
     Option(String),
+    /// A number of an action cannot be done. The cell is as it was.
+    #[error("action[{index}], {name}, {reason}")]
+    Action {
+        /// Its place in the action.
+        index: usize,
+        /// Its name.
+        name: String,
+        /// What is wrong with it, what would be right.
+        reason: String,
+    },
+    /// The cell has no arm of that name.
+    #[error("no arm '{name}' in the cell; it has {known}")]
+    UnknownArm {
+        /// The name asked for.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A field of the scene cannot be built.
+    #[error("scene '{scene}': {field} {reason}")]
+    Scene {
+        /// The scene's name.
+        scene: String,
+        /// The field.
+        field: String,
+        /// What is wrong with it, what would be right.
+        reason: String,
+    },
+    /// An arm, an instrument or a port is unusable.
+    #[error(transparent)]
+    Robot(#[from] trocar_robot::Error),
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,

@@ -6,6 +6,7 @@ use trocar_geometry::Pose;
 use trocar_tissue::Piece;
 
 /// The tissue that was in the jaws when they closed, and where it was.
+#[derive(Clone, Debug)]
 pub(crate) struct Hold {
     organ: usize,
     nodes: Vec<u32>,
@@ -51,6 +52,12 @@ impl Hold {
         let shift = self.now(world) - was;
         self.centroid += shift;
         self.centroid_in_jaw += pose.rotation.inverse() * shift;
+    }
+
+    /// The numbers of its state.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        let vectors = [self.centroid, self.centroid_in_jaw, self.jaw].map(|v| v.to_array());
+        vectors.into_iter().flatten().chain([self.organ as f64]).chain(self.nodes.iter().map(|n| f64::from(*n)))
     }
 
     /// Centroid of the tissue now [m].

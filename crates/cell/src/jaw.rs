@@ -14,9 +14,6 @@ pub const JAW_FORCE: f64 = 0.5;
 /// Time that the jaws take from wide open to closed on nothing [s].
 const CLOSING_TIME: f64 = 0.3;
 
-/// Fastest motion [rad a frame].
-const FASTEST: f64 = MAX_ANGLE * FRAME / CLOSING_TIME;
-
 /// Share of the way to the budget that one step goes.
 const GAIN: f64 = 0.5;
 
@@ -34,6 +31,10 @@ const LEAST_MOTION: f64 = 1e-4;
 pub struct Jaw {
     /// Force with which it presses [N].
     pub budget: f64,
+    /// Widest angle [rad].
+    max_angle: f64,
+    /// Fastest motion [rad a frame].
+    fastest: f64,
     /// Opening force gained per angle closed [N/rad].
     stiffness: f64,
     /// Angle [rad] and opening force [N] a frame ago.
@@ -41,12 +42,17 @@ pub struct Jaw {
 }
 
 impl Jaw {
-    /// A jaw that presses with `budget` [N].
+    /// A jaw that presses with `budget` [N], opens to [`MAX_ANGLE`](crate::MAX_ANGLE) and closes in 0.3 s.
     pub fn new(budget: f64) -> Self {
-        Self { budget, stiffness: 0.0, last: None }
+        Self::sized(budget, MAX_ANGLE, CLOSING_TIME)
     }
 
-    /// The angle [rad] at the end of the next frame, for a jaw at `angle` that tissue pushes open with `force` [N]. 0 to [`MAX_ANGLE`](crate::MAX_ANGLE).
+    /// A jaw that presses with `budget` [N], opens to `max_angle` [rad] and closes in `closing_time` [s].
+    pub fn sized(budget: f64, max_angle: f64, closing_time: f64) -> Self {
+        Self { budget, max_angle, fastest: max_angle * FRAME / closing_time, stiffness: 0.0, last: None }
+    }
+
+    /// The angle [rad] at the end of the next frame, for a jaw at `angle` that tissue pushes open with `force` [N]. 0 to the widest.
     pub fn squeeze(&mut self, angle: f64, force: f64) -> f64 {
         self.stiffness *= FORGETTING;
         if let Some((then, was)) = self.last
@@ -59,16 +65,22 @@ impl Jaw {
         if missing.abs() <= DEADBAND * self.budget {
             return angle;
         }
-        let fastest = FASTEST * (missing.abs() / self.budget).min(1.0);
+        let fastest = self.fastest * (missing.abs() / self.budget).min(1.0);
         let step = if self.stiffness > 0.0 { (GAIN * missing.abs() / self.stiffness).min(fastest) } else { fastest };
-        (angle - step.copysign(missing)).clamp(0.0, MAX_ANGLE)
+        (angle - step.copysign(missing)).clamp(0.0, self.max_angle)
+    }
+
+    /// The numbers of its state.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let (angle, force) = self.last.unwrap_or((-1.0, 0.0));
+        [self.budget, self.stiffness, angle, force].into_iter()
     }
 
     /// The angle [rad] at the end of the next frame on the way to `target` at full speed.
     pub fn turn_to(&mut self, angle: f64, target: f64) -> f64 {
         self.last = None;
         self.stiffness = 0.0;
-        angle + (target - angle).clamp(-FASTEST, FASTEST)
+        angle + (target - angle).clamp(-self.fastest, self.fastest)
     }
 }
 
@@ -83,7 +95,7 @@ mod tests {
         let mut forces = Vec::new();
         for _ in 0..90 {
             let next = jaw.squeeze(angle, force);
-            assert!((next - angle).abs() <= FASTEST + 1e-12, "faster than the drive");
+            assert!((next - angle).abs() <= jaw.fastest + 1e-12, "faster than the drive");
             force = spring(next, next - angle);
             angle = next;
             forces.push(force);

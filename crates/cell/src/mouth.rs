@@ -23,6 +23,8 @@ const TOWARDS_CORNER: f64 = 0.5;
 pub struct Mouth {
     gripper: Gripper,
     to_gripper: Pose,
+    /// Length of the blades [m].
+    length: f64,
 }
 
 /// Tissue between the blades.
@@ -37,9 +39,14 @@ pub struct Mouthful {
 }
 
 impl Mouth {
-    /// The mouth of a gripper.
+    /// The mouth of a gripper with the paper's blades.
     pub fn of(gripper: &Gripper) -> Self {
-        Self { gripper: *gripper, to_gripper: gripper.pose.inverse() }
+        Self::sized(gripper, BLADE_TIP)
+    }
+
+    /// The mouth of a gripper whose blades are `length` [m] long.
+    pub fn sized(gripper: &Gripper, length: f64) -> Self {
+        Self { gripper: *gripper, to_gripper: gripper.pose.inverse(), length }
     }
 
     /// Whether a point [m, world] is in the wedge; on its faces counts as in.
@@ -50,7 +57,7 @@ impl Mouth {
     /// The same in the gripper's frame, with the blades farther apart by `beyond` [m] on each side.
     fn holds(&self, q: DVec3, beyond: f64) -> bool {
         let r = q.x.hypot(q.y);
-        let along = q.x > 0.0 && (MOUTH_BEGIN..=BLADE_TIP).contains(&r);
+        let along = q.x > 0.0 && (MOUTH_BEGIN..=self.length).contains(&r);
         along && q.z.abs() <= 0.5 * BLADE_WIDTH && q.y.abs() <= self.gripper.half_gap(r) + beyond
     }
 
@@ -65,6 +72,11 @@ impl Mouth {
             let [a, b, c, d] = corners;
             let share = (b - a).cross(c - a).dot(d - a).abs() / 30.0;
             let middle = 0.25 * (a + b + c + d);
+            // Most elements are far away; no point that is looked at is farther from the middle than half of the way to a corner.
+            let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
+            if middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach {
+                continue;
+            }
             for p in corners.map(|c| middle.lerp(c, TOWARDS_CORNER)).into_iter().chain([middle]) {
                 let q = self.to_gripper.transform(p);
                 if self.holds(q, 0.0) {
@@ -86,6 +98,22 @@ impl Mouth {
     /// Tissue of organ `organ` between the blades, as [`tissue`](Self::tissue).
     pub fn tissue_of(&self, world: &World, organ: usize) -> Option<Mouthful> {
         self.tissue(world.model.bodies()[organ].tets(), &world.state.positions(&world.model, organ))
+    }
+
+    /// The organ with the most tissue between the blades, and that tissue.
+    pub fn fullest(&self, world: &World) -> Option<(usize, Mouthful)> {
+        let near = |k: &usize| self.is_near(world, *k);
+        let all = (0..world.model.bodies().len()).filter(near).filter_map(|k| Some((k, self.tissue_of(world, k)?)));
+        all.reduce(|best, next| if next.1.volume > best.1.volume { next } else { best })
+    }
+
+    /// Whether any node of organ `organ` is so near that some of it may be between the blades.
+    fn is_near(&self, world: &World, organ: usize) -> bool {
+        let body = &world.model.bodies()[organ];
+        // Coarse inner elements are a few times as large as the median.
+        let reach = self.length + BLADE_WIDTH + 8.0 * body.median_edge();
+        let place = |i: usize| world.state.position(&world.model, organ, i);
+        (0..body.len()).any(|i| place(i).distance_squared(self.gripper.pose.translation) < reach * reach)
     }
 
     /// Nodes of organ `organ` between the blades, or within half of a median edge of them.

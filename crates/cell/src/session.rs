@@ -1,11 +1,11 @@
 //! A grasp-lift in progress, frame by frame.
 
-use crate::blades::{GRIPPER_TOOL, colliders, opening_force};
+use crate::blades::{Tools, colliders, opening_force};
 use crate::calm::Calm;
+use crate::clasp::{Clasp, Snap};
 use crate::hold::{Hold, Moved};
 use crate::jaw::Jaw;
 use crate::measure::{HELD_FOLLOW_RATIO, HELD_SLIP_MM, SETTLED_SPEED};
-use crate::mouth::attached;
 use crate::resection::{CARRY, Resection};
 use crate::target::Target;
 use crate::world::GRAVITY;
@@ -17,6 +17,9 @@ use glam::DVec3;
 use std::time::{Duration, Instant};
 use trocar_specimen::Specimen;
 use trocar_tissue::{Event, State, StepReport};
+
+/// The one gripper's.
+const TOOLS: Tools = Tools::of(0);
 
 /// Height from which the gripper approaches [m].
 const APPROACH_HEIGHT: f64 = 0.03;
@@ -272,7 +275,7 @@ impl<'a> Session<'a> {
             JawCommand::Stay => angle,
             JawCommand::To(to) => self.jaw.turn_to(angle, to),
             JawCommand::Squeeze => {
-                let force = opening_force(&self.gripper, self.world.forces());
+                let force = opening_force(&self.gripper, TOOLS, self.world.forces());
                 let next = self.jaw.squeeze(angle, force);
 
                 if self.task.contact { next } else { next.max(target.touching_angle) }
@@ -300,33 +303,22 @@ impl<'a> Session<'a> {
         let (world, organ, pose) = (&self.world, self.organ, self.gripper.pose);
         let mouth = Mouth::of(&self.gripper);
         let tissue = mouth.tissue_of(world, organ);
-        let cluster = tissue.and_then(|tissue| attached(world, organ, tissue.centroid, target.reach));
+        let clasp = tissue.and_then(|tissue| Clasp::on(world, organ, &mouth, tissue, target.reach, design));
         let summary = &mut self.summary;
-        summary.attached = cluster.is_some();
+        summary.attached = clasp.is_some();
         summary.gap_mm = tissue.map_or(0.0, |tissue| tissue.gap * 1e3);
-        summary.closing_force_n = opening_force(&self.gripper, world.forces());
+        summary.closing_force_n = opening_force(&self.gripper, TOOLS, world.forces());
         // Where nothing is held, what was meant to be is followed all the same.
-        let cluster = cluster.unwrap_or_else(|| target.cluster.clone());
-        summary.at = cluster.s;
-        let mut nodes = cluster.nodes;
-        if design == GraspDesign::Friction && summary.attached {
-            let between = mouth.nodes_of(world, organ);
-            nodes = if between.is_empty() { nodes } else { between };
-        }
-        let place = |i: u32| world.state.position(&world.model, organ, i as usize);
+        let (s, nodes) = clasp.map_or((target.cluster.s, target.cluster.nodes.clone()), |c| (c.s, c.nodes));
+        summary.at = s;
         let rest = world.model.bodies()[organ].rest_positions();
-        let mean =
-            |distances: &mut dyn Iterator<Item = f64>, count: usize| distances.sum::<f64>() / count.max(1) as f64;
-        let displaced = &mut nodes.iter().map(|i| place(*i).distance(rest[*i as usize]));
-        summary.displaced_mm = 1e3 * mean(displaced, nodes.len());
-        let held = if summary.attached { design.grasp(world, organ, &nodes, &pose, self.task.jaw_force) } else { None };
-        (summary.snap_mm, summary.snap_mean_mm, summary.held_nodes) = (0.0, 0.0, 0);
-        if let Some(grasp) = &held {
-            let snaps: Vec<f64> = grasp.prescribed(&pose).map(|(i, x)| x.distance(place(i))).collect();
-            summary.snap_mm = 1e3 * snaps.iter().copied().fold(0.0, f64::max);
-            summary.snap_mean_mm = 1e3 * mean(&mut snaps.iter().copied(), snaps.len());
-            summary.held_nodes = snaps.len();
-        }
+        let place = |i: u32| world.state.position(&world.model, organ, i as usize);
+        let displaced = nodes.iter().map(|i| place(*i).distance(rest[*i as usize]));
+        summary.displaced_mm = 1e3 * displaced.sum::<f64>() / nodes.len().max(1) as f64;
+        let grasp = || design.grasp(world, organ, &nodes, TOOLS, &pose, self.task.jaw_force);
+        let held = if summary.attached { grasp() } else { None };
+        let snap = held.as_ref().map(|grasp| Snap::of(world, grasp, &pose)).unwrap_or_default();
+        (summary.snap_mm, summary.snap_mean_mm, summary.held_nodes) = (snap.most * 1e3, snap.mean * 1e3, snap.nodes);
         self.hold = Some(Hold::new(world, organ, nodes, &pose));
         self.world.state.grasps = held.into_iter().collect();
     }
@@ -336,7 +328,7 @@ impl<'a> Session<'a> {
         let moved = self.hold.as_ref().map_or(Moved::default(), |h| h.moved(world, &self.gripper.pose));
         let forces = world.forces();
         let contact: DVec3 = forces.iter().map(|f| f.contact.force).sum();
-        let constraint = forces.get(GRIPPER_TOOL).map_or(DVec3::ZERO, |f| f.constraint.force);
+        let constraint = forces.get(TOOLS.gripper).map_or(DVec3::ZERO, |f| f.constraint.force);
         let sample = Sample {
             time_s: self.frame as f64 * FRAME,
             phase: phase.name(),
@@ -344,7 +336,7 @@ impl<'a> Session<'a> {
             tissue_lift_mm: moved.tissue_lift * 1e3,
             slip_mm: moved.slip * 1e3,
             jaw_angle_deg: self.gripper.jaw_angle.to_degrees(),
-            jaw_force_n: opening_force(&self.gripper, forces),
+            jaw_force_n: opening_force(&self.gripper, TOOLS, forces),
             contact_n: contact.length(),
             constraint_n: constraint.length(),
             max_speed_m_s: report.max_speed,

@@ -24,6 +24,11 @@ pub(crate) struct Target {
     pub reach: f64,
 }
 
+/// How far jaws reach from the middle of what they pinch of organ `organ` [m].
+pub(crate) fn reach_into(world: &World, organ: usize) -> f64 {
+    REACH.max(REACH_EDGES * world.model.bodies()[organ].median_edge())
+}
+
 impl Target {
     /// The gripper comes `offset` [m] beside it, towards its +y. Chooses the cluster of organ `organ` nearest to organ coordinate `at`, clear of pins if one is near, of which jaws from above reach enough nodes.
     ///
@@ -31,7 +36,7 @@ impl Target {
     /// When the organ has no free node.
     pub fn choose(world: &World, organ: usize, at: f64, offset: f64) -> Result<Self> {
         let body = &world.model.bodies()[organ];
-        let reach = REACH.max(REACH_EDGES * body.median_edge());
+        let reach = reach_into(world, organ);
         let mut within: Vec<Cluster> =
             clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
         let distance = |c: &Cluster| (c.s - at).abs();

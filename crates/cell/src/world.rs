@@ -36,6 +36,49 @@ pub struct World {
     /// Unit vector against gravity.
     pub up: DVec3,
     pub(crate) stepper: Stepper,
+    /// How often something was severed: each time the model became another.
+    pub(crate) cuts: usize,
+}
+
+/// What organs lie on and how they touch each other.
+#[derive(Clone, Debug)]
+pub struct Surroundings {
+    /// How organs touch each other; None if they pass through each other.
+    pub body_contact: Option<BodyContact>,
+    /// Pairs of organs that do not touch, by their places in the specimen.
+    pub filtered: Vec<[usize; 2]>,
+    /// Friction of the bed that organs lie on, with their imprints; None for no bed.
+    pub bed_friction: Option<f64>,
+    /// Organs that feel no bed.
+    pub floating: Vec<usize>,
+}
+
+impl Default for Surroundings {
+    /// Organs that touch each other, on a bed with their imprints (SPEC C1).
+    fn default() -> Self {
+        Self {
+            body_contact: Some(BodyContact::default()),
+            filtered: Vec::new(),
+            bed_friction: Some(SUPPORT_FRICTION),
+            floating: Vec::new(),
+        }
+    }
+}
+
+/// Everything of a [`World`] that changes, cuts included.
+#[derive(Clone, Debug)]
+pub(crate) struct WorldState {
+    model: Model,
+    state: State,
+    axes: Vec<OrganAxis>,
+    cuts: usize,
+}
+
+impl WorldState {
+    /// Hash over every bit of positions, velocities and grasps.
+    pub fn hash(&self) -> u64 {
+        self.state.hash()
+    }
 }
 
 impl World {
@@ -58,19 +101,40 @@ impl World {
         schedule: Schedule,
         threads: usize,
     ) -> Result<Self> {
+        Self::surrounded(specimen, &Surroundings::default(), colliders, schedule, threads)
+    }
+
+    /// The same with other `surroundings`.
+    ///
+    /// # Errors
+    /// As [`World::with_tools`], and filtered pairs of organs that are not there.
+    pub fn surrounded(
+        specimen: &Specimen,
+        surroundings: &Surroundings,
+        colliders: Vec<Collider>,
+        schedule: Schedule,
+        threads: usize,
+    ) -> Result<Self> {
         let up = specimen.up.normalize();
-        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up).body_contact(BodyContact::default());
+        let mut builder = ModelBuilder::new().gravity(-GRAVITY * up);
+        if let Some(contact) = surroundings.body_contact {
+            builder = builder.body_contact(contact);
+        }
         let mut axes = Vec::with_capacity(specimen.organs.len());
-        for organ in &specimen.organs {
+        for (k, organ) in specimen.organs.iter().enumerate() {
+            let bed = surroundings.bed_friction.filter(|_| !surroundings.floating.contains(&k));
             let axis = OrganAxis::of(&organ.body, organ.base)?;
             builder.body(BodyDescription {
                 name: organ.name.clone(),
                 mesh: &organ.body,
                 material: material(organ),
                 pinned: pinned_nodes(organ, &axis, up),
-                supports: vec![support_under(organ, up)?],
+                supports: bed.map(|friction| support_under(organ, up, friction)).transpose()?.into_iter().collect(),
             })?;
             axes.push(axis);
+        }
+        for [a, b] in &surroundings.filtered {
+            builder.filter_pair(*a, *b)?;
         }
         for collider in colliders {
             builder.collider(collider)?;
@@ -78,7 +142,7 @@ impl World {
         let model = builder.build()?;
         let state = State::new(&model);
         let stepper = Stepper::new(&model, schedule, FRAME, threads)?;
-        Ok(Self { model, state, axes, up, stepper })
+        Ok(Self { model, state, axes, up, stepper, cuts: 0 })
     }
 
     /// What tissue did to each tool in the last frame, in the order of the motions that were given; shorter where nothing is felt.
@@ -91,6 +155,27 @@ impl World {
         self.stepper.events()
     }
 
+    /// All that changes.
+    pub(crate) fn save(&self) -> WorldState {
+        let (model, state, axes) = (self.model.clone(), self.state.clone(), self.axes.clone());
+        WorldState { model, state, axes, cuts: self.cuts }
+    }
+
+    /// Puts back what [`World::save`] gave. What comes after is the same to the bit.
+    ///
+    /// # Errors
+    /// Threads that the system does not give.
+    pub(crate) fn restore(&mut self, saved: &WorldState) -> Result<()> {
+        if self.cuts > 0 || saved.cuts > 0 {
+            self.stepper.follow(&saved.model)?;
+        }
+        self.model = saved.model.clone();
+        self.state = saved.state.clone();
+        self.axes.clone_from(&saved.axes);
+        self.cuts = saved.cuts;
+        Ok(())
+    }
+
     /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and colliders.
     pub fn step(&mut self, tools: &[ToolMotion]) -> trocar_tissue::StepReport {
         self.stepper.step(&self.model, &mut self.state, tools)
@@ -98,9 +183,9 @@ impl World {
 }
 
 /// The bed the organ lay on when it was recorded, and its imprint in it.
-fn support_under(organ: &Organ, up: DVec3) -> Result<Support> {
+fn support_under(organ: &Organ, up: DVec3, friction: f64) -> Result<Support> {
     let cell = SUPPORT_CELL * TetQuality::of(&organ.body).median_edge;
-    Ok(SupportField::under(&organ.body, up, cell, SUPPORT_FRICTION)?.into())
+    Ok(SupportField::under(&organ.body, up, cell, friction)?.into())
 }
 
 fn material(organ: &Organ) -> Material {

@@ -1,6 +1,7 @@
 //! The commands' work from folder to folder, and the reports: what came out, beside what the paper says.
 
 mod bench;
+mod cell_run;
 mod demo;
 mod error;
 mod experiment;
@@ -13,10 +14,11 @@ mod truth;
 mod workflow;
 
 pub use bench::{
-    GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow,
-    OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench, RenderBenchResult, ScalingBench, ScalingResult,
-    ScalingRow, Timing,
+    CellBench, CellBenchResult, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench,
+    MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench, RenderBenchResult,
+    ScalingBench, ScalingResult, ScalingRow, Timing,
 };
+pub use cell_run::{CellRun, CellSimulation, TimedEvent, scene_specimen};
 pub use demo::{Demo, DemoResult};
 pub use error::{Error, Result};
 pub use experiment::{

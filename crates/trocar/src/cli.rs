@@ -265,8 +265,27 @@ pub enum BenchName {
     Scaling(ScalingBench),
     /// What contact with the gripper costs in a grasp-lift of all organs.
     Grasp(GraspBench),
+    /// Speed of the whole two-arm cell, and what its parts cost.
+    Cell(CellBench),
     /// What pictures cost: a preview for policies, a path-traced frame, rays beside Embree.
     Render(RenderBench),
+}
+
+/// Arguments of `bench cell`.
+#[derive(Debug, Args)]
+pub struct CellBench {
+    /// Scene file or built-in scene.
+    #[arg(default_value = "cell-a")]
+    pub scene: String,
+    /// A specimen folder instead of the scene's specimen.
+    #[arg(long, value_name = "FOLDER")]
+    pub specimen: Option<PathBuf>,
+    /// Folder for a scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
 }
 
 /// Arguments of `bench meshing`.
@@ -368,7 +387,7 @@ impl From<Units> for trocar_geometry::io::Unit {
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub struct Simulate {
-    /// Specimen folder.
+    /// Specimen folder; or a scene file or built-in scene such as cell-a, for the same task by the left arm of the two-arm cell.
     pub specimen: PathBuf,
     /// The task.
     #[arg(long, value_enum, default_value_t = Task::GraspLift)]
@@ -382,12 +401,12 @@ pub struct Simulate {
     /// Lift of the jaws [mm].
     #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
     pub lift: f64,
-    /// How the jaws hold.
-    #[arg(long, value_enum, default_value_t = DesignName::Compliant)]
-    pub design: DesignName,
-    /// Force with which the jaws close [N].
-    #[arg(long, default_value_t = trocar_cell::JAW_FORCE, allow_negative_numbers = true)]
-    pub jaw_force: f64,
+    /// How the jaws hold; compliant, or as the scene says.
+    #[arg(long, value_enum)]
+    pub design: Option<DesignName>,
+    /// Force with which the jaws close [N]; 0.5, or as the scene says.
+    #[arg(long, allow_negative_numbers = true)]
+    pub jaw_force: Option<f64>,
     /// How far beside the organ's middle the gripper comes [mm], across the organ.
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub approach_offset: f64,
@@ -397,12 +416,15 @@ pub struct Simulate {
     /// After the hold, cut the organ between the grasp and its pins with a second instrument and lift on what comes loose; --sever=S cuts at organ coordinate S.
     #[arg(long, value_name = "S", num_args = 0..=1, require_equals = true, allow_negative_numbers = true)]
     pub sever: Option<Option<f64>>,
-    /// What steps the organs.
-    #[arg(long, value_enum, default_value_t = SolverName::Fast)]
-    pub schedule: SolverName,
+    /// What steps the organs; fast by default. A scene says it itself.
+    #[arg(long, value_enum)]
+    pub schedule: Option<SolverName>,
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
+    /// Folder for a scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
     /// Run folder to write.
     #[arg(short, long)]
     pub output: PathBuf,

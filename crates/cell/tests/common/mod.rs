@@ -5,6 +5,7 @@
 
 use glam::DVec3;
 use trocar_geometry::{LatticeMesher, SignedDistance, TetQuality};
+use trocar_scene::{Scene, SpecimenSource};
 use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 /// A tube along x, 60 mm long and 9 mm thick: about the appendix.
@@ -23,8 +24,13 @@ pub const ONE_END: Pins = Pins::End { end: End::Base, length: 0.15, band_length:
 
 /// The tube as a specimen under a camera that looks straight down.
 pub fn specimen(pins: Pins) -> Specimen {
+    meshed(pins, 2.2e-3)
+}
+
+/// The same in elements of edge `edge` [m].
+pub fn meshed(pins: Pins, edge: f64) -> Specimen {
     let half = DVec3::new(HALF_LENGTH, RADIUS, RADIUS);
-    let body = LatticeMesher::uniform(2.2e-3).mesh_shape(&Tube, (-half, half)).unwrap();
+    let body = LatticeMesher::uniform(edge).mesh_shape(&Tube, (-half, half)).unwrap();
     let quality = TetQuality::of(&body);
     let surface = body.boundary().0;
     Specimen {
@@ -44,4 +50,23 @@ pub fn specimen(pins: Pins) -> Specimen {
         background: None,
         provenance: Provenance::default(),
     }
+}
+
+/// The tube in elements of edge `edge` [m], and a second one, 25 mm beside it and 12 mm lower, which keeps the cell's floor away from the first.
+pub fn two_tubes(pins: Pins, edge: f64) -> Specimen {
+    let mut both = meshed(pins, edge);
+    let mut low = meshed(Pins::Band { share: 0.42 }, 4e-3).organs.remove(0);
+    let by = DVec3::new(0.0, 0.025, 0.012);
+    low.name = "low".into();
+    low.body.vertices.iter_mut().chain(&mut low.surface.vertices).for_each(|p| *p += by);
+    low.base += by;
+    both.organs.push(low);
+    both
+}
+
+/// The paper's cell with the tube along x below the middle between the ports.
+pub fn scene() -> Scene {
+    let mut scene = Scene::new("tube-cell", SpecimenSource::phantom("phantom-a", 1));
+    scene.placement.position_m = [0.0, 0.46, 0.045];
+    scene
 }

@@ -1,5 +1,6 @@
 //! Measurements of speed and cost: one file each.
 
+mod cell;
 mod embree;
 mod grasp;
 mod machine;
@@ -11,6 +12,7 @@ mod render;
 mod scaling;
 mod timing;
 
+pub use cell::{CellBench, CellBenchResult};
 pub use grasp::{GraspBench, GraspBenchResult, GraspPhaseTiming};
 pub use machine::Machine;
 pub use many::ManyRow;

@@ -4,6 +4,7 @@
 //! the organs behaved when they were lifted.
 
 mod axis;
+mod cell_lift;
 mod colors;
 mod controller_grid;
 mod convergence;
@@ -71,6 +72,15 @@ pub fn reconstruction_sections(r: &Reconstruction) -> Result<String> {
         + &run::bodies(specimen, true)?
         + &seen::depth_errors(r)?
         + &notes(&r.notes))
+}
+
+/// The page of a grasp-lift in the cell.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn cell_lift(made: &crate::CellRun, run: &trocar_cell::CellLiftRun) -> Result<String> {
+    let subtitle = format!("Grasp-lift in the cell '{}'", made.scene);
+    Ok(page::page(&made.scene, &subtitle, &cell_lift::body(made, run)?))
 }
 
 /// The page of the reconstruction experiment; `made` are the reconstructions of its phantoms in their order.

@@ -1,5 +1,6 @@
 //! `trocar bench`.
 
+mod cell;
 mod grasp;
 mod organs;
 mod render;
@@ -13,6 +14,7 @@ use trocar_progress::Progress;
 pub fn run(arguments: &Bench, json: bool, progress: &dyn Progress) -> Result<()> {
     match &arguments.name {
         BenchName::Meshing(arguments) => meshing(arguments, json, progress),
+        BenchName::Cell(arguments) => cell::run(arguments, json, progress),
         BenchName::Grasp(arguments) => grasp::run(arguments, json, progress),
         BenchName::Organs(arguments) => organs::run(arguments, json, progress),
         BenchName::Render(arguments) => render::run(arguments, json, progress),

@@ -1,0 +1,254 @@
+//! From a scene to the arms of its cell.
+
+use super::station::{Fixed, Moving, Station};
+use crate::blades::{Blades, Tools};
+use crate::{Error, GraspDesign, Jaw, Result, Scissors};
+use glam::DVec3;
+use trocar_robot::chain::{InverseOptions, Joints, MassProperties, SerialArm};
+use trocar_robot::instrument::{Coordinates, Instrument, Jaw as JawDrive, Limits};
+use trocar_robot::manipulator::{Manipulator, ModelError, Settings};
+use trocar_robot::port::Port;
+use trocar_scene::{ArmModel, GraspDesignName, InstrumentKind, Scene, ScheduleName};
+use trocar_tissue::{Descent, Schedule, Start};
+
+/// Clearance that a tilt at the limit leaves [m].
+const LEAST_CLEARANCE: f64 = 2e-5;
+
+/// Least way of the jaw's pivot into the body and of the shaft's base out of it [m].
+const MARGIN: f64 = 0.02;
+
+/// The blades' tips stay this far above the lowest tissue [m].
+const ABOVE_FLOOR: f64 = 0.001;
+
+/// Radius and length of what an instrument's mass is spread over [m]: about its motor's housing. Only the moments of inertia depend on it, and they are small beside the arm's.
+const HOUSING: [f64; 2] = [0.028, 0.09];
+
+/// Time that a grasper's and a cutter's jaws take from open to closed [s].
+const CLOSING: [f64; 2] = [0.3, 0.2];
+
+/// Kept from the end of the wrist [rad].
+const MARGIN_OF_ROLL: f64 = 0.2;
+
+/// Tilt up to which all rolls are reached [rad]: the task's.
+const LEAN: f64 = 0.35;
+
+/// Postures from which the start is searched, and steps of a way along which arms are followed.
+const STARTS: usize = 24;
+/// See there.
+const WALK: u32 = 24;
+
+/// Shaft that tissue may touch [m]: more than goes into the body.
+const TOUCHING_SHAFT: f64 = 0.2;
+
+/// The schedule of that name.
+pub(super) fn schedule(name: ScheduleName) -> Schedule {
+    match name {
+        ScheduleName::Fast => Schedule::FAST,
+        ScheduleName::Paper => Schedule::PAPER,
+        ScheduleName::Adaptive => Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive }),
+    }
+}
+
+/// The design of that name.
+pub(super) fn design(name: GraspDesignName) -> GraspDesign {
+    match name {
+        GraspDesignName::Friction => GraspDesign::Friction,
+        GraspDesignName::RestPose => GraspDesign::RestPose,
+        GraspDesignName::LivePose => GraspDesign::LivePose,
+        GraspDesignName::Compliant => GraspDesign::Compliant,
+    }
+}
+
+/// The arms of a scene, the left one first, over tissue whose lowest node is at height `floor` [m].
+pub(super) fn stations(scene: &Scene, floor: f64) -> Result<Vec<Station>> {
+    let all = scene.stations().into_iter().enumerate();
+    all.map(|(k, (arm, port, instrument))| station(scene, k, arm, port, instrument, floor)).collect()
+}
+
+fn station(
+    scene: &Scene,
+    k: usize,
+    arm: &trocar_scene::Arm,
+    port: &trocar_scene::Port,
+    held: &trocar_scene::Instrument,
+    floor: f64,
+) -> Result<Station> {
+    let hole = hole(port)?;
+    let closing = CLOSING[usize::from(held.kind == InstrumentKind::Cutter)];
+    let instrument = described(held, closing);
+    instrument.check()?;
+    let blades = Blades {
+        length: 1e-3 * held.blade_length_mm,
+        ridges: if held.kind == InstrumentKind::Cutter { 1 } else { 3 },
+        max_angle: held.jaw_max_angle_deg.to_radians(),
+        shaft_radius: 0.5e-3 * held.shaft_diameter_mm,
+        shaft_length: (1e-3 * held.shaft_length_mm).min(TOUCHING_SHAFT),
+        rest_offset: 1e-3 * scene.tissue.tip_rest_offset_mm,
+        friction: scene.tissue.friction,
+    };
+    let floor = floor + ABOVE_FLOOR;
+    let mut limits = limits(&hole, &instrument, &blades, floor)?;
+    let period = 1.0 / f64::from(scene.rates.control_hz);
+    let wrong = |field: &str, reason: String| Error::Scene {
+        scene: scene.name.clone(),
+        field: format!("arm '{}', {field}", arm.name.name()),
+        reason,
+    };
+    let start = start(&arm.start, port, &hole, &blades);
+    let (start, beyond) = limits.clamp(&start);
+    if let Some((limit, excess)) = beyond.binding().next() {
+        let reason =
+            format!("is beyond the {limit} that the port and the tissue below it allow, by {excess:.4} (m or rad)");
+        return Err(wrong("start", reason));
+    }
+    let chain = chain(scene, arm)?;
+    limits.roll = roll_of(&chain, &hole, &instrument, &limits, &start)?;
+    let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
+    let error = scene.gravity_error;
+    settings.error = ModelError {
+        links: error.link_mass_share,
+        instrument: error.instrument_mass_share,
+        friction: Some(error.joint_friction_nm),
+    };
+    settings.command_rate = f64::from(scene.rates.control_hz);
+    settings.limits = Some(limits);
+    let fixed = Fixed {
+        side: arm.name,
+        kind: held.kind,
+        port: hole,
+        instrument: instrument.clone(),
+        limits,
+        tools: Tools::of(k),
+        blades,
+        floor,
+        rcm: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
+        period,
+    };
+    let manipulator = Manipulator::new(chain, instrument, hole, settings, start)?;
+    let gates = &scene.task.gates;
+    let scissors = Scissors::new(gates.cut_open * blades.max_angle, gates.cut_closed * blades.max_angle);
+    let jaw = Jaw::sized(held.jaw_force_n, blades.max_angle, closing);
+    let now = Moving::new(manipulator.measured_cp(), &fixed, start, design(scene.task.grasp), jaw, scissors);
+    Ok(Station { fixed, manipulator, now })
+}
+
+/// The scene's port for the arm: normal into the body.
+fn hole(port: &trocar_scene::Port) -> Result<Port> {
+    let frame = port.frame();
+    let mut hole = Port::new(frame.translation, -(frame.rotation * DVec3::Z), frame.rotation * DVec3::X)?;
+    hole.hole_diameter = 1e-3 * port.hole_diameter_mm;
+    hole.thickness = 1e-3 * port.sheet_thickness_mm;
+    hole.check()?;
+    Ok(hole)
+}
+
+fn described(held: &trocar_scene::Instrument, closing: f64) -> Instrument {
+    let max_angle = held.jaw_max_angle_deg.to_radians();
+    let [radius, length] = HOUSING;
+    let centre = 1e-3 * DVec3::from(held.centre_of_mass_mm);
+    Instrument {
+        name: held.name.clone(),
+        shaft_radius: 0.5e-3 * held.shaft_diameter_mm,
+        shaft_length: 1e-3 * held.shaft_length_mm,
+        mount: held.mount.pose(),
+        pivot_offset: 0.0,
+        jaw: JawDrive { max_angle, blade_length: 1e-3 * held.blade_length_mm, speed: max_angle / closing },
+        mass: MassProperties::tube(held.mass_kg, radius, 0.0, length, centre),
+    }
+}
+
+/// The limits of the port, and of the tissue's floor where the shaft leans as far as it may.
+fn limits(port: &Port, instrument: &Instrument, blades: &Blades, floor: f64) -> Result<Limits> {
+    let mut limits = port.limits(instrument, LEAST_CLEARANCE, MARGIN)?;
+    let down = port.normal().dot(-DVec3::Z);
+    if down > 0.1 {
+        let room = (port.centre().z - floor) / (down * limits.tilt.cos()) - blades.length;
+        limits.insertion[1] = limits.insertion[1].min(room.max(limits.insertion[0]));
+    }
+    Ok(limits)
+}
+
+/// The start pose as coordinates.
+fn start(start: &trocar_scene::Start, port: &trocar_scene::Port, hole: &Port, blades: &Blades) -> Coordinates {
+    let u = hole.pose.rotation.inverse() * start.direction(port);
+    // The pivots turn the port's z first about x, then about the y that the first has turned.
+    let pivots = [(-u.y).atan2(u.z), u.x.atan2(u.y.hypot(u.z))];
+    let roll = start.roll_deg.to_radians();
+    let roll = roll - std::f64::consts::TAU * (roll / std::f64::consts::TAU).round();
+    Coordinates { pivots, insertion: 1e-3 * start.insertion_mm - blades.length, roll, jaw: start.jaw }
+}
+
+/// The rolls [rad] to which an arm gets from its start without a joint at a limit, wherever the shaft leans by up to [`LEAN`]: the wrist's range less what the shaft's turn takes of it. Where the arm does not get
+/// even at the start's roll is left out: commands there are held back.
+fn roll_of(
+    arm: &SerialArm,
+    port: &Port,
+    instrument: &Instrument,
+    limits: &Limits,
+    start: &Coordinates,
+) -> Result<[f64; 2]> {
+    let options = InverseOptions { tolerance: [1e-6, 1e-5], posture_tolerance: 1e-2, ..InverseOptions::default() };
+    let first = InverseOptions { restarts: STARTS, ..options };
+    let posture = arm.inverse(&port.flange(instrument, start), &arm.home(), &first)?;
+    let mut range = limits.roll;
+    // Steps towards `to`, each from the posture of the one before: the last posture, and the share of the way that was gone.
+    let walk = |from: &Coordinates, q: &Joints, to: &Coordinates| -> Result<(Joints, f64)> {
+        let (mut q, mut share) = (*q, 0.0);
+        for step in 1..=WALK {
+            let s = f64::from(step) / f64::from(WALK);
+            let mix = |a: f64, b: f64| a + s * (b - a);
+            let at = Coordinates {
+                pivots: [mix(from.pivots[0], to.pivots[0]), mix(from.pivots[1], to.pivots[1])],
+                insertion: mix(from.insertion, to.insertion),
+                roll: mix(from.roll, to.roll),
+                jaw: 0.0,
+            };
+            let found = arm.inverse(&port.flange(instrument, &at), &q, &options)?;
+            if !found.reached || !found.at_limit.is_empty() {
+                break;
+            }
+            (q, share) = (found.q, s);
+        }
+        Ok((q, share))
+    };
+    let lean = LEAN.min(0.9 * limits.tilt);
+    let [shallow, deep] = limits.insertion;
+    let insertions = [start.insertion, deep.min(shallow.max(0.5 * (start.insertion + deep)))];
+    for pivots in [start.pivots, [lean, 0.0], [-lean, 0.0], [0.0, lean], [0.0, -lean]] {
+        for insertion in insertions {
+            let there = Coordinates { pivots, insertion, ..*start };
+            let (q, share) = walk(start, &posture.q, &there)?;
+            if share < 1.0 {
+                continue;
+            }
+            for (k, end) in limits.roll.into_iter().enumerate() {
+                let (_, share) = walk(&there, &q, &Coordinates { roll: end, ..there })?;
+                let reached = start.roll + share * (end - start.roll);
+                range[k] = if k == 0 { range[0].max(reached) } else { range[1].min(reached) };
+            }
+        }
+    }
+    // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now and then.
+    let ends = [0, 1]
+        .map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - MARGIN_OF_ROLL.copysign(range[k]) });
+    Ok([ends[0].min(start.roll), ends[1].max(start.roll)])
+}
+
+fn chain(scene: &Scene, arm: &trocar_scene::Arm) -> Result<SerialArm> {
+    let flange = arm.flange.as_deref();
+    let model = match arm.source() {
+        Some(ArmModel::Urdf(file)) => SerialArm::from_urdf(&scene.resolve(file), None, flange)?,
+        Some(ArmModel::Mjcf(file)) => {
+            let tip = flange.ok_or_else(|| Error::Scene {
+                scene: scene.name.clone(),
+                field: format!("arm '{}', flange", arm.name.name()),
+                reason: "is missing; an MJCF file needs it: the body or site that carries the instrument".to_owned(),
+            })?;
+            SerialArm::from_mjcf(&scene.resolve(file), tip)?
+        }
+        Some(ArmModel::FrankaFr3) | None => SerialArm::franka_fr3()?,
+    };
+    let posture: Vec<f64> = arm.posture_deg.iter().map(|d| d.to_radians()).collect();
+    let model = if posture.is_empty() { model } else { model.with_home(&posture)? };
+    Ok(model.with_base(arm.base.pose())?)
+}

@@ -1,0 +1,94 @@
+//! A specimen as a scene has it: placed in the cell frame, with the scene's materials and pins.
+
+use crate::{Error, Result, Surroundings};
+use glam::DVec3;
+use trocar_geometry::{OrganAxis, Pose};
+use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind};
+use trocar_specimen::{End, Organ, Specimen};
+use trocar_tissue::BodyContact;
+
+/// A specimen in the cell frame, and what surrounds its organs.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// All points in the cell frame, up along z; materials and pins are the scene's.
+    pub specimen: Specimen,
+    /// Contact, filtered pairs and the bed.
+    pub surroundings: Surroundings,
+    /// Height of the lowest node [m].
+    pub floor: f64,
+}
+
+impl Placed {
+    /// Places `specimen` as `scene` says.
+    ///
+    /// # Errors
+    /// Names the organ of the scene that the specimen does not have, or the field that cannot be.
+    pub fn new(scene: &Scene, specimen: &Specimen) -> Result<Self> {
+        let pose = scene.placement.pose();
+        let mut placed = specimen.clone();
+        placed.placement = pose;
+        placed.up = DVec3::Z;
+        for organ in &mut placed.organs {
+            move_organ(organ, &pose);
+        }
+        let wrong = |field: String, reason: String| Error::Scene { scene: scene.name.clone(), field, reason };
+        let find = |field: &dyn Fn() -> String, name: &str| {
+            placed.organs.iter().position(|o| o.name == name).ok_or_else(|| {
+                let known: Vec<&str> = placed.organs.iter().map(|o| o.name.as_str()).collect();
+                wrong(field(), format!("names organ '{name}'; the specimen has {}", known.join(", ")))
+            })
+        };
+        let mut filtered = Vec::new();
+        let mut floating = Vec::new();
+        for (k, [a, b]) in scene.tissue.filtered_pairs.iter().enumerate() {
+            let field = || format!("tissue.filtered_pairs[{k}]");
+            match (a.as_str(), b.as_str()) {
+                (FIELD, organ) | (organ, FIELD) => floating.push(find(&field, organ)?),
+                (a, b) => filtered.push([find(&field, a)?, find(&field, b)?]),
+            }
+        }
+        let mut changes = Vec::new();
+        for (name, change) in &scene.organs {
+            changes.push((find(&|| format!("organ.{name}"), name)?, change));
+        }
+        for (k, change) in changes {
+            let far = far_end(scene, &placed.organs[k], change.pins.as_ref())?;
+            let organ = &mut placed.organs[k];
+            organ.material = change.material.applied_to(organ.material);
+            if let Some(rule) = &change.pins {
+                organ.pins = rule.pins(far);
+            }
+        }
+        let contact = BodyContact {
+            offset: 1e-3 * scene.tissue.contact_offset_mm,
+            friction: scene.tissue.friction,
+            ..BodyContact::default()
+        };
+        let support = &scene.tissue.support;
+        let surroundings = Surroundings {
+            body_contact: Some(contact),
+            filtered,
+            bed_friction: (support.kind == SupportKind::Imprint).then_some(support.friction),
+            floating,
+        };
+        let heights = placed.organs.iter().flat_map(|o| &o.body.vertices).map(|p| p.z);
+        let floor = heights.fold(f64::INFINITY, f64::min);
+        Ok(Self { specimen: placed, surroundings, floor })
+    }
+}
+
+fn move_organ(organ: &mut Organ, pose: &Pose) {
+    let points = organ.body.vertices.iter_mut().chain(&mut organ.surface.vertices).chain([&mut organ.base]);
+    for p in points {
+        *p = pose.transform(*p);
+    }
+}
+
+/// The end of `organ` that is farther from the port of the arm that grasps; found only where the rule asks for it.
+fn far_end(scene: &Scene, organ: &Organ, rule: Option<&PinRule>) -> Result<End> {
+    let port = scene.grasping_arm().and_then(|arm| scene.port(&arm.port));
+    let (Some(PinRule::End { end: PinEnd::Far, .. }), Some(port)) = (rule, port) else { return Ok(End::Tip) };
+    let axis = OrganAxis::of(&organ.body, organ.base)?;
+    let from = |s: f64| axis.point_at(s).distance(port.centre_m.into());
+    Ok(if from(0.0) > from(1.0) { End::Base } else { End::Tip })
+}

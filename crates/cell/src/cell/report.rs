@@ -1,0 +1,184 @@
+//! What a step of the cell reports: the observation of each arm, of the tissue, and what happened.
+
+use glam::DVec3;
+use serde::Serialize;
+use trocar_geometry::Pose;
+use trocar_robot::instrument::Coordinates;
+use trocar_robot::wrench::{ForceKind, Wrench};
+use trocar_scene::Side;
+use trocar_tissue::{Divergence, StepReport};
+
+/// A force with what it is, so that nobody mistakes one for the other (SPEC C8).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TaggedForce {
+    /// Contact, or the constraint of a latched grasp.
+    pub kind: ForceKind,
+    /// Force and torque; [`ArmObservation`] and [`crate::Cell::measured_cf`] say in which frame.
+    pub wrench: Wrench,
+}
+
+/// What is measured of one arm at the end of a control period.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ArmObservation {
+    /// Which arm.
+    pub side: Side,
+    /// Measured coordinates of the instrument in its port, jaw included.
+    pub coordinates: Coordinates,
+    /// Their rates: two pivots [rad/s], insertion [m/s], roll [rad/s], jaw [1/s].
+    pub rates: [f64; 5],
+    /// Measured pose of the tip frame in the cell.
+    pub tip: Pose,
+    /// RCM deviation [m]: from the port's centre to the shaft's axis, in the port's plane.
+    pub rcm_deviation: f64,
+    /// Largest RCM deviation over the period's physics steps [m].
+    pub rcm_peak: f64,
+    /// The peak is beyond the scene's threshold (3 mm).
+    pub rcm_over_threshold: bool,
+    /// The peak is beyond the deviation at which hardware stops (5 mm).
+    pub rcm_over_abort: bool,
+    /// Angle between shaft and port normal [rad].
+    pub tilt: f64,
+    /// What was commanded for the end of the period.
+    pub commanded: Coordinates,
+    /// What is left of the wanted orientation: axis times angle [rad] in the cell of the turn from the commanded to the wanted one.
+    pub rejected_rotation: DVec3,
+    /// The command stops short of what was asked: it was too far for one period, or below the cell's floor.
+    pub held_back: bool,
+    /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is latched its constraint force, otherwise contact.
+    pub force: TaggedForce,
+    /// Contact force on shaft and blades [N], whether a grasp is latched or not.
+    pub contact: DVec3,
+    /// Constraint force of a latched grasp [N].
+    pub constraint: DVec3,
+    /// Force with which tissue pushes the blades apart [N].
+    pub jaw_force: f64,
+    /// Tissue pushed with more than an arm bears, and the arm felt only so much.
+    pub load_limited: bool,
+    /// The jaws hold tissue.
+    pub attached: bool,
+}
+
+/// What is measured of the tissue: privileged, no policy sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TissueObservation {
+    /// Largest node speed at the end [m/s].
+    pub max_speed: f64,
+    /// Most inverted elements in any frame.
+    pub inverted: usize,
+    /// Smallest element volume over its rest volume in any frame.
+    pub min_volume_ratio: f64,
+    /// Substeps in which held nodes could not follow the jaws.
+    pub yielded_substeps: usize,
+    /// Substeps in which the solver gave a body up to sweeps.
+    pub fallbacks: usize,
+    /// Why the tissue's numbers are worth nothing, if they are not.
+    pub divergence: Option<Divergence>,
+}
+
+impl Default for TissueObservation {
+    fn default() -> Self {
+        Self {
+            max_speed: 0.0,
+            inverted: 0,
+            min_volume_ratio: f64::INFINITY,
+            yielded_substeps: 0,
+            fallbacks: 0,
+            divergence: None,
+        }
+    }
+}
+
+impl TissueObservation {
+    /// Takes another frame in.
+    pub(super) fn add(&mut self, report: &StepReport) {
+        self.max_speed = report.max_speed;
+        self.inverted = self.inverted.max(report.inverted);
+        self.min_volume_ratio = self.min_volume_ratio.min(report.min_volume_ratio);
+        self.yielded_substeps += report.grasp_limited;
+        self.fallbacks += report.fallbacks;
+        self.divergence = self.divergence.or(report.divergence);
+    }
+}
+
+/// Something that happened in a control period.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "event", rename_all = "kebab-case")]
+pub enum CellEvent {
+    /// Jaws closed on tissue and hold it.
+    Attached {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+        /// Organ coordinate of the attached cluster.
+        s: f64,
+        /// Nodes that the grasp holds; 0 for friction.
+        nodes: usize,
+        /// Largest distance between where the grasp first prescribes a node and where it was [mm].
+        snap_mm: f64,
+    },
+    /// Jaws opened, or what was between them is no longer.
+    Released {
+        /// The arm.
+        arm: Side,
+    },
+    /// Held tissue began to slide through the jaws.
+    Slipped {
+        /// The arm.
+        arm: Side,
+    },
+    /// Held tissue tore out of the jaws.
+    Torn {
+        /// The arm.
+        arm: Side,
+        /// Pull at which it tore [N].
+        force_n: f64,
+    },
+    /// A cutter closed through tissue.
+    Cut {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+        /// Pieces that the organ now is in: 1 where the scene parts nothing.
+        pieces: usize,
+    },
+    /// The instrument had hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until the tissue has come back.
+    Unhooked {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+        /// Length of its most stretched edge over that at rest.
+        stretch: f64,
+        /// Least volume of an element over that at rest.
+        volume: f64,
+    },
+    /// The RCM deviation went beyond the scene's threshold.
+    RcmThreshold {
+        /// The arm.
+        arm: Side,
+        /// The deviation [mm].
+        deviation_mm: f64,
+    },
+    /// The RCM deviation went beyond that at which the hardware stops.
+    RcmAbort {
+        /// The arm.
+        arm: Side,
+        /// The deviation [mm].
+        deviation_mm: f64,
+    },
+}
+
+/// What a control period reports.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CellReport {
+    /// Time at its end [s].
+    pub time: f64,
+    /// The arms, the left one first.
+    pub arms: Vec<ArmObservation>,
+    /// The tissue.
+    pub tissue: TissueObservation,
+    /// What happened, in order.
+    pub events: Vec<CellEvent>,
+}

@@ -1,0 +1,429 @@
+//! The two-arm cell around a small analytic tube.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+mod common;
+
+use common::{ONE_END, meshed, scene, two_tubes};
+use glam::{DMat3, DQuat, DVec3};
+use trocar_cell::{
+    Action, ActionSpace, Cell, CellEvent, CellLift, CellReport, GraspDesign, ROLL_SPEED, SWING_SPEED, TIP_SPEED,
+};
+use trocar_geometry::Pose;
+use trocar_progress::Silent;
+use trocar_robot::instrument::Coordinates;
+use trocar_robot::wrench::ForceKind;
+use trocar_specimen::{Pins, Specimen};
+
+const ARMS: [&str; 2] = ["left", "right"];
+
+fn cell(specimen: &Specimen) -> Cell {
+    Cell::new(&scene(), specimen, 1).unwrap()
+}
+
+/// A small generator of numbers from 0 to 1 (splitmix64).
+struct Dice(u64);
+
+impl Dice {
+    fn roll(&mut self) -> f64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    fn within(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.roll()
+    }
+
+    /// Anywhere that an arm may go; half of the time deep, where the tissue is.
+    fn coordinates(&mut self, cell: &Cell, arm: &str) -> Coordinates {
+        let limits = cell.limits(arm).unwrap();
+        loop {
+            let pivots = [(); 2].map(|()| self.within(-limits.tilt, limits.tilt));
+            let deep = self.roll() < 0.5;
+            let low = if deep { 0.09 } else { limits.insertion[0] };
+            let insertion = self.within(low, limits.insertion[1]);
+            let roll = self.within(limits.roll[0], limits.roll[1]);
+            let c = Coordinates { pivots, insertion, roll, jaw: self.roll() };
+            if c.tilt() < limits.tilt {
+                return c;
+            }
+        }
+    }
+
+    fn action(&mut self, cell: &Cell, space: ActionSpace) -> Action {
+        match space {
+            ActionSpace::Pivots => Action::pivots(&ARMS.map(|arm| self.coordinates(cell, arm))),
+            ActionSpace::Tip => {
+                let (tip, roll) = (TIP_SPEED * cell.period(), ROLL_SPEED * cell.period());
+                let mut one = || {
+                    [
+                        self.within(-tip, tip),
+                        self.within(-tip, tip),
+                        self.within(-tip, tip),
+                        self.within(-roll, roll),
+                        self.roll(),
+                    ]
+                };
+                Action { space, numbers: [one(), one()].concat() }
+            }
+        }
+    }
+}
+
+fn check_joints(cell: &Cell) {
+    for arm in ARMS {
+        let q = cell.measured_js(arm).unwrap().position;
+        for (i, [low, high]) in cell.joint_limits(arm).unwrap().into_iter().enumerate() {
+            assert!((low..=high).contains(&q[i]), "{arm} joint {i}: {} not in {low} to {high}", q[i]);
+        }
+    }
+}
+
+/// Random legal actions, each kept for a random while. The largest RCM deviation [m].
+fn random_run(specimen: &Specimen, seed: u64, steps: usize) -> f64 {
+    // No bed: tissue that tools grind into it stays there, folded, which is a matter of the tissue.
+    let mut scene = scene();
+    scene.tissue.support.kind = trocar_scene::SupportKind::None;
+    let (mut cell, mut dice) = (Cell::new(&scene, specimen, 1).unwrap(), Dice(seed));
+    let space = if seed % 4 == 3 { ActionSpace::Tip } else { ActionSpace::Pivots };
+    let mut action = dice.action(&cell, space);
+    let (mut left, mut rcm, mut touched) = (0, 0.0_f64, false);
+    for step in 0..steps {
+        if left == 0 {
+            action = dice.action(&cell, space);
+            left = 1 + (20.0 * dice.roll()) as usize;
+        }
+        left -= 1;
+        let report = cell.step(&action).unwrap();
+        let t = &report.tissue;
+        assert!(t.divergence.is_none() && t.inverted == 0, "seed {seed}, step {step}: {t:?}");
+        check_joints(&cell);
+        for arm in &report.arms {
+            assert!(arm.tip.translation.is_finite() && arm.force.wrench.is_finite());
+            rcm = rcm.max(arm.rcm_peak);
+            touched |= arm.contact.length() > 0.0;
+        }
+    }
+    println!("seed {seed}: touched {touched}, rcm {:.3} mm", 1e3 * rcm);
+    rcm
+}
+
+fn random_runs(seeds: std::ops::Range<u64>, steps: usize, edge: f64) {
+    let specimen = meshed(ONE_END, edge);
+    let next = std::sync::atomic::AtomicU64::new(seeds.start);
+    let worst = std::sync::Mutex::new(0.0_f64);
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| {
+                loop {
+                    let seed = next.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+                    if seed >= seeds.end {
+                        return;
+                    }
+                    let rcm = random_run(&specimen, seed, steps);
+                    let mut worst = worst.lock().unwrap();
+                    *worst = worst.max(rcm);
+                }
+            });
+        }
+    });
+    let worst = 1e3 * *worst.lock().unwrap();
+    println!("largest RCM deviation {worst:.3} mm");
+    assert!(worst < 5.0, "RCM deviation of {worst} mm");
+}
+
+#[test]
+fn random_legal_actions_break_nothing() {
+    random_runs(0..20, 500, 4e-3);
+}
+
+#[test]
+#[ignore = "minutes: ten thousand actions on finer tissue"]
+fn ten_thousand_random_actions_break_nothing() {
+    random_runs(100..102, 10_000, 2.2e-3);
+}
+
+#[test]
+fn illegal_actions_are_refused_by_name_and_change_nothing() {
+    let mut cell = cell(&meshed(ONE_END, 4e-3));
+    cell.advance().unwrap();
+    let before = cell.hash();
+    let good = Action::pivots(&ARMS.map(|arm| cell.setpoint(arm).unwrap()));
+    let mut said = |change: &dyn Fn(&mut Vec<f64>)| {
+        let mut action = good.clone();
+        change(&mut action.numbers);
+        let text = cell.step(&action).unwrap_err().to_string();
+        assert_eq!(cell.hash(), before, "{text}");
+        text
+    };
+    assert!(said(&|a| a[5] = f64::NAN).contains("action[5], right first pivot"));
+    assert!(said(&|a| a[1] = 0.9).contains("left second pivot"));
+    assert!(said(&|a| a[2] = 0.5).contains("left insertion"));
+    assert!(said(&|a| a[8] = f64::NEG_INFINITY).contains("right roll"));
+    assert!(said(&|a| a[9] = -0.1).contains("right jaw"));
+    assert!(said(&|a| a.truncate(9)).contains("10 numbers"));
+    assert!(said(&|a| a.push(0.0)).contains("10 numbers"));
+    assert!(said(&Vec::clear).contains("10 numbers"));
+    let tip = Action { space: ActionSpace::Tip, numbers: vec![0.0; 10] };
+    let mut far = tip.clone();
+    far.numbers[7] = 0.05;
+    assert!(cell.step(&far).unwrap_err().to_string().contains("right tip z"));
+    assert!(cell.measured_cp("middle").unwrap_err().to_string().contains("left, right"));
+    assert!(cell.servo_jaw("left", 2.0).is_err() && cell.servo_jp("left", &[0.0; 3]).is_err());
+    assert!(cell.servo_jp("left", &[f64::NAN; 7]).is_err());
+    assert_eq!(cell.hash(), before);
+    cell.step(&tip).unwrap();
+}
+
+/// The start of a lift, up to where tissue is held and a little further: 5 s.
+fn grasping(specimen: &Specimen, threads: usize) -> (Cell, Vec<Action>) {
+    let mut cell = Cell::new(&scene(), specimen, threads).unwrap();
+    let mut policy = trocar_cell::CellLiftPolicy::new(&CellLift::default(), &cell).unwrap();
+    let mut actions = Vec::new();
+    use trocar_cell::Policy;
+    while let Some(action) = policy.act(&cell).unwrap() {
+        cell.step(&action).unwrap();
+        actions.push(action);
+        if policy.phase() == "lift" && cell.observe()[0].tip.translation.z > 0.0 && actions.len() > 10 {
+            break;
+        }
+    }
+    (cell, actions)
+}
+
+#[test]
+fn a_restored_state_goes_on_to_the_bit_and_threads_do_not_matter() {
+    let specimen = two_tubes(ONE_END, 3e-3);
+    let (mut one, actions) = grasping(&specimen, 1);
+    assert!(one.held("left").unwrap().is_some(), "something is held when the state is saved");
+    // The same actions on two threads.
+    let mut two = Cell::new(&scene(), &specimen, 2).unwrap();
+    actions.iter().for_each(|a| drop(two.step(a).unwrap()));
+    assert_eq!(one.hash(), two.hash());
+    let mut dice = Dice(5);
+    let later: Vec<Action> = (0..12).map(|_| dice.action(&one, ActionSpace::Pivots)).collect();
+    let go = |cell: &mut Cell| -> (Vec<CellReport>, u64) {
+        let reports = later.iter().map(|a| cell.step(a).unwrap()).collect();
+        (reports, cell.hash())
+    };
+    let saved = one.save();
+    assert_eq!(saved.hash(), one.hash());
+    let first = go(&mut one);
+    assert_ne!(first.1, saved.hash());
+    one.restore(&saved).unwrap();
+    assert_eq!(one.hash(), saved.hash());
+    assert_eq!(go(&mut one), first);
+    // In another cell, too.
+    two.restore(&saved).unwrap();
+    assert_eq!(go(&mut two), first);
+    let mut new = Cell::new(&scene(), &specimen, 1).unwrap();
+    new.restore(&saved).unwrap();
+    assert_eq!(go(&mut new), first);
+}
+
+#[test]
+fn the_left_arm_lifts_the_tube_by_actions() {
+    let specimen = two_tubes(ONE_END, 2.2e-3);
+    for design in [GraspDesign::LivePose, GraspDesign::Compliant] {
+        let mut cell = cell(&specimen);
+        let run = CellLift { design: Some(design), ..CellLift::default() }.run(&mut cell, &Silent).unwrap();
+        let s = &run.summary;
+        println!("{s:?}");
+        assert!(s.held && !s.diverged && s.inverted_peak == 0, "{s:?}");
+        assert!((s.lift_mm - 15.0).abs() < 2.0 && s.snap_mm == 0.0, "{s:?}");
+        assert!(s.rcm_median_mm <= 0.12 && s.rcm_run_max_mm < 3.0, "{s:?}");
+        let arm = &cell.observe()[0];
+        assert!(arm.attached && arm.force.kind == ForceKind::Constraint && arm.constraint.length() > 0.02);
+        assert_eq!(cell.measured_cf("left").unwrap().kind, ForceKind::Constraint);
+        assert_eq!(cell.measured_cf("right").unwrap().kind, ForceKind::Contact);
+        // Jaws that open let go.
+        cell.servo_jaw("left", 1.0).unwrap();
+        let events: Vec<CellEvent> = (0..6).flat_map(|_| cell.advance().unwrap().events).collect();
+        assert!(events.iter().any(|e| matches!(e, CellEvent::Released { .. })), "{events:?}");
+        assert!(!cell.observe()[0].attached && cell.world().state.grasps.is_empty());
+    }
+}
+
+/// The tip's pose with `at` [m] in mid-mouth of an arm, jaws across x.
+fn over(cell: &Cell, arm: &str, at: DVec3, beyond: f64) -> Pose {
+    let x = (at - cell.port(arm).unwrap().centre()).normalize();
+    let z = (DVec3::X - DVec3::X.dot(x) * x).normalize();
+    let pose = |z: DVec3| {
+        let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
+        Pose { rotation, translation: at - (0.0115 - beyond) * x }
+    };
+    let near = cell.setpoint(arm).unwrap();
+    let turn = |p: &Pose| {
+        let s = cell.solve(arm, p, &near).unwrap();
+        (s.coordinates.roll - near.roll).abs() + 10.0 * s.excess.roll.abs()
+    };
+    let [one, other] = [pose(z), pose(-z)];
+    if turn(&one) <= turn(&other) { one } else { other }
+}
+
+/// Goes to a pose in `periods`, starting and stopping gently, and stays for half a second.
+fn go(cell: &mut Cell, arm: &str, pose: &Pose, periods: usize) -> Vec<CellReport> {
+    let from = cell.setpoint(arm).unwrap();
+    let start = cell.port(arm).unwrap().tip(&from);
+    (1..=periods + 15)
+        .map(|k| {
+            let t = (k as f64 / periods as f64).min(1.0);
+            let share = t * t * (3.0 - 2.0 * t);
+            let rotation = start.rotation.slerp(pose.rotation, share);
+            let translation = start.translation.lerp(pose.translation, share);
+            cell.servo_cp(arm, &Pose { rotation, translation }).unwrap();
+            cell.advance().unwrap()
+        })
+        .collect()
+}
+
+#[test]
+fn pressing_on_stiff_tissue_neither_swings_nor_drifts_and_the_shaft_comes_back() {
+    let mut specimen = two_tubes(Pins::Band { share: 0.42 }, 3e-3);
+    for young_modulus_pa in [12e3, 100e3, 1e6] {
+        specimen.organs[0].material.young_modulus_pa = young_modulus_pa;
+        let mut cell = cell(&specimen);
+        cell.servo_jaw("left", 0.0).unwrap();
+        let top = DVec3::new(0.0, 0.46, 0.045 + 0.0045);
+        // Closed blades, their tips 10 mm above the tube; then 4 mm into it, and back.
+        let above = over(&cell, "left", top, -0.0195);
+        let inside = over(&cell, "left", top, -0.0055);
+        let free = go(&mut cell, "left", &above, 60).pop().unwrap();
+        let pressed = go(&mut cell, "left", &inside, 90);
+        let back = go(&mut cell, "left", &above, 60).pop().unwrap();
+        let last = &pressed[90..];
+        let force = |r: &CellReport| r.arms[0].contact.length();
+        let mean = last.iter().map(force).sum::<f64>() / last.len() as f64;
+        let swing = last.iter().map(|r| (force(r) - mean).abs()).fold(0.0, f64::max);
+        let rate = |r: &CellReport| r.arms[0].rates[2].abs();
+        let speed = last.iter().map(rate).fold(0.0, f64::max);
+        let peak = pressed.iter().map(force).fold(0.0, f64::max);
+        let [a, b, c] = [&free, pressed.last().unwrap(), &back].map(|r| r.arms[0].rcm_deviation * 1e3);
+        println!(
+            "{young_modulus_pa:.0} Pa: {mean:.2} N, swing {swing:.4} N, peak {peak:.2} N, {:.2} mm/s, rcm {a:.3} {b:.3} {c:.3} mm",
+            speed * 1e3
+        );
+        assert!(mean > 0.02, "it presses: {mean} N at {young_modulus_pa} Pa");
+        assert!(swing < 0.03 * mean + 0.01, "it swings by {swing} N around {mean} N at {young_modulus_pa} Pa");
+        assert!(peak < 1.3 * mean + 0.1, "a peak of {peak} N, then {mean} N");
+        assert!(back.arms[0].contact.length() < 1e-6, "free again");
+        assert!(c < a + 0.1, "the shaft comes back: {a} mm before, {c} mm after");
+    }
+}
+
+#[test]
+fn a_load_aside_leans_the_shaft_in_its_port() {
+    // A tube pinned at its lower half and as stiff as cartilage, pushed aside with the closed blades.
+    let mut specimen = two_tubes(Pins::Band { share: 0.42 }, 3e-3);
+    specimen.organs[0].material.young_modulus_pa = 1e6;
+    let mut cell = cell(&specimen);
+    cell.servo_jaw("left", 0.0).unwrap();
+    let beside = DVec3::new(0.0, 0.46 - 0.0105, 0.045);
+    let free = over(&cell, "left", beside, -0.006);
+    let pushed = over(&cell, "left", beside + DVec3::new(0.0, 0.005, 0.0), -0.006);
+    let high = over(&cell, "left", beside + DVec3::new(0.0, 0.0, 0.02), -0.006);
+    go(&mut cell, "left", &high, 60);
+    let before = go(&mut cell, "left", &free, 60).pop().unwrap();
+    let under = go(&mut cell, "left", &pushed, 60).pop().unwrap();
+    let after = go(&mut cell, "left", &free, 60).pop().unwrap();
+    let tip = |r: &CellReport| {
+        let arm = &r.arms[0];
+        cell.port("left").unwrap().tip(&arm.commanded).translation.distance(arm.tip.translation) * 1e3
+    };
+    let rcm = |r: &CellReport| r.arms[0].rcm_deviation * 1e3;
+    let load = under.arms[0].contact.length();
+    println!(
+        "{load:.2} N: rcm {:.3} {:.3} {:.3} mm, tip off by {:.3} {:.3} {:.3} mm",
+        rcm(&before),
+        rcm(&under),
+        rcm(&after),
+        tip(&before),
+        tip(&under),
+        tip(&after)
+    );
+    assert!(load > 0.3, "{load} N");
+    assert!(tip(&under) > tip(&before) || rcm(&under) > rcm(&before), "a loaded tip gives way");
+    assert!(rcm(&under) < 3.0 && rcm(&after) < rcm(&before) + 0.1 && tip(&after) < tip(&before) + 0.2);
+}
+
+#[test]
+fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
+    for sever in [false, true] {
+        let mut scene = scene();
+        scene.task.sever = sever;
+        scene.instruments[1].jaw_force_n = 5.0;
+        let mut cell = Cell::new(&scene, &two_tubes(ONE_END, 2.2e-3), 1).unwrap();
+        let at = DVec3::new(0.005, 0.46, 0.045);
+        cell.servo_jaw("right", 1.0).unwrap();
+        let above = over(&cell, "right", at, -0.03);
+        let across = over(&cell, "right", at, 0.0);
+        go(&mut cell, "right", &above, 60);
+        go(&mut cell, "right", &across, 60);
+        assert_eq!(cell.in_mouth("right").unwrap(), Some(0));
+        cell.servo_jaw("right", 0.0).unwrap();
+        let mut events = Vec::new();
+        for _ in 0..45 {
+            let report = cell.advance().unwrap();
+            assert!(report.tissue.divergence.is_none() && report.tissue.inverted == 0, "{:?}", report.tissue);
+            events.extend(report.events);
+        }
+        let pieces: Vec<usize> = events
+            .iter()
+            .filter_map(|e| if let CellEvent::Cut { pieces, .. } = e { Some(*pieces) } else { None })
+            .collect();
+        println!("sever {sever}: {events:?}, jaw {:.3}", cell.observe()[1].coordinates.jaw);
+        assert_eq!(pieces, [if sever { 2 } else { 1 }]);
+        assert_eq!(cell.world().model.bodies().len(), if sever { 3 } else { 2 });
+        // A state with a cut is restored, and one from before it.
+        let saved = cell.save();
+        cell.advance().unwrap();
+        let hash = cell.hash();
+        cell.restore(&saved).unwrap();
+        cell.advance().unwrap();
+        assert_eq!(cell.hash(), hash);
+    }
+}
+
+#[test]
+fn joints_can_be_commanded_and_orientations_that_cannot_be_met_are_told() {
+    let mut cell = cell(&meshed(ONE_END, 4e-3));
+    let mut q: Vec<f64> = cell.measured_js("right").unwrap().position.iter().copied().collect();
+    q[6] += 0.1;
+    cell.servo_jp("right", &q).unwrap();
+    for _ in 0..45 {
+        cell.advance().unwrap();
+    }
+    let now = cell.measured_js("right").unwrap().position;
+    assert!((now[6] - q[6]).abs() < 5e-3, "{} of {}", now[6], q[6]);
+    let mut tip = cell.measured_cp("left").unwrap();
+    tip.rotation = DQuat::from_rotation_y(0.2) * tip.rotation;
+    let solution = cell.servo_cp("left", &tip).unwrap();
+    assert!((solution.rejected_rotation.length() - 0.2).abs() < 0.02, "{}", solution.rejected_rotation);
+    let report = cell.advance().unwrap();
+    assert_eq!(report.arms[0].rejected_rotation, solution.rejected_rotation);
+}
+
+#[test]
+fn the_speeds_of_commands_are_those_of_the_task() {
+    // The task moves tips at 20 to 50 mm/s (SPEC); what actions may ask for in a step leaves room above that.
+    assert!(TIP_SPEED >= 0.05 && SWING_SPEED * 0.1 >= 0.05);
+}
+
+#[test]
+fn scenes_that_do_not_fit_are_named() {
+    let specimen = meshed(ONE_END, 4e-3);
+    let said = |change: &dyn Fn(&mut trocar_scene::Scene)| {
+        let mut scene = scene();
+        change(&mut scene);
+        Cell::new(&scene, &specimen, 1).err().unwrap().to_string()
+    };
+    assert!(said(&|s| s.rates.control_hz = 50).contains("rates.control_hz"));
+    assert!(said(&|s| s.rates.physics_hz = 90).contains("rates.physics_hz"));
+    assert!(said(&|s| s.tissue.filtered_pairs.push(["tube".into(), "liver".into()])).contains("liver"));
+    assert!(said(&|s| drop(s.organs.insert("liver".into(), Default::default()))).contains("organ.liver"));
+    assert!(said(&|s| s.arms[1].controller.name = "fuzzy".into()).contains("fuzzy"));
+    assert!(said(&|s| s.arms[0].start.insertion_mm = 180.0).contains("insertion"));
+}

@@ -1,0 +1,127 @@
+//! `trocar simulate SCENE`: the scripted grasp-lift in the two-arm cell, from a scene to a run folder.
+
+use crate::experiment::phantoms;
+use crate::workflow::{REPORT, refuse_overlap};
+use crate::{Error, Result, report};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use trocar_cell::{Cell, CellEvent, CellLift, CellLiftRun, CellLiftSummary};
+use trocar_phantom::RecordOptions;
+use trocar_progress::Progress;
+use trocar_scene::{Scene, Source};
+use trocar_specimen::{Specimen, StagedFolder};
+
+/// Frames of a phantom's recording: the composite's window.
+const FRAMES: usize = 181;
+
+/// The file that makes a folder a run.
+const RUN_MARKER: &str = "result.json";
+
+/// A run in the cell that was made, in figures.
+#[derive(Clone, Debug, Serialize)]
+pub struct CellRun {
+    /// Name of the scene.
+    pub scene: String,
+    /// The measurements.
+    #[serde(flatten)]
+    pub summary: CellLiftSummary,
+    /// What happened.
+    pub events: Vec<TimedEvent>,
+    /// The report's path.
+    pub report: String,
+}
+
+/// Something that happened, and when.
+#[derive(Clone, Debug, Serialize)]
+pub struct TimedEvent {
+    /// Time at the end of its control period [s].
+    pub time_s: f64,
+    /// What.
+    #[serde(flatten)]
+    pub event: CellEvent,
+}
+
+/// How the grasp-lift is run in a cell.
+#[derive(Clone, Debug)]
+pub struct CellSimulation {
+    /// Scene file or name of a built-in scene.
+    pub scene: String,
+    /// The task.
+    pub task: CellLift,
+    /// Force of the grasping arm's jaws [N]; the scene's when `None`.
+    pub jaw_force: Option<f64>,
+    /// Worker threads, 0 for all.
+    pub threads: usize,
+    /// Folder in which a scene's phantom is recorded and reconstructed; what is there is used again.
+    pub phantoms: PathBuf,
+}
+
+impl CellSimulation {
+    /// Runs it into the run folder `output`: figures, channels and report.
+    ///
+    /// # Errors
+    /// One line that names the file, field or option; `output` is then left as it was.
+    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<CellRun> {
+        let mut scene = Scene::read(&self.scene)?;
+        refuse_overlap(Path::new(&self.scene), output)?;
+        if let (Some(force), Some(arm)) =
+            (self.jaw_force, scene.stations().first().map(|(arm, ..)| arm.instrument.clone()))
+        {
+            scene.instruments.iter_mut().filter(|i| i.name == arm).for_each(|i| i.jaw_force_n = force);
+        }
+        let staged = StagedFolder::create(output, RUN_MARKER)?;
+        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
+        let mut cell = Cell::new(&scene, &specimen, self.threads)?;
+        let mut task = self.task.clone();
+        if task.organ.is_none() && specimen.organs.iter().any(|o| o.name == scene.task.organ) {
+            task.organ = Some(scene.task.organ.clone());
+        }
+        let run = task.run(&mut cell, progress)?;
+        let made = CellRun {
+            scene: scene.name.clone(),
+            summary: run.summary.clone(),
+            events: run
+                .events
+                .iter()
+                .map(|(time_s, event)| TimedEvent { time_s: *time_s, event: event.clone() })
+                .collect(),
+            report: output.join(REPORT).display().to_string(),
+        };
+        write(staged, &made, &run, progress)?;
+        Ok(made)
+    }
+}
+
+/// The specimen of a scene: its folder's, or its phantom's, recorded and reconstructed below the folder `phantoms`.
+///
+/// # Errors
+/// A specimen that cannot be read or made.
+pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -> Result<Specimen> {
+    match scene.specimen.source() {
+        Some(Source::Folder(path)) => Ok(Specimen::read(&scene.resolve(path))?),
+        Some(Source::Phantom(name, seed)) => {
+            let options = RecordOptions { frames: FRAMES, seed: u64::from(seed), ..RecordOptions::default() };
+            phantoms::specimen(name, &options, &phantoms.join(format!("{name}-{seed}")), progress)
+        }
+        None => Err(Error::Mismatch(format!("scene '{}' names neither a specimen folder nor a phantom", scene.name))),
+    }
+}
+
+fn write(staged: StagedFolder, made: &CellRun, run: &CellLiftRun, progress: &dyn Progress) -> Result<()> {
+    let folder = staged.path();
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })
+    };
+    write(RUN_MARKER, &serde_json::to_vec_pretty(made).map_err(|e| Error::Format(e.to_string()))?)?;
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for sample in &run.samples {
+        table.serialize(sample).map_err(|e| Error::Format(e.to_string()))?;
+    }
+    write("channels.csv", &table.into_inner().map_err(|e| Error::Format(e.to_string()))?)?;
+    write(REPORT, report::cell_lift(made, run)?.as_bytes())?;
+    if progress.interrupted() {
+        return Err(Error::Interrupted);
+    }
+    Ok(staged.commit()?)
+}
