@@ -151,7 +151,7 @@ fn numbers() {
         ),
         Case("lift_mm = 8.0", "lift_mm = -8.0§", "task.gates.lift_mm is -8; 0.1 to 100 mm"),
         Case(
-            "sheet_thickness_mm = 2.0",
+            "sheet_thickness_mm = 0.0",
             "sheet_thickness_mm = 1e300§",
             "port[0].sheet_thickness_mm is 1e300; 0 to 50 mm",
         ),
