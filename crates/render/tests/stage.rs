@@ -304,3 +304,33 @@ fn what_does_not_fit_is_refused_and_nonsense_is_survived() {
     render(&mut stage, &eyes[0], &Pose::IDENTITY, &Settings::path(2), &Film::default());
     assert!(preview(&mut Stage::new(), &eyes[0], &Pose::IDENTITY).labels.iter().all(|l| *l == 0));
 }
+
+#[test]
+fn a_tile_finds_what_each_of_its_rays_finds() {
+    let mut stage = Stage::new();
+    let shape = stage.add_shape(&sphere(DVec3::ZERO, 0.03, 60)).unwrap();
+    for i in 0..40 {
+        let turn = DQuat::from_rotation_y(f64::from(i)) * DQuat::from_rotation_x(2.0 * f64::from(i));
+        // All round the camera, which some enclose.
+        let pose = Pose { rotation: turn, translation: turn * DVec3::new(0.0, 0.0, 0.004 * f64::from(i)) };
+        stage.add_body(shape, &pose, i as u16 + 1, &Look::steel()).unwrap();
+    }
+    for model in models() {
+        let camera = *model.camera();
+        for pose in [Pose::IDENTITY, askew(), Pose::look_at(DVec3::new(0.3, 0.1, 0.0), DVec3::ZERO, DVec3::Z)] {
+            let picture = preview(&mut stage, &Eye::new(model), &pose);
+            let mut differing = 0;
+            for i in (0..camera.width * camera.height).step_by(7) {
+                let ray = model.unproject((i % camera.width) as f64, (i / camera.width) as f64).unwrap();
+                let ray = if matches!(model, CameraModel::Pinhole(_)) { ray / ray.z } else { ray };
+                let found = stage.cast(pose.translation.as_vec3(), (pose.rotation * ray).as_vec3());
+                let depth = found.map_or(0.0, |m| m.t * ray.z as f32);
+                // The ray is turned in another precision here.
+                let off = (depth - picture.depth.depth[i]).abs();
+                differing += usize::from(off > 1e-4);
+            }
+            // At silhouettes only.
+            assert!(differing <= 8, "{differing} of 2743 pixels");
+        }
+    }
+}
