@@ -40,7 +40,7 @@ pub struct GraspLift {
     pub lower: bool,
     /// After the hold, cut the organ between the grasp and what holds it, and lift on instead of lowering.
     pub sever: Option<SeverAt>,
-    /// Blades and shaft touch the tissue. Without, jaws stop where they would touch it.
+    /// Blades and shaft touch the tissue, and organs each other. Without, jaws stop where they would touch it.
     pub contact: bool,
     /// How a frame is stepped.
     pub schedule: Schedule,

@@ -11,7 +11,7 @@ use crate::target::Target;
 use crate::world::GRAVITY;
 use crate::{
     CutOrgan, FRAME, GraspDesign, GraspLift, GraspLiftRun, Gripper, MAX_ANGLE, Mouth, Phase, Result, Sample, Snapshot,
-    Summary, World,
+    Summary, Surroundings, World,
 };
 use glam::DVec3;
 use std::time::{Duration, Instant};
@@ -70,7 +70,9 @@ impl<'a> Session<'a> {
         task.validate()?;
         let organ = task.choose_organ(specimen)?;
         let tools = if task.contact { colliders() } else { Vec::new() };
-        let world = World::with_tools(specimen, tools, task.schedule, task.threads)?;
+        let mut surroundings = Surroundings::default();
+        surroundings.body_contact = surroundings.body_contact.filter(|_| task.contact);
+        let world = World::surrounded(specimen, &surroundings, tools, task.schedule, task.threads)?;
         let summary = Summary {
             organ: specimen.organs[organ].name.clone(),
             at: task.at,

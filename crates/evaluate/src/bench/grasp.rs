@@ -1,4 +1,4 @@
-//! What contact with the gripper costs: the grasp-lift of a whole specimen with colliders and without, frame beside frame.
+//! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole specimen with all contact and with none, frame beside frame.
 
 use super::machine::Machine;
 use super::timing::median;
@@ -43,7 +43,7 @@ pub struct GraspPhaseTiming {
     pub frames: usize,
     /// Median wall time of a frame with contact [ms].
     pub with_contact_ms: f64,
-    /// The same without colliders [ms].
+    /// The same without [ms].
     pub without_contact_ms: f64,
     /// The slowest frame with contact [ms].
     pub worst_ms: f64,
@@ -56,7 +56,7 @@ pub struct GraspPhaseTiming {
 pub struct GraspBenchResult {
     /// 1/60 s over the median wall time of a frame with contact, all phases in which the gripper is near.
     pub real_time_factor: f64,
-    /// The same without colliders.
+    /// The same without contact.
     pub real_time_factor_without_contact: f64,
     /// Share of the time that contact costs.
     pub contact_share: f64,
