@@ -5,7 +5,6 @@ use crate::integrator::{Frame, Solver, Worker, for_each};
 use crate::report::Divergence;
 use crate::untangle::Untangler;
 use crate::{Body, BodyContact, Model, State, StepReport};
-use rayon::prelude::*;
 
 /// What the stepper knows of the solvers' kind: nothing.
 pub(crate) trait Crew: Send {
@@ -127,10 +126,9 @@ impl<S: Solver> Crew for Workers<S> {
         }
         let Self { list, coupling, .. } = self;
         let advance = |island: &mut [Worker<S>]| advance(island, coupling.as_ref(), frame);
-        let together = |a: &Worker<S>, b: &Worker<S>| a.island == b.island;
         match pool {
-            Some(pool) => pool.install(|| list.par_chunk_by_mut(together).for_each(advance)),
-            None => list.chunk_by_mut(together).for_each(advance),
+            Some(pool) => pool.install(|| for_islands(list, &advance)),
+            None => list.chunk_by_mut(|a, b| a.island == b.island).for_each(advance),
         }
         let report = list.iter().fold(StepReport::default(), |all, worker| all.with(&worker.report));
         let broken = matches!(report.divergence, Some(Divergence::NonFinite { .. }));
@@ -146,6 +144,18 @@ impl<S: Solver> Crew for Workers<S> {
 
     fn for_bodies(&self, tell: &mut dyn FnMut(usize, &Reaction, Option<&Contacts>)) {
         self.list.iter().for_each(|worker| tell(worker.index, &worker.reaction, worker.solver.contacts()));
+    }
+}
+
+/// Does the same with every island, in parallel: who is free takes the next.
+fn for_islands<S: Solver>(list: &mut [Worker<S>], work: &(impl Fn(&mut [Worker<S>]) + Sync)) {
+    let Some(first) = list.first().map(|worker| worker.island) else { return };
+    let count = list.iter().take_while(|worker| worker.island == first).count();
+    let (island, rest) = list.split_at_mut(count);
+    if rest.is_empty() {
+        work(island);
+    } else {
+        rayon::join(|| work(island), || for_islands(rest, work));
     }
 }
 

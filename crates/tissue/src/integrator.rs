@@ -79,18 +79,21 @@ impl Frame<'_> {
         Self { index, ..*self }
     }
 
-    /// How far colliders that may come near the body may push it in the frame [m]; `around`: a box round the body, in its frame.
-    pub fn pushes(&self, body: &Body, around: Option<(Vec3A, Vec3A)>) -> f64 {
-        let Some((low, high)) = around else { return 0.0 };
-        let (middle, half) = ((0.5 * (low + high)).as_dvec3(), (0.5 * (high - low)).length());
+    /// How far colliders that may come to the body in the frame may push it [m]. `meets` asks for boxes round parts of the body's surface, in
+    /// its frame, whether a collider reaches them, by their middle and half their diagonal.
+    pub fn pushes(&self, body: &Body, meets: impl Fn(&dyn Fn(Vec3A, f32) -> bool) -> bool) -> f64 {
         let way = |collider: &Collider| {
             let motion = self.tools.get(collider.tool)?;
+            let back = motion.from.inverse();
             let (centre, radius) = collider.shape.bounds(collider.rest_offset);
-            let far = motion.from.transform(centre).distance(body.origin + middle);
+            let place = |middle: Vec3A| back.transform(body.origin + middle.as_dvec3());
             // How far a half-space turns is not bounded: what matters of it is near the body.
-            let arm = if radius.is_finite() { centre.length() + radius } else { far + f64::from(half) };
+            let arm = if radius.is_finite() { centre.length() + radius } else { place(Vec3A::ZERO).length() + 1.0 };
             let way = crate::grasp::way(&motion.from, &motion.to, arm);
-            (far <= radius + f64::from(half) + way).then_some(way)
+            let reaches = |middle: Vec3A, half: f32| {
+                collider.shape.nearest(place(middle)).distance - collider.rest_offset <= way + f64::from(half)
+            };
+            (way > 0.0 && meets(&reaches)).then_some(way)
         };
         self.colliders.iter().filter_map(way).fold(0.0, f64::max)
     }

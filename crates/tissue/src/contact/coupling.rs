@@ -7,6 +7,9 @@ use crate::{BodyContact, Model, State};
 /// Bodies this much further apart [m] than where they press and what they travel in a frame are not looked at.
 const NEAR: f32 = 5e-4;
 
+/// Steps of the reach [m].
+const STEP: f32 = 1e-3;
+
 /// Finds at the beginning of every frame what may touch, and the islands of bodies that do.
 pub(crate) struct Coupling {
     contact: BodyContact,
@@ -43,11 +46,13 @@ impl Coupling {
             let model = &model.bodies[b];
             // What is pinned does not fall.
             let falls = if model.pinned.contains(&true) { 0.0 } else { fall };
-            let pushed = here.pushes(model, self.proximity.around(b)) as f32;
-            *way = carried.max(f64::from(pushed)) as f32 + dt * fastest + falls;
+            let pushed = here.pushes(model, |reaches| self.proximity.meets(model, b, reaches));
+            *way = carried.max(pushed) as f32 + dt * fastest + falls;
         }
         let ways = &self.ways;
-        let reach = |a: usize, b: usize| self.contact.offset as f32 + NEAR + ways[a] + ways[b];
+        // In steps, so that what did not move need not be looked at again while tools come nearer.
+        let stepped = |reach: f32| (reach / STEP).ceil() * STEP;
+        let reach = |a: usize, b: usize| stepped(self.contact.offset as f32 + NEAR + ways[a] + ways[b]);
         self.proximity.find(model, &state.bodies, reach, &mut self.near);
         self.parents.iter_mut().enumerate().for_each(|(b, parent)| *parent = b as u32);
         for k in 0..self.near.len() {

@@ -141,9 +141,21 @@ impl Proximity {
         }
     }
 
-    /// Corners of the box round a body's surface, in its frame [m]; None without a surface.
-    pub fn around(&self, body: usize) -> Option<(Vec3A, Vec3A)> {
-        self.boxes[body].first().map(|b| (b.low, b.high))
+    /// Whether `reaches` holds for the middle and half the diagonal of the box round any few triangles of a body and of all boxes round that.
+    pub fn meets(&self, body: &Body, index: usize, reaches: &dyn Fn(Vec3A, f32) -> bool) -> bool {
+        let (nodes, boxes) = (&body.surface.tree.nodes, &self.boxes[index]);
+        let mut at = 0;
+        while let Some(node) = nodes.get(at as usize) {
+            let Aabb { low, high } = boxes[at as usize];
+            if !reaches(0.5 * (low + high), 0.5 * (high - low).length()) {
+                at = node.end;
+            } else if node.is_leaf() {
+                return true;
+            } else {
+                at += 1;
+            }
+        }
+        false
     }
 
     /// Puts into `found` every vertex whose distance from another body it collides with is between [`Limits::depth`] deeper than where it presses and `reach` of both bodies [m], with the nearest triangle;

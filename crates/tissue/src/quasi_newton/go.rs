@@ -6,6 +6,7 @@ use crate::Body;
 use crate::descent::HELD_STRETCH;
 use crate::integrator::Frame;
 use crate::lanes::{LANES, Row};
+use fearless_simd::dispatch;
 use glam::Vec3A;
 
 /// Held nodes this near to their targets have arrived [m]: rounding of positions.
@@ -131,11 +132,15 @@ impl QuasiNewtonSolver {
     pub fn go(&mut self, share: f32, h: f32) -> bool {
         for _ in 0..=RETREATS {
             for round in 0..=HALVINGS + DROPS {
-                for i in 0..self.layout.free {
-                    for c in 0..3 {
-                        self.x[i][c] = self.base[i][c] + share * self.direction[i][c];
+                let Self { level, layout, x, base, direction, .. } = self;
+                dispatch!(*level, _simd => {
+                    let ways = base.iter().zip(direction.iter());
+                    for (x, (from, by)) in x[..layout.free].iter_mut().zip(ways) {
+                        for c in 0..3 {
+                            x[c] = from[c] + share * by[c];
+                        }
                     }
-                }
+                });
                 if !self.pass(h) {
                     return true;
                 }

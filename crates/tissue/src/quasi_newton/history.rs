@@ -45,18 +45,20 @@ impl Memory {
         [before, after]: [&[Row]; 2],
     ) -> [f32; 3] {
         let pair = &mut self.pairs[at];
-        for (to, from) in pair.step.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
-            *to = share * from;
-        }
-        let values = after.as_flattened().iter().zip(before.as_flattened());
-        for (to, (after, before)) in pair.change.as_flattened_mut().iter_mut().zip(values) {
-            *to = after - before;
-        }
-        dispatch!(level, simd => [
-            dot_rows(simd, &pair.step, &pair.change),
-            dot_rows(simd, &pair.step, &pair.step),
-            dot_rows(simd, &pair.change, &pair.change),
-        ])
+        dispatch!(level, simd => {
+            for (to, from) in pair.step.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
+                *to = share * from;
+            }
+            let values = after.as_flattened().iter().zip(before.as_flattened());
+            for (to, (after, before)) in pair.change.as_flattened_mut().iter_mut().zip(values) {
+                *to = after - before;
+            }
+            [
+                dot_rows(simd, &pair.step, &pair.change),
+                dot_rows(simd, &pair.step, &pair.step),
+                dot_rows(simd, &pair.change, &pair.change),
+            ]
+        })
     }
 }
 

@@ -204,8 +204,8 @@ impl Island<'_> {
             }
             self.find_direction();
             self.count();
-            let longest = self.parts().map(|part| part.longest_step()).fold(0.0, f32::max);
-            if self.is_solved(tolerance, if iteration > 0 { relative } else { 0.0 }) {
+            self.for_active(|part| part.look(iteration == 0));
+            if self.is_solved(tolerance, relative) {
                 if iteration > 0 || moved {
                     if !alone && self.wake() {
                         continue;
@@ -216,7 +216,7 @@ impl Island<'_> {
                     }
                     continue;
                 }
-                if longest <= settled {
+                if self.parts().all(|part| part.longest <= settled) {
                     // At rest: what is left of the velocity is noise.
                     self.parts().for_each(|part| part.v.fill([0.0; 4]));
                     return true;
@@ -241,7 +241,7 @@ impl Island<'_> {
 
     /// Finds the gradient where the substep starts from, and which bodies take part: among others, one that neither moves nor would by what pushes it is left where it is.
     fn choose_active(&mut self, alone: bool) {
-        let (h, still) = (self.h, self.still());
+        let h = self.h;
         self.all().for_each(|part| part.was_resting = !std::mem::replace(&mut part.active, true));
         self.take_gradient();
         self.accept_gradient();
@@ -249,6 +249,7 @@ impl Island<'_> {
         if alone {
             return;
         }
+        let still = self.still();
         for_each(self.workers, self.frame, |Worker { solver, .. }| {
             if solver.is_quiet(h, still) && solver.correction() <= still {
                 solver.rest(h);
@@ -303,11 +304,8 @@ impl Island<'_> {
 
     /// Whether no step is longer than `tolerance` [m] or a share `relative` of how far its body went. One that hardly moves beside one that does is not held to nearly nothing.
     fn is_solved(&mut self, tolerance: f32, relative: f32) -> bool {
-        if relative == 0.0 {
-            return self.parts().all(|part| part.longest_step() <= tolerance);
-        }
-        let farthest = self.parts().map(|part| part.way()).fold(0.0, f32::max);
-        self.parts().all(|part| part.longest_step() <= tolerance.max(relative * part.way().max(BESIDE * farthest)))
+        let farthest = self.parts().map(|part| part.gone).fold(0.0, f32::max);
+        self.parts().all(|part| part.longest <= tolerance.max(relative * part.gone.max(BESIDE * farthest)))
     }
 
     /// Counts an iteration.

@@ -67,6 +67,9 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) pressed: bool,
     /// Whether a tool carries held nodes on in this substep.
     pub(super) carried: bool,
+    /// Largest coordinate of the direction, and how far the body went in the substep [m], when last looked at.
+    pub(super) longest: f32,
+    pub(super) gone: f32,
     /// Where the substep started from.
     pub(super) guess: Guess,
     /// Whether a held node could not go on in this substep because an edge would be too long.
@@ -121,6 +124,8 @@ impl QuasiNewtonSolver {
             pressed: false,
             was_resting: false,
             carried: false,
+            longest: 0.0,
+            gone: 0.0,
             guess: Guess::Still,
             yielded: false,
             limited: 0,
@@ -163,11 +168,14 @@ impl QuasiNewtonSolver {
         self.start.copy_from_slice(&self.x);
         // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere implicit Euler's h^2 g.
         let reach = if !self.pressed && self.flies() { 0.5 * h * h } else { h * h };
-        for i in 0..self.layout.free {
-            for c in 0..3 {
-                self.predictor[i][c] = self.x[i][c] + h * self.v[i][c] + reach * gravity[c];
+        let Self { level, layout, predictor, x, v, .. } = self;
+        dispatch!(*level, _simd => {
+            for ((y, x), v) in predictor[..layout.free].iter_mut().zip(x.iter()).zip(v.iter()) {
+                for c in 0..3 {
+                    y[c] = x[c] + h * v[c] + reach * gravity[c];
+                }
             }
-        }
+        });
     }
 
     /// The warp of the nodes where they are.
@@ -257,8 +265,10 @@ impl QuasiNewtonSolver {
 
     /// Turns the direction downhill; held nodes have none.
     pub fn turn_downhill(&mut self) {
-        for (i, d) in self.direction.iter_mut().enumerate() {
-            *d = if self.held.get(i) == Some(&true) { [0.0; 4] } else { d.map(|d| -d) };
+        let Self { level, held, direction, .. } = self;
+        dispatch!(*level, _simd => direction.as_flattened_mut().iter_mut().for_each(|d| *d = -*d));
+        for (d, _) in direction.iter_mut().zip(held).filter(|(_, held)| **held) {
+            *d = [0.0; 4];
         }
     }
 
@@ -269,12 +279,13 @@ impl QuasiNewtonSolver {
 
     /// Largest coordinate of any free node [m].
     pub fn extent(&self) -> f32 {
-        longest(&self.x[..self.layout.free])
+        dispatch!(self.level, _simd => longest(&self.x[..self.layout.free]))
     }
 
-    /// Largest coordinate of the direction [m].
-    pub fn longest_step(&self) -> f32 {
-        longest(&self.direction)
+    /// Looks how long the direction is, and how far the body went; nowhere before the `first` step.
+    pub fn look(&mut self, first: bool) {
+        self.longest = dispatch!(self.level, _simd => longest(&self.direction));
+        self.gone = if first { 0.0 } else { self.way() };
     }
 
     /// Sum of the gradient over the nodes [N].
@@ -293,26 +304,30 @@ impl QuasiNewtonSolver {
     }
 
     /// How far any coordinate is from where the node would have gone by itself [m]: what the substep was found to be about, without any rigid motion.
-    pub fn way(&self) -> f32 {
-        let mut way = 0.0f32;
-        for i in (0..self.layout.free).filter(|i| !self.held[*i]) {
-            for c in 0..3 {
-                way = way.max((self.x[i][c] - self.targets[i][c]).abs());
+    fn way(&self) -> f32 {
+        let Self { level, layout, held, x, targets, .. } = self;
+        dispatch!(*level, _simd => {
+            let mut most = [0.0f32; 4];
+            for ((x, to), held) in x[..layout.free].iter().zip(targets).zip(held) {
+                let counts = if *held { 0.0 } else { 1.0 };
+                for c in 0..4 {
+                    most[c] = most[c].max(counts * (x[c] - to[c]).abs());
+                }
             }
-        }
-        way
+            most[0].max(most[1]).max(most[2])
+        })
     }
 
     /// Whether no node goes farther than `way` [m] by itself in a substep of `h` [s], and no tool carries any.
     pub fn is_quiet(&self, h: f32, way: f32) -> bool {
-        !self.carried && h * longest(&self.v) <= way
+        !self.carried && h * dispatch!(self.level, _simd => longest(&self.v)) <= way
     }
 
     /// How far the gradient would move any node [m], without what was learnt. The direction is lost.
     pub fn correction(&mut self) -> f32 {
         self.direction.copy_from_slice(&self.gradient);
         self.precondition();
-        longest(&self.direction)
+        dispatch!(self.level, _simd => longest(&self.direction))
     }
 
     /// Forgets where nodes would have gone by themselves.
@@ -339,12 +354,16 @@ impl QuasiNewtonSolver {
 
     /// The velocities after the substep.
     pub fn take_velocities(&mut self, h: f32, gravity: Row) {
-        for i in 0..self.layout.free {
-            for c in 0..3 {
-                let v = self.v[i][c] + h * gravity[c] + (self.x[i][c] - self.predictor[i][c]) / h;
-                self.v[i][c] = if self.held[i] { 0.0 } else { v };
+        let Self { level, layout, predictor, held, x, v, .. } = self;
+        dispatch!(*level, _simd => {
+            let ways = x[..layout.free].iter().zip(predictor.iter()).zip(held.iter());
+            for (v, ((x, y), held)) in v.iter_mut().zip(ways) {
+                for c in 0..3 {
+                    let next = v[c] + h * gravity[c] + (x[c] - y[c]) / h;
+                    v[c] = if *held { 0.0 } else { next };
+                }
             }
-        }
+        });
     }
 
     /// Whether no tool and no support holds or touches the body.
@@ -429,6 +448,7 @@ pub(super) fn position(row: &Row) -> Vec3A {
 }
 
 /// Largest coordinate of any row; not a number counts as infinite.
+#[inline(always)]
 fn longest(rows: &[Row]) -> f32 {
     let mut most = [0.0f32; 4];
     let mut sane = true;

@@ -42,7 +42,7 @@ impl Island<'_> {
     }
 
     /// Does the same with every body that takes part, in parallel if there are several.
-    fn for_active(&mut self, work: impl Fn(&mut QuasiNewtonSolver) + Send + Sync) {
+    pub(super) fn for_active(&mut self, work: impl Fn(&mut QuasiNewtonSolver) + Send + Sync) {
         if self.parts().nth(1).is_none() {
             self.parts().for_each(work);
         } else {
