@@ -170,6 +170,39 @@ pub enum CellEvent {
     },
 }
 
+impl std::fmt::Display for CellEvent {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Attached { arm, organ, s, nodes, snap_mm } => write!(
+                f,
+                "the {} jaws took hold of the {organ} at s = {s:.2}: {nodes} nodes, a snap of {snap_mm:.2} mm",
+                arm.name()
+            ),
+            Self::Released { arm } => write!(f, "the {} jaws let go", arm.name()),
+            Self::Slipped { arm } => write!(f, "tissue began to slide through the {} jaws", arm.name()),
+            Self::Torn { arm, force_n } => {
+                write!(f, "tissue tore out of the {} jaws at {force_n:.2} N", arm.name())
+            }
+            Self::Cut { arm, organ, pieces } => {
+                let into = if *pieces == 1 { "without parting it".to_owned() } else { format!("into {pieces} pieces") };
+                write!(f, "the {} blades closed through the {organ}, {into}", arm.name())
+            }
+            Self::Unhooked { arm, organ, stretch, volume } => write!(
+                f,
+                "the {} instrument let go of the {organ}, which was stretched {stretch:.1} times and crushed to {:.1}%",
+                arm.name(),
+                1e2 * volume
+            ),
+            Self::RcmThreshold { arm, deviation_mm } => {
+                write!(f, "the {} RCM deviation of {deviation_mm:.2} mm is beyond the threshold", arm.name())
+            }
+            Self::RcmAbort { arm, deviation_mm } => {
+                write!(f, "the {} RCM deviation of {deviation_mm:.2} mm is where hardware stops", arm.name())
+            }
+        }
+    }
+}
+
 /// What a control period reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellReport {

@@ -115,7 +115,6 @@ fn behind(run: &CellLiftRun) -> Result<String> {
 }
 
 fn events(made: &CellRun) -> String {
-    let rows: Vec<Vec<String>> =
-        made.events.iter().map(|e| vec![fixed(e.time_s, 2), page::escape(&format!("{:?}", e.event))]).collect();
+    let rows: Vec<Vec<String>> = made.events.iter().map(|e| vec![fixed(e.time_s, 2), e.event.to_string()]).collect();
     page::section("What happened", "", &table::plain(&["Time [s]", "Event"], &rows))
 }
