@@ -140,7 +140,7 @@ fn random_legal_actions_break_nothing() {
 }
 
 #[test]
-#[ignore = "minutes: ten thousand actions on finer tissue"]
+#[ignore = "not met yet: on finer tissue an edge is over-stretched after 1,448 and 5,692 actions"]
 fn ten_thousand_random_actions_break_nothing() {
     random_runs(100..102, 10_000, 2.2e-3);
 }
