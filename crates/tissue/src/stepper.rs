@@ -38,7 +38,7 @@ impl Stepper {
         Ok(stepper)
     }
 
-    /// Goes over to another `model`, such as that of before or after a cut ([`crate::sever`]). What both have in common keeps its solver; only the other bodies are prepared. States
+    /// Goes over to another `model`, such as that of before or after a cut ([`crate::sever`]). What both have in common keeps its solver; only the other bodies are prepared, but where bodies touch, all pairs are measured at rest anew. States
     /// of the new model go on with the same bits as in a new stepper.
     ///
     /// # Errors
