@@ -27,7 +27,7 @@ mod target;
 mod world;
 
 pub use cell::{
-    Action, ActionSpace, ArmObservation, Cell, CellEvent, CellReport, CellState, MOST_LOAD, Placed, ROLL_SPEED,
+    Action, ActionSpace, ArmObservation, Carried, Cell, CellEvent, CellReport, CellState, MOST_LOAD, Placed, ROLL_SPEED,
     SWING_SPEED, TIP_SPEED, TaggedForce, Timing, TissueObservation,
 };
 pub use cell_lift::{CellLift, CellLiftPolicy, CellLiftRun, CellLiftSample, CellLiftSummary};

@@ -18,7 +18,7 @@ impl Cell {
         })
     }
 
-    fn arm(&self, arm: &str) -> Result<&Station> {
+    pub(super) fn arm(&self, arm: &str) -> Result<&Station> {
         Ok(&self.stations[self.place(arm)?])
     }
 

@@ -8,14 +8,17 @@ mod action;
 mod build;
 mod crtk;
 mod exchange;
+mod figures;
 mod overstretch;
 mod placed;
 mod report;
+mod restart;
 mod state;
 mod station;
 
 pub use action::{Action, ActionSpace, ROLL_SPEED, SWING_SPEED, TIP_SPEED};
 pub use exchange::MOST_LOAD;
+pub use figures::Carried;
 pub use placed::Placed;
 pub use report::{ArmObservation, CellEvent, CellReport, TaggedForce, TissueObservation};
 pub use state::CellState;

@@ -438,6 +438,11 @@ impl Fixed {
 }
 
 impl Moving {
+    /// What watches its blades.
+    pub fn scissors(&self) -> Scissors {
+        self.scissors
+    }
+
     /// The opening that is asked for.
     pub fn wanted_jaw(&self) -> f64 {
         self.wanted.jaw()

@@ -13,6 +13,7 @@
 mod control;
 mod measure;
 mod reference;
+mod restart;
 mod settings;
 mod touch;
 

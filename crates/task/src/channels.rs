@@ -1,0 +1,243 @@
+//! Channels: one flat row of figures a control period. All gates, sweeps and summaries are functions of these rows alone.
+
+use serde::Serialize;
+
+/// Declares a struct of numbers with their names in order.
+macro_rules! row {
+    ($(#[$meta:meta])* $name:ident { $($(#[$doc:meta])* $field:ident,)* }) => {
+        $(#[$meta])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+        pub struct $name { $($(#[$doc])* pub $field: f64,)* }
+
+        impl $name {
+            /// Names of the numbers, in order.
+            pub const NAMES: [&'static str; [$(stringify!($field)),*].len()] = [$(stringify!($field)),*];
+
+            fn push(&self, all: &mut Vec<f64>) {
+                all.extend([$(self.$field),*]);
+            }
+
+            fn take(from: &mut impl Iterator<Item = f64>) -> Option<Self> {
+                Some(Self { $($field: from.next()?,)* })
+            }
+        }
+    };
+}
+
+row! {
+    /// One arm in a period; all zero where the scene has no such arm. Flags are 0 or 1.
+    ArmChannels {
+        /// First pivot, measured [rad].
+        pivot_1_rad,
+        /// Second pivot [rad].
+        pivot_2_rad,
+        /// Port's centre to the jaw's pivot [m].
+        insertion_m,
+        /// Turn about the shaft [rad].
+        roll_rad,
+        /// Jaw opening, 0 closed to 1.
+        jaw,
+        /// Rate of the first pivot [rad/s].
+        pivot_1_rad_s,
+        /// Rate of the second pivot [rad/s].
+        pivot_2_rad_s,
+        /// Rate of the insertion [m/s].
+        insertion_m_s,
+        /// Rate of the roll [rad/s].
+        roll_rad_s,
+        /// Rate of the jaw's opening [1/s].
+        jaw_1_s,
+        /// Measured tip frame (at the jaw's pivot) in the cell [m].
+        tip_x_m,
+        /// See [`tip_x_m`](Self::tip_x_m).
+        tip_y_m,
+        /// See [`tip_x_m`](Self::tip_x_m).
+        tip_z_m,
+        /// Its rotation, a unit quaternion, scalar first.
+        tip_qw,
+        /// See [`tip_qw`](Self::tip_qw).
+        tip_qx,
+        /// See [`tip_qw`](Self::tip_qw).
+        tip_qy,
+        /// See [`tip_qw`](Self::tip_qw).
+        tip_qz,
+        /// Commanded place of the tip frame [m].
+        commanded_x_m,
+        /// See [`commanded_x_m`](Self::commanded_x_m).
+        commanded_y_m,
+        /// See [`commanded_x_m`](Self::commanded_x_m).
+        commanded_z_m,
+        /// Distance between the two at the same time: error and lag together [mm].
+        tracking_mm,
+        /// RCM deviation at the period's end [mm].
+        rcm_mm,
+        /// The largest in the period [mm].
+        rcm_peak_mm,
+        /// Angle between shaft and port normal [degrees].
+        tilt_deg,
+        /// Contact force on the instrument along the cell's axes [N].
+        contact_x_n,
+        /// See [`contact_x_n`](Self::contact_x_n).
+        contact_y_n,
+        /// See [`contact_x_n`](Self::contact_x_n).
+        contact_z_n,
+        /// Constraint force of a latched grasp [N].
+        constraint_x_n,
+        /// See [`constraint_x_n`](Self::constraint_x_n).
+        constraint_y_n,
+        /// See [`constraint_x_n`](Self::constraint_x_n).
+        constraint_z_n,
+        /// Force with which tissue pushes the blades apart [N].
+        jaw_force_n,
+        /// The jaws hold tissue of any organ.
+        attached,
+        /// The task's organ is in the mouth (SPEC C3).
+        in_mouth,
+        /// Share of the wedge between the blades that it fills.
+        mouth_share,
+        /// Rotation that was asked for and that four degrees of freedom cannot do [degrees].
+        rejected_deg,
+        /// The command stops short of what was asked.
+        held_back,
+        /// Tissue pushed with more than an arm bears.
+        load_limited,
+        /// The instrument passes through tissue that it had crushed or overstretched.
+        unhooked,
+    }
+}
+
+row! {
+    /// The task in a period. What concerns tissue in jaws is zero while the grasper holds none of the task's organ. Flags are 0 or 1.
+    TaskChannels {
+        /// Distance from the middle of the grasper's mouth to the organ's axis where the grasp gate wants it [mm].
+        grasp_distance_mm,
+        /// The grasper holds the task's organ.
+        grasped,
+        /// Organ coordinate of what it holds.
+        grasp_s,
+        /// Rise of the held tissue's centroid since [mm].
+        lift_mm,
+        /// Rise of the jaws since [mm].
+        jaw_lift_mm,
+        /// Follow ratio: tissue lift over jaw lift; 0 below 0.1 mm of jaw lift.
+        follow,
+        /// Slip [mm].
+        slip_mm,
+        /// Distance from the cutter's tip to the nearest tissue between grasp (the gate's upper end while nothing is held) and base [mm].
+        position_mm,
+        /// Jaw opening of the cutter.
+        cut_jaw,
+        /// The cutter's mouth has tissue of the organ in it (SPEC C3).
+        cut_mouth,
+        /// Share of the cutter's wedge that it fills.
+        cut_share,
+        /// Cuts in the period.
+        cuts,
+        /// Largest distance of any arm's blade tip from its first target [mm]; port-reach only, as the next two.
+        reach_1_mm,
+        /// From its second.
+        reach_2_mm,
+        /// From its third.
+        reach_3_mm,
+        /// Times that tissue tore out of jaws in the period.
+        torn,
+        /// Times that it began to slide.
+        slipped,
+        /// Largest node speed [m/s].
+        max_speed_m_s,
+        /// Most inverted elements in any frame of the period.
+        inverted,
+        /// Smallest element volume over its rest volume.
+        min_volume,
+        /// Substeps in which held nodes could not follow the jaws.
+        yielded,
+        /// Substeps given up to sweeps.
+        fallbacks,
+        /// The tissue diverged.
+        diverged,
+    }
+}
+
+/// A row.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Channels {
+    /// Time at the period's end since the episode's start [s].
+    pub time_s: f64,
+    /// The left arm.
+    pub left: ArmChannels,
+    /// The right arm.
+    pub right: ArmChannels,
+    /// The task.
+    pub task: TaskChannels,
+}
+
+impl Channels {
+    /// Numbers a row.
+    pub const COUNT: usize = 1 + 2 * ArmChannels::NAMES.len() + TaskChannels::NAMES.len();
+
+    /// Names of the numbers of a row, in order: `time_s`, `left_*`, `right_*`, then the task's.
+    pub fn names() -> Vec<String> {
+        let arm = |side: &'static str| ArmChannels::NAMES.into_iter().map(move |n| format!("{side}_{n}"));
+        let task = TaskChannels::NAMES.into_iter().map(str::to_owned);
+        ["time_s".to_owned()].into_iter().chain(arm("left")).chain(arm("right")).chain(task).collect()
+    }
+
+    /// The numbers, in the order of [`names`](Self::names).
+    pub fn to_row(&self) -> Vec<f64> {
+        let mut row = Vec::with_capacity(Self::COUNT);
+        row.push(self.time_s);
+        self.left.push(&mut row);
+        self.right.push(&mut row);
+        self.task.push(&mut row);
+        row
+    }
+
+    /// From the numbers of a row; None of too few or too many.
+    pub fn from_row(row: &[f64]) -> Option<Self> {
+        let mut from = row.iter().copied();
+        let time_s = from.next()?;
+        let (left, right) = (ArmChannels::take(&mut from)?, ArmChannels::take(&mut from)?);
+        let made = Self { time_s, left, right, task: TaskChannels::take(&mut from)? };
+        from.next().is_none().then_some(made)
+    }
+
+    /// Both arms, the left one first.
+    pub fn arms(&self) -> [&ArmChannels; 2] {
+        [&self.left, &self.right]
+    }
+}
+
+impl ArmChannels {
+    /// Magnitude of the contact force [N].
+    pub fn contact_n(&self) -> f64 {
+        glam::DVec3::new(self.contact_x_n, self.contact_y_n, self.contact_z_n).length()
+    }
+
+    /// Magnitude of the constraint force [N].
+    pub fn constraint_n(&self) -> f64 {
+        glam::DVec3::new(self.constraint_x_n, self.constraint_y_n, self.constraint_z_n).length()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_and_names_go_together() {
+        let names = Channels::names();
+        assert_eq!(names.len(), Channels::COUNT);
+        let row: Vec<f64> = (0..Channels::COUNT).map(|k| k as f64).collect();
+        let made = Channels::from_row(&row).unwrap();
+        assert_eq!(made.to_row(), row);
+        let place = |name: &str| names.iter().position(|n| n == name).unwrap() as f64;
+        assert_eq!(made.left.jaw, place("left_jaw"));
+        assert_eq!(made.right.rcm_peak_mm, place("right_rcm_peak_mm"));
+        assert_eq!(made.task.cut_jaw, place("cut_jaw"));
+        let mut sorted = names.clone();
+        sorted.sort();
+        sorted.dedup();
+        assert_eq!(sorted.len(), names.len(), "names are unique");
+        assert!(Channels::from_row(&row[1..]).is_none());
+    }
+}

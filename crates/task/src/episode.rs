@@ -1,0 +1,359 @@
+//! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is scored and what happened.
+
+use crate::measure::Subject;
+use crate::random::Random;
+use crate::stages::Tracker;
+use crate::start::{Arrangement, starts, targets};
+use crate::{Channels, Error, Observation, Progress, Result, Summary, specimen_hash};
+use serde::{Deserialize, Serialize};
+use trocar_cell::{Action, Cell, CellEvent, CellState};
+use trocar_scene::{Scene, TaskName};
+use trocar_specimen::Specimen;
+use xxhash_rust::xxh3::Xxh3;
+
+/// How long organs settle under gravity before any episode begins [s]: all phantoms are at rest within it (SPEC, settled).
+pub const SETTLE_S: f64 = 1.0;
+
+/// How an episode ended.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "end", rename_all = "kebab-case")]
+pub enum End {
+    /// All stages are passed.
+    Passed,
+    /// The scene's time is up.
+    TimeOut,
+    /// The RCM deviation went beyond that at which hardware stops.
+    RcmAbort {
+        /// The arm.
+        arm: String,
+        /// The deviation [mm].
+        deviation_mm: f64,
+    },
+    /// Tissue or an arm is lost.
+    Diverged {
+        /// Why.
+        why: String,
+    },
+    /// The policy gave no action that could be done.
+    PolicyError {
+        /// What was wrong with it.
+        why: String,
+    },
+}
+
+impl End {
+    /// Its name in files.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Passed => "passed",
+            Self::TimeOut => "time-out",
+            Self::RcmAbort { .. } => "rcm-abort",
+            Self::Diverged { .. } => "diverged",
+            Self::PolicyError { .. } => "policy-error",
+        }
+    }
+}
+
+impl std::fmt::Display for End {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Passed => write!(f, "all stages passed"),
+            Self::TimeOut => write!(f, "the time was up"),
+            Self::RcmAbort { arm, deviation_mm } => {
+                write!(f, "the {arm} RCM deviation of {deviation_mm:.2} mm is where hardware stops")
+            }
+            Self::Diverged { why } => write!(f, "diverged: {why}"),
+            Self::PolicyError { why } => write!(f, "the policy failed: {why}"),
+        }
+    }
+}
+
+/// What a step gives.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Step {
+    /// The row: privileged, for scores and `info`.
+    pub channels: Channels,
+    /// How far the task is.
+    pub progress: Progress,
+    /// How the episode ended, with its last step.
+    pub end: Option<End>,
+    /// What happened.
+    pub events: Vec<CellEvent>,
+}
+
+/// An episode's whole state; what follows from a restored one is the same to the bit.
+#[derive(Clone, Debug)]
+pub struct EpisodeState {
+    cell: CellState,
+    arrangement: Arrangement,
+    now: Now,
+}
+
+/// What changes beside the cell.
+#[derive(Clone, Debug)]
+struct Now {
+    seed: u64,
+    subject: Subject,
+    tracker: Tracker,
+    rows: Vec<Channels>,
+    events: Vec<(f64, CellEvent)>,
+    end: Option<End>,
+}
+
+/// An episode of a scene's task.
+pub struct Episode {
+    scene: Scene,
+    specimen: Specimen,
+    specimen_hash: u64,
+    threads: usize,
+    cell: Cell,
+    /// Where the specimen is in `cell`, and the tissue there when it has settled.
+    arrangement: Arrangement,
+    settled: CellState,
+    now: Now,
+}
+
+impl Episode {
+    /// The episodes of `scene` around `specimen`, stepped by `threads` threads (0: as many as the machine has; results do not depend on them). Builds the models and lets the organs settle once;
+    /// the episode stands at the start of seed 0.
+    ///
+    /// # Errors
+    /// A scene without the task's organ or instruments, or one that cannot be built.
+    pub fn new(scene: &Scene, specimen: &Specimen, threads: usize) -> Result<Self> {
+        let arrangement = Arrangement::default();
+        let (cell, settled) = build(scene, specimen, threads, &arrangement)?;
+        let now = Now {
+            seed: 0,
+            subject: Subject::new(&cell, &scene.task.organ, &scene.task.gates, Vec::new()),
+            tracker: Tracker::new(scene.task.name, &scene.task.gates),
+            rows: Vec::new(),
+            events: Vec::new(),
+            end: None,
+        };
+        let mut made = Self {
+            scene: scene.clone(),
+            specimen_hash: specimen_hash(specimen),
+            specimen: specimen.clone(),
+            threads,
+            cell,
+            arrangement,
+            settled,
+            now,
+        };
+        made.check()?;
+        made.reset(0)?;
+        Ok(made)
+    }
+
+    fn check(&self) -> Result<()> {
+        let task = &self.scene.task;
+        let subject = &self.now.subject;
+        let missing = |what: &str| {
+            Err(Error::Option(format!("scene '{}': task {} needs {what}", self.scene.name, task.name.name())))
+        };
+        if task.needs_organ() && subject.bodies(&self.cell).is_empty() {
+            let known: Vec<&str> = self.cell.world().model.bodies().iter().map(|b| b.name()).collect();
+            return missing(&format!("organ '{}'; the specimen has {}", task.organ, known.join(", ")));
+        }
+        if task.needs_organ() && subject.grasper.is_none() {
+            return missing("a grasper");
+        }
+        if task.name == TaskName::AppendixResection && subject.cutter.is_none() {
+            return missing("a cutter");
+        }
+        Ok(())
+    }
+
+    /// Begins the episode of `seed`: the arms' starts, and where the scene says so the specimen's place, are those of the seed. The same seed gives the same bits, whatever was before. Takes
+    /// milliseconds; a specimen that moves is built and settled anew, which takes seconds.
+    ///
+    /// # Errors
+    /// A start that an arm does not reach; a specimen that cannot be built there.
+    pub fn reset(&mut self, seed: u64) -> Result<Observation> {
+        let arrangement = Arrangement::of(&self.scene, seed);
+        if arrangement != self.arrangement {
+            (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &arrangement)?;
+            self.arrangement = arrangement;
+        }
+        let starts = starts(&self.scene, &self.cell, seed);
+        self.cell.restart(&self.settled, &starts)?;
+        let task = &self.scene.task;
+        let targets = match task.name {
+            TaskName::PortReach => targets(&self.cell, seed)?,
+            TaskName::AppendixResection | TaskName::GraspLift => Vec::new(),
+        };
+        self.now = Now {
+            seed,
+            subject: Subject::new(&self.cell, &task.organ, &task.gates, targets),
+            tracker: Tracker::new(task.name, &task.gates),
+            rows: Vec::new(),
+            events: Vec::new(),
+            end: None,
+        };
+        Ok(self.observe())
+    }
+
+    /// Does one control period.
+    ///
+    /// # Errors
+    /// An action that cannot be done: nothing has changed, and the caller may try another or [`fail`](Self::fail). An episode that has ended.
+    pub fn step(&mut self, action: &Action) -> Result<Step> {
+        if let Some(end) = &self.now.end {
+            return Err(Error::Ended(end.to_string()));
+        }
+        let report = match self.cell.step(action) {
+            Ok(report) => report,
+            Err(refused @ trocar_cell::Error::Action { .. }) => return Err(refused.into()),
+            // An arm whose numbers are lost; the row stays the last that was right.
+            Err(lost) => {
+                self.now.end = Some(End::Diverged { why: lost.to_string() });
+                let mut channels = self.now.rows.last().copied().unwrap_or_default();
+                channels.task.diverged = 1.0;
+                let (progress, end) = (self.progress().clone(), self.now.end.clone());
+                return Ok(Step { channels, progress, end, events: Vec::new() });
+            }
+        };
+        let channels = self.now.subject.channels(&self.cell, &report)?;
+        self.now.tracker.update(&channels);
+        let abort = report.arms.iter().find(|a| a.rcm_over_abort);
+        self.now.end = if let Some(why) = report.tissue.divergence {
+            Some(End::Diverged { why: why.to_string() })
+        } else if let Some(arm) = abort {
+            Some(End::RcmAbort { arm: arm.side.name().to_owned(), deviation_mm: 1e3 * arm.rcm_peak })
+        } else if self.now.tracker.progress().passed() {
+            Some(End::Passed)
+        } else if report.time >= self.scene.task.episode_s - 0.5 * self.cell.period() {
+            Some(End::TimeOut)
+        } else {
+            None
+        };
+        self.now.rows.push(channels);
+        self.now.events.extend(report.events.iter().map(|e| (report.time, e.clone())));
+        let (progress, end) = (self.progress().clone(), self.now.end.clone());
+        Ok(Step { channels, progress, end, events: report.events })
+    }
+
+    /// Ends the episode because its policy failed.
+    pub fn fail(&mut self, why: &str) {
+        if self.now.end.is_none() {
+            self.now.end = Some(End::PolicyError { why: why.to_owned() });
+        }
+    }
+
+    /// What a policy sees now.
+    pub fn observe(&self) -> Observation {
+        Observation::of(&self.cell.observe(), self.cell.time(), self.progress())
+    }
+
+    /// How far the task is.
+    pub fn progress(&self) -> &Progress {
+        self.now.tracker.progress()
+    }
+
+    /// How the episode ended, if it has.
+    pub fn end(&self) -> Option<&End> {
+        self.now.end.as_ref()
+    }
+
+    /// The rows so far.
+    pub fn rows(&self) -> &[Channels] {
+        &self.now.rows
+    }
+
+    /// What happened so far, with times [s].
+    pub fn events(&self) -> &[(f64, CellEvent)] {
+        &self.now.events
+    }
+
+    /// Simulated time since the start [s].
+    pub fn time(&self) -> f64 {
+        self.cell.time()
+    }
+
+    /// The seed.
+    pub fn seed(&self) -> u64 {
+        self.now.seed
+    }
+
+    /// The scene.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Hash of the specimen; see [`specimen_hash`].
+    pub fn specimen_hash(&self) -> u64 {
+        self.specimen_hash
+    }
+
+    /// The cell: privileged, for scripts and pictures.
+    pub fn cell(&self) -> &Cell {
+        &self.cell
+    }
+
+    /// Places of the first grasper and of the first cutter among the arms.
+    pub fn roles(&self) -> (Option<usize>, Option<usize>) {
+        (self.now.subject.grasper, self.now.subject.cutter)
+    }
+
+    /// Bodies of the task's organ: one, or its pieces after a cut.
+    pub fn bodies(&self) -> Vec<usize> {
+        self.now.subject.bodies(&self.cell)
+    }
+
+    /// Targets of port-reach in the cell [m], three an arm; empty for other tasks.
+    pub fn targets(&self) -> &[[glam::DVec3; 3]] {
+        &self.now.subject.targets
+    }
+
+    /// Random numbers of this episode for `purpose`.
+    pub fn random(&self, purpose: &str) -> Random {
+        Random::new(self.now.seed, purpose)
+    }
+
+    /// The episode in figures so far.
+    pub fn summary(&self) -> Summary {
+        let arms: Vec<&str> = self.cell.arms().iter().map(|(side, _)| side.name()).collect();
+        let threshold = self.scene.safety.rcm_threshold_mm;
+        Summary::of(&self.now.rows, self.progress(), self.end(), &arms, threshold)
+    }
+
+    /// The state as it is now.
+    pub fn save(&self) -> EpisodeState {
+        EpisodeState { cell: self.cell.save(), arrangement: self.arrangement, now: self.now.clone() }
+    }
+
+    /// Puts back a state that this episode, or another of the same scene and specimen, gave.
+    ///
+    /// # Errors
+    /// A state of another scene.
+    pub fn restore(&mut self, state: &EpisodeState) -> Result<()> {
+        if state.arrangement != self.arrangement {
+            (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
+            self.arrangement = state.arrangement;
+        }
+        self.cell.restore(&state.cell)?;
+        self.now = state.now.clone();
+        Ok(())
+    }
+
+    /// Hash over every bit that the future depends on, but for the seed's random numbers: cell and stages.
+    pub fn state_hash(&self) -> u64 {
+        let mut hash = Xxh3::new();
+        hash.update(&self.cell.hash().to_le_bytes());
+        for number in self.now.tracker.numbers() {
+            hash.update(&number.to_bits().to_le_bytes());
+        }
+        hash.digest()
+    }
+}
+
+/// The cell with the specimen as arranged, and its state once the organs have settled.
+fn build(scene: &Scene, specimen: &Specimen, threads: usize, at: &Arrangement) -> Result<(Cell, CellState)> {
+    let mut cell = Cell::new(&at.scene(scene, specimen), specimen, threads)?;
+    let periods = (SETTLE_S / cell.period()).round() as usize;
+    for _ in 0..periods {
+        cell.advance()?;
+    }
+    let settled = cell.save();
+    Ok((cell, settled))
+}

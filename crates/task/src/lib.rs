@@ -1,0 +1,24 @@
+//! Tasks in the two-arm cell: stages, channels, episodes, their files, and policies.
+//!
+//! An [`Episode`] steps a scene's cell from a seeded start to its [`End`]. Each step gives a row of [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds the
+//! actions and a hash a step, so that anyone can run it again and compare.
+
+mod channels;
+mod episode;
+mod error;
+mod measure;
+mod observation;
+mod random;
+mod specimen;
+pub mod stages;
+mod start;
+mod summary;
+
+pub use channels::{ArmChannels, Channels, TaskChannels};
+pub use episode::{End, Episode, EpisodeState, SETTLE_S, Step};
+pub use error::{Error, Result};
+pub use observation::{ArmState, Observation, STATE_NAMES, STATE_SIZE, privileged};
+pub use random::Random;
+pub use specimen::specimen_hash;
+pub use stages::{Progress, Stage, StageProgress, Tracker};
+pub use summary::{ArmSummary, LOADED_N, Summary};

@@ -1,0 +1,196 @@
+//! From a cell to a row of channels.
+
+use crate::channels::{ArmChannels, TaskChannels};
+use crate::{Channels, Result};
+use glam::{DQuat, DVec3};
+use trocar_cell::{ArmObservation, Cell, CellEvent, CellReport};
+use trocar_scene::{Gates, InstrumentKind, Side};
+
+/// Middle of a mouth from the pivot [m].
+const MID_MOUTH: f64 = 0.0115;
+
+/// Jaw lift below which no follow ratio is told [m].
+const LEAST_LIFT: f64 = 1e-4;
+
+/// What of a cell the channels are about.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Subject {
+    /// Name of the task's organ; its pieces after a cut are called `name.1` and so on.
+    pub organ: String,
+    pub gates: Gates,
+    /// Places of the first grasper and the first cutter among the arms.
+    pub grasper: Option<usize>,
+    pub cutter: Option<usize>,
+    /// Targets of port-reach: blade tips in the cell [m], three an arm; empty for other tasks.
+    pub targets: Vec<[DVec3; 3]>,
+}
+
+impl Subject {
+    pub fn new(cell: &Cell, organ: &str, gates: &Gates, targets: Vec<[DVec3; 3]>) -> Self {
+        let arms = cell.arms();
+        let first = |kind| arms.iter().position(|(_, k)| *k == kind);
+        Self {
+            organ: organ.to_owned(),
+            gates: *gates,
+            grasper: first(InstrumentKind::Grasper),
+            cutter: first(InstrumentKind::Cutter),
+            targets,
+        }
+    }
+
+    /// The bodies that the organ is in.
+    pub fn bodies(&self, cell: &Cell) -> Vec<usize> {
+        let is = |name: &str| name.strip_prefix(&self.organ).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        let bodies = cell.world().model.bodies().iter().enumerate();
+        bodies.filter(|(_, b)| is(b.name())).map(|(k, _)| k).collect()
+    }
+
+    /// The row of a period that `report` tells of.
+    pub fn channels(&self, cell: &Cell, report: &CellReport) -> Result<Channels> {
+        let bodies = self.bodies(cell);
+        let mut row = Channels { time_s: report.time, ..Channels::default() };
+        for (k, arm) in report.arms.iter().enumerate() {
+            let of = arm_channels(cell, k, arm, &bodies)?;
+            match arm.side {
+                Side::Left => row.left = of,
+                Side::Right => row.right = of,
+            }
+        }
+        row.task = self.task(cell, report, &bodies)?;
+        Ok(row)
+    }
+
+    fn task(&self, cell: &Cell, report: &CellReport, bodies: &[usize]) -> Result<TaskChannels> {
+        let mut t = TaskChannels {
+            max_speed_m_s: report.tissue.max_speed,
+            inverted: report.tissue.inverted as f64,
+            min_volume: report.tissue.min_volume_ratio,
+            yielded: report.tissue.yielded_substeps as f64,
+            fallbacks: report.tissue.fallbacks as f64,
+            diverged: flag(report.tissue.divergence.is_some()),
+            ..TaskChannels::default()
+        };
+        for event in &report.events {
+            match event {
+                CellEvent::Cut { .. } => t.cuts += 1.0,
+                CellEvent::Torn { .. } => t.torn += 1.0,
+                CellEvent::Slipped { .. } => t.slipped += 1.0,
+                _ => {}
+            }
+        }
+        let world = cell.world();
+        let mut upper = self.gates.grasp_to;
+        if let Some(k) = self.grasper {
+            let middle = report.arms[k].tip.transform(MID_MOUTH * DVec3::X);
+            let axis_distance = |body: &usize| {
+                let axis = &world.axes[*body];
+                let part = (self.gates.grasp_from, self.gates.grasp_to);
+                nearest(cell, *body, middle, |i| (part.0..=part.1).contains(&axis.s[i]))
+            };
+            t.grasp_distance_mm = 1e3 * bodies.iter().map(axis_distance).fold(f64::INFINITY, f64::min);
+            if let Some(held) = cell.carried(k).filter(|c| bodies.contains(&c.organ)) {
+                t.grasped = 1.0;
+                t.grasp_s = held.s;
+                t.lift_mm = 1e3 * held.tissue_lift;
+                t.jaw_lift_mm = 1e3 * held.jaw_lift;
+                t.follow = if held.jaw_lift > LEAST_LIFT { held.tissue_lift / held.jaw_lift } else { 0.0 };
+                t.slip_mm = 1e3 * held.slip;
+                upper = held.s;
+            }
+        }
+        if let Some(k) = self.cutter {
+            let tip = cell.blade_tip(report.arms[k].side.name())?;
+            let part = |body: &usize| nearest(cell, *body, tip, |i| world.axes[*body].s[i] <= upper);
+            t.position_mm = 1e3 * bodies.iter().map(part).fold(f64::INFINITY, f64::min);
+            t.cut_jaw = report.arms[k].coordinates.jaw;
+            let (within, share) = mouth(cell, k, bodies);
+            (t.cut_mouth, t.cut_share) = (flag(within), share);
+        }
+        for name in [&mut t.grasp_distance_mm, &mut t.position_mm] {
+            if !name.is_finite() {
+                *name = 1e3;
+            }
+        }
+        if !self.targets.is_empty() {
+            let mut most: [f64; 3] = [0.0; 3];
+            for (arm, targets) in report.arms.iter().zip(&self.targets) {
+                let tip = cell.blade_tip(arm.side.name())?;
+                for (m, target) in most.iter_mut().zip(targets) {
+                    *m = m.max(1e3 * tip.distance(*target));
+                }
+            }
+            [t.reach_1_mm, t.reach_2_mm, t.reach_3_mm] = most;
+        }
+        Ok(t)
+    }
+}
+
+fn flag(is: bool) -> f64 {
+    f64::from(u8::from(is))
+}
+
+/// Of the two quaternions of a rotation the one whose scalar is not negative.
+pub(crate) fn upright(q: DQuat) -> DQuat {
+    if q.w < 0.0 { -q } else { q }
+}
+
+/// Distance from `p` to the nearest node of a body among those `of` [m]; infinite without any.
+fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f64 {
+    let world = cell.world();
+    let count = world.model.bodies()[body].len();
+    let square = |i: usize| world.state.position(&world.model, body, i).distance_squared(p);
+    (0..count).filter(|i| of(*i)).map(square).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+/// Whether any of `bodies` is between the blades of arm `k`, and the share of the wedge that they fill.
+fn mouth(cell: &Cell, k: usize, bodies: &[usize]) -> (bool, f64) {
+    let all: Vec<f64> = bodies.iter().filter_map(|body| Some(cell.between_blades(k, *body)?.1)).collect();
+    (!all.is_empty(), all.iter().sum::<f64>().min(1.0))
+}
+
+fn arm_channels(cell: &Cell, k: usize, arm: &ArmObservation, bodies: &[usize]) -> Result<ArmChannels> {
+    let c = &arm.coordinates;
+    let commanded = cell.port(arm.side.name())?.tip(&arm.commanded).translation;
+    let (tip, q) = (arm.tip.translation, upright(arm.tip.rotation));
+    let (within, share) = mouth(cell, k, bodies);
+    Ok(ArmChannels {
+        pivot_1_rad: c.pivots[0],
+        pivot_2_rad: c.pivots[1],
+        insertion_m: c.insertion,
+        roll_rad: c.roll,
+        jaw: c.jaw,
+        pivot_1_rad_s: arm.rates[0],
+        pivot_2_rad_s: arm.rates[1],
+        insertion_m_s: arm.rates[2],
+        roll_rad_s: arm.rates[3],
+        jaw_1_s: arm.rates[4],
+        tip_x_m: tip.x,
+        tip_y_m: tip.y,
+        tip_z_m: tip.z,
+        tip_qw: q.w,
+        tip_qx: q.x,
+        tip_qy: q.y,
+        tip_qz: q.z,
+        commanded_x_m: commanded.x,
+        commanded_y_m: commanded.y,
+        commanded_z_m: commanded.z,
+        tracking_mm: 1e3 * commanded.distance(tip),
+        rcm_mm: 1e3 * arm.rcm_deviation,
+        rcm_peak_mm: 1e3 * arm.rcm_peak,
+        tilt_deg: arm.tilt.to_degrees(),
+        contact_x_n: arm.contact.x,
+        contact_y_n: arm.contact.y,
+        contact_z_n: arm.contact.z,
+        constraint_x_n: arm.constraint.x,
+        constraint_y_n: arm.constraint.y,
+        constraint_z_n: arm.constraint.z,
+        jaw_force_n: arm.jaw_force,
+        attached: flag(arm.attached),
+        in_mouth: flag(within),
+        mouth_share: share,
+        rejected_deg: arm.rejected_rotation.length().to_degrees(),
+        held_back: flag(arm.held_back),
+        load_limited: flag(arm.load_limited),
+        unhooked: flag(cell.unhooked(arm.side.name())?),
+    })
+}

@@ -1,0 +1,229 @@
+//! An episode in figures (SPEC E2), computed from its channels alone.
+
+use crate::channels::ArmChannels;
+use crate::{Channels, End, Progress, Stage};
+use serde::{Deserialize, Serialize};
+
+/// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument [N].
+pub const LOADED_N: f64 = 0.05;
+
+/// The greatest lag that is looked for [s], and the step of the search.
+const LONGEST_LAG: f64 = 0.3;
+const LAG_STEP: f64 = 1e-3;
+
+/// One arm in figures.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ArmSummary {
+    /// left or right.
+    pub arm: String,
+    /// Time under load [s]; the next three are over it, and 0 without any.
+    pub loaded_s: f64,
+    /// RCM deviation under load, median over periods [mm].
+    pub rcm_median_mm: f64,
+    /// Its 95th percentile [mm].
+    pub rcm_p95_mm: f64,
+    /// The largest in any physics step under load [mm].
+    pub rcm_max_mm: f64,
+    /// The largest of the whole episode [mm].
+    pub rcm_peak_mm: f64,
+    /// Root mean square distance between commanded and measured tip at the same time, without load [mm].
+    pub tracking_rms_mm: f64,
+    /// The delay of the measured tip behind the commanded one that makes that distance least [ms].
+    pub lag_ms: f64,
+    /// The distance that is left then [mm].
+    pub lagged_rms_mm: f64,
+    /// Peak contact force [N].
+    pub peak_contact_n: f64,
+    /// Peak constraint force [N]: the pull of what is held, no contact.
+    pub peak_constraint_n: f64,
+    /// Peak force with which tissue pushed the blades apart [N].
+    pub peak_jaw_n: f64,
+    /// Largest tilt [degrees].
+    pub tilt_max_deg: f64,
+    /// Periods in which the instrument passed through tissue that it had crushed or overstretched.
+    pub unhooked: usize,
+}
+
+/// An episode in figures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// All stages are passed.
+    pub passed: bool,
+    /// Stages passed.
+    pub stage: usize,
+    /// Name of the stage that was next; `done` after the last.
+    pub next: String,
+    /// Mean share of all stages, 0 to 1.
+    pub score: f64,
+    /// The stages with the times at which they passed.
+    pub progress: Progress,
+    /// How it ended; None while it goes on.
+    pub end: Option<End>,
+    /// Simulated time [s].
+    pub duration_s: f64,
+    /// The grasper has held the organ at some time.
+    pub attached: bool,
+    /// Organ coordinate of the first grasp; None without any.
+    pub grasp_at: Option<f64>,
+    /// It held it at the end too.
+    pub held_to_end: bool,
+    /// Greatest rise of held tissue [mm].
+    pub lift_mm: f64,
+    /// Slip of what is held, at the end or when it was last held [mm].
+    pub slip_mm: f64,
+    /// Follow ratio then.
+    pub follow_ratio: f64,
+    /// Times that tissue tore out of jaws.
+    pub torn: usize,
+    /// Times that a cutter closed through tissue.
+    pub cuts: usize,
+    /// Most inverted elements in any frame.
+    pub inverted_peak: usize,
+    /// Smallest element volume over its rest volume in any frame.
+    pub min_volume_ratio: f64,
+    /// Substeps in which held nodes could not follow the jaws.
+    pub yielded_substeps: usize,
+    /// The tissue diverged.
+    pub diverged: bool,
+    /// Largest node speed at any period's end [m/s].
+    pub max_speed_m_s: f64,
+    /// Largest RCM deviation of any arm [mm].
+    pub rcm_peak_mm: f64,
+    /// It never went beyond the scene's threshold (3 mm).
+    pub rcm_within: bool,
+    /// The arms, left first.
+    pub arms: Vec<ArmSummary>,
+}
+
+impl Summary {
+    /// Of the rows of an episode that ended as `end` says; `threshold_mm` is the RCM deviation that it is scored against.
+    pub fn of(rows: &[Channels], progress: &Progress, end: Option<&End>, arms: &[&str], threshold_mm: f64) -> Self {
+        let tasks = || rows.iter().map(|c| &c.task);
+        let most = |f: fn(&Channels) -> f64| rows.iter().map(f).fold(0.0, f64::max);
+        let held = rows.iter().rfind(|c| c.task.grasped > 0.0).map(|c| c.task);
+        let arms: Vec<ArmSummary> = arms.iter().map(|name| arm(name, rows)).collect();
+        let rcm_peak_mm = arms.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max);
+        Self {
+            passed: progress.passed(),
+            stage: progress.stage,
+            next: progress.name().to_owned(),
+            score: progress.score(),
+            progress: progress.clone(),
+            end: end.cloned(),
+            duration_s: rows.last().map_or(0.0, |c| c.time_s),
+            attached: held.is_some(),
+            grasp_at: tasks().find(|t| t.grasped > 0.0).map(|t| t.grasp_s),
+            held_to_end: rows.last().is_some_and(|c| c.task.grasped > 0.0),
+            lift_mm: most(|c| c.task.lift_mm),
+            slip_mm: held.map_or(0.0, |t| t.slip_mm),
+            follow_ratio: held.map_or(0.0, |t| t.follow),
+            torn: tasks().map(|t| t.torn).sum::<f64>() as usize,
+            cuts: tasks().map(|t| t.cuts).sum::<f64>() as usize,
+            inverted_peak: most(|c| c.task.inverted) as usize,
+            min_volume_ratio: tasks().map(|t| t.min_volume).fold(1.0, f64::min),
+            yielded_substeps: tasks().map(|t| t.yielded).sum::<f64>() as usize,
+            diverged: tasks().any(|t| t.diverged > 0.0) || matches!(end, Some(End::Diverged { .. })),
+            max_speed_m_s: most(|c| c.task.max_speed_m_s),
+            rcm_peak_mm,
+            rcm_within: rcm_peak_mm <= threshold_mm,
+            arms,
+        }
+    }
+
+    /// When `stage` passed [s].
+    pub fn passed_at(&self, stage: Stage) -> Option<f64> {
+        self.progress.stages.iter().find(|s| s.stage == stage).and_then(|s| s.time_s)
+    }
+}
+
+fn arm(name: &str, rows: &[Channels]) -> ArmSummary {
+    let pick = |c: &Channels| if name == "right" { c.right } else { c.left };
+    let all: Vec<ArmChannels> = rows.iter().map(pick).collect();
+    let is_loaded = |a: &ArmChannels| a.attached > 0.0 || a.contact_n() + a.constraint_n() > LOADED_N;
+    let loaded: Vec<&ArmChannels> = all.iter().filter(|a| is_loaded(a)).collect();
+    let mut rcm: Vec<f64> = loaded.iter().map(|a| a.rcm_mm).collect();
+    rcm.sort_by(f64::total_cmp);
+    let most = |f: fn(&ArmChannels) -> f64| all.iter().map(f).fold(0.0, f64::max);
+    let period = rows.first().map_or(0.0, |c| c.time_s);
+    let free = |k: usize| !is_loaded(&all[k]);
+    let (lag, lagged) = lag(&all, period, &free);
+    ArmSummary {
+        arm: name.to_owned(),
+        loaded_s: loaded.len() as f64 * period,
+        rcm_median_mm: quantile(&rcm, 0.5),
+        rcm_p95_mm: quantile(&rcm, 0.95),
+        rcm_max_mm: loaded.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max),
+        rcm_peak_mm: most(|a| a.rcm_peak_mm),
+        tracking_rms_mm: 1e3 * off_by(&all, 0.0, period, &free),
+        lag_ms: 1e3 * lag,
+        lagged_rms_mm: 1e3 * lagged,
+        peak_contact_n: most(ArmChannels::contact_n),
+        peak_constraint_n: most(ArmChannels::constraint_n),
+        peak_jaw_n: most(|a| a.jaw_force_n),
+        tilt_max_deg: most(|a| a.tilt_deg),
+        unhooked: all.iter().filter(|a| a.unhooked > 0.0).count(),
+    }
+}
+
+/// A quantile of sorted values, between neighbours by their weights; 0 of nothing.
+pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
+    let at = share * last as f64;
+    let k = (at as usize).min(last);
+    let next = (k + 1).min(last);
+    sorted[k] + (at - k as f64) * (sorted[next] - sorted[k])
+}
+
+/// Root mean square distance [m] of the measured tips from those commanded `lag` [s] before, over the rows `of`.
+fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool) -> f64 {
+    let tip = |a: &ArmChannels| glam::DVec3::new(a.tip_x_m, a.tip_y_m, a.tip_z_m);
+    let commanded = |a: &ArmChannels| glam::DVec3::new(a.commanded_x_m, a.commanded_y_m, a.commanded_z_m);
+    let back = if period > 0.0 { lag / period } else { 0.0 };
+    // The same rows for every lag, so that lags compare.
+    let first = if period > 0.0 { (LONGEST_LAG / period).ceil() as usize } else { 0 };
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for k in (first.max(1)..all.len()).filter(|k| of(*k)) {
+        let at = (k as f64 - back).max(0.0);
+        let (j, share) = (at as usize, at.fract());
+        let then = commanded(&all[j]).lerp(commanded(&all[(j + 1).min(all.len() - 1)]), share);
+        sum += tip(&all[k]).distance_squared(then);
+        count += 1;
+    }
+    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+}
+
+/// The lag [s] with the least distance, and that distance [m].
+fn lag(all: &[ArmChannels], period: f64, of: &dyn Fn(usize) -> bool) -> (f64, f64) {
+    let steps = (LONGEST_LAG / LAG_STEP) as usize;
+    let tried = (0..=steps).map(|k| k as f64 * LAG_STEP).map(|lag| (lag, off_by(all, lag, period, of)));
+    tried.fold((0.0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_delay_is_found() {
+        let rows: Vec<Channels> = (1..300)
+            .map(|k| {
+                let t = f64::from(k) / 30.0;
+                let mut c = Channels { time_s: t, ..Channels::default() };
+                c.left.commanded_x_m = 0.02 * (1.3 * t).sin();
+                c.left.tip_x_m = 0.02 * (1.3 * (t - 0.08)).sin();
+                c
+            })
+            .collect();
+        let found = arm("left", &rows);
+        assert!((found.lag_ms - 80.0).abs() <= 2.0, "{found:?}");
+        assert!(found.lagged_rms_mm < 0.02 && found.tracking_rms_mm > 1.0);
+        assert_eq!(found.loaded_s, 0.0);
+    }
+
+    #[test]
+    fn quantiles() {
+        assert_eq!(quantile(&[], 0.5), 0.0);
+        assert_eq!(quantile(&[1.0, 2.0, 3.0], 0.5), 2.0);
+        assert_eq!(quantile(&[0.0, 10.0], 0.95), 9.5);
+    }
+}
