@@ -14,11 +14,14 @@ use std::process::ExitCode;
 const BAD_INPUT: u8 = 2;
 /// Exit code of a run the user stopped (128 + SIGINT).
 const INTERRUPTED: u8 = 130;
+/// Exit code of work that was done and whose result could not be printed.
+const NOT_PRINTED: u8 = 1;
 
 fn main() -> ExitCode {
     let cli = cli::Cli::parse();
     let progress = bar::Bar::new(cli.quiet);
     match commands::run(&cli, &progress) {
+        Ok(()) if output::lost() => ExitCode::from(NOT_PRINTED),
         Ok(()) => ExitCode::SUCCESS,
         Err(_) if progress.was_interrupted() => {
             eprintln!("interrupted; nothing half-written was left behind");

@@ -2,20 +2,34 @@
 
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Set once a result could not be handed over: the work was done, and nobody has it.
+static LOST: AtomicBool = AtomicBool::new(false);
+
+/// Whether a result could not be printed; the program then ends with an error.
+pub fn lost() -> bool {
+    LOST.load(Ordering::Relaxed)
+}
+
+fn lose(why: impl std::fmt::Display) {
+    eprintln!("error: {why}");
+    LOST.store(true, Ordering::Relaxed);
+}
 
 /// Prints `value` as JSON, or what `text` says for people.
 pub fn print<T: Serialize>(json: bool, value: &T, text: impl FnOnce(&T) -> String) {
     let line = if json {
         match serde_json::to_string(value) {
             Ok(line) => line,
-            Err(e) => return eprintln!("error: the result cannot be written as JSON: {e}"),
+            Err(e) => return lose(format_args!("the result cannot be written as JSON: {e}")),
         }
     } else {
         text(value)
     };
     match writeln!(std::io::stdout(), "{line}") {
         // Nobody reads on: that is theirs to decide.
-        Err(e) if e.kind() != ErrorKind::BrokenPipe => eprintln!("error: standard output: {e}"),
+        Err(e) if e.kind() != ErrorKind::BrokenPipe => lose(format_args!("standard output: {e}")),
         _ => {}
     }
 }

@@ -51,3 +51,12 @@ fn mistakes_are_one_line() {
     let unknown = trocar(&["scene", "show", "cell-b"]);
     assert!(String::from_utf8_lossy(&unknown.stderr).contains("did you mean 'cell-a'?"));
 }
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_result_that_cannot_be_printed_is_no_success() {
+    let full = std::fs::File::options().write(true).open("/dev/full").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_trocar")).args(["scene", "list"]).stdout(full).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).starts_with("error: standard output: "));
+}
