@@ -7,7 +7,7 @@ use crate::untangle::Untangler;
 use crate::{Body, BodyContact, Model, State, StepReport};
 
 /// What the stepper knows of the solvers' kind: nothing.
-pub(crate) trait Crew: Send {
+pub(crate) trait Crew: Send + Sync {
     /// Goes over to another model; what both have in common keeps its solver. `alone`: the calling thread is to do all the work.
     fn follow(&mut self, model: &Model, alone: bool);
 
@@ -28,7 +28,7 @@ pub(crate) trait Crew: Send {
 }
 
 /// Makes the solver of a body; the flag says whether the calling thread is to do all the work.
-type Make<S> = Box<dyn Fn(&Body, bool) -> S + Send>;
+type Make<S> = Box<dyn Fn(&Body, bool) -> S + Send + Sync>;
 
 /// Bodies that are all stepped by the same kind of solver.
 pub(crate) struct Workers<S> {
@@ -44,7 +44,7 @@ pub(crate) struct Workers<S> {
 }
 
 impl<S: Solver> Workers<S> {
-    pub fn new(make: impl Fn(&Body, bool) -> S + Send + 'static) -> Self {
+    pub fn new(make: impl Fn(&Body, bool) -> S + Send + Sync + 'static) -> Self {
         Self {
             make: Box::new(make),
             list: Vec::new(),

@@ -8,7 +8,7 @@ use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
 /// A solver with its scratch memory for one body.
-pub(crate) trait Solver: Send + Sized {
+pub(crate) trait Solver: Send + Sync + Sized {
     /// Whether bodies can touch each other.
     const COUPLES: bool;
 

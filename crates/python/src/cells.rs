@@ -1,0 +1,308 @@
+//! `Cells`: episodes of one scene, side by side in one process.
+
+use crate::actions::Actions;
+use crate::error::{task, wrong};
+use crate::frames::Rows;
+use crate::prepare;
+use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray2, PyReadonlyArray1, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use std::path::PathBuf;
+use trocar_cell::Action;
+use trocar_task::{Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
+
+/// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it goes on), time [s].
+const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
+
+/// Names of the ends, by their number in `figures`.
+const ENDS: [&str; 5] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error"];
+
+/// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
+#[pyclass(frozen)]
+pub struct State(EpisodeState);
+
+/// Episodes of one scene, stepped side by side.
+#[pyclass]
+pub struct Cells {
+    episodes: Vec<Episode>,
+    actions: Actions,
+    pool: rayon::ThreadPool,
+    task_name: &'static str,
+    organ: String,
+    steps: usize,
+}
+
+/// A cell with what is written of it.
+struct Place<'a> {
+    episode: &'a mut Episode,
+    state: &'a mut [f32],
+    figures: &'a mut [f64],
+    channels: &'a mut [f64],
+}
+
+impl Place<'_> {
+    fn write(&mut self, reward: f64) {
+        let episode = &*self.episode;
+        for (to, from) in self.state.iter_mut().zip(episode.observe().to_vec()) {
+            *to = from as f32;
+        }
+        let progress = episode.progress();
+        let end = episode.end().and_then(|e| ENDS.iter().position(|n| *n == e.name()));
+        let end = end.map_or(-1.0, |k| k as f64);
+        self.figures.copy_from_slice(&[reward, progress.score(), progress.stage as f64, end, episode.time()]);
+        if !self.channels.is_empty() {
+            let row = episode.rows().last().copied().unwrap_or_default();
+            self.channels.copy_from_slice(&row.to_row());
+        }
+    }
+
+    /// The reward is the gain in stages, parts of stages included: a task passed gives as much as it has stages in all.
+    fn step(&mut self, action: &Action) -> Result<(), trocar_task::Error> {
+        if self.episode.end().is_some() {
+            return Err(trocar_task::Error::Ended(self.episode.end().map_or_else(String::new, End::to_string)));
+        }
+        let stages = self.episode.progress().stages.len() as f64;
+        let before = self.episode.progress().score();
+        self.episode.step(action)?;
+        self.write(stages * (self.episode.progress().score() - before));
+        Ok(())
+    }
+}
+
+#[pymethods]
+impl Cells {
+    /// `count` episodes of `scene` on `threads` threads (0: as many as the machine has; results do not depend on them).
+    #[new]
+    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None))]
+    fn new(
+        py: Python<'_>,
+        scene: &str,
+        count: usize,
+        phantoms: PathBuf,
+        threads: usize,
+        task: Option<&str>,
+        actions: &str,
+        episode_s: Option<f64>,
+    ) -> PyResult<Self> {
+        if count == 0 || count > 4096 {
+            return Err(wrong(format!("num_envs: is {count}; 1 to 4096 cells")));
+        }
+        let scene = prepare::scene(scene, task, episode_s)?;
+        py.detach(|| {
+            let specimen = prepare::specimen(&scene, &phantoms)?;
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(wrong)?;
+            // One cell uses all threads; of many, each has its own.
+            let each = if count == 1 { threads } else { 1 };
+            let built: Result<Vec<Episode>, trocar_task::Error> =
+                pool.install(|| (0..count).into_par_iter().map(|_| Episode::new(&scene, &specimen, each)).collect());
+            let episodes = built.map_err(|e| crate::error::task(&e))?;
+            let actions = Actions::new(episodes[0].cell(), actions)?;
+            let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
+            let organ = scene.task.organ.clone();
+            Ok(Self { episodes, actions, pool, task_name: scene.task.name.name(), organ, steps })
+        })
+    }
+
+    /// Cells.
+    #[getter]
+    fn count(&self) -> usize {
+        self.episodes.len()
+    }
+
+    /// Name of the task.
+    #[getter]
+    fn task(&self) -> &'static str {
+        self.task_name
+    }
+
+    /// The organ it is about.
+    #[getter]
+    fn organ(&self) -> &str {
+        &self.organ
+    }
+
+    /// Control periods of an episode, at most.
+    #[getter]
+    fn max_steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Control periods a second.
+    #[getter]
+    fn control_hz(&self) -> f64 {
+        1.0 / self.episodes[0].cell().period()
+    }
+
+    /// Names of the numbers of a state.
+    #[getter]
+    fn state_names(&self) -> Vec<&'static str> {
+        STATE_NAMES[..STATE_SIZE].to_vec()
+    }
+
+    /// Names of the numbers of an action.
+    #[getter]
+    fn action_names(&self) -> Vec<String> {
+        self.actions.names.clone()
+    }
+
+    /// Names of the channels.
+    #[getter]
+    fn channel_names(&self) -> Vec<String> {
+        Channels::names()
+    }
+
+    /// Names of the figures.
+    #[getter]
+    fn figure_names(&self) -> Vec<&'static str> {
+        FIGURES.to_vec()
+    }
+
+    /// Names of the ends, by their number in the figures.
+    #[getter]
+    fn end_names(&self) -> Vec<&'static str> {
+        ENDS.to_vec()
+    }
+
+    /// Names of the task's stages.
+    #[getter]
+    fn stage_names(&self) -> Vec<&'static str> {
+        Stage::of(self.episodes[0].scene().task.name).iter().map(|s| s.name()).collect()
+    }
+
+    /// Least and greatest numbers of an action.
+    #[getter]
+    fn action_limits<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
+        (PyArray1::from_slice(py, &self.actions.low), PyArray1::from_slice(py, &self.actions.high))
+    }
+
+    /// Begins the episodes of `seeds` in the cells `which`, and writes what is seen there.
+    fn reset(
+        &mut self,
+        py: Python<'_>,
+        which: PyReadonlyArray1<'_, i64>,
+        seeds: PyReadonlyArray1<'_, u64>,
+        state: &Bound<'_, PyArrayDyn<f32>>,
+        figures: &Bound<'_, PyArrayDyn<f64>>,
+        channels: &Bound<'_, PyArrayDyn<f64>>,
+    ) -> PyResult<()> {
+        let count = self.episodes.len();
+        let (which, seeds) = (which.as_slice().map_err(wrong)?, seeds.as_slice().map_err(wrong)?);
+        let mut wanted = vec![None; count];
+        for (k, seed) in which.iter().zip(seeds) {
+            let place = usize::try_from(*k).ok().and_then(|k| wanted.get_mut(k));
+            *place.ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))? = Some(*seed);
+        }
+        let begin = |(place, seed): (&mut Place<'_>, &Option<u64>)| match seed {
+            Some(seed) => place.episode.reset(*seed).map(|_| place.write(0.0)),
+            None => Ok(()),
+        };
+        self.each(py, state, figures, channels, &wanted, begin)
+    }
+
+    /// Does one control period in every cell that `active` says, by its row of `actions`. An action that is not finite is refused before anything changes.
+    fn step(
+        &mut self,
+        py: Python<'_>,
+        actions: PyReadonlyArray2<'_, f64>,
+        active: PyReadonlyArray1<'_, bool>,
+        state: &Bound<'_, PyArrayDyn<f32>>,
+        figures: &Bound<'_, PyArrayDyn<f64>>,
+        channels: &Bound<'_, PyArrayDyn<f64>>,
+    ) -> PyResult<()> {
+        let (count, numbers) = (self.episodes.len(), self.actions.len());
+        if actions.shape() != [count, numbers] {
+            return Err(wrong(format!("actions: have shape {:?}; ({count}, {numbers}) is needed", actions.shape())));
+        }
+        let active = active.as_slice().map_err(wrong)?;
+        if active.len() != count {
+            return Err(wrong(format!("active: has {} flags; {count} are needed", active.len())));
+        }
+        let rows = actions.as_slice().map_err(wrong)?.chunks_exact(numbers);
+        let told: Vec<Option<Action>> = rows
+            .zip(active)
+            .map(|(row, active)| active.then(|| self.actions.action(row)).transpose())
+            .collect::<PyResult<_>>()?;
+        let go = |(place, action): (&mut Place<'_>, &Option<Action>)| match action {
+            Some(action) => place.step(action),
+            None => Ok(()),
+        };
+        self.each(py, state, figures, channels, &told, go)
+    }
+
+    /// Why the episode in cell `k` ended; None while it goes on.
+    fn why(&self, k: usize) -> PyResult<Option<String>> {
+        Ok(self.at(k)?.end().map(End::to_string))
+    }
+
+    /// What happened in cell `k` since its reset: a JSON list of `[time_s, event]`.
+    fn events(&self, k: usize) -> PyResult<String> {
+        serde_json::to_string(self.at(k)?.events()).map_err(wrong)
+    }
+
+    /// The episode in cell `k` in figures: a JSON object.
+    fn summary(&self, k: usize) -> PyResult<String> {
+        serde_json::to_string(&self.at(k)?.summary()).map_err(wrong)
+    }
+
+    /// Hash over every bit that the future of cell `k` depends on.
+    fn state_hash(&self, k: usize) -> PyResult<u64> {
+        Ok(self.at(k)?.state_hash())
+    }
+
+    /// The state of cell `k`.
+    fn save(&self, k: usize) -> PyResult<State> {
+        Ok(State(self.at(k)?.save()))
+    }
+
+    /// Puts `state` into cell `k`, and writes what is seen there.
+    fn restore(
+        &mut self,
+        py: Python<'_>,
+        k: usize,
+        saved: &State,
+        state: &Bound<'_, PyArrayDyn<f32>>,
+        figures: &Bound<'_, PyArrayDyn<f64>>,
+        channels: &Bound<'_, PyArrayDyn<f64>>,
+    ) -> PyResult<()> {
+        self.at(k)?;
+        let which: Vec<Option<&State>> = (0..self.episodes.len()).map(|j| (j == k).then_some(saved)).collect();
+        let put = |(place, saved): (&mut Place<'_>, &Option<&State>)| match saved {
+            Some(saved) => place.episode.restore(&saved.0).map(|()| place.write(0.0)),
+            None => Ok(()),
+        };
+        self.each(py, state, figures, channels, &which, put)
+    }
+}
+
+impl Cells {
+    fn at(&self, k: usize) -> PyResult<&Episode> {
+        let count = self.episodes.len();
+        self.episodes.get(k).ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))
+    }
+
+    /// Does `work` in every cell, with what `with` has for it, in parallel and without the interpreter's lock. The first error in the order of the cells is told.
+    fn each<T: Sync>(
+        &mut self,
+        py: Python<'_>,
+        state: &Bound<'_, PyArrayDyn<f32>>,
+        figures: &Bound<'_, PyArrayDyn<f64>>,
+        channels: &Bound<'_, PyArrayDyn<f64>>,
+        with: &[T],
+        work: impl Fn((&mut Place<'_>, &T)) -> Result<(), trocar_task::Error> + Sync,
+    ) -> PyResult<()> {
+        let count = self.episodes.len();
+        let mut state = Rows::new(state, "state", count, &[STATE_SIZE])?;
+        let mut figures = Rows::new(figures, "figures", count, &[FIGURES.len()])?;
+        let mut channels = Rows::new(channels, "channels", count, &[Channels::COUNT])?;
+        let mut places: Vec<Place<'_>> = self
+            .episodes
+            .iter_mut()
+            .zip(state.pieces()?.into_iter().zip(figures.pieces()?).zip(channels.pieces()?))
+            .map(|(episode, ((state, figures), channels))| Place { episode, state, figures, channels })
+            .collect();
+        let pool = &self.pool;
+        let done: Vec<Result<(), trocar_task::Error>> =
+            py.detach(|| pool.install(|| places.par_iter_mut().zip(with).map(&work).collect()));
+        done.into_iter().collect::<Result<(), _>>().map_err(|e| task(&e))
+    }
+}

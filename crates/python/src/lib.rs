@@ -1,0 +1,22 @@
+//! The native module of the Python package `trocar`: many cells in one process, stepped in parallel without the interpreter's lock.
+//!
+//! It knows no Gymnasium and no dataset; `python/trocar` makes environments of it. Arrays are the caller's and are written in place.
+
+mod actions;
+mod cells;
+mod error;
+mod frames;
+mod prepare;
+mod progress;
+
+use pyo3::prelude::*;
+
+/// The module.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<cells::Cells>()?;
+    module.add_class::<cells::State>()?;
+    module.add_function(wrap_pyfunction!(prepare::scenes, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,38 @@
+//! From the name of a scene to an episode: the scene with what the caller changes, its specimen from disk or made once and kept.
+
+use crate::error::{evaluate, wrong};
+use crate::progress::Signals;
+use pyo3::prelude::*;
+use std::path::Path;
+use trocar_evaluate::scene_specimen;
+use trocar_scene::{BUILTINS, Scene, TaskName};
+use trocar_specimen::Specimen;
+
+/// Names of the built-in scenes.
+#[pyfunction]
+pub fn scenes() -> Vec<&'static str> {
+    BUILTINS.iter().map(|b| b.name).collect()
+}
+
+/// The scene `name` (or file), asking for `task` where that is given and for `episode_s` seconds.
+pub fn scene(name: &str, task: Option<&str>, episode_s: Option<f64>) -> PyResult<Scene> {
+    let mut scene = Scene::read(name).map_err(wrong)?;
+    if let Some(task) = task {
+        let all = [TaskName::AppendixResection, TaskName::GraspLift, TaskName::PortReach];
+        scene.task.name = all.into_iter().find(|t| t.name() == task).ok_or_else(|| {
+            wrong(format!("task: '{task}' is unknown; {} are known", all.map(TaskName::name).join(", ")))
+        })?;
+    }
+    if let Some(seconds) = episode_s {
+        if !(seconds > 0.0 && seconds.is_finite()) {
+            return Err(wrong(format!("episode_s: is {seconds}; it must be positive")));
+        }
+        scene.task.episode_s = seconds;
+    }
+    Ok(scene)
+}
+
+/// The specimen of `scene`; a phantom's is made in the folder `phantoms` the first time, which takes seconds.
+pub fn specimen(scene: &Scene, phantoms: &Path) -> PyResult<Specimen> {
+    scene_specimen(scene, phantoms, &Signals::new()).map_err(|e| evaluate(&e))
+}

@@ -1,0 +1,72 @@
+"""Calibration gives back the camera that pictures of a board were drawn with."""
+
+
+import numpy as np
+import pytest
+
+cv2 = pytest.importorskip("cv2")
+
+from trocar.calibration import Board, calibrate, main
+
+BOARD = Board((9, 6), 10e-3, 7e-3, "DICT_4X4_100")
+MATRIX = np.array([[600.0, 0, 325.0], [0, 605.0, 238.0], [0, 0, 1]])
+PINHOLE = np.array([-0.20, 0.06, 0.001, -0.0005, 0.0])
+SIZE = (640, 480)
+
+
+def drawn(distortion, views=12):
+    """Pictures of the board, through the distorted lens by its inverse at every pixel of a picture of twice the size."""
+    flat = BOARD.opencv().generateImage((1800, 1200), marginSize=0)
+    scale = 1800 / (9 * BOARD.square)
+    dice = np.random.default_rng(3)
+    fine = 2
+    y, x = np.mgrid[0 : SIZE[1] * fine, 0 : SIZE[0] * fine]
+    pixels = np.stack([(x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5], -1).reshape(-1, 1, 2).astype(np.float64)
+    rays = cv2.undistortPoints(pixels, MATRIX, distortion, criteria=(3, 40, 1e-10)).reshape(-1, 2)
+    rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
+    for _ in range(views):
+        turn = cv2.Rodrigues(dice.uniform([-0.5, -0.5, -0.3], [0.5, 0.5, 0.3]))[0]
+        centre = np.array([dice.uniform(-0.02, 0.02), dice.uniform(-0.015, 0.015), dice.uniform(0.09, 0.15)])
+        shift = centre - turn @ np.array([4.5, 3, 0]) * BOARD.square
+        normal = turn[:, 2]
+        hit = rays * ((normal @ shift) / (rays @ normal))[:, None]
+        on_board = (hit - shift) @ turn[:, :2] * scale - 0.5
+        maps = on_board.reshape(SIZE[1] * fine, SIZE[0] * fine, 2).astype(np.float32)
+        big = cv2.remap(flat, maps[..., 0], maps[..., 1], cv2.INTER_LINEAR, borderValue=255)
+        yield cv2.resize(big, SIZE, interpolation=cv2.INTER_AREA)
+
+
+def test_a_drawn_board_gives_the_lens_back(tmp_path):
+    pictures = list(drawn(PINHOLE))
+    made = calibrate(pictures, BOARD)
+    assert made.rms < 0.1 and len(made.views) >= 10
+    np.testing.assert_allclose(np.diag(made.matrix)[:2], [600, 605], rtol=2e-3)
+    np.testing.assert_allclose(made.matrix[:2, 2], [325, 238], atol=1.0)
+    assert abs(made.distortion[0] - PINHOLE[0]) < 0.01
+    # The command writes what OpenCV reads.
+    names = []
+    for k, picture in enumerate(pictures):
+        names.append(str(tmp_path / f"{k}.png"))
+        cv2.imwrite(names[-1], picture)
+    for name in ("camera.yaml", "camera.json"):
+        arguments = [*names, "--squares", "9x6", "--square-mm", "10", "--marker-mm", "7", "--dictionary", "DICT_4X4_100"]
+        assert main([*arguments, "-o", str(tmp_path / name), "--json"]) == 0
+        storage = cv2.FileStorage(str(tmp_path / name), cv2.FILE_STORAGE_READ)
+        np.testing.assert_allclose(storage.getNode("camera_matrix").mat(), made.matrix, rtol=1e-5)
+        assert int(storage.getNode("image_width").real()) == 640
+
+
+def test_what_is_wrong_is_said(tmp_path, capsys):
+    blank = [np.full((480, 640), 200, np.uint8)] * 6
+    with pytest.raises(ValueError, match="found in 0 of 6 pictures"):
+        calibrate(blank, BOARD)
+    with pytest.raises(ValueError, match="all must be of one size"):
+        calibrate([blank[0], np.zeros((10, 10), np.uint8)], BOARD)
+    with pytest.raises(ValueError, match="do not fit"):
+        calibrate(blank, Board((9, 6), 7e-3, 10e-3))
+    with pytest.raises(ValueError, match="knows no 'DICT'"):
+        calibrate(blank, Board((9, 6), 10e-3, 7e-3, "DICT"))
+    arguments = [str(tmp_path / "none.png"), "--square-mm", "10", "--marker-mm", "7", "-o", str(tmp_path / "c.yaml")]
+    assert main(arguments) == 1
+    assert "none.png is no picture" in capsys.readouterr().err
+    assert not (tmp_path / "c.yaml").exists()

@@ -1,0 +1,167 @@
+"""Datasets are read back by those who define the layouts, as far as they are installed: pyarrow and h5py always, LeRobot where it is."""
+
+import json
+
+import numpy as np
+import pytest
+
+pytest.importorskip("pyarrow")
+pytest.importorskip("av")
+h5py = pytest.importorskip("h5py")
+
+import pandas as pd
+import pyarrow.parquet as pq
+from trocar.datasets import LeRobotWriter, RobomimicWriter
+from trocar.datasets import _stats, _video
+
+FEATURES = {
+    "observation.state": {"dtype": "float32", "shape": (3,), "names": ["x", "y", "z"]},
+    "observation.images.endoscope": {"dtype": "video", "shape": (64, 96, 3), "names": ["height", "width", "channels"]},
+    "action": {"dtype": "float32", "shape": (2,), "names": None},
+}
+LENGTHS = [7, 12, 5]
+
+
+def picture(episode: int, frame: int) -> np.ndarray:
+    """A smooth picture whose colours say which frame it is."""
+    y, x = np.mgrid[0:64, 0:96]
+    return np.stack([x * 2, y * 3, np.full_like(x, 20 * episode + 10 * frame)], -1).astype(np.uint8)
+
+
+def frames(episode: int):
+    for k in range(LENGTHS[episode]):
+        yield {
+            "observation.state": np.array([episode, k, -k], dtype=np.float32),
+            "observation.images.endoscope": picture(episode, k),
+            "action": np.array([k, 0.5], dtype=np.float32),
+        }
+
+
+def write(root, version, episodes=range(len(LENGTHS))):
+    writer = LeRobotWriter(root, fps=30, features=FEATURES, version=version)
+    for episode in episodes:
+        for frame in frames(episode):
+            writer.add_frame(frame)
+        assert writer.save_episode("lift" if episode < 2 else "cut") == episode
+    return writer
+
+
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+def test_numbers_and_pictures_come_back(tmp_path, version):
+    root = tmp_path / "set"
+    write(root, version)
+    info = json.loads((root / "meta/info.json").read_text())
+    assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (3, sum(LENGTHS), 2)
+    table = pd.concat(pd.read_parquet(p) for p in sorted((root / "data").rglob("*.parquet")))
+    assert table["index"].tolist() == list(range(sum(LENGTHS)))
+    assert table["episode_index"].tolist() == [e for e, n in enumerate(LENGTHS) for _ in range(n)]
+    assert table["task_index"].tolist() == [0] * (LENGTHS[0] + LENGTHS[1]) + [1] * LENGTHS[2]
+    assert np.stack(table["observation.state"])[LENGTHS[0] + 3].tolist() == [1, 3, -3]
+    for episode, length in enumerate(LENGTHS):
+        path = sorted((root / "videos").rglob("*.mp4"))[episode]
+        decoded = _video.read(path).astype(int)
+        assert len(decoded) == length
+        for k in range(length):
+            error = np.abs(decoded[k] - picture(episode, k).astype(int))
+            assert error.mean() < 3.0, (episode, k)
+
+
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+def test_a_dataset_is_gone_on_with_and_looks_as_if_written_at_once(tmp_path, version):
+    write(tmp_path / "whole", version)
+    write(tmp_path / "parts", version, [0])
+    write(tmp_path / "parts", version, [1, 2])
+    whole = sorted(p.relative_to(tmp_path / "whole") for p in (tmp_path / "whole").rglob("*") if p.is_file())
+    assert whole == sorted(p.relative_to(tmp_path / "parts") for p in (tmp_path / "parts").rglob("*") if p.is_file())
+    for name in whole:
+        if name.suffix == ".parquet":
+            assert pq.read_table(tmp_path / "whole" / name).equals(pq.read_table(tmp_path / "parts" / name)), name
+        elif name.suffix != ".mp4":
+            assert (tmp_path / "whole" / name).read_text() == (tmp_path / "parts" / name).read_text(), name
+
+
+def test_an_episode_that_was_not_finished_leaves_nothing(tmp_path):
+    root = tmp_path / "set"
+    writer = write(root, "v3.0", [0])
+    before = (root / "meta/info.json").read_text()
+    for frame in frames(1):
+        writer.add_frame(frame)
+    writer.save_episode("lift")
+    # As after a crash just before `info` was written.
+    (root / "meta/info.json").write_text(before)
+    write(root, "v3.0", [1, 2])
+    table = pd.read_parquet(root / "data/chunk-000/file-000.parquet")
+    assert table["index"].tolist() == list(range(sum(LENGTHS)))
+    episodes = pd.read_parquet(root / "meta/episodes/chunk-000/file-000.parquet")
+    assert episodes["length"].tolist() == LENGTHS
+
+
+def test_wrong_frames_are_named_and_not_kept(tmp_path):
+    writer = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES)
+    good = next(frames(0))
+    for change, words in [
+        ({"action": np.zeros(3, np.float32)}, r"action has shape \(3,\)"),
+        ({"action": np.array([np.nan, 0], np.float32)}, "action holds a number that is not finite"),
+        ({"observation.images.endoscope": np.zeros((64, 96, 3))}, "pictures are uint8"),
+        ({"more": 1}, "more unknown"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            writer.add_frame(good | change)
+    with pytest.raises(ValueError, match="action missing"):
+        writer.add_frame({k: v for k, v in good.items() if k != "action"})
+    with pytest.raises(ValueError, match="no frames"):
+        writer.save_episode("lift")
+    (tmp_path / "foreign").mkdir()
+    (tmp_path / "foreign/letter.txt").write_text("dear")
+    with pytest.raises(FileExistsError, match="no LeRobot dataset"):
+        LeRobotWriter(tmp_path / "foreign", fps=30, features=FEATURES)
+
+
+def test_merged_statistics_are_those_of_all_frames():
+    dice = np.random.default_rng(1)
+    a, b = dice.normal(size=(50, 4)), dice.normal(2.0, 3.0, size=(130, 4))
+    got, want = _stats.merged(_stats.of_numbers(a), _stats.of_numbers(b)), _stats.of_numbers(np.concatenate([a, b]))
+    for name in ("min", "max", "mean", "std", "count"):
+        np.testing.assert_allclose(got[name], want[name], rtol=1e-12)
+
+
+def test_lerobot_reads_it(tmp_path):
+    pytest.importorskip("lerobot", reason="LeRobot is not installed (it brings PyTorch)")
+    from lerobot.datasets.lerobot_dataset import LeRobotDataset
+
+    write(tmp_path / "set", "v3.0")
+    dataset = LeRobotDataset("trocar/test", root=tmp_path / "set", video_backend="pyav", delta_timestamps={"action": [0, 1 / 30]})
+    assert (dataset.num_episodes, dataset.num_frames, dataset.fps) == (3, sum(LENGTHS), 30)
+    first = 0
+    for episode, length in enumerate(LENGTHS):
+        for k in (0, length - 1):
+            item = dataset[first + k]
+            assert item["observation.state"].tolist() == [episode, k, -k]
+            assert item["task"] == ("lift" if episode < 2 else "cut")
+            assert item["action"].shape == (2, 2)
+            shown = (item["observation.images.endoscope"].numpy().transpose(1, 2, 0) * 255).round()
+            assert np.abs(shown - picture(episode, k)).mean() < 3.0
+        first += length
+    assert dataset.meta.stats["observation.state"]["max"].shape == (3,)
+
+
+def test_robomimic_layout(tmp_path):
+    observations = {"state": {"dtype": "float32", "shape": (3,)}, "endoscope_image": {"dtype": "image", "shape": (64, 96, 3)}}
+    for part in ([0, 1], [2]):
+        writer = RobomimicWriter(tmp_path / "set.hdf5", observations=observations, actions=2, env_args={"obs": "state+rgb"})
+        for episode in part:
+            for k in range(LENGTHS[episode]):
+                frame = {"state": np.full(3, k, np.float32), "endoscope_image": picture(episode, k)}
+                writer.add_frame(frame | {"actions": np.array([k, 1.0]), "rewards": float(k)})
+            last = {"state": np.full(3, 99, np.float32), "endoscope_image": picture(episode, 9)}
+            assert writer.save_episode(last, success=episode == 1) == episode
+    with h5py.File(tmp_path / "set.hdf5") as file:
+        data = file["data"]
+        assert data.attrs["total"] == sum(LENGTHS)
+        assert json.loads(data.attrs["env_args"])["env_kwargs"] == {"obs": "state+rgb"}
+        demo = data["demo_1"]
+        assert demo.attrs["num_samples"] == LENGTHS[1] and demo.attrs["success"]
+        assert demo["dones"][:].tolist() == [0] * (LENGTHS[1] - 1) + [1]
+        assert demo["obs/state"][:, 0].tolist() == list(range(LENGTHS[1]))
+        assert demo["next_obs/state"][:, 0].tolist() == [*range(1, LENGTHS[1]), 99]
+        assert np.array_equal(demo["obs/endoscope_image"][4], picture(1, 4))

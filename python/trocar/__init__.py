@@ -1,0 +1,33 @@
+"""Trocar: a simulator for laparoscopic robot policies.
+
+>>> import gymnasium as gym, trocar
+>>> env = gym.make("trocar/AppendixResection-v0", obs="state")
+>>> envs = gym.make_vec("trocar/GraspLift-v0", num_envs=16)
+
+Environments are documented in `trocar.envs`, demonstrations on disk in `trocar.datasets`, camera calibration in `trocar.calibration`.
+"""
+
+import gymnasium as _gymnasium
+
+from ._native import __version__, scenes
+from .envs import TrocarEnv, TrocarVectorEnv
+
+__all__ = ["TASKS", "TrocarEnv", "TrocarVectorEnv", "__version__", "scenes"]
+
+#: Environments by name, with the task that each asks for.
+TASKS = {
+    "trocar/AppendixResection-v0": "appendix-resection",
+    "trocar/GraspLift-v0": "grasp-lift",
+    "trocar/PortReach-v0": "port-reach",
+}
+
+for _name, _task in TASKS.items():
+    if _name not in _gymnasium.registry:
+        _gymnasium.register(
+            id=_name,
+            entry_point="trocar.envs:TrocarEnv",
+            vector_entry_point="trocar.envs:TrocarVectorEnv",
+            kwargs={"task": _task},
+            # The episode's time is the task's and ends it from within.
+            max_episode_steps=None,
+        )

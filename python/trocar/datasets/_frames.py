@@ -1,0 +1,68 @@
+"""What writers of demonstrations share: features, the frames of an episode under way, files that appear whole."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+#: A feature: `{"dtype": "float32" | "int64" | ... | "video", "shape": (...), "names": [...] | None}`.
+Feature = dict[str, Any]
+
+
+class Frames:
+    """The frames of one episode: checked against their features as they come."""
+
+    def __init__(self, features: dict[str, Feature]):
+        self.features = features
+        self.columns: dict[str, list[np.ndarray]] = {}
+        self.clear()
+
+    def clear(self) -> None:
+        self.columns = {key: [] for key in self.features}
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values()), []))
+
+    def add(self, frame: dict[str, Any]) -> None:
+        """Takes a frame. What is wrong with it is told by the feature's name, and nothing of it is kept."""
+        missing, unknown = self.features.keys() - frame.keys(), frame.keys() - self.features.keys()
+        if missing or unknown:
+            words = [f"{', '.join(sorted(keys))} {what}" for keys, what in ((missing, "missing"), (unknown, "unknown")) if keys]
+            raise ValueError(f"frame: {'; '.join(words)}; the features are {', '.join(self.features)}")
+        checked = {key: checked_value(key, frame[key], feature) for key, feature in self.features.items()}
+        for key, value in checked.items():
+            self.columns[key].append(value)
+
+
+def checked_value(key: str, value: Any, feature: Feature) -> np.ndarray:
+    """`value` as an array of the feature's type and shape."""
+    kind = "uint8" if feature["dtype"] in ("video", "image") else feature["dtype"]
+    array = np.asarray(value)
+    shape = tuple(feature["shape"])
+    if array.shape != shape and not (array.shape == () and shape == (1,)):
+        raise ValueError(f"frame: {key} has shape {array.shape}; it must be {shape}")
+    if kind == "uint8" and array.dtype != np.uint8:
+        raise ValueError(f"frame: {key} is {array.dtype}; pictures are uint8")
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        raise ValueError(f"frame: {key} holds a number that is not finite")
+    if not np.can_cast(array.dtype, kind, casting="same_kind"):
+        raise ValueError(f"frame: {key} is {array.dtype}; it must be {kind}")
+    # A copy: environments write the next observation into the same array.
+    return np.array(array, dtype=kind).reshape(shape)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Writes JSON whole or not at all."""
+    replace(path, json.dumps(value, indent=4).encode())
+
+
+def replace(path: Path, content: bytes) -> None:
+    """Writes a file whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".partial")
+    partial.write_bytes(content)
+    os.replace(partial, path)

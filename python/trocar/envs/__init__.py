@@ -1,0 +1,26 @@
+"""Gymnasium environments of the two-arm cell.
+
+| name | task | passes when |
+|---|---|---|
+| `trocar/AppendixResection-v0` | `appendix-resection` | grasp, lift, positioning, jaw on tissue and cut are done, in this order |
+| `trocar/GraspLift-v0` | `grasp-lift` | the appendix is grasped, lifted and held |
+| `trocar/PortReach-v0` | `port-reach` | both instruments have been at three places each, in free motion |
+
+`TrocarEnv` is one cell, `TrocarVectorEnv` many in one process, which is what `gymnasium.make_vec` makes. Both take
+
+- `scene`: a built-in scene or a scene file (`cell-a`).
+- `obs`: what is observed, joined by `+`: `state`, `rgb`, `depth`. `state` alone gives one array, otherwise a dict gives
+  `agent_pos` (the state), `pixels` and `depth` (one array a camera).
+- `actions`: `pivots` for absolute targets (two pivots [rad], insertion [m], roll [rad], jaw opening 0 to 1, for each arm), `tip` for
+  steps of the tip ([m], roll [rad], jaw opening). With `normalize=True` every number is -1 to 1.
+- `episode_s`: longest episode [s], the scene's if not given.
+- `threads`: 0 for as many as the machine has. Results do not depend on it.
+
+The reward is the gain in stages, parts of stages included: an episode that passes gives as much as its task has stages. What is
+privileged (tissue, channels) is in `info` alone, and only with `privileged=True`.
+"""
+
+from .single import TrocarEnv
+from .vector import TrocarVectorEnv
+
+__all__ = ["TrocarEnv", "TrocarVectorEnv"]

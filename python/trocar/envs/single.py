@@ -1,0 +1,108 @@
+"""One cell as a Gymnasium environment."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gymnasium as gym
+import numpy as np
+
+from .cells import Cells
+
+
+class TrocarEnv(gym.Env):
+    """One episode after the other in one two-arm cell; see `trocar.envs` for the options.
+
+    `info["is_success"]` says whether the task is passed. An episode ends with `terminated` when it is passed or cannot go on (the
+    deviation at which hardware stops, tissue that diverged) and with `truncated` when its time is up. `reset(seed=S)` begins episode
+    S: the same seed gives the same bits on every machine of its kind. Without a seed the next one is drawn from `np_random`.
+    """
+
+    metadata = {"render_modes": [], "render_fps": 30}
+
+    def __init__(
+        self,
+        scene: str = "cell-a",
+        *,
+        task: str | None = None,
+        obs: str = "state",
+        actions: str = "pivots",
+        normalize: bool = False,
+        episode_s: float | None = None,
+        threads: int = 0,
+        privileged: bool = False,
+        render_mode: str | None = None,
+    ):
+        self.render_mode = render_mode
+        self.cells = Cells(
+            1,
+            scene=scene,
+            task=task,
+            obs=obs,
+            actions=actions,
+            normalize=normalize,
+            episode_s=episode_s,
+            threads=threads,
+            privileged=privileged,
+        )
+        self.observation_space = self.cells.observation_space()
+        self.action_space = self.cells.action_space()
+
+    @property
+    def task(self) -> str:
+        """Name of the task."""
+        return self.cells.native.task
+
+    @property
+    def task_description(self) -> str:
+        """What is asked for, in words."""
+        return self.cells.task_description
+
+    @property
+    def _max_episode_steps(self) -> int:
+        return self.cells.native.max_steps
+
+    @property
+    def state_names(self) -> list[str]:
+        """Names of the numbers of a state."""
+        return self.cells.native.state_names
+
+    @property
+    def action_names(self) -> list[str]:
+        """Names of the numbers of an action."""
+        return self.cells.native.action_names
+
+    @property
+    def state_hash(self) -> int:
+        """Hash over every bit that the future depends on."""
+        return self.cells.native.state_hash(0)
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        super().reset(seed=seed)
+        episode = seed if seed is not None else int(self.np_random.integers(2**31))
+        self.cells.reset(np.array([0]), np.array([episode]))
+        return self._observation(), self.cells.info(0) | {"seed": episode}
+
+    def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        self.cells.step(np.asarray(action)[None])
+        reward, ended, late = self.cells.rewards[0], self.cells.terminated[0], self.cells.truncated[0]
+        return self._observation(), float(reward), bool(ended), bool(late), self.cells.info(0)
+
+    def save_state(self) -> Any:
+        """The whole state. What follows from a restored one is the same to the bit; it stays in the process."""
+        return self.cells.save(0)
+
+    def restore_state(self, state: Any) -> Any:
+        """Goes back to a state that `save_state` of this environment, or of one like it, gave; returns what is seen there."""
+        self.cells.restore(0, state)
+        return self._observation()
+
+    def _observation(self) -> Any:
+        return _first(self.cells.observation())
+
+
+def _first(value: Any) -> Any:
+    """What cell 0 sees, as a copy: users keep observations."""
+    if isinstance(value, dict):
+        return {key: _first(part) for key, part in value.items()}
+    return value[0].copy()
