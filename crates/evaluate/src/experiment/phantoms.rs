@@ -1,7 +1,9 @@
 //! The phantoms as specimens: recorded, unless an earlier run left the recording, and reconstructed.
 
-use crate::Result;
 use crate::workflow::reconstruct_recording;
+use crate::{Error, Result};
+use std::fs::File;
+use std::io::ErrorKind;
 use std::path::Path;
 use trocar_phantom::RecordOptions;
 use trocar_progress::Progress;
@@ -21,14 +23,37 @@ pub(super) fn recorded(phantom: &str, options: &RecordOptions, dir: &Path, progr
     Ok(trocar_phantom::record(phantom, options, dir, progress)?)
 }
 
-/// `phantom` recorded into `folder/recording` and reconstructed with the default settings into `folder/specimen`.
+/// What a kept specimen must have been made by and with to be used again.
+const STAMP: &str = "made-by.txt";
+
+/// `phantom` recorded into `folder/recording` and reconstructed with the default settings into `folder/specimen`, or what lies there of an earlier time if the same program would make the same.
+/// Of several processes that want it at once, one makes it and the others wait.
 pub(crate) fn specimen(
     phantom: &str,
     options: &RecordOptions,
     folder: &Path,
     progress: &dyn Progress,
 ) -> Result<Specimen> {
-    let [recording, specimen] = ["recording", "specimen"].map(|name| folder.join(name));
+    let (settings, [recording, specimen]) = (Settings::default(), ["recording", "specimen"].map(|n| folder.join(n)));
+    let stamp = format!("{phantom}\n{options:?}\n{settings:?}\n{}\n", env!("TROCAR_SPECIMEN_MAKERS"));
+    let path = folder.join(STAMP);
+    let io = |source| Error::Io { path: path.clone(), source };
+    std::fs::create_dir_all(folder).map_err(io)?;
+    let lock = File::create(folder.join(".lock")).map_err(io)?;
+    lock.lock().map_err(io)?;
+    if std::fs::read_to_string(&path).is_ok_and(|kept| kept == stamp)
+        && let Ok(kept) = Specimen::read(&specimen)
+    {
+        return Ok(kept);
+    }
+    // Until all is made anew, what lies there is of nobody.
+    match std::fs::remove_file(&path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => return Err(io(e)),
+        _ => {}
+    }
     recorded(phantom, options, &recording, progress)?;
-    Ok(reconstruct_recording(&recording, &Settings::default(), &specimen, progress)?.1.specimen)
+    reconstruct_recording(&recording, &settings, &specimen, progress)?;
+    std::fs::write(&path, &stamp).map_err(io)?;
+    // Read back, so that it is the same to the bit whoever made it.
+    Ok(Specimen::read(&specimen)?)
 }
