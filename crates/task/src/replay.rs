@@ -131,12 +131,8 @@ impl EpisodeFile {
     /// # Errors
     /// When it cannot be written.
     pub fn write(&self, path: &Path) -> Result<()> {
-        let line = Line {
-            format: FORMAT.to_owned(),
-            version: VERSION,
-            steps: self.steps.len(),
-            header: self.header.clone(),
-        };
+        let line =
+            Line { format: FORMAT.to_owned(), version: VERSION, steps: self.steps.len(), header: self.header.clone() };
         let invalid = |reason: String| Error::Invalid { path: path.to_owned(), reason };
         let mut bytes = serde_json::to_vec(&line).map_err(|e| invalid(format!("cannot be written: {e}")))?;
         bytes.push(b'\n');
@@ -191,7 +187,9 @@ impl EpisodeFile {
         let wanted = line.steps.checked_mul(size).and_then(|n| n.checked_add(8));
         if wanted != Some(body.len()) {
             let (steps, has) = (line.steps, body.len());
-            return Err(format!("{steps} steps of {size} bytes and a checksum of 8 should follow its header; {has} bytes do"));
+            return Err(format!(
+                "{steps} steps of {size} bytes and a checksum of 8 should follow its header; {has} bytes do"
+            ));
         }
         let (steps, sum) = body.split_at(body.len() - 8);
         if xxh3_64(&bytes[..bytes.len() - 8]).to_le_bytes() != sum {

@@ -97,8 +97,7 @@ fn encode(info: &ChannelsInfo, rows: &[Channels]) -> std::result::Result<Vec<u8>
         .set_created_by(format!("trocar {}", env!("CARGO_PKG_VERSION")))
         .set_key_value_metadata(Some(vec![KeyValue::new(KEY.to_owned(), text)]))
         .build();
-    let mut writer =
-        SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties)).map_err(failed)?;
+    let mut writer = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties)).map_err(failed)?;
     let table: Vec<Vec<f64>> = rows.iter().map(Channels::to_row).collect();
     let mut group = writer.next_row_group().map_err(failed)?;
     let mut k = 0;

@@ -105,7 +105,8 @@ pub fn sweep(episodes: &[(ChannelsInfo, Vec<Channels>)], ranges: &[GateRange]) -
         return Err(Error::Option(format!("channels of different tasks, {a} and {b}; sweep one task at a time")));
     }
     let count = ranges.iter().try_fold(1_usize, |n, r| n.checked_mul(r.values.len()).filter(|n| *n <= MOST_ROWS));
-    let count = count.ok_or_else(|| Error::Option(format!("more than {MOST_ROWS} combinations; sweep fewer values")))?;
+    let count =
+        count.ok_or_else(|| Error::Option(format!("more than {MOST_ROWS} combinations; sweep fewer values")))?;
     let stages = Stage::of(task);
     let mut rows = Vec::with_capacity(count);
     for k in 0..count {

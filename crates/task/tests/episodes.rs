@@ -77,7 +77,7 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
     let mut soft = specimen.clone();
     soft.organs[0].material.young_modulus_pa *= 1.001;
     assert!(file.verify(&scene, &soft, 1).unwrap().said.contains("specimen"));
-    let mut stricter = scene.clone();
+    let mut stricter = scene;
     stricter.task.gates.lift_mm = 9.0;
     assert!(file.verify(&stricter, &specimen, 1).unwrap().said.contains("scene"));
     damaged(&path);
