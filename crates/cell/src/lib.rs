@@ -27,8 +27,8 @@ mod target;
 mod world;
 
 pub use cell::{
-    Action, ActionSpace, ArmObservation, Carried, Cell, CellEvent, CellReport, CellState, MOST_LOAD, Placed, ROLL_SPEED,
-    SWING_SPEED, TIP_SPEED, TaggedForce, Timing, TissueObservation,
+    Action, ActionSpace, ArmObservation, Carried, Cell, CellEvent, CellReport, CellState, MOST_LOAD, Placed,
+    ROLL_SPEED, SWING_SPEED, TIP_SPEED, TaggedForce, Timing, TissueObservation,
 };
 pub use cell_lift::{CellLift, CellLiftPolicy, CellLiftRun, CellLiftSample, CellLiftSummary};
 pub use clusters::{Cluster, clusters};

@@ -353,7 +353,6 @@ fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
     for sever in [false, true] {
         let mut scene = scene();
         scene.task.sever = sever;
-        scene.instruments[1].jaw_force_n = 5.0;
         let mut cell = Cell::new(&scene, &two_tubes(ONE_END, 2.2e-3), 1).unwrap();
         let at = DVec3::new(0.005, 0.46, 0.045);
         cell.servo_jaw("right", 1.0).unwrap();

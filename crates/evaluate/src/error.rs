@@ -109,6 +109,9 @@ pub enum Error {
     /// A model cannot be built or stepped.
     #[error(transparent)]
     Tissue(#[from] trocar_tissue::Error),
+    /// An episode cannot be run, or its files are unusable.
+    #[error(transparent)]
+    Task(#[from] trocar_task::Error),
     /// A task cannot be run.
     #[error(transparent)]
     Cell(#[from] trocar_cell::Error),

@@ -3,6 +3,7 @@
 mod bench;
 mod cell_run;
 mod demo;
+mod episode_run;
 mod error;
 mod experiment;
 mod inspect;
@@ -20,6 +21,7 @@ pub use bench::{
 };
 pub use cell_run::{CellRun, CellSimulation, TimedEvent, scene_specimen};
 pub use demo::{Demo, DemoResult};
+pub use episode_run::{EpisodeMade, EpisodeRun, read_episode, replay, sweep_files};
 pub use error::{Error, Result};
 pub use experiment::{
     AppendixSource, ControllerBars, ControllerFigures, ControllerGridExperiment, ControllerGridResult,
@@ -32,6 +34,7 @@ pub use experiment::{
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};
+pub use trocar_task::SweepRow;
 pub use truth::TruthFigures;
 pub use workflow::{
     CompositeFigures, OrganRow, Reconstructed, SimulatedRun, reconstruct_recording, reconstruct_surface, simulate,

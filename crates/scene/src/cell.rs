@@ -239,7 +239,7 @@ pub struct Instrument {
     /// Full angle between the open blades [degrees].
     #[serde(default = "jaw_max_angle")]
     pub jaw_max_angle_deg: f64,
-    /// Force with which the jaws close [N].
+    /// Force with which the jaws close [N]; 0.5 if left out, for a cutter too. The paper's cutter has 20.
     #[serde(default = "jaw_force")]
     pub jaw_force_n: f64,
     /// Pose of the mount in the flange's frame.
@@ -275,6 +275,9 @@ fn jaw_force() -> f64 {
     0.5
 }
 
+/// Force of the paper's cutter [N]. Tissue between blades stiffens without end as they close, so a grasper's half a newton stops short of closed in thick or stiff tissue; laparoscopic scissors close with tens.
+const CUTTER_FORCE_N: f64 = 20.0;
+
 impl Instrument {
     /// The paper's instrument of that kind.
     pub fn of(kind: InstrumentKind) -> Self {
@@ -291,7 +294,10 @@ impl Instrument {
             mass_kg: instrument_mass(),
             centre_of_mass_mm: centre_of_mass(),
             jaw_max_angle_deg: jaw_max_angle(),
-            jaw_force_n: jaw_force(),
+            jaw_force_n: match kind {
+                InstrumentKind::Grasper => jaw_force(),
+                InstrumentKind::Cutter => CUTTER_FORCE_N,
+            },
             mount: Frame::default(),
         }
     }

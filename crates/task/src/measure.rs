@@ -40,7 +40,8 @@ impl Subject {
 
     /// The bodies that the organ is in.
     pub fn bodies(&self, cell: &Cell) -> Vec<usize> {
-        let is = |name: &str| name.strip_prefix(&self.organ).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+        let is =
+            |name: &str| name.strip_prefix(&self.organ).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
         let bodies = cell.world().model.bodies().iter().enumerate();
         bodies.filter(|(_, b)| is(b.name())).map(|(k, _)| k).collect()
     }

@@ -51,9 +51,7 @@ impl Stage {
     /// The stages of a task, in order.
     pub fn of(task: TaskName) -> &'static [Self] {
         match task {
-            TaskName::AppendixResection => {
-                &[Self::Grasp, Self::Lift, Self::Positioning, Self::JawOnTissue, Self::Cut]
-            }
+            TaskName::AppendixResection => &[Self::Grasp, Self::Lift, Self::Positioning, Self::JawOnTissue, Self::Cut],
             TaskName::GraspLift => &[Self::Grasp, Self::Lift, Self::Held],
             TaskName::PortReach => &[Self::Reach1, Self::Reach2, Self::Reach3],
         }
@@ -153,8 +151,12 @@ pub struct Tracker {
 impl Tracker {
     /// At the beginning of `task`.
     pub fn new(task: TaskName, gates: &Gates) -> Self {
-        let stages =
-            Stage::of(task).iter().map(|stage| StageProgress { stage: *stage, passed: false, time_s: None, share: 0.0 });
+        let stages = Stage::of(task).iter().map(|stage| StageProgress {
+            stage: *stage,
+            passed: false,
+            time_s: None,
+            share: 0.0,
+        });
         let progress = Progress { stage: 0, stages: stages.collect() };
         Self { gates: *gates, progress, since: None, armed: false }
     }

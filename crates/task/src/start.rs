@@ -67,7 +67,7 @@ pub(crate) fn starts(scene: &Scene, cell: &Cell, seed: u64) -> Vec<Coordinates> 
 
 /// Greatest tilt of port-reach's targets [rad].
 const TARGET_TILT: f64 = 0.35;
-/// They are this much above the deepest insertion [m], over this length.
+/// They are this much above the deepest insertion with which the blades stay above the floor [m], over this length.
 const TARGET_ABOVE: f64 = 0.015;
 const TARGET_RANGE: f64 = 0.03;
 
@@ -79,18 +79,18 @@ pub(crate) fn targets(cell: &Cell, seed: u64) -> Result<Vec<[DVec3; 3]>> {
         let (limits, port) = (cell.limits(side.name())?, cell.port(side.name())?);
         let tilt = TARGET_TILT.min(0.9 * limits.tilt);
         let length = cell.blade_tip(side.name())?.distance(cell.measured_cp(side.name())?.translation);
-        let deepest = limits.insertion[1] - TARGET_ABOVE;
-        let target = |n: u64| {
+        let target = |n: u64| -> Result<DVec3> {
             let first = 16 * side as u64 + 4 * n;
             // Evenly over the cone's disc.
             let lean = tilt * random.unit(first).sqrt();
             let azimuth = std::f64::consts::TAU * random.unit(first + 1);
-            let insertion = random.within(first + 2, deepest - TARGET_RANGE, deepest).max(limits.insertion[0]);
             let pivots = [lean * azimuth.cos(), lean * azimuth.sin()];
-            let at = limits.clamp(&Coordinates { pivots, insertion, ..Coordinates::default() }).0;
-            port.tip(&at).transform(length * DVec3::X)
+            let low = limits.clamp(&Coordinates { pivots, insertion: limits.insertion[1], ..Coordinates::default() }).0;
+            let deepest = cell.solve(side.name(), &port.tip(&low), &low)?.coordinates.insertion - TARGET_ABOVE;
+            let insertion = random.within(first + 2, deepest - TARGET_RANGE, deepest).max(limits.insertion[0]);
+            Ok(port.tip(&Coordinates { insertion, ..low }).transform(length * DVec3::X))
         };
-        all.push([0, 1, 2].map(target));
+        all.push([target(0)?, target(1)?, target(2)?]);
     }
     Ok(all)
 }

@@ -1,12 +1,14 @@
 //! What a user may type.
 
 mod comparison;
+mod episode;
 mod grasp;
 mod port;
 mod scene;
 mod solver;
 
 pub use comparison::*;
+pub use episode::*;
 pub use grasp::*;
 pub use port::*;
 pub use scene::*;
@@ -47,6 +49,12 @@ pub enum Command {
     Scene(Scene),
     /// Run a scripted task on a specimen without a window.
     Simulate(Simulate),
+    /// Run one episode of a scene's task by a policy, into a folder.
+    Episode(Episode),
+    /// Do a recorded episode again and compare every step.
+    Replay(Replay),
+    /// Judge stored episodes at other gates, without simulating.
+    Sweep(Sweep),
     /// Make a table or figure of the paper anew, beside the paper's numbers.
     Experiment(Experiment),
     /// Measure what something costs.

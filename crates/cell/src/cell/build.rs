@@ -169,7 +169,12 @@ fn limits(port: &Port, instrument: &Instrument, blades: &Blades, floor: f64) -> 
 }
 
 /// The start pose as coordinates.
-pub(super) fn start(start: &trocar_scene::Start, port: &trocar_scene::Port, hole: &Port, blades: &Blades) -> Coordinates {
+pub(super) fn start(
+    start: &trocar_scene::Start,
+    port: &trocar_scene::Port,
+    hole: &Port,
+    blades: &Blades,
+) -> Coordinates {
     let u = hole.pose.rotation.inverse() * start.direction(port);
     // The pivots turn the port's z first about x, then about the y that the first has turned.
     let pivots = [(-u.y).atan2(u.z), u.x.atan2(u.y.hypot(u.z))];

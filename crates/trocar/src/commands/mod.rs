@@ -2,6 +2,7 @@
 
 mod bench;
 mod demo;
+mod episode;
 mod experiment;
 mod inspect;
 mod reconstruct;
@@ -19,6 +20,9 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
     match &cli.command {
         Command::Bench(arguments) => bench::run(arguments, cli.json, progress),
         Command::Demo(arguments) => demo::run(arguments, cli.json, progress),
+        Command::Episode(arguments) => episode::run(arguments, cli.json, progress),
+        Command::Replay(arguments) => episode::replay_file(arguments, cli.json, progress),
+        Command::Sweep(arguments) => episode::sweep(arguments, cli.json),
         Command::Inspect(arguments) => inspect::run(arguments, cli.json),
         Command::Record(arguments) => record::run(arguments, cli.json, progress),
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress),

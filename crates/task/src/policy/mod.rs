@@ -1,0 +1,56 @@
+//! Policies: what moves an episode. Six controllers come with the program: a scripted one that passes, and five that are worse in one way each.
+
+mod aim;
+mod perturbed;
+mod random_walk;
+mod scripted;
+
+pub use perturbed::{DELAY_S, Delay, NOISE_M, NOISE_RAD, Noise, OFFSET_MM, Offset};
+pub use random_walk::RandomWalk;
+pub use scripted::{Scripted, Style};
+
+use crate::{Episode, Error, Result};
+use trocar_cell::Action;
+
+/// Actions a chunk (SPEC E4).
+pub const CHUNK: usize = 8;
+
+/// Says what the arms do, a chunk of actions after the other.
+pub trait Policy {
+    /// Its name in files.
+    fn name(&self) -> &str;
+
+    /// An episode begins: forgets the one before. `seed` is for the policy's own chance.
+    ///
+    /// # Errors
+    /// An episode that it cannot do.
+    fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()>;
+
+    /// The next 1 to [`CHUNK`] actions, one a control period. What is to be scored looks at [`Episode::observe`] alone; scripts may look at the tissue too.
+    ///
+    /// # Errors
+    /// Ends the episode as [`crate::End::PolicyError`].
+    fn act(&mut self, episode: &Episode) -> Result<Vec<Action>>;
+}
+
+/// Names of the controllers.
+pub const POLICIES: [&str; 6] = ["scripted", "noise", "delay", "offset", "greedy", "random"];
+
+/// The controller of that name.
+///
+/// # Errors
+/// A name that is none.
+pub fn named(name: &str) -> Result<Box<dyn Policy>> {
+    let scripted = || Scripted::new(Style::Careful);
+    Ok(match name {
+        "scripted" => Box::new(scripted()),
+        "noise" => Box::new(Noise::new(scripted())),
+        "delay" => Box::new(Delay::new(scripted())),
+        "offset" => Box::new(Offset::new(scripted())),
+        "greedy" => Box::new(Scripted::new(Style::Greedy)),
+        "random" => Box::new(RandomWalk::default()),
+        _ => {
+            return Err(Error::Option(format!("no policy '{name}'; there are {}", POLICIES.join(", "))));
+        }
+    })
+}

@@ -1,0 +1,218 @@
+//! Episodes around a small tube: the scripted baseline passes, resets and replays are exact, files are checked.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+#![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
+
+mod common;
+
+use common::{ONE_END, resection, two_tubes};
+use std::path::Path;
+use trocar_cell::{Action, CellEvent};
+use trocar_robot::instrument::Coordinates;
+use trocar_scene::{Scene, TaskName};
+use trocar_specimen::Specimen;
+use trocar_task::{
+    Channels, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, Stage, policy, read_channels, run,
+    sweep,
+};
+
+fn specimen() -> Specimen {
+    two_tubes(ONE_END, 3e-3)
+}
+
+fn record(scene: &Scene, specimen: &Specimen, name: &str, seed: u64, threads: usize) -> Recording {
+    let mut episode = Episode::new(scene, specimen, threads).unwrap();
+    let mut chosen = policy::named(name).unwrap();
+    run(&mut episode, chosen.as_mut(), seed, &mut |_| true).unwrap()
+}
+
+#[test]
+fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
+    let (scene, specimen) = (resection(), specimen());
+    let recording = record(&scene, &specimen, "scripted", 3, 1);
+    let s = &recording.summary;
+    println!("{s:?}");
+    assert!(s.passed && s.end == Some(End::Passed) && s.stage == 5, "{s:?}");
+    assert!(s.held_to_end && !s.diverged && s.inverted_peak == 0 && s.rcm_within, "{s:?}");
+    assert!((0.30..=0.70).contains(&s.grasp_at.unwrap()) && s.lift_mm >= 8.0 && s.lift_mm < 13.0);
+    assert!(s.passed_at(Stage::Cut).unwrap() <= s.duration_s);
+    assert!(recording.events.iter().any(|(_, e)| matches!(e, CellEvent::Cut { pieces: 1, .. })));
+
+    let folder = tempfile::tempdir().unwrap();
+    recording.write_into(folder.path()).unwrap();
+    // Channels come back to the bit, and a sweep says at the scene's gates what the episode said.
+    let path = folder.path().join("channels.parquet");
+    let (info, rows) = read_channels(&path).unwrap();
+    assert_eq!((&info, &rows), (&recording.info, &recording.channels));
+    let swept = sweep(&[(info, rows)], &[GateRange::parse("lift_mm=8,30").unwrap()]).unwrap();
+    assert_eq!((swept.rows[0].stages[0], swept.rows[1].stages[0]), (5, 1));
+    // A damaged file is an error that names it.
+    let good = std::fs::read(&path).unwrap();
+    for at in (0..good.len()).step_by(good.len() / 60) {
+        let mut bad = good.clone();
+        bad[at] ^= 0x10;
+        std::fs::write(&path, &bad).unwrap();
+        if let Err(e) = read_channels(&path) {
+            assert!(e.to_string().contains("channels.parquet"), "{e}");
+        }
+        std::fs::write(&path, &good[..at]).unwrap();
+        assert!(read_channels(&path).is_err(), "cut at {at}");
+    }
+
+    // Replay: the same bits, on two threads.
+    let path = folder.path().join("episode.trocar");
+    let file = EpisodeFile::read(&path).unwrap();
+    assert_eq!(file, recording.file);
+    let verdict = file.verify(&scene, &specimen, 2).unwrap();
+    assert!(verdict.same, "{verdict:?}");
+    // Another action at step 50 is found there.
+    let mut tampered = file.clone();
+    tampered.steps[49].0.numbers[4] -= 0.25;
+    let verdict = tampered.verify(&scene, &specimen, 1).unwrap();
+    assert_eq!((verdict.same, verdict.first_difference), (false, Some(50)), "{verdict:?}");
+    // Another seed at the start, another specimen before that.
+    let mut other = file.clone();
+    other.header.seed += 1;
+    assert_eq!(other.verify(&scene, &specimen, 1).unwrap().first_difference, Some(0));
+    let mut soft = specimen.clone();
+    soft.organs[0].material.young_modulus_pa *= 1.001;
+    assert!(file.verify(&scene, &soft, 1).unwrap().said.contains("specimen"));
+    let mut stricter = scene;
+    stricter.task.gates.lift_mm = 9.0;
+    assert!(file.verify(&stricter, &specimen, 1).unwrap().said.contains("scene"));
+    damaged(&path);
+}
+
+/// No damage to an episode file goes unnoticed.
+fn damaged(path: &Path) {
+    let good = std::fs::read(path).unwrap();
+    let said = |bytes: &[u8]| EpisodeFile::parse(bytes).err();
+    assert_eq!(said(&good), None);
+    for at in (0..good.len()).step_by(good.len() / 200) {
+        let mut bad = good.clone();
+        bad[at] ^= 0x01;
+        assert!(said(&bad).is_some(), "bit {at}");
+        assert!(said(&good[..at]).is_some(), "cut at {at}");
+    }
+    assert!(said(b"").unwrap().contains("header"));
+    assert!(said(b"{}\n").unwrap().contains("header"));
+    assert!(said(b"\x00\xff\xff\n123").is_some());
+    assert!(EpisodeFile::read(&path.with_file_name("none")).unwrap_err().to_string().contains("none"));
+}
+
+#[test]
+fn a_reset_gives_the_same_bits_whatever_was_before() {
+    let specimen = specimen();
+    let scene = resection();
+    let mut episode = Episode::new(&scene, &specimen, 1).unwrap();
+    let mut scripted = policy::named("noise").unwrap();
+    let mut go = |episode: &mut Episode, seed: u64, steps: usize| -> Vec<u64> {
+        let seen = episode.reset(seed).unwrap();
+        assert_eq!(seen.to_vec().len(), STATE_SIZE);
+        scripted.begin(episode, seed).unwrap();
+        let mut hashes = vec![episode.state_hash()];
+        while hashes.len() < steps {
+            for action in scripted.act(episode).unwrap() {
+                episode.step(&action).unwrap();
+                hashes.push(episode.state_hash());
+            }
+        }
+        hashes
+    };
+    let first = go(&mut episode, 5, 110);
+    let second = go(&mut episode, 6, 40);
+    assert_ne!(first[0], second[0], "another seed is another start");
+    assert_eq!(go(&mut episode, 5, 110), first);
+    let mut new = Episode::new(&scene, &specimen, 2).unwrap();
+    assert_eq!(go(&mut new, 5, 110), first, "a new episode on two threads");
+    // A saved state goes on to the bit, in another episode too.
+    let saved = new.save();
+    let stay = |e: &Episode| {
+        let at: Vec<Coordinates> = e.cell().observe().iter().map(|a| a.commanded).collect();
+        Action::pivots(&at)
+    };
+    let after = |e: &mut Episode| {
+        for _ in 0..5 {
+            let action = stay(e);
+            e.step(&action).unwrap();
+        }
+        (e.state_hash(), e.rows().len(), e.observe())
+    };
+    let one = after(&mut new);
+    episode.reset(1).unwrap();
+    episode.restore(&saved).unwrap();
+    assert_eq!(after(&mut episode), one);
+}
+
+#[test]
+fn specimens_are_shifted_and_turned_by_the_seed() {
+    let specimen = two_tubes(ONE_END, 4e-3);
+    let mut scene = resection();
+    (scene.task.variation.specimen_shift_mm, scene.task.variation.specimen_turn_deg) = (4.0, 20.0);
+    let middle = |e: &Episode| e.cell().world().axes[0].point_at(0.5);
+    let mut episode = Episode::new(&scene, &specimen, 1).unwrap();
+    episode.reset(1).unwrap();
+    let (a, hash) = (middle(&episode), episode.state_hash());
+    episode.reset(2).unwrap();
+    assert!(middle(&episode).distance(a) > 1e-4);
+    episode.reset(1).unwrap();
+    assert_eq!((middle(&episode), episode.state_hash()), (a, hash));
+}
+
+#[test]
+fn every_controller_and_task_runs_and_ends_are_told() {
+    let specimen = two_tubes(ONE_END, 4e-3);
+    let mut scene = resection();
+    scene.task.episode_s = 2.0;
+    let mut episode = Episode::new(&scene, &specimen, 1).unwrap();
+    for name in policy::POLICIES {
+        let mut chosen = policy::named(name).unwrap();
+        let made = run(&mut episode, chosen.as_mut(), 1, &mut |_| true).unwrap();
+        assert_eq!(chosen.name(), name);
+        assert!(matches!(made.summary.end, Some(End::TimeOut)), "{name}: {:?}", made.summary.end);
+        assert_eq!(made.channels.len(), 60, "{name}");
+    }
+    let refused = episode.step(&Action { space: trocar_cell::ActionSpace::Pivots, numbers: vec![0.0; 10] });
+    assert!(refused.unwrap_err().to_string().contains("the time was up"));
+    assert!(policy::named("best").err().unwrap().to_string().contains("scripted"));
+    // A policy that gives nonsense ends the episode.
+    struct Nonsense;
+    impl Policy for Nonsense {
+        fn name(&self) -> &str {
+            "nonsense"
+        }
+        fn begin(&mut self, _: &Episode, _: u64) -> trocar_task::Result<()> {
+            Ok(())
+        }
+        fn act(&mut self, _: &Episode) -> trocar_task::Result<Vec<Action>> {
+            Ok(vec![Action { space: trocar_cell::ActionSpace::Pivots, numbers: vec![f64::NAN; 10] }])
+        }
+    }
+    let made = run(&mut episode, &mut Nonsense, 1, &mut |_| true).unwrap();
+    assert!(matches!(&made.summary.end, Some(End::PolicyError { why }) if why.contains("finite")));
+    // The other two tasks pass.
+    for task in [TaskName::PortReach, TaskName::GraspLift] {
+        let mut scene = resection();
+        scene.task.name = task;
+        let made = record(&scene, &specimen, "scripted", 2, 1);
+        assert!(made.summary.passed, "{task:?}: {:?}", made.summary);
+    }
+    let mut wrong = resection();
+    wrong.task.organ = "liver".to_owned();
+    assert!(Episode::new(&wrong, &specimen, 1).err().unwrap().to_string().contains("tube"));
+}
+
+#[test]
+fn a_strong_cutter_closes_through_tissue_and_harms_nothing_else() {
+    let specimen = two_tubes(ONE_END, 2.2e-3);
+    for sever in [false, true] {
+        let mut scene = resection();
+        scene.task.sever = sever;
+        let recording = record(&scene, &specimen, "scripted", 1, 1);
+        let worst = |f: fn(&Channels) -> f64| recording.channels.iter().map(f).fold(0.0, f64::max);
+        let s = &recording.summary;
+        println!("sever {sever}: {} N at the blades, {s:?}", worst(|c| c.right.jaw_force_n));
+        assert!(s.passed && !s.diverged && s.inverted_peak == 0, "{s:?}");
+        assert!(worst(|c| c.right.unhooked) == 0.0 && s.arms.iter().all(|a| a.unhooked == 0));
+    }
+}

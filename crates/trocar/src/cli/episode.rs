@@ -1,0 +1,56 @@
+//! Arguments of `episode`, `replay` and `sweep`.
+
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `episode`.
+#[derive(Debug, Args)]
+pub struct Episode {
+    /// Scene file, or a built-in scene such as cell-a.
+    pub scene: String,
+    /// The controller: scripted, noise, delay, offset, greedy, random.
+    #[arg(long, default_value = "scripted")]
+    pub policy: String,
+    /// Seed of the start and of the controller's chance.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Worker threads; all by default. The result does not depend on them.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Folder for a scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
+    /// Episode folder to write: episode.trocar, channels.parquet, result.json.
+    #[arg(short, long)]
+    pub output: PathBuf,
+}
+
+/// Arguments of `replay`.
+#[derive(Debug, Args)]
+pub struct Replay {
+    /// Episode file.
+    pub file: PathBuf,
+    /// Do the episode again and compare the state after every step.
+    #[arg(long)]
+    pub verify: bool,
+    /// Specimen folder, where it is no longer where the scene says.
+    #[arg(long, value_name = "FOLDER")]
+    pub specimen: Option<PathBuf>,
+    /// Worker threads; all by default. The result does not depend on them.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Folder for a scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
+}
+
+/// Arguments of `sweep`.
+#[derive(Debug, Args)]
+pub struct Sweep {
+    /// Channels of episodes: channels.parquet files.
+    #[arg(required = true)]
+    pub channels: Vec<PathBuf>,
+    /// A gate and its values: lift_mm=4..12 (nine values), lift_mm=4..12:0.5 or cut_closed=0.15,0.3; several for every combination.
+    #[arg(long = "gate", value_name = "NAME=VALUES", required = true)]
+    pub gates: Vec<String>,
+}
