@@ -139,7 +139,7 @@ fn bytes_that_are_no_message_are_refused() {
         ("Malformed", map(&[(text("__ndarray__"), vec![0xc3])])),
         ("Malformed", map(&[(bin(b"__npgeneric__"), vec![0xc3]), (bin(b"dtype"), text("<f4"))])),
         ("Malformed", array(text("<f4"), &[0xff], &[])),
-        ("WrongShape", array(text("<f8"), &[0xcf, 0x40, 0, 0, 0, 0, 0, 0, 0].repeat(1), &[])),
+        ("WrongShape", array(text("<f8"), &[0x7f; 12], &[])),
         ("TooDeep", [vec![0x91; 100_000], vec![0xc0]].concat()),
         ("TooDeep", [b"\x81\xa1a".repeat(10_000), vec![0xc0]].concat()),
         ("TooMany", [vec![0xdd, 0, 1, 0x86, 0xa0], vec![0xc0; 100_000]].concat()),
