@@ -131,6 +131,11 @@ impl Endpoint {
         if uri.host().is_none_or(str::is_empty) {
             return wrong("url", format!("'{}' has no host", self.shown()));
         }
+        let authority = uri.authority().map_or("", |a| a.as_str());
+        let port = authority.rsplit('@').next().unwrap_or("").strip_prefix(uri.host().unwrap_or("")).unwrap_or("");
+        if !port.is_empty() && uri.port_u16().is_none_or(|p| p == 0) {
+            return wrong("url", format!("'{}' has a port that is not from 1 to 65535", self.shown()));
+        }
         if self.timeouts.connect.is_zero() || self.timeouts.infer.is_zero() {
             return wrong("timeouts", "must be longer than 0 s".into());
         }

@@ -189,7 +189,10 @@ fn waits_end_by_a_deadline() {
         // A byte now and then: nothing is idle, and nothing comes of it.
         (
             raw(|mut socket| {
-                while socket.write_all(b"H").is_ok() {
+                for byte in b"HTTP/1.1 101 Switching Protocols\r\n" {
+                    if socket.write_all(&[*byte]).is_err() {
+                        return;
+                    }
                     std::thread::sleep(Duration::from_millis(50));
                 }
             }),
