@@ -1,24 +1,47 @@
-//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, the TetGen program.
+//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, openpi's
+//! client and server, the TetGen program.
 //! Without them these tests are skipped, and say so.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 
 /// A Python environment of the project's own, beside what cargo builds.
-const ENVIRONMENT: &str = "target/tools";
-/// Python packages and their versions.
-const PACKAGES: [&str; 4] = ["onnxruntime>=1.23", "mujoco>=4.0", "opencv-python-headless>=4.10", "embreex>=4.4"];
+struct Environment {
+    folder: &'static str,
+    /// Packages and their versions.
+    packages: &'static [&'static str],
+    /// What must be importable then.
+    modules: &'static str,
+}
+
+/// openpi's client wants an older NumPy than the others have.
+const ENVIRONMENTS: [Environment; 2] = [
+    Environment {
+        folder: "target/tools",
+        packages: &["onnxruntime>=1.23", "mujoco>=4.0", "opencv-python-headless>=4.10", "embreex>=4.4"],
+        modules: "onnxruntime, mujoco, cv2, embreex",
+    },
+    Environment {
+        folder: "target/tools-openpi",
+        packages: &["openpi-client>=0.1.2", "openpi-server>=0.1", "typing-extensions"],
+        modules: "openpi_client.websocket_client_policy, openpi_server",
+    },
+];
 
 /// Fetches what is missing. A machine without network or Python is no error.
 pub fn fetch() {
-    let python = Path::new(ENVIRONMENT).join("bin/python");
-    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime, mujoco, cv2, embreex"]));
-    if !import() {
-        eprintln!("== tools: {} into {ENVIRONMENT}", PACKAGES.join(" "));
-        let made = quiet(Command::new("python3").args(["-m", "venv", ENVIRONMENT]))
-            && quiet(Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(PACKAGES));
-        if !made || !import() {
-            eprintln!("   not to be had (python3 with venv and network is needed); the tests that need it are skipped");
+    for Environment { folder, packages, modules } in ENVIRONMENTS {
+        let python = Path::new(folder).join("bin/python");
+        let import = || quiet(Command::new(&python).args(["-c", &format!("import {modules}")]));
+        if !import() {
+            eprintln!("== tools: {} into {folder}", packages.join(" "));
+            let made = quiet(Command::new("python3").args(["-m", "venv", folder]))
+                && quiet(Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(packages));
+            if !made || !import() {
+                eprintln!(
+                    "   not to be had (python3 with venv and network is needed); the tests that need it are skipped"
+                );
+            }
         }
     }
     // It ends with an error however it is asked for its help; that it starts is enough.
