@@ -8,6 +8,7 @@ mod action;
 mod build;
 mod crtk;
 mod exchange;
+mod look;
 mod overstretch;
 mod placed;
 mod report;
