@@ -109,6 +109,9 @@ pub enum Error {
     /// A model cannot be built or stepped.
     #[error(transparent)]
     Tissue(#[from] trocar_tissue::Error),
+    /// A camera of the cell cannot see.
+    #[error(transparent)]
+    Sight(#[from] trocar_sight::Error),
     /// A task cannot be run.
     #[error(transparent)]
     Cell(#[from] trocar_cell::Error),

@@ -6,7 +6,9 @@ mod demo;
 mod error;
 mod experiment;
 mod inspect;
+mod moving;
 mod paper;
+mod rendering;
 pub mod report;
 pub mod scenes;
 mod segment;
@@ -31,6 +33,7 @@ pub use experiment::{
     SettlingResult, SettlingRow, StepRow, WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
+pub use rendering::{Rendered, Rendering, Seen};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};
 pub use truth::TruthFigures;
 pub use workflow::{

@@ -3,12 +3,14 @@
 mod comparison;
 mod grasp;
 mod port;
+mod render;
 mod scene;
 mod solver;
 
 pub use comparison::*;
 pub use grasp::*;
 pub use port::*;
+pub use render::*;
 pub use scene::*;
 pub use solver::*;
 
@@ -45,6 +47,8 @@ pub enum Command {
     Reconstruct(Reconstruct),
     /// List, print and check scene files: the whole two-arm cell in one TOML file.
     Scene(Scene),
+    /// Make a picture of a specimen or a scene through one of its cameras, or a moving one of the scene's grasp-lift.
+    Render(Render),
     /// Run a scripted task on a specimen without a window.
     Simulate(Simulate),
     /// Make a table or figure of the paper anew, beside the paper's numbers.
