@@ -13,10 +13,11 @@ pub mod report;
 pub mod scenes;
 mod segment;
 mod truth;
+mod watched;
 mod workflow;
 
 pub use bench::{
-    CellBench, CellBenchResult, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench,
+    CameraRow, CellBench, CellRow, CellBenchResult, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench,
     MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench, RenderBenchResult,
     ScalingBench, ScalingResult, ScalingRow, Timing,
 };

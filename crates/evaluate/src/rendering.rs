@@ -396,7 +396,7 @@ pub(crate) fn label_color(label: u16) -> [u8; 3] {
 }
 
 /// Depth in colours from near (bright) to far; black where there is none.
-fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
+pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
     let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).collect();
     valid.sort_by(f32::total_cmp);
     let at = |share: f64| valid.get((share * valid.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(1.0);

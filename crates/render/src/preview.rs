@@ -21,7 +21,9 @@ pub(crate) fn light(
 ) -> Vec3A {
     let frame = Frame::new(surface.smooth);
     let out = frame.local(to_eye);
-    let mut sum = surface.albedo * Vec3A::from(stage.environment);
+    // Metal is a mirror: what it shows of the room is darker towards its edges, where it shows what is behind it.
+    let ambient = if material.is_metal() { 0.35 + 0.85 * out.z } else { 1.0 };
+    let mut sum = surface.albedo * Vec3A::from(stage.environment) * ambient;
     for lamp in stage.lamps() {
         let Some(arriving) = lamp.arriving(surface.position, [0.5; 2]) else { continue };
         let towards = frame.local(arriving.direction);

@@ -5,7 +5,7 @@ use glam::DVec3;
 use trocar_geometry::{Pose, TriMesh};
 
 /// Cell of the links' surfaces [m].
-const SPACING: f64 = 0.0055;
+const SPACING: f64 = 0.0045;
 
 const SHELL: [u8; 3] = [232, 233, 231];
 const JOINT: [u8; 3] = [86, 92, 99];

@@ -14,7 +14,7 @@ const ROUND: f32 = 1.34;
 /// The endoscope's light is this far from the middle of its lens [m]: fibres around it.
 const BESIDE: f64 = 0.0025;
 /// A white surface at this many times the distance of what is in the picture's middle is as bright as the film.
-const WHITE_AT: f64 = 1.45;
+const WHITE_AT: f64 = 1.28;
 /// Sizes of which a camera keeps its rays.
 const SIZES: usize = 3;
 
@@ -92,7 +92,7 @@ impl Viewer {
         let ahead = (self.pose.rotation * DVec3::Z).as_vec3();
         let distance = stage.cast(self.pose.translation.as_vec3(), ahead).map_or(0.08, |m| f64::from(m.t));
         self.lights = vec![Light::endoscope(&self.pose, BESIDE, WHITE_AT * distance.clamp(0.02, 0.3))];
-        self.environment = [0.012, 0.008, 0.008];
+        self.environment = [0.085, 0.062, 0.058];
         self.film = Film { vignette: 0.4, ..Film::endoscope() };
         self.round = true;
     }
@@ -104,10 +104,10 @@ impl Viewer {
         let away = room.middle - bases;
         let away = DVec3::new(away.x, away.y, 0.0).try_normalize().unwrap_or(DVec3::Y);
         let side = away.cross(DVec3::Z);
-        let eye = room.middle + 0.92 * away + 0.62 * side + 0.62 * DVec3::Z;
-        let target = room.middle - 0.16 * away + 0.17 * DVec3::Z;
+        let eye = room.middle + 1.02 * away + 0.52 * side + 0.98 * DVec3::Z;
+        let target = room.middle - 0.20 * away + 0.20 * DVec3::Z;
         let (width, height) = (1280, 720);
-        let model = Camera::centred(width, height, 58.0_f64.to_radians());
+        let model = Camera::centred(width, height, 52.0_f64.to_radians());
         Self::lit(OUTSIDE, model, Pose::look_at(eye, target, DVec3::Z), false, room)
     }
 

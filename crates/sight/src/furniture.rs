@@ -15,7 +15,7 @@ pub(crate) struct Piece {
 }
 
 /// Half the table's side [m].
-const TABLE: f64 = 6.0;
+const TABLE: f64 = 20.0;
 /// Height of the tray's rim above the field, and its width [m].
 const RIM: [f64; 2] = [0.008, 0.007];
 /// Radius of an endoscope's shaft, its length, and the same of its camera head [m].
@@ -35,7 +35,7 @@ pub(crate) fn table(field: &Field) -> f64 {
 pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Piece> {
     let table = table(field);
     let mut all = vec![
-        Piece { name: "table", mesh: square(table), look: plastic([52, 84, 100], 0.75) },
+        Piece { name: "table", mesh: square(table), look: plastic([92, 126, 138], 0.7) },
         Piece { name: "tray", mesh: tray(field, table), look: plastic([214, 216, 218], 0.45) },
     ];
     let mut rings = TriMesh::default();

@@ -6,14 +6,14 @@ use trocar_geometry::TriMesh;
 use trocar_scene::{Instrument, InstrumentKind};
 
 /// Cell of the blades' surfaces [m].
-const SPACING: f64 = 0.00028;
+const SPACING: f64 = 0.0002;
 
 /// Thickness of a blade at its root, and width of a grasper's and of a cutter's [m]: as tissue feels them.
 const THICK: f64 = 0.0032;
 const WIDE: [f64; 2] = [0.005, 0.0016];
 
 /// Pitch and depth of a grasper's teeth [m].
-const TEETH: [f64; 2] = [0.0013, 0.0005];
+const TEETH: [f64; 2] = [0.0014, 0.0005];
 
 /// Radius and length of the motor's housing [m].
 const MOTOR: [f64; 2] = [0.026, 0.1];
@@ -134,7 +134,7 @@ mod tests {
                 assert!((high.x - 0.021).abs() < 4e-4, "{kind:?}: {high}");
                 let (inner, outer) = if side > 0.0 { (low.y, high.y) } else { (-high.y, -low.y) };
                 assert!(inner.abs() < 4e-4 && (outer - THICK).abs() < 4e-4, "{kind:?}: {inner} {outer}");
-                assert!(blade.volume() > 0.0 && blade.triangles.len() < 40_000, "{}", blade.triangles.len());
+                assert!(blade.volume() > 0.0 && blade.triangles.len() < 60_000, "{}", blade.triangles.len());
             }
         }
     }

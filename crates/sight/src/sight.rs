@@ -313,8 +313,11 @@ impl Sight {
         Ok(&self.picture)
     }
 
-    /// Brings the stage to where the cell is.
-    fn follow(&mut self, cell: &Cell) -> Result<()> {
+    /// Brings the stage to where the cell is; [`Self::see`] does it itself.
+    ///
+    /// # Errors
+    /// A cell of another scene.
+    pub fn follow(&mut self, cell: &Cell) -> Result<()> {
         let world = cell.world();
         let bodies = world.model.bodies();
         let mut same = true;

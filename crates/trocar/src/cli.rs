@@ -329,6 +329,12 @@ pub struct RenderBench {
     /// Where to write the large picture (PNG).
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
+    /// Scene file or built-in scene whose cameras are measured; none for none.
+    #[arg(long, default_value = "cell-a")]
+    pub scene: String,
+    /// Folder for the scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
 }
 
 /// Models of the unseen back by name.
