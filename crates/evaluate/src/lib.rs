@@ -17,9 +17,9 @@ mod watched;
 mod workflow;
 
 pub use bench::{
-    CameraRow, CellBench, CellRow, CellBenchResult, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench,
-    MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench, RenderBenchResult,
-    ScalingBench, ScalingResult, ScalingRow, Timing,
+    CameraRow, CellBench, CellBenchResult, CellRow, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow,
+    MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench,
+    RenderBenchResult, ScalingBench, ScalingResult, ScalingRow, Timing,
 };
 pub use cell_run::{CellRun, CellSimulation, TimedEvent, scene_specimen};
 pub use demo::{Demo, DemoResult};

@@ -164,10 +164,8 @@ impl Rendering {
         let size = self.size.map_or_else(|| sight.size(&camera), Ok)?;
         self.cut(&mut sight, &camera, size, &specimen_points(&specimen))?;
         let clock = std::time::Instant::now();
-        let color = averaged(
-            &sight.see_still(&camera, size.map(|n| n * self.finer()), &self.settings())?.color,
-            self.finer(),
-        );
+        let color =
+            averaged(&sight.see_still(&camera, size.map(|n| n * self.finer()), &self.settings())?.color, self.finer());
         let picture = sight.see_still(&camera, size, &Settings::Preview { shadows: false })?.clone();
         let render_s = clock.elapsed().as_secs_f64();
         self.write(&sight, &camera, &color, &picture, output, (0.0, render_s))

@@ -7,7 +7,7 @@ use trocar_geometry::{Pose, TriMesh};
 /// Cell of the links' surfaces [m].
 const SPACING: f64 = 0.0045;
 
-const SHELL: [u8; 3] = [232, 233, 231];
+const SHELL: [u8; 3] = [208, 210, 210];
 const JOINT: [u8; 3] = [86, 92, 99];
 
 /// Radius of the rods of an arm that is not known [m].

@@ -105,9 +105,9 @@ impl Viewer {
         let away = DVec3::new(away.x, away.y, 0.0).try_normalize().unwrap_or(DVec3::Y);
         let side = away.cross(DVec3::Z);
         let eye = room.middle + 1.02 * away + 0.52 * side + 0.98 * DVec3::Z;
-        let target = room.middle - 0.20 * away + 0.20 * DVec3::Z;
+        let target = room.middle - 0.21 * away + 0.235 * DVec3::Z;
         let (width, height) = (1280, 720);
-        let model = Camera::centred(width, height, 52.0_f64.to_radians());
+        let model = Camera::centred(width, height, 54.0_f64.to_radians());
         Self::lit(OUTSIDE, model, Pose::look_at(eye, target, DVec3::Z), false, room)
     }
 

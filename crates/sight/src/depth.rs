@@ -35,13 +35,7 @@ const JUMP: f32 = 0.03;
 
 impl DepthNoise {
     /// Spoils `depth`, seen with a focal length of `focal` [px]; `true_depth` is scratch. `seed` and `frame` choose the noise.
-    pub(crate) fn spoil(
-        &self,
-        depth: &mut DepthImage,
-        true_depth: &mut Vec<f32>,
-        focal: f64,
-        [seed, frame]: [u32; 2],
-    ) {
+    pub(crate) fn spoil(&self, depth: &mut DepthImage, true_depth: &mut Vec<f32>, focal: f64, [seed, frame]: [u32; 2]) {
         let (width, height) = (depth.width, depth.height);
         true_depth.clear();
         true_depth.extend_from_slice(&depth.depth);

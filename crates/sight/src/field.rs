@@ -9,7 +9,7 @@ use trocar_geometry::{Pose, TriMesh};
 use trocar_render::{Eye, Film, Look, Settings, Stage, render, srgb};
 
 /// Most cells along a side.
-const CELLS: f64 = 300.0;
+const CELLS: f64 = 360.0;
 /// Most that it reaches beyond the organs [m].
 const BEYOND: f64 = 0.16;
 /// Space under an organ [m].
@@ -137,9 +137,8 @@ impl<'a> Texture<'a> {
         let (x, y) = (mirror(pixel.x, width), mirror(pixel.y, height));
         let (i, j) = (x as usize, y as usize);
         let (a, b) = ((x - i as f64) as f32, (y - j as f64) as f32);
-        let at = |i: usize, j: usize| {
-            srgb::to_linear(self.picture.pixels[j.min(height - 1) * width + i.min(width - 1)])
-        };
+        let at =
+            |i: usize, j: usize| srgb::to_linear(self.picture.pixels[j.min(height - 1) * width + i.min(width - 1)]);
         let corners = [at(i, j), at(i + 1, j), at(i, j + 1), at(i + 1, j + 1)];
         let weights = [(1.0 - a) * (1.0 - b), a * (1.0 - b), (1.0 - a) * b, a * b];
         srgb::from_linear([0, 1, 2].map(|k| corners.iter().zip(weights).map(|(c, w)| w * c[k]).sum()))
@@ -219,7 +218,8 @@ mod tests {
     #[test]
     fn what_was_hidden_is_as_what_is_around_it() {
         let mut picture = ColorImage::new(40, 30, [0; 3]);
-        let hidden: Vec<bool> = (0..1200).map(|i| (10..25).contains(&(i % 40)) && (8..20).contains(&(i / 40))).collect();
+        let hidden: Vec<bool> =
+            (0..1200).map(|i| (10..25).contains(&(i % 40)) && (8..20).contains(&(i / 40))).collect();
         for (i, p) in picture.pixels.iter_mut().enumerate() {
             *p = if hidden[i] { [0, 255, 0] } else { [(4 * (i % 40)) as u8, 20, 90] };
         }

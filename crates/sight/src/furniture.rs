@@ -206,7 +206,8 @@ pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Piece> {
     let held = back(length + 0.5 * long);
     if held.z > table + 0.08 {
         let foot = DVec3::new(held.x, held.y, table);
-        let rod = |radius: f64| Part::Cylinder { from: foot, to: held - DVec3::Z * (wide - 0.004), radius, edge: 0.001 };
+        let rod =
+            |radius: f64| Part::Cylinder { from: foot, to: held - DVec3::Z * (wide - 0.004), radius, edge: 0.001 };
         let base = Part::Cylinder { from: foot, to: foot + 0.014 * DVec3::Z, radius: 0.05, edge: 0.004 };
         let color = [120, 124, 130];
         let mesh = Solid::new(0.004).with(color, rod(0.009)).with(color, base).surface(0.004);

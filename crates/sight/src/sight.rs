@@ -190,10 +190,8 @@ impl Sight {
         let poses = cell.link_poses(name)?;
         let label = ARMS + k as u16;
         self.labels.push((label, format!("{name} arm")));
-        let shell = Look {
-            color: [232; 3],
-            surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, wander: [0.0; 3] },
-        };
+        let shell =
+            Look { color: [232; 3], surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, wander: [0.0; 3] } };
         let mut links = Vec::new();
         for (mesh, pose) in arm::links(cell.arm_model(name)?, &poses).iter().zip(&poses) {
             let shape = self.base.add_shape(mesh)?;

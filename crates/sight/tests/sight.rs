@@ -82,12 +82,13 @@ fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
     let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
     sight.sensor = Sensor { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
     assert_eq!(sight.cameras(), ["endoscope", "d405", "recording", "outside"]);
+    sight.follow(&cell).unwrap();
     let mut run = |threads: usize| -> Vec<Picture> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mut seen = Vec::new();
         for camera in ["endoscope", "d405", "recording", "outside"] {
             for settings in [Settings::preview(), Settings::path(2)] {
-                seen.push(pool.install(|| sight.see(&cell, camera, [96, 64], &settings).unwrap().clone()));
+                seen.push(pool.install(|| sight.see_still(camera, [96, 64], &settings).unwrap().clone()));
             }
         }
         seen
@@ -100,7 +101,13 @@ fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
             assert!(share(picture, organ) > 0.001, "camera {k} does not see organ {organ}");
         }
         assert!(share(picture, label(&sight, "grasper")) > 0.003, "camera {k} sees no grasper");
-        assert!(picture.normals.iter().zip(&picture.labels).all(|(n, l)| *l == 0 || (glam::Vec3::from(*n).length() - 1.0).abs() < 1e-3));
+        assert!(
+            picture
+                .normals
+                .iter()
+                .zip(&picture.labels)
+                .all(|(n, l)| *l == 0 || (glam::Vec3::from(*n).length() - 1.0).abs() < 1e-3)
+        );
     }
     assert!(share(&one[6], label(&sight, "left arm")) > 0.01);
     // Depth of a camera without noise is the truth: the bed is 150 mm before the recording camera.
@@ -127,10 +134,7 @@ fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
     }
 }
 
-fn trocar_cell_coordinates(
-    arm: &trocar_cell::ArmObservation,
-    deeper: f64,
-) -> trocar_robot::instrument::Coordinates {
+fn trocar_cell_coordinates(arm: &trocar_cell::ArmObservation, deeper: f64) -> trocar_robot::instrument::Coordinates {
     trocar_robot::instrument::Coordinates { insertion: arm.commanded.insertion - deeper, jaw: 1.0, ..arm.commanded }
 }
 
@@ -165,8 +169,12 @@ fn specimens_are_seen_alone_and_mistakes_are_told() {
     // The organ's middle is where the recording camera has it.
     let at = Camera::centred(212, 120, 1.5).project(DVec3::new(0.012, 0.012, 0.141)).unwrap().round();
     assert_eq!(seen.labels[at.y as usize * 212 + at.x as usize], 1);
-    assert!(matches!(sight.see_still("endoscope", [96, 64], &Settings::preview()), Err(e) if e.to_string() == "there is no camera 'endoscope'; the cameras are recording, outside"));
-    assert!(matches!(sight.see_still("outside", [4, 64], &Settings::preview()), Err(e) if e.to_string().contains("8 to 8192")));
+    assert!(
+        matches!(sight.see_still("endoscope", [96, 64], &Settings::preview()), Err(e) if e.to_string() == "there is no camera 'endoscope'; the cameras are recording, outside")
+    );
+    assert!(
+        matches!(sight.see_still("outside", [4, 64], &Settings::preview()), Err(e) if e.to_string().contains("8 to 8192"))
+    );
     // Turned specimens stand upright all the same, and those without a camera are seen from aside.
     specimen.up = (DQuat::from_rotation_x(0.6) * specimen.up).normalize();
     (specimen.camera, specimen.background) = (None, None);

@@ -271,18 +271,19 @@ impl RenderBench {
         let mut plain = shadowed.clone();
         let mut follow = Vec::new();
         for frame in 0..FRAMES + FRAMES / 10 {
-            let mut step = |timed: &mut dyn FnMut(&mut Sight, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
-                script.advance()?;
-                let clock = Instant::now();
-                timed(&mut sight, &script.cell)?;
-                if frame >= FRAMES / 10 {
-                    times.push(1e3 * clock.elapsed().as_secs_f64());
-                }
-                Ok(())
-            };
+            let mut step =
+                |timed: &mut dyn FnMut(&mut Sight, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
+                    if progress.interrupted() {
+                        return Err(Error::Interrupted);
+                    }
+                    script.advance()?;
+                    let clock = Instant::now();
+                    timed(&mut sight, &script.cell)?;
+                    if frame >= FRAMES / 10 {
+                        times.push(1e3 * clock.elapsed().as_secs_f64());
+                    }
+                    Ok(())
+                };
             // A camera and a kind a period, so that all that moves has moved before each.
             let k = frame % names.len().max(1);
             let see = |shadows: bool| {

@@ -48,5 +48,7 @@ pub struct Render {
 
 fn size(text: &str) -> Result<[usize; 2], String> {
     let sides = text.split_once('x').and_then(|(w, h)| Some([w.parse().ok()?, h.parse().ok()?]));
-    sides.filter(|s| s.iter().all(|n| (8..=8192).contains(n))).ok_or_else(|| "width x height, 8 to 8192 pixels each: 1280x720".to_owned())
+    sides
+        .filter(|s| s.iter().all(|n| (8..=8192).contains(n)))
+        .ok_or_else(|| "width x height, 8 to 8192 pixels each: 1280x720".to_owned())
 }

@@ -39,9 +39,15 @@ fn text(r: &RenderBenchResult) -> String {
     let header = ["rays", "count", "ours M/s", "Embree M/s", "ratio", "differ", "most um"];
     let mut out = String::new();
     if let Some(cell) = &r.cell {
-        out += &format!("{}: {} triangles, made in {:.0} ms; following the cell {:.2} ms\n", cell.scene, cell.triangles, cell.begin_ms, cell.follow_ms);
+        out += &format!(
+            "{}: {} triangles, made in {:.0} ms; following the cell {:.2} ms\n",
+            cell.scene, cell.triangles, cell.begin_ms, cell.follow_ms
+        );
         for c in &cell.cameras {
-            out += &format!("  {:>10} 224 x 224: {:.1} ms with shadows (best {:.1}), {:.1} without\n", c.camera, c.ms, c.best_ms, c.unshadowed_ms);
+            out += &format!(
+                "  {:>10} 224 x 224: {:.1} ms with shadows (best {:.1}), {:.1} without\n",
+                c.camera, c.ms, c.best_ms, c.unshadowed_ms
+            );
         }
     }
     out += &format!(
