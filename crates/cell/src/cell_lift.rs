@@ -367,6 +367,19 @@ impl CellLift {
     /// # Errors
     /// Names the arm or organ that is not there, the option out of range, the place that cannot be grasped; an interruption.
     pub fn run(&self, cell: &mut Cell, progress: &dyn Progress) -> Result<CellLiftRun> {
+        self.run_watched(cell, progress, &mut |_, _| {})
+    }
+
+    /// The same, with `watch` shown the cell and the phase's name before the first period and after each.
+    ///
+    /// # Errors
+    /// As [`CellLift::run`].
+    pub fn run_watched(
+        &self,
+        cell: &mut Cell,
+        progress: &dyn Progress,
+        watch: &mut dyn FnMut(&Cell, &'static str),
+    ) -> Result<CellLiftRun> {
         let mut policy = CellLiftPolicy::new(self, cell)?;
         if self.design.is_none() {
             policy.design = cell.grasp_design(&self.arm)?;
@@ -374,6 +387,7 @@ impl CellLift {
         let mut record = Record::new(self, &policy);
         let before = cell.timing().all;
         progress.begin("simulate", 1);
+        watch(cell, policy.phase());
         loop {
             if progress.interrupted() {
                 return Err(Error::Interrupted);
@@ -383,6 +397,7 @@ impl CellLift {
             let Some(action) = policy.act(cell)? else { break };
             let report = cell.step(&action)?;
             record.add(phase, &report, cell)?;
+            watch(cell, phase);
             if record.summary.diverged {
                 break;
             }

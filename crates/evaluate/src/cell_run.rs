@@ -1,6 +1,7 @@
 //! `trocar simulate SCENE`: the scripted grasp-lift in the two-arm cell, from a scene to a run folder.
 
 use crate::experiment::phantoms;
+use crate::watched::{Pictures, Watched};
 use crate::workflow::{REPORT, refuse_overlap};
 use crate::{Error, Result, report};
 use serde::Serialize;
@@ -9,6 +10,7 @@ use trocar_cell::{Cell, CellEvent, CellLift, CellLiftRun, CellLiftSummary};
 use trocar_phantom::RecordOptions;
 use trocar_progress::Progress;
 use trocar_scene::{Scene, Source};
+use trocar_sight::Sight;
 use trocar_specimen::{Specimen, StagedFolder};
 
 /// Frames of a phantom's recording: the composite's window.
@@ -76,7 +78,9 @@ impl CellSimulation {
         if task.organ.is_none() && specimen.organs.iter().any(|o| o.name == scene.task.organ) {
             task.organ = Some(scene.task.organ.clone());
         }
-        let run = task.run(&mut cell, progress)?;
+        let mut watched = Watched::new(Sight::new(&scene, &specimen, &cell)?, &task.arm);
+        let run = task.run_watched(&mut cell, progress, &mut |cell, phase| watched.look(cell, phase))?;
+        let pictures = watched.finish(&cell)?;
         let made = CellRun {
             scene: scene.name.clone(),
             summary: run.summary.clone(),
@@ -87,7 +91,7 @@ impl CellSimulation {
                 .collect(),
             report: output.join(REPORT).display().to_string(),
         };
-        write(staged, &made, &run, progress)?;
+        write(staged, &made, &run, &pictures, progress)?;
         Ok(made)
     }
 }
@@ -107,7 +111,13 @@ pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -
     }
 }
 
-fn write(staged: StagedFolder, made: &CellRun, run: &CellLiftRun, progress: &dyn Progress) -> Result<()> {
+fn write(
+    staged: StagedFolder,
+    made: &CellRun,
+    run: &CellLiftRun,
+    pictures: &Pictures,
+    progress: &dyn Progress,
+) -> Result<()> {
     let folder = staged.path();
     let write = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);
@@ -119,7 +129,7 @@ fn write(staged: StagedFolder, made: &CellRun, run: &CellLiftRun, progress: &dyn
         table.serialize(sample).map_err(|e| Error::Format(e.to_string()))?;
     }
     write("channels.csv", &table.into_inner().map_err(|e| Error::Format(e.to_string()))?)?;
-    write(REPORT, report::cell_lift(made, run)?.as_bytes())?;
+    write(REPORT, report::cell_lift(made, run, pictures)?.as_bytes())?;
     if progress.interrupted() {
         return Err(Error::Interrupted);
     }

@@ -112,6 +112,9 @@ pub enum Error {
     /// An episode cannot be run, or its files are unusable.
     #[error(transparent)]
     Task(#[from] trocar_task::Error),
+    /// A camera of the cell cannot see.
+    #[error(transparent)]
+    Sight(#[from] trocar_sight::Error),
     /// A task cannot be run.
     #[error(transparent)]
     Cell(#[from] trocar_cell::Error),

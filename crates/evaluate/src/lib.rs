@@ -7,17 +7,20 @@ mod episode_run;
 mod error;
 mod experiment;
 mod inspect;
+mod moving;
 mod paper;
+mod rendering;
 pub mod report;
 pub mod scenes;
 mod segment;
 mod truth;
+mod watched;
 mod workflow;
 
 pub use bench::{
-    CellBench, CellBenchResult, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow, MeshingBench,
-    MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench, RenderBenchResult,
-    ScalingBench, ScalingResult, ScalingRow, Timing,
+    CameraRow, CellBench, CellBenchResult, CellRow, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow,
+    MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench,
+    RenderBenchResult, ScalingBench, ScalingResult, ScalingRow, Timing,
 };
 pub use cell_run::{CellRun, CellSimulation, TimedEvent, scene_specimen};
 pub use demo::{Demo, DemoResult};
@@ -33,6 +36,7 @@ pub use experiment::{
     SettlingResult, SettlingRow, StepRow, WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
+pub use rendering::{Rendered, Rendering, Seen};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};
 pub use trocar_task::SweepRow;
 pub use truth::TruthFigures;

@@ -9,7 +9,8 @@ use trocar_progress::Silent;
 #[test]
 fn rays_end_where_embrees_do() {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
-    let bench = RenderBench { triangles: 20_000, samples: 0, rays: 200, python, picture: None };
+    let (scene, phantoms) = (None, std::path::PathBuf::new());
+    let bench = RenderBench { triangles: 20_000, samples: 0, rays: 200, python, picture: None, scene, phantoms };
     let result = bench.run(&Silent).unwrap();
     assert!((result.triangles as f64 / 20_000.0 - 1.0).abs() < 0.1, "{} triangles", result.triangles);
     assert!(result.preview_224_ms > 0.0 && result.refit_ms > 0.0 && result.path_720p_ms.is_none());

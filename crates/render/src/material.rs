@@ -104,6 +104,10 @@ impl Material {
         }
     }
 
+    pub fn is_metal(&self) -> bool {
+        matches!(self.kind, Kind::Metal { .. })
+    }
+
     /// Probability with which a path goes on by the gloss, seen under `to_eye` (local frame, z is the normal).
     pub fn gloss_share(&self, albedo: Vec3A, to_eye: Vec3A) -> f32 {
         match &self.kind {

@@ -13,6 +13,10 @@ use trocar_camera::{ColorImage, DepthImage, Pose};
 /// Side of the tiles that a picture is rendered in [px].
 const TILE: usize = 8;
 
+/// A path that brings more than so many times white is dimmed to it: one in ten thousand that meets a light in a mirror by chance
+/// would be a white dot in a picture of a hundred paths a pixel. (Firefly clamping; it loses what no film shows.)
+const BRIGHTEST: f32 = 24.0;
+
 /// How light is worked out.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Settings {
@@ -67,27 +71,72 @@ impl Settings {
     }
 }
 
+impl Picture {
+    /// A black picture of nothing.
+    pub fn new(width: usize, height: usize) -> Self {
+        let mut picture = Self::default();
+        picture.resize(width, height);
+        picture
+    }
+
+    fn resize(&mut self, width: usize, height: usize) {
+        let count = width * height;
+        (self.color.width, self.color.height) = (width, height);
+        (self.depth.width, self.depth.height) = (width, height);
+        self.color.pixels.resize(count, [0; 3]);
+        self.depth.depth.resize(count, 0.0);
+        self.labels.resize(count, 0);
+        self.normals.resize(count, [0.0; 3]);
+        self.light.resize(count, [0.0; 3]);
+    }
+}
+
+impl Default for Picture {
+    fn default() -> Self {
+        Self {
+            color: ColorImage::new(0, 0, [0; 3]),
+            depth: DepthImage::new(0, 0),
+            labels: Vec::new(),
+            normals: Vec::new(),
+            light: Vec::new(),
+        }
+    }
+}
+
 /// The stage seen through `eye` at `pose` (camera to world). The same call gives the same bits for any number of threads and
 /// any instruction set.
 pub fn render(stage: &mut Stage, eye: &Eye, pose: &Pose, settings: &Settings, film: &Film) -> Picture {
+    let mut picture = Picture::default();
+    render_into(&mut picture, stage, eye, pose, settings, film);
+    picture
+}
+
+/// [`render`] into a picture that is there: of the same size it is written over, and nothing is allocated for it.
+pub fn render_into(picture: &mut Picture, stage: &mut Stage, eye: &Eye, pose: &Pose, settings: &Settings, film: &Film) {
     stage.settle();
     let (width, height) = (eye.width(), eye.height());
-    let mut pixels = vec![Pixel::default(); width * height];
+    picture.resize(width, height);
     let shot = Shot { stage, eye, rotation: rotation_of(pose), origin: pose.translation.as_vec3a(), settings };
-    pixels.par_chunks_mut((width * TILE).max(1)).enumerate().for_each(|(band, rows)| {
-        let mut hand = Hand { stacks: Stacks::new(), rays: Vec::new(), directions: Vec::new(), ahead: Vec::new() };
+    let band = (width * TILE).max(1);
+    let rows = (
+        picture.color.pixels.par_chunks_mut(band),
+        picture.depth.depth.par_chunks_mut(band),
+        picture.labels.par_chunks_mut(band),
+        picture.normals.par_chunks_mut(band),
+        picture.light.par_chunks_mut(band),
+    );
+    rows.into_par_iter().enumerate().for_each_init(Hand::new, |hand, (k, (color, depth, label, normal, light))| {
+        let first = k * band;
+        hand.pixels.clear();
+        hand.pixels.resize(color.len(), Pixel::default());
         for left in (0..width).step_by(TILE) {
-            shot.tile(rows, band * TILE * width, left..width.min(left + TILE), &mut hand);
+            shot.tile(first, left..width.min(left + TILE), hand);
+        }
+        for (i, pixel) in hand.pixels.iter().enumerate() {
+            color[i] = film.develop(eye, first + i, pixel.light);
+            (depth[i], label[i], normal[i], light[i]) = (pixel.depth, pixel.label, pixel.normal, pixel.light);
         }
     });
-    let colors = pixels.par_iter().with_min_len(4096).enumerate().map(|(i, p)| film.develop(eye, i, p.light)).collect();
-    Picture {
-        color: ColorImage { width, height, pixels: colors },
-        depth: DepthImage { width, height, depth: pixels.iter().map(|p| p.depth).collect() },
-        labels: pixels.iter().map(|p| p.label).collect(),
-        normals: pixels.iter().map(|p| p.normal).collect(),
-        light: pixels.iter().map(|p| p.light).collect(),
-    }
 }
 
 struct Shot<'a> {
@@ -101,17 +150,26 @@ struct Shot<'a> {
 /// What a worker keeps from tile to tile.
 struct Hand {
     stacks: Stacks,
+    /// The band's pixels.
+    pixels: Vec<Pixel>,
     /// Of each pixel of a tile that sees something: its place among the band's pixels, and its ray.
     rays: Vec<(usize, Vec3A)>,
     directions: Vec<Vec3A>,
     ahead: Vec<(f32, u32)>,
 }
 
+impl Hand {
+    fn new() -> Self {
+        let (rays, directions, ahead) = (Vec::new(), Vec::new(), Vec::new());
+        Self { stacks: Stacks::new(), pixels: Vec::new(), rays, directions, ahead }
+    }
+}
+
 impl Shot<'_> {
     /// Renders the pixels of some columns of a band of rows, whose first pixel is the image's `first`.
-    fn tile(&self, band: &mut [Pixel], first: usize, columns: std::ops::Range<usize>, hand: &mut Hand) {
+    fn tile(&self, first: usize, columns: std::ops::Range<usize>, hand: &mut Hand) {
         let width = self.eye.width();
-        let Hand { stacks, rays, directions, ahead } = hand;
+        let Hand { stacks, pixels: band, rays, directions, ahead } = hand;
         rays.clear();
         for row in 0..band.len() / width {
             let pixels = columns.clone().map(|u| row * width + u);
@@ -137,6 +195,7 @@ impl Shot<'_> {
             pixel.normal = (self.rotation.transpose() * surface.smooth).to_array();
             if let Settings::Preview { shadows } = *self.settings {
                 let to_eye = -direction.normalize();
+                let shadows = shadows.then_some(self.origin);
                 direct = preview::light(self.stage, &surface, self.stage.material(&touch), to_eye, shadows, stacks);
             }
         }
@@ -149,7 +208,8 @@ impl Shot<'_> {
                     let key = Key { seed, pixel: index as u32, sample };
                     let [a, b, ..] = key.draw(0, LENS);
                     if let Some(ray) = self.eye.within(index, a, b) {
-                        sum += radiance(self.stage, self.origin, self.rotation * ray, bounces, key, stacks);
+                        let light = radiance(self.stage, self.origin, self.rotation * ray, bounces, key, stacks);
+                        sum += light * (BRIGHTEST / light.max_element().max(BRIGHTEST));
                     }
                 }
                 (sum / samples as f32).to_array()

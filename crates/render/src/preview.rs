@@ -5,18 +5,25 @@ use crate::stage::{Stage, Surface};
 use crate::tree::Stacks;
 use glam::Vec3A;
 
-/// Light towards the eye from the lights alone and, evenly, from the environment. Panels shine from their middles.
+/// A light nearer to the eye than this share of its distance to a surface casts no shadow that is worth a ray: what it does not
+/// reach, the eye does not see, but for a rim at edges as thin as that share of the depth behind them.
+const BESIDE: f32 = 0.1;
+
+/// Light towards the eye from the lights alone and, evenly, from the environment. Panels shine from their middles. With `shadows`,
+/// which is where the eye is, lights that are not beside the eye cast them.
 pub(crate) fn light(
     stage: &Stage,
     surface: &Surface,
     material: &Material,
     to_eye: Vec3A,
-    shadows: bool,
+    shadows: Option<Vec3A>,
     stacks: &mut Stacks,
 ) -> Vec3A {
     let frame = Frame::new(surface.smooth);
     let out = frame.local(to_eye);
-    let mut sum = surface.albedo * Vec3A::from(stage.environment);
+    // Metal is a mirror: what it shows of the room is darker towards its edges, where it shows what is behind it.
+    let ambient = if material.is_metal() { 0.35 + 0.85 * out.z } else { 1.0 };
+    let mut sum = surface.albedo * Vec3A::from(stage.environment) * ambient;
     for lamp in stage.lamps() {
         let Some(arriving) = lamp.arriving(surface.position, [0.5; 2]) else { continue };
         let towards = frame.local(arriving.direction);
@@ -32,7 +39,11 @@ pub(crate) fn light(
         if back == Vec3A::ZERO {
             continue;
         }
-        if shadows {
+        let beside = |eye: Vec3A| {
+            let light = surface.position + arriving.direction * arriving.distance;
+            light.distance_squared(eye) < (BESIDE * arriving.distance) * (BESIDE * arriving.distance)
+        };
+        if shadows.is_some_and(|eye| !beside(eye)) {
             let origin = surface.position + surface.flat * offset(surface.position);
             if stage.blocked(origin, arriving.direction, arriving.distance * (1.0 - 1e-4), stacks) {
                 continue;

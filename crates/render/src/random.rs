@@ -2,7 +2,7 @@
 
 /// Four numbers in [0, 1) for a key such as (pixel, sample, purpose, seed): `pcg4d` of Jarzynski and Olano, "Hash Functions for
 /// GPU Rendering" (2020).
-pub(crate) fn numbers(key: [u32; 4]) -> [f32; 4] {
+pub fn numbers(key: [u32; 4]) -> [f32; 4] {
     let [mut x, mut y, mut z, mut w] = key.map(|k| k.wrapping_mul(1_664_525).wrapping_add(1_013_904_223));
     let stir = |x: &mut u32, y: &mut u32, z: &mut u32, w: &mut u32| {
         *x = x.wrapping_add(y.wrapping_mul(*w));
@@ -18,7 +18,7 @@ pub(crate) fn numbers(key: [u32; 4]) -> [f32; 4] {
 }
 
 /// Two numbers of the standard normal distribution from two in [0, 1) (Box and Muller).
-pub(crate) fn normal(a: f32, b: f32) -> [f32; 2] {
+pub fn normal(a: f32, b: f32) -> [f32; 2] {
     let radius = (-2.0 * (1.0 - a).ln()).sqrt();
     let (sin, cos) = (std::f32::consts::TAU * b).sin_cos();
     [radius * cos, radius * sin]

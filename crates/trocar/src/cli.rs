@@ -4,6 +4,7 @@ mod comparison;
 mod episode;
 mod grasp;
 mod port;
+mod render;
 mod scene;
 mod solver;
 
@@ -11,6 +12,7 @@ pub use comparison::*;
 pub use episode::*;
 pub use grasp::*;
 pub use port::*;
+pub use render::*;
 pub use scene::*;
 pub use solver::*;
 
@@ -47,6 +49,8 @@ pub enum Command {
     Reconstruct(Reconstruct),
     /// List, print and check scene files: the whole two-arm cell in one TOML file.
     Scene(Scene),
+    /// Make a picture of a specimen or a scene through one of its cameras, or a moving one of the scene's grasp-lift.
+    Render(Render),
     /// Run a scripted task on a specimen without a window.
     Simulate(Simulate),
     /// Run one episode of a scene's task by a policy, into a folder.
@@ -333,6 +337,12 @@ pub struct RenderBench {
     /// Where to write the large picture (PNG).
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
+    /// Scene file or built-in scene whose cameras are measured; none for none.
+    #[arg(long, default_value = "cell-a")]
+    pub scene: String,
+    /// Folder for the scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
 }
 
 /// Models of the unseen back by name.

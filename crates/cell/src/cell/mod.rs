@@ -9,6 +9,7 @@ mod build;
 mod crtk;
 mod exchange;
 mod figures;
+mod look;
 mod overstretch;
 mod placed;
 mod report;

@@ -18,7 +18,7 @@ pub use machine::Machine;
 pub use many::ManyRow;
 pub use meshing::{MeshingBench, MeshingResult, MeshingRow};
 pub use organs::{OrganSource, OrgansBench, OrgansResult};
-pub use render::{RayRow, RenderBench, RenderBenchResult};
+pub use render::{CameraRow, CellRow, RayRow, RenderBench, RenderBenchResult};
 pub use scaling::{ScalingBench, ScalingResult, ScalingRow};
 pub use timing::Timing;
 pub(crate) use timing::median;

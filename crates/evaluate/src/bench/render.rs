@@ -3,6 +3,8 @@
 use super::Machine;
 use super::embree::{Embree, EmbreeRows};
 use super::median;
+use crate::cell_run::scene_specimen;
+use crate::rendering::Script;
 use crate::scenes::{LaparoscopicScene, endoscope_view};
 use crate::{Error, Result};
 use glam::Vec3;
@@ -11,9 +13,12 @@ use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use trocar_camera::{Camera, Endoscope, Pose};
+use trocar_cell::Cell;
 use trocar_geometry::TriMesh;
 use trocar_progress::Progress;
 use trocar_render::{BodyId, Eye, Film, Light, Look, Settings, ShapeId, Stage, render};
+use trocar_scene::Scene;
+use trocar_sight::Sight;
 
 /// The organ that deforms.
 const MOVING: usize = 1;
@@ -35,23 +40,34 @@ pub struct RenderBench {
     pub python: PathBuf,
     /// Where to write the large picture (PNG); nowhere if left out.
     pub picture: Option<PathBuf>,
+    /// Scene whose cameras are measured while its grasp-lift goes on; none if left out.
+    pub scene: Option<String>,
+    /// Folder in which its phantom is recorded and reconstructed.
+    pub phantoms: PathBuf,
 }
 
 /// The benchmark's outcome.
 #[derive(Clone, Debug, Serialize)]
 pub struct RenderBenchResult {
-    /// Triangles on the stage.
-    pub triangles: usize,
-    /// Triangles that are refitted each frame.
-    pub refitted_triangles: usize,
-    /// Median of a frame of 224 x 224 with colour, depth and labels, the refit and moved instruments included, hard shadows [ms].
+    /// The scene through its cameras; left out without a scene.
+    pub cell: Option<CellRow>,
+    /// Median of a frame of 224 x 224 with colour, depth and labels, all deformed organs refitted and arms moved, hard shadows: of the scene through its first camera, or else of the stage of
+    /// loops of bowel [ms].
     pub preview_224_ms: f64,
     /// The same without shadows [ms].
     pub preview_224_unshadowed_ms: f64,
     /// The fastest frame with shadows [ms]: what the machine can do when it is left alone.
     pub preview_224_best_ms: f64,
-    /// Median of the refit alone [ms].
+    /// Median of bringing the stage to where the cell is, or of the refit alone [ms].
     pub refit_ms: f64,
+    /// Triangles of the loops of bowel.
+    pub triangles: usize,
+    /// Triangles of them that are refitted each frame.
+    pub refitted_triangles: usize,
+    /// Median of a frame of 224 x 224 of the loops of bowel with hard shadows [ms].
+    pub loops_224_ms: f64,
+    /// The same without shadows [ms].
+    pub loops_224_unshadowed_ms: f64,
     /// Building all trees anew [ms].
     pub build_ms: f64,
     /// One frame of 1280 x 720 at `samples` paths a pixel [ms]; left out with 0 samples.
@@ -66,6 +82,34 @@ pub struct RenderBenchResult {
     pub threads: usize,
     /// Where this was measured.
     pub machine: Machine,
+}
+
+/// A cell through its cameras.
+#[derive(Clone, Debug, Serialize)]
+pub struct CellRow {
+    /// The scene.
+    pub scene: String,
+    /// Triangles on the stage.
+    pub triangles: usize,
+    /// Making the sight: field, arms, instruments, all trees [ms].
+    pub begin_ms: f64,
+    /// Median of bringing the stage to where the cell is [ms].
+    pub follow_ms: f64,
+    /// The cameras, 224 x 224.
+    pub cameras: Vec<CameraRow>,
+}
+
+/// One camera of a cell.
+#[derive(Clone, Debug, Serialize)]
+pub struct CameraRow {
+    /// Its name.
+    pub camera: String,
+    /// Median of a frame with shadows, all that has moved included [ms].
+    pub ms: f64,
+    /// The fastest [ms].
+    pub best_ms: f64,
+    /// Median without shadows [ms].
+    pub unshadowed_ms: f64,
 }
 
 /// First hits of one kind of ray on one thread.
@@ -176,13 +220,14 @@ impl RenderBench {
             progress.advance(1);
             if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
         };
+        let cell = self.scene.as_ref().map(|scene| self.cell(scene, progress)).transpose()?;
         let clock = Instant::now();
         let mut set = Set::new(self.triangles)?;
         let build_ms = 1e3 * clock.elapsed().as_secs_f64();
-        let (preview_224_ms, preview_224_best_ms) = set.preview(true)?;
-        let (preview_224_unshadowed_ms, _) = set.preview(false)?;
+        let (loops_224_ms, loops_best_ms) = set.preview(true)?;
+        let (loops_224_unshadowed_ms, _) = set.preview(false)?;
         step()?;
-        let refit_ms = set.refit()?;
+        let loops_refit_ms = set.refit()?;
         step()?;
         let whole = merged(&set.scene.organs);
         let (mut rays, embree_failure) = self.rays(&whole, &set.view)?;
@@ -191,13 +236,17 @@ impl RenderBench {
         let path_720p_ms = if self.samples > 0 { Some(self.path(&mut set)?) } else { None };
         step()?;
         progress.end();
+        let first = cell.as_ref().and_then(|c| c.cameras.first());
         Ok(RenderBenchResult {
+            preview_224_ms: first.map_or(loops_224_ms, |c| c.ms),
+            preview_224_unshadowed_ms: first.map_or(loops_224_unshadowed_ms, |c| c.unshadowed_ms),
+            preview_224_best_ms: first.map_or(loops_best_ms, |c| c.best_ms),
+            refit_ms: cell.as_ref().map_or(loops_refit_ms, |c| c.follow_ms),
+            cell,
+            loops_224_ms,
+            loops_224_unshadowed_ms,
             triangles: set.stage.triangles(),
             refitted_triangles: set.scene.organs[MOVING].triangles.len(),
-            preview_224_ms,
-            preview_224_unshadowed_ms,
-            preview_224_best_ms,
-            refit_ms,
             build_ms,
             path_720p_ms,
             samples: self.samples,
@@ -206,6 +255,60 @@ impl RenderBench {
             threads: rayon::current_num_threads(),
             machine,
         })
+    }
+
+    /// The cell's cameras while the grasp-lift goes on: frames of all of them after each period, which is not timed.
+    fn cell(&self, name: &str, progress: &dyn Progress) -> Result<CellRow> {
+        let scene = Scene::read(name)?;
+        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
+        let cell = Cell::new(&scene, &specimen, 0)?;
+        let clock = Instant::now();
+        let mut sight = Sight::new(&scene, &specimen, &cell)?;
+        let begin_ms = 1e3 * clock.elapsed().as_secs_f64();
+        let mut script = Script::new(&scene, cell)?;
+        let names: Vec<String> = scene.cameras.iter().map(|c| c.name.clone()).collect();
+        let mut shadowed = vec![Vec::new(); names.len()];
+        let mut plain = shadowed.clone();
+        let mut follow = Vec::new();
+        for frame in 0..FRAMES + FRAMES / 10 {
+            let mut step =
+                |timed: &mut dyn FnMut(&mut Sight, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
+                    if progress.interrupted() {
+                        return Err(Error::Interrupted);
+                    }
+                    script.advance()?;
+                    let clock = Instant::now();
+                    timed(&mut sight, &script.cell)?;
+                    if frame >= FRAMES / 10 {
+                        times.push(1e3 * clock.elapsed().as_secs_f64());
+                    }
+                    Ok(())
+                };
+            // A camera and a kind a period, so that all that moves has moved before each.
+            let k = frame % names.len().max(1);
+            let see = |shadows: bool| {
+                let camera = &names[k];
+                move |sight: &mut Sight, cell: &Cell| -> Result<()> {
+                    std::hint::black_box(sight.see(cell, camera, [224; 2], &Settings::Preview { shadows })?);
+                    Ok(())
+                }
+            };
+            if !names.is_empty() {
+                step(&mut see(true), &mut shadowed[k])?;
+                step(&mut see(false), &mut plain[k])?;
+            }
+            step(&mut |sight, cell| Ok(sight.follow(cell)?), &mut follow)?;
+        }
+        let rows = names.into_iter().zip(shadowed.iter_mut().zip(&mut plain));
+        let cameras = rows
+            .map(|(camera, (shadowed, plain))| {
+                let ms = median(shadowed);
+                let best_ms = shadowed.first().copied().unwrap_or(ms);
+                CameraRow { camera, ms, best_ms, unshadowed_ms: median(plain) }
+            })
+            .collect();
+        let (scene, triangles, follow_ms) = (scene.name, sight.triangles(), median(&mut follow));
+        Ok(CellRow { scene, triangles, begin_ms, follow_ms, cameras })
     }
 
     fn path(&self, set: &mut Set) -> Result<f64> {

@@ -1,18 +1,20 @@
 //! The page of a grasp-lift in the two-arm cell: figures of merit, and what the arm and the tissue did over time.
 
 use super::colors;
+use super::figures;
 use super::page::{self, Card, Columns};
 use super::plots::{Band, Line, Plot};
 use super::table::{self, fixed};
 use crate::Result;
 use crate::cell_run::CellRun;
+use crate::watched::Pictures;
 use trocar_cell::{CellLiftRun, CellLiftSample};
 
 /// RCM deviation of the paper's rollouts, median [mm]; its threshold [mm] (SPEC E2, E3).
 const PAPER_RCM_MM: f64 = 0.12;
 const THRESHOLD_MM: f64 = 3.0;
 
-pub(super) fn body(made: &CellRun, run: &CellLiftRun) -> Result<String> {
+pub(super) fn body(made: &CellRun, run: &CellLiftRun, pictures: &Pictures) -> Result<String> {
     let s = &made.summary;
     let mm = |v: f64| format!("{} mm", fixed(v, 3));
     let cards = [
@@ -41,7 +43,22 @@ pub(super) fn body(made: &CellRun, run: &CellLiftRun) -> Result<String> {
     let figures = [rcm(run)?, lift(run)?, force(run)?, behind(run)?];
     let lead = format!("The {} arm works through its port by actions, thirty a second.", page::escape(&s.arm));
     Ok(page::section("Grasp-lift in the cell", &lead, &(page::cards(&cards) + &page::grid(Columns::Two, &figures)))
+        + &seen(pictures)?
         + &events(made))
+}
+
+/// What the cameras saw.
+fn seen(pictures: &Pictures) -> Result<String> {
+    let mut figures = Vec::new();
+    if let Some((bytes, size)) = &pictures.film {
+        let img = figures::img_of_bytes("webp", bytes, size[0], size[1], "the lift through the endoscope");
+        figures.push(page::figure(&img, "<b>The lift</b>, as fast as it was."));
+    }
+    for (caption, picture) in &pictures.stills {
+        figures.push(page::figure(&figures::img(picture, caption)?, &format!("<b>{}</b>", page::escape(caption))));
+    }
+    let lead = "Direct light; instruments and organs are where the simulation has them.";
+    Ok(page::section("What the cameras saw", lead, &page::grid(Columns::Two, &figures)))
 }
 
 fn bands(run: &CellLiftRun) -> Vec<Band> {

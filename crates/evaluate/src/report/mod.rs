@@ -78,9 +78,13 @@ pub fn reconstruction_sections(r: &Reconstruction) -> Result<String> {
 ///
 /// # Errors
 /// A plot that cannot be drawn.
-pub(crate) fn cell_lift(made: &crate::CellRun, run: &trocar_cell::CellLiftRun) -> Result<String> {
+pub(crate) fn cell_lift(
+    made: &crate::CellRun,
+    run: &trocar_cell::CellLiftRun,
+    pictures: &crate::watched::Pictures,
+) -> Result<String> {
     let subtitle = format!("Grasp-lift in the cell '{}'", made.scene);
-    Ok(page::page(&made.scene, &subtitle, &cell_lift::body(made, run)?))
+    Ok(page::page(&made.scene, &subtitle, &cell_lift::body(made, run, pictures)?))
 }
 
 /// The page of the reconstruction experiment; `made` are the reconstructions of its phantoms in their order.

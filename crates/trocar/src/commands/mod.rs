@@ -7,6 +7,7 @@ mod experiment;
 mod inspect;
 mod reconstruct;
 mod record;
+mod render;
 mod scene;
 mod segment;
 mod simulate;
@@ -25,6 +26,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Sweep(arguments) => episode::sweep(arguments, cli.json),
         Command::Inspect(arguments) => inspect::run(arguments, cli.json),
         Command::Record(arguments) => record::run(arguments, cli.json, progress),
+        Command::Render(arguments) => render::run(arguments, cli.json, progress),
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress),
         Command::Experiment(arguments) => experiment::run(arguments, cli.json, progress),
         Command::Scene(arguments) => scene::run(arguments, cli.json),

@@ -12,6 +12,8 @@ pub fn run(arguments: &RenderBench, json: bool, progress: &dyn Progress) -> Resu
         rays: arguments.rays,
         python: arguments.python.clone(),
         picture: arguments.picture.clone(),
+        scene: (arguments.scene != "none").then(|| arguments.scene.clone()),
+        phantoms: arguments.phantoms.clone(),
     };
     output::print(json, &bench.run(progress)?, text);
     Ok(())
@@ -35,19 +37,29 @@ fn text(r: &RenderBenchResult) -> String {
         })
         .collect();
     let header = ["rays", "count", "ours M/s", "Embree M/s", "ratio", "differ", "most um"];
-    let mut out = format!(
-        "{} triangles, {} of them refitted; {} threads ({} cores{})\n\
-         preview 224 x 224: {:.1} ms a frame with shadows (best {:.1}), {:.1} without, refit included\n\
-         refit {:.2} ms, all trees anew {:.0} ms\n",
+    let mut out = String::new();
+    if let Some(cell) = &r.cell {
+        out += &format!(
+            "{}: {} triangles, made in {:.0} ms; following the cell {:.2} ms\n",
+            cell.scene, cell.triangles, cell.begin_ms, cell.follow_ms
+        );
+        for c in &cell.cameras {
+            out += &format!(
+                "  {:>10} 224 x 224: {:.1} ms with shadows (best {:.1}), {:.1} without\n",
+                c.camera, c.ms, c.best_ms, c.unshadowed_ms
+            );
+        }
+    }
+    out += &format!(
+        "loops of bowel: {} triangles, {} of them refitted; {} threads ({} cores{})\n\
+         preview 224 x 224: {:.1} ms a frame with shadows, {:.1} without, refit included; all trees anew {:.0} ms\n",
         r.triangles,
         r.refitted_triangles,
         r.threads,
         r.machine.cores,
         r.machine.load.map_or(String::new(), |l| format!(", load {l:.1}")),
-        r.preview_224_ms,
-        r.preview_224_best_ms,
-        r.preview_224_unshadowed_ms,
-        r.refit_ms,
+        r.loops_224_ms,
+        r.loops_224_unshadowed_ms,
         r.build_ms,
     );
     if let Some(ms) = r.path_720p_ms {

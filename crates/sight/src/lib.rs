@@ -1,0 +1,22 @@
+//! What the cameras of a cell see.
+//!
+//! A [`Sight`] joins a scene's cameras, a cell that is stepped, and the ray tracer: organs with their surfaces (in their pieces after a cut), what they lie on,
+//! instruments with jaws that open, arms, ports and the room. [`Sight::see`] gives colour, metric depth, labels and normals. The same state gives the same bits for any
+//! number of threads.
+
+mod arm;
+mod camera;
+mod depth;
+mod error;
+mod field;
+mod furniture;
+mod instrument;
+mod organ;
+mod section;
+mod sight;
+mod solid;
+
+pub use camera::OUTSIDE;
+pub use depth::DepthNoise;
+pub use error::{Error, Result};
+pub use sight::{Sensor, Sight};

@@ -1,0 +1,167 @@
+//! The surface of an organ as it is drawn: the recorded skin carried by the body, and after a cut the faces that it laid bare.
+
+use glam::DVec3;
+use std::collections::BTreeMap;
+use trocar_geometry::{Skin, TetMesh, TriMesh};
+use trocar_specimen::Organ;
+
+/// Colour of what a cut laid bare.
+pub(crate) const BARED: [u8; 3] = [158, 34, 40];
+
+/// Corners of the face opposite each corner of an element, counter-clockwise seen from outside.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
+
+/// An organ and its skin at rest.
+#[derive(Clone, Debug)]
+pub(crate) struct Whole {
+    pub name: String,
+    pub surface: TriMesh,
+    pub body: TetMesh,
+    skin: Skin,
+    nodes: BTreeMap<[u64; 3], u32>,
+    elements: BTreeMap<[u32; 4], u32>,
+}
+
+/// A surface whose vertices are mixtures of nodes; the nodes of all pieces are numbered one piece after the other.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Draped {
+    /// At rest, with colours.
+    pub mesh: TriMesh,
+    carried: Vec<([u32; 4], [f64; 4])>,
+}
+
+/// A piece of an organ: rest positions of its nodes and its elements.
+pub(crate) struct Piece<'a> {
+    pub rest: &'a [DVec3],
+    pub tets: &'a [[u32; 4]],
+}
+
+fn bits(p: &DVec3) -> [u64; 3] {
+    p.to_array().map(f64::to_bits)
+}
+
+fn sorted<const N: usize>(mut nodes: [u32; N]) -> [u32; N] {
+    nodes.sort_unstable();
+    nodes
+}
+
+impl Whole {
+    pub fn new(organ: &Organ) -> Self {
+        let mut surface = organ.surface.clone();
+        if surface.colors.len() != surface.vertices.len() {
+            surface.colors = vec![[190, 96, 88]; surface.vertices.len()];
+        }
+        let numbered = |i: usize| i as u32;
+        Self {
+            name: organ.name.clone(),
+            skin: Skin::bind(&surface, &organ.body),
+            surface,
+            nodes: organ.body.vertices.iter().enumerate().map(|(i, p)| (bits(p), numbered(i))).collect(),
+            elements: organ.body.tets.iter().enumerate().map(|(i, t)| (sorted(*t), numbered(i))).collect(),
+            body: organ.body.clone(),
+        }
+    }
+
+    /// The surface of the organ in one piece.
+    pub fn draped(&self) -> Draped {
+        let carried = self.skin.bindings.iter().map(|(t, w)| (self.body.tets[*t as usize], *w)).collect();
+        Draped { mesh: self.surface.clone(), carried }
+    }
+
+    /// The surface of the organ in `pieces`; `None` where they are not of this organ. The recorded skin knows nothing of cuts: where elements fell apart, and beside them, the
+    /// elements' own faces take its place.
+    pub fn in_pieces(&self, pieces: &[Piece<'_>]) -> Option<Draped> {
+        let mut tets = vec![[u32::MAX; 4]; self.body.tets.len()];
+        let mut piece_of = vec![0_usize; tets.len()];
+        let mut parents = Vec::new();
+        for (k, piece) in pieces.iter().enumerate() {
+            let first = parents.len() as u32;
+            for p in piece.rest {
+                parents.push(*self.nodes.get(&bits(p))?);
+            }
+            for tet in piece.tets {
+                let whole = tet.map(|i| parents.get((first + i) as usize).copied().unwrap_or(u32::MAX));
+                let element = *self.elements.get(&sorted(whole))? as usize;
+                // Corners in the specimen's order, in which the skin's weights are.
+                tets[element] =
+                    self.body.tets[element].map(|node| first + tet[whole.iter().position(|w| *w == node).unwrap_or(0)]);
+                piece_of[element] = k;
+            }
+        }
+        if tets.iter().any(|t| t[0] == u32::MAX) {
+            return None;
+        }
+        let mut copies = vec![0_u32; self.body.vertices.len()];
+        parents.iter().for_each(|i| copies[*i as usize] += 1);
+        let beside = |nodes: &dyn Fn(u32) -> bool| -> Vec<bool> {
+            self.body.tets.iter().map(|tet| tet.iter().any(|i| nodes(*i))).collect()
+        };
+        // Elements at the cut, and with them those that share a node: skin and faces overlap there, so that nothing gapes.
+        let at_cut = beside(&|i| copies[i as usize] > 1);
+        let mut near = vec![false; copies.len()];
+        for (tet, _) in self.body.tets.iter().zip(&at_cut).filter(|(_, at)| **at) {
+            tet.iter().for_each(|i| near[*i as usize] = true);
+        }
+        let around = beside(&|i| near[i as usize]);
+        let stays = |triangle: &&[u32; 3]| {
+            let of = triangle.map(|v| self.skin.bindings[v as usize].0 as usize);
+            of.iter().all(|t| !at_cut[*t] && piece_of[*t] == piece_of[of[0]])
+        };
+        let mut draped = Draped {
+            mesh: TriMesh {
+                triangles: self.surface.triangles.iter().filter(stays).copied().collect(),
+                ..self.surface.clone()
+            },
+            carried: self.skin.bindings.iter().map(|(t, w)| (tets[*t as usize], *w)).collect(),
+        };
+        let neighbours = |tets: &[[u32; 4]]| TetMesh { vertices: Vec::new(), tets: tets.to_vec() }.neighbours();
+        let (before, after) = (neighbours(&self.body.tets), neighbours(&tets));
+        let (mut outer, mut bared) = (Vec::new(), Vec::new());
+        for (t, tet) in tets.iter().enumerate() {
+            for (corner, face) in FACES.iter().enumerate() {
+                let nodes = face.map(|c| tet[c]);
+                match (before[t][corner], after[t][corner]) {
+                    (None, _) if around[t] => outer.push(nodes),
+                    (Some(_), None) => bared.push(nodes),
+                    _ => {}
+                }
+            }
+        }
+        let tint = |node: u32| {
+            let p = self.body.vertices[parents[node as usize] as usize];
+            let nearest = self.surface.vertices.iter().zip(&self.surface.colors);
+            nearest
+                .min_by(|a, b| a.0.distance_squared(p).total_cmp(&b.0.distance_squared(p)))
+                .map_or(BARED, |(_, c)| *c)
+        };
+        let place = |node: u32| self.body.vertices[parents[node as usize] as usize];
+        draped.add(&outer, &place, &tint);
+        draped.add(&bared, &place, &|_| BARED);
+        Some(draped)
+    }
+}
+
+impl Draped {
+    /// Adds faces of nodes with vertices of their own, so that no colour runs over into what is beside them.
+    fn add(&mut self, faces: &[[u32; 3]], place: &dyn Fn(u32) -> DVec3, color: &dyn Fn(u32) -> [u8; 3]) {
+        let mut number = BTreeMap::new();
+        for node in faces.iter().flatten() {
+            number.entry(*node).or_insert_with(|| {
+                self.mesh.vertices.push(place(*node));
+                self.mesh.colors.push(color(*node));
+                self.carried.push(([*node; 4], [1.0, 0.0, 0.0, 0.0]));
+                self.mesh.vertices.len() as u32 - 1
+            });
+        }
+        self.mesh.triangles.extend(faces.iter().map(|f| f.map(|node| number[&node])));
+    }
+
+    /// Where its vertices are when the nodes are at `nodes` [m]. Allocates nothing once `out` is large enough.
+    pub fn positions(&self, nodes: &[DVec3], out: &mut Vec<DVec3>) {
+        out.clear();
+        out.extend(self.carried.iter().map(|(tet, w)| {
+            let [a, b, c, d] = tet.map(|i| nodes[i as usize]);
+            w[0] * a + w[1] * b + w[2] * c + w[3] * d
+        }));
+    }
+}

@@ -1,0 +1,185 @@
+//! What the cameras of a small cell see: the same bits on any number of threads, what moves where it is, cuts, sections, noise.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+use glam::{DQuat, DVec3};
+use trocar_camera::{Camera, ColorImage, Pose};
+use trocar_cell::{Action, Cell};
+use trocar_geometry::{TetMesh, TriMesh};
+use trocar_render::{Picture, Settings};
+use trocar_scene::{Scene, SpecimenSource};
+use trocar_sight::{DepthNoise, Sensor, Sight};
+use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
+
+/// A bar of cubes along x, six elements each, in the recording camera's frame, on a bed 150 mm before it.
+fn bar(name: &str, middle: DVec3, cubes: usize, edge: f64) -> Organ {
+    let mut body = TetMesh::default();
+    let at = |i: usize, j: usize, k: usize| (i * 9 + j * 3 + k) as u32;
+    for i in 0..=cubes {
+        for j in 0..3 {
+            for k in 0..3 {
+                let p = DVec3::new(i as f64 - 0.5 * cubes as f64, j as f64 - 1.0, k as f64 - 1.0);
+                body.vertices.push(middle + edge * p);
+            }
+        }
+    }
+    for i in 0..cubes {
+        for (j, k) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+            let corner = |c: usize| at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+            for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                body.tets.push([corner(0), corner(a), corner(b), corner(7)]);
+            }
+        }
+    }
+    let (mut surface, _): (TriMesh, _) = body.boundary();
+    surface.colors = vec![[200, 120, 90]; surface.vertices.len()];
+    Organ {
+        name: name.to_owned(),
+        base: body.vertices[0],
+        body,
+        surface,
+        material: Material::default(),
+        pins: Pins::Band { share: 0.4 },
+        facts: OrganFacts::default(),
+    }
+}
+
+fn specimen() -> Specimen {
+    let mut picture = ColorImage::new(212, 120, [150, 60, 50]);
+    picture.pixels.iter_mut().enumerate().for_each(|(i, p)| p[0] = 100 + (i % 90) as u8);
+    Specimen {
+        name: "bars".to_owned(),
+        up: -DVec3::Z,
+        placement: Pose::IDENTITY,
+        camera: Some(Camera::centred(212, 120, 1.5)),
+        organs: vec![
+            bar("appendix", DVec3::new(0.012, 0.012, 0.145), 12, 0.004),
+            bar("bowel", DVec3::new(0.0, -0.02, 0.145), 8, 0.005),
+        ],
+        background: Some(picture),
+        provenance: Provenance::default(),
+    }
+}
+
+fn scene() -> Scene {
+    let mut scene = Scene::new("bars", SpecimenSource::phantom("phantom-a", 1));
+    scene.task.organ = "appendix".to_owned();
+    scene
+}
+
+fn share(picture: &Picture, label: u16) -> f64 {
+    picture.labels.iter().filter(|l| **l == label).count() as f64 / picture.labels.len() as f64
+}
+
+fn label(sight: &Sight, name: &str) -> u16 {
+    sight.labels().iter().find(|(_, n)| n == name).unwrap().0
+}
+
+#[test]
+fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
+    let (scene, specimen) = (scene(), specimen());
+    let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
+    let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
+    sight.sensor = Sensor { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
+    assert_eq!(sight.cameras(), ["endoscope", "d405", "recording", "outside"]);
+    sight.follow(&cell).unwrap();
+    let mut run = |threads: usize| -> Vec<Picture> {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let mut seen = Vec::new();
+        for camera in ["endoscope", "d405", "recording", "outside"] {
+            for settings in [Settings::preview(), Settings::path(2)] {
+                seen.push(pool.install(|| sight.see_still(camera, [96, 64], &settings).unwrap().clone()));
+            }
+        }
+        seen
+    };
+    let (one, two) = (run(1), run(2));
+    assert_eq!(one, two);
+    let organs = [label(&sight, "appendix"), label(&sight, "bowel")];
+    for (k, picture) in one.iter().step_by(2).take(3).enumerate() {
+        for organ in organs {
+            assert!(share(picture, organ) > 0.001, "camera {k} does not see organ {organ}");
+        }
+        assert!(share(picture, label(&sight, "grasper")) > 0.003, "camera {k} sees no grasper");
+        assert!(
+            picture
+                .normals
+                .iter()
+                .zip(&picture.labels)
+                .all(|(n, l)| *l == 0 || (glam::Vec3::from(*n).length() - 1.0).abs() < 1e-3)
+        );
+    }
+    assert!(share(&one[6], label(&sight, "left arm")) > 0.01);
+    // Depth of a camera without noise is the truth: the bed is 150 mm before the recording camera.
+    sight.sensor = Sensor::default();
+    let size = sight.size("recording").unwrap();
+    let picture = sight.see(&cell, "recording", size, &Settings::preview()).unwrap();
+    let bed = picture.depth.depth[100 * size[0] + 20];
+    assert!((0.145..0.153).contains(&bed), "{bed}");
+    // After a step of the arms the instruments are elsewhere in the picture, where the cell says.
+    let still = sight.see(&cell, "endoscope", [96, 64], &Settings::preview()).unwrap().clone();
+    let action: Vec<_> = cell.observe().iter().map(|a| trocar_cell_coordinates(a, 0.004)).collect();
+    for _ in 0..10 {
+        cell.step(&Action::pivots(&action)).unwrap();
+    }
+    let moved = sight.see(&cell, "endoscope", [96, 64], &Settings::preview()).unwrap().clone();
+    assert_ne!(still.labels, moved.labels);
+    let (model, pose) = sight.model("endoscope", [96, 64]).unwrap();
+    let gripper = cell.gripper("right").unwrap();
+    let tip = pose.inverse().transform(gripper.blade(1.0).transform(DVec3::new(0.012, 0.0008, 0.0)));
+    let pixel = model.project(tip).unwrap().round();
+    if (0.0..96.0).contains(&pixel.x) && (0.0..64.0).contains(&pixel.y) {
+        let at = pixel.y as usize * 96 + pixel.x as usize;
+        assert_eq!(moved.labels[at], label(&sight, "cutter"), "the blade is at {pixel}");
+    }
+}
+
+fn trocar_cell_coordinates(arm: &trocar_cell::ArmObservation, deeper: f64) -> trocar_robot::instrument::Coordinates {
+    trocar_robot::instrument::Coordinates { insertion: arm.commanded.insertion - deeper, jaw: 1.0, ..arm.commanded }
+}
+
+#[test]
+fn cut_organs_are_seen_in_their_pieces_and_whole_again() {
+    let (scene, specimen) = (scene(), specimen());
+    let cell = Cell::new(&scene, &specimen, 1).unwrap();
+    let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
+    let camera = ("recording", [212, 120]);
+    let whole = sight.see(&cell, camera.0, camera.1, &Settings::preview()).unwrap().clone();
+    let triangles = sight.triangles();
+    // Sections leave out what is on the normal's side, and show whole organs again.
+    let organ = label(&sight, "appendix");
+    let middle = specimen.organs[0].body.vertices.iter().sum::<DVec3>() / specimen.organs[0].body.vertices.len() as f64;
+    let middle = scene.placement.pose().transform(middle);
+    sight.section(Some((middle + 1e-4 * DVec3::X, DVec3::X)));
+    let half = sight.see(&cell, camera.0, camera.1, &Settings::preview()).unwrap().clone();
+    let ratio = share(&half, organ) / share(&whole, organ);
+    assert!((0.35..0.65).contains(&ratio), "{ratio}");
+    sight.section(None);
+    assert_eq!(*sight.see(&cell, camera.0, camera.1, &Settings::preview()).unwrap(), whole);
+    assert_eq!(sight.triangles(), triangles);
+}
+
+#[test]
+fn specimens_are_seen_alone_and_mistakes_are_told() {
+    let mut specimen = specimen();
+    let mut sight = Sight::of_specimen(&specimen).unwrap();
+    assert_eq!(sight.cameras(), ["recording", "outside"]);
+    let seen = sight.see_still("recording", [212, 120], &Settings::preview()).unwrap().clone();
+    assert!(share(&seen, 1) > 0.01 && share(&seen, 2) > 0.01);
+    // The organ's middle is where the recording camera has it.
+    let at = Camera::centred(212, 120, 1.5).project(DVec3::new(0.012, 0.012, 0.141)).unwrap().round();
+    assert_eq!(seen.labels[at.y as usize * 212 + at.x as usize], 1);
+    assert!(
+        matches!(sight.see_still("endoscope", [96, 64], &Settings::preview()), Err(e) if e.to_string() == "there is no camera 'endoscope'; the cameras are recording, outside")
+    );
+    assert!(
+        matches!(sight.see_still("outside", [4, 64], &Settings::preview()), Err(e) if e.to_string().contains("8 to 8192"))
+    );
+    // Turned specimens stand upright all the same, and those without a camera are seen from aside.
+    specimen.up = (DQuat::from_rotation_x(0.6) * specimen.up).normalize();
+    (specimen.camera, specimen.background) = (None, None);
+    let mut sight = Sight::of_specimen(&specimen).unwrap();
+    assert_eq!(sight.cameras(), ["outside"]);
+    let seen = sight.see_still("outside", [120, 80], &Settings::preview()).unwrap();
+    assert!(share(seen, 1) > 0.01, "{}", share(seen, 1));
+}
