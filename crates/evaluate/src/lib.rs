@@ -1,6 +1,7 @@
 //! The commands' work from folder to folder, and the reports: what came out, beside what the paper says.
 
 mod bench;
+mod campaign;
 mod cell_run;
 mod demo;
 mod episode_run;
@@ -21,6 +22,10 @@ pub use bench::{
     CameraRow, CellBench, CellBenchResult, CellRow, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow,
     MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench,
     RenderBenchResult, ScalingBench, ScalingResult, ScalingRow, Timing,
+};
+pub use campaign::{
+    Campaign, CampaignResult, Comparison, Files, Interval, Job, Kept, Plan, PolicyRow, PolicySpec, StageCount, Store,
+    Worker,
 };
 pub use cell_run::{CellRun, CellSimulation, TimedEvent, scene_specimen};
 pub use demo::{Demo, DemoResult};

@@ -1,15 +1,14 @@
 //! `Cells`: episodes of one scene, side by side in one process.
 
-use crate::actions::Actions;
 use crate::error::{task, wrong};
 use crate::frames::Rows;
 use crate::prepare;
-use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray2, PyReadonlyArray1, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
-use trocar_cell::Action;
-use trocar_task::{Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
+use trocar_cell::{Action, ActionSpace};
+use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it goes on), time [s].
 const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
@@ -25,7 +24,7 @@ pub struct State(EpisodeState);
 #[pyclass]
 pub struct Cells {
     episodes: Vec<Episode>,
-    actions: Actions,
+    bounds: Bounds,
     pool: rayon::ThreadPool,
     task_name: &'static str,
     organ: String,
@@ -87,6 +86,14 @@ impl Cells {
         if count == 0 || count > 4096 {
             return Err(wrong(format!("num_envs: is {count}; 1 to 4096 cells")));
         }
+        let space = match actions {
+            "pivots" => ActionSpace::Pivots,
+            "tip" => ActionSpace::Tip,
+            other => {
+                let known = "pivots (absolute targets), tip (steps of the tip)";
+                return Err(wrong(format!("actions: '{other}' is unknown; {known} are known")));
+            }
+        };
         let scene = prepare::scene(scene, task, episode_s)?;
         py.detach(|| {
             let specimen = prepare::specimen(&scene, &phantoms)?;
@@ -96,10 +103,10 @@ impl Cells {
             let built: Result<Vec<Episode>, trocar_task::Error> =
                 pool.install(|| (0..count).into_par_iter().map(|_| Episode::new(&scene, &specimen, each)).collect());
             let episodes = built.map_err(|e| crate::error::task(&e))?;
-            let actions = Actions::new(episodes[0].cell(), actions)?;
+            let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let organ = scene.task.organ.clone();
-            Ok(Self { episodes, actions, pool, task_name: scene.task.name.name(), organ, steps })
+            Ok(Self { episodes, bounds, pool, task_name: scene.task.name.name(), organ, steps })
         })
     }
 
@@ -142,7 +149,7 @@ impl Cells {
     /// Names of the numbers of an action.
     #[getter]
     fn action_names(&self) -> Vec<String> {
-        self.actions.names.clone()
+        self.bounds.names.clone()
     }
 
     /// Names of the channels.
@@ -172,7 +179,7 @@ impl Cells {
     /// Least and greatest numbers of an action.
     #[getter]
     fn action_limits<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
-        (PyArray1::from_slice(py, &self.actions.low), PyArray1::from_slice(py, &self.actions.high))
+        (PyArray1::from_slice(py, &self.bounds.low), PyArray1::from_slice(py, &self.bounds.high))
     }
 
     /// Begins the episodes of `seeds` in the cells `which`, and writes what is seen there.
@@ -209,7 +216,7 @@ impl Cells {
         figures: &Bound<'_, PyArrayDyn<f64>>,
         channels: &Bound<'_, PyArrayDyn<f64>>,
     ) -> PyResult<()> {
-        let (count, numbers) = (self.episodes.len(), self.actions.len());
+        let (count, numbers) = (self.episodes.len(), self.bounds.low.len());
         if actions.shape() != [count, numbers] {
             return Err(wrong(format!("actions: have shape {:?}; ({count}, {numbers}) is needed", actions.shape())));
         }
@@ -220,7 +227,7 @@ impl Cells {
         let rows = actions.as_slice().map_err(wrong)?.chunks_exact(numbers);
         let told: Vec<Option<Action>> = rows
             .zip(active)
-            .map(|(row, active)| active.then(|| self.actions.action(row)).transpose())
+            .map(|(row, active)| active.then(|| self.bounds.action(row).map_err(|e| task(&e))).transpose())
             .collect::<PyResult<_>>()?;
         let go = |(place, action): (&mut Place<'_>, &Option<Action>)| match action {
             Some(action) => place.step(action),

@@ -16,7 +16,10 @@ impl<'py, T: Element> Rows<'py, T> {
     pub fn new(array: &Bound<'py, PyArrayDyn<T>>, name: &'static str, cells: usize, shape: &[usize]) -> PyResult<Self> {
         let wanted: Vec<usize> = std::iter::once(cells).chain(shape.iter().copied()).collect();
         if array.shape() != wanted || !array.is_c_contiguous() {
-            return Err(wrong(format!("{name}: has shape {:?}; a contiguous array of shape {wanted:?} is needed", array.shape())));
+            return Err(wrong(format!(
+                "{name}: has shape {:?}; a contiguous array of shape {wanted:?} is needed",
+                array.shape()
+            )));
         }
         let array = array.try_readwrite().map_err(|e| wrong(format!("{name}: {e}")))?;
         Ok(Self { array, name, cells })

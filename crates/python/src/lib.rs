@@ -2,7 +2,6 @@
 //!
 //! It knows no Gymnasium and no dataset; `python/trocar` makes environments of it. Arrays are the caller's and are written in place.
 
-mod actions;
 mod cells;
 mod error;
 mod frames;

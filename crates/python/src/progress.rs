@@ -1,8 +1,8 @@
 //! Long work listens to Ctrl-C: the interpreter's signals are looked at while Rust works.
 
 use pyo3::Python;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use trocar_progress::Progress;
 

@@ -3,6 +3,7 @@
 //! An [`Episode`] steps a scene's cell from a seeded start to its [`End`]. Each step gives a row of [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds the
 //! actions and a hash a step, so that anyone can run it again and compare.
 
+mod bounds;
 mod channels;
 mod episode;
 mod error;
@@ -19,6 +20,7 @@ mod storage;
 mod summary;
 mod sweep;
 
+pub use bounds::Bounds;
 pub use channels::{ArmChannels, Channels, TaskChannels};
 pub use episode::{End, Episode, EpisodeState, SETTLE_S, Step};
 pub use error::{Error, Result};

@@ -2,6 +2,7 @@
 
 mod comparison;
 mod episode;
+mod evaluate;
 mod grasp;
 mod port;
 mod render;
@@ -10,6 +11,7 @@ mod solver;
 
 pub use comparison::*;
 pub use episode::*;
+pub use evaluate::*;
 pub use grasp::*;
 pub use port::*;
 pub use render::*;
@@ -53,6 +55,8 @@ pub enum Command {
     Render(Render),
     /// Run a scripted task on a specimen without a window.
     Simulate(Simulate),
+    /// Scores policies over many episodes: a table with intervals and a report; killed at any moment and gone on with.
+    Evaluate(Evaluate),
     /// Run one episode of a scene's task by a policy, into a folder.
     Episode(Episode),
     /// Do a recorded episode again and compare every step.

@@ -4,6 +4,7 @@
 //! the organs behaved when they were lifted.
 
 mod axis;
+mod campaign;
 mod cell_lift;
 mod colors;
 mod controller_grid;
@@ -30,6 +31,7 @@ mod views;
 mod wrench;
 
 use crate::bench::{MeshingResult, ScalingResult};
+use crate::campaign::{CampaignResult, Kept, Plan, Store};
 use crate::experiment::{
     ControllerGridResult, ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult,
     PortBudgetResult, ReconstructionResult, SettlingResult, WrenchResult,
@@ -95,6 +97,16 @@ pub(crate) fn reconstruction_experiment(result: &ReconstructionResult, made: &[R
     made.iter().try_for_each(seen::check_sizes)?;
     let subtitle = format!("{} organs of {} phantoms, one set of settings", result.organs.len(), made.len());
     Ok(page::page("Reconstruction", &subtitle, &reconstruction_experiment::body(result, made)?))
+}
+
+/// The page of a campaign: how far each policy came, on what, and how it failed.
+///
+/// # Errors
+/// A plot that cannot be drawn, channels that cannot be read.
+pub(crate) fn campaign(plan: &Plan, result: &CampaignResult, kept: &[Kept], store: &Store) -> Result<String> {
+    let title = format!("{}: {}", plan.scene, plan.task);
+    let subtitle = format!("Campaign of {} episodes, seeds from {}", result.episodes, plan.seed);
+    Ok(page::page(&title, &subtitle, &campaign::body(plan, result, kept, store)?))
 }
 
 /// The page of the meshing benchmark.

@@ -40,7 +40,7 @@ pub const POLICIES: [&str; 6] = ["scripted", "noise", "delay", "offset", "greedy
 ///
 /// # Errors
 /// A name that is none.
-pub fn named(name: &str) -> Result<Box<dyn Policy>> {
+pub fn named(name: &str) -> Result<Box<dyn Policy + Send>> {
     let scripted = || Scripted::new(Style::Careful);
     Ok(match name {
         "scripted" => Box::new(scripted()),

@@ -3,6 +3,7 @@
 mod bench;
 mod demo;
 mod episode;
+mod evaluate;
 mod experiment;
 mod inspect;
 mod reconstruct;
@@ -21,6 +22,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
     match &cli.command {
         Command::Bench(arguments) => bench::run(arguments, cli.json, progress),
         Command::Demo(arguments) => demo::run(arguments, cli.json, progress),
+        Command::Evaluate(arguments) => evaluate::run(arguments, cli.json, progress),
         Command::Episode(arguments) => episode::run(arguments, cli.json, progress),
         Command::Replay(arguments) => episode::replay_file(arguments, cli.json, progress),
         Command::Sweep(arguments) => episode::sweep(arguments, cli.json),

@@ -1,0 +1,108 @@
+//! Campaigns: many episodes of one scene by several policies, in parallel, killed at any moment and gone on with.
+//!
+//! A [`Plan`] says which episodes there are, a [`Store`] keeps each finished one in a folder of its own, a [`Worker`] runs one after the other. [`Campaign::run`] puts them together on this
+//! machine; the Python package does the same over many. An episode's bits depend on scene, specimen, policy and seed alone, so who ran it where does not matter.
+
+pub(crate) mod pictures;
+mod plan;
+mod remote;
+mod store;
+pub(crate) mod table;
+mod worker;
+
+pub use plan::{Job, Plan, PolicySpec};
+pub use store::{Files, Kept, Store};
+pub use table::{CampaignResult, Comparison, Interval, PolicyRow, StageCount};
+pub use worker::Worker;
+
+use crate::cell_run::scene_specimen;
+use crate::workflow::refuse_overlap;
+use crate::{Error, Result, report};
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use trocar_progress::Progress;
+use trocar_scene::Scene;
+
+/// What a campaign is to do on this machine.
+#[derive(Clone, Debug)]
+pub struct Campaign {
+    /// Scene file or name of a built-in scene.
+    pub scene: String,
+    /// The policies.
+    pub policies: Vec<PolicySpec>,
+    /// Episodes of each.
+    pub episodes: usize,
+    /// Seed of the first episode; the next have the next. All policies get the same.
+    pub seed: u64,
+    /// Episodes at once, 0 for as many as the machine has cores. Results do not depend on it.
+    pub jobs: usize,
+    /// Episodes that ended because their policy failed are done again.
+    pub retry_failed: bool,
+    /// Folder in which a scene's phantom is recorded and reconstructed; what is there is used again.
+    pub phantoms: PathBuf,
+}
+
+impl Campaign {
+    /// Runs what is missing in the campaign folder `output`, then writes the table and the report there.
+    ///
+    /// # Errors
+    /// One line that names the file, field or option. Finished episodes stay; an interruption loses only those under way.
+    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<CampaignResult> {
+        let scene = Scene::read(&self.scene)?;
+        refuse_overlap(Path::new(&self.scene), output)?;
+        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
+        let plan = Plan::new(&scene, &specimen, &self.policies, self.episodes, self.seed)?;
+        let store = Store::open(output, &plan)?;
+        let missing = store.missing(&plan, self.retry_failed)?;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let workers = if self.jobs == 0 { cores } else { self.jobs }.min(missing.len());
+        progress.begin("episodes", missing.len() as u64);
+        let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let first_error: Mutex<Option<Error>> = Mutex::new(None);
+        let work = || -> Result<()> {
+            let mut worker = Worker::new(&scene, &specimen)?;
+            while let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
+                let files = worker.run(job, &|| stop.load(Ordering::Relaxed) || progress.interrupted())?;
+                store.put(job, &files)?;
+                progress.advance(1);
+            }
+            Ok(())
+        };
+        std::thread::scope(|scope| {
+            for _ in 0..workers {
+                scope.spawn(|| {
+                    if let Err(why) = work() {
+                        stop.store(true, Ordering::Relaxed);
+                        // The first is told; those of the others are its consequence.
+                        if let Ok(mut told) = first_error.lock() {
+                            told.get_or_insert(why);
+                        }
+                    }
+                });
+            }
+        });
+        if let Some(why) = first_error.into_inner().ok().flatten() {
+            return Err(if progress.interrupted() { Error::Interrupted } else { why });
+        }
+        progress.end();
+        pictures::film(&store, &plan, &store.kept(&plan)?, &scene, &specimen, progress)?;
+        store.finish(&plan)
+    }
+}
+
+impl Store {
+    /// Makes the table and the report out of the episodes that are kept.
+    ///
+    /// # Errors
+    /// A kept episode that is damaged, by its name; a file that cannot be written.
+    pub fn finish(&self, plan: &Plan) -> Result<CampaignResult> {
+        let kept = self.kept(plan)?;
+        let result = CampaignResult::of(plan, &kept, self.folder());
+        self.write("table.csv", table::csv(&kept)?.as_bytes())?;
+        self.write("report.html", report::campaign(plan, &result, &kept, self)?.as_bytes())?;
+        let text = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
+        self.write("result.json", &text)?;
+        Ok(result)
+    }
+}

@@ -1,0 +1,93 @@
+//! Moving pictures of episodes that failed: done again from their files and filmed through the endoscope.
+
+use super::{Kept, Plan, Store};
+use crate::moving::webp;
+use crate::{Error, Result};
+use std::path::PathBuf;
+use trocar_progress::Progress;
+use trocar_render::Settings;
+use trocar_scene::Scene;
+use trocar_sight::Sight;
+use trocar_specimen::Specimen;
+use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
+
+/// Episodes that are filmed, at most; those of each policy take turns.
+const FILMED: usize = 4;
+/// Size of a picture [px].
+pub(crate) const SIZE: [usize; 2] = [320, 180];
+/// Pictures of an episode, at most.
+const FRAMES: usize = 80;
+
+/// Where the moving picture of an episode is kept.
+pub(crate) fn path(store: &Store, kept: &Kept) -> PathBuf {
+    store.folder().join("pictures").join(format!("{}-{:06}.webp", kept.name, kept.index))
+}
+
+/// The failures that come first in a report: of each policy in turn, those that came least far.
+pub(crate) fn failures<'a>(plan: &Plan, kept: &'a [Kept]) -> Vec<&'a Kept> {
+    let mut by_policy: Vec<Vec<&Kept>> = plan
+        .policies
+        .iter()
+        .map(|p| {
+            let mut own: Vec<&Kept> = kept.iter().filter(|k| k.name == p.name && !k.summary.passed).collect();
+            own.sort_by(|a, b| a.summary.score.total_cmp(&b.summary.score).then(a.index.cmp(&b.index)));
+            own
+        })
+        .collect();
+    let longest = by_policy.iter().map(Vec::len).max().unwrap_or(0);
+    (0..longest).flat_map(|k| by_policy.iter_mut().filter_map(|own| own.get(k).copied()).collect::<Vec<_>>()).collect()
+}
+
+/// Films the first failures that have no moving picture yet.
+///
+/// # Errors
+/// A kept episode that is damaged, a picture that cannot be written, an interruption.
+pub(super) fn film(
+    store: &Store,
+    plan: &Plan,
+    kept: &[Kept],
+    scene: &Scene,
+    specimen: &Specimen,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let chosen: Vec<&Kept> =
+        failures(plan, kept).into_iter().take(FILMED).filter(|k| !path(store, k).exists()).collect();
+    if chosen.is_empty() || !scene.cameras.iter().any(|c| c.name == "endoscope") {
+        return Ok(());
+    }
+    let mut episode = Episode::new(scene, specimen, 0)?;
+    let mut sight = Sight::new(scene, specimen, episode.cell())?;
+    progress.begin("pictures", chosen.len() as u64);
+    for kept in chosen {
+        let file = EpisodeFile::read(&store.episode(&kept.name, kept.index).join(EPISODE_FILE))?;
+        episode.reset(kept.seed)?;
+        let every = file.steps.len().div_ceil(FRAMES).max(1);
+        let milliseconds = (1e3 * every as f64 * episode.cell().period()).round() as i32;
+        let mut frames = Vec::new();
+        for (k, (action, _)) in file.steps.iter().enumerate() {
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
+            }
+            // A step that cannot be done is where an episode of another build would end.
+            if episode.step(action).is_err() {
+                break;
+            }
+            if k % every == 0 || k + 1 == file.steps.len() {
+                let picture = sight.see(episode.cell(), "endoscope", SIZE, &Settings::Preview { shadows: false })?;
+                frames.push((picture.color.clone(), milliseconds));
+            }
+        }
+        if frames.is_empty() {
+            let picture = sight.see(episode.cell(), "endoscope", SIZE, &Settings::Preview { shadows: false })?;
+            frames.push((picture.color.clone(), 1000));
+        }
+        let (path, bytes) = (path(store, kept), webp(&frames)?);
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
+        }
+        std::fs::write(&path, bytes).map_err(|source| Error::Io { path: path.clone(), source })?;
+        progress.advance(1);
+    }
+    progress.end();
+    Ok(())
+}

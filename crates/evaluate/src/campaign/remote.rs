@@ -1,0 +1,236 @@
+//! Policies of other processes, by openpi's protocol: a server that runs already, or a Python callable that is served for as long as it is needed.
+//!
+//! What they are shown: `observation/state` (the numbers of [`trocar_task::STATE_NAMES`]), `observation/images/NAME` for each camera of the scene but the recording one, `prompt`,
+//! `episode/seed` and `episode/step`. What they answer: `actions`, a chunk of absolute targets (two pivots [rad], insertion [m], roll [rad], jaw opening, for each arm), of which up to 8 are done.
+
+use super::PolicySpec;
+use crate::{Error, Result};
+use std::io::{BufRead, BufReader, Read};
+use std::process::{Child, Command, Stdio};
+use std::sync::mpsc;
+use std::time::Duration;
+use trocar_cell::{Action, ActionSpace};
+use trocar_remote::{Array, Client, Endpoint, Observation, Value};
+use trocar_render::Settings;
+use trocar_scene::{Scene, TaskName};
+use trocar_sight::Sight;
+use trocar_specimen::Specimen;
+use trocar_task::policy::CHUNK;
+use trocar_task::{Bounds, Episode, Policy};
+
+/// Side of the pictures that policies see, where the scene says none [px].
+const RECORDING: &str = "recording";
+
+/// The interpreter that serves `python:` policies, unless `$TROCAR_PYTHON` names another.
+const PYTHON: &str = "python3";
+
+/// Longest that an interpreter takes to import a policy.
+const START: Duration = Duration::from_secs(120);
+
+/// The key that a server may want.
+const KEY: &str = "TROCAR_POLICY_KEY";
+/// Longest wait for a reply [s], unless this says another.
+const TIMEOUT: &str = "TROCAR_POLICY_TIMEOUT_S";
+
+/// A policy of another process.
+pub(super) struct Remote {
+    name: String,
+    endpoint: Endpoint,
+    module: Option<String>,
+    child: Option<Served>,
+    client: Option<Client>,
+    bounds: Bounds,
+    sight: Sight,
+    cameras: Vec<(String, [usize; 2])>,
+    prompt: String,
+    seed: u64,
+}
+
+/// A child process that serves a Python callable; it ends with this.
+struct Served {
+    child: Child,
+    url: String,
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        // It may have ended by itself; either way it is gone.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Remote {
+    pub fn new(spec: &PolicySpec, scene: &Scene, specimen: &Specimen, episode: &Episode) -> Result<Self> {
+        let module = spec.source.strip_prefix("python:").map(str::to_owned);
+        let mut endpoint = Endpoint::new(if module.is_some() { "ws://127.0.0.1:1" } else { &spec.source });
+        endpoint.api_key = std::env::var(KEY).ok();
+        if let Ok(text) = std::env::var(TIMEOUT) {
+            let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);
+            let seconds =
+                seconds.ok_or_else(|| Error::Mismatch(format!("${TIMEOUT} is '{text:.40}'; seconds are wanted")))?;
+            endpoint.timeouts.infer = Duration::from_secs_f64(seconds);
+        }
+        let bounds = Bounds::new(episode.cell(), ActionSpace::Pivots)?;
+        endpoint.actions.dim = Some(bounds.low.len());
+        let seen = scene.cameras.iter().filter(|c| c.name != RECORDING);
+        let cameras = seen.map(|c| (c.name.clone(), c.policy_size_px.map(|n| n as usize))).collect();
+        Ok(Self {
+            name: spec.name.clone(),
+            endpoint,
+            module,
+            child: None,
+            client: None,
+            bounds,
+            sight: Sight::new(scene, specimen, episode.cell())?,
+            cameras,
+            prompt: prompt(scene),
+            seed: 0,
+        })
+    }
+
+    /// The connection, made when it is first needed and after it was lost.
+    fn client(&mut self) -> std::result::Result<&mut Client, String> {
+        if let Some(module) = &self.module
+            && self.child.is_none()
+        {
+            let served = serve(module)?;
+            self.endpoint.url.clone_from(&served.url);
+            self.child = Some(served);
+            self.client = None;
+        }
+        if self.client.as_ref().is_none_or(|c| !c.is_connected()) {
+            self.client = Some(Client::connect(&self.endpoint).map_err(|e| e.to_string())?);
+        }
+        self.client.as_mut().ok_or_else(|| "there is no connection".to_owned())
+    }
+
+    fn observation(&mut self, episode: &Episode) -> std::result::Result<Observation, String> {
+        let state: Vec<f32> = episode.observe().to_vec().iter().map(|x| *x as f32).collect();
+        let said = |e: trocar_remote::Error| e.to_string();
+        let mut seen = Observation::new();
+        let array = Array::from_f32(&[state.len()], &state).map_err(said)?;
+        seen.insert("observation/state".to_owned(), Value::Array(array));
+        for (camera, size) in &self.cameras {
+            let picture = self
+                .sight
+                .see(episode.cell(), camera, *size, &Settings::Preview { shadows: false })
+                .map_err(|e| e.to_string())?;
+            let pixels = picture.color.pixels.as_flattened().to_vec();
+            let array = Array::from_u8(&[size[1], size[0], 3], pixels).map_err(said)?;
+            seen.insert(format!("observation/images/{camera}"), Value::Array(array));
+        }
+        seen.insert("prompt".to_owned(), Value::Text(self.prompt.clone()));
+        seen.insert("episode/seed".to_owned(), Value::Int(self.seed as i64));
+        seen.insert("episode/step".to_owned(), Value::Int(episode.rows().len() as i64));
+        Ok(seen)
+    }
+
+    fn chunk(&mut self, episode: &Episode) -> std::result::Result<Vec<Action>, String> {
+        let observation = self.observation(episode)?;
+        let reply = match self.client()?.infer(&observation) {
+            Ok(reply) => reply,
+            Err(why) => {
+                // A child that has died says why on its last line.
+                let last = self.child.as_mut().and_then(|c| c.last_words());
+                if last.is_some() {
+                    self.child = None;
+                }
+                return Err(last.map_or_else(|| why.to_string(), |words| format!("{why}; its last words: {words}")));
+            }
+        };
+        let steps = reply.actions.horizon().min(CHUNK);
+        (0..steps)
+            .filter_map(|k| reply.actions.step(k))
+            .map(|numbers| self.bounds.action(numbers).map_err(|e| e.to_string()))
+            .collect()
+    }
+}
+
+/// What the task asks for, in words.
+fn prompt(scene: &Scene) -> String {
+    let organ = &scene.task.organ;
+    match scene.task.name {
+        TaskName::AppendixResection => {
+            format!(
+                "grasp the {organ} with the left instrument, lift it, and close the right instrument's blades through it"
+            )
+        }
+        TaskName::GraspLift => format!("grasp the {organ} with the left instrument, lift it and hold it"),
+        TaskName::PortReach => "move both instruments through their ports to one place after the other".to_owned(),
+    }
+}
+
+impl Policy for Remote {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn begin(&mut self, _episode: &Episode, seed: u64) -> trocar_task::Result<()> {
+        self.seed = seed;
+        // A server that keeps a history forgets it; one that cannot be reached is told by the first action.
+        if let Some(client) = &mut self.client
+            && client.reset(&Observation::new()).is_err()
+        {
+            self.client = None;
+        }
+        Ok(())
+    }
+
+    fn act(&mut self, episode: &Episode) -> trocar_task::Result<Vec<Action>> {
+        self.chunk(episode).map_err(trocar_task::Error::Option)
+    }
+}
+
+/// Starts the server of a callable and waits for its address.
+fn serve(module: &str) -> std::result::Result<Served, String> {
+    let python = std::env::var("TROCAR_PYTHON").unwrap_or_else(|_| PYTHON.to_owned());
+    let mut child = Command::new(&python)
+        .args(["-m", "trocar.serve", module, "--port", "0"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .map_err(|e| format!("python:{module}: {python} cannot be started: {e}"))?;
+    let out = child.stdout.take();
+    let mut served = Served { child, url: String::new() };
+    let (tell, told) = mpsc::channel();
+    if let Some(out) = out {
+        // Its thread ends with the child's output.
+        std::thread::spawn(move || {
+            let mut lines = BufReader::new(out.take(1 << 16));
+            let mut line = String::new();
+            let _ = lines.read_line(&mut line);
+            let _ = tell.send(line);
+            let _ = std::io::copy(&mut lines.into_inner().into_inner(), &mut std::io::sink());
+        });
+    }
+    match told.recv_timeout(START) {
+        Ok(line) if line.trim().starts_with("ws://") => {
+            served.url = line.trim().to_owned();
+            Ok(served)
+        }
+        Ok(_) => {
+            let words = served.last_words().unwrap_or_else(|| "it said nothing".to_owned());
+            Err(format!("python:{module}: cannot be served: {words}"))
+        }
+        Err(_) => Err(format!("python:{module}: was not served within {} s", START.as_secs())),
+    }
+}
+
+impl Served {
+    /// The last line that a child which has ended wrote to its standard error; None while it runs.
+    fn last_words(&mut self) -> Option<String> {
+        for _ in 0..20 {
+            if self.child.try_wait().ok().flatten().is_some() {
+                let mut text = String::new();
+                // A child that has ended cannot block; a grandchild that keeps the pipe open is cut off by the limit.
+                self.child.stderr.take()?.take(1 << 16).read_to_string(&mut text).ok()?;
+                let last = text.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it said nothing");
+                return Some(last.chars().take(300).collect());
+            }
+            std::thread::sleep(Duration::from_millis(50));
+        }
+        None
+    }
+}

@@ -1,0 +1,208 @@
+//! Finished episodes on disk: each in a folder of its own that appears whole or not at all.
+
+use super::{Job, Plan};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+use trocar_task::{CHANNELS_FILE, EPISODE_FILE, End, RESULT_FILE, Recording, Summary};
+
+/// What makes a folder a campaign's.
+const PLAN: &str = "campaign.json";
+/// Where the episodes are, and where they are written.
+const EPISODES: &str = "episodes";
+const UNDER_WAY: &str = "under-way";
+
+/// An episode's files by their names.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Files(pub Vec<(String, Vec<u8>)>);
+
+impl Files {
+    /// Those of a finished episode.
+    ///
+    /// # Errors
+    /// A folder for the time being that cannot be written.
+    pub fn of(recording: &Recording) -> Result<Self> {
+        let io = |source| Error::Io { path: std::env::temp_dir(), source };
+        let folder = tempfile::tempdir().map_err(io)?;
+        recording.write_into(folder.path())?;
+        let names = [EPISODE_FILE, CHANNELS_FILE, RESULT_FILE];
+        let read = |name: &str| {
+            let path = folder.path().join(name);
+            fs::read(&path).map(|bytes| (name.to_owned(), bytes)).map_err(|source| Error::Io { path, source })
+        };
+        Ok(Self(names.into_iter().map(read).collect::<Result<_>>()?))
+    }
+}
+
+/// A kept episode, in figures.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Kept {
+    /// Its policy's name.
+    #[serde(default)]
+    pub name: String,
+    /// Its place among the policy's episodes.
+    #[serde(default)]
+    pub index: usize,
+    /// The seed.
+    pub seed: u64,
+    /// Hash of the final state.
+    pub state_hash: String,
+    /// The figures.
+    #[serde(flatten)]
+    pub summary: Summary,
+}
+
+/// A campaign's folder.
+pub struct Store {
+    folder: PathBuf,
+    /// One process at a time writes; it is held as long as the store lives.
+    _lock: fs::File,
+}
+
+fn io(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
+    |source| Error::Io { path: path.to_owned(), source }
+}
+
+impl Store {
+    /// Opens the campaign in `folder` to go on with, or begins it. It may get more episodes and other policies, but not another scene, specimen or seed.
+    ///
+    /// # Errors
+    /// A folder of something else or of another campaign; one that another process writes.
+    pub fn open(folder: &Path, plan: &Plan) -> Result<Self> {
+        let path = folder.join(PLAN);
+        let exists = |reason: String| Error::Exists { path: folder.to_owned(), reason };
+        if let Ok(text) = fs::read_to_string(&path) {
+            let old: Plan = serde_json::from_str(&text).map_err(|e| exists(format!("holds a damaged {PLAN}: {e}")))?;
+            let other = [
+                ("scene", &old.scene_hash != &plan.scene_hash),
+                ("specimen", &old.specimen_hash != &plan.specimen_hash),
+                ("seed", old.seed != plan.seed),
+                ("program", old.program != plan.program),
+            ];
+            if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
+                return Err(exists(format!("is a campaign of another {what}; write into another folder")));
+            }
+            let changed =
+                |p: &&super::PolicySpec| old.policies.iter().any(|o| o.name == p.name && o.source != p.source);
+            if let Some(policy) = plan.policies.iter().find(changed) {
+                return Err(exists(format!(
+                    "has episodes of another policy named '{}'; name this one differently",
+                    policy.name
+                )));
+            }
+        } else if folder.is_dir() && fs::read_dir(folder).map_err(io(folder))?.next().is_some() {
+            return Err(exists(format!("is not empty and is no campaign ({PLAN} is missing)")));
+        }
+        let episodes = folder.join(EPISODES);
+        fs::create_dir_all(&episodes).map_err(io(&episodes))?;
+        let lock_path = folder.join(".lock");
+        let lock = fs::File::create(&lock_path).map_err(io(&lock_path))?;
+        if lock.try_lock().is_err() {
+            return Err(exists("is being written by another process".to_owned()));
+        }
+        let under_way = folder.join(UNDER_WAY);
+        if under_way.exists() {
+            fs::remove_dir_all(&under_way).map_err(io(&under_way))?;
+        }
+        fs::create_dir_all(&under_way).map_err(io(&under_way))?;
+        let made = Self { folder: folder.to_owned(), _lock: lock };
+        let text = serde_json::to_vec_pretty(plan).map_err(|e| Error::Format(e.to_string()))?;
+        made.write(PLAN, &text)?;
+        Ok(made)
+    }
+
+    /// The folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The folder of an episode, whether it is there or not.
+    pub fn episode(&self, policy: &str, index: usize) -> PathBuf {
+        self.folder.join(EPISODES).join(policy).join(format!("{index:06}"))
+    }
+
+    /// Jobs that are not done. With `retry_failed` also those whose policy failed.
+    ///
+    /// # Errors
+    /// A kept episode that is damaged.
+    pub fn missing(&self, plan: &Plan, retry_failed: bool) -> Result<Vec<Job>> {
+        let mut missing = Vec::new();
+        for job in plan.jobs() {
+            match self.read(&job)? {
+                Some(kept) if !(retry_failed && matches!(kept.summary.end, Some(End::PolicyError { .. }))) => {}
+                _ => missing.push(job),
+            }
+        }
+        Ok(missing)
+    }
+
+    /// Keeps a finished episode.
+    ///
+    /// # Errors
+    /// Files that cannot be written, or with names that are no names.
+    pub fn put(&self, job: &Job, files: &Files) -> Result<()> {
+        let target = self.episode(&job.policy.name, job.index);
+        let partial = self.folder.join(UNDER_WAY).join(format!("{}-{:06}", job.policy.name, job.index));
+        fs::create_dir_all(&partial).map_err(io(&partial))?;
+        for (name, bytes) in &files.0 {
+            if ![EPISODE_FILE, CHANNELS_FILE, RESULT_FILE].contains(&name.as_str()) {
+                return Err(Error::Mismatch(format!("an episode has no file '{name:.60}'")));
+            }
+            let path = partial.join(name);
+            let mut file = fs::File::create(&path).map_err(io(&path))?;
+            std::io::Write::write_all(&mut file, bytes).map_err(io(&path))?;
+            // The folder's name says that all is there; so it must be there before the name is.
+            file.sync_all().map_err(io(&path))?;
+        }
+        if let Some(parent) = target.parent() {
+            fs::create_dir_all(parent).map_err(io(parent))?;
+        }
+        if target.exists() {
+            fs::remove_dir_all(&target).map_err(io(&target))?;
+        }
+        fs::rename(&partial, &target).map_err(io(&target))
+    }
+
+    /// The kept episodes of the plan, policy after policy.
+    ///
+    /// # Errors
+    /// A kept episode that is damaged, or missing.
+    pub fn kept(&self, plan: &Plan) -> Result<Vec<Kept>> {
+        let mut all = Vec::new();
+        for job in plan.jobs() {
+            all.extend(self.read(&job)?);
+        }
+        let place = |k: &Kept| (plan.policies.iter().position(|p| p.name == k.name), k.index);
+        all.sort_by_key(place);
+        Ok(all)
+    }
+
+    fn read(&self, job: &Job) -> Result<Option<Kept>> {
+        let path = self.episode(&job.policy.name, job.index).join(RESULT_FILE);
+        let text = match fs::read_to_string(&path) {
+            Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+            text => text.map_err(io(&path))?,
+        };
+        let damaged = |why: String| {
+            let folder = path.parent().map(Path::to_owned).unwrap_or_default();
+            Error::Exists {
+                path: folder,
+                reason: format!("holds a damaged episode ({why}); remove it to have it run again"),
+            }
+        };
+        let mut kept: Kept = serde_json::from_str(&text).map_err(|e| damaged(e.to_string()))?;
+        if kept.seed != job.seed {
+            return Err(damaged(format!("its seed is {}, not {}", kept.seed, job.seed)));
+        }
+        (kept.name, kept.index) = (job.policy.name.clone(), job.index);
+        Ok(Some(kept))
+    }
+
+    /// Writes a file of the campaign, whole or not at all.
+    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
+        let (path, partial) = (self.folder.join(name), self.folder.join(UNDER_WAY).join(name));
+        fs::write(&partial, bytes).map_err(io(&partial))?;
+        fs::rename(&partial, &path).map_err(io(&path))
+    }
+}

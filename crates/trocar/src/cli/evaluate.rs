@@ -1,0 +1,32 @@
+//! Arguments of `evaluate`.
+
+use clap::Args;
+use std::path::PathBuf;
+
+/// Arguments of `evaluate`.
+#[derive(Debug, Args)]
+pub struct Evaluate {
+    /// Scene file, or a built-in scene such as cell-a.
+    pub scene: String,
+    /// A policy: scripted, noise, delay, offset, greedy, random; ws://HOST:PORT for an openpi server; python:MODULE:NAME for a Python callable. NAME=... names it. Several are compared.
+    #[arg(long = "policy", value_name = "POLICY", default_value = "scripted")]
+    pub policies: Vec<String>,
+    /// Episodes of each policy.
+    #[arg(long, default_value_t = 15)]
+    pub episodes: usize,
+    /// Seed of the first episode; the next have the next. All policies get the same.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// Episodes at once; as many as the machine has cores by default. The result does not depend on it.
+    #[arg(long, default_value_t = 0)]
+    pub jobs: usize,
+    /// Episodes that ended because their policy failed are done again.
+    #[arg(long)]
+    pub retry_failed: bool,
+    /// Folder for a scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
+    /// Campaign folder: begun there, or gone on with where it was left.
+    #[arg(short, long, visible_alias = "resume", value_name = "FOLDER", default_value = "trocar-campaign")]
+    pub output: PathBuf,
+}
