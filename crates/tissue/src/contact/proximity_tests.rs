@@ -161,6 +161,8 @@ fn signs_near_sharp_edges_and_corners_are_those_of_the_convex_shape() {
             one.tets[0].swap(0, 1);
         }
         let hull = Hull::of(&corners).unwrap();
+        let probe = block([12, 12, 12], |p| 0.2 + 1e-3 * p);
+        let model = model(&[probe, one]);
         let mut state = State::new(&model);
         let mut near_edges = 0;
         let mut proximity = Proximity::new(&model, Limits { depth: 2e-3, ..Limits::default() });

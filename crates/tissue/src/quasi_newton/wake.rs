@@ -27,12 +27,15 @@ impl Island<'_> {
 
     /// Leaves alone the bodies whose own correction is small enough while that of others is not.
     pub(super) fn doze(&mut self, tolerance: f32, relative: f32) {
+        // Beside what nothing holds every push counts: momentum would be lost, and what slides be held back.
+        if self.all().any(|part| part.is_free()) {
+            return;
+        }
         let farthest = self.farthest();
         let mut any = false;
         for part in self.parts() {
             let least = tolerance.max(relative * part.gone.max(BESIDE * farthest));
-            // What nothing holds takes up every push: momentum would be lost.
-            part.dozes = part.longest <= DOZING * least && !part.is_free();
+            part.dozes = part.longest <= DOZING * least;
             any |= part.dozes;
         }
         if any {
