@@ -35,6 +35,8 @@ pub(crate) struct Pair {
     pub touch: Touch,
     /// Limit of friction [N], held during a search.
     pub limit: f32,
+    /// What it pushed its vertex with when that was last written down [N].
+    pub noted: Vec3A,
     /// Which of those that may touch in the frame it is.
     candidate: u32,
     /// The triangle's number.
@@ -47,6 +49,8 @@ pub(crate) struct Pair {
     stretch: Vec3A,
     /// Whether the vertex was outside when it was last looked at.
     outside: bool,
+    /// Whether it was near enough then.
+    listed: bool,
 }
 
 /// A vertex that takes part in a pair.
@@ -85,6 +89,11 @@ impl Pair {
     pub fn shares(&self) -> [(usize, u32, f32); 4] {
         let corner = |k: usize| (self.other, self.corners[k], -self.weights[k]);
         [(self.member, self.vertex, 1.0), corner(0), corner(1), corner(2)]
+    }
+
+    /// What the vertex is pushed with [N]; `x` says where a vertex of a body of the island is.
+    pub fn push_at(&self, x: impl Fn(usize, u32) -> Vec3A) -> Vec3A {
+        self.push(self.offset(x)).map_or(Vec3A::ZERO, |push| push.gradient)
     }
 
     /// Force on the vertex at an `offset`, within the limit of friction.
@@ -134,12 +143,14 @@ impl Pairs {
                     friction: Friction::Coulomb(contact.friction as f32),
                 },
                 limit: 0.0,
+                noted: Vec3A::ZERO,
                 candidate: self.candidates.len() as u32,
                 triangle: near.at,
                 free: near.free,
                 shift: (one.body.origin - two.body.origin).as_vec3a(),
                 stretch: known.map_or(Vec3A::ZERO, |k| stretches[k].by),
                 outside: near.distance > 0.0,
+                listed: false,
             });
         }
     }
@@ -159,10 +170,18 @@ impl Pairs {
     }
 
     /// Finds the places and planes of a substep of `h` [s] that begins with the states as they are. They are those that the vertex will have come to along the surface: planes of where it is would
-    /// be steps in its way wherever it goes over an edge.
-    pub fn find<S: Solver>(&mut self, island: &[Worker<S>], h: f32) {
+    /// be steps in its way wherever it goes over an edge. Between bodies of which `rested` says that they were at rest since the last substep of this frame, nothing is new.
+    pub fn find<S: Solver>(&mut self, island: &[Worker<S>], h: f32, rested: impl Fn(&Worker<S>) -> bool) {
         self.list.clear();
         for pair in &mut self.candidates {
+            if rested(&island[pair.member]) && rested(&island[pair.other]) {
+                if pair.listed {
+                    pair.limit = 0.0;
+                    self.list.push(*pair);
+                }
+                continue;
+            }
+            pair.listed = false;
             let (one, two) = (&island[pair.member], &island[pair.other]);
             let (surface, x, v) = (&two.body.surface, &two.state.x[..], &two.state.v[..]);
             let p = one.state.x[pair.vertex as usize] + pair.shift;
@@ -180,10 +199,14 @@ impl Pairs {
             let own = pair.member == pair.other;
             let nearest = |p: Vec3A, t: u32| if own { surface.at(x, p, t) } else { surface.nearest_from(x, p, t) };
             let (triangle, foot) = nearest(p, triangle);
-            let Some((normal, _)) = surface.signed(x, triangle, &foot) else { continue };
+            let Some((normal, distance)) = surface.signed(x, triangle, &foot) else { continue };
             let ahead = p + (way - way.dot(normal) * normal);
-            let (triangle, foot) = nearest(ahead, triangle);
-            let (normal, distance) = surface.signed(x, triangle, &foot).unwrap_or((normal, 0.0));
+            let (triangle, foot) = if ahead == p { (triangle, foot) } else { nearest(ahead, triangle) };
+            let (normal, distance) = if ahead == p {
+                (normal, distance)
+            } else {
+                surface.signed(x, triangle, &foot).unwrap_or((normal, 0.0))
+            };
             pair.triangle = triangle;
             pair.outside = distance > 0.0;
             pair.corners = surface.triangles[triangle as usize];
@@ -194,6 +217,7 @@ impl Pairs {
             pair.touch.point = pair.free * normal;
             pair.touch.place = foot.off - (ahead - p) - pair.stretch;
             pair.limit = 0.0;
+            pair.listed = true;
             self.list.push(*pair);
         }
     }

@@ -64,7 +64,7 @@ impl Solver for TouchingDescent {
         let substeps = island[0].solver.descent.schedule.substeps;
         let share = |k: usize| k as f64 / substeps as f64;
         for substep in 1..=substeps {
-            pairs.find(island, (frame.dt / substeps as f64) as f32);
+            pairs.find(island, (frame.dt / substeps as f64) as f32, |_| false);
             for Worker { index, body, solver, state, .. } in island.iter_mut() {
                 let (from, to) = (share(substep - 1), share(substep));
                 solver.contacts.find(&frame.of(*index), body, from, to, |i| state.x[i]);

@@ -60,6 +60,18 @@ impl Memory {
             ]
         })
     }
+
+    /// Forgets a step.
+    fn forget(&mut self, at: usize) {
+        self.pairs[at].step.fill([0.0; 4]);
+        self.pairs[at].change.fill([0.0; 4]);
+    }
+
+    /// step . change.
+    fn curvature(&self, level: Level, at: usize) -> f32 {
+        let pair = &self.pairs[at];
+        dispatch!(level, simd => dot_rows(simd, &pair.step, &pair.change))
+    }
 }
 
 impl History {
@@ -97,6 +109,10 @@ impl Island<'_> {
             let products = part.memory.write(part.level, next, share, &part.direction, gradients);
             sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
         }
+        // What a body would have learnt that is left alone.
+        for part in self.all().filter(|part| part.dozes) {
+            part.memory.forget(next);
+        }
         let [curvature, steps, changes] = sums;
         let lengths: f32 = steps * changes;
         if curvature > LEAST_CURVATURE * lengths.sqrt() && curvature > f32::MIN_POSITIVE {
@@ -106,6 +122,19 @@ impl Island<'_> {
         } else {
             // The oldest pair was written over.
             self.history.count = self.history.count.min(pairs - 1);
+        }
+    }
+
+    /// Takes the curvatures anew after other bodies take part: each step's share of them is a step as well.
+    pub(super) fn recount(&mut self) {
+        for age in 0..self.history.count {
+            let at = self.history.at(age);
+            let curvature: f32 = self.parts().map(|part| part.memory.curvature(part.level, at)).sum();
+            if curvature <= f32::MIN_POSITIVE || curvature.is_nan() {
+                self.history.count = age;
+                return;
+            }
+            self.history.inverses[at] = 1.0 / curvature;
         }
     }
 

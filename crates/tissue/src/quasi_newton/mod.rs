@@ -14,10 +14,12 @@ mod go;
 mod history;
 mod layout;
 mod part;
+mod patch;
 mod rigid;
 mod search;
 mod stress;
 mod tiles;
+mod wake;
 mod warp;
 
 use crate::contact::{Contacts, Pairs};
@@ -58,9 +60,6 @@ impl Sweeps for QuasiNewtonSolver {
         (&mut self.fallback, &mut self.contacts)
     }
 }
-
-/// What a body goes at least, as a share of what another of its island goes, when it is asked how exact its place has to be.
-const BESIDE: f32 = 0.1;
 
 /// Times a minimum is looked for, each with friction's limits as they were at the last.
 const ROUNDS: usize = 4;
@@ -107,7 +106,7 @@ impl Island<'_> {
 
     /// One substep, between two shares of the frame.
     fn advance(&mut self, from: f64, to: f64) {
-        self.pairs.find(self.workers, self.h);
+        self.pairs.find(self.workers, self.h, |worker| from > 0.0 && !worker.solver.active);
         let frame = self.frame;
         for_each(self.workers, frame, |Worker { index, body, solver, .. }| {
             solver.find_touches(&frame.of(*index), body, from, to);
@@ -183,10 +182,16 @@ impl Island<'_> {
             solver.guess = solver.guess(&frame.of(*index), share, h, body);
             solver.update_warp();
             report.grasp_limited += usize::from(solver.yielded);
+            solver.patch.rest();
         });
         let moved = self.all().any(|part| part.guess != Guess::Still);
         let behind = self.all().any(|part| part.guess == Guess::Behind);
         self.choose_active(alone);
+        self.for_active(|part| {
+            if part.guess != Guess::Still {
+                part.patch()
+            }
+        });
         let (mut stepped, mut rounds) = (false, 0);
         if behind {
             stepped = self.pull();
@@ -207,7 +212,7 @@ impl Island<'_> {
             self.for_active(|part| part.look(iteration == 0));
             if self.is_solved(tolerance, relative) {
                 if iteration > 0 || moved {
-                    if !alone && self.wake() {
+                    if !alone && self.wake(tolerance, relative) {
                         continue;
                     }
                     rounds += 1;
@@ -221,19 +226,22 @@ impl Island<'_> {
                     self.parts().for_each(|part| part.v.fill([0.0; 4]));
                     return true;
                 }
+            } else if !alone {
+                self.doze(tolerance, relative);
             }
             match self.search() {
                 Found::Step => stepped = true,
-                Found::Nothing if stepped && !alone && self.wake() => {}
+                Found::Nothing if stepped && !alone && self.wake(tolerance, relative) => {}
                 Found::Nothing if stepped => break,
                 // What an earlier substep taught may mislead where contacts have changed.
                 Found::Nothing if self.history.forget() => {}
                 Found::Nothing => {
-                    self.parts().for_each(|part| part.restore());
+                    self.all().for_each(|part| part.restore());
                     return false;
                 }
             }
         }
+        self.all().for_each(|part| part.active |= std::mem::take(&mut part.dozes));
         self.keep_momentum();
         self.parts().for_each(|part| part.take_velocities(h, gravity));
         true
@@ -242,16 +250,20 @@ impl Island<'_> {
     /// Finds the gradient where the substep starts from, and which bodies take part: among others, one that neither moves nor would by what pushes it is left where it is.
     fn choose_active(&mut self, alone: bool) {
         let h = self.h;
-        self.all().for_each(|part| part.was_resting = !std::mem::replace(&mut part.active, true));
+        for part in self.all() {
+            part.was_resting = !std::mem::replace(&mut part.active, true);
+            part.dozes = false;
+        }
         self.take_gradient();
         self.accept_gradient();
         self.refresh_limits();
         if alone {
             return;
         }
+        self.note_pushes();
         let still = self.still();
         for_each(self.workers, self.frame, |Worker { solver, .. }| {
-            if solver.is_quiet(h, still) && solver.correction() <= still {
+            if solver.is_quiet(h, still) && solver.correction_at_rest() <= still {
                 solver.rest(h);
             }
         });
@@ -270,27 +282,6 @@ impl Island<'_> {
         2.0 * f32::EPSILON * self.parts().map(|part| part.extent()).fold(0.0, f32::max)
     }
 
-    /// Lets the bodies at rest take part that the others have begun to push; whether there is one.
-    fn wake(&mut self) -> bool {
-        let still = self.still();
-        if self.workers.iter().all(|worker| worker.solver.active) {
-            return false;
-        }
-        self.all().for_each(|part| part.was_resting = !std::mem::replace(&mut part.active, true));
-        self.take_gradient();
-        for_each(self.workers, self.frame, |Worker { solver, .. }| {
-            if solver.was_resting {
-                std::mem::swap(&mut solver.gradient, &mut solver.next_gradient);
-                solver.active = solver.correction() > still;
-            }
-        });
-        let woken = self.all().any(|part| part.was_resting && part.active);
-        if woken {
-            self.history.clear();
-        }
-        woken
-    }
-
     /// Takes out of an island that nothing holds what is left of the sum of all forces: moving all of it alike changes none of those between its parts.
     fn keep_momentum(&mut self) {
         if self.pairs.is_empty() || !self.all().all(|part| part.active && part.flies()) {
@@ -300,12 +291,6 @@ impl Island<'_> {
         let mass: f32 = self.parts().map(|part| part.mass()).sum();
         let by = force * (-self.h * self.h / mass);
         self.parts().for_each(|part| part.shift(by));
-    }
-
-    /// Whether no step is longer than `tolerance` [m] or a share `relative` of how far its body went. One that hardly moves beside one that does is not held to nearly nothing.
-    fn is_solved(&mut self, tolerance: f32, relative: f32) -> bool {
-        let farthest = self.parts().map(|part| part.gone).fold(0.0, f32::max);
-        self.parts().all(|part| part.longest <= tolerance.max(relative * part.gone.max(BESIDE * farthest)))
     }
 
     /// Counts an iteration.

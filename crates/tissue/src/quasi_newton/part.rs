@@ -5,6 +5,7 @@ use super::factor::Factor;
 use super::go::Guess;
 use super::history::{History, Memory};
 use super::layout::Layout;
+use super::patch::Patch;
 use super::rigid::Rigid;
 use super::warp::Warp;
 use crate::contact::{Contacts, Source};
@@ -26,7 +27,13 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) level: Level,
     pub(super) layout: Layout,
     /// None if no node is free or the matrix cannot be had.
-    factor: Option<Factor>,
+    pub(super) factor: Option<Factor>,
+    /// What the factor does not know of what presses.
+    pub(super) patch: Patch,
+    /// Nodes that press as far as the factor knows, and how hard [N/m]; negative where they do not any more.
+    pub(super) known: Vec<(u32, f32)>,
+    /// Stiffness of what presses each free node [N/m]; scratch.
+    pub(super) pressing: Vec<f32>,
     pub(super) elements: Elements,
     /// The body's part of what the island's last steps taught.
     pub(super) memory: Memory,
@@ -49,7 +56,7 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) next_gradient: Vec<Row>,
     pub(super) direction: Vec<Row>,
     pub(super) base: Vec<Row>,
-    right: Vec<f32>,
+    pub(super) right: Vec<f32>,
     /// Nodes that a tool carries, now and in the factor.
     pub(super) held: Vec<bool>,
     held_in_factor: Vec<bool>,
@@ -61,6 +68,14 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) active: bool,
     /// Whether it took no part when that was last looked at.
     pub(super) was_resting: bool,
+    /// Whether it moved in this substep, is where it is to be, and is left alone until others push it.
+    pub(super) dozes: bool,
+    /// Where the body was last asked whether it is at rest, the gradient there, and its correction [m], if the factor is still the same.
+    rest_x: Vec<Row>,
+    rest_gradient: Vec<Row>,
+    rest_correction: Option<f32>,
+    /// Whether others push it otherwise than when it was left alone.
+    pub(super) stirred: bool,
     /// Whether it bore the last step along a direction.
     pub(super) went: bool,
     /// Whether another body presses it when a substep begins.
@@ -116,6 +131,9 @@ impl QuasiNewtonSolver {
             base: rows(),
             targets: rows(),
             right: vec![0.0; 3 * layout.rows + 16],
+            patch: Patch::new(3 * layout.rows),
+            known: Vec::with_capacity(layout.free),
+            pressing: vec![0.0; layout.free],
             held_in_factor: held.clone(),
             touches_in_factor: vec![0.0; layout.free],
             usable: factor.is_some() || layout.free == 0,
@@ -123,6 +141,11 @@ impl QuasiNewtonSolver {
             went: true,
             pressed: false,
             was_resting: false,
+            dozes: false,
+            rest_x: rows(),
+            rest_gradient: rows(),
+            rest_correction: None,
+            stirred: false,
             carried: false,
             longest: 0.0,
             gone: 0.0,
@@ -254,11 +277,12 @@ impl QuasiNewtonSolver {
 
     /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue.
     pub fn precondition(&mut self) {
-        let Self { level, warp, factor, direction, right, .. } = self;
+        let Self { level, warp, factor, patch, direction, right, .. } = self;
         let Some(factor) = factor else { return };
         dispatch!(*level, simd => {
             warp.to_rest(simd, direction, right);
             factor.solve(simd, right);
+            patch.apply(simd, right);
             warp.out_of_rest(simd, right, direction);
         });
     }
@@ -330,6 +354,20 @@ impl QuasiNewtonSolver {
         dispatch!(self.level, _simd => longest(&self.direction))
     }
 
+    /// The same where it may have been asked for before; without what the factor does not know of.
+    pub fn correction_at_rest(&mut self) -> f32 {
+        let free = self.layout.free;
+        let same = self.gradient == self.rest_gradient && self.x[..free] == self.rest_x[..free];
+        if let Some(correction) = self.rest_correction.filter(|_| same) {
+            return correction;
+        }
+        self.rest_x[..free].copy_from_slice(&self.x[..free]);
+        self.rest_gradient.copy_from_slice(&self.gradient);
+        let correction = self.correction();
+        self.rest_correction = Some(correction);
+        correction
+    }
+
     /// Forgets where nodes would have gone by themselves.
     pub fn aim_nowhere(&mut self) {
         let free = self.layout.free;
@@ -394,6 +432,14 @@ impl QuasiNewtonSolver {
             self.touches_in_factor[i] = stiffness;
         }
         if stale {
+            self.patch.clear();
+            self.rest_correction = None;
+            self.known.clear();
+            for (i, vertex) in self.layout.vertex[..self.layout.free].iter().enumerate() {
+                if state.supported[*vertex as usize] {
+                    self.known.push((i as u32, body.vertices[*vertex as usize].contact_stiffness));
+                }
+            }
             self.usable = factor.factorise(&self.held, &self.touches_in_factor);
             self.held_in_factor.copy_from_slice(&self.held);
         }

@@ -75,6 +75,7 @@ impl Island<'_> {
                     workers[m].solver.push(false, vertex, share * change);
                 }
                 pair.limit = now;
+                pair.noted += change;
                 most = most.max(change.length());
             }
             largest = largest.max(now);
@@ -149,6 +150,7 @@ impl Island<'_> {
         self.parts().for_each(|part| part.elements.accept());
         self.learn(share);
         self.accept_gradient();
+        self.parts().for_each(|part| part.patch());
         Found::Step
     }
 
