@@ -120,6 +120,7 @@ fn station(
         limits,
         tools: Tools::of(k),
         blades,
+        parts: blades.colliders(Tools::of(k)),
         floor,
         rcm: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
         period,

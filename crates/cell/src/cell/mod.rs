@@ -9,6 +9,7 @@ mod build;
 mod crtk;
 mod exchange;
 mod overstretch;
+mod pierce;
 mod placed;
 mod report;
 mod state;
@@ -24,7 +25,7 @@ use crate::hold::Moved;
 use crate::{Error, FRAME, Gripper, Result, World};
 use action::NUMBERS;
 use glam::DVec3;
-use overstretch::{CRUSHED, Edges, MOST, REST, ROUND};
+use overstretch::{Edges, NEAR, PATIENCE};
 use station::{Station, Wanted};
 use std::time::{Duration, Instant};
 use trocar_scene::Scene;
@@ -57,6 +58,8 @@ pub struct Cell {
     sever: bool,
     motions: Vec<ToolMotion>,
     edges: Edges,
+    /// By body, frames that it has been strained with no instrument at it.
+    waits: Vec<u32>,
     timing: Timing,
 }
 
@@ -87,6 +90,7 @@ impl Cell {
         Ok(Self {
             motions: Vec::with_capacity(3 * stations.len()),
             edges: Edges::of(&world),
+            waits: vec![0; world.model.bodies().len()],
             world,
             stations,
             periods: 0,
@@ -152,7 +156,7 @@ impl Cell {
                     self.cut(k, organ, &open, &mut events)?;
                 }
             }
-            self.unhook(report.min_volume_ratio, &mut events);
+            self.look_after(report.min_volume_ratio, &mut events);
         }
         self.periods += 1;
         let arms = self.stations.iter().map(Station::observe).collect();
@@ -160,32 +164,52 @@ impl Cell {
         Ok(CellReport { time: self.time(), arms, tissue, events })
     }
 
-    /// Unhooks instruments from tissue that is stretched or crushed beyond what it bears, and lets tissue feel them again when it no longer is. `least` is the smallest share of its rest
-    /// volume that an element has.
-    fn unhook(&mut self, least: f64, events: &mut Vec<CellEvent>) {
-        if !self.stations.iter().any(Station::meets_tissue) {
+    /// Unhooks instruments from what they pierced, hooked or crushed beyond what tissue bears, lets tissue feel them again when all is well, and puts right what does not come back by itself. `least`
+    /// is the smallest share of its rest volume that an element has.
+    fn look_after(&mut self, least: f64, events: &mut Vec<CellEvent>) {
+        let busy = self.stations.iter().any(Station::meets_tissue) || self.waits.iter().any(|w| *w > 0);
+        if !busy {
             return;
         }
-        let Some(worst) = self.edges.worst(&self.world) else { return };
-        if worst.stretch < REST && least > ROUND {
-            self.stations.iter_mut().for_each(|s| s.now.unhooked = false);
-        }
-        let (body, at) = if worst.stretch > MOST {
-            (worst.body, worst.at)
-        } else if least < CRUSHED {
-            let Some(crushed) = overstretch::most_crushed(&self.world) else { return };
-            crushed
-        } else {
-            return;
+        let strains = self.edges.strains(&self.world, least);
+        self.waits.resize(strains.len(), 0);
+        let calm = !strains.iter().any(|s| s.lasts());
+        let mut relaxed = Vec::new();
+        let mut unhook = |world: &mut World, station: &mut Station, organ: usize| {
+            station.unhook(world, events);
+            let (arm, name) = (station.fixed.side, world.model.bodies()[organ].name().to_owned());
+            let (stretch, volume) = (strains[organ].stretch, strains[organ].volume);
+            events.push(CellEvent::Unhooked { arm, organ: name, stretch, volume });
         };
-        let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked);
-        let nearest = felt.map(|s| (s.distance(at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, station)) = nearest {
-            let organ = self.world.model.bodies()[body].name().to_owned();
-            station.unhook(&mut self.world, events);
-            let (arm, stretch) = (station.fixed.side, worst.stretch);
-            events.push(CellEvent::Unhooked { arm, organ, stretch, volume: least });
+        for station in self.stations.iter_mut().filter(|s| s.meets_tissue()) {
+            match (station.now.unhooked, station.pierces(&self.world)) {
+                (false, Some(organ)) => unhook(&mut self.world, station, organ),
+                (true, None) if calm => station.now.unhooked = false,
+                _ => {}
+            }
         }
+        for (organ, strain) in strains.iter().enumerate() {
+            let at = |s: &Station| s.distance(strain.at) < NEAR || s.holds(organ);
+            let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked && s.meets_tissue() && at(s));
+            let nearest = felt.map(|s| (s.distance(strain.at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+            match nearest {
+                Some((_, station)) => {
+                    self.waits[organ] = 0;
+                    if strain.is_too_much() {
+                        unhook(&mut self.world, station, organ);
+                    }
+                }
+                None if strain.is_too_much() || strain.lasts() && self.waits[organ] >= PATIENCE => {
+                    self.waits[organ] = 0;
+                    self.world.state.relax(organ);
+                    let name = self.world.model.bodies()[organ].name().to_owned();
+                    relaxed.push(CellEvent::Relaxed { organ: name, stretch: strain.stretch, volume: strain.volume });
+                }
+                None if strain.lasts() => self.waits[organ] += 1,
+                None => self.waits[organ] = 0,
+            }
+        }
+        events.append(&mut relaxed);
     }
 
     /// The cutter of arm `k`, as wide as it is in `open`, has closed through `organ`.

@@ -143,7 +143,7 @@ pub enum CellEvent {
         /// Pieces that the organ now is in: 1 where the scene parts nothing.
         pieces: usize,
     },
-    /// The instrument had hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until the tissue has come back.
+    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until it is out and the tissue has come back.
     Unhooked {
         /// The arm.
         arm: Side,
@@ -152,6 +152,15 @@ pub enum CellEvent {
         /// Length of its most stretched edge over that at rest.
         stretch: f64,
         /// Least volume of an element over that at rest.
+        volume: f64,
+    },
+    /// An organ was folded so that it would not come back by itself: it was put right, without regard to time and forces.
+    Relaxed {
+        /// Name of the organ.
+        organ: String,
+        /// Length of its most stretched edge over that at rest, before.
+        stretch: f64,
+        /// Least volume of an element over that at rest, before.
         volume: f64,
     },
     /// The RCM deviation went beyond the scene's threshold.
@@ -193,6 +202,10 @@ impl std::fmt::Display for CellEvent {
                 arm.name(),
                 1e2 * volume
             ),
+            Self::Relaxed { organ, stretch, volume } => {
+                let volume = 1e2 * volume;
+                write!(f, "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was put right")
+            }
             Self::RcmThreshold { arm, deviation_mm } => {
                 write!(f, "the {} RCM deviation of {deviation_mm:.2} mm is beyond the threshold", arm.name())
             }

@@ -2,6 +2,7 @@
 
 use super::action::{Action, ActionSpace, Checker, NUMBERS, paced};
 use super::exchange::Exchange;
+use super::pierce::pierced;
 use super::report::{ArmObservation, CellEvent, TaggedForce};
 use crate::blades::{Blades, Tools, opening_force};
 use crate::clasp::{Clasp, Snap};
@@ -15,7 +16,7 @@ use trocar_robot::manipulator::Manipulator;
 use trocar_robot::port::{Port, Solution};
 use trocar_robot::wrench::{ForceKind, Wrench};
 use trocar_scene::{InstrumentKind, Side};
-use trocar_tissue::{Event, Piece, ToolForce, ToolMotion};
+use trocar_tissue::{Collider, Event, Piece, Shape, ToolForce, ToolMotion};
 
 /// Jaws that press with this share of their force have closed on what is between them.
 const PRESSING: f64 = 0.95;
@@ -36,6 +37,8 @@ pub(super) struct Fixed {
     pub limits: Limits,
     pub tools: Tools,
     pub blades: Blades,
+    /// The convex parts that tissue touches.
+    pub parts: Vec<Collider>,
     /// The blades' tips stay above this height in the cell [m].
     pub floor: f64,
     /// RCM deviations that are told [m].
@@ -229,6 +232,31 @@ impl Station {
         let q = self.now.gripper.pose.inverse().transform(p);
         let along = q.x.clamp(-self.fixed.blades.shaft_length, self.fixed.blades.length);
         q.distance(along * DVec3::X)
+    }
+
+    /// Whether the jaws hold tissue of that organ.
+    pub fn holds(&self, organ: usize) -> bool {
+        self.now.held.as_ref().is_some_and(|held| held.organ == organ)
+    }
+
+    /// The organ that a part of the instrument has gone into, but for what the jaws hold.
+    pub fn pierces(&self, world: &World) -> Option<usize> {
+        let Self { fixed, now, .. } = self;
+        let frames = [(fixed.tools.gripper, now.gripper.pose)]
+            .into_iter()
+            .chain(fixed.tools.sides().map(|(tool, side)| (tool, now.gripper.blade(side))));
+        let spared = now.held.as_ref().map(|held| held.organ);
+        for (tool, frame) in frames {
+            let axes = fixed.parts.iter().filter(|part| part.tool == tool).filter_map(|part| match part.shape {
+                Shape::Capsule { ends, .. } => Some(ends.map(|p| frame.transform(p))),
+                _ => None,
+            });
+            let axes: Vec<[DVec3; 2]> = axes.collect();
+            if let Some((organ, _)) = pierced(world, &axes, spared) {
+                return Some(organ);
+            }
+        }
+        None
     }
 
     /// Lets go, and is not felt for now.
