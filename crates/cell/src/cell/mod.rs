@@ -8,6 +8,7 @@ mod action;
 mod build;
 mod crtk;
 mod exchange;
+mod guard;
 mod overstretch;
 mod pierce;
 mod placed;
@@ -25,7 +26,7 @@ use crate::hold::Moved;
 use crate::{Error, FRAME, Gripper, Result, World};
 use action::NUMBERS;
 use glam::DVec3;
-use overstretch::{Edges, NEAR, PATIENCE};
+use overstretch::{Edges, FAR_TOO_MUCH, NEAR, PATIENCE, SQUEEZED};
 use station::{Station, Wanted};
 use std::time::{Duration, Instant};
 use trocar_scene::Scene;
@@ -167,8 +168,7 @@ impl Cell {
     /// Unhooks instruments from what they pierced, hooked or crushed beyond what tissue bears, lets tissue feel them again when all is well, and puts right what does not come back by itself. `least`
     /// is the smallest share of its rest volume that an element has.
     fn look_after(&mut self, least: f64, events: &mut Vec<CellEvent>) {
-        let busy = self.stations.iter().any(Station::meets_tissue) || self.waits.iter().any(|w| *w > 0);
-        if !busy {
+        if least > SQUEEZED && !self.stations.iter().any(Station::meets_tissue) && self.waits.iter().all(|w| *w == 0) {
             return;
         }
         let strains = self.edges.strains(&self.world, least);
@@ -189,17 +189,22 @@ impl Cell {
             }
         }
         for (organ, strain) in strains.iter().enumerate() {
-            let at = |s: &Station| s.distance(strain.at) < NEAR || s.holds(organ);
-            let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked && s.meets_tissue() && at(s));
-            let nearest = felt.map(|s| (s.distance(strain.at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+            let near = |s: &Station| s.distance(strain.at) < NEAR;
+            // What an instrument left behind that has just let go is given time to come back.
+            let left = self.stations.iter().any(|s| s.now.unhooked && near(s));
+            let patient = left && self.waits[organ] < PATIENCE && strain.stretch < FAR_TOO_MUCH;
+            let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked && s.meets_tissue());
+            let at = felt.filter(|s| near(s) || s.holds(organ));
+            let nearest = at.map(|s| (s.distance(strain.at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
             match nearest {
+                Some(_) if patient && strain.is_too_much() => self.waits[organ] += 1,
                 Some((_, station)) => {
                     self.waits[organ] = 0;
                     if strain.is_too_much() {
                         unhook(&mut self.world, station, organ);
                     }
                 }
-                None if strain.is_too_much() || strain.lasts() && self.waits[organ] >= PATIENCE => {
+                None if strain.stretch > FAR_TOO_MUCH || strain.lasts() && self.waits[organ] >= PATIENCE => {
                     self.waits[organ] = 0;
                     self.world.state.relax(organ);
                     let name = self.world.model.bodies()[organ].name().to_owned();

@@ -3,14 +3,17 @@
 //! Real tissue tears at a stretch of about two; ours has no such end. So where an edge of an organ is longer than [`MOST`] times its rest length, or an element has less than [`CRUSHED`] of its rest
 //! volume, the nearest instrument lets go of what it holds and is not felt until all tissue is below [`REST`] and above [`ROUND`] again. It is told as an event, and no figure of merit counts on it.
 //!
-//! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold lock each other, whatever the energy. An organ that is beyond these limits and that no instrument is at, or
-//! that stays so for [`PATIENCE`], is put right outside of time ([`trocar_tissue::State::relax`]), and that is told, too.
+//! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold lock each other, whatever the energy. An organ that no instrument is at and
+//! that stays beyond [`REST`] or [`ROUND`] for [`PATIENCE`], or gets far beyond, is put right outside of time ([`trocar_tissue::State::relax`]), and that is told, too.
 
 use crate::World;
 use glam::DVec3;
 
 /// Stretch of an edge at which the nearest instrument is unhooked.
 pub(super) const MOST: f64 = 5.0;
+
+/// Stretch at which nothing is waited for: at ten the solver says that the body diverged.
+pub(super) const FAR_TOO_MUCH: f64 = 6.5;
 
 /// Stretch of all edges at which it is felt again.
 pub(super) const REST: f64 = 3.0;
@@ -21,8 +24,11 @@ pub(super) const CRUSHED: f64 = 0.01;
 /// Share of which every element has to have more for an instrument to be felt again.
 pub(super) const ROUND: f64 = 0.05;
 
+/// Tissue that no instrument meets is looked at where an element has less than this share of its rest volume.
+pub(super) const SQUEEZED: f64 = 0.2;
+
 /// Frames that an organ may stay beyond [`REST`] and [`ROUND`] after the last instrument has let go of it: what is elastic has come back by then.
-pub(super) const PATIENCE: u32 = 60;
+pub(super) const PATIENCE: u32 = 15;
 
 /// An instrument farther than this from where tissue is strained most has nothing to do with it [m].
 pub(super) const NEAR: f64 = 0.03;

@@ -10,8 +10,7 @@ use glam::DVec3;
 /// The first organ, but for `spared`, in which one of `segments` lies in part, and where [m]. Elements that are pinned all round do not count: nothing feels them.
 pub(super) fn pierced(world: &World, segments: &[[DVec3; 2]], spared: Option<usize>) -> Option<(usize, DVec3)> {
     let ends = segments.iter().flatten();
-    let (low, high) =
-        ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+    let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
     let mut places = Vec::new();
     let mut sides = Vec::new();
     for (k, body) in world.model.bodies().iter().enumerate().filter(|(k, _)| Some(*k) != spared) {

@@ -42,8 +42,10 @@ pub struct ArmObservation {
     pub commanded: Coordinates,
     /// What is left of the wanted orientation: axis times angle [rad] in the cell of the turn from the commanded to the wanted one.
     pub rejected_rotation: DVec3,
-    /// The command stops short of what was asked: it was too far for one period, or below the cell's floor.
+    /// The command stops short of what was asked: it was too far for one period, below the cell's floor, or against a force near the limit.
     pub held_back: bool,
+    /// It was the force: the scene's `safety.force_limit_n` shortened the last command, or turned it back.
+    pub guarded: bool,
     /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is latched its constraint force, otherwise contact.
     pub force: TaggedForce,
     /// Contact force on shaft and blades [N], whether a grasp is latched or not.
@@ -163,6 +165,13 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest, before.
         volume: f64,
     },
+    /// Tissue pushed the instrument with more than the scene's limit; it draws back.
+    ForceLimit {
+        /// The arm.
+        arm: Side,
+        /// The force [N].
+        force_n: f64,
+    },
     /// The RCM deviation went beyond the scene's threshold.
     RcmThreshold {
         /// The arm.
@@ -205,6 +214,9 @@ impl std::fmt::Display for CellEvent {
             Self::Relaxed { organ, stretch, volume } => {
                 let volume = 1e2 * volume;
                 write!(f, "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was put right")
+            }
+            Self::ForceLimit { arm, force_n } => {
+                write!(f, "tissue pushes the {} instrument with {force_n:.1} N, beyond the limit", arm.name())
             }
             Self::RcmThreshold { arm, deviation_mm } => {
                 write!(f, "the {} RCM deviation of {deviation_mm:.2} mm is beyond the threshold", arm.name())

@@ -2,6 +2,7 @@
 
 use super::action::{Action, ActionSpace, Checker, NUMBERS, paced};
 use super::exchange::Exchange;
+use super::guard::Guard;
 use super::pierce::pierced;
 use super::report::{ArmObservation, CellEvent, TaggedForce};
 use crate::blades::{Blades, Tools, opening_force};
@@ -41,6 +42,8 @@ pub(super) struct Fixed {
     pub parts: Vec<Collider>,
     /// The blades' tips stay above this height in the cell [m].
     pub floor: f64,
+    /// Force against which no command pushes the instrument on [N].
+    pub force_limit: f64,
     /// RCM deviations that are told [m].
     pub rcm: [f64; 2],
     /// Length of a control period [s].
@@ -82,6 +85,9 @@ pub(super) struct Moving {
     /// The coordinates that were commanded last.
     pub commanded: Coordinates,
     pub held_back: bool,
+    guard: Guard,
+    /// The guard has shortened the last command.
+    guarded: bool,
     /// Gripper at the end of the last tissue frame.
     pub gripper: Gripper,
     pub design: GraspDesign,
@@ -119,6 +125,8 @@ impl Moving {
             wanted: Wanted::Coordinates(start, DVec3::ZERO),
             commanded: start,
             held_back: false,
+            guard: Guard::default(),
+            guarded: false,
             gripper: Gripper { pose, jaw_angle: start.jaw * fixed.blades.max_angle },
             design,
             jaw,
@@ -175,14 +183,25 @@ impl Station {
     /// A control period begins.
     pub fn command(&mut self) -> Result<()> {
         let Self { fixed, manipulator, now } = self;
-        now.rcm_peak = 0.0;
+        (now.rcm_peak, now.guarded) = (0.0, false);
         let Wanted::Coordinates(wanted, _) = now.wanted else { return Ok(()) };
         let (mut next, far) = paced(&now.commanded, &wanted, fixed.period);
         let room = fixed.deepest(&next);
         let low = next.insertion > room;
         next.insertion = next.insertion.min(room);
+        now.guard.look(now.exchange.force(), manipulator.measured_cp().translation);
+        let from = fixed.port.tip(&now.commanded).translation;
+        let mut tip = fixed.port.tip(&next);
+        let way = tip.translation - from;
+        let allowed = now.guard.allow(way, fixed.force_limit);
+        now.guarded = allowed != way;
+        if now.guarded {
+            tip.translation = from + allowed;
+            let solved = fixed.port.solve(&fixed.instrument, &fixed.limits, &tip, &next)?.coordinates;
+            next = Coordinates { insertion: solved.insertion.min(fixed.deepest(&solved)), roll: next.roll, ..solved };
+        }
         let commanded = manipulator.servo_cp(&next)?;
-        (now.commanded, now.held_back) = (commanded.coordinates, far || low || commanded.reach < 1.0);
+        (now.commanded, now.held_back) = (commanded.coordinates, far || low || now.guarded || commanded.reach < 1.0);
         Ok(())
     }
 
@@ -284,6 +303,10 @@ impl Station {
             }
         }
         self.tell_rcm(events);
+        let Self { fixed, now, .. } = self;
+        if let Some(force_n) = now.guard.tell(fixed.force_limit) {
+            events.push(CellEvent::ForceLimit { arm: fixed.side, force_n });
+        }
         match self.fixed.kind {
             InstrumentKind::Grasper => {
                 self.grasp(world, events);
@@ -436,6 +459,7 @@ impl Station {
             commanded: now.commanded,
             rejected_rotation,
             held_back: now.held_back,
+            guarded: now.guarded,
             force: TaggedForce { kind, wrench },
             contact,
             constraint,
@@ -493,6 +517,7 @@ impl Moving {
         all.extend(pose.rotation.to_array());
         all.extend([self.gripper.jaw_angle, self.jaw_rate, self.rcm_peak]);
         all.extend(self.exchange.numbers());
+        all.extend(self.guard.numbers());
         all.extend(self.jaw.numbers());
         all.extend(self.scissors.numbers());
         for f in &self.forces {
@@ -503,7 +528,7 @@ impl Moving {
             all.extend([f.pressing, f.touching as f64]);
         }
         all.extend(
-            [self.unhooked, self.held_back, self.rcm_told[0], self.rcm_told[1], self.held.is_some()]
+            [self.unhooked, self.held_back, self.guarded, self.rcm_told[0], self.rcm_told[1], self.held.is_some()]
                 .map(|b| f64::from(u8::from(b))),
         );
         all.push(GraspDesign::ALL.iter().position(|d| *d == self.design).unwrap_or(0) as f64);
