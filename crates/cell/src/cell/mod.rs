@@ -204,7 +204,7 @@ impl Cell {
                         unhook(&mut self.world, station, organ);
                     }
                 }
-                None if strain.stretch > FAR_TOO_MUCH || strain.lasts() && self.waits[organ] >= PATIENCE => {
+                None if strain.is_too_much() || strain.lasts() && self.waits[organ] >= PATIENCE => {
                     self.waits[organ] = 0;
                     self.world.state.relax(organ);
                     let name = self.world.model.bodies()[organ].name().to_owned();
@@ -256,6 +256,11 @@ impl Cell {
     /// The tissue, in the cell frame: privileged, no policy sees it.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Length of the most stretched edge of any organ now over that at rest: privileged, too. Takes a pass over all edges.
+    pub fn max_stretch(&mut self) -> f64 {
+        self.edges.strains(&self.world, 1.0).iter().fold(1.0, |most, s| s.stretch.max(most))
     }
 
     /// Wall time since the cell was built.
