@@ -148,7 +148,35 @@ mod tests {
     use trocar_geometry::TetMesh;
 
     #[test]
-    fn the_rotation_is_found() {
+    fn what_is_stretched_is_put_right_when_it_is_asked_for() {
+        let model = tet();
+        let frame = Frame {
+            dt: 1.0 / 60.0,
+            gravity: DVec3::ZERO,
+            index: 0,
+            grasps: &[],
+            tools: &[],
+            colliders: &[],
+            alone: true,
+        };
+        let body = &model.bodies[0];
+        let rest = State::new(&model);
+        let mut stretched = rest.bodies[0].clone();
+        stretched.x.iter_mut().for_each(|x| x.x *= 6.0);
+        stretched.disturbed = true;
+        let mut untangler = Untangler::new(&rest.bodies[0]);
+        let mut left = stretched.clone();
+        untangler.untangle(&frame, body, &mut left);
+        assert_eq!(left.x, stretched.x, "no element is inverted");
+        let mut state = rest.clone();
+        state.bodies[0] = stretched;
+        state.relax(0);
+        untangler.untangle(&frame, body, &mut state.bodies[0]);
+        let now = &state.bodies[0];
+        assert!(!is_stretched(body, &now.x) && least_ratio(body, &now.x) > RIGHT && !now.disturbed && !now.relaxes);
+    }
+
+    fn tet() -> crate::Model {
         let p = |x: f64, y: f64, z: f64| 1e-2 * DVec3::new(x, y, z);
         let vertices = vec![p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.3), p(0.0, 1.3, 0.4), p(0.3, 0.3, 1.7)];
         let mesh = TetMesh { vertices, tets: vec![[0, 1, 2, 3]] };
@@ -162,7 +190,12 @@ mod tests {
         let body = BodyDescription { name: "tet".into(), mesh: &mesh, material, pinned: vec![], supports: vec![] };
         let mut builder = ModelBuilder::new();
         builder.body(body).unwrap();
-        let model = builder.build().unwrap();
+        builder.build().unwrap()
+    }
+
+    #[test]
+    fn the_rotation_is_found() {
+        let model = tet();
         let rest = State::new(&model).bodies[0].x.clone();
         for angles in [[0.3, -0.2, 0.9], [2.9, 0.4, -1.5], [0.0, 0.0, 3.1]] {
             let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, angles[0], angles[1], angles[2]);

@@ -2,10 +2,11 @@
 //!
 //! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of physics steps of the arms (1/480 s). In a frame the arms go first, under the load that tissue had on
 //! them at the last frame's end, carried on with the tip (`exchange.rs`); then tissue is stepped with tools that go from where the tips were measured at the frame's beginning to where they are now.
-//! Instruments do not touch each other.
+//! Instruments do not push each other: their clearance is measured, and an event tells where they would have touched.
 
 mod action;
 mod build;
+mod clearance;
 mod crtk;
 mod exchange;
 mod guard;
@@ -61,6 +62,8 @@ pub struct Cell {
     edges: Edges,
     /// By body, frames that it has been strained with no instrument at it.
     waits: Vec<u32>,
+    /// The instruments are inside each other, and that was told.
+    touch: bool,
     timing: Timing,
 }
 
@@ -92,6 +95,7 @@ impl Cell {
             motions: Vec::with_capacity(3 * stations.len()),
             edges: Edges::of(&world),
             waits: vec![0; world.model.bodies().len()],
+            touch: false,
             world,
             stations,
             periods: 0,
@@ -162,7 +166,21 @@ impl Cell {
         self.periods += 1;
         let arms = self.stations.iter().map(Station::observe).collect();
         self.timing.all += clock.elapsed();
-        Ok(CellReport { time: self.time(), arms, tissue, events })
+        let clearance = self.clearance();
+        let touch = clearance < 0.0;
+        if touch && !self.touch {
+            events.push(CellEvent::InstrumentsTouch { depth_mm: -1e3 * clearance });
+        }
+        self.touch = touch;
+        Ok(CellReport { time: self.time(), arms, clearance, tissue, events })
+    }
+
+    /// The gap between the two instruments now [m]: negative where they are inside each other, for they do not push each other.
+    pub fn clearance(&self) -> f64 {
+        match &self.stations[..] {
+            [one, other] => clearance::clearance(&one.rods(), &other.rods()),
+            _ => f64::INFINITY,
+        }
     }
 
     /// Unhooks instruments from what they pierced, hooked or crushed beyond what tissue bears, lets tissue feel them again when all is well, and puts right what does not come back by itself. `least`

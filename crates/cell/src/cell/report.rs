@@ -172,6 +172,11 @@ pub enum CellEvent {
         /// The force [N].
         force_n: f64,
     },
+    /// The instruments came into each other, which real ones would not: they do not push each other here.
+    InstrumentsTouch {
+        /// How deep [mm].
+        depth_mm: f64,
+    },
     /// The RCM deviation went beyond the scene's threshold.
     RcmThreshold {
         /// The arm.
@@ -215,6 +220,7 @@ impl std::fmt::Display for CellEvent {
                 let volume = 1e2 * volume;
                 write!(f, "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was put right")
             }
+            Self::InstrumentsTouch { depth_mm } => write!(f, "the instruments are {depth_mm:.2} mm inside each other"),
             Self::ForceLimit { arm, force_n } => {
                 write!(f, "tissue pushes the {} instrument with {force_n:.1} N, beyond the limit", arm.name())
             }
@@ -235,6 +241,8 @@ pub struct CellReport {
     pub time: f64,
     /// The arms, the left one first.
     pub arms: Vec<ArmObservation>,
+    /// Gap between the two instruments at its end [m]: negative where they are inside each other, for they do not push each other.
+    pub clearance: f64,
     /// The tissue.
     pub tissue: TissueObservation,
     /// What happened, in order.

@@ -13,6 +13,7 @@ pub struct CellState {
     world: WorldState,
     arms: Vec<(Moving, ManipulatorState)>,
     waits: Vec<u32>,
+    touch: bool,
     periods: u64,
 }
 
@@ -23,6 +24,7 @@ impl CellState {
         hash.update(&self.periods.to_le_bytes());
         hash.update(&self.world.hash().to_le_bytes());
         self.waits.iter().for_each(|w| hash.update(&w.to_le_bytes()));
+        hash.update(&[u8::from(self.touch)]);
         for (arm, manipulator) in &self.arms {
             // Printed numbers are as exact as their bits: the shortest text that reads back as the same.
             hash.update(format!("{:?}", manipulator).as_bytes());
@@ -38,7 +40,13 @@ impl Cell {
     /// The state as it is now.
     pub fn save(&self) -> CellState {
         let arms = self.stations.iter().map(|s| (s.now.clone(), s.manipulator.state())).collect();
-        CellState { world: self.world.save(), arms, waits: self.waits.clone(), periods: self.periods }
+        CellState {
+            world: self.world.save(),
+            arms,
+            waits: self.waits.clone(),
+            touch: self.touch,
+            periods: self.periods,
+        }
     }
 
     /// Puts back a state that this cell, or another of the same scene and specimen, gave. What comes after is the same to the bit.
@@ -56,6 +64,7 @@ impl Cell {
             station.now.clone_from(now);
         }
         self.waits.clone_from(&state.waits);
+        self.touch = state.touch;
         self.periods = state.periods;
         Ok(())
     }

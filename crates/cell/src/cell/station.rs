@@ -1,6 +1,7 @@
 //! One arm of the cell: its manipulator, its instrument's end among the tissue, and what it holds.
 
 use super::action::{Action, ActionSpace, Checker, NUMBERS, paced};
+use super::clearance::Rod;
 use super::exchange::Exchange;
 use super::guard::Guard;
 use super::pierce::pierced;
@@ -258,14 +259,32 @@ impl Station {
         self.now.held.as_ref().is_some_and(|held| held.organ == organ)
     }
 
+    /// Its convex parts where they are now, as far as they are round. The rest offset is the blades' thickness.
+    pub fn rods(&self) -> Vec<Rod> {
+        let rods = self.frames().into_iter().flat_map(|(tool, frame)| {
+            let parts = self.fixed.parts.iter().filter(move |part| part.tool == tool);
+            parts.filter_map(move |part| match part.shape {
+                Shape::Capsule { ends, radius } => {
+                    let ends = ends.map(|p| frame.transform(p));
+                    Some(Rod { ends, radius: radius + part.rest_offset })
+                }
+                _ => None,
+            })
+        });
+        rods.collect()
+    }
+
+    /// The instrument's tools and where they are.
+    fn frames(&self) -> [(usize, Pose); 3] {
+        let [one, two] = self.fixed.tools.sides().map(|(tool, side)| (tool, self.now.gripper.blade(side)));
+        [(self.fixed.tools.gripper, self.now.gripper.pose), one, two]
+    }
+
     /// The organ that a part of the instrument has gone into, but for what the jaws hold.
     pub fn pierces(&self, world: &World) -> Option<usize> {
         let Self { fixed, now, .. } = self;
-        let frames = [(fixed.tools.gripper, now.gripper.pose)]
-            .into_iter()
-            .chain(fixed.tools.sides().map(|(tool, side)| (tool, now.gripper.blade(side))));
         let spared = now.held.as_ref().map(|held| held.organ);
-        for (tool, frame) in frames {
+        for (tool, frame) in self.frames() {
             let axes = fixed.parts.iter().filter(|part| part.tool == tool).filter_map(|part| match part.shape {
                 Shape::Capsule { ends, .. } => Some(ends.map(|p| frame.transform(p))),
                 _ => None,

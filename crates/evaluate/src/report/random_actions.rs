@@ -20,8 +20,17 @@ pub(super) fn body(r: &RandomActionsResult) -> String {
         Card::new("Joint limits broken", count(broken), "over all actions").met(broken == 0),
     ]);
     let head = [
-        "Seed", "Actions", "Diverged", "Inverted", "Stretch", "Least volume", "RCM [mm]", "Force [N]", "Unhooked",
-        "Put right", "Guarded",
+        "Seed",
+        "Actions",
+        "Diverged",
+        "Inverted",
+        "Stretch",
+        "Least volume",
+        "RCM [mm]",
+        "Force [N]",
+        "Unhooked",
+        "Put right",
+        "Guarded",
     ];
     let rows: Vec<Vec<String>> = r
         .rows

@@ -19,8 +19,18 @@ pub fn run(arguments: &RandomActionsExperiment, json: bool, progress: &dyn Progr
 }
 
 fn text(r: &RandomActionsResult) -> String {
-    let header =
-        ["seed", "actions", "inverted", "stretch", "least volume", "rcm mm", "force N", "unhooked", "put right", "guarded"];
+    let header = [
+        "seed",
+        "actions",
+        "inverted",
+        "stretch",
+        "least volume",
+        "rcm mm",
+        "force N",
+        "unhooked",
+        "put right",
+        "guarded",
+    ];
     let rows: Vec<Vec<String>> = r
         .rows
         .iter()
