@@ -25,7 +25,8 @@ fn distance([p, p_end]: &[DVec3; 2], [q, q_end]: &[DVec3; 2]) -> f64 {
     // Parallel segments: any share of the first will do, the clamps find the rest.
     let mut s = if span > 1e-12 * a * e { ((b * f - c * e) / span).clamp(0.0, 1.0) } else { 0.0 };
     let t = (b * s + f) / e.max(least);
-    if !(0.0..=1.0).contains(&t) {
+    // A point instead of the second has no share to find.
+    if !(0.0..=1.0).contains(&t) || e < least {
         s = ((b * t.clamp(0.0, 1.0) - c) / a.max(least)).clamp(0.0, 1.0);
     }
     (r + s * u - t.clamp(0.0, 1.0) * v).length()
