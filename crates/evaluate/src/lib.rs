@@ -37,8 +37,9 @@ pub use experiment::{
     ElementQualityExperiment, ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment,
     GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp,
     PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
-    ReconstructionExperiment, ReconstructionResult, ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan,
-    SettlingResult, SettlingRow, StepRow, WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
+    RandomActionsExperiment, RandomActionsResult, RandomActionsRow, ReconstructionExperiment, ReconstructionResult,
+    ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
+    WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
 pub use rendering::{Rendered, Rendering, Seen};

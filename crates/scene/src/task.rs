@@ -156,10 +156,12 @@ pub struct Safety {
     pub rcm_threshold_mm: f64,
     /// RCM deviation at which the hardware stops [mm].
     pub rcm_abort_mm: f64,
+    /// Force of tissue on an instrument against which no command pushes it on [N].
+    pub force_limit_n: f64,
 }
 
 impl Default for Safety {
     fn default() -> Self {
-        Self { rcm_threshold_mm: 3.0, rcm_abort_mm: 5.0 }
+        Self { rcm_threshold_mm: 3.0, rcm_abort_mm: 5.0, force_limit_n: 10.0 }
     }
 }

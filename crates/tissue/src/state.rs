@@ -33,6 +33,8 @@ pub(crate) struct BodyState {
     pub stretches: Vec<Stretch>,
     /// Whether nodes were put somewhere from outside, and elements may be inverted by it.
     pub disturbed: bool,
+    /// Whether the body is to be put right whether elements are inverted or not.
+    pub relaxes: bool,
 }
 
 impl BodyState {
@@ -45,6 +47,7 @@ impl BodyState {
         self.anchors.clone_from(&other.anchors);
         self.stretches.clone_from(&other.stretches);
         self.disturbed = other.disturbed;
+        self.relaxes = other.relaxes;
     }
 }
 
@@ -64,6 +67,7 @@ impl State {
                 anchors: Vec::with_capacity(2 * body.surface_vertices().len()),
                 stretches: Vec::new(),
                 disturbed: false,
+                relaxes: false,
             }
         };
         Self { time: 0.0, grasps: Vec::new(), bodies: model.bodies.iter().map(at_rest).collect() }
@@ -99,6 +103,13 @@ impl State {
         let b = &model.bodies[body];
         self.bodies[body].x[b.internal[node] as usize] = (position - b.origin).as_vec3a();
         self.bodies[body].disturbed = true;
+    }
+
+    /// Puts a body right at the beginning of the next step, without regard to time and forces: towards the rest shape, turned, until no element is squeezed and no edge is stretched much. For
+    /// tissue so folded that its elements lock each other. Pinned and held nodes stay.
+    pub fn relax(&mut self, body: usize) {
+        self.bodies[body].disturbed = true;
+        self.bodies[body].relaxes = true;
     }
 
     /// Sets the velocity of a node [m/s]; a pinned or held node keeps none.
@@ -156,7 +167,7 @@ impl State {
                 [stretch.vertex, stretch.other].iter().for_each(|k| hash.update(&k.to_le_bytes()));
                 stretch.by.to_array().iter().for_each(|c| hash.update(&c.to_bits().to_le_bytes()));
             }
-            for flag in body.supported.iter().chain([&body.disturbed]) {
+            for flag in body.supported.iter().chain([&body.disturbed, &body.relaxes]) {
                 hash.update(&[u8::from(*flag)]);
             }
         }

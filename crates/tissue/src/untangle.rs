@@ -13,6 +13,9 @@ use glam::{DMat3, DVec3, Mat3A, Vec3A};
 /// Volume ratio of every element at which the material's energy takes over: near enough to the rest shape to end in it.
 const RIGHT: f32 = 0.6;
 
+/// Stretch of every edge at which it does where the body was to be relaxed.
+const SHORT: f32 = 1.5;
+
 /// Sweeps between two looks at the elements, and most looks a frame.
 const SWEEPS: usize = 5;
 const LOOKS: usize = 100;
@@ -29,14 +32,16 @@ impl Untangler {
         Self { rest: rest.x.clone(), fixed: vec![false; rest.x.len()] }
     }
 
-    /// Puts a disturbed body right if an element of it is inverted, as far as one frame's effort goes; it is still then. Pinned and held nodes stay.
+    /// Puts a disturbed body right if an element of it is inverted or it was asked for, as far as one frame's effort goes; it is still then. Pinned and held nodes stay.
     pub fn untangle(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         if !state.disturbed {
             return;
         }
         state.disturbed = false;
+        let relaxes = std::mem::take(&mut state.relaxes);
+        let wrong = relaxes || least_ratio(body, &state.x) <= 0.0;
         // Numbers that are not finite are the report's.
-        if !(least_ratio(body, &state.x) <= 0.0 && state.x.iter().all(|x| x.is_finite())) {
+        if !(wrong && state.x.iter().all(|x| x.is_finite())) {
             return;
         }
         for (fixed, vertex) in self.fixed.iter_mut().zip(&body.vertices) {
@@ -48,12 +53,17 @@ impl Untangler {
         let turn = self.rotation(body, &state.x);
         for _ in 0..LOOKS {
             (0..SWEEPS).for_each(|_| self.sweep(body, turn, &mut state.x));
-            if least_ratio(body, &state.x) > RIGHT {
+            if least_ratio(body, &state.x) > RIGHT && !(relaxes && is_stretched(body, &state.x)) {
                 break;
             }
         }
         state.v.fill(Vec3A::ZERO);
         state.falling.fill(0.0);
+        if relaxes {
+            // Friction does not pull back to where the tissue was.
+            state.anchors.clear();
+            state.stretches.clear();
+        }
         // What one frame did not put right goes on in the next.
         state.disturbed = least_ratio(body, &state.x) <= 0.0;
     }
@@ -117,6 +127,15 @@ fn fit(body: &Body, rest: &[Vec3A], x: &[Vec3A], counts: impl Fn(usize) -> bool)
     Mat3A::from_quat(glam::DQuat::from_xyzw(x, y, z, w).as_quat())
 }
 
+/// Whether an edge is longer than [`SHORT`] times its rest length.
+fn is_stretched(body: &Body, x: &[Vec3A]) -> bool {
+    let too_long = |i: usize| {
+        let long = |e: &crate::body::Edge| (x[e.to as usize] - x[i]).length_squared() > (SHORT * e.length).powi(2);
+        body.edges_of(i).iter().any(long)
+    };
+    (0..x.len()).any(too_long)
+}
+
 fn least_ratio(body: &Body, x: &[Vec3A]) -> f32 {
     let ratios = body.tets.iter().zip(&body.volumes).map(|(tet, volume)| volume_ratio(tet, x, *volume as f32));
     ratios.fold(f32::INFINITY, f32::min)
@@ -129,7 +148,35 @@ mod tests {
     use trocar_geometry::TetMesh;
 
     #[test]
-    fn the_rotation_is_found() {
+    fn what_is_stretched_is_put_right_when_it_is_asked_for() {
+        let model = tet();
+        let frame = Frame {
+            dt: 1.0 / 60.0,
+            gravity: DVec3::ZERO,
+            index: 0,
+            grasps: &[],
+            tools: &[],
+            colliders: &[],
+            alone: true,
+        };
+        let body = &model.bodies[0];
+        let rest = State::new(&model);
+        let mut stretched = rest.bodies[0].clone();
+        stretched.x.iter_mut().for_each(|x| x.x *= 6.0);
+        stretched.disturbed = true;
+        let mut untangler = Untangler::new(&rest.bodies[0]);
+        let mut left = stretched.clone();
+        untangler.untangle(&frame, body, &mut left);
+        assert_eq!(left.x, stretched.x, "no element is inverted");
+        let mut state = rest.clone();
+        state.bodies[0] = stretched;
+        state.relax(0);
+        untangler.untangle(&frame, body, &mut state.bodies[0]);
+        let now = &state.bodies[0];
+        assert!(!is_stretched(body, &now.x) && least_ratio(body, &now.x) > RIGHT && !now.disturbed && !now.relaxes);
+    }
+
+    fn tet() -> crate::Model {
         let p = |x: f64, y: f64, z: f64| 1e-2 * DVec3::new(x, y, z);
         let vertices = vec![p(0.0, 0.0, 0.0), p(1.0, 0.0, 0.3), p(0.0, 1.3, 0.4), p(0.3, 0.3, 1.7)];
         let mesh = TetMesh { vertices, tets: vec![[0, 1, 2, 3]] };
@@ -143,7 +190,12 @@ mod tests {
         let body = BodyDescription { name: "tet".into(), mesh: &mesh, material, pinned: vec![], supports: vec![] };
         let mut builder = ModelBuilder::new();
         builder.body(body).unwrap();
-        let model = builder.build().unwrap();
+        builder.build().unwrap()
+    }
+
+    #[test]
+    fn the_rotation_is_found() {
+        let model = tet();
         let rest = State::new(&model).bodies[0].x.clone();
         for angles in [[0.3, -0.2, 0.9], [2.9, 0.4, -1.5], [0.0, 0.0, 3.1]] {
             let turn = glam::Quat::from_euler(glam::EulerRot::XYZ, angles[0], angles[1], angles[2]);

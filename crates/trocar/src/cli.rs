@@ -234,6 +234,8 @@ pub enum ExperimentName {
     ControllerGrid(ControllerGridExperiment),
     /// The instrument weighed in 54 noisy poses, many times over; and a touch of tens of millinewtons after the tare.
     Wrench(WrenchExperiment),
+    /// Random but legal actions in a scene's cell: whether tissue or arms break.
+    RandomActions(RandomActionsExperiment),
 }
 
 /// Arguments of `experiment reconstruction`.

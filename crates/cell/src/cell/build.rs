@@ -120,7 +120,9 @@ fn station(
         limits,
         tools: Tools::of(k),
         blades,
+        parts: blades.colliders(Tools::of(k)),
         floor,
+        force_limit: scene.safety.force_limit_n,
         rcm: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
         period,
     };

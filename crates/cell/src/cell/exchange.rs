@@ -63,6 +63,11 @@ impl Exchange {
         (self.load, self.at) = (load, at);
     }
 
+    /// The force at the end of the last frame [N].
+    pub fn force(&self) -> DVec3 {
+        self.load.force
+    }
+
     /// What a tip that has come to `at` [m] feels.
     pub fn load(&self, at: DVec3) -> Wrench {
         let force = self.load.force - self.stiffness * (at - self.at);

@@ -2,15 +2,18 @@
 //!
 //! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of physics steps of the arms (1/480 s). In a frame the arms go first, under the load that tissue had on
 //! them at the last frame's end, carried on with the tip (`exchange.rs`); then tissue is stepped with tools that go from where the tips were measured at the frame's beginning to where they are now.
-//! Instruments do not touch each other.
+//! Instruments do not push each other: their clearance is measured, and an event tells where they would have touched.
 
 mod action;
 mod build;
+mod clearance;
 mod crtk;
 mod exchange;
 mod figures;
 mod look;
+mod guard;
 mod overstretch;
+mod pierce;
 mod placed;
 mod report;
 mod restart;
@@ -28,7 +31,7 @@ use crate::hold::Moved;
 use crate::{Error, FRAME, Gripper, Result, World};
 use action::NUMBERS;
 use glam::DVec3;
-use overstretch::{CRUSHED, Edges, MOST, REST, ROUND};
+use overstretch::{Edges, FAR_TOO_MUCH, NEAR, PATIENCE, SQUEEZED};
 use station::{Station, Wanted};
 use std::time::{Duration, Instant};
 use trocar_scene::Scene;
@@ -61,6 +64,10 @@ pub struct Cell {
     sever: bool,
     motions: Vec<ToolMotion>,
     edges: Edges,
+    /// By body, frames that it has been strained with no instrument at it.
+    waits: Vec<u32>,
+    /// The instruments are inside each other, and that was told.
+    touch: bool,
     timing: Timing,
 }
 
@@ -91,6 +98,8 @@ impl Cell {
         Ok(Self {
             motions: Vec::with_capacity(3 * stations.len()),
             edges: Edges::of(&world),
+            waits: vec![0; world.model.bodies().len()],
+            touch: false,
             world,
             stations,
             periods: 0,
@@ -156,40 +165,78 @@ impl Cell {
                     self.cut(k, organ, &open, &mut events)?;
                 }
             }
-            self.unhook(report.min_volume_ratio, &mut events);
+            self.look_after(report.min_volume_ratio, &mut events);
         }
         self.periods += 1;
         let arms = self.stations.iter().map(Station::observe).collect();
         self.timing.all += clock.elapsed();
-        Ok(CellReport { time: self.time(), arms, tissue, events })
+        let clearance = self.clearance();
+        let touch = clearance < 0.0;
+        if touch && !self.touch {
+            events.push(CellEvent::InstrumentsTouch { depth_mm: -1e3 * clearance });
+        }
+        self.touch = touch;
+        Ok(CellReport { time: self.time(), arms, clearance, tissue, events })
     }
 
-    /// Unhooks instruments from tissue that is stretched or crushed beyond what it bears, and lets tissue feel them again when it no longer is. `least` is the smallest share of its rest
-    /// volume that an element has.
-    fn unhook(&mut self, least: f64, events: &mut Vec<CellEvent>) {
-        if !self.stations.iter().any(Station::meets_tissue) {
+    /// The gap between the two instruments now [m]: negative where they are inside each other, for they do not push each other.
+    pub fn clearance(&self) -> f64 {
+        match &self.stations[..] {
+            [one, other] => clearance::clearance(&one.rods(), &other.rods()),
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Unhooks instruments from what they pierced, hooked or crushed beyond what tissue bears, lets tissue feel them again when all is well, and puts right what does not come back by itself. `least`
+    /// is the smallest share of its rest volume that an element has.
+    fn look_after(&mut self, least: f64, events: &mut Vec<CellEvent>) {
+        if least > SQUEEZED && !self.stations.iter().any(Station::meets_tissue) && self.waits.iter().all(|w| *w == 0) {
             return;
         }
-        let Some(worst) = self.edges.worst(&self.world) else { return };
-        if worst.stretch < REST && least > ROUND {
-            self.stations.iter_mut().for_each(|s| s.now.unhooked = false);
-        }
-        let (body, at) = if worst.stretch > MOST {
-            (worst.body, worst.at)
-        } else if least < CRUSHED {
-            let Some(crushed) = overstretch::most_crushed(&self.world) else { return };
-            crushed
-        } else {
-            return;
+        let strains = self.edges.strains(&self.world, least);
+        self.waits.resize(strains.len(), 0);
+        let calm = !strains.iter().any(|s| s.lasts());
+        let mut relaxed = Vec::new();
+        let mut unhook = |world: &mut World, station: &mut Station, organ: usize| {
+            station.unhook(world, events);
+            let (arm, name) = (station.fixed.side, world.model.bodies()[organ].name().to_owned());
+            let (stretch, volume) = (strains[organ].stretch, strains[organ].volume);
+            events.push(CellEvent::Unhooked { arm, organ: name, stretch, volume });
         };
-        let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked);
-        let nearest = felt.map(|s| (s.distance(at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
-        if let Some((_, station)) = nearest {
-            let organ = self.world.model.bodies()[body].name().to_owned();
-            station.unhook(&mut self.world, events);
-            let (arm, stretch) = (station.fixed.side, worst.stretch);
-            events.push(CellEvent::Unhooked { arm, organ, stretch, volume: least });
+        for station in self.stations.iter_mut().filter(|s| s.meets_tissue()) {
+            match (station.now.unhooked, station.pierces(&self.world)) {
+                (false, Some(organ)) => unhook(&mut self.world, station, organ),
+                (true, None) if calm => station.now.unhooked = false,
+                _ => {}
+            }
         }
+        for (organ, strain) in strains.iter().enumerate() {
+            let near = |s: &Station| s.distance(strain.at) < NEAR;
+            // What an instrument left behind that has just let go is given time to come back.
+            let left = self.stations.iter().any(|s| s.now.unhooked && near(s));
+            let patient = left && self.waits[organ] < PATIENCE && strain.stretch < FAR_TOO_MUCH;
+            let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked && s.meets_tissue());
+            let at = felt.filter(|s| near(s) || s.holds(organ));
+            let nearest = at.map(|s| (s.distance(strain.at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+            match nearest {
+                Some(_) if patient && strain.is_too_much() => self.waits[organ] += 1,
+                Some((_, station)) => {
+                    self.waits[organ] = 0;
+                    if strain.is_too_much() {
+                        unhook(&mut self.world, station, organ);
+                    }
+                }
+                None if strain.is_too_much() || strain.lasts() && self.waits[organ] >= PATIENCE => {
+                    self.waits[organ] = 0;
+                    self.world.state.relax(organ);
+                    let name = self.world.model.bodies()[organ].name().to_owned();
+                    relaxed.push(CellEvent::Relaxed { organ: name, stretch: strain.stretch, volume: strain.volume });
+                }
+                None if strain.lasts() => self.waits[organ] += 1,
+                None => self.waits[organ] = 0,
+            }
+        }
+        events.append(&mut relaxed);
     }
 
     /// The cutter of arm `k`, as wide as it is in `open`, has closed through `organ`.
@@ -231,6 +278,11 @@ impl Cell {
     /// The tissue, in the cell frame: privileged, no policy sees it.
     pub fn world(&self) -> &World {
         &self.world
+    }
+
+    /// Length of the most stretched edge of any organ now over that at rest: privileged, too. Takes a pass over all edges.
+    pub fn max_stretch(&mut self) -> f64 {
+        self.edges.strains(&self.world, 1.0).iter().fold(1.0, |most, s| s.stretch.max(most))
     }
 
     /// Wall time since the cell was built.

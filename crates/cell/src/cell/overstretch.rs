@@ -1,14 +1,19 @@
 //! Tissue that an instrument has hooked or crushed beyond what tissue bears.
 //!
-//! Only vertices of the tissue touch: between them a blade that is driven hard enough enters, and then drags single vertices along from within. Real tissue tears at a stretch of about two; ours has
-//! no such end. So where an edge of an organ is longer than [`MOST`] times its rest length, or an element has less than [`CRUSHED`] of its rest volume, the nearest instrument lets go of what it holds
-//! and is not felt until all tissue is below [`REST`] and above [`ROUND`] again. It is told as an event, and no figure of merit counts on it.
+//! Real tissue tears at a stretch of about two; ours has no such end. So where an edge of an organ is longer than [`MOST`] times its rest length, or an element has less than [`CRUSHED`] of its rest
+//! volume, the nearest instrument lets go of what it holds and is not felt until all tissue is below [`REST`] and above [`ROUND`] again. It is told as an event, and no figure of merit counts on it.
+//!
+//! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold lock each other, whatever the energy. An organ that is beyond these limits and that no instrument is at, or
+//! that stays beyond [`REST`] or [`ROUND`] for [`PATIENCE`], is put right outside of time ([`trocar_tissue::State::relax`]), and that is told, too.
 
 use crate::World;
 use glam::DVec3;
 
 /// Stretch of an edge at which the nearest instrument is unhooked.
 pub(super) const MOST: f64 = 5.0;
+
+/// Stretch at which nothing is waited for: at ten the solver says that the body diverged.
+pub(super) const FAR_TOO_MUCH: f64 = 6.5;
 
 /// Stretch of all edges at which it is felt again.
 pub(super) const REST: f64 = 3.0;
@@ -19,23 +24,52 @@ pub(super) const CRUSHED: f64 = 0.01;
 /// Share of which every element has to have more for an instrument to be felt again.
 pub(super) const ROUND: f64 = 0.05;
 
-/// The middle of the element that has least of its rest volume [m], and its body.
-pub(super) fn most_crushed(world: &World) -> Option<(usize, DVec3)> {
-    let mut least: Option<(f64, usize, DVec3)> = None;
-    for (k, body) in world.model.bodies().iter().enumerate() {
-        let (now, rest) = (world.state.positions(&world.model, k), body.rest_positions());
-        for tet in body.tets() {
-            let volume = |x: &[DVec3]| {
-                let [a, b, c, d] = tet.map(|i| x[i as usize]);
-                (b - a).cross(c - a).dot(d - a)
-            };
-            let share = volume(&now) / volume(rest);
-            if least.is_none_or(|l| share < l.0) {
-                least = Some((share, k, tet.iter().map(|i| 0.25 * now[*i as usize]).sum()));
-            }
+/// Tissue that no instrument meets is looked at where an element has less than this share of its rest volume.
+pub(super) const SQUEEZED: f64 = 0.2;
+
+/// Frames that an organ may stay beyond [`REST`] and [`ROUND`] after the last instrument has let go of it: what is elastic has come back by then.
+pub(super) const PATIENCE: u32 = 15;
+
+/// An instrument farther than this from where tissue is strained most has nothing to do with it [m].
+pub(super) const NEAR: f64 = 0.03;
+
+/// How far an organ is from its rest shape at worst.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Strain {
+    /// Length of the most stretched edge over that at rest; 1 where none is stretched.
+    pub stretch: f64,
+    /// Least volume of an element over that at rest; 1 where that was not asked for.
+    pub volume: f64,
+    /// Where the worse of the two is [m].
+    pub at: DVec3,
+}
+
+impl Strain {
+    /// Beyond what tissue bears.
+    pub fn is_too_much(&self) -> bool {
+        self.stretch > MOST || self.volume < CRUSHED
+    }
+
+    /// Not as good as at rest.
+    pub fn lasts(&self) -> bool {
+        self.stretch > REST || self.volume < ROUND
+    }
+}
+
+/// The element of a body that has least of its rest volume: how much of it, and its middle [m].
+fn most_crushed(world: &World, body: usize, now: &[DVec3]) -> (f64, DVec3) {
+    let (data, mut least) = (&world.model.bodies()[body], (1.0, DVec3::ZERO));
+    for tet in data.tets() {
+        let volume = |x: &[DVec3]| {
+            let [a, b, c, d] = tet.map(|i| x[i as usize]);
+            (b - a).cross(c - a).dot(d - a)
+        };
+        let share = volume(now) / volume(data.rest_positions());
+        if share < least.0 {
+            least = (share, tet.iter().map(|i| 0.25 * now[*i as usize]).sum());
         }
     }
-    least.map(|(_, k, at)| (k, at))
+    least
 }
 
 /// The edges of all bodies with their squared rest lengths.
@@ -44,15 +78,6 @@ pub(super) struct Edges {
     /// The world's count of cuts for which they are right.
     cuts: usize,
     positions: Vec<DVec3>,
-}
-
-/// The edge that is stretched most.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Worst {
-    pub body: usize,
-    pub stretch: f64,
-    /// Its middle [m].
-    pub at: DVec3,
 }
 
 impl Edges {
@@ -73,29 +98,34 @@ impl Edges {
         Self { bodies: bodies.collect(), cuts: world.cuts, positions: Vec::new() }
     }
 
-    /// The most stretched edge of all, if any is stretched at all.
-    pub fn worst(&mut self, world: &World) -> Option<Worst> {
+    /// The strain of every body; `least` is the smallest share of its rest volume that any element has.
+    pub fn strains(&mut self, world: &World, least: f64) -> Vec<Strain> {
         if self.cuts != world.cuts {
             *self = Self::of(world);
         }
-        let mut worst: Option<Worst> = None;
-        for (body, edges) in self.bodies.iter().enumerate() {
-            self.positions.clear();
+        let Self { bodies, positions, .. } = self;
+        let strain = |(body, edges): (usize, &Vec<([u32; 2], f64)>)| {
+            positions.clear();
             let count = world.model.bodies()[body].len();
-            self.positions.extend((0..count).map(|i| world.state.position(&world.model, body, i)));
-            let (mut most, mut which) = (1.0, None);
+            positions.extend((0..count).map(|i| world.state.position(&world.model, body, i)));
+            let (mut most, mut which) = (1.0, [0, 0]);
             for ([a, b], rest) in edges {
-                let square = self.positions[*a as usize].distance_squared(self.positions[*b as usize]);
+                let square = positions[*a as usize].distance_squared(positions[*b as usize]);
                 if square > most * rest {
-                    (most, which) = (square / rest, Some([*a, *b]));
+                    (most, which) = (square / rest, [*a, *b]);
                 }
             }
-            let stretch = most.sqrt();
-            if let Some([a, b]) = which.filter(|_| worst.is_none_or(|w| stretch > w.stretch)) {
-                let at = 0.5 * (self.positions[a as usize] + self.positions[b as usize]);
-                worst = Some(Worst { body, stretch, at });
+            let [a, b] = which.map(|i| positions[i as usize]);
+            let mut strain = Strain { stretch: most.sqrt(), volume: 1.0, at: 0.5 * (a + b) };
+            if least < ROUND {
+                let (volume, at) = most_crushed(world, body, positions);
+                strain.volume = volume;
+                if strain.stretch < MOST && volume < CRUSHED {
+                    strain.at = at;
+                }
             }
-        }
-        worst
+            strain
+        };
+        bodies.iter().enumerate().map(strain).collect()
     }
 }

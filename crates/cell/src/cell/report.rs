@@ -42,8 +42,10 @@ pub struct ArmObservation {
     pub commanded: Coordinates,
     /// What is left of the wanted orientation: axis times angle [rad] in the cell of the turn from the commanded to the wanted one.
     pub rejected_rotation: DVec3,
-    /// The command stops short of what was asked: it was too far for one period, or below the cell's floor.
+    /// The command stops short of what was asked: it was too far for one period, below the cell's floor, or against a force near the limit.
     pub held_back: bool,
+    /// It was the force: the scene's `safety.force_limit_n` shortened the last command, or turned it back.
+    pub guarded: bool,
     /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is latched its constraint force, otherwise contact.
     pub force: TaggedForce,
     /// Contact force on shaft and blades [N], whether a grasp is latched or not.
@@ -143,7 +145,7 @@ pub enum CellEvent {
         /// Pieces that the organ now is in: 1 where the scene parts nothing.
         pieces: usize,
     },
-    /// The instrument had hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until the tissue has come back.
+    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until it is out and the tissue has come back.
     Unhooked {
         /// The arm.
         arm: Side,
@@ -153,6 +155,27 @@ pub enum CellEvent {
         stretch: f64,
         /// Least volume of an element over that at rest.
         volume: f64,
+    },
+    /// An organ was folded so that it would not come back by itself: it was put right, without regard to time and forces.
+    Relaxed {
+        /// Name of the organ.
+        organ: String,
+        /// Length of its most stretched edge over that at rest, before.
+        stretch: f64,
+        /// Least volume of an element over that at rest, before.
+        volume: f64,
+    },
+    /// Tissue pushed the instrument with more than the scene's limit; it draws back.
+    ForceLimit {
+        /// The arm.
+        arm: Side,
+        /// The force [N].
+        force_n: f64,
+    },
+    /// The instruments came into each other, which real ones would not: they do not push each other here.
+    InstrumentsTouch {
+        /// How deep [mm].
+        depth_mm: f64,
     },
     /// The RCM deviation went beyond the scene's threshold.
     RcmThreshold {
@@ -193,6 +216,14 @@ impl std::fmt::Display for CellEvent {
                 arm.name(),
                 1e2 * volume
             ),
+            Self::Relaxed { organ, stretch, volume } => {
+                let volume = 1e2 * volume;
+                write!(f, "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was put right")
+            }
+            Self::InstrumentsTouch { depth_mm } => write!(f, "the instruments are {depth_mm:.2} mm inside each other"),
+            Self::ForceLimit { arm, force_n } => {
+                write!(f, "tissue pushes the {} instrument with {force_n:.1} N, beyond the limit", arm.name())
+            }
             Self::RcmThreshold { arm, deviation_mm } => {
                 write!(f, "the {} RCM deviation of {deviation_mm:.2} mm is beyond the threshold", arm.name())
             }
@@ -210,6 +241,8 @@ pub struct CellReport {
     pub time: f64,
     /// The arms, the left one first.
     pub arms: Vec<ArmObservation>,
+    /// Gap between the two instruments at its end [m]: negative where they are inside each other, for they do not push each other.
+    pub clearance: f64,
     /// The tissue.
     pub tissue: TissueObservation,
     /// What happened, in order.

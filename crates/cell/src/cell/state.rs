@@ -12,6 +12,8 @@ use xxhash_rust::xxh3::Xxh3;
 pub struct CellState {
     world: WorldState,
     arms: Vec<(Moving, ManipulatorState)>,
+    waits: Vec<u32>,
+    touch: bool,
     periods: u64,
 }
 
@@ -21,6 +23,8 @@ impl CellState {
         let mut hash = Xxh3::new();
         hash.update(&self.periods.to_le_bytes());
         hash.update(&self.world.hash().to_le_bytes());
+        self.waits.iter().for_each(|w| hash.update(&w.to_le_bytes()));
+        hash.update(&[u8::from(self.touch)]);
         for (arm, manipulator) in &self.arms {
             // Printed numbers are as exact as their bits: the shortest text that reads back as the same.
             hash.update(format!("{:?}", manipulator).as_bytes());
@@ -36,7 +40,13 @@ impl Cell {
     /// The state as it is now.
     pub fn save(&self) -> CellState {
         let arms = self.stations.iter().map(|s| (s.now.clone(), s.manipulator.state())).collect();
-        CellState { world: self.world.save(), arms, periods: self.periods }
+        CellState {
+            world: self.world.save(),
+            arms,
+            waits: self.waits.clone(),
+            touch: self.touch,
+            periods: self.periods,
+        }
     }
 
     /// Puts back a state that this cell, or another of the same scene and specimen, gave. What comes after is the same to the bit.
@@ -53,6 +63,8 @@ impl Cell {
             station.manipulator.restore(manipulator)?;
             station.now.clone_from(now);
         }
+        self.waits.clone_from(&state.waits);
+        self.touch = state.touch;
         self.periods = state.periods;
         Ok(())
     }

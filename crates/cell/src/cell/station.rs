@@ -1,7 +1,10 @@
 //! One arm of the cell: its manipulator, its instrument's end among the tissue, and what it holds.
 
 use super::action::{Action, ActionSpace, Checker, NUMBERS, paced};
+use super::clearance::Rod;
 use super::exchange::Exchange;
+use super::guard::Guard;
+use super::pierce::pierced;
 use super::report::{ArmObservation, CellEvent, TaggedForce};
 use crate::blades::{Blades, Tools, opening_force};
 use crate::clasp::{Clasp, Snap};
@@ -15,7 +18,7 @@ use trocar_robot::manipulator::Manipulator;
 use trocar_robot::port::{Port, Solution};
 use trocar_robot::wrench::{ForceKind, Wrench};
 use trocar_scene::{InstrumentKind, Side};
-use trocar_tissue::{Event, Piece, ToolForce, ToolMotion};
+use trocar_tissue::{Collider, Event, Piece, Shape, ToolForce, ToolMotion};
 
 /// Jaws that press with this share of their force have closed on what is between them.
 const PRESSING: f64 = 0.95;
@@ -36,8 +39,12 @@ pub(super) struct Fixed {
     pub limits: Limits,
     pub tools: Tools,
     pub blades: Blades,
+    /// The convex parts that tissue touches.
+    pub parts: Vec<Collider>,
     /// The blades' tips stay above this height in the cell [m].
     pub floor: f64,
+    /// Force against which no command pushes the instrument on [N].
+    pub force_limit: f64,
     /// RCM deviations that are told [m].
     pub rcm: [f64; 2],
     /// Length of a control period [s].
@@ -79,6 +86,9 @@ pub(super) struct Moving {
     /// The coordinates that were commanded last.
     pub commanded: Coordinates,
     pub held_back: bool,
+    guard: Guard,
+    /// The guard has shortened the last command.
+    guarded: bool,
     /// Gripper at the end of the last tissue frame.
     pub gripper: Gripper,
     pub design: GraspDesign,
@@ -116,6 +126,8 @@ impl Moving {
             wanted: Wanted::Coordinates(start, DVec3::ZERO),
             commanded: start,
             held_back: false,
+            guard: Guard::default(),
+            guarded: false,
             gripper: Gripper { pose, jaw_angle: start.jaw * fixed.blades.max_angle },
             design,
             jaw,
@@ -172,14 +184,25 @@ impl Station {
     /// A control period begins.
     pub fn command(&mut self) -> Result<()> {
         let Self { fixed, manipulator, now } = self;
-        now.rcm_peak = 0.0;
+        (now.rcm_peak, now.guarded) = (0.0, false);
         let Wanted::Coordinates(wanted, _) = now.wanted else { return Ok(()) };
         let (mut next, far) = paced(&now.commanded, &wanted, fixed.period);
         let room = fixed.deepest(&next);
         let low = next.insertion > room;
         next.insertion = next.insertion.min(room);
+        now.guard.look(now.exchange.force(), manipulator.measured_cp().translation);
+        let from = fixed.port.tip(&now.commanded).translation;
+        let mut tip = fixed.port.tip(&next);
+        let way = tip.translation - from;
+        let allowed = now.guard.allow(way, fixed.force_limit);
+        now.guarded = allowed != way;
+        if now.guarded {
+            tip.translation = from + allowed;
+            let solved = fixed.port.solve(&fixed.instrument, &fixed.limits, &tip, &next)?.coordinates;
+            next = Coordinates { insertion: solved.insertion.min(fixed.deepest(&solved)), roll: next.roll, ..solved };
+        }
         let commanded = manipulator.servo_cp(&next)?;
-        (now.commanded, now.held_back) = (commanded.coordinates, far || low || commanded.reach < 1.0);
+        (now.commanded, now.held_back) = (commanded.coordinates, far || low || now.guarded || commanded.reach < 1.0);
         Ok(())
     }
 
@@ -231,6 +254,49 @@ impl Station {
         q.distance(along * DVec3::X)
     }
 
+    /// Whether the jaws hold tissue of that organ.
+    pub fn holds(&self, organ: usize) -> bool {
+        self.now.held.as_ref().is_some_and(|held| held.organ == organ)
+    }
+
+    /// Its convex parts where they are now, as far as they are round. The rest offset is the blades' thickness.
+    pub fn rods(&self) -> Vec<Rod> {
+        let rods = self.frames().into_iter().flat_map(|(tool, frame)| {
+            let parts = self.fixed.parts.iter().filter(move |part| part.tool == tool);
+            parts.filter_map(move |part| match part.shape {
+                Shape::Capsule { ends, radius } => {
+                    let ends = ends.map(|p| frame.transform(p));
+                    Some(Rod { ends, radius: radius + part.rest_offset })
+                }
+                _ => None,
+            })
+        });
+        rods.collect()
+    }
+
+    /// The instrument's tools and where they are.
+    fn frames(&self) -> [(usize, Pose); 3] {
+        let [one, two] = self.fixed.tools.sides().map(|(tool, side)| (tool, self.now.gripper.blade(side)));
+        [(self.fixed.tools.gripper, self.now.gripper.pose), one, two]
+    }
+
+    /// The organ that a part of the instrument has gone into, but for what the jaws hold.
+    pub fn pierces(&self, world: &World) -> Option<usize> {
+        let Self { fixed, now, .. } = self;
+        let spared = now.held.as_ref().map(|held| held.organ);
+        for (tool, frame) in self.frames() {
+            let axes = fixed.parts.iter().filter(|part| part.tool == tool).filter_map(|part| match part.shape {
+                Shape::Capsule { ends, .. } => Some(ends.map(|p| frame.transform(p))),
+                _ => None,
+            });
+            let axes: Vec<[DVec3; 2]> = axes.collect();
+            if let Some((organ, _)) = pierced(world, &axes, spared) {
+                return Some(organ);
+            }
+        }
+        None
+    }
+
     /// Lets go, and is not felt for now.
     pub fn unhook(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         self.let_go(world, events);
@@ -256,6 +322,10 @@ impl Station {
             }
         }
         self.tell_rcm(events);
+        let Self { fixed, now, .. } = self;
+        if let Some(force_n) = now.guard.tell(fixed.force_limit) {
+            events.push(CellEvent::ForceLimit { arm: fixed.side, force_n });
+        }
         match self.fixed.kind {
             InstrumentKind::Grasper => {
                 self.grasp(world, events);
@@ -408,6 +478,7 @@ impl Station {
             commanded: now.commanded,
             rejected_rotation,
             held_back: now.held_back,
+            guarded: now.guarded,
             force: TaggedForce { kind, wrench },
             contact,
             constraint,
@@ -470,6 +541,7 @@ impl Moving {
         all.extend(pose.rotation.to_array());
         all.extend([self.gripper.jaw_angle, self.jaw_rate, self.rcm_peak]);
         all.extend(self.exchange.numbers());
+        all.extend(self.guard.numbers());
         all.extend(self.jaw.numbers());
         all.extend(self.scissors.numbers());
         for f in &self.forces {
@@ -480,7 +552,7 @@ impl Moving {
             all.extend([f.pressing, f.touching as f64]);
         }
         all.extend(
-            [self.unhooked, self.held_back, self.rcm_told[0], self.rcm_told[1], self.held.is_some()]
+            [self.unhooked, self.held_back, self.guarded, self.rcm_told[0], self.rcm_told[1], self.held.is_some()]
                 .map(|b| f64::from(u8::from(b))),
         );
         all.push(GraspDesign::ALL.iter().position(|d| *d == self.design).unwrap_or(0) as f64);

@@ -11,6 +11,7 @@ mod integrators;
 mod normal;
 pub(crate) mod phantoms;
 mod port_budget;
+mod random_actions;
 mod reconstruction;
 mod settling;
 mod step_ladder;
@@ -36,6 +37,7 @@ pub(crate) use port_budget::SHEETS;
 #[cfg(test)]
 pub(crate) use port_budget::tests::measured as measured_port_budget;
 pub use port_budget::{PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart};
+pub use random_actions::{RandomActionsExperiment, RandomActionsResult, RandomActionsRow};
 pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
 pub(crate) use settling::SETTLED;
 pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};

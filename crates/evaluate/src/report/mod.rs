@@ -19,6 +19,7 @@ mod overlays;
 mod page;
 mod plots;
 mod port_budget;
+mod random_actions;
 mod reconstruction_experiment;
 mod run;
 mod scaling;
@@ -34,7 +35,7 @@ use crate::bench::{MeshingResult, ScalingResult};
 use crate::campaign::{CampaignResult, Kept, Plan, Store};
 use crate::experiment::{
     ControllerGridResult, ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult,
-    PortBudgetResult, ReconstructionResult, SettlingResult, WrenchResult,
+    PortBudgetResult, RandomActionsResult, ReconstructionResult, SettlingResult, WrenchResult,
 };
 use crate::{Error, Result};
 use moving_picture::Lift;
@@ -131,6 +132,11 @@ pub(crate) fn scaling(result: &ScalingResult) -> Result<String> {
 /// A plot that cannot be drawn.
 pub(crate) fn integrators(result: &IntegratorsResult) -> Result<String> {
     Ok(page::page("Integrators", "Which stay bounded, and which are right", &integrators::body(result)?))
+}
+
+/// The page of random actions.
+pub(crate) fn random_actions(result: &RandomActionsResult) -> String {
+    page::page("Random actions", "What breaks under random but legal actions", &random_actions::body(result))
 }
 
 /// The page of the settling experiment.

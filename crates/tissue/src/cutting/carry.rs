@@ -143,6 +143,7 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
         // Cut tissue settles against its neighbours anew.
         stretches: Vec::new(),
         disturbed: state.disturbed,
+        relaxes: state.relaxes,
     }
 }
 

@@ -52,3 +52,29 @@ pub struct SettlingExperiment {
     #[arg(short, long, default_value = "trocar-experiment/settling")]
     pub output: PathBuf,
 }
+
+/// Arguments of `experiment random-actions`.
+#[derive(Debug, Args)]
+pub struct RandomActionsExperiment {
+    /// Scene file or built-in scene.
+    #[arg(default_value = "cell-a")]
+    pub scene: String,
+    /// First seed; every fourth (3, 7, ...) moves the tips, the others ask for coordinates in the ports.
+    #[arg(long, default_value_t = 0)]
+    pub first_seed: u64,
+    /// Number of seeds.
+    #[arg(long, default_value_t = 20)]
+    pub seeds: u64,
+    /// Actions a seed.
+    #[arg(long, default_value_t = 500)]
+    pub actions: usize,
+    /// Folder for a scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
+    /// Seeds that are run at once; as many as there are threads by default.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Folder for trials and report; finished seeds in it are not run again.
+    #[arg(short, long, default_value = "trocar-experiment/random-actions")]
+    pub output: PathBuf,
+}

@@ -6,6 +6,7 @@ mod element_quality;
 mod grasp_designs;
 mod integrators;
 mod port_budget;
+mod random_actions;
 mod settling;
 mod wrench;
 
@@ -25,6 +26,7 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
         ExperimentName::PortBudget(arguments) => port_budget::run(arguments, json, progress),
         ExperimentName::ControllerGrid(arguments) => controller_grid::run(arguments, json, progress),
         ExperimentName::Wrench(arguments) => wrench::run(arguments, json, progress),
+        ExperimentName::RandomActions(arguments) => random_actions::run(arguments, json, progress),
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }
