@@ -1,4 +1,5 @@
-//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, the TetGen program.
+//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, scikit-image,
+//! the TetGen program.
 //! Without them these tests are skipped, and say so.
 
 use std::path::Path;
@@ -7,12 +8,13 @@ use std::process::{Command, Stdio};
 /// A Python environment of the project's own, beside what cargo builds.
 const ENVIRONMENT: &str = "target/tools";
 /// Python packages and their versions.
-const PACKAGES: [&str; 4] = ["onnxruntime>=1.23", "mujoco>=4.0", "opencv-python-headless>=4.10", "embreex>=4.4"];
+const PACKAGES: [&str; 5] =
+    ["onnxruntime>=1.23", "mujoco>=4.0", "opencv-python-headless>=4.10", "embreex>=4.4", "scikit-image>=0.25"];
 
 /// Fetches what is missing. A machine without network or Python is no error.
 pub fn fetch() {
     let python = Path::new(ENVIRONMENT).join("bin/python");
-    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime, mujoco, cv2, embreex"]));
+    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime, mujoco, cv2, embreex, skimage"]));
     if !import() {
         eprintln!("== tools: {} into {ENVIRONMENT}", PACKAGES.join(" "));
         let made = quiet(Command::new("python3").args(["-m", "venv", ENVIRONMENT]))
