@@ -26,9 +26,10 @@ pub use experiment::{
     ControllerInstant, ControllerRow, ConvergenceCase, ConvergenceExperiment, ConvergenceResult,
     ElementQualityExperiment, ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment,
     GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp,
-    PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
+    PaperSimilarity, PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
     ReconstructionExperiment, ReconstructionResult, ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan,
-    SettlingResult, SettlingRow, StepRow, WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
+    SettlingResult, SettlingRow, SimilarityExperiment, SimilarityResult, SimilarityRow, StepRow, WrenchExperiment,
+    WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};

@@ -13,6 +13,7 @@ pub(crate) mod phantoms;
 mod port_budget;
 mod reconstruction;
 mod settling;
+mod similarity;
 mod step_ladder;
 mod trials;
 mod wrench;
@@ -39,6 +40,8 @@ pub use port_budget::{PortBudgetExperiment, PortBudgetResult, PortBudgetRow, Por
 pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
 pub(crate) use settling::SETTLED;
 pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
+pub(crate) use similarity::SimilarityPictures;
+pub use similarity::{PaperSimilarity, SimilarityExperiment, SimilarityResult, SimilarityRow};
 pub use step_ladder::StepRow;
 pub use trials::Resumed;
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod grasp_designs;
 mod integrators;
 mod port_budget;
 mod settling;
+mod similarity;
 mod wrench;
 
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
@@ -26,6 +27,7 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
         ExperimentName::ControllerGrid(arguments) => controller_grid::run(arguments, json, progress),
         ExperimentName::Wrench(arguments) => wrench::run(arguments, json, progress),
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
+        ExperimentName::Similarity(arguments) => similarity::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }
 }
