@@ -4,6 +4,7 @@
 //! the first pixel is (0, 0).
 
 mod calibration;
+mod depth_noise;
 mod distortion;
 mod endoscope;
 mod error;
@@ -12,6 +13,7 @@ mod lens;
 mod model;
 mod raster;
 
+pub use depth_noise::DepthNoise;
 pub use distortion::{Distortion, Fisheye};
 pub use endoscope::Endoscope;
 pub use error::{Error, Result};

@@ -103,6 +103,9 @@ pub enum Error {
     /// A scene cannot be read or written.
     #[error(transparent)]
     Scene(#[from] trocar_scene::Error),
+    /// Two pictures cannot be compared.
+    #[error(transparent)]
+    Similarity(#[from] trocar_similarity::Error),
     /// A specimen cannot be read or written.
     #[error(transparent)]
     Specimen(#[from] trocar_specimen::Error),

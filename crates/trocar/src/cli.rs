@@ -236,6 +236,31 @@ pub enum ExperimentName {
     Wrench(WrenchExperiment),
     /// Random but legal actions in a scene's cell: whether tissue or arms break.
     RandomActions(RandomActionsExperiment),
+    /// Silhouettes, SSIM and PSNR of rendered reconstructions beside what was filmed, and oblique views through the endoscope.
+    Similarity(SimilarityExperiment),
+}
+
+/// Arguments of `experiment similarity`.
+#[derive(Debug, Args)]
+pub struct SimilarityExperiment {
+    /// Folder for recordings, specimens, pictures and the report; finished recordings in it are used again.
+    #[arg(short, long, default_value = "trocar-experiment/similarity")]
+    pub output: PathBuf,
+    /// Phantoms; all by default. The first is filmed from the side too.
+    #[arg(long = "phantom")]
+    pub phantoms: Vec<String>,
+    /// Frames of each recording (the composite's window holds 181; the paper recorded 1,790).
+    #[arg(long, default_value_t = 181)]
+    pub frames: usize,
+    /// Seed of the anatomies and of the camera's noise.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Folder with the real recordings; what it lacks is left out.
+    #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
+    pub data: PathBuf,
+    /// Paths a pixel.
+    #[arg(long, default_value_t = 16)]
+    pub samples: u32,
 }
 
 /// Arguments of `experiment reconstruction`.

@@ -14,6 +14,7 @@ mod port_budget;
 mod random_actions;
 mod reconstruction;
 mod settling;
+mod similarity;
 mod step_ladder;
 mod trials;
 mod wrench;
@@ -41,6 +42,8 @@ pub use random_actions::{RandomActionsExperiment, RandomActionsResult, RandomAct
 pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
 pub(crate) use settling::SETTLED;
 pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
+pub(crate) use similarity::SimilarityPictures;
+pub use similarity::{PaperSimilarity, SimilarityExperiment, SimilarityResult, SimilarityRow};
 pub use step_ladder::StepRow;
 pub use trials::Resumed;
 #[cfg(test)]

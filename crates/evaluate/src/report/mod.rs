@@ -26,6 +26,7 @@ mod scaling;
 mod seen;
 mod settling;
 mod severed;
+mod similarity;
 mod table;
 mod truth;
 mod views;
@@ -36,6 +37,7 @@ use crate::campaign::{CampaignResult, Kept, Plan, Store};
 use crate::experiment::{
     ControllerGridResult, ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult,
     PortBudgetResult, RandomActionsResult, ReconstructionResult, SettlingResult, WrenchResult,
+    PortBudgetResult, ReconstructionResult, SettlingResult, SimilarityPictures, SimilarityResult, WrenchResult,
 };
 use crate::{Error, Result};
 use moving_picture::Lift;
@@ -187,6 +189,19 @@ pub(crate) fn port_budget(result: &PortBudgetResult) -> Result<String> {
 pub(crate) fn controller_grid(result: &ControllerGridResult) -> Result<String> {
     let subtitle = "182 configurations on the same motion, and the one that is chosen";
     Ok(page::page("Controllers", subtitle, &controller_grid::body(result)?))
+}
+
+/// The page of the similarity experiment; `shown` and `oblique` are the pictures of its rows and of its oblique views.
+///
+/// # Errors
+/// A picture that cannot be encoded.
+pub(crate) fn similarity(
+    result: &SimilarityResult,
+    shown: &[SimilarityPictures],
+    oblique: &[SimilarityPictures],
+) -> Result<String> {
+    let subtitle = "Reconstructions rendered beside what was filmed";
+    Ok(page::page("Similarity", subtitle, &similarity::body(result, shown, oblique)?))
 }
 
 /// The page of the wrench experiment.

@@ -8,6 +8,7 @@ mod integrators;
 mod port_budget;
 mod random_actions;
 mod settling;
+mod similarity;
 mod wrench;
 
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
@@ -28,6 +29,7 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
         ExperimentName::Wrench(arguments) => wrench::run(arguments, json, progress),
         ExperimentName::RandomActions(arguments) => random_actions::run(arguments, json, progress),
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
+        ExperimentName::Similarity(arguments) => similarity::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
     }
 }

@@ -1,0 +1,152 @@
+//! One picture of a reconstruction beside the real one, in figures.
+
+use crate::Result;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use trocar_camera::{ColorImage, Mask};
+use trocar_similarity::{Likeness, compare, iou, mean_colour, union};
+
+/// One specimen: its silhouettes, and its picture beside a real frame, within the organs.
+#[derive(Clone, Debug, Serialize)]
+pub struct SimilarityRow {
+    /// Its name.
+    pub specimen: String,
+    /// Mean over the organs of the silhouettes' intersection over union.
+    pub iou: f64,
+    /// The same of all organs together.
+    pub union_iou: f64,
+    /// The same organ by organ.
+    pub organ_iou: BTreeMap<String, f64>,
+    /// The rendered picture beside the recording's first frame.
+    #[serde(flatten)]
+    pub rendered: Likeness,
+    /// The recording's second frame beside its first; `None` where it has but one.
+    pub second_frame: Option<Likeness>,
+    /// The first frame's mean colour beside it.
+    pub mean_colour: Likeness,
+    /// The rendered picture beside the composite, whose colours it has.
+    pub composite: Option<Likeness>,
+    /// Where the masks come from, and in what light the picture was rendered.
+    pub note: String,
+}
+
+/// What was compared, for the page.
+pub(crate) struct SimilarityPictures {
+    pub real: ColorImage,
+    pub rendered: ColorImage,
+    /// Pixels that were compared.
+    pub compared: Mask,
+    /// The organs in the real picture, and in the rendered one.
+    pub silhouettes: [Mask; 2],
+    /// The rendered one in another light: what it is, and the picture.
+    pub other: Option<(&'static str, ColorImage)>,
+}
+
+/// What there is to be compared.
+pub(super) struct Sides<'a> {
+    pub specimen: String,
+    pub note: String,
+    /// The organs' names, their true masks, and their masks in the rendered picture.
+    pub organs: Vec<(String, Mask, Mask)>,
+    pub real: &'a ColorImage,
+    pub rendered: &'a ColorImage,
+    /// What covers the organs in the real picture.
+    pub covered: &'a Mask,
+    /// The second frame, and what covers it.
+    pub second: Option<(&'a ColorImage, &'a Mask)>,
+    pub composite: Option<&'a ColorImage>,
+}
+
+/// The figures, and the pixels that were compared.
+pub(super) fn measure(sides: &Sides<'_>) -> Result<(SimilarityRow, SimilarityPictures)> {
+    let mut organ_iou = BTreeMap::new();
+    for (name, real, rendered) in &sides.organs {
+        organ_iou.insert(name.clone(), iou(real, rendered)?.unwrap_or(0.0));
+    }
+    let silhouettes = [union(sides.organs.iter().map(|o| &o.1))?, union(sides.organs.iter().map(|o| &o.2))?];
+    let [truth, shown] = &silhouettes;
+    let without = |covered: &Mask, of: &Mask| {
+        let set = of.set.iter().zip(&covered.set).map(|(of, covered)| *of && !covered).collect();
+        Mask { width: of.width, height: of.height, set }
+    };
+    let compared = without(&grown(sides.covered), truth);
+    let second = sides.second.map(|(frame, covered)| compare(sides.real, frame, &without(&grown(covered), &compared)));
+    let row = SimilarityRow {
+        specimen: sides.specimen.clone(),
+        iou: organ_iou.values().sum::<f64>() / organ_iou.len().max(1) as f64,
+        union_iou: iou(truth, shown)?.unwrap_or(0.0),
+        organ_iou,
+        rendered: compare(sides.real, sides.rendered, &compared)?,
+        second_frame: second.transpose()?,
+        mean_colour: compare(sides.real, &mean_colour(sides.real, &compared)?, &compared)?,
+        composite: sides.composite.map(|c| compare(c, sides.rendered, truth)).transpose()?,
+        note: sides.note.clone(),
+    };
+    let pictures = SimilarityPictures {
+        real: sides.real.clone(),
+        rendered: sides.rendered.clone(),
+        compared,
+        silhouettes,
+        other: None,
+    };
+    Ok((row, pictures))
+}
+
+/// A mask and two pixels around it: an instrument's rim is blended with what is behind.
+fn grown(mask: &Mask) -> Mask {
+    let mut out = mask.clone();
+    for _ in 0..2 {
+        let from = out.set.clone();
+        for i in (0..from.len()).filter(|i| from[*i]) {
+            trocar_camera::pixel_neighbours(i, mask.width, mask.height).for_each(|j| out.set[j] = true);
+        }
+    }
+    out
+}
+
+/// The pixels of an organ in labels, where it is 1 + `index`.
+pub(super) fn labelled(labels: &[u16], index: usize, width: usize, height: usize) -> Mask {
+    Mask { width, height, set: labels.iter().map(|l| usize::from(*l) == index + 1).collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    #![allow(clippy::unwrap_used, reason = "a failed test is a failed test")]
+
+    use super::*;
+
+    #[test]
+    fn organs_are_measured_apart_and_instruments_left_out() {
+        let (width, height) = (40, 30);
+        let columns = |from: usize, to: usize| Mask {
+            width,
+            height,
+            set: (0..width * height).map(|i| (from..to).contains(&(i % width))).collect(),
+        };
+        let mut real = ColorImage::new(width, height, [90, 60, 50]);
+        let rendered = real.clone();
+        // An instrument, and something beside the organs.
+        for (i, p) in real.pixels.iter_mut().enumerate() {
+            if (5..8).contains(&(i % width)) || i % width > 30 {
+                *p = [255; 3];
+            }
+        }
+        let organs =
+            vec![("a".to_owned(), columns(0, 10), columns(0, 10)), ("b".to_owned(), columns(10, 20), columns(15, 20))];
+        let covered = columns(5, 8);
+        let sides = Sides {
+            specimen: "s".into(),
+            note: String::new(),
+            organs,
+            real: &real,
+            rendered: &rendered,
+            covered: &covered,
+            second: None,
+            composite: None,
+        };
+        let (row, pictures) = measure(&sides).unwrap();
+        assert_eq!((row.organ_iou["a"], row.organ_iou["b"], row.iou, row.union_iou), (1.0, 0.5, 0.75, 0.75));
+        assert_eq!(row.rendered.psnr_db, f64::INFINITY);
+        assert_eq!(pictures.compared.count(), 30 * (20 - 7));
+    }
+}
