@@ -412,7 +412,10 @@ pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
         if *d <= 0.0 {
             return [0; 3];
         }
-        let x = 5.0 * f64::from((d - near) / (far - near).max(1e-6)).clamp(0.0, 0.9999);
+        // Half by depth and half by how many pixels are nearer, so that what lies flat on a table is not all one colour.
+        let rank = valid.partition_point(|v| v < d) as f64 / valid.len().max(1) as f64;
+        let share = f64::from((d - near) / (far - near).max(1e-6));
+        let x = 5.0 * (0.5 * share.clamp(0.0, 1.0) + 0.5 * rank).min(0.9999);
         let (i, t) = (x as usize, x.fract());
         [0, 1, 2].map(|k| (stops[i][k] + t * (stops[i + 1][k] - stops[i][k])) as u8)
     };
