@@ -230,8 +230,17 @@ mod tests {
         }
         let mut moved = draped.mesh.clone();
         draped.positions(&nodes, &mut moved.vertices);
-        // Each piece is closed by what the cut laid bare: their volumes are together the whole's, however far they are apart.
-        assert!((moved.volume() / volume - 1.0).abs() < 1e-6, "{} of {volume}", moved.volume());
+        // What the cut laid bare is a cross-section of 4 x 4 mm on each side, the one facing the other. (Skin and faces overlap beside it, so that volumes say nothing.)
+        let bared = (0..moved.triangles.len())
+            .filter(|t| moved.triangles[*t].iter().all(|v| moved.colors[*v as usize] == BARED))
+            .map(|t| moved.area_vector(t));
+        let (mut there, mut back) = (0.0, 0.0);
+        for area in bared {
+            there += area.x.max(0.0);
+            back -= area.x.min(0.0);
+        }
+        assert!((there - 1.6e-5).abs() < 1e-9 && (back - 1.6e-5).abs() < 1e-9, "{there} {back}");
+        assert!(volume > 0.0 && moved.volume() >= volume);
         assert!(moved.colors.contains(&BARED) && moved.colors.len() == moved.vertices.len());
         // No triangle spans the gap.
         let longest = (0..moved.triangles.len()).map(|t| {
