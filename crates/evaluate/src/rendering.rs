@@ -395,7 +395,9 @@ pub(crate) fn label_color(label: u16) -> [u8; 3] {
 
 /// Depth in colours from near (bright) to far; black where there is none.
 pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
-    let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).collect();
+    // Whole millimetres: what is flat has one rank, not that of its rounding.
+    let whole = |d: f32| (d * 1e3).round() * 1e-3;
+    let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).map(whole).collect();
     valid.sort_by(f32::total_cmp);
     let at = |share: f64| valid.get((share * valid.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(1.0);
     let (near, far) = (at(0.01), at(0.97));
@@ -412,7 +414,10 @@ pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
         if *d <= 0.0 {
             return [0; 3];
         }
-        let x = 5.0 * f64::from((d - near) / (far - near).max(1e-6)).clamp(0.0, 0.9999);
+        // Half by depth and half by how many pixels are nearer, so that what lies flat on a table is not all one colour.
+        let rank = valid.partition_point(|v| *v < whole(*d)) as f64 / valid.len().max(1) as f64;
+        let share = f64::from((d - near) / (far - near).max(1e-6));
+        let x = 5.0 * (0.5 * share.clamp(0.0, 1.0) + 0.5 * rank).min(0.9999);
         let (i, t) = (x as usize, x.fract());
         [0, 1, 2].map(|k| (stops[i][k] + t * (stops[i + 1][k] - stops[i][k])) as u8)
     };

@@ -165,3 +165,91 @@ impl Draped {
         }));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trocar_specimen::{Material, OrganFacts, Pins};
+    use trocar_tissue::{BodyDescription, ConstitutiveModel, Cut, ModelBuilder, State, sever};
+
+    /// A row of cubes of 4 mm along x, six elements each.
+    fn row(cubes: u32) -> TetMesh {
+        let mut mesh = TetMesh::default();
+        for i in 0..=cubes {
+            for c in 0..4 {
+                mesh.vertices.push(4e-3 * DVec3::new(f64::from(i), f64::from(c & 1), f64::from(c >> 1)));
+            }
+        }
+        for i in 0..cubes {
+            let corner = |c: u32| 4 * (i + (c & 1)) + (c >> 1);
+            for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+                mesh.tets.push([corner(0), corner(a), corner(b), corner(7)]);
+            }
+        }
+        mesh
+    }
+
+    #[test]
+    fn pieces_are_closed_and_come_apart_with_what_was_bared() {
+        let body = row(12);
+        let (mut surface, _) = body.boundary();
+        surface.colors = vec![[200, 120, 90]; surface.vertices.len()];
+        let volume = surface.volume();
+        let organ = Organ {
+            name: "row".to_owned(),
+            base: body.vertices[0],
+            body: body.clone(),
+            surface,
+            material: Material::default(),
+            pins: Pins::None,
+            facts: OrganFacts::default(),
+        };
+        let whole = Whole::new(&organ);
+        let mut builder = ModelBuilder::new();
+        let material = trocar_tissue::Material {
+            model: ConstitutiveModel::StableNeoHookean,
+            young_modulus: 12e3,
+            poisson_ratio: 0.45,
+            density: 1200.0,
+            viscosity: 0.0,
+        };
+        let description =
+            BodyDescription { name: "row".into(), mesh: &body, material, pinned: vec![0, 1], supports: vec![] };
+        builder.body(description).unwrap();
+        let model = builder.build().unwrap();
+        let point = DVec3::new(0.0241, 2e-3, 2e-3);
+        let cut = sever(&model, &State::new(&model), &Cut::through(0, point, DVec3::X)).unwrap();
+        assert_eq!(cut.pieces.len(), 2);
+        let bodies = cut.model.bodies();
+        let pieces: Vec<Piece<'_>> =
+            bodies.iter().map(|b| Piece { rest: b.rest_positions(), tets: b.tets() }).collect();
+        let draped = whole.in_pieces(&pieces).unwrap();
+        let mut nodes = Vec::new();
+        for (k, body) in bodies.iter().enumerate() {
+            nodes.extend(body.rest_positions().iter().map(|p| *p + DVec3::X * 0.05 * k as f64));
+        }
+        let mut moved = draped.mesh.clone();
+        draped.positions(&nodes, &mut moved.vertices);
+        // What the cut laid bare is a cross-section of 4 x 4 mm on each side, the one facing the other. (Skin and faces overlap beside it, so that volumes say nothing.)
+        let bared = (0..moved.triangles.len())
+            .filter(|t| moved.triangles[*t].iter().all(|v| moved.colors[*v as usize] == BARED))
+            .map(|t| moved.area_vector(t));
+        let (mut there, mut back) = (0.0, 0.0);
+        for area in bared {
+            there += area.x.max(0.0);
+            back -= area.x.min(0.0);
+        }
+        assert!((there - 1.6e-5).abs() < 1e-9 && (back - 1.6e-5).abs() < 1e-9, "{there} {back}");
+        assert!(volume > 0.0 && moved.volume() >= volume);
+        assert!(moved.colors.contains(&BARED) && moved.colors.len() == moved.vertices.len());
+        // No triangle spans the gap.
+        let longest = (0..moved.triangles.len()).map(|t| {
+            let [a, b, c] = moved.corners(t);
+            a.distance(b).max(b.distance(c)).max(c.distance(a))
+        });
+        assert!(longest.fold(0.0, f64::max) < 0.01);
+        // Pieces of something else are refused.
+        let other = [DVec3::ZERO; 4];
+        assert!(whole.in_pieces(&[Piece { rest: &other, tets: &[[0, 1, 2, 3]] }]).is_none());
+    }
+}

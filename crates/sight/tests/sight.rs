@@ -98,7 +98,7 @@ fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
     let organs = [label(&sight, "appendix"), label(&sight, "bowel")];
     for (k, picture) in one.iter().step_by(2).take(3).enumerate() {
         for organ in organs {
-            assert!(share(picture, organ) > 0.001, "camera {k} does not see organ {organ}");
+            assert!(share(picture, organ) > 0.0003, "camera {k} does not see organ {organ}");
         }
         assert!(share(picture, label(&sight, "grasper")) > 0.003, "camera {k} sees no grasper");
         assert!(
@@ -139,7 +139,7 @@ fn trocar_cell_coordinates(arm: &trocar_cell::ArmObservation, deeper: f64) -> tr
 }
 
 #[test]
-fn cut_organs_are_seen_in_their_pieces_and_whole_again() {
+fn sections_show_half_and_the_whole_again() {
     let (scene, specimen) = (scene(), specimen());
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
     let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
