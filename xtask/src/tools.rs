@@ -1,7 +1,5 @@
-//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, openpi's
-//! client and server, the TetGen program.
 //! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, scikit-image,
-//! the TetGen program.
+//! openpi's client and server, the TetGen program.
 //! Without them these tests are skipped, and say so.
 
 use std::path::Path;
@@ -20,8 +18,14 @@ struct Environment {
 const ENVIRONMENTS: [Environment; 2] = [
     Environment {
         folder: "target/tools",
-        packages: &["onnxruntime>=1.23", "mujoco>=4.0", "opencv-python-headless>=4.10", "embreex>=4.4"],
-        modules: "onnxruntime, mujoco, cv2, embreex",
+        packages: &[
+            "onnxruntime>=1.23",
+            "mujoco>=4.0",
+            "opencv-python-headless>=4.10",
+            "embreex>=4.4",
+            "scikit-image>=0.25",
+        ],
+        modules: "onnxruntime, mujoco, cv2, embreex, skimage",
     },
     Environment {
         folder: "target/tools-openpi",
@@ -44,21 +48,6 @@ pub fn fetch() {
                     "   not to be had (python3 with venv and network is needed); the tests that need it are skipped"
                 );
             }
-const ENVIRONMENT: &str = "target/tools";
-/// Python packages and their versions.
-const PACKAGES: [&str; 5] =
-    ["onnxruntime>=1.23", "mujoco>=4.0", "opencv-python-headless>=4.10", "embreex>=4.4", "scikit-image>=0.25"];
-
-/// Fetches what is missing. A machine without network or Python is no error.
-pub fn fetch() {
-    let python = Path::new(ENVIRONMENT).join("bin/python");
-    let import = || quiet(Command::new(&python).args(["-c", "import onnxruntime, mujoco, cv2, embreex, skimage"]));
-    if !import() {
-        eprintln!("== tools: {} into {ENVIRONMENT}", PACKAGES.join(" "));
-        let made = quiet(Command::new("python3").args(["-m", "venv", ENVIRONMENT]))
-            && quiet(Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(PACKAGES));
-        if !made || !import() {
-            eprintln!("   not to be had (python3 with venv and network is needed); the tests that need it are skipped");
         }
     }
     // It ends with an error however it is asked for its help; that it starts is enough.

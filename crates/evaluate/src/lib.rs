@@ -36,14 +36,10 @@ pub use experiment::{
     ControllerInstant, ControllerRow, ConvergenceCase, ConvergenceExperiment, ConvergenceResult,
     ElementQualityExperiment, ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment,
     GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp,
-    PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
-    RandomActionsExperiment, RandomActionsResult, RandomActionsRow, ReconstructionExperiment, ReconstructionResult,
-    ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, StepRow,
-    WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
     PaperSimilarity, PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
-    ReconstructionExperiment, ReconstructionResult, ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan,
-    SettlingResult, SettlingRow, SimilarityExperiment, SimilarityResult, SimilarityRow, StepRow, WrenchExperiment,
-    WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
+    RandomActionsExperiment, RandomActionsResult, RandomActionsRow, ReconstructionExperiment, ReconstructionResult,
+    ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, SimilarityExperiment,
+    SimilarityResult, SimilarityRow, StepRow, WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
 pub use rendering::{Rendered, Rendering, Seen};

@@ -142,7 +142,8 @@ mod tests {
         let back = webp::AnimDecoder::new(&bytes).decode().unwrap();
         assert!(back.has_animation() && back.len() == 3);
         for (k, (frame, _)) in frames.iter().enumerate() {
-            let seen = back.get_frame(k).unwrap().get_image();
+            let shown = back.get_frame(k).unwrap();
+            let seen = shown.get_image();
             let mean = |c: usize| seen.chunks(4).map(|p| f64::from(p[c])).sum::<f64>() / (32.0 * 24.0);
             assert!((0..3).all(|c| (mean(c) - f64::from(frame.pixels[0][c])).abs() < 6.0), "frame {k}");
         }

@@ -62,7 +62,6 @@ pub(super) fn film(
         let file = EpisodeFile::read(&store.episode(&kept.name, kept.index).join(EPISODE_FILE))?;
         episode.reset(kept.seed)?;
         let every = file.steps.len().div_ceil(FRAMES).max(1);
-        let milliseconds = (1e3 * every as f64 * episode.cell().period()).round() as i32;
         let mut frames = Vec::new();
         for (k, (action, _)) in file.steps.iter().enumerate() {
             if progress.interrupted() {
@@ -74,12 +73,12 @@ pub(super) fn film(
             }
             if k % every == 0 || k + 1 == file.steps.len() {
                 let picture = sight.see(episode.cell(), "endoscope", SIZE, &Settings::Preview { shadows: false })?;
-                frames.push((picture.color.clone(), milliseconds));
+                frames.push((picture.color.clone(), (1e3 * episode.time()).round() as i32));
             }
         }
         if frames.is_empty() {
             let picture = sight.see(episode.cell(), "endoscope", SIZE, &Settings::Preview { shadows: false })?;
-            frames.push((picture.color.clone(), 1000));
+            frames.push((picture.color.clone(), 0));
         }
         let (path, bytes) = (path(store, kept), webp(&frames)?);
         if let Some(folder) = path.parent() {

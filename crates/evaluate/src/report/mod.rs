@@ -36,8 +36,8 @@ use crate::bench::{MeshingResult, ScalingResult};
 use crate::campaign::{CampaignResult, Kept, Plan, Store};
 use crate::experiment::{
     ControllerGridResult, ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult,
-    PortBudgetResult, RandomActionsResult, ReconstructionResult, SettlingResult, WrenchResult,
-    PortBudgetResult, ReconstructionResult, SettlingResult, SimilarityPictures, SimilarityResult, WrenchResult,
+    PortBudgetResult, RandomActionsResult, ReconstructionResult, SettlingResult, SimilarityPictures, SimilarityResult,
+    WrenchResult,
 };
 use crate::{Error, Result};
 use moving_picture::Lift;
