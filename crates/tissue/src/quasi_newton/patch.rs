@@ -39,7 +39,8 @@ impl Patch {
             next: Vec::with_capacity(MOST),
             places: Vec::with_capacity(MOST),
             known: Vec::with_capacity(MOST),
-            columns: Vec::new(),
+            // Zeros take no memory until a column is written.
+            columns: vec![0.0; 3 * MOST * length],
             length,
             matrix: vec![0.0; 9 * MOST * MOST],
             shares: vec![0.0; 3 * MOST],
@@ -84,9 +85,6 @@ impl Patch {
     #[inline(always)]
     fn learn<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32]) {
         let size = 3 * self.length;
-        if self.columns.is_empty() && !self.nodes.is_empty() {
-            self.columns.resize(MOST * size, 0.0);
-        }
         self.places.clear();
         for (node, _) in &self.nodes {
             let place = self.known.iter().position(|known| known == node).unwrap_or_else(|| {
