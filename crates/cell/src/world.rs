@@ -1,6 +1,6 @@
 //! A specimen made ready to be stepped.
 
-use crate::Result;
+use crate::{Error, Result};
 use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
@@ -75,6 +75,11 @@ pub(crate) struct WorldState {
 }
 
 impl WorldState {
+    /// Whether its organs have been cut.
+    pub fn is_cut(&self) -> bool {
+        self.cuts > 0
+    }
+
     /// Hash over every bit of positions, velocities and grasps.
     pub fn hash(&self) -> u64 {
         self.state.hash()
@@ -166,6 +171,10 @@ impl World {
     /// # Errors
     /// Threads that the system does not give.
     pub(crate) fn restore(&mut self, saved: &WorldState) -> Result<()> {
+        let sizes = |model: &Model| model.bodies().iter().map(|b| b.len()).collect::<Vec<_>>();
+        if self.cuts == 0 && saved.cuts == 0 && sizes(&self.model) != sizes(&saved.model) {
+            return Err(Error::Option("the state is of another specimen: its organs have other nodes".to_owned()));
+        }
         if self.cuts > 0 || saved.cuts > 0 {
             self.stepper.follow(&saved.model)?;
         }

@@ -377,3 +377,28 @@ fn one_bad_reply_of_each_kind_over_the_wire() {
     assert!(matches!(&e, Error::WrongDtype { at, dtype, .. } if at.ends_with("reply/actions") && dtype == "|O"), "{e}");
     assert!(e.to_string().starts_with("ws://127.0.0.1:"), "{e}");
 }
+
+#[test]
+fn a_server_that_never_stops_talking_is_told() {
+    // Pings and empty pieces of a message, for as long as somebody listens, before any request.
+    for pieces in [&[0x89u8, 0x00][..], &[0x00, 0x00]] {
+        let server = web(move |mut socket| {
+            socket.send(Message::Binary(pack(&Map::new()).unwrap().into())).unwrap();
+            let stream = socket.get_mut();
+            if pieces[0] == 0 {
+                // A message that has begun.
+                stream.write_all(&[0x02, 0x00]).unwrap();
+            }
+            let flood = pieces.repeat(4096);
+            let start = Instant::now();
+            while start.elapsed() < Duration::from_secs(3) && stream.write_all(&flood).is_ok() {}
+        });
+        let mut client = Client::connect(&endpoint(&server.url)).unwrap();
+        std::thread::sleep(Duration::from_millis(50));
+        let start = Instant::now();
+        let error = client.infer(&observation()).unwrap_err();
+        drop(client);
+        assert!(start.elapsed() < Duration::from_millis(1500), "{error}: {:?}", start.elapsed());
+        assert!(!error.to_string().contains('\n'), "{error}");
+    }
+}

@@ -99,7 +99,8 @@ impl Summary {
     /// Of the rows of an episode that ended as `end` says; `threshold_mm` is the RCM deviation that it is scored against.
     pub fn of(rows: &[Channels], progress: &Progress, end: Option<&End>, arms: &[&str], threshold_mm: f64) -> Self {
         let tasks = || rows.iter().map(|c| &c.task);
-        let most = |f: fn(&Channels) -> f64| rows.iter().map(f).fold(0.0, f64::max);
+        // What has blown up is told as a very large number: files have no infinity.
+        let most = |f: fn(&Channels) -> f64| rows.iter().map(f).fold(0.0, f64::max).min(f64::MAX);
         let held = rows.iter().rfind(|c| c.task.grasped > 0.0).map(|c| c.task);
         let arms: Vec<ArmSummary> = arms.iter().map(|name| arm(name, rows)).collect();
         let rcm_peak_mm = arms.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max);
@@ -115,12 +116,12 @@ impl Summary {
             grasp_at: tasks().find(|t| t.grasped > 0.0).map(|t| t.grasp_s),
             held_to_end: rows.last().is_some_and(|c| c.task.grasped > 0.0),
             lift_mm: most(|c| c.task.lift_mm),
-            slip_mm: held.map_or(0.0, |t| t.slip_mm),
-            follow_ratio: held.map_or(0.0, |t| t.follow),
+            slip_mm: held.map_or(0.0, |t| finite(t.slip_mm)),
+            follow_ratio: held.map_or(0.0, |t| finite(t.follow)),
             torn: tasks().map(|t| t.torn).sum::<f64>() as usize,
             cuts: tasks().map(|t| t.cuts).sum::<f64>() as usize,
             inverted_peak: most(|c| c.task.inverted) as usize,
-            min_volume_ratio: tasks().map(|t| t.min_volume).fold(1.0, f64::min),
+            min_volume_ratio: tasks().map(|t| t.min_volume).fold(1.0, f64::min).max(f64::MIN),
             yielded_substeps: tasks().map(|t| t.yielded).sum::<f64>() as usize,
             diverged: tasks().any(|t| t.diverged > 0.0) || matches!(end, Some(End::Diverged { .. })),
             max_speed_m_s: most(|c| c.task.max_speed_m_s),
@@ -136,6 +137,11 @@ impl Summary {
     }
 }
 
+/// `x`, or a very large number where it is none.
+fn finite(x: f64) -> f64 {
+    if x.is_nan() { f64::MAX } else { x.clamp(f64::MIN, f64::MAX) }
+}
+
 fn arm(name: &str, rows: &[Channels]) -> ArmSummary {
     let pick = |c: &Channels| if name == "right" { c.right } else { c.left };
     let all: Vec<ArmChannels> = rows.iter().map(pick).collect();
@@ -143,20 +149,20 @@ fn arm(name: &str, rows: &[Channels]) -> ArmSummary {
     let loaded: Vec<&ArmChannels> = all.iter().filter(|a| is_loaded(a)).collect();
     let mut rcm: Vec<f64> = loaded.iter().map(|a| a.rcm_mm).collect();
     rcm.sort_by(f64::total_cmp);
-    let most = |f: fn(&ArmChannels) -> f64| all.iter().map(f).fold(0.0, f64::max);
+    let most = |f: fn(&ArmChannels) -> f64| all.iter().map(f).fold(0.0, f64::max).min(f64::MAX);
     let period = rows.first().map_or(0.0, |c| c.time_s);
     let free = |k: usize| !is_loaded(&all[k]);
     let (lag, lagged) = lag(&all, period, &free);
     ArmSummary {
         arm: name.to_owned(),
         loaded_s: loaded.len() as f64 * period,
-        rcm_median_mm: quantile(&rcm, 0.5),
-        rcm_p95_mm: quantile(&rcm, 0.95),
-        rcm_max_mm: loaded.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max),
+        rcm_median_mm: finite(quantile(&rcm, 0.5)),
+        rcm_p95_mm: finite(quantile(&rcm, 0.95)),
+        rcm_max_mm: loaded.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max).min(f64::MAX),
         rcm_peak_mm: most(|a| a.rcm_peak_mm),
-        tracking_rms_mm: 1e3 * off_by(&all, 0.0, period, &free),
+        tracking_rms_mm: finite(1e3 * off_by(&all, 0.0, period, &free)),
         lag_ms: 1e3 * lag,
-        lagged_rms_mm: 1e3 * lagged,
+        lagged_rms_mm: finite(1e3 * lagged),
         peak_contact_n: most(ArmChannels::contact_n),
         peak_constraint_n: most(ArmChannels::constraint_n),
         peak_jaw_n: most(|a| a.jaw_force_n),

@@ -120,7 +120,8 @@ impl Edges {
             if least < ROUND {
                 let (volume, at) = most_crushed(world, body, positions);
                 strain.volume = volume;
-                if strain.stretch < MOST && volume < CRUSHED {
+                // The place of what makes the strain last.
+                if strain.stretch < REST || strain.stretch < MOST && volume < CRUSHED {
                     strain.at = at;
                 }
             }

@@ -1,6 +1,7 @@
 //! Saving, restoring and hashing a cell.
 
 use super::Cell;
+use super::overstretch::Edges;
 use super::station::Moving;
 use crate::Result;
 use crate::world::WorldState;
@@ -58,7 +59,12 @@ impl Cell {
             let (given, here) = (state.arms.len(), self.stations.len());
             return Err(crate::Error::Option(format!("the state has {given} arms, the cell {here}")));
         }
+        let cut = self.world.cuts > 0 || state.world.is_cut();
         self.world.restore(&state.world)?;
+        if cut {
+            // As many cuts are not the same cuts.
+            self.edges = Edges::of(&self.world);
+        }
         for (station, (now, manipulator)) in self.stations.iter_mut().zip(&state.arms) {
             station.manipulator.restore(manipulator)?;
             station.now.clone_from(now);

@@ -19,10 +19,14 @@ use crate::cell_run::scene_specimen;
 use crate::workflow::refuse_overlap;
 use crate::{Error, Result, report};
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
 use trocar_progress::Progress;
 use trocar_scene::Scene;
+
+/// How often it is looked whether the user asks to stop.
+const GLANCE: Duration = Duration::from_millis(50);
 
 /// What a campaign is to do on this machine.
 #[derive(Clone, Debug)]
@@ -58,12 +62,13 @@ impl Campaign {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let workers = if self.jobs == 0 { cores } else { self.jobs }.min(missing.len());
         progress.begin("episodes", missing.len() as u64);
-        let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let (next, stop) = (AtomicUsize::new(0), Arc::new(AtomicBool::new(false)));
+        let at_work = AtomicUsize::new(workers);
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
         let work = || -> Result<()> {
-            let mut worker = Worker::new(&scene, &specimen)?;
+            let mut worker = Worker::new(&scene, &specimen)?.stopped_by(Arc::clone(&stop));
             while let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let files = worker.run(job, &|| stop.load(Ordering::Relaxed) || progress.interrupted())?;
+                let files = worker.run(job)?;
                 store.put(job, &files)?;
                 progress.advance(1);
             }
@@ -79,7 +84,15 @@ impl Campaign {
                             told.get_or_insert(why);
                         }
                     }
+                    at_work.fetch_sub(1, Ordering::Relaxed);
                 });
+            }
+            // Whoever waits for a server is told by the flag.
+            while at_work.load(Ordering::Relaxed) > 0 {
+                if progress.interrupted() {
+                    stop.store(true, Ordering::Relaxed);
+                }
+                std::thread::sleep(GLANCE);
             }
         });
         if let Some(why) = first_error.into_inner().ok().flatten() {

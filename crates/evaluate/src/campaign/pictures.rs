@@ -18,9 +18,14 @@ pub(crate) const SIZE: [usize; 2] = [320, 180];
 /// Pictures of an episode, at most.
 const FRAMES: usize = 80;
 
+/// Name of the moving picture of an episode in the campaign's folder.
+pub(super) fn name(policy: &str, index: usize) -> String {
+    format!("pictures/{policy}-{index:06}.webp")
+}
+
 /// Where the moving picture of an episode is kept.
 pub(crate) fn path(store: &Store, kept: &Kept) -> PathBuf {
-    store.folder().join("pictures").join(format!("{}-{:06}.webp", kept.name, kept.index))
+    store.folder().join(name(&kept.name, kept.index))
 }
 
 /// The failures that come first in a report: of each policy in turn, those that came least far.
@@ -56,11 +61,11 @@ pub(super) fn film(
         return Ok(());
     }
     let mut episode = Episode::new(scene, specimen, 0)?;
-    let mut sight = Sight::new(scene, specimen, episode.cell())?;
     progress.begin("pictures", chosen.len() as u64);
     for kept in chosen {
         let file = EpisodeFile::read(&store.episode(&kept.name, kept.index).join(EPISODE_FILE))?;
         episode.reset(kept.seed)?;
+        let mut sight = Sight::new(&episode.arranged_scene(), specimen, episode.cell())?;
         let every = file.steps.len().div_ceil(FRAMES).max(1);
         let mut frames = Vec::new();
         for (k, (action, _)) in file.steps.iter().enumerate() {
@@ -80,11 +85,7 @@ pub(super) fn film(
             let picture = sight.see(episode.cell(), "endoscope", SIZE, &Settings::Preview { shadows: false })?;
             frames.push((picture.color.clone(), 0));
         }
-        let (path, bytes) = (path(store, kept), webp(&frames)?);
-        if let Some(folder) = path.parent() {
-            std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
-        }
-        std::fs::write(&path, bytes).map_err(|source| Error::Io { path: path.clone(), source })?;
+        store.write(&name(&kept.name, kept.index), &webp(&frames)?)?;
         progress.advance(1);
     }
     progress.end();

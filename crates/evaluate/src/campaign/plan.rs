@@ -60,7 +60,7 @@ pub struct Job {
 /// What a campaign is: its folder's `campaign.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// Version of the program.
+    /// Version of the program, and hash of the sources that decide what an episode is: one table is not made by two programs.
     pub program: String,
     /// Name of the scene.
     pub scene: String,
@@ -106,7 +106,7 @@ impl Plan {
         }
         let hash = specimen_hash(specimen);
         Ok(Self {
-            program: env!("CARGO_PKG_VERSION").to_owned(),
+            program: format!("{} {}", env!("CARGO_PKG_VERSION"), env!("TROCAR_EPISODE_MAKERS")),
             scene: scene.name.clone(),
             task: scene.task.name.name().to_owned(),
             scene_hash: format!("{:016x}", scene_hash(scene, hash)?),

@@ -7,18 +7,20 @@ use super::PolicySpec;
 use crate::{Error, Result};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
-use std::sync::mpsc;
-use std::time::Duration;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 use trocar_cell::{Action, ActionSpace};
 use trocar_remote::{Array, Client, Endpoint, Observation, Value};
 use trocar_render::Settings;
-use trocar_scene::{Scene, TaskName};
+use trocar_scene::{Frame, Scene, TaskName};
 use trocar_sight::Sight;
 use trocar_specimen::Specimen;
 use trocar_task::policy::CHUNK;
 use trocar_task::{Bounds, Episode, Policy};
 
-/// Side of the pictures that policies see, where the scene says none [px].
+/// The camera that policies do not see through: no hospital has it.
 const RECORDING: &str = "recording";
 
 /// The interpreter that serves `python:` policies, unless `$TROCAR_PYTHON` names another.
@@ -26,6 +28,12 @@ const PYTHON: &str = "python3";
 
 /// Longest that an interpreter takes to import a policy.
 const START: Duration = Duration::from_secs(120);
+
+/// How often a child that is waited for is looked at.
+const GLANCE: Duration = Duration::from_millis(50);
+
+/// Longest line of a child that is kept in one piece [bytes].
+const LONGEST: u64 = 4096;
 
 /// The key that a server may want.
 const KEY: &str = "TROCAR_POLICY_KEY";
@@ -40,7 +48,10 @@ pub(super) struct Remote {
     child: Option<Served>,
     client: Option<Client>,
     bounds: Bounds,
-    sight: Sight,
+    specimen: Specimen,
+    /// What the cameras see, with where the specimen was when it was made; made in the first episode, and anew where the specimen lies elsewhere.
+    sight: Option<(Frame, Sight)>,
+    stop: Arc<AtomicBool>,
     cameras: Vec<(String, [usize; 2])>,
     prompt: String,
     seed: u64,
@@ -50,6 +61,8 @@ pub(super) struct Remote {
 struct Served {
     child: Child,
     url: String,
+    /// The last line of its standard error.
+    said: Arc<Mutex<String>>,
 }
 
 impl Drop for Served {
@@ -61,10 +74,12 @@ impl Drop for Served {
 }
 
 impl Remote {
-    pub fn new(spec: &PolicySpec, scene: &Scene, specimen: &Specimen, episode: &Episode) -> Result<Self> {
+    pub fn new(spec: &PolicySpec, specimen: &Specimen, episode: &Episode, stop: Arc<AtomicBool>) -> Result<Self> {
+        let scene = episode.scene();
         let module = spec.source.strip_prefix("python:").map(str::to_owned);
         let mut endpoint = Endpoint::new(if module.is_some() { "ws://127.0.0.1:1" } else { &spec.source });
         endpoint.api_key = std::env::var(KEY).ok();
+        endpoint.interrupt = Some(Arc::clone(&stop));
         if let Ok(text) = std::env::var(TIMEOUT) {
             let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);
             let seconds =
@@ -82,7 +97,9 @@ impl Remote {
             child: None,
             client: None,
             bounds,
-            sight: Sight::new(scene, specimen, episode.cell())?,
+            specimen: specimen.clone(),
+            sight: None,
+            stop,
             cameras,
             prompt: prompt(scene),
             seed: 0,
@@ -94,7 +111,7 @@ impl Remote {
         if let Some(module) = &self.module
             && self.child.is_none()
         {
-            let served = serve(module)?;
+            let served = serve(module, &self.stop)?;
             self.endpoint.url.clone_from(&served.url);
             self.child = Some(served);
             self.client = None;
@@ -111,9 +128,14 @@ impl Remote {
         let mut seen = Observation::new();
         let array = Array::from_f32(&[state.len()], &state).map_err(said)?;
         seen.insert("observation/state".to_owned(), Value::Array(array));
+        let scene = episode.arranged_scene();
+        if self.sight.as_ref().is_none_or(|(placed, _)| *placed != scene.placement) {
+            let sight = Sight::new(&scene, &self.specimen, episode.cell()).map_err(|e| e.to_string())?;
+            self.sight = Some((scene.placement, sight));
+        }
+        let Some((_, sight)) = &mut self.sight else { return Err("there are no cameras".to_owned()) };
         for (camera, size) in &self.cameras {
-            let picture = self
-                .sight
+            let picture = sight
                 .see(episode.cell(), camera, *size, &Settings::Preview { shadows: false })
                 .map_err(|e| e.to_string())?;
             let pixels = picture.color.pixels.as_flattened().to_vec();
@@ -183,7 +205,7 @@ impl Policy for Remote {
 }
 
 /// Starts the server of a callable and waits for its address.
-fn serve(module: &str) -> std::result::Result<Served, String> {
+fn serve(module: &str, stop: &AtomicBool) -> std::result::Result<Served, String> {
     let python = std::env::var("TROCAR_PYTHON").unwrap_or_else(|_| PYTHON.to_owned());
     let mut child = Command::new(&python)
         .args(["-m", "trocar.serve", module, "--port", "0"])
@@ -192,44 +214,70 @@ fn serve(module: &str) -> std::result::Result<Served, String> {
         .stderr(Stdio::piped())
         .spawn()
         .map_err(|e| format!("python:{module}: {python} cannot be started: {e}"))?;
-    let out = child.stdout.take();
-    let mut served = Served { child, url: String::new() };
+    let (out, err) = (child.stdout.take(), child.stderr.take());
+    let mut served = Served { child, url: String::new(), said: Arc::default() };
+    // Both pipes are read for as long as they are open: one that is full would hold the child up. The threads end with the child, or with whoever keeps its pipes.
+    let said = Arc::clone(&served.said);
+    each_line(err, move |line| {
+        if let Ok(mut said) = said.lock() {
+            *said = line;
+        }
+        true
+    });
     let (tell, told) = mpsc::channel();
-    if let Some(out) = out {
-        // Its thread ends with the child's output.
-        std::thread::spawn(move || {
-            let mut lines = BufReader::new(out.take(1 << 16));
-            let mut line = String::new();
-            let _ = lines.read_line(&mut line);
-            let _ = tell.send(line);
-            let _ = std::io::copy(&mut lines.into_inner().into_inner(), &mut std::io::sink());
-        });
-    }
-    match told.recv_timeout(START) {
-        Ok(line) if line.trim().starts_with("ws://") => {
-            served.url = line.trim().to_owned();
-            Ok(served)
+    each_line(out, move |line| {
+        // Whatever else is printed first is not the address.
+        let _ = !line.starts_with("ws://") || tell.send(line).is_ok();
+        true
+    });
+    let begun = Instant::now();
+    while begun.elapsed() < START {
+        match told.recv_timeout(GLANCE) {
+            Ok(url) => {
+                served.url = url;
+                return Ok(served);
+            }
+            Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => return Err("interrupted".to_owned()),
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => {
+                let words = served.last_words().unwrap_or_default();
+                return Err(format!("python:{module}: cannot be served: {words}"));
+            }
         }
-        Ok(_) => {
-            let words = served.last_words().unwrap_or_else(|| "it said nothing".to_owned());
-            Err(format!("python:{module}: cannot be served: {words}"))
-        }
-        Err(_) => Err(format!("python:{module}: was not served within {} s", START.as_secs())),
     }
+    Err(format!("python:{module}: was not served within {} s", START.as_secs()))
+}
+
+/// Gives every line of a child's output, cut to [`LONGEST`] bytes, to `take`, on a thread of its own.
+fn each_line(from: Option<impl Read + Send + 'static>, take: impl Fn(String) -> bool + Send + 'static) {
+    let Some(from) = from else { return };
+    std::thread::spawn(move || {
+        let mut lines = BufReader::new(from);
+        let mut line = Vec::new();
+        while lines.by_ref().take(LONGEST).read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
+            let text = String::from_utf8_lossy(&line).trim().to_owned();
+            if !text.is_empty() && !take(text) {
+                return;
+            }
+            line.clear();
+        }
+    });
 }
 
 impl Served {
     /// The last line that a child which has ended wrote to its standard error; None while it runs.
     fn last_words(&mut self) -> Option<String> {
         for _ in 0..20 {
+            // The line may come a moment after the end.
+            std::thread::sleep(GLANCE);
             if self.child.try_wait().ok().flatten().is_some() {
-                let mut text = String::new();
-                // A child that has ended cannot block; a grandchild that keeps the pipe open is cut off by the limit.
-                self.child.stderr.take()?.take(1 << 16).read_to_string(&mut text).ok()?;
-                let last = text.lines().rev().find(|l| !l.trim().is_empty()).unwrap_or("it said nothing");
-                return Some(last.chars().take(300).collect());
+                let said = self.said.lock().map(|s| s.clone()).unwrap_or_default();
+                return Some(if said.is_empty() {
+                    "it said nothing".to_owned()
+                } else {
+                    said.chars().take(300).collect()
+                });
             }
-            std::thread::sleep(Duration::from_millis(50));
         }
         None
     }

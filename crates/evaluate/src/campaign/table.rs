@@ -145,7 +145,8 @@ impl CampaignResult {
         }
         let mut hash = xxhash_rust::xxh3::Xxh3::new();
         for k in kept {
-            hash.update(format!("{} {} {} {:?}\n", k.name, k.index, k.state_hash, k.summary.end).as_bytes());
+            let end = k.summary.end.as_ref().map_or("", |e| e.name());
+            hash.update(format!("{} {} {} {end}\n", k.name, k.index, k.state_hash).as_bytes());
         }
         Self {
             scene: plan.scene.clone(),

@@ -2,18 +2,21 @@
 
 use super::remote::Remote;
 use super::{Files, Job};
-use crate::Result;
+use crate::{Error, Result};
 use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_task::{Episode, Policy, policy, run};
 
 /// An episode's cell with policies.
 pub struct Worker {
-    scene: Scene,
     specimen: Specimen,
     episode: Episode,
+    /// By their names.
     policies: BTreeMap<String, Box<dyn Policy + Send>>,
+    stop: Arc<AtomicBool>,
 }
 
 impl Worker {
@@ -23,25 +26,37 @@ impl Worker {
     /// A scene that cannot be built.
     pub fn new(scene: &Scene, specimen: &Specimen) -> Result<Self> {
         let episode = Episode::new(scene, specimen, 1)?;
-        Ok(Self { scene: scene.clone(), specimen: specimen.clone(), episode, policies: BTreeMap::new() })
+        Ok(Self { specimen: specimen.clone(), episode, policies: BTreeMap::new(), stop: Arc::default() })
+    }
+
+    /// The same, which gives up what it does when `flag` becomes true.
+    #[must_use]
+    pub fn stopped_by(mut self, flag: Arc<AtomicBool>) -> Self {
+        self.stop = flag;
+        self
     }
 
     /// Runs `job` and gives the files of its episode. A policy that fails ends its episode, which is a result.
     ///
     /// # Errors
-    /// An episode that cannot be begun; [`crate::Error::Cell`] (interrupted) when `stop` says so.
-    pub fn run(&mut self, job: &Job, stop: &dyn Fn() -> bool) -> Result<Files> {
-        let source = job.policy.source.as_str();
-        if !self.policies.contains_key(source) {
+    /// An episode that cannot be begun; [`crate::Error::Interrupted`] when the flag says so.
+    pub fn run(&mut self, job: &Job) -> Result<Files> {
+        let (name, source) = (job.policy.name.as_str(), job.policy.source.as_str());
+        if !self.policies.contains_key(name) {
             let made: Box<dyn Policy + Send> = if source.contains(':') {
-                Box::new(Remote::new(&job.policy, &self.scene, &self.specimen, &self.episode)?)
+                Box::new(Remote::new(&job.policy, &self.specimen, &self.episode, Arc::clone(&self.stop))?)
             } else {
                 policy::named(source)?
             };
-            self.policies.insert(source.to_owned(), made);
+            self.policies.insert(name.to_owned(), made);
         }
-        let Some(policy) = self.policies.get_mut(source) else { return Ok(Files::default()) };
-        let recording = run(&mut self.episode, policy.as_mut(), job.seed, &mut |_| !stop())?;
-        Files::of(&recording)
+        let Some(policy) = self.policies.get_mut(name) else { return Ok(Files::default()) };
+        let stop = &self.stop;
+        let recording = run(&mut self.episode, policy.as_mut(), job.seed, &mut |_| !stop.load(Ordering::Relaxed));
+        if stop.load(Ordering::Relaxed) {
+            // A policy that was waited for ends as one that failed; it did not.
+            return Err(Error::Interrupted);
+        }
+        Files::of(&recording?)
     }
 }

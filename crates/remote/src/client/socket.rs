@@ -14,6 +14,8 @@ use tungstenite::protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCod
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Bytes, Message, WebSocket};
 
+/// Longest that is read between requests from a server that always has something to say.
+const FLOOD: Duration = Duration::from_millis(100);
 /// Most of a traceback that is kept [bytes].
 const TRACEBACK: usize = 64 << 10;
 
@@ -116,9 +118,15 @@ impl Socket {
     /// Answers pings and learns of a close, without waiting. Between requests nothing else may come.
     pub fn tend(&mut self) -> Result<()> {
         let wait = Wait::new("a request", Duration::from_millis(1));
-        self.control.at_once();
+        let end = Instant::now() + FLOOD;
+        self.control.at_once(end);
         loop {
-            match self.web.read() {
+            let read = self.web.read();
+            if Instant::now() >= end {
+                let reason = "it sends without a pause and lets no request through".into();
+                return Err(Error::Protocol { url: self.url.clone(), reason });
+            }
+            match read {
                 Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {}
                 Ok(Message::Close(frame)) => return Err(closed(&self.url, wait.what, frame.as_ref())),
                 Ok(Message::Text(text)) => return Err(server_error(&self.url, text.as_str())),

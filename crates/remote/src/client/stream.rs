@@ -25,8 +25,8 @@ pub(crate) enum Halt {
 enum Patience {
     /// Until then.
     Until(Instant),
-    /// What is not there at once is not waited for.
-    None,
+    /// What is not there at once is not waited for; what never ends is read until then.
+    AtOnce(Instant),
 }
 
 /// The way to a stream that has been put into a WebSocket.
@@ -39,9 +39,9 @@ impl Control {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Patience::Until(deadline);
     }
 
-    /// Operations from here on give [`io::ErrorKind::WouldBlock`] where they would wait.
-    pub fn at_once(&self) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Patience::None;
+    /// Operations from here on give [`io::ErrorKind::WouldBlock`] where they would wait, and end by `deadline` where there is always something.
+    pub fn at_once(&self, deadline: Instant) {
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Patience::AtOnce(deadline);
     }
 
     fn now(&self) -> Patience {
@@ -70,7 +70,8 @@ impl Timed {
             let patience = self.control.now();
             // The flag and the deadline also end what always has something to read.
             let left = match patience {
-                Patience::None => Duration::from_millis(1),
+                Patience::AtOnce(deadline) if Instant::now() < deadline => Duration::from_millis(1),
+                Patience::AtOnce(_) => Duration::ZERO,
                 Patience::Until(_) if self.interrupt.as_ref().is_some_and(|f| f.load(Ordering::Relaxed)) => {
                     return Err(io::Error::other(Halt::Interrupted));
                 }
@@ -83,7 +84,7 @@ impl Timed {
             match operate(&mut self.socket, pause.max(Duration::from_millis(1))) {
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
                 Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
-                    if matches!(patience, Patience::None) {
+                    if matches!(patience, Patience::AtOnce(_)) {
                         return Err(io::ErrorKind::WouldBlock.into());
                     }
                 }

@@ -12,6 +12,8 @@ pub(super) struct Memory {
 struct Taught {
     step: Vec<Row>,
     change: Vec<Row>,
+    /// Both are zero.
+    empty: bool,
 }
 
 /// Which of them are known, and the numbers that all bodies of an island share.
@@ -31,7 +33,7 @@ const LEAST_CURVATURE: f32 = 1e-6;
 impl Memory {
     /// Room for `pairs` of vectors of `rows`.
     pub fn new(pairs: usize, rows: usize) -> Self {
-        let pair = || Taught { step: vec![[0.0; 4]; rows], change: vec![[0.0; 4]; rows] };
+        let pair = || Taught { step: vec![[0.0; 4]; rows], change: vec![[0.0; 4]; rows], empty: true };
         Self { pairs: (0..pairs).map(|_| pair()).collect() }
     }
 
@@ -45,6 +47,7 @@ impl Memory {
         [before, after]: [&[Row]; 2],
     ) -> [f32; 3] {
         let pair = &mut self.pairs[at];
+        pair.empty = false;
         dispatch!(level, simd => {
             for (to, from) in pair.step.as_flattened_mut().iter_mut().zip(direction.as_flattened()) {
                 *to = share * from;
@@ -63,8 +66,11 @@ impl Memory {
 
     /// Forgets a step.
     fn forget(&mut self, at: usize) {
-        self.pairs[at].step.fill([0.0; 4]);
-        self.pairs[at].change.fill([0.0; 4]);
+        let pair = &mut self.pairs[at];
+        if !std::mem::replace(&mut pair.empty, true) {
+            pair.step.fill([0.0; 4]);
+            pair.change.fill([0.0; 4]);
+        }
     }
 
     /// step . change.
@@ -109,8 +115,8 @@ impl Island<'_> {
             let products = part.memory.write(part.level, next, share, &part.direction, gradients);
             sums.iter_mut().zip(products).for_each(|(sum, product)| *sum += product);
         }
-        // What a body would have learnt that is left alone.
-        for part in self.all().filter(|part| part.dozes) {
+        // What a body would have learnt that is left alone or at rest: what stands there is of another time.
+        for part in self.all().filter(|part| !part.active) {
             part.memory.forget(next);
         }
         let [curvature, steps, changes] = sums;

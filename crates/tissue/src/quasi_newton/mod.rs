@@ -202,6 +202,9 @@ impl Island<'_> {
         let settled =
             if gravity == [0.0; 4] { f32::INFINITY } else { 1e-4 * h * h * self.frame.gravity.length() as f32 };
         let (tolerance, relative) = ((settings.tolerance as f32).max(rounding), settings.relative as f32);
+        if alone {
+            self.rest_alone(tolerance.min(settled));
+        }
         for iteration in usize::from(behind)..settings.iterations {
             if self.parts().next().is_none() {
                 // Nothing moves, and nothing did.
@@ -252,7 +255,7 @@ impl Island<'_> {
         let h = self.h;
         for part in self.all() {
             part.was_resting = !std::mem::replace(&mut part.active, true);
-            part.dozes = false;
+            (part.dozes, part.stirred) = (false, false);
         }
         self.take_gradient();
         self.accept_gradient();
@@ -269,6 +272,18 @@ impl Island<'_> {
         });
         if self.all().any(|part| part.was_resting == part.active) {
             self.history.clear();
+        }
+    }
+
+    /// Leaves a body that no other is near where it is if it is at rest: what was found of it in the same place need not be found again.
+    fn rest_alone(&mut self, limit: f32) {
+        let h = self.h;
+        if let [Worker { solver, .. }] = self.workers
+            && solver.guess == Guess::Still
+            && solver.is_quiet(h, limit)
+            && solver.correction_at_rest() <= limit
+        {
+            solver.rest(h);
         }
     }
 

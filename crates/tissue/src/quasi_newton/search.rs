@@ -72,7 +72,9 @@ impl Island<'_> {
                 let push = |limit| pair.touch.push_within(offset, limit).map_or(Vec3A::ZERO, |push| push.gradient);
                 let change = push(now) - push(pair.limit);
                 for (m, vertex, share) in pair.shares() {
-                    workers[m].solver.push(false, vertex, share * change);
+                    let part = &mut workers[m].solver;
+                    part.push(false, vertex, share * change);
+                    part.stirred |= !part.active;
                 }
                 pair.limit = now;
                 pair.noted += change;

@@ -68,7 +68,7 @@ fn text(made: &EpisodeMade) -> String {
     let arms = s.arms.iter().map(|a| {
         format!(
             "{}: RCM deviation under load {:.3} mm median, {:.3} mm p95, {:.3} mm at most; lag {:.0} ms; peaks of {:.2} N contact, {:.2} N constraint",
-            a.arm, a.rcm_median_mm, a.rcm_p95_mm, a.rcm_peak_mm, a.lag_ms, a.peak_contact_n, a.peak_constraint_n
+            a.arm, a.rcm_median_mm, a.rcm_p95_mm, a.rcm_max_mm, a.lag_ms, a.peak_contact_n, a.peak_constraint_n
         )
     });
     let grasp = s.grasp_at.map_or("no grasp".to_owned(), |at| format!("grasp at s = {at:.2}"));
