@@ -158,6 +158,17 @@ impl Material {
         parts
     }
 
+    /// [`Parts::gloss`] alone.
+    pub fn gloss(&self, albedo: Vec3A, to_eye: Vec3A, to_light: Vec3A) -> Vec3A {
+        match &self.kind {
+            Kind::Coated { lobe, head_on, .. } if to_eye.z > 0.0 && to_light.z > 0.0 => {
+                let (value, _, facing) = lobe.between(to_eye, to_light);
+                Vec3A::splat(value * fresnel(*head_on, facing))
+            }
+            _ => self.parts(albedo, to_eye, to_light).gloss,
+        }
+    }
+
     /// A direction in which a path goes on by the gloss; `None` where it would go into the surface.
     pub fn gloss_direction(&self, to_eye: Vec3A, [a, b]: [f32; 2]) -> Option<Vec3A> {
         match &self.kind {
