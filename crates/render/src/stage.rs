@@ -60,6 +60,8 @@ struct Body {
     shape: usize,
     label: u16,
     material: Material,
+    /// The same for light that paths carry here after a bounce.
+    blunt: Material,
     /// Linear colour where the shape has none.
     color: Vec3A,
     /// The world is the shape's own frame.
@@ -188,6 +190,7 @@ impl Stage {
         self.bodies.push(Body {
             shape: shape.0,
             label,
+            blunt: Material::new(&look.surface.blunt()),
             material: Material::new(&look.surface),
             color: srgb::to_linear(look.color).into(),
             still: true,
@@ -425,6 +428,11 @@ impl Stage {
 
     pub(crate) fn material(&self, touch: &Touch) -> &Material {
         &self.bodies[touch.body as usize].material
+    }
+
+    /// The material for paths that have bounced before, see [`crate::SurfaceKind`].
+    pub(crate) fn blunt(&self, touch: &Touch) -> &Material {
+        &self.bodies[touch.body as usize].blunt
     }
 
     /// The surface that a ray in `direction` met.
