@@ -32,7 +32,7 @@ impl Seen {
     }
 
     /// Light that a lamp adds where nothing is in its way, and whether the lamp is seen from another place than the eye's. Panels shine from their middles.
-    fn from_lamp(&self, stage: &Stage, lamp: &Lamp, eye: Vec3A) -> Option<(Vec3A, bool)> {
+    fn lit_by(&self, stage: &Stage, lamp: &Lamp, eye: Vec3A) -> Option<(Vec3A, bool)> {
         let Self { surface, frame, out, .. } = self;
         let material = stage.material(&self.touch);
         let arriving = lamp.arriving(surface.position, [0.5; 2])?;
@@ -76,7 +76,7 @@ pub(crate) fn light(
         waiting.clear();
         directions.clear();
         for (i, place) in seen.iter_mut().enumerate() {
-            let Some((light, aside)) = place.from_lamp(stage, lamp, eye) else { continue };
+            let Some((light, aside)) = place.lit_by(stage, lamp, eye) else { continue };
             if !(shadows && aside) {
                 place.light += light;
                 continue;
