@@ -48,7 +48,7 @@ impl Eye {
         let radius = 0.5 * diameter * self.height as f32;
         self.circle = Some(radius);
         for i in 0..self.centres.len() {
-            if self.middle_distance(i) > radius {
+            if self.middle_distance_squared(i) > radius * radius {
                 self.centres[i] = [f32::NAN; 3];
             }
         }
@@ -81,15 +81,16 @@ impl Eye {
         ray.is_finite().then_some(ray)
     }
 
-    /// How far a pixel is from the image's middle, 1 at the rim of the round picture or at the image's corner.
-    pub(crate) fn eccentricity(&self, pixel: usize) -> f32 {
-        let corner = 0.5 * (self.width as f32).hypot(self.height as f32);
-        self.middle_distance(pixel) / self.circle.unwrap_or(corner).max(1e-6)
+    /// The square of how far a pixel is from the image's middle, 1 at the rim of the round picture or at the image's corner.
+    pub(crate) fn eccentricity_squared(&self, pixel: usize) -> f32 {
+        let (width, height) = (self.width as f32, self.height as f32);
+        let rim = self.circle.map_or(0.25 * (width * width + height * height), |radius| radius * radius);
+        self.middle_distance_squared(pixel) / rim.max(1e-12)
     }
 
-    fn middle_distance(&self, pixel: usize) -> f32 {
+    fn middle_distance_squared(&self, pixel: usize) -> f32 {
         let x = (pixel % self.width) as f32 - 0.5 * (self.width as f32 - 1.0);
         let y = (pixel / self.width) as f32 - 0.5 * (self.height as f32 - 1.0);
-        x.hypot(y)
+        x * x + y * y
     }
 }

@@ -45,8 +45,7 @@ impl Film {
 
     /// The sRGB colour of a pixel with linear radiance `light`.
     pub(crate) fn develop(&self, eye: &Eye, pixel: usize, light: [f32; 3]) -> [u8; 3] {
-        let rim = eye.eccentricity(pixel);
-        let gain = self.exposure * (1.0 - self.vignette * rim * rim).max(0.0);
+        let gain = self.exposure * (1.0 - self.vignette * eye.eccentricity_squared(pixel)).max(0.0);
         let mut values = light.map(|l| l * gain);
         if let Some(noise) = self.noise {
             let [a, b, c, d] = numbers([pixel as u32, noise.frame, 0x6e6f_6973, noise.seed]);

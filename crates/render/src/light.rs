@@ -87,6 +87,14 @@ impl Lamp {
         }
     }
 
+    /// The light's middle [m].
+    pub fn middle(&self) -> Vec3A {
+        match *self {
+            Self::Spot { position, .. } => position,
+            Self::Panel { corner, along, across, .. } => corner + 0.5 * along + 0.5 * across,
+        }
+    }
+
     /// What arrives at `point` from the place of the light that two random numbers choose; `None` where nothing does.
     pub fn arriving(&self, point: Vec3A, [a, b]: [f32; 2]) -> Option<Arriving> {
         match *self {

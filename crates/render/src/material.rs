@@ -34,6 +34,22 @@ pub enum SurfaceKind {
     },
 }
 
+/// Least roughness of what paths meet after a bounce.
+const BLUNT: f32 = 0.62;
+
+impl SurfaceKind {
+    /// As rough as paths find it after their first bounce. A lamp of no size in the mirror of a coat that itself is met by chance is too bright for too few paths, a white dot; in a rougher
+    /// coat more paths find less, and energy is kept (Kaplanyan and Dachsbacher 2013, "Path Space Regularization for Holistic and Robust Light Transport").
+    pub(crate) fn blunt(self) -> Self {
+        let rough = |roughness: f32| roughness.max(BLUNT);
+        match self {
+            Self::Matte => Self::Matte,
+            Self::Coated { roughness, ior, wander } => Self::Coated { roughness: rough(roughness), ior, wander },
+            Self::Metal { roughness } => Self::Metal { roughness: rough(roughness) },
+        }
+    }
+}
+
 impl Look {
     /// Wet tissue: a film of water over flesh, in which red light wanders some millimetres.
     pub fn tissue(color: [u8; 3]) -> Self {
@@ -156,6 +172,17 @@ impl Material {
             }
         }
         parts
+    }
+
+    /// [`Parts::gloss`] alone.
+    pub fn gloss(&self, albedo: Vec3A, to_eye: Vec3A, to_light: Vec3A) -> Vec3A {
+        match &self.kind {
+            Kind::Coated { lobe, head_on, .. } if to_eye.z > 0.0 && to_light.z > 0.0 => {
+                let (value, _, facing) = lobe.between(to_eye, to_light);
+                Vec3A::splat(value * fresnel(*head_on, facing))
+            }
+            _ => self.parts(albedo, to_eye, to_light).gloss,
+        }
     }
 
     /// A direction in which a path goes on by the gloss; `None` where it would go into the surface.

@@ -66,7 +66,7 @@ pub(crate) fn radiance(
             return sum;
         }
         let surface = stage.surface(&touch, direction);
-        let material = stage.material(&touch);
+        let material = if bounce == 0 { stage.material(&touch) } else { stage.blunt(&touch) };
         let seen = Place { surface, frame: Frame::new(surface.smooth), weight: Vec3A::ONE };
         let to_eye = seen.frame.local(-direction.normalize());
         let below = if bounce == 0 { wander(stage, &touch, &seen, material, key, stacks) } else { None };

@@ -3,8 +3,8 @@
 use crate::eye::Eye;
 use crate::film::Film;
 use crate::path::{Key, LENS, radiance};
-use crate::preview;
-use crate::stage::{Stage, Touch, rotation_of};
+use crate::preview::{self, Seen, Shades};
+use crate::stage::{Ahead, Stage, rotation_of};
 use crate::tree::Stacks;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
@@ -155,13 +155,18 @@ struct Hand {
     /// Of each pixel of a tile that sees something: its place among the band's pixels, and its ray.
     rays: Vec<(usize, Vec3A)>,
     directions: Vec<Vec3A>,
-    ahead: Vec<(f32, u32)>,
+    ahead: Ahead,
+    /// Of a preview: what is seen of the stage, and where among the band's pixels.
+    seen: Vec<Seen>,
+    places: Vec<usize>,
+    shades: Shades,
 }
 
 impl Hand {
     fn new() -> Self {
-        let (rays, directions, ahead) = (Vec::new(), Vec::new(), Vec::new());
-        Self { stacks: Stacks::new(), pixels: Vec::new(), rays, directions, ahead }
+        let (pixels, rays, directions) = (Vec::new(), Vec::new(), Vec::new());
+        let (ahead, shades) = (Ahead::default(), Shades::default());
+        Self { stacks: Stacks::new(), pixels, rays, directions, ahead, seen: Vec::new(), places: Vec::new(), shades }
     }
 }
 
@@ -169,7 +174,7 @@ impl Shot<'_> {
     /// Renders the pixels of some columns of a band of rows, whose first pixel is the image's `first`.
     fn tile(&self, first: usize, columns: std::ops::Range<usize>, hand: &mut Hand) {
         let width = self.eye.width();
-        let Hand { stacks, pixels: band, rays, directions, ahead } = hand;
+        let Hand { stacks, pixels: band, rays, directions, ahead, seen, places, shades } = hand;
         rays.clear();
         for row in 0..band.len() / width {
             let pixels = columns.clone().map(|u| row * width + u);
@@ -178,43 +183,43 @@ impl Shot<'_> {
         directions.clear();
         directions.extend(rays.iter().map(|(_, ray)| self.rotation * *ray));
         self.stage.ahead(self.origin, directions, ahead);
+        seen.clear();
+        places.clear();
+        let to_camera = self.rotation.transpose();
         for ((i, ray), direction) in rays.iter().zip(directions.iter()) {
-            let touch = self.stage.first_ahead(ahead, self.origin, *direction, stacks);
-            band[*i] = self.pixel(first + i, *ray, *direction, touch, stacks);
-        }
-    }
-
-    /// A pixel whose centre's ray meets `touch`.
-    fn pixel(&self, index: usize, ray: Vec3A, direction: Vec3A, touch: Option<Touch>, stacks: &mut Stacks) -> Pixel {
-        let mut pixel = Pixel::default();
-        let mut direct = Vec3A::from(self.stage.environment);
-        if let Some(touch) = touch {
-            let surface = self.stage.surface(&touch, direction);
-            pixel.depth = (touch.t * ray.z).max(0.0);
-            pixel.label = self.stage.label(&touch);
-            pixel.normal = (self.rotation.transpose() * surface.smooth).to_array();
-            if let Settings::Preview { shadows } = *self.settings {
-                let to_eye = -direction.normalize();
-                let shadows = shadows.then_some(self.origin);
-                direct = preview::light(self.stage, &surface, self.stage.material(&touch), to_eye, shadows, stacks);
+            let pixel = &mut band[*i];
+            pixel.light = self.stage.environment;
+            if let Some(touch) = self.stage.first_ahead(ahead, self.origin, *direction, stacks) {
+                let surface = self.stage.surface(&touch, *direction);
+                pixel.depth = (touch.t * ray.z).max(0.0);
+                pixel.label = self.stage.label(&touch);
+                pixel.normal = (to_camera * surface.smooth).to_array();
+                places.push(*i);
+                seen.push(Seen::new(self.stage, touch, surface, *direction));
             }
         }
-        pixel.light = match *self.settings {
-            Settings::Preview { .. } => direct.to_array(),
-            Settings::Path { samples, bounces, seed } => {
-                let mut sum = Vec3A::ZERO;
-                let samples = samples.max(1);
-                for sample in 0..samples {
-                    let key = Key { seed, pixel: index as u32, sample };
-                    let [a, b, ..] = key.draw(0, LENS);
-                    if let Some(ray) = self.eye.within(index, a, b) {
-                        let light = radiance(self.stage, self.origin, self.rotation * ray, bounces, key, stacks);
-                        sum += light * (BRIGHTEST / light.max_element().max(BRIGHTEST));
-                    }
+        match *self.settings {
+            Settings::Preview { shadows } => {
+                preview::light(self.stage, self.origin, seen, shadows, shades, stacks);
+                for (i, seen) in places.iter().zip(seen.iter()) {
+                    band[*i].light = seen.light.to_array();
                 }
-                (sum / samples as f32).to_array()
             }
-        };
-        pixel
+            Settings::Path { samples, bounces, seed } => {
+                for (i, _) in rays.iter() {
+                    let key = |sample| Key { seed, pixel: (first + i) as u32, sample };
+                    let mut sum = Vec3A::ZERO;
+                    for sample in 0..samples.max(1) {
+                        let key = key(sample);
+                        let [a, b, ..] = key.draw(0, LENS);
+                        if let Some(ray) = self.eye.within(first + i, a, b) {
+                            let light = radiance(self.stage, self.origin, self.rotation * ray, bounces, key, stacks);
+                            sum += light * (BRIGHTEST / light.max_element().max(BRIGHTEST));
+                        }
+                    }
+                    band[*i].light = (sum / samples.max(1) as f32).to_array();
+                }
+            }
+        }
     }
 }

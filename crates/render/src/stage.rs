@@ -2,7 +2,7 @@
 
 use crate::light::{Lamp, Light};
 use crate::material::{Look, Material};
-use crate::tree::{Bounds, Boxes, ROOT, Ray, Stack, Stacks, Tree, Visitor};
+use crate::tree::{Beam, Bounds, Boxes, ROOT, Ray, Stack, Stacks, Tree, Visitor};
 use crate::{Error, Result, srgb};
 use fearless_simd::{Level, Simd, dispatch};
 use glam::{DVec3, Mat3A, Quat, Vec3, Vec3A};
@@ -60,11 +60,15 @@ struct Body {
     shape: usize,
     label: u16,
     material: Material,
+    /// The same for light that paths carry here after a bounce.
+    blunt: Material,
     /// Linear colour where the shape has none.
     color: Vec3A,
     /// The world is the shape's own frame.
     still: bool,
     rotation: Mat3A,
+    /// The other way.
+    back: Mat3A,
     translation: Vec3A,
 }
 
@@ -77,6 +81,16 @@ pub struct Meeting {
     pub body: BodyId,
     /// Index among its shape's triangles.
     pub triangle: u32,
+}
+
+/// What a bundle of rays from one place may meet.
+#[derive(Debug, Default)]
+pub(crate) struct Ahead {
+    leaves: Vec<(f32, u32)>,
+    /// The bundle in the frames of bodies that are not still.
+    beams: Vec<(u32, Beam)>,
+    /// Least distance, body, and entry to its shape's tree; the nearest first.
+    parts: Vec<(f32, u32, u32)>,
 }
 
 /// Where a ray first meets the stage.
@@ -176,10 +190,12 @@ impl Stage {
         self.bodies.push(Body {
             shape: shape.0,
             label,
+            blunt: Material::new(&look.surface.blunt()),
             material: Material::new(&look.surface),
             color: srgb::to_linear(look.color).into(),
             still: true,
             rotation: Mat3A::IDENTITY,
+            back: Mat3A::IDENTITY,
             translation: Vec3A::ZERO,
         });
         let id = BodyId(self.bodies.len() - 1);
@@ -196,6 +212,7 @@ impl Stage {
         let body = self.bodies.get_mut(body.0).ok_or(unknown)?;
         body.still = *pose == Pose::IDENTITY;
         body.rotation = rotation_of(pose);
+        body.back = body.rotation.transpose();
         body.translation = pose.translation.as_vec3a();
         self.stale = true;
         Ok(())
@@ -252,15 +269,40 @@ impl Stage {
         dispatch!(self.level, simd => self.first_in(simd, origin, direction, reach, stacks))
     }
 
-    /// What rays from `origin` in any of `directions` may meet; for [`Self::first_ahead`].
-    pub(crate) fn ahead(&self, origin: Vec3A, directions: &[Vec3A], found: &mut Vec<(f32, u32)>) {
-        self.top.beam(origin, directions, found);
+    /// What rays from `origin` in any of `directions` may meet; for [`Self::first_ahead`] and [`Self::blocked_ahead`].
+    pub(crate) fn ahead(&self, origin: Vec3A, directions: &[Vec3A], found: &mut Ahead) {
+        let Ahead { leaves, beams, parts } = found;
+        parts.clear();
+        beams.clear();
+        if directions.is_empty() {
+            leaves.clear();
+            return;
+        }
+        let world = Beam::new(origin, directions.iter().copied());
+        self.top.beam(&world, leaves);
+        for (near, leaf) in leaves.iter() {
+            let (index, entry) = self.entries[*leaf as usize];
+            let body = &self.bodies[index as usize];
+            let found = |near: f32, entry: u32| parts.push((near, index, entry));
+            let tree = &self.shapes[body.shape].tree;
+            if body.still {
+                tree.narrow(&world, entry, *near, found);
+                continue;
+            }
+            let at = beams.iter().position(|(b, _)| *b == index).unwrap_or_else(|| {
+                let local = directions.iter().map(|d| body.back * *d);
+                beams.push((index, Beam::new(body.back * (origin - body.translation), local)));
+                beams.len() - 1
+            });
+            tree.narrow(&beams[at].1, entry, *near, found);
+        }
+        parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     }
 
     /// The first surface along one of the rays of which [`Self::ahead`] knows.
     pub(crate) fn first_ahead(
         &self,
-        ahead: &[(f32, u32)],
+        ahead: &Ahead,
         origin: Vec3A,
         direction: Vec3A,
         stacks: &mut Stacks,
@@ -272,21 +314,68 @@ impl Stage {
     fn first_ahead_in<S: Simd>(
         &self,
         simd: S,
-        ahead: &[(f32, u32)],
+        ahead: &Ahead,
         origin: Vec3A,
         direction: Vec3A,
         stacks: &mut Stacks,
     ) -> Option<Touch> {
         let ray = Ray::new(origin, direction);
-        let mut nearest = Nearest { stage: self, stack: &mut stacks.below, best: None };
         let mut reach = f32::INFINITY;
-        for (near, leaf) in ahead {
+        let mut best = None;
+        let (mut last, mut local) = (u32::MAX, ray);
+        for (near, index, entry) in &ahead.parts {
             if *near > reach {
                 break;
             }
-            reach = nearest.leaf(simd, &ray, *leaf, reach);
+            let body = &self.bodies[*index as usize];
+            if *index != last {
+                (last, local) = (*index, body.local(&ray));
+            }
+            if let Some(hit) = self.shapes[body.shape].tree.first(simd, &local, *entry, reach, &mut stacks.below) {
+                reach = hit.t;
+                best = Some(Touch { t: hit.t, body: *index, triangle: hit.triangle, u: hit.u, v: hit.v });
+            }
         }
-        nearest.best
+        best
+    }
+
+    /// Whether anything lies before `reach` on one of the rays of which [`Self::ahead`] knows.
+    pub(crate) fn blocked_ahead(
+        &self,
+        ahead: &Ahead,
+        origin: Vec3A,
+        direction: Vec3A,
+        reach: f32,
+        stacks: &mut Stacks,
+    ) -> bool {
+        dispatch!(self.level, simd => self.blocked_ahead_in(simd, ahead, origin, direction, reach, stacks))
+    }
+
+    #[inline(always)]
+    fn blocked_ahead_in<S: Simd>(
+        &self,
+        simd: S,
+        ahead: &Ahead,
+        origin: Vec3A,
+        direction: Vec3A,
+        reach: f32,
+        stacks: &mut Stacks,
+    ) -> bool {
+        let ray = Ray::new(origin, direction);
+        let (mut last, mut local) = (u32::MAX, ray);
+        for (near, index, entry) in &ahead.parts {
+            if *near > reach {
+                break;
+            }
+            let body = &self.bodies[*index as usize];
+            if *index != last {
+                (last, local) = (*index, body.local(&ray));
+            }
+            if self.shapes[body.shape].tree.any(simd, &local, *entry, reach, &mut stacks.below) {
+                return true;
+            }
+        }
+        false
     }
 
     /// Whether anything lies on the ray before `reach`.
@@ -339,6 +428,11 @@ impl Stage {
 
     pub(crate) fn material(&self, touch: &Touch) -> &Material {
         &self.bodies[touch.body as usize].material
+    }
+
+    /// The material for paths that have bounced before, see [`crate::SurfaceKind`].
+    pub(crate) fn blunt(&self, touch: &Touch) -> &Material {
+        &self.bodies[touch.body as usize].blunt
     }
 
     /// The surface that a ray in `direction` met.
@@ -427,8 +521,7 @@ impl Body {
         if self.still {
             return *ray;
         }
-        let back = self.rotation.transpose();
-        Ray::new(back * (ray.origin - self.translation), back * ray.direction)
+        Ray::new(self.back * (ray.origin - self.translation), self.back * ray.direction)
     }
 
     /// A box of the shape in the world's frame.

@@ -6,6 +6,8 @@
 mod beam;
 mod build;
 
+pub(crate) use beam::Beam;
+
 use build::{build, fit, whole};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 use glam::Vec3A;
@@ -309,6 +311,11 @@ impl Tree {
                 (node.child[lane], Bounds { low, high: Vec3A::new(bound(3), bound(4), bound(5)) })
             }));
         }
+    }
+
+    /// See [`Boxes::narrow`].
+    pub fn narrow(&self, beam: &Beam, entry: u32, near: f32, found: impl FnMut(f32, u32)) {
+        self.boxes.narrow(beam, entry, near, found);
     }
 
     /// Leaves of the tree.

@@ -6,7 +6,7 @@ use trocar_geometry::TriMesh;
 use trocar_scene::{Instrument, InstrumentKind};
 
 /// Cell of the blades' surfaces [m].
-const SPACING: f64 = 0.0002;
+const SPACING: f64 = 0.0003;
 
 /// Thickness of a blade at its root, and width of a grasper's and of a cutter's [m]: as tissue feels them.
 const THICK: f64 = 0.0032;

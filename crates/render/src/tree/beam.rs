@@ -6,25 +6,24 @@ use glam::Vec3A;
 /// Covers the rounding of a ray's own way to a box.
 const SLACK: f32 = 1e-5;
 
+/// How often the nodes below one entry may be parted before a beam stops going down.
+const PARTINGS: usize = 3;
+
 /// Rays from one origin whose directions lie between two corners.
-struct Beam {
+#[derive(Clone, Debug)]
+pub(crate) struct Beam {
     origin: [f32; 3],
     /// One over the least and the greatest component along each axis; none where they differ in sign.
     inverse: [Option<[f32; 2]>; 3],
 }
 
 impl Boxes {
-    /// The leaves that rays from `origin` in any of `directions` may meet, with the least distance at which one could, in units of
-    /// the directions, the nearest first.
-    pub fn beam(&self, origin: Vec3A, directions: &[Vec3A], leaves: &mut Vec<(f32, u32)>) {
+    /// The leaves that rays of `beam` may meet, with the least distance at which one could, in units of the directions.
+    pub fn beam(&self, beam: &Beam, leaves: &mut Vec<(f32, u32)>) {
         leaves.clear();
-        let low = directions.iter().copied().fold(Vec3A::INFINITY, Vec3A::min);
-        let high = directions.iter().copied().fold(Vec3A::NEG_INFINITY, Vec3A::max);
-        if self.nodes.is_empty() || directions.is_empty() {
+        if self.nodes.is_empty() {
             return;
         }
-        let inverse = [0, 1, 2].map(|k| (low[k] * high[k] > 0.0).then(|| [1.0 / low[k], 1.0 / high[k]]));
-        let beam = Beam { origin: origin.to_array(), inverse };
         let mut open = vec![ROOT];
         while let Some(at) = open.pop() {
             let node = &self.nodes[at as usize];
@@ -41,11 +40,47 @@ impl Boxes {
                 }
             }
         }
-        leaves.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    }
+
+    /// Goes down from `entry` for as long as the beam meets few children, so that its rays need not do so one by one: gives `found` entries below which is all that they may meet, each with
+    /// the least distance at which one could.
+    pub fn narrow(&self, beam: &Beam, entry: u32, near: f32, mut found: impl FnMut(f32, u32)) {
+        // Each parting adds one to what is open.
+        let mut open = [(near, entry); PARTINGS + 1];
+        let (mut count, mut partings) = (1, 0);
+        while count > 0 {
+            count -= 1;
+            let (near, at) = open[count];
+            let Some(node) = self.nodes.get(at as usize).filter(|_| at & LEAF == 0) else {
+                found(near, at);
+                continue;
+            };
+            let (enter, leave) = beam.cross(node);
+            let met = |lane: &usize| node.child[*lane] != NONE && enter[*lane] <= leave[*lane];
+            match (0..WIDE).filter(met).count() {
+                0 => {}
+                n if n == 1 || (n == 2 && partings < PARTINGS) => {
+                    partings += n - 1;
+                    for lane in (0..WIDE).filter(met) {
+                        open[count] = (enter[lane], node.child[lane]);
+                        count += 1;
+                    }
+                }
+                _ => found(near, at),
+            }
+        }
     }
 }
 
 impl Beam {
+    /// Rays from `origin` in any of `directions`.
+    pub fn new(origin: Vec3A, directions: impl Iterator<Item = Vec3A>) -> Self {
+        let empty = (Vec3A::INFINITY, Vec3A::NEG_INFINITY);
+        let (low, high) = directions.fold(empty, |(low, high), d| (low.min(d), high.max(d)));
+        let inverse = [0, 1, 2].map(|k| (low[k] * high[k] > 0.0).then(|| [1.0 / low[k], 1.0 / high[k]]));
+        Self { origin: origin.to_array(), inverse }
+    }
+
     /// Least distance at which any ray enters each child's box, and greatest at which one leaves it.
     fn cross(&self, node: &Node) -> ([f32; WIDE], [f32; WIDE]) {
         let (mut near, mut far) = ([0.0_f32; WIDE], [f32::INFINITY; WIDE]);
@@ -55,8 +90,13 @@ impl Beam {
             for lane in 0..WIDE {
                 let enter = node.bounds[first][lane] - self.origin[k];
                 let leave = node.bounds[last][lane] - self.origin[k];
-                near[lane] = near[lane].max((enter * a).min(enter * b));
-                far[lane] = far[lane].min((leave * a).max(leave * b));
+                // Comparisons that are one instruction for several lanes; `min` and `max` are not, for they look for what is no number.
+                let (first, second) = (enter * a, enter * b);
+                let least = if first < second { first } else { second };
+                near[lane] = if near[lane] > least { near[lane] } else { least };
+                let (first, second) = (leave * a, leave * b);
+                let most = if first > second { first } else { second };
+                far[lane] = if far[lane] < most { far[lane] } else { most };
             }
         }
         (near.map(|t| t * (1.0 - SLACK)), far.map(|t| t * (1.0 + SLACK)))
