@@ -221,7 +221,7 @@ fn stage_table(r: &CampaignResult) -> String {
 }
 
 /// Fig. 6(d, e): every episode that attached the organ.
-fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
+pub(super) fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
     let attached: Vec<&Kept> = kept.iter().filter(|k| k.summary.attached).collect();
     let most = |of: &dyn Fn(&Kept) -> f64| attached.iter().map(|k| of(k)).fold(1e-3, f64::max);
     let (width, height) = (most(&|k| k.summary.lift_mm), most(&|k| k.summary.rcm_peak_mm));
@@ -245,6 +245,12 @@ fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
     };
     let caption = format!("<b>Lift against RCM deviation</b>, every episode that attached the organ.{}", legend(plan));
     Ok(page::figure(&plot.svg()?, &caption))
+}
+
+/// The lifts of every episode that attached the organ, as a distribution a policy.
+pub(super) fn lifts(plan: &Plan, kept: &[Kept]) -> Result<String> {
+    let attached: Vec<Kept> = kept.iter().filter(|k| k.summary.attached).cloned().collect();
+    distribution(plan, &attached, "Lift", "greatest lift of held tissue [mm]", &|k| k.summary.lift_mm)
 }
 
 fn distribution(plan: &Plan, kept: &[Kept], name: &str, x: &str, of: &dyn Fn(&Kept) -> f64) -> Result<String> {
