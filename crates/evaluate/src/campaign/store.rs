@@ -106,7 +106,9 @@ impl Store {
             let begun = |name: &std::ffi::OsStr| [EPISODES, UNDER_WAY, LOCK].iter().any(|own| name == *own);
             for entry in fs::read_dir(folder).map_err(io(folder))? {
                 if !begun(&entry.map_err(io(folder))?.file_name()) {
-                    return Err(exists(format!("is not empty and is no campaign ({PLAN} is missing); name a new folder")));
+                    return Err(exists(format!(
+                        "is not empty and is no campaign ({PLAN} is missing); name a new folder"
+                    )));
                 }
             }
         }

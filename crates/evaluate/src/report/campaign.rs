@@ -2,6 +2,7 @@
 
 use super::colors;
 use super::figures;
+use super::funnel;
 use super::page::{self, Card, Columns};
 use super::plots::{Line, Plot};
 use super::table::{self, fixed, percent};
@@ -34,9 +35,13 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
     let stages = page::section(
         "Stages",
         "Stages pass in their order; each counts the episodes that passed it and all before.",
-        &(page::grid(Columns::Two, &[funnel(r)?, lift_and_rcm(plan, kept)?]) + &stage_table(r)),
+        &(page::figure(
+            &funnel::funnel(r),
+            "<b>How far episodes came.</b> Filled: the share that passed. Whiskers: 95% intervals.",
+        ) + &stage_table(r)),
     );
     let distributions = [
+        lift_and_rcm(plan, kept)?,
         distribution(plan, kept, "RCM deviation", "largest RCM deviation of the episode [mm]", &|k| {
             k.summary.rcm_peak_mm
         })?,
@@ -186,27 +191,6 @@ fn failures(plan: &Plan, kept: &[Kept], store: &Store) -> Result<String> {
 
 fn why(k: &Kept) -> String {
     k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string)
-}
-
-fn funnel(r: &CampaignResult) -> Result<String> {
-    let lines = r.policies.iter().enumerate().map(|(k, p)| {
-        let all = p.episodes.max(1) as f64;
-        let steps = p.stages.iter().enumerate().map(|(n, s)| (n as f64 + 1.0, s.passed as f64 / all));
-        Line { points: [(0.0, 1.0)].into_iter().chain(steps).collect(), color: colors::organ(k), filled: false }
-    });
-    let plot = Plot {
-        title: "Episodes that pass each stage",
-        x: "stages passed",
-        y: "share of episodes",
-        lines: lines.collect(),
-        bands: vec![],
-        show: vec![0.0, 1.0],
-        limits: vec![],
-        log_x: false,
-        log_y: false,
-    };
-    let legend = page::legend(r.policies.iter().enumerate().map(|(k, p)| (p.policy.as_str(), colors::organ(k))));
-    Ok(page::figure(&plot.svg()?, &format!("<b>How far episodes came.</b>{legend}")))
 }
 
 fn stage_table(r: &CampaignResult) -> String {

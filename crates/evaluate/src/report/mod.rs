@@ -11,6 +11,7 @@ mod controller_grid;
 mod convergence;
 mod element_quality;
 mod figures;
+mod funnel;
 mod grasp_designs;
 mod integrators;
 mod meshing;
