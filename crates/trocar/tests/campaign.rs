@@ -102,8 +102,7 @@ fn a_campaign_that_is_killed_loses_nothing_and_repeats_nothing() {
     let random = Random::new(7, "kills");
     let (mut seen, mut under_way): (BTreeMap<PathBuf, SystemTime>, usize) = (BTreeMap::new(), 0);
     for kill in 0..kills {
-        let mut child =
-            evaluate(&scene, &broken, &more).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let mut child = evaluate(&scene, &broken, &more).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let most = each.max(Duration::from_millis(300));
         std::thread::sleep(most.mul_f64(random.unit(kill)));
         // Not the end of the process by itself: SIGKILL.
@@ -118,7 +117,11 @@ fn a_campaign_that_is_killed_loses_nothing_and_repeats_nothing() {
         seen = now;
     }
     let resumed = json(&evaluate(&scene, &broken, &more).output().unwrap());
-    println!("{kills} kills, {} of {} episodes kept before the last start, {under_way} with files under way", seen.len(), 4 * kills);
+    println!(
+        "{kills} kills, {} of {} episodes kept before the last start, {under_way} with files under way",
+        seen.len(),
+        4 * kills
+    );
     assert!(seen.iter().all(|(path, time)| kept(&broken)[path] == *time));
     assert_eq!(table(&whole), table(&broken));
     assert_eq!((&unbroken["hash"], &unbroken["policies"]), (&resumed["hash"], &resumed["policies"]));

@@ -102,6 +102,8 @@ pub(super) struct Moving {
     pub held: Option<Held>,
     /// Tissue does not feel the instrument for now.
     pub unhooked: bool,
+    /// Tissue does not feel the blades until they let go of what they hold.
+    pub bare: bool,
     rcm_peak: f64,
     /// Which of the deviations have been told and are still exceeded.
     rcm_told: [bool; 2],
@@ -140,6 +142,7 @@ impl Moving {
             shears: None,
             held: None,
             unhooked: false,
+            bare: false,
             rcm_peak: 0.0,
             rcm_told: [false; 2],
         }
@@ -243,7 +246,7 @@ impl Station {
         if now.unhooked {
             return [away; 3];
         }
-        if now.shears.is_some() {
+        if now.shears.is_some() || now.bare {
             motions[1..].fill(away);
         }
         motions
@@ -289,7 +292,7 @@ impl Station {
 
     /// The organ that a part of the instrument has gone into, but for what the jaws hold and what blades shear.
     pub fn pierces(&self, world: &World) -> Option<usize> {
-        let felt = if self.now.shears.is_some() { 1 } else { 3 };
+        let felt = if self.now.shears.is_some() || self.now.bare { 1 } else { 3 };
         self.pierced_by(world, felt)
     }
 
@@ -308,6 +311,13 @@ impl Station {
             }
         }
         None
+    }
+
+    /// Holds on by its latch alone: the blades are felt no more. False where they are so already, or where nothing but the blades holds.
+    pub fn bare(&mut self) -> bool {
+        let can = !self.now.bare && self.force_kind() == ForceKind::Constraint;
+        self.now.bare |= can;
+        can
     }
 
     /// Lets go, and is not felt for now.
@@ -412,6 +422,8 @@ impl Station {
     fn let_go(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let tool = self.fixed.tools.gripper;
         world.state.grasps.retain(|g| g.tool != tool);
+        // Bare blades are in tissue that would be dragged along.
+        self.now.unhooked |= std::mem::take(&mut self.now.bare);
         if self.now.held.take().is_some() {
             events.push(CellEvent::Released { arm: self.fixed.side });
         }
@@ -577,8 +589,16 @@ impl Moving {
             all.extend([f.pressing, f.touching as f64]);
         }
         all.extend(
-            [self.unhooked, self.held_back, self.guarded, self.rcm_told[0], self.rcm_told[1], self.held.is_some()]
-                .map(|b| f64::from(u8::from(b))),
+            [
+                self.unhooked,
+                self.bare,
+                self.held_back,
+                self.guarded,
+                self.rcm_told[0],
+                self.rcm_told[1],
+                self.held.is_some(),
+            ]
+            .map(|b| f64::from(u8::from(b))),
         );
         all.push(GraspDesign::ALL.iter().position(|d| *d == self.design).unwrap_or(0) as f64);
         if let Some(held) = &self.held {
