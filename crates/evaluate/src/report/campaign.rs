@@ -31,7 +31,8 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
         plan.task,
         r.policies.iter().map(|p| p.policy.as_str()).collect::<Vec<_>>().join(", ")
     );
-    let overview = page::section("Outcome", &lead, &(cards(r) + &outcome(r)));
+    let overview = page::section("Outcome", &lead, &cards(r));
+    let policies = page::section("Policies", "", &outcome(r));
     let stages = page::section(
         "Stages",
         "Stages pass in their order; each counts the episodes that passed it and all before.",
@@ -63,7 +64,7 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
         "Stored channels judged anew at other thresholds, without simulating. An episode ends when it has passed at the scene\u{2019}s gates, so a stricter gate sees no more of it than there was.",
         &page::grid(Columns::Two, &sweeps(plan, kept, store)?),
     );
-    Ok(overview + &failed + &stages + &spread + &gates + &pairs(r))
+    Ok(overview + &failed + &policies + &stages + &spread + &gates + &pairs(r))
 }
 
 fn color(plan: &Plan, name: &str) -> [u8; 3] {
@@ -160,7 +161,13 @@ fn failures(plan: &Plan, kept: &[Kept], store: &Store) -> Result<String> {
             let [width, height] = pictures::SIZE;
             let name = format!("{} with seed {}", k.name, k.seed);
             let img = figures::img_of_bytes("webp", &bytes, width, height, &name);
-            films.push(page::figure(&img, &format!("<b>{}</b>: {}", page::escape(&name), page::escape(&why(k)))));
+            let text = format!(
+                "<b>{}</b> stopped at {}: {}",
+                page::escape(&name),
+                page::escape(&k.summary.next),
+                page::escape(&why(k))
+            );
+            films.push(page::figure(&img, &text));
         }
     }
     let rows: Vec<Vec<String>> = failed
@@ -193,15 +200,15 @@ fn why(k: &Kept) -> String {
     k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string)
 }
 
+/// When stages passed.
 fn stage_table(r: &CampaignResult) -> String {
-    let mut rows = Vec::new();
-    for p in &r.policies {
-        for s in &p.stages {
-            let count = format!("{} of {}", s.passed, p.episodes);
-            rows.push(vec![p.policy.clone(), s.stage.to_owned(), count, share(&s.interval), or_dash(s.median_s, 2)]);
-        }
-    }
-    table::plain(&["policy", "stage", "passed", "share", "median time s"], &rows)
+    let Some(first) = r.policies.first() else { return String::new() };
+    let head: Vec<&str> = ["median time [s]"].into_iter().chain(first.stages.iter().map(|s| s.stage)).collect();
+    let row = |p: &crate::campaign::PolicyRow| {
+        let times = p.stages.iter().map(|s| or_dash(s.median_s, 2));
+        [p.policy.clone()].into_iter().chain(times).collect()
+    };
+    table::plain(&head, &r.policies.iter().map(row).collect::<Vec<Vec<String>>>())
 }
 
 /// Fig. 6(d, e): every episode that attached the organ.
