@@ -19,9 +19,9 @@ mod watched;
 mod workflow;
 
 pub use bench::{
-    CameraRow, CellBench, CellBenchResult, CellRow, GraspBench, GraspBenchResult, GraspPhaseTiming, Machine, ManyRow,
-    MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench, OrgansResult, RayRow, RenderBench,
-    RenderBenchResult, ScalingBench, ScalingResult, ScalingRow, Timing,
+    CameraRow, CellBench, CellBenchResult, CellRow, EpisodeBench, EpisodeBenchResult, GraspBench, GraspBenchResult,
+    GraspPhaseTiming, Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench,
+    OrgansResult, RayRow, RenderBench, RenderBenchResult, ScalingBench, ScalingResult, ScalingRow, Timing,
 };
 pub use campaign::{
     Campaign, CampaignResult, Comparison, Files, Interval, Job, Kept, Plan, PolicyRow, PolicySpec, StageCount, Store,
@@ -35,11 +35,12 @@ pub use experiment::{
     AppendixSource, ControllerBars, ControllerFigures, ControllerGridExperiment, ControllerGridResult,
     ControllerInstant, ControllerRow, ConvergenceCase, ConvergenceExperiment, ConvergenceResult,
     ElementQualityExperiment, ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment,
-    GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp,
+    GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PaperRollouts,
     PaperSimilarity, PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
     RandomActionsExperiment, RandomActionsResult, RandomActionsRow, ReconstructionExperiment, ReconstructionResult,
-    ReconstructionRow, Resumed, SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow, SimilarityExperiment,
-    SimilarityResult, SimilarityRow, StepRow, WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt,
+    ReconstructionRow, Resumed, RolloutsExperiment, RolloutsResult, SettlingExperiment, SettlingOrgan, SettlingResult,
+    SettlingRow, SimilarityExperiment, SimilarityResult, SimilarityRow, StepRow, WrenchExperiment, WrenchFrame,
+    WrenchParameter, WrenchResult, WrenchTilt,
 };
 pub use inspect::{Inspection, inspect};
 pub use rendering::{Rendered, Rendering, Seen};

@@ -236,6 +236,8 @@ pub enum ExperimentName {
     Wrench(WrenchExperiment),
     /// Random but legal actions in a scene's cell: whether tissue or arms break.
     RandomActions(RandomActionsExperiment),
+    /// Fig. 6(d, e): 140 rollouts of six controllers; killed at any moment and gone on with.
+    Rollouts(RolloutsExperiment),
     /// Silhouettes, SSIM and PSNR of rendered reconstructions beside what was filmed, and oblique views through the endoscope.
     Similarity(SimilarityExperiment),
 }
@@ -310,6 +312,8 @@ pub enum BenchName {
     Grasp(GraspBench),
     /// Speed of the whole two-arm cell, and what its parts cost.
     Cell(CellBench),
+    /// Speed of a whole scripted episode with arms, organs and two cameras, and what its parts cost.
+    Episode(EpisodeBench),
     /// What pictures cost: a preview for policies, a path-traced frame, rays beside Embree.
     Render(RenderBench),
 }
@@ -329,6 +333,32 @@ pub struct CellBench {
     /// Worker threads; all by default.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
+}
+
+/// Arguments of `bench episode`.
+#[derive(Debug, Args)]
+pub struct EpisodeBench {
+    /// Scene file or built-in scene.
+    #[arg(default_value = "cell-a")]
+    pub scene: String,
+    /// Folder for a scene's phantom, which is recorded and reconstructed there.
+    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    pub phantoms: PathBuf,
+    /// Worker threads for tissue; all by default.
+    #[arg(long, default_value_t = 0)]
+    pub threads: usize,
+    /// Times that the episode is run; the median counts.
+    #[arg(long, default_value_t = 3)]
+    pub runs: usize,
+    /// Seed of the episode.
+    #[arg(long, default_value_t = 0)]
+    pub seed: u64,
+    /// A camera that looks once a control period; the endoscope and the depth camera by default. Several are named by several.
+    #[arg(long = "camera", value_name = "NAME", default_values_t = ["endoscope".to_owned(), "d405".to_owned()])]
+    pub cameras: Vec<String>,
+    /// Side of the square pictures [px].
+    #[arg(long, default_value_t = 224)]
+    pub size: usize,
 }
 
 /// Arguments of `bench meshing`.

@@ -198,10 +198,17 @@ impl Cell {
         let calm = !strains.iter().any(|s| s.lasts());
         let mut relaxed = Vec::new();
         let mut unhook = |world: &mut World, station: &mut Station, organ: usize| {
-            station.unhook(world, events);
+            // What holds by a latch first keeps its hold and only presses no more.
+            let bare = station.bare();
+            if !bare {
+                station.unhook(world, events);
+            }
             let (arm, name) = (station.fixed.side, world.model.bodies()[organ].name().to_owned());
             let (stretch, volume) = (strains[organ].stretch, strains[organ].volume);
-            events.push(CellEvent::Unhooked { arm, organ: name, stretch, volume });
+            events.push(match bare {
+                true => CellEvent::Bared { arm, organ: name, stretch, volume },
+                false => CellEvent::Unhooked { arm, organ: name, stretch, volume },
+            });
         };
         for station in self.stations.iter_mut().filter(|s| s.meets_tissue()) {
             match (station.now.unhooked, station.pierces(&self.world)) {
@@ -213,11 +220,13 @@ impl Cell {
         for (organ, strain) in strains.iter().enumerate() {
             let near = |s: &Station| s.distance(strain.at) < NEAR;
             // What an instrument left behind that has just let go is given time to come back.
-            let left = self.stations.iter().any(|s| s.now.unhooked && near(s));
+            let left = self.stations.iter().any(|s| (s.now.unhooked || s.now.bare) && (near(s) || s.holds(organ)));
             let patient = left && self.waits[organ] < PATIENCE && strain.stretch < FAR_TOO_MUCH;
             let felt = self.stations.iter_mut().filter(|s| !s.now.unhooked && s.meets_tissue());
             let at = felt.filter(|s| near(s) || s.holds(organ));
-            let nearest = at.map(|s| (s.distance(strain.at), s)).min_by(|a, b| a.0.total_cmp(&b.0));
+            // What only presses gives way before what holds.
+            let order = |s: &Station| (s.holds(organ), s.distance(strain.at));
+            let nearest = at.map(|s| (order(s), s)).min_by(|a, b| a.0.0.cmp(&b.0.0).then(a.0.1.total_cmp(&b.0.1)));
             match nearest {
                 Some(_) if patient && strain.is_too_much() => self.waits[organ] += 1,
                 Some((_, station)) => {

@@ -156,6 +156,17 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
+    /// Tissue was hooked or crushed beyond what it bears by jaws that hold it: they keep their hold, but their blades are not felt until they let go.
+    Bared {
+        /// The arm.
+        arm: Side,
+        /// Name of the organ.
+        organ: String,
+        /// Length of its most stretched edge over that at rest.
+        stretch: f64,
+        /// Least volume of an element over that at rest.
+        volume: f64,
+    },
     /// An organ was folded so that it would not come back by itself: it was put right, without regard to time and forces.
     Relaxed {
         /// Name of the organ.
@@ -213,6 +224,12 @@ impl std::fmt::Display for CellEvent {
             Self::Unhooked { arm, organ, stretch, volume } => write!(
                 f,
                 "the {} instrument let go of the {organ}, which was stretched {stretch:.1} times and crushed to {:.1}%",
+                arm.name(),
+                1e2 * volume
+            ),
+            Self::Bared { arm, organ, stretch, volume } => write!(
+                f,
+                "the {} jaws hold the {organ} without pressing it: an edge was stretched {stretch:.1} times, an element had {:.1}% of its volume",
                 arm.name(),
                 1e2 * volume
             ),

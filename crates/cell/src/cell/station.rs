@@ -97,9 +97,13 @@ pub(super) struct Moving {
     pub exchange: Exchange,
     pub forces: [ToolForce; 3],
     scissors: Scissors,
+    /// A cutter's blades are closing, or have closed, through tissue: how wide they were [rad]. They shear it then and press none of it.
+    shears: Option<f64>,
     pub held: Option<Held>,
     /// Tissue does not feel the instrument for now.
     pub unhooked: bool,
+    /// Tissue does not feel the blades until they let go of what they hold.
+    pub bare: bool,
     rcm_peak: f64,
     /// Which of the deviations have been told and are still exceeded.
     rcm_told: [bool; 2],
@@ -135,8 +139,10 @@ impl Moving {
             exchange: Exchange::new(pose.translation),
             forces: [ToolForce::default(); 3],
             scissors,
+            shears: None,
             held: None,
             unhooked: false,
+            bare: false,
             rcm_peak: 0.0,
             rcm_told: [false; 2],
         }
@@ -231,13 +237,17 @@ impl Station {
             now.jaw.turn_to(angle, target)
         };
         let next = Gripper { pose: self.manipulator.measured_cp(), jaw_angle: next_angle };
-        let motions = now.gripper.motions_to(&next);
+        let mut motions = now.gripper.motions_to(&next);
         now.jaw_rate = (next_angle - angle) / (self.fixed.blades.max_angle * dt);
         now.gripper = next;
+        // At rest, far from everything.
+        let away = Pose { translation: FAR * DVec3::Z, ..Pose::IDENTITY };
+        let away = ToolMotion { from: away, to: away };
         if now.unhooked {
-            // At rest, far from everything.
-            let away = Pose { translation: FAR * DVec3::Z, ..Pose::IDENTITY };
-            return [ToolMotion { from: away, to: away }; 3];
+            return [away; 3];
+        }
+        if now.shears.is_some() || now.bare {
+            motions[1..].fill(away);
         }
         motions
     }
@@ -280,11 +290,17 @@ impl Station {
         [(self.fixed.tools.gripper, self.now.gripper.pose), one, two]
     }
 
-    /// The organ that a part of the instrument has gone into, but for what the jaws hold.
+    /// The organ that a part of the instrument has gone into, but for what the jaws hold and what blades shear.
     pub fn pierces(&self, world: &World) -> Option<usize> {
+        let felt = if self.now.shears.is_some() || self.now.bare { 1 } else { 3 };
+        self.pierced_by(world, felt)
+    }
+
+    /// The organ that one of the first `count` tools has gone into: the shaft, then the blades.
+    fn pierced_by(&self, world: &World, count: usize) -> Option<usize> {
         let Self { fixed, now, .. } = self;
         let spared = now.held.as_ref().map(|held| held.organ);
-        for (tool, frame) in self.frames() {
+        for (tool, frame) in self.frames().into_iter().take(count) {
             let axes = fixed.parts.iter().filter(|part| part.tool == tool).filter_map(|part| match part.shape {
                 Shape::Capsule { ends, .. } => Some(ends.map(|p| frame.transform(p))),
                 _ => None,
@@ -295,6 +311,13 @@ impl Station {
             }
         }
         None
+    }
+
+    /// Holds on by its latch alone: the blades are felt no more. False where they are so already, or where nothing but the blades holds.
+    pub fn bare(&mut self) -> bool {
+        let can = !self.now.bare && self.force_kind() == ForceKind::Constraint;
+        self.now.bare |= can;
+        can
     }
 
     /// Lets go, and is not felt for now.
@@ -399,23 +422,36 @@ impl Station {
     fn let_go(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let tool = self.fixed.tools.gripper;
         world.state.grasps.retain(|g| g.tool != tool);
+        // Bare blades are in tissue that would be dragged along.
+        self.now.unhooked |= std::mem::take(&mut self.now.bare);
         if self.now.held.take().is_some() {
             events.push(CellEvent::Released { arm: self.fixed.side });
         }
     }
 
     /// Blades that close through tissue cut it, after they were open with tissue between them all the while (SPEC E1): the organ, and the cutter as wide as it was open.
+    ///
+    /// What closes past each other with edges shears: it goes through what lies between instead of pressing it flat. So from the closing on tissue does not feel the blades, until none is left where the
+    /// open blades were and they are out of all organs. The shaft is felt all the while.
     fn cut(&mut self, world: &World) -> Option<(usize, Gripper)> {
         let length = self.fixed.blades.length;
-        let now = &mut self.now;
         let between = |open: &Gripper| Mouth::sized(open, length).fullest(world).map(|(organ, _)| organ);
+        if let Some(jaw_angle) = self.now.shears
+            && between(&Gripper { jaw_angle, ..self.now.gripper }).is_none()
+            && self.pierced_by(world, 3).is_none()
+        {
+            self.now.shears = None;
+        }
+        let now = &mut self.now;
         if let Some(open) = now.scissors.follow(&now.gripper) {
             return between(&open).map(|organ| (organ, open));
         }
-        if let Some(jaw_angle) = now.scissors.opened().filter(|_| now.jaw_rate < 0.0)
-            && between(&Gripper { jaw_angle, ..now.gripper }).is_none()
-        {
-            now.scissors.rest();
+        if let Some(jaw_angle) = now.scissors.opened().filter(|_| now.jaw_rate < 0.0) {
+            if between(&Gripper { jaw_angle, ..now.gripper }).is_some() {
+                now.shears = Some(jaw_angle);
+            } else {
+                now.scissors.rest();
+            }
         }
         None
     }
@@ -429,9 +465,10 @@ impl Station {
         }
     }
 
-    /// The tissue between the blades now, and its organ.
+    /// The tissue between the blades now, and its organ; of blades that shear, between them as wide as they were.
     pub fn tissue(&self, world: &World) -> Option<(usize, Mouthful)> {
-        self.mouth().fullest(world)
+        let jaw_angle = self.now.shears.unwrap_or(self.now.gripper.jaw_angle);
+        Mouth::sized(&Gripper { jaw_angle, ..self.now.gripper }, self.fixed.blades.length).fullest(world)
     }
 
     /// Centroid of what is held [m]; zero of nothing.
@@ -539,7 +576,7 @@ impl Moving {
         all.extend(self.commanded.to_action());
         all.extend(pose.translation.to_array());
         all.extend(pose.rotation.to_array());
-        all.extend([self.gripper.jaw_angle, self.jaw_rate, self.rcm_peak]);
+        all.extend([self.gripper.jaw_angle, self.jaw_rate, self.rcm_peak, self.shears.unwrap_or(-1.0)]);
         all.extend(self.exchange.numbers());
         all.extend(self.guard.numbers());
         all.extend(self.jaw.numbers());
@@ -552,8 +589,16 @@ impl Moving {
             all.extend([f.pressing, f.touching as f64]);
         }
         all.extend(
-            [self.unhooked, self.held_back, self.guarded, self.rcm_told[0], self.rcm_told[1], self.held.is_some()]
-                .map(|b| f64::from(u8::from(b))),
+            [
+                self.unhooked,
+                self.bare,
+                self.held_back,
+                self.guarded,
+                self.rcm_told[0],
+                self.rcm_told[1],
+                self.held.is_some(),
+            ]
+            .map(|b| f64::from(u8::from(b))),
         );
         all.push(GraspDesign::ALL.iter().position(|d| *d == self.design).unwrap_or(0) as f64);
         if let Some(held) = &self.held {

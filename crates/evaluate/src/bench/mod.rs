@@ -2,6 +2,7 @@
 
 mod cell;
 mod embree;
+mod episode;
 mod grasp;
 mod machine;
 mod many;
@@ -13,6 +14,7 @@ mod scaling;
 mod timing;
 
 pub use cell::{CellBench, CellBenchResult};
+pub use episode::{EpisodeBench, EpisodeBenchResult};
 pub use grasp::{GraspBench, GraspBenchResult, GraspPhaseTiming};
 pub use machine::Machine;
 pub use many::ManyRow;

@@ -15,6 +15,8 @@ pub use store::{Files, Kept, Store};
 pub use table::{CampaignResult, Comparison, Interval, PolicyRow, StageCount};
 pub use worker::Worker;
 
+pub(crate) use table::median;
+
 use crate::cell_run::scene_specimen;
 use crate::workflow::refuse_overlap;
 use crate::{Error, Result, report};
@@ -53,10 +55,20 @@ impl Campaign {
     /// # Errors
     /// One line that names the file, field or option. Finished episodes stay; an interruption loses only those under way.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<CampaignResult> {
+        let (store, plan) = self.keep(output, None, progress)?;
+        store.finish(&plan)
+    }
+
+    /// Runs what is missing, no more than `most` episodes in all, and films failures: what is kept, and of what.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub(crate) fn keep(&self, output: &Path, most: Option<usize>, progress: &dyn Progress) -> Result<(Store, Plan)> {
         let scene = Scene::read(&self.scene)?;
         refuse_overlap(Path::new(&self.scene), output)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let plan = Plan::new(&scene, &specimen, &self.policies, self.episodes, self.seed)?;
+        let plan = most.map_or(plan.clone(), |most| plan.at_most(most));
         let store = Store::open(output, &plan)?;
         let missing = store.missing(&plan, self.retry_failed)?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
@@ -100,7 +112,7 @@ impl Campaign {
         }
         progress.end();
         pictures::film(&store, &plan, &store.kept(&plan)?, &scene, &specimen, progress)?;
-        store.finish(&plan)
+        Ok((store, plan))
     }
 }
 

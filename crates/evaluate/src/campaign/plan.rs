@@ -78,6 +78,9 @@ pub struct Plan {
     pub episodes: usize,
     /// Seed of the first.
     pub seed: u64,
+    /// Most episodes of all policies together; None for all. Policies take turns, so that the first have one more than the last.
+    #[serde(default)]
+    pub most: Option<usize>,
 }
 
 impl Plan {
@@ -115,21 +118,58 @@ impl Plan {
             policies: policies.to_vec(),
             episodes,
             seed,
+            most: None,
         })
+    }
+
+    /// The same with no more than `most` episodes of all policies together.
+    #[must_use]
+    pub fn at_most(self, most: usize) -> Self {
+        Self { most: Some(most), ..self }
+    }
+
+    /// How many episodes there are in all.
+    pub fn count(&self) -> usize {
+        let all = self.episodes.saturating_mul(self.policies.len());
+        self.most.map_or(all, |most| most.min(all))
     }
 
     /// All jobs; the policies take turns, so that a campaign that was stopped compares what it has.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + '_ {
-        (0..self.episodes).flat_map(move |index| {
+        let all = (0..self.episodes).flat_map(move |index| {
             let seed = self.seed.wrapping_add(index as u64);
             self.policies.iter().map(move |policy| Job { policy: policy.clone(), index, seed })
-        })
+        });
+        all.take(self.count())
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_first_policies_have_one_episode_more() {
+        let policies = POLICIES.map(|p| PolicySpec::parse(p).unwrap()).to_vec();
+        let plan = Plan {
+            program: String::new(),
+            scene: String::new(),
+            task: String::new(),
+            scene_hash: String::new(),
+            specimen_hash: String::new(),
+            rcm_threshold_mm: 3.0,
+            policies,
+            episodes: 24,
+            seed: 7,
+            most: None,
+        };
+        assert_eq!((plan.count(), plan.jobs().count()), (144, 144));
+        let plan = plan.at_most(140);
+        let jobs: Vec<Job> = plan.jobs().collect();
+        let of = |name: &str| jobs.iter().filter(|j| j.policy.name == name).count();
+        assert_eq!(POLICIES.map(of), [24, 24, 23, 23, 23, 23]);
+        assert!(jobs.iter().all(|j| j.seed == 7 + j.index as u64));
+    }
 
     #[test]
     fn policies_are_named_for_folders() {

@@ -12,6 +12,8 @@ const PLAN: &str = "campaign.json";
 /// Where the episodes are, and where they are written.
 const EPISODES: &str = "episodes";
 const UNDER_WAY: &str = "under-way";
+/// What one process at a time holds.
+const LOCK: &str = ".lock";
 
 /// An episode's files by their names.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -53,6 +55,14 @@ pub struct Kept {
     pub summary: Summary,
 }
 
+impl Kept {
+    /// Median RCM deviation under load of the arm that was longest under load [mm]; None where none was.
+    pub fn loaded_rcm_mm(&self) -> Option<f64> {
+        let arms = self.summary.arms.iter().filter(|a| a.loaded_s > 0.0);
+        arms.max_by(|a, b| a.loaded_s.total_cmp(&b.loaded_s)).map(|a| a.rcm_median_mm)
+    }
+}
+
 /// A campaign's folder.
 pub struct Store {
     folder: PathBuf,
@@ -91,12 +101,20 @@ impl Store {
                     policy.name
                 )));
             }
-        } else if folder.is_dir() && fs::read_dir(folder).map_err(io(folder))?.next().is_some() {
-            return Err(exists(format!("is not empty and is no campaign ({PLAN} is missing)")));
+        } else if folder.is_dir() {
+            // A campaign that was killed before it had its plan has these, and nothing in them.
+            let begun = |name: &std::ffi::OsStr| [EPISODES, UNDER_WAY, LOCK].iter().any(|own| name == *own);
+            for entry in fs::read_dir(folder).map_err(io(folder))? {
+                if !begun(&entry.map_err(io(folder))?.file_name()) {
+                    return Err(exists(format!(
+                        "is not empty and is no campaign ({PLAN} is missing); name a new folder"
+                    )));
+                }
+            }
         }
         let episodes = folder.join(EPISODES);
         fs::create_dir_all(&episodes).map_err(io(&episodes))?;
-        let lock_path = folder.join(".lock");
+        let lock_path = folder.join(LOCK);
         let lock = fs::File::create(&lock_path).map_err(io(&lock_path))?;
         if lock.try_lock().is_err() {
             return Err(exists("is being written by another process".to_owned()));
@@ -158,10 +176,16 @@ impl Store {
         if let Some(parent) = target.parent() {
             fs::create_dir_all(parent).map_err(io(parent))?;
         }
+        // An episode that is done again goes aside whole, so that at no moment a part of it is there.
+        let aside = partial.with_extension("old");
         if target.exists() {
-            fs::remove_dir_all(&target).map_err(io(&target))?;
+            fs::rename(&target, &aside).map_err(io(&target))?;
         }
-        fs::rename(&partial, &target).map_err(io(&target))
+        fs::rename(&partial, &target).map_err(io(&target))?;
+        if aside.exists() {
+            fs::remove_dir_all(&aside).map_err(io(&aside))?;
+        }
+        Ok(())
     }
 
     /// The kept episodes of the plan, policy after policy.
@@ -200,7 +224,7 @@ impl Store {
     }
 
     /// Writes a file of the campaign, whole or not at all.
-    pub(super) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
+    pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let (path, partial) = (self.folder.join(name), self.folder.join(UNDER_WAY).join(name));
         fs::write(&partial, bytes).map_err(io(&partial))?;
         fs::rename(&partial, &path).map_err(io(&path))

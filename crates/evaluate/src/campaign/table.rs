@@ -153,7 +153,7 @@ impl CampaignResult {
             task: plan.task.clone(),
             seed: plan.seed,
             episodes: kept.len(),
-            planned: plan.episodes * plan.policies.len(),
+            planned: plan.count(),
             passed: kept.iter().filter(|k| k.summary.passed).count(),
             policies,
             comparisons,
@@ -184,10 +184,6 @@ fn row(name: &str, kept: &[&Kept], plan: &Plan) -> PolicyRow {
             Some(End::PolicyError { .. }) => ends[4] += 1,
         }
     }
-    let loaded_rcm = |k: &&&Kept| {
-        let arms = k.summary.arms.iter().filter(|a| a.loaded_s > 0.0);
-        arms.max_by(|a, b| a.loaded_s.total_cmp(&b.loaded_s)).map(|a| a.rcm_median_mm)
-    };
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| {
         median(kept.iter().map(|k| k.summary.arms.iter().map(of).fold(0.0, f64::max)).collect())
     };
@@ -203,7 +199,7 @@ fn row(name: &str, kept: &[&Kept], plan: &Plan) -> PolicyRow {
         attached: attached.len(),
         held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
         lift_median_mm: median(attached.iter().map(|k| k.summary.lift_mm).collect()),
-        rcm_median_mm: median(attached.iter().filter_map(loaded_rcm).collect()),
+        rcm_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
         rcm_max_mm: kept.iter().map(|k| k.summary.rcm_peak_mm).max_by(f64::total_cmp),
         rcm_within: attached.iter().filter(|k| k.summary.rcm_peak_mm <= plan.rcm_threshold_mm).count(),
         rcm_within_5_mm: attached.iter().filter(|k| k.summary.rcm_peak_mm <= 5.0).count(),

@@ -2,6 +2,7 @@
 
 use super::colors;
 use super::figures;
+use super::funnel;
 use super::page::{self, Card, Columns};
 use super::plots::{Line, Plot};
 use super::table::{self, fixed, percent};
@@ -30,13 +31,18 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
         plan.task,
         r.policies.iter().map(|p| p.policy.as_str()).collect::<Vec<_>>().join(", ")
     );
-    let overview = page::section("Outcome", &lead, &(cards(r) + &outcome(r)));
+    let overview = page::section("Outcome", &lead, &cards(r));
+    let policies = page::section("Policies", "", &outcome(r));
     let stages = page::section(
         "Stages",
         "Stages pass in their order; each counts the episodes that passed it and all before.",
-        &(page::grid(Columns::Two, &[funnel(r)?, lift_and_rcm(plan, kept)?]) + &stage_table(r)),
+        &(page::figure(
+            &funnel::funnel(r),
+            "<b>How far episodes came.</b> Filled: the share that passed. Whiskers: 95% intervals.",
+        ) + &stage_table(r)),
     );
     let distributions = [
+        lift_and_rcm(plan, kept)?,
         distribution(plan, kept, "RCM deviation", "largest RCM deviation of the episode [mm]", &|k| {
             k.summary.rcm_peak_mm
         })?,
@@ -58,7 +64,7 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
         "Stored channels judged anew at other thresholds, without simulating. An episode ends when it has passed at the scene\u{2019}s gates, so a stricter gate sees no more of it than there was.",
         &page::grid(Columns::Two, &sweeps(plan, kept, store)?),
     );
-    Ok(overview + &failed + &stages + &spread + &gates + &pairs(r))
+    Ok(overview + &failed + &policies + &stages + &spread + &gates + &pairs(r))
 }
 
 fn color(plan: &Plan, name: &str) -> [u8; 3] {
@@ -155,7 +161,13 @@ fn failures(plan: &Plan, kept: &[Kept], store: &Store) -> Result<String> {
             let [width, height] = pictures::SIZE;
             let name = format!("{} with seed {}", k.name, k.seed);
             let img = figures::img_of_bytes("webp", &bytes, width, height, &name);
-            films.push(page::figure(&img, &format!("<b>{}</b>: {}", page::escape(&name), page::escape(&why(k)))));
+            let text = format!(
+                "<b>{}</b> stopped at {}: {}",
+                page::escape(&name),
+                page::escape(&k.summary.next),
+                page::escape(&why(k))
+            );
+            films.push(page::figure(&img, &text));
         }
     }
     let rows: Vec<Vec<String>> = failed
@@ -188,40 +200,19 @@ fn why(k: &Kept) -> String {
     k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string)
 }
 
-fn funnel(r: &CampaignResult) -> Result<String> {
-    let lines = r.policies.iter().enumerate().map(|(k, p)| {
-        let all = p.episodes.max(1) as f64;
-        let steps = p.stages.iter().enumerate().map(|(n, s)| (n as f64 + 1.0, s.passed as f64 / all));
-        Line { points: [(0.0, 1.0)].into_iter().chain(steps).collect(), color: colors::organ(k), filled: false }
-    });
-    let plot = Plot {
-        title: "Episodes that pass each stage",
-        x: "stages passed",
-        y: "share of episodes",
-        lines: lines.collect(),
-        bands: vec![],
-        show: vec![0.0, 1.0],
-        limits: vec![],
-        log_x: false,
-        log_y: false,
-    };
-    let legend = page::legend(r.policies.iter().enumerate().map(|(k, p)| (p.policy.as_str(), colors::organ(k))));
-    Ok(page::figure(&plot.svg()?, &format!("<b>How far episodes came.</b>{legend}")))
-}
-
+/// When stages passed.
 fn stage_table(r: &CampaignResult) -> String {
-    let mut rows = Vec::new();
-    for p in &r.policies {
-        for s in &p.stages {
-            let count = format!("{} of {}", s.passed, p.episodes);
-            rows.push(vec![p.policy.clone(), s.stage.to_owned(), count, share(&s.interval), or_dash(s.median_s, 2)]);
-        }
-    }
-    table::plain(&["policy", "stage", "passed", "share", "median time s"], &rows)
+    let Some(first) = r.policies.first() else { return String::new() };
+    let head: Vec<&str> = ["median time [s]"].into_iter().chain(first.stages.iter().map(|s| s.stage)).collect();
+    let row = |p: &crate::campaign::PolicyRow| {
+        let times = p.stages.iter().map(|s| or_dash(s.median_s, 2));
+        [p.policy.clone()].into_iter().chain(times).collect()
+    };
+    table::plain(&head, &r.policies.iter().map(row).collect::<Vec<Vec<String>>>())
 }
 
 /// Fig. 6(d, e): every episode that attached the organ.
-fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
+pub(super) fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
     let attached: Vec<&Kept> = kept.iter().filter(|k| k.summary.attached).collect();
     let most = |of: &dyn Fn(&Kept) -> f64| attached.iter().map(|k| of(k)).fold(1e-3, f64::max);
     let (width, height) = (most(&|k| k.summary.lift_mm), most(&|k| k.summary.rcm_peak_mm));
@@ -245,6 +236,12 @@ fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
     };
     let caption = format!("<b>Lift against RCM deviation</b>, every episode that attached the organ.{}", legend(plan));
     Ok(page::figure(&plot.svg()?, &caption))
+}
+
+/// The lifts of every episode that attached the organ, as a distribution a policy.
+pub(super) fn lifts(plan: &Plan, kept: &[Kept]) -> Result<String> {
+    let attached: Vec<Kept> = kept.iter().filter(|k| k.summary.attached).cloned().collect();
+    distribution(plan, &attached, "Lift", "greatest lift of held tissue [mm]", &|k| k.summary.lift_mm)
 }
 
 fn distribution(plan: &Plan, kept: &[Kept], name: &str, x: &str, of: &dyn Fn(&Kept) -> f64) -> Result<String> {

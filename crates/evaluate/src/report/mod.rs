@@ -11,6 +11,7 @@ mod controller_grid;
 mod convergence;
 mod element_quality;
 mod figures;
+mod funnel;
 mod grasp_designs;
 mod integrators;
 mod meshing;
@@ -21,6 +22,7 @@ mod plots;
 mod port_budget;
 mod random_actions;
 mod reconstruction_experiment;
+mod rollouts;
 mod run;
 mod scaling;
 mod seen;
@@ -36,8 +38,8 @@ use crate::bench::{MeshingResult, ScalingResult};
 use crate::campaign::{CampaignResult, Kept, Plan, Store};
 use crate::experiment::{
     ControllerGridResult, ConvergenceResult, ElementQualityResult, GraspDesignsResult, IntegratorsResult,
-    PortBudgetResult, RandomActionsResult, ReconstructionResult, SettlingResult, SimilarityPictures, SimilarityResult,
-    WrenchResult,
+    PortBudgetResult, RandomActionsResult, ReconstructionResult, RolloutsResult, SettlingResult, SimilarityPictures,
+    SimilarityResult, WrenchResult,
 };
 use crate::{Error, Result};
 use moving_picture::Lift;
@@ -110,6 +112,15 @@ pub(crate) fn campaign(plan: &Plan, result: &CampaignResult, kept: &[Kept], stor
     let title = format!("{}: {}", plan.scene, plan.task);
     let subtitle = format!("Campaign of {} episodes, seeds from {}", result.episodes, plan.seed);
     Ok(page::page(&title, &subtitle, &campaign::body(plan, result, kept, store)?))
+}
+
+/// The page of the rollouts beside the paper.
+///
+/// # Errors
+/// A plot that cannot be drawn.
+pub(crate) fn rollouts(plan: &Plan, result: &RolloutsResult, kept: &[Kept]) -> Result<String> {
+    let subtitle = "Lift and RCM deviation of six controllers, beside the paper's Fig. 6(d, e)";
+    Ok(page::page("Rollouts", subtitle, &rollouts::body(plan, result, kept)?))
 }
 
 /// The page of the meshing benchmark.

@@ -1,6 +1,7 @@
 //! `trocar bench`.
 
 mod cell;
+mod episode;
 mod grasp;
 mod organs;
 mod render;
@@ -15,6 +16,7 @@ pub fn run(arguments: &Bench, json: bool, progress: &dyn Progress) -> Result<()>
     match &arguments.name {
         BenchName::Meshing(arguments) => meshing(arguments, json, progress),
         BenchName::Cell(arguments) => cell::run(arguments, json, progress),
+        BenchName::Episode(arguments) => episode::run(arguments, json, progress),
         BenchName::Grasp(arguments) => grasp::run(arguments, json, progress),
         BenchName::Organs(arguments) => organs::run(arguments, json, progress),
         BenchName::Render(arguments) => render::run(arguments, json, progress),

@@ -7,6 +7,7 @@ mod grasp_designs;
 mod integrators;
 mod port_budget;
 mod random_actions;
+mod rollouts;
 mod settling;
 mod similarity;
 mod wrench;
@@ -28,6 +29,7 @@ pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Resul
         ExperimentName::ControllerGrid(arguments) => controller_grid::run(arguments, json, progress),
         ExperimentName::Wrench(arguments) => wrench::run(arguments, json, progress),
         ExperimentName::RandomActions(arguments) => random_actions::run(arguments, json, progress),
+        ExperimentName::Rollouts(arguments) => rollouts::run(arguments, json, progress),
         ExperimentName::Settling(arguments) => settling::run(arguments, json, progress),
         ExperimentName::Similarity(arguments) => similarity::run(arguments, json, progress),
         ExperimentName::Reconstruction(arguments) => reconstruction(arguments, json, progress),
