@@ -23,6 +23,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use trocar_progress::Progress;
 use trocar_scene::Scene;
+use trocar_specimen::Specimen;
 
 /// What a campaign is to do on this machine.
 #[derive(Clone, Debug)]
@@ -86,12 +87,20 @@ impl Campaign {
             return Err(if progress.interrupted() { Error::Interrupted } else { why });
         }
         progress.end();
-        pictures::film(&store, &plan, &store.kept(&plan)?, &scene, &specimen, progress)?;
+        store.film(&plan, &scene, &specimen, progress)?;
         store.finish(&plan)
     }
 }
 
 impl Store {
+    /// Films the first failures that have no moving picture yet, for the report.
+    ///
+    /// # Errors
+    /// A kept episode that is damaged, a picture that cannot be written, an interruption.
+    pub fn film(&self, plan: &Plan, scene: &Scene, specimen: &Specimen, progress: &dyn Progress) -> Result<()> {
+        pictures::film(self, plan, &self.kept(plan)?, scene, specimen, progress)
+    }
+
     /// Makes the table and the report out of the episodes that are kept.
     ///
     /// # Errors
