@@ -1,6 +1,5 @@
 """Pictures of the cameras: their spaces, the same bits for one cell and many, noise by the seed."""
 
-import gymnasium as gym
 import numpy as np
 import pytest
 import trocar
@@ -68,4 +67,4 @@ def test_wrong_cameras_are_named():
         ({"render_mode": "human"}, "rgb_array"),
     ]:
         with pytest.raises(ValueError, match=words):
-            gym.make("trocar/PortReach-v0", obs="rgb", **SHORT, **options)
+            trocar.TrocarEnv(task="port-reach", obs="rgb", **options)

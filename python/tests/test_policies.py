@@ -97,8 +97,9 @@ def evaluated(program, scene, tmp_path, policies):
     (tmp_path / "mine.py").write_text(STILL)
     named = [word for policy in policies for word in ("--policy", policy)]
     command = [program, "--quiet", "--json", "evaluate", scene, *named, "--episodes", "2", "-o", tmp_path / "out"]
+    paths = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
     phantoms = trocar.envs.cells.phantoms_folder()
-    environment = os.environ | {"TROCAR_PYTHON": sys.executable, "PYTHONPATH": str(tmp_path)}
+    environment = os.environ | {"TROCAR_PYTHON": sys.executable, "PYTHONPATH": paths}
     done = subprocess.run([*map(str, command), "--phantoms", str(phantoms)], capture_output=True, text=True, env=environment)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)

@@ -2,7 +2,7 @@
 
 use crate::error::{task, wrong};
 use crate::frames::Rows;
-use crate::pictures::{Described, Eyes};
+use crate::pictures::Eyes;
 use crate::prepare;
 use numpy::{PyArray1, PyArray3, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -178,12 +178,6 @@ impl Cells {
     #[getter]
     fn stage_names(&self) -> Vec<&'static str> {
         Stage::of(self.episodes[0].scene().task.name).iter().map(|s| s.name()).collect()
-    }
-
-    /// The scene's cameras: name, height and width [px] of what policies see, whether it measures depth.
-    #[getter]
-    fn cameras(&self) -> Vec<Described> {
-        self.described()
     }
 
     /// Writes what `cameras` see of the cells that `active` says: `color` has an array (cells, height, width, 3) of bytes a camera, `depth` one (cells, height, width, 1) of z [m], 0 where

@@ -3,6 +3,7 @@
 use crate::cells::Cells;
 use crate::error::wrong;
 use crate::frames::Rows;
+use crate::prepare;
 use numpy::{PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
@@ -74,16 +75,17 @@ fn awake<'a>(
 /// A camera as Python is told of it: name, height and width [px] of what policies see, whether it measures depth.
 pub type Described = (String, usize, usize, bool);
 
-impl Cells {
-    /// The scene's cameras.
-    pub fn described(&self) -> Vec<Described> {
-        let row = |c: &trocar_scene::CellCamera| {
-            let [width, height] = c.policy_size_px.map(|n| n as usize);
-            (c.name.clone(), height, width, c.depth)
-        };
-        self.episodes[0].scene().cameras.iter().map(row).collect()
-    }
+/// The cameras of a scene, before anything is built of it.
+#[pyfunction]
+pub fn cameras(scene: &str) -> PyResult<Vec<Described>> {
+    let row = |c: &trocar_scene::CellCamera| {
+        let [width, height] = c.policy_size_px.map(|n| n as usize);
+        (c.name.clone(), height, width, c.depth)
+    };
+    Ok(prepare::scene(scene, None, None)?.cameras.iter().map(row).collect())
+}
 
+impl Cells {
     /// See `Cells.see`.
     pub fn look(
         &mut self,

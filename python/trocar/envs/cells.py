@@ -11,6 +11,7 @@ import gymnasium as gym
 import numpy as np
 
 from .._native import Cells as Native
+from .._native import cameras as scene_cameras
 
 #: What can be observed.
 KINDS = ("state", "rgb", "depth")
@@ -53,6 +54,7 @@ class Cells:
         unknown = [kind for kind in self.kinds if kind not in KINDS]
         if unknown or len(set(self.kinds)) != len(self.kinds):
             raise ValueError(f"obs: '{obs}' cannot be observed; join any of {', '.join(KINDS)} by '+'")
+        self._choose_cameras(scene, cameras, image_size)
         folder = phantoms_folder()
         folder.mkdir(parents=True, exist_ok=True)
         self.native = Native(
@@ -72,7 +74,8 @@ class Cells:
         self.channels = np.zeros((count, len(native.channel_names)), np.float64)
         self.low, self.high = native.action_limits
         self.action_kind = actions
-        self._choose_cameras(cameras, image_size)
+        self.color = {c: np.zeros((count, *s, 3), np.uint8) for c, s in self.sizes.items() if "rgb" in self.kinds}
+        self.depth = {c: np.zeros((count, *s, 1), np.float32) for c, s in self.sizes.items() if "depth" in self.kinds}
         self.ends = native.end_names
         self.stages = native.stage_names
         self.task_description = DESCRIPTIONS[native.task].format(organ=native.organ)
@@ -82,9 +85,9 @@ class Cells:
             return gym.spaces.Box(-1.0, 1.0, self.low.shape, np.float32)
         return gym.spaces.Box(self.low.astype(np.float32), self.high.astype(np.float32), dtype=np.float32)
 
-    def _choose_cameras(self, wanted: Sequence[str] | None, size: tuple[int, int] | None) -> None:
-        """The cameras that are observed and their arrays: `color` and `depth` by camera, (cells, height, width, channels)."""
-        known = {name: (height, width) for name, height, width, _ in self.native.cameras}
+    def _choose_cameras(self, scene: str, wanted: Sequence[str] | None, size: tuple[int, int] | None) -> None:
+        """The cameras that are observed, with height and width [px]; told before anything is built."""
+        known = {name: (height, width) for name, height, width, _ in scene_cameras(scene)}
         if wanted is None:
             # The recording camera is a machine's, not a policy's.
             wanted = [name for name in known if name != "recording"]
@@ -101,9 +104,6 @@ class Cells:
         self.sizes = sizes if sees else {}
         self.render_size = known.get("endoscope", (224, 224)) if size is None else (int(size[0]), int(size[1]))
         self.render_camera = "endoscope" if "endoscope" in known else next(iter(known), None)
-        count = self.count
-        self.color = {c: np.zeros((count, h, w, 3), np.uint8) for c, (h, w) in sizes.items() if "rgb" in sees}
-        self.depth = {c: np.zeros((count, h, w, 1), np.float32) for c, (h, w) in sizes.items() if "depth" in sees}
 
     def _look(self, which: np.ndarray) -> None:
         """Writes what the cameras see of the cells that `which` flags."""
