@@ -11,9 +11,9 @@ import trocar
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
 
+from conftest import SHORT
+
 NAMES = list(trocar.TASKS)
-#: Short episodes: a test of the contract needs no more.
-SHORT = {"episode_s": 0.4}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -37,11 +37,6 @@ def rollout(env, seed, actions):
         if ended or late:
             break
     return np.array(all_seen), np.array(rewards), hashes
-
-
-@pytest.fixture(scope="module")
-def one():
-    return gym.make("trocar/GraspLift-v0", **SHORT)
 
 
 def actions_of(env, seed, count):

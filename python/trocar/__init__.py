@@ -4,15 +4,17 @@
 >>> env = gym.make("trocar/AppendixResection-v0", obs="state")
 >>> envs = gym.make_vec("trocar/GraspLift-v0", num_envs=16)
 
-Environments are documented in `trocar.envs`, demonstrations on disk in `trocar.datasets`, camera calibration in `trocar.calibration`.
+Environments are documented in `trocar.envs`, demonstrations on disk in `trocar.datasets`, camera calibration in `trocar.calibration`,
+policies served to `trocar evaluate` in `trocar.serve`, campaigns over many machines in `trocar.campaign`.
 """
 
 import gymnasium as _gymnasium
 
 from ._native import __version__, scenes
 from .envs import TrocarEnv, TrocarVectorEnv
+from .policy import Policy, policies
 
-__all__ = ["TASKS", "TrocarEnv", "TrocarVectorEnv", "__version__", "scenes"]
+__all__ = ["TASKS", "Policy", "TrocarEnv", "TrocarVectorEnv", "__version__", "policies", "scenes"]
 
 #: Environments by name, with the task that each asks for.
 TASKS = {

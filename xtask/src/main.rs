@@ -4,6 +4,7 @@
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
 mod peers;
+mod python;
 mod tools;
 
 use std::process::{Command, ExitCode};
@@ -20,6 +21,7 @@ const TEST: &[Check] = &[
 ];
 
 const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests and docs, warnings as errors
+       cargo xtask python        the tests of the Python package (test does this too; skipped without Python)
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
@@ -31,6 +33,13 @@ fn main() -> ExitCode {
         ["test"] => {
             tools::fetch();
             test()
+        }
+        ["python"] => {
+            if python::test() {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
+            }
         }
         ["tools"] => {
             tools::fetch();
@@ -64,6 +73,11 @@ fn test() -> ExitCode {
             eprintln!("\n{name} failed");
             return ExitCode::FAILURE;
         }
+    }
+    eprintln!("\n== Python package");
+    if !python::test() {
+        eprintln!("\nthe tests of the Python package failed");
+        return ExitCode::FAILURE;
     }
     eprintln!("\nformatting, lints, tests and docs are in order");
     ExitCode::SUCCESS

@@ -2,8 +2,9 @@
 
 use crate::error::{task, wrong};
 use crate::frames::Rows;
+use crate::pictures::Eyes;
 use crate::prepare;
-use numpy::{PyArray1, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray3, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
@@ -17,15 +18,16 @@ const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 const ENDS: [&str; 5] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error"];
 
 /// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
-#[pyclass(frozen)]
+#[pyclass(frozen, module = "trocar._native")]
 pub struct State(EpisodeState);
 
 /// Episodes of one scene, stepped side by side.
-#[pyclass]
+#[pyclass(module = "trocar._native")]
 pub struct Cells {
-    episodes: Vec<Episode>,
+    pub(crate) episodes: Vec<Episode>,
+    pub(crate) eyes: Eyes,
     bounds: Bounds,
-    pool: rayon::ThreadPool,
+    pub(crate) pool: rayon::ThreadPool,
     task_name: &'static str,
     organ: String,
     steps: usize,
@@ -72,7 +74,7 @@ impl Place<'_> {
 impl Cells {
     /// `count` episodes of `scene` on `threads` threads (0: as many as the machine has; results do not depend on them).
     #[new]
-    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None))]
+    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -82,6 +84,7 @@ impl Cells {
         task: Option<&str>,
         actions: &str,
         episode_s: Option<f64>,
+        sensor_noise: bool,
     ) -> PyResult<Self> {
         if count == 0 || count > 4096 {
             return Err(wrong(format!("num_envs: is {count}; 1 to 4096 cells")));
@@ -106,7 +109,8 @@ impl Cells {
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let organ = scene.task.organ.clone();
-            Ok(Self { episodes, bounds, pool, task_name: scene.task.name.name(), organ, steps })
+            let eyes = Eyes::new(specimen, count, sensor_noise);
+            Ok(Self { episodes, eyes, bounds, pool, task_name: scene.task.name.name(), organ, steps })
         })
     }
 
@@ -176,6 +180,32 @@ impl Cells {
         Stage::of(self.episodes[0].scene().task.name).iter().map(|s| s.name()).collect()
     }
 
+    /// Writes what `cameras` see of the cells that `active` says: `color` has an array (cells, height, width, 3) of bytes a camera, `depth` one (cells, height, width, 1) of z [m], 0 where
+    /// nothing is; either list may be empty. Cells go in parallel, without the interpreter's lock.
+    fn see(
+        &mut self,
+        py: Python<'_>,
+        cameras: Vec<String>,
+        size: Vec<(usize, usize)>,
+        active: PyReadonlyArray1<'_, bool>,
+        color: Vec<Bound<'_, PyArrayDyn<u8>>>,
+        depth: Vec<Bound<'_, PyArrayDyn<f32>>>,
+    ) -> PyResult<()> {
+        self.look(py, &cameras, &size, &active, &color, &depth)
+    }
+
+    /// A picture (height, width, 3) of cell `k` through `camera`.
+    fn picture<'py>(
+        &mut self,
+        py: Python<'py>,
+        k: usize,
+        camera: &str,
+        height: usize,
+        width: usize,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        self.photograph(py, k, camera, height, width)
+    }
+
     /// Least and greatest numbers of an action.
     #[getter]
     fn action_limits<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>) {
@@ -198,6 +228,9 @@ impl Cells {
         for (k, seed) in which.iter().zip(seeds) {
             let place = usize::try_from(*k).ok().and_then(|k| wanted.get_mut(k));
             *place.ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))? = Some(*seed);
+        }
+        for k in (0..count).filter(|k| wanted[*k].is_some()) {
+            self.eyes.moved(k, self.episodes[k].scene());
         }
         let begin = |(place, seed): (&mut Place<'_>, &Option<u64>)| match seed {
             Some(seed) => place.episode.reset(*seed).map(|_| place.write(0.0)),
@@ -272,6 +305,7 @@ impl Cells {
         channels: &Bound<'_, PyArrayDyn<f64>>,
     ) -> PyResult<()> {
         self.at(k)?;
+        self.eyes.moved(k, self.episodes[k].scene());
         let which: Vec<Option<&State>> = (0..self.episodes.len()).map(|j| (j == k).then_some(saved)).collect();
         let put = |(place, saved): (&mut Place<'_>, &Option<&State>)| match saved {
             Some(saved) => place.episode.restore(&saved.0).map(|()| place.write(0.0)),
@@ -282,7 +316,7 @@ impl Cells {
 }
 
 impl Cells {
-    fn at(&self, k: usize) -> PyResult<&Episode> {
+    pub(crate) fn at(&self, k: usize) -> PyResult<&Episode> {
         let count = self.episodes.len();
         self.episodes.get(k).ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))
     }

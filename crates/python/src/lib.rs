@@ -2,9 +2,12 @@
 //!
 //! It knows no Gymnasium and no dataset; `python/trocar` makes environments of it. Arrays are the caller's and are written in place.
 
+mod campaign;
 mod cells;
 mod error;
 mod frames;
+mod pictures;
+mod policy;
 mod prepare;
 mod progress;
 
@@ -16,6 +19,11 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<cells::Cells>()?;
     module.add_class::<cells::State>()?;
+    module.add_class::<policy::Controller>()?;
+    module.add_class::<campaign::Campaign>()?;
+    module.add_class::<campaign::Worker>()?;
+    module.add_function(wrap_pyfunction!(pictures::cameras, module)?)?;
+    module.add_function(wrap_pyfunction!(policy::policies, module)?)?;
     module.add_function(wrap_pyfunction!(prepare::scenes, module)?)?;
     Ok(())
 }

@@ -280,6 +280,11 @@ impl Episode {
         &self.scene
     }
 
+    /// The scene with the specimen where this episode has it: what pictures are made of.
+    pub fn arranged_scene(&self) -> Scene {
+        self.arrangement.scene(&self.scene, &self.specimen)
+    }
+
     /// Hash of the specimen; see [`specimen_hash`].
     pub fn specimen_hash(&self) -> u64 {
         self.specimen_hash

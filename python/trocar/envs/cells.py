@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, Sequence
 
 import gymnasium as gym
 import numpy as np
 
 from .._native import Cells as Native
+from .._native import cameras as scene_cameras
 
 #: What can be observed.
 KINDS = ("state", "rgb", "depth")
@@ -45,15 +46,26 @@ class Cells:
         episode_s: float | None,
         threads: int,
         privileged: bool,
+        cameras: Sequence[str] | None = None,
+        image_size: tuple[int, int] | None = None,
+        sensor_noise: bool = False,
     ):
         self.kinds = obs.split("+")
         unknown = [kind for kind in self.kinds if kind not in KINDS]
         if unknown or len(set(self.kinds)) != len(self.kinds):
             raise ValueError(f"obs: '{obs}' cannot be observed; join any of {', '.join(KINDS)} by '+'")
+        self._choose_cameras(scene, cameras, image_size)
         folder = phantoms_folder()
         folder.mkdir(parents=True, exist_ok=True)
         self.native = Native(
-            scene, count, phantoms=folder, threads=threads, task=task, actions=actions, episode_s=episode_s
+            scene,
+            count,
+            phantoms=folder,
+            threads=threads,
+            task=task,
+            actions=actions,
+            episode_s=episode_s,
+            sensor_noise=sensor_noise,
         )
         self.count, self.privileged, self.normalize = count, privileged, normalize
         native = self.native
@@ -61,6 +73,9 @@ class Cells:
         self.figures = np.zeros((count, len(native.figure_names)), np.float64)
         self.channels = np.zeros((count, len(native.channel_names)), np.float64)
         self.low, self.high = native.action_limits
+        self.action_kind = actions
+        self.color = {c: np.zeros((count, *s, 3), np.uint8) for c, s in self.sizes.items() if "rgb" in self.kinds}
+        self.depth = {c: np.zeros((count, *s, 1), np.float32) for c, s in self.sizes.items() if "depth" in self.kinds}
         self.ends = native.end_names
         self.stages = native.stage_names
         self.task_description = DESCRIPTIONS[native.task].format(organ=native.organ)
@@ -70,17 +85,74 @@ class Cells:
             return gym.spaces.Box(-1.0, 1.0, self.low.shape, np.float32)
         return gym.spaces.Box(self.low.astype(np.float32), self.high.astype(np.float32), dtype=np.float32)
 
+    def _choose_cameras(self, scene: str, wanted: Sequence[str] | None, size: tuple[int, int] | None) -> None:
+        """The cameras that are observed, with height and width [px]; told before anything is built."""
+        known = {name: (height, width) for name, height, width, _ in scene_cameras(scene)}
+        if wanted is None:
+            # The recording camera is a machine's, not a policy's.
+            wanted = [name for name in known if name != "recording"]
+        wanted = [wanted] if isinstance(wanted, str) else list(wanted)
+        strange = [name for name in wanted if name not in known]
+        if strange or len(set(wanted)) != len(wanted):
+            raise ValueError(f"cameras: {wanted} cannot be seen; any of {', '.join(known)} can, each once")
+        if size is not None and (len(size) != 2 or not all(8 <= n <= 8192 for n in size)):
+            raise ValueError(f"image_size: is {size}; height and width are wanted, 8 to 8192 pixels each")
+        sizes = {name: known[name] if size is None else (int(size[0]), int(size[1])) for name in wanted}
+        sees = {"rgb", "depth"} & set(self.kinds)
+        if sees and not wanted:
+            raise ValueError(f"cameras: {' and '.join(sorted(sees))} need at least one; there are {', '.join(known)}")
+        self.sizes = sizes if sees else {}
+        self.render_size = known.get("endoscope", (224, 224)) if size is None else (int(size[0]), int(size[1]))
+        self.render_camera = "endoscope" if "endoscope" in known else next(iter(known), None)
+
+    def _look(self, which: np.ndarray) -> None:
+        """Writes what the cameras see of the cells that `which` flags."""
+        if self.sizes:
+            self.native.see(
+                list(self.sizes), list(self.sizes.values()), which, list(self.color.values()), list(self.depth.values())
+            )
+
+    def render(self, k: int) -> np.ndarray:
+        """The endoscope's picture of cell `k` (height, width, 3)."""
+        if self.render_camera is None:
+            raise ValueError("render: the scene has no camera")
+        return self.native.picture(k, self.render_camera, *self.render_size)
+
     def observation_space(self) -> gym.Space:
-        return gym.spaces.Box(-np.inf, np.inf, (self.state.shape[1],), np.float32)
+        state = gym.spaces.Box(-np.inf, np.inf, (self.state.shape[1],), np.float32)
+        if self.kinds == ["state"]:
+            return state
+        parts: dict[str, gym.Space] = {}
+        if "state" in self.kinds:
+            parts["agent_pos"] = state
+        if self.color:
+            pixels = {c: gym.spaces.Box(0, 255, a.shape[1:], np.uint8) for c, a in self.color.items()}
+            parts["pixels"] = gym.spaces.Dict(pixels)
+        if self.depth:
+            depths = {c: gym.spaces.Box(0.0, np.inf, a.shape[1:], np.float32) for c, a in self.depth.items()}
+            parts["depth"] = gym.spaces.Dict(depths)
+        return gym.spaces.Dict(parts)
 
     def observation(self) -> Any:
         """What is seen now: the arrays themselves, which the next step writes again."""
-        return self.state
+        if self.kinds == ["state"]:
+            return self.state
+        parts: dict[str, Any] = {}
+        if "state" in self.kinds:
+            parts["agent_pos"] = self.state
+        if self.color:
+            parts["pixels"] = dict(self.color)
+        if self.depth:
+            parts["depth"] = dict(self.depth)
+        return parts
 
     def reset(self, which: np.ndarray, seeds: np.ndarray) -> None:
         """Begins the episodes of `seeds` in the cells `which`."""
         which, seeds = np.asarray(which, np.int64), np.asarray(seeds, np.uint64)
         self.native.reset(which, seeds, self.state, self.figures, self.channels)
+        flags = np.zeros(self.count, bool)
+        flags[which] = True
+        self._look(flags)
 
     def step(self, actions: np.ndarray, active: np.ndarray | None = None) -> None:
         """Steps the cells that are `active` (all if not given) by their rows of `actions`."""
@@ -91,6 +163,7 @@ class Cells:
             actions = self.low + 0.5 * (np.clip(actions, -1.0, 1.0) + 1.0) * (self.high - self.low)
         active = np.ones(self.count, bool) if active is None else np.asarray(active, bool)
         self.native.step(np.ascontiguousarray(actions), active, self.state, self.figures, self.channels)
+        self._look(active)
 
     def save(self, k: int) -> Any:
         """The state of cell `k`: an object of this process."""
@@ -98,6 +171,7 @@ class Cells:
 
     def restore(self, k: int, state: Any) -> None:
         self.native.restore(k, state, self.state, self.figures, self.channels)
+        self._look(np.arange(self.count) == k)
 
     # What the figures say; their columns are reward, score, stage, end, time.
 

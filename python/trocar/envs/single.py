@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Sequence
 
 import gymnasium as gym
 import numpy as np
@@ -18,7 +18,7 @@ class TrocarEnv(gym.Env):
     S: the same seed gives the same bits on every machine of its kind. Without a seed the next one is drawn from `np_random`.
     """
 
-    metadata = {"render_modes": [], "render_fps": 30}
+    metadata = {"render_modes": ["rgb_array"], "render_fps": 30}
 
     def __init__(
         self,
@@ -31,8 +31,13 @@ class TrocarEnv(gym.Env):
         episode_s: float | None = None,
         threads: int = 0,
         privileged: bool = False,
+        cameras: Sequence[str] | None = None,
+        image_size: tuple[int, int] | None = None,
+        sensor_noise: bool = False,
         render_mode: str | None = None,
     ):
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode: '{render_mode}' is unknown; rgb_array is known")
         self.render_mode = render_mode
         self.cells = Cells(
             1,
@@ -44,6 +49,9 @@ class TrocarEnv(gym.Env):
             episode_s=episode_s,
             threads=threads,
             privileged=privileged,
+            cameras=cameras,
+            image_size=image_size,
+            sensor_noise=sensor_noise,
         )
         self.observation_space = self.cells.observation_space()
         self.action_space = self.cells.action_space()
@@ -61,6 +69,11 @@ class TrocarEnv(gym.Env):
     @property
     def _max_episode_steps(self) -> int:
         return self.cells.native.max_steps
+
+    @property
+    def privileged_channels(self) -> dict[str, float]:
+        """Channels of the last step by name: tissue and all, for rewards of one's own and for scripts, not for policies."""
+        return dict(zip(self.cells.native.channel_names, self.cells.channels[0].tolist()))
 
     @property
     def state_names(self) -> list[str]:
@@ -87,6 +100,10 @@ class TrocarEnv(gym.Env):
         self.cells.step(np.asarray(action)[None])
         reward, ended, late = self.cells.rewards[0], self.cells.terminated[0], self.cells.truncated[0]
         return self._observation(), float(reward), bool(ended), bool(late), self.cells.info(0)
+
+    def render(self) -> np.ndarray | None:
+        """The endoscope's picture (height, width, 3) with `render_mode="rgb_array"`, otherwise None."""
+        return None if self.render_mode is None else self.cells.render(0)
 
     def save_state(self) -> Any:
         """The whole state. What follows from a restored one is the same to the bit; it stays in the process."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Sequence
 
 import gymnasium as gym
 import numpy as np
@@ -37,7 +37,7 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
     (`reset(options={"reset_mask": ...})` is the caller's).
     """
 
-    metadata: dict[str, Any] = {"render_modes": [], "render_fps": 30}
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}
 
     def __init__(
         self,
@@ -51,10 +51,15 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
         episode_s: float | None = None,
         threads: int = 0,
         privileged: bool = False,
+        cameras: Sequence[str] | None = None,
+        image_size: tuple[int, int] | None = None,
+        sensor_noise: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         render_mode: str | None = None,
     ):
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode: '{render_mode}' is unknown; rgb_array is known")
         self.render_mode, self.num_envs, self.copy = render_mode, num_envs, copy
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
@@ -68,6 +73,9 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
             episode_s=episode_s,
             threads=threads,
             privileged=privileged,
+            cameras=cameras,
+            image_size=image_size,
+            sensor_noise=sensor_noise,
         )
         self.single_observation_space = self.cells.observation_space()
         self.single_action_space = self.cells.action_space()
@@ -138,6 +146,12 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
             cells.reset(over, np.array([self._draw(k) for k in over], np.uint64))
             self._over = np.zeros(self.num_envs, bool)
         return self._observation(), rewards, terminated, truncated, infos
+
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """The endoscope's picture of each cell with `render_mode="rgb_array"`, otherwise None."""
+        if self.render_mode is None:
+            return None
+        return tuple(self.cells.render(k) for k in range(self.num_envs))
 
     def save_state(self, k: int) -> Any:
         """The whole state of cell `k`; it stays in the process."""

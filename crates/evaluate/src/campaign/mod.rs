@@ -26,6 +26,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use trocar_progress::Progress;
 use trocar_scene::Scene;
+use trocar_specimen::Specimen;
 
 /// How often it is looked whether the user asks to stop.
 const GLANCE: Duration = Duration::from_millis(50);
@@ -111,12 +112,20 @@ impl Campaign {
             return Err(if progress.interrupted() { Error::Interrupted } else { why });
         }
         progress.end();
-        pictures::film(&store, &plan, &store.kept(&plan)?, &scene, &specimen, progress)?;
+        store.film(&plan, &scene, &specimen, progress)?;
         Ok((store, plan))
     }
 }
 
 impl Store {
+    /// Films the first failures that have no moving picture yet, for the report.
+    ///
+    /// # Errors
+    /// A kept episode that is damaged, a picture that cannot be written, an interruption.
+    pub fn film(&self, plan: &Plan, scene: &Scene, specimen: &Specimen, progress: &dyn Progress) -> Result<()> {
+        pictures::film(self, plan, &self.kept(plan)?, scene, specimen, progress)
+    }
+
     /// Makes the table and the report out of the episodes that are kept.
     ///
     /// # Errors

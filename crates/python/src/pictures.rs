@@ -1,0 +1,189 @@
+//! What the cameras see of the cells: colour and depth written into the caller's arrays, all cells at once.
+
+use crate::cells::Cells;
+use crate::error::wrong;
+use crate::frames::Rows;
+use crate::prepare;
+use numpy::{PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
+use pyo3::prelude::*;
+use rayon::prelude::*;
+use trocar_render::Settings;
+use trocar_scene::Scene;
+use trocar_sight::{DepthNoise, Sensor, Sight};
+use trocar_specimen::Specimen;
+use trocar_task::Episode;
+
+/// Shot and read noise of the colours, with `sensor_noise`.
+const COLOR_NOISE: [f32; 2] = [0.015, 0.003];
+
+/// Pictures are made by direct light without shadows, which is what policies of campaigns see too.
+const SETTINGS: Settings = Settings::Preview { shadows: false };
+
+/// The sights of the cells; each is made when its cell is first looked at.
+pub struct Eyes {
+    sights: Vec<Option<Sight>>,
+    specimen: Specimen,
+    noise: bool,
+}
+
+/// A cell that is looked at, with the pieces of the arrays that are its own.
+struct Look<'a> {
+    sight: &'a mut Option<Sight>,
+    episode: &'a Episode,
+    color: Vec<&'a mut [u8]>,
+    depth: Vec<&'a mut [f32]>,
+}
+
+impl Eyes {
+    pub fn new(specimen: Specimen, count: usize, noise: bool) -> Self {
+        Self { sights: (0..count).map(|_| None).collect(), specimen, noise }
+    }
+
+    /// The specimen of cell `k` may be elsewhere now: where a scene varies that, the field under it is made anew.
+    pub fn moved(&mut self, k: usize, scene: &Scene) {
+        let v = &scene.task.variation;
+        if v.specimen_shift_mm != 0.0 || v.specimen_turn_deg != 0.0 {
+            self.sights[k] = None;
+        }
+    }
+}
+
+/// The sight of `episode`, made if it is not there, with the noise of its seed.
+fn awake<'a>(
+    sight: &'a mut Option<Sight>,
+    episode: &Episode,
+    specimen: &Specimen,
+    noise: bool,
+) -> trocar_sight::Result<&'a mut Sight> {
+    let sensor = if noise {
+        let seed = episode.seed();
+        // Both halves of the seed count.
+        let seed = (seed ^ (seed >> 32)) as u32;
+        Sensor { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
+    } else {
+        Sensor::default()
+    };
+    let made = match sight.take() {
+        Some(made) => made,
+        None => Sight::new(&episode.arranged_scene(), specimen, episode.cell())?,
+    };
+    let sight = sight.insert(made);
+    sight.sensor = sensor;
+    Ok(sight)
+}
+
+/// A camera as Python is told of it: name, height and width [px] of what policies see, whether it measures depth.
+pub type Described = (String, usize, usize, bool);
+
+/// The cameras of a scene, before anything is built of it.
+#[pyfunction]
+pub fn cameras(scene: &str) -> PyResult<Vec<Described>> {
+    let row = |c: &trocar_scene::CellCamera| {
+        let [width, height] = c.policy_size_px.map(|n| n as usize);
+        (c.name.clone(), height, width, c.depth)
+    };
+    Ok(prepare::scene(scene, None, None)?.cameras.iter().map(row).collect())
+}
+
+impl Cells {
+    /// See `Cells.see`.
+    pub fn look(
+        &mut self,
+        py: Python<'_>,
+        cameras: &[String],
+        size: &[(usize, usize)],
+        active: &PyReadonlyArray1<'_, bool>,
+        color: &[Bound<'_, PyArrayDyn<u8>>],
+        depth: &[Bound<'_, PyArrayDyn<f32>>],
+    ) -> PyResult<()> {
+        let count = self.episodes.len();
+        let active = active.as_slice().map_err(wrong)?;
+        let fits = |n: usize| n == 0 || n == cameras.len();
+        if active.len() != count || size.len() != cameras.len() || !fits(color.len()) || !fits(depth.len()) {
+            return Err(wrong(format!(
+                "see: {count} flags are needed, and a size and an array for each of {} cameras",
+                cameras.len()
+            )));
+        }
+        let mut color = rows(color, "color", count, size, 3)?;
+        let mut depth = rows(depth, "depth", count, size, 1)?;
+        let mut colors = by_cell(&mut color, count)?;
+        let mut depths = by_cell(&mut depth, count)?;
+        let Self { episodes, eyes, pool, .. } = self;
+        let (specimen, noise) = (&eyes.specimen, eyes.noise);
+        let mut looks: Vec<Look<'_>> = eyes
+            .sights
+            .iter_mut()
+            .zip(&*episodes)
+            .zip(colors.drain(..).zip(depths.drain(..)))
+            .zip(active)
+            .filter(|(_, active)| **active)
+            .map(|(((sight, episode), (color, depth)), _)| Look { sight, episode, color, depth })
+            .collect();
+        let see = |look: &mut Look<'_>| -> trocar_sight::Result<()> {
+            let sight = awake(look.sight, look.episode, specimen, noise)?;
+            for (k, (camera, (height, width))) in cameras.iter().zip(size).enumerate() {
+                let picture = sight.see(look.episode.cell(), camera, [*width, *height], &SETTINGS)?;
+                if let Some(to) = look.color.get_mut(k) {
+                    to.copy_from_slice(picture.color.pixels.as_flattened());
+                }
+                if let Some(to) = look.depth.get_mut(k) {
+                    to.copy_from_slice(&picture.depth.depth);
+                }
+            }
+            Ok(())
+        };
+        let done: Vec<trocar_sight::Result<()>> =
+            py.detach(|| pool.install(|| looks.par_iter_mut().map(see).collect()));
+        done.into_iter().collect::<trocar_sight::Result<()>>().map_err(wrong)
+    }
+
+    /// See `Cells.picture`.
+    pub fn photograph<'py>(
+        &mut self,
+        py: Python<'py>,
+        k: usize,
+        camera: &str,
+        height: usize,
+        width: usize,
+    ) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        self.at(k)?;
+        let Self { episodes, eyes, pool, .. } = self;
+        let (episode, sight) = (&episodes[k], &mut eyes.sights[k]);
+        let (specimen, noise) = (&eyes.specimen, eyes.noise);
+        let pixels = py.detach(|| {
+            pool.install(|| {
+                let sight = awake(sight, episode, specimen, noise)?;
+                let picture = sight.see(episode.cell(), camera, [width, height], &SETTINGS)?;
+                Ok(picture.color.pixels.as_flattened().to_vec())
+            })
+        });
+        let pixels: Vec<u8> = pixels.map_err(|e: trocar_sight::Error| wrong(e))?;
+        numpy::PyArray1::from_vec(py, pixels).reshape([height, width, 3])
+    }
+}
+
+/// The arrays of all cameras, checked.
+fn rows<'py, T: numpy::Element>(
+    arrays: &[Bound<'py, PyArrayDyn<T>>],
+    name: &'static str,
+    count: usize,
+    size: &[(usize, usize)],
+    channels: usize,
+) -> PyResult<Vec<Rows<'py, T>>> {
+    let one = |(array, (height, width)): (&Bound<'py, PyArrayDyn<T>>, &(usize, usize))| {
+        Rows::new(array, name, count, &[*height, *width, channels])
+    };
+    arrays.iter().zip(size).map(one).collect()
+}
+
+/// For each cell its pieces, one a camera.
+fn by_cell<'a, T: numpy::Element>(rows: &'a mut [Rows<'_, T>], count: usize) -> PyResult<Vec<Vec<&'a mut [T]>>> {
+    let mut cells: Vec<Vec<&'a mut [T]>> = (0..count).map(|_| Vec::new()).collect();
+    for row in rows {
+        for (cell, piece) in cells.iter_mut().zip(row.pieces()?) {
+            cell.push(piece);
+        }
+    }
+    Ok(cells)
+}

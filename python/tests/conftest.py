@@ -1,0 +1,45 @@
+"""What several files of tests share: cells that are built once, since building one takes about a second of work."""
+
+from pathlib import Path
+import os
+import shutil
+
+import gymnasium as gym
+import pytest
+import trocar  # noqa: F401  (registers the environments)
+
+#: Short episodes: a test of the contract needs no more.
+SHORT = {"episode_s": 0.4}
+
+
+@pytest.fixture(scope="session")
+def one():
+    """One cell that lifts."""
+    return gym.make("trocar/GraspLift-v0", **SHORT)
+
+
+@pytest.fixture(scope="session")
+def seeing():
+    """One cell with state, colours and depth of two cameras."""
+    return gym.make("trocar/GraspLift-v0", obs="state+rgb+depth", image_size=(48, 64), render_mode="rgb_array", **SHORT)
+
+
+@pytest.fixture(scope="session")
+def program():
+    """The program `trocar`: `$TROCAR_PROGRAM`, or what cargo has built, or the one on the path."""
+    built = Path(__file__).parents[2] / "target/release/trocar"
+    found = os.environ.get("TROCAR_PROGRAM") or (str(built) if built.exists() else shutil.which("trocar"))
+    if not found:
+        pytest.skip("the program is not built (cargo build --release)")
+    return found
+
+
+@pytest.fixture(scope="session")
+def short_scene(tmp_path_factory):
+    """A scene file whose episodes of port-reach are over after half a second."""
+    text = (Path(__file__).parents[2] / "crates/scene/scenes/cell-a.toml").read_text()
+    text = text.replace('name = "appendix-resection"', 'name = "port-reach"').replace("episode_s = 40.0", "episode_s = 0.5")
+    assert "port-reach" in text and "episode_s = 0.5" in text
+    path = tmp_path_factory.mktemp("scene") / "short.toml"
+    path.write_text(text)
+    return path

@@ -1,0 +1,131 @@
+"""Types of the native module; what it does is documented in `crates/python/src`."""
+
+from os import PathLike
+from typing import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+__version__: str
+
+def scenes() -> list[str]:
+    """Names of the built-in scenes."""
+
+def policies() -> list[str]:
+    """Names of the controllers."""
+
+def cameras(scene: str) -> list[tuple[str, int, int, bool]]:
+    """A scene's cameras: name, height and width [px] of what policies see, whether it measures depth."""
+
+class State:
+    """A saved cell; it stays in the process."""
+
+class Cells:
+    """Episodes of one scene, stepped side by side without the interpreter's lock; arrays are the caller's."""
+
+    def __init__(
+        self,
+        scene: str,
+        count: int,
+        *,
+        phantoms: str | PathLike[str],
+        threads: int = 0,
+        task: str | None = None,
+        actions: str = "pivots",
+        episode_s: float | None = None,
+        sensor_noise: bool = False,
+    ) -> None: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def task(self) -> str: ...
+    @property
+    def organ(self) -> str: ...
+    @property
+    def max_steps(self) -> int: ...
+    @property
+    def control_hz(self) -> float: ...
+    @property
+    def state_names(self) -> list[str]: ...
+    @property
+    def action_names(self) -> list[str]: ...
+    @property
+    def channel_names(self) -> list[str]: ...
+    @property
+    def figure_names(self) -> list[str]: ...
+    @property
+    def end_names(self) -> list[str]: ...
+    @property
+    def stage_names(self) -> list[str]: ...
+    @property
+    def action_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
+    def reset(
+        self,
+        which: NDArray[np.int64],
+        seeds: NDArray[np.uint64],
+        state: NDArray[np.float32],
+        figures: NDArray[np.float64],
+        channels: NDArray[np.float64],
+    ) -> None: ...
+    def step(
+        self,
+        actions: NDArray[np.float64],
+        active: NDArray[np.bool_],
+        state: NDArray[np.float32],
+        figures: NDArray[np.float64],
+        channels: NDArray[np.float64],
+    ) -> None: ...
+    def see(
+        self,
+        cameras: Sequence[str],
+        size: Sequence[tuple[int, int]],
+        active: NDArray[np.bool_],
+        color: Sequence[NDArray[np.uint8]],
+        depth: Sequence[NDArray[np.float32]],
+    ) -> None:
+        """Writes (cells, height, width, 3) colours and (cells, height, width, 1) depths [m] of the cells that are active."""
+    def picture(self, k: int, camera: str, height: int, width: int) -> NDArray[np.uint8]: ...
+    def why(self, k: int) -> str | None: ...
+    def events(self, k: int) -> str: ...
+    def summary(self, k: int) -> str: ...
+    def state_hash(self, k: int) -> int: ...
+    def save(self, k: int) -> State: ...
+    def restore(
+        self,
+        k: int,
+        saved: State,
+        state: NDArray[np.float32],
+        figures: NDArray[np.float64],
+        channels: NDArray[np.float64],
+    ) -> None: ...
+
+class Controller:
+    """A controller of the program."""
+
+    def __init__(self, name: str) -> None: ...
+    def begin(self, cells: Cells, k: int) -> None: ...
+    def act(self, cells: Cells, k: int) -> NDArray[np.float64]: ...
+
+class Campaign:
+    """A campaign's plan and folder."""
+
+    def __init__(
+        self,
+        scene: str,
+        policies: list[str],
+        episodes: int,
+        seed: int,
+        phantoms: str | PathLike[str],
+        output: str | PathLike[str],
+    ) -> None: ...
+    @property
+    def plan(self) -> str: ...
+    def missing(self, retry_failed: bool = False) -> list[str]: ...
+    def put(self, job: str, files: list[tuple[str, bytes]]) -> None: ...
+    def finish(self) -> str: ...
+
+class Worker:
+    """A cell that runs one job after the other."""
+
+    def __init__(self, scene: str, phantoms: str | PathLike[str], plan: str) -> None: ...
+    def run(self, job: str) -> list[tuple[str, bytes]]: ...
