@@ -28,19 +28,18 @@ impl Default for DepthNoise {
 }
 
 /// Width for which `disparity` is told [px].
-const OWN_WIDTH: f64 = 848.0;
+pub(crate) const OWN_WIDTH: f64 = 848.0;
 
 /// Two neighbours whose depths are apart by more than this share are on different surfaces.
 const JUMP: f32 = 0.03;
 
 impl DepthNoise {
-    /// Spoils `depth`, seen with a focal length of `focal` [px]; `true_depth` is scratch. `seed` and `frame` choose the noise.
+    /// Spoils `depth`, measured by eyes with a focal length of `focal` [px] at a width of [`OWN_WIDTH`]; `true_depth` is scratch. `seed` and `frame` choose the noise.
     pub(crate) fn spoil(&self, depth: &mut DepthImage, true_depth: &mut Vec<f32>, focal: f64, [seed, frame]: [u32; 2]) {
         let (width, height) = (depth.width, depth.height);
         true_depth.clear();
         true_depth.extend_from_slice(&depth.depth);
-        let own = focal * OWN_WIDTH / width.max(1) as f64;
-        let spread = self.disparity / (own * self.baseline);
+        let spread = self.disparity / (focal * self.baseline);
         let before = &*true_depth;
         depth.depth.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, line)| {
             for (column, out) in line.iter_mut().enumerate() {
@@ -75,7 +74,7 @@ mod tests {
         let spread = |z: f32| {
             let mut image = DepthImage::new(200, 200);
             image.depth.fill(z);
-            DepthNoise::default().spoil(&mut image, &mut Vec::new(), 105.0, [1, 2]);
+            DepthNoise::default().spoil(&mut image, &mut Vec::new(), 445.0, [1, 2]);
             let all: Vec<f64> = image.depth.iter().map(|d| f64::from(d - z)).collect();
             (all.iter().map(|d| d * d).sum::<f64>() / all.len() as f64).sqrt()
         };
@@ -87,7 +86,7 @@ mod tests {
         for (i, d) in image.depth.iter_mut().enumerate() {
             *d = if i % 64 < 32 { 0.2 } else { 0.3 };
         }
-        DepthNoise::default().spoil(&mut image, &mut Vec::new(), 105.0, [1, 2]);
+        DepthNoise::default().spoil(&mut image, &mut Vec::new(), 445.0, [1, 2]);
         let lost = |column: usize| (0..64).filter(|r| image.depth[r * 64 + column] == 0.0).count();
         assert!((25..55).contains(&lost(31)) && (25..55).contains(&lost(32)) && lost(10) == 0 && lost(33) == 0);
         assert!(image.depth.iter().all(|d| (f64::from(*d) / 1e-4 - (f64::from(*d) / 1e-4).round()).abs() < 1e-3));

@@ -1,6 +1,7 @@
 //! The cell as cameras see it.
 
 use crate::camera::{Room, Viewer, is_endoscope};
+use crate::depth::OWN_WIDTH;
 use crate::field::{Field, Recorded};
 use crate::instrument::Shapes;
 use crate::organ::{Draped, Piece, Whole};
@@ -80,12 +81,16 @@ impl Sight {
     pub fn new(scene: &Scene, specimen: &Specimen, cell: &Cell) -> Result<Self> {
         let placed = Placed::new(scene, specimen)?.specimen;
         let mut sight = Self::over(&placed, scene.placement.pose(), Some(scene))?;
+        // Lights are set by the organs as they were recorded, so that pictures do not depend on what the cell did before.
+        sight.rebuild(None)?;
+        let room = Room { middle: middle(&placed) };
+        let viewers = Viewer::all(scene, specimen.camera.as_ref(), room, &mut sight.stage)?;
         for (k, (described, _, instrument)) in scene.stations().iter().enumerate() {
             sight.add_arm(k, described.name.name(), instrument, cell)?;
         }
-        let room = Room { middle: middle(&placed) };
+        sight.organs.iter_mut().for_each(|o| o.shape = None);
         sight.follow(cell)?;
-        sight.viewers = Viewer::all(scene, specimen.camera.as_ref(), room, &mut sight.stage)?;
+        sight.viewers = viewers;
         Ok(sight)
     }
 
@@ -303,7 +308,9 @@ impl Sight {
         stage.environment = viewer.environment;
         let mut film = viewer.film;
         film.noise = sensor.color.map(|[shot, read]| Noise { shot, read, seed: sensor.seed, frame });
-        let (pose, depth, focal) = (viewer.pose, viewer.depth, viewer.sized(size).fx);
+        // What its eyes see is not cropped or scaled.
+        let focal = viewer.model.fx * OWN_WIDTH / viewer.model.width.max(1) as f64;
+        let (pose, depth) = (viewer.pose, viewer.depth);
         render_into(picture, stage, viewer.eye(size), &pose, settings, &film);
         if let Some(noise) = sensor.depth.filter(|_| depth) {
             noise.spoil(&mut picture.depth, scratch, focal, [sensor.seed, frame]);

@@ -290,11 +290,6 @@ impl Episode {
         self.specimen_hash
     }
 
-    /// The scene with the specimen where this episode has it: what pictures are made of.
-    pub fn arranged_scene(&self) -> Scene {
-        self.arrangement.scene(&self.scene, &self.specimen)
-    }
-
     /// The cell: privileged, for scripts and pictures.
     pub fn cell(&self) -> &Cell {
         &self.cell

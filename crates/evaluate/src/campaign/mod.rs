@@ -90,6 +90,7 @@ impl Campaign {
         std::thread::scope(|scope| {
             for _ in 0..workers {
                 scope.spawn(|| {
+                    let _leaves = Leaves(&at_work);
                     if let Err(why) = work() {
                         stop.store(true, Ordering::Relaxed);
                         // The first is told; those of the others are its consequence.
@@ -97,7 +98,6 @@ impl Campaign {
                             told.get_or_insert(why);
                         }
                     }
-                    at_work.fetch_sub(1, Ordering::Relaxed);
                 });
             }
             // Whoever waits for a server is told by the flag.
@@ -114,6 +114,15 @@ impl Campaign {
         progress.end();
         store.film(&plan, &scene, &specimen, progress)?;
         Ok((store, plan))
+    }
+}
+
+/// Counts a worker less when it goes, however it goes.
+struct Leaves<'a>(&'a AtomicUsize);
+
+impl Drop for Leaves<'_> {
+    fn drop(&mut self) {
+        self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 

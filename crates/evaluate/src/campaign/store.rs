@@ -82,6 +82,8 @@ impl Store {
     pub fn open(folder: &Path, plan: &Plan) -> Result<Self> {
         let path = folder.join(PLAN);
         let exists = |reason: String| Error::Exists { path: folder.to_owned(), reason };
+        // Episodes of policies that are not asked for now stay theirs.
+        let mut whole = plan.clone();
         if let Ok(text) = fs::read_to_string(&path) {
             let old: Plan = serde_json::from_str(&text).map_err(|e| exists(format!("holds a damaged {PLAN}: {e}")))?;
             let other = [
@@ -101,6 +103,8 @@ impl Store {
                     policy.name
                 )));
             }
+            let others = old.policies.into_iter().filter(|o| plan.policies.iter().all(|p| p.name != o.name));
+            whole.policies.extend(others);
         } else if folder.is_dir() {
             // A campaign that was killed before it had its plan has these, and nothing in them.
             let begun = |name: &std::ffi::OsStr| [EPISODES, UNDER_WAY, LOCK].iter().any(|own| name == *own);
@@ -125,7 +129,7 @@ impl Store {
         }
         fs::create_dir_all(&under_way).map_err(io(&under_way))?;
         let made = Self { folder: folder.to_owned(), _lock: lock };
-        let text = serde_json::to_vec_pretty(plan).map_err(|e| Error::Format(e.to_string()))?;
+        let text = serde_json::to_vec_pretty(&whole).map_err(|e| Error::Format(e.to_string()))?;
         made.write(PLAN, &text)?;
         Ok(made)
     }
@@ -180,6 +184,8 @@ impl Store {
         let aside = partial.with_extension("old");
         if target.exists() {
             fs::rename(&target, &aside).map_err(io(&target))?;
+            // What was filmed is of the episode before; that there is no film is no error.
+            let _ = fs::remove_file(self.folder.join(super::pictures::name(&job.policy.name, job.index)));
         }
         fs::rename(&partial, &target).map_err(io(&target))?;
         if aside.exists() {
@@ -226,6 +232,9 @@ impl Store {
     /// Writes a file of the campaign, whole or not at all.
     pub(crate) fn write(&self, name: &str, bytes: &[u8]) -> Result<()> {
         let (path, partial) = (self.folder.join(name), self.folder.join(UNDER_WAY).join(name));
+        for parent in [path.parent(), partial.parent()].into_iter().flatten() {
+            fs::create_dir_all(parent).map_err(io(parent))?;
+        }
         fs::write(&partial, bytes).map_err(io(&partial))?;
         fs::rename(&partial, &path).map_err(io(&path))
     }

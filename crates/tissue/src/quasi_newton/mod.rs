@@ -189,7 +189,7 @@ impl Island<'_> {
         self.choose_active(alone);
         self.for_active(|part| {
             if part.guess != Guess::Still {
-                part.patch()
+                part.patch();
             }
         });
         let (mut stepped, mut rounds) = (false, 0);
