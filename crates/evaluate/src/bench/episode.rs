@@ -69,8 +69,10 @@ pub struct EpisodeBenchResult {
     pub end: String,
     /// All stages passed.
     pub passed: bool,
-    /// Hash of the final state, the same in all runs.
+    /// Hash of the first run's final state.
     pub state_hash: String,
+    /// All runs ended in it.
+    pub repeatable: bool,
     /// Organs.
     pub organs: usize,
     /// Nodes.
@@ -118,10 +120,6 @@ impl EpisodeBench {
             progress.advance(1);
         }
         progress.end();
-        if let Some(other) = hashes.iter().find(|h| **h != hashes[0]) {
-            let reason = format!("runs of one seed ended in states {:016x} and {other:016x}", hashes[0]);
-            return Err(Error::Mismatch(reason));
-        }
         let periods = episode.rows().len();
         let ms = |of: fn(&Took) -> f64| {
             let mut values: Vec<f64> = runs.iter().map(|t| 1e3 * of(t) / periods.max(1) as f64).collect();
@@ -145,6 +143,7 @@ impl EpisodeBench {
             end: episode.end().map_or("no end".to_owned(), ToString::to_string),
             passed: episode.progress().passed(),
             state_hash: format!("{:016x}", hashes[0]),
+            repeatable: hashes.iter().all(|h| *h == hashes[0]),
             organs: bodies.len(),
             nodes: bodies.iter().map(|b| b.len()).sum(),
             cameras: self.cameras.clone(),

@@ -43,5 +43,5 @@ fn text(r: &EpisodeBenchResult) -> String {
         r.threads,
         r.machine.cores,
         r.machine.load.map_or(String::new(), |l| format!(", load {l:.1}"))
-    )
+    ) + if r.repeatable { "" } else { "; the runs ended in DIFFERENT states" }
 }
