@@ -131,7 +131,7 @@ impl Worker {
         let signals = Signals::new();
         let files = py.detach(|| {
             let mut worker = self.0.lock().map_err(|_| wrong("the worker failed before; make another"))?;
-            worker.run(&job, &|| signals.interrupted()).map_err(|e| evaluate(&e))
+            worker.run_until(&job, &|| signals.interrupted()).map_err(|e| evaluate(&e))
         })?;
         Ok(files.0.into_iter().map(|(name, bytes)| (name, PyBytes::new(py, &bytes))).collect())
     }

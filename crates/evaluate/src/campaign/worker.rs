@@ -41,6 +41,14 @@ impl Worker {
     /// # Errors
     /// An episode that cannot be begun; [`crate::Error::Interrupted`] when the flag says so.
     pub fn run(&mut self, job: &Job) -> Result<Files> {
+        self.run_until(job, &|| false)
+    }
+
+    /// The same, which also gives up between two steps when `given_up` says so.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run).
+    pub fn run_until(&mut self, job: &Job, given_up: &dyn Fn() -> bool) -> Result<Files> {
         let (name, source) = (job.policy.name.as_str(), job.policy.source.as_str());
         if !self.policies.contains_key(name) {
             let made: Box<dyn Policy + Send> = if source.contains(':') {
@@ -51,9 +59,10 @@ impl Worker {
             self.policies.insert(name.to_owned(), made);
         }
         let Some(policy) = self.policies.get_mut(name) else { return Ok(Files::default()) };
-        let stop = &self.stop;
-        let recording = run(&mut self.episode, policy.as_mut(), job.seed, &mut |_| !stop.load(Ordering::Relaxed));
-        if stop.load(Ordering::Relaxed) {
+        let flag = &self.stop;
+        let stopped = || flag.load(Ordering::Relaxed) || given_up();
+        let recording = run(&mut self.episode, policy.as_mut(), job.seed, &mut |_| !stopped());
+        if stopped() {
             // A policy that was waited for ends as one that failed; it did not.
             return Err(Error::Interrupted);
         }
