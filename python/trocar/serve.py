@@ -45,13 +45,8 @@ def pack(value: Any) -> bytes:
 def unpack(message: bytes) -> Any:
     """The inverse of `pack`; a message that is none is a `ValueError`."""
     try:
-        return msgpack.unpackb(
-            message,
-            raw=False,
-            strict_map_key=False,
-            object_hook=_unpack_array,
-            max_buffer_size=MAX_MESSAGE,
-        )
+        # No length in it may be beyond the message's own: unpackb sees to that.
+        return msgpack.unpackb(message, raw=False, strict_map_key=False, object_hook=_unpack_array)
     except (msgpack.exceptions.UnpackException, msgpack.exceptions.ExtraData, UnicodeDecodeError) as why:
         raise ValueError(f"the message is no MessagePack: {why or type(why).__name__}") from why
 

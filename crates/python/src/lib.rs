@@ -2,6 +2,9 @@
 //!
 //! It knows no Gymnasium and no dataset; `python/trocar` makes environments of it. Arrays are the caller's and are written in place.
 
+#![allow(clippy::needless_pass_by_value, reason = "what Python hands over arrives by value")]
+#![allow(clippy::too_many_arguments, reason = "Python's arguments have names")]
+
 mod campaign;
 mod cells;
 mod error;
