@@ -4,8 +4,8 @@
     python examples/python/train_grasp_lift.py --steps 20000
 
 The reward is shaped with what only a simulator knows (how far the jaws are from the tissue). The state is what the robot measures,
-with the places of the two tips. A budget of minutes is enough to approach the appendix; it is not enough to pass the task: the
-printed figures say how far it came.
+with the place of the left tip. This is a start, not a solution: no run of it has been long enough to pass the task. The printed
+figures say how far a run came.
 """
 
 import argparse

@@ -19,7 +19,8 @@ NAMES = list(trocar.TASKS)
 @pytest.mark.parametrize("name", NAMES)
 def test_gymnasium_finds_nothing_wrong(name):
     env = gym.make(name, **SHORT)
-    check_env(env.unwrapped, skip_render_check=True)
+    # The check of closing builds another cell; one environment's is enough.
+    check_env(env.unwrapped, skip_render_check=True, skip_close_check=name != NAMES[0])
     assert env.unwrapped.task_description and env.unwrapped._max_episode_steps == 12
     assert len(env.unwrapped.state_names) == env.observation_space.shape[0]
     assert len(env.unwrapped.action_names) == env.action_space.shape[0] == 10
