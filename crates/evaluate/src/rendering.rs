@@ -380,7 +380,7 @@ pub(crate) fn label_color(label: u16) -> [u8; 3] {
         return [0; 3];
     }
     let hue = (f64::from(label) * 0.618_033_988_75).fract() * 6.0;
-    let light = if label % 2 == 0 { 0.95 } else { 0.72 };
+    let light = if label.is_multiple_of(2) { 0.95 } else { 0.72 };
     let x = 1.0 - (hue % 2.0 - 1.0).abs();
     let rgb = match hue as u32 {
         0 => [1.0, x, 0.0],

@@ -1,5 +1,5 @@
 //! Servers that do everything wrong, each answered by its own error of one line, in time.
-#![allow(clippy::unwrap_used, reason = "tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests, which tell the errors they saw")]
 
 mod common;
 
@@ -96,7 +96,7 @@ fn keys_are_asked_for() {
         endpoint.api_key = key.map(str::to_owned);
         match fails(&endpoint) {
             Error::KeyRefused { reason, .. } => {
-                assert_eq!(reason.contains("no key was sent"), key.is_none(), "{reason}")
+                assert_eq!(reason.contains("no key was sent"), key.is_none(), "{reason}");
             }
             e => panic!("{e}"),
         }

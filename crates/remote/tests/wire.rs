@@ -48,7 +48,7 @@ fn taken(reply: &[u8], limits: ActionLimits) -> Result<Actions> {
     unpack(reply).and_then(|reply| limits.take(&reply))
 }
 
-fn named(e: Error) -> String {
+fn named(e: &Error) -> String {
     let line = e.to_string();
     assert!(!line.contains('\n'), "{line}");
     let debug = format!("{e:?}");
@@ -106,7 +106,7 @@ fn chunks_that_cannot_be_are_refused() {
         ("Malformed", actions(array(vec![0x91, 0x92, 0xa1, b'a', 0xa3, b'<', b'f', b'4'], &[1, 1], &[0; 4]))),
     ];
     for (expected, reply) in cases {
-        assert_eq!(named(taken(&reply, limits).unwrap_err()), expected, "{reply:x?}");
+        assert_eq!(named(&taken(&reply, limits).unwrap_err()), expected, "{reply:x?}");
     }
 }
 
@@ -146,7 +146,7 @@ fn bytes_that_are_no_message_are_refused() {
         ("TooMany", [vec![0x92], [&[0xdc, 0xff, 0xff][..], &[0xc0; 65_535]].concat().repeat(2)].concat()),
     ];
     for (expected, bytes) in cases {
-        let found = unpack(&bytes).map(|v| format!("{v:?}")).map_err(named);
+        let found = unpack(&bytes).map(|v| format!("{v:?}")).map_err(|e| named(&e));
         assert_eq!(found, Err(expected.to_owned()), "{:x?}", &bytes[..bytes.len().min(40)]);
     }
 }

@@ -168,7 +168,7 @@ mod tests {
         let mut left = stretched.clone();
         untangler.untangle(&frame, body, &mut left);
         assert_eq!(left.x, stretched.x, "no element is inverted");
-        let mut state = rest.clone();
+        let mut state = rest;
         state.bodies[0] = stretched;
         state.relax(0);
         untangler.untangle(&frame, body, &mut state.bodies[0]);

@@ -505,3 +505,47 @@ fn bits_repeat() {
         assert_eq!(again.hash(), hash);
     }
 }
+
+/// Bodies that rest and are woken by a push go on as if the stepper had never seen them before: what they had learnt when they last moved is of another time.
+#[test]
+fn bodies_that_wake_remember_nothing() {
+    let gap = 10e-3 + 1.2e-3;
+    let row = |k: usize| moved(block([4, 4, 4], 2.5e-3), move |p| p + DVec3::X * (gap * k as f64));
+    let meshes = [0, 1, 2].map(row);
+    let material = Material { viscosity: 10.0, ..tissue(8e3) };
+    let held = nodes(&meshes[0], |p| p.z > 9e-3 && p.x < 3e-3);
+    let parts = meshes.map(|mesh| Part { pinned: nodes(&mesh, |p| p.z < 1e-3), mesh, material });
+    let model = scene(&parts, BodyContact::default(), GRAVITY);
+    let mut settled = State::new(&model);
+    settled.grasps = vec![Grasp::capture(&model, &settled, 0, &held, 0, &Pose::IDENTITY)];
+    let pose = |x: f64| Pose { translation: DVec3::X * x, ..Pose::IDENTITY };
+    let go = |stepper: &mut Stepper, state: &mut State, way: &dyn Fn(usize) -> f64, frames: usize| {
+        let mut hashes = Vec::new();
+        for k in 0..frames {
+            let motion = ToolMotion { from: pose(way(k)), to: pose(way(k + 1)) };
+            assert_eq!(stepper.step(&model, state, &[motion]).divergence, None);
+            hashes.push(state.hash());
+        }
+        hashes
+    };
+    let stepper = || Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    go(&mut stepper(), &mut settled, &|_| 0.0, 60);
+    // Pushed into the second, which is pushed into the third; they rest in between.
+    let push = |k: usize| if k < 10 { 0.0 } else { 4e-3 * ((k - 10) as f64 / 20.0).min(1.0) };
+    let shake = |k: usize| 5e-3 * (0.5 * k as f64).sin();
+    let first = go(&mut stepper(), &mut settled.clone(), &push, 45);
+    let mut used = stepper();
+    for before in [&shake as &dyn Fn(usize) -> f64, &push] {
+        go(&mut used, &mut settled.clone(), before, 33);
+        let again = go(&mut used, &mut settled.clone(), &push, 45);
+        let differs = (0..45).find(|k| again[*k] != first[*k]);
+        assert_eq!(differs, None, "from this frame on");
+    }
+    let [_, second, third] = [0, 1, 2].map(|b| {
+        let mut end = settled.clone();
+        go(&mut used, &mut end, &push, 45);
+        centroid(&model, &end, b).x - centroid(&model, &settled, b).x
+    });
+    println!("the second went {:.3} mm, the third {:.3} mm", 1e3 * second, 1e3 * third);
+    assert!(second > 0.1e-3 && third > 1e-6, "the push went through: {second} {third}");
+}

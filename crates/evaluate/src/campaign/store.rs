@@ -87,8 +87,8 @@ impl Store {
         if let Ok(text) = fs::read_to_string(&path) {
             let old: Plan = serde_json::from_str(&text).map_err(|e| exists(format!("holds a damaged {PLAN}: {e}")))?;
             let other = [
-                ("scene", &old.scene_hash != &plan.scene_hash),
-                ("specimen", &old.specimen_hash != &plan.specimen_hash),
+                ("scene", old.scene_hash != plan.scene_hash),
+                ("specimen", old.specimen_hash != plan.specimen_hash),
                 ("seed", old.seed != plan.seed),
                 ("program", old.program != plan.program),
             ];
