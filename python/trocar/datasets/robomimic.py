@@ -52,7 +52,7 @@ class RobomimicWriter:
     def episodes(self) -> int:
         """Episodes in the file."""
         with self._open() as file:
-            return len(file["data"])
+            return sum(name.startswith("demo_") for name in file["data"])
 
     def add_frame(self, frame: dict[str, Any]) -> None:
         """Takes a frame of the episode under way."""
@@ -70,9 +70,9 @@ class RobomimicWriter:
         columns = {key: np.stack(values) for key, values in self._frames.columns.items()}
         with self._open() as file:
             data = file["data"]
-            index = len(data)
             # Under another name until it is whole.
             data.pop("partial", None)
+            index = len(data)
             demo = data.create_group("partial")
             demo.create_dataset("actions", data=columns["actions"])
             demo.create_dataset("rewards", data=columns["rewards"].reshape(-1))

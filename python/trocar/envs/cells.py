@@ -70,6 +70,7 @@ class Cells:
         self.count, self.privileged, self.normalize = count, privileged, normalize
         native = self.native
         self.state = np.zeros((count, len(native.state_names)), np.float32)
+        self.seeds = np.zeros(count, np.uint64)
         self.figures = np.zeros((count, len(native.figure_names)), np.float64)
         self.channels = np.zeros((count, len(native.channel_names)), np.float64)
         self.low, self.high = native.action_limits
@@ -150,6 +151,7 @@ class Cells:
         """Begins the episodes of `seeds` in the cells `which`."""
         which, seeds = np.asarray(which, np.int64), np.asarray(seeds, np.uint64)
         self.native.reset(which, seeds, self.state, self.figures, self.channels)
+        self.seeds[which] = seeds
         flags = np.zeros(self.count, bool)
         flags[which] = True
         self._look(flags)
@@ -204,6 +206,7 @@ class Cells:
             "stage": int(stage),
             "score": float(score),
             "time_s": float(time),
+            "seed": int(self.seeds[k]),
         }
         if self.privileged:
             info["channels"] = self.channels[k].copy()

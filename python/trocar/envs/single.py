@@ -94,7 +94,7 @@ class TrocarEnv(gym.Env):
         super().reset(seed=seed)
         episode = seed if seed is not None else int(self.np_random.integers(2**31))
         self.cells.reset(np.array([0]), np.array([episode]))
-        return self._observation(), self.cells.info(0) | {"seed": episode}
+        return self._observation(), self.cells.info(0)
 
     def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         self.cells.step(np.asarray(action)[None])

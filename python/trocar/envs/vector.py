@@ -82,7 +82,7 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._over = np.zeros(num_envs, bool)
-        self._dice = [np.random.default_rng(k) for k in range(num_envs)]
+        self._dice = [np.random.default_rng() for _ in range(num_envs)]
         self.envs = [_View(self) for _ in range(num_envs)]
 
     @property
@@ -132,18 +132,21 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
             cells.reset(fresh, np.array([self._draw(k) for k in fresh], np.uint64))
         rewards, terminated, truncated = cells.rewards.copy(), cells.terminated, cells.truncated
         self._over = terminated | truncated
-        infos = self._infos()
-        if self.autoreset_mode == AutoresetMode.SAME_STEP and self._over.any():
+        if self.autoreset_mode != AutoresetMode.SAME_STEP or not self._over.any():
+            infos = self._infos()
+        else:
             over = np.flatnonzero(self._over)
             final: dict[str, Any] = {}
             for k in over:
                 final = self._add_info(final, cells.info(k), k)
-            infos["final_info"], infos["_final_info"] = final, self._over.copy()
             seen = np.full(self.num_envs, None, dtype=object)
             for k in over:
                 seen[k] = _row(cells.observation(), k)
-            infos["final_obs"], infos["_final_obs"] = seen, self._over.copy()
             cells.reset(over, np.array([self._draw(k) for k in over], np.uint64))
+            # What stands outside of "final_" is of the episodes that have begun.
+            infos = self._infos()
+            infos["final_info"], infos["_final_info"] = final, self._over.copy()
+            infos["final_obs"], infos["_final_obs"] = seen, self._over.copy()
             self._over = np.zeros(self.num_envs, bool)
         return self._observation(), rewards, terminated, truncated, infos
 
