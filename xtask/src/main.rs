@@ -35,7 +35,7 @@ fn main() -> ExitCode {
             test()
         }
         ["python"] => {
-            if python::test() {
+            if python::test(false) {
                 ExitCode::SUCCESS
             } else {
                 ExitCode::FAILURE
@@ -75,7 +75,7 @@ fn test() -> ExitCode {
         }
     }
     eprintln!("\n== Python package");
-    if !python::test() {
+    if !python::test(true) {
         eprintln!("\nthe tests of the Python package failed");
         return ExitCode::FAILURE;
     }
