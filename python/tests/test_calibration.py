@@ -15,11 +15,11 @@ SIZE = (640, 480)
 
 
 def drawn(distortion, views=12):
-    """Pictures of the board, through the distorted lens by its inverse at every pixel of a picture of twice the size."""
+    """Pictures of the board, through the distorted lens by its inverse at every pixel of a picture of three times the size."""
     flat = BOARD.opencv().generateImage((1800, 1200), marginSize=0)
     scale = 1800 / (9 * BOARD.square)
     dice = np.random.default_rng(3)
-    fine = 2
+    fine = 3
     y, x = np.mgrid[0 : SIZE[1] * fine, 0 : SIZE[0] * fine]
     pixels = np.stack([(x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5], -1).reshape(-1, 1, 2).astype(np.float64)
     rays = cv2.undistortPoints(pixels, MATRIX, distortion, criteria=(3, 40, 1e-10)).reshape(-1, 2)

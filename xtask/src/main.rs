@@ -21,7 +21,7 @@ const TEST: &[Check] = &[
 ];
 
 const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests and docs, warnings as errors
-       cargo xtask python        the tests of the Python package (test does this too; skipped without Python)
+       cargo xtask python        the tests of the Python package (apart from test: it builds everything once more; skipped without Python)
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
@@ -35,7 +35,7 @@ fn main() -> ExitCode {
             test()
         }
         ["python"] => {
-            if python::test(false) {
+            if python::test() {
                 ExitCode::SUCCESS
             } else {
                 ExitCode::FAILURE
@@ -73,11 +73,6 @@ fn test() -> ExitCode {
             eprintln!("\n{name} failed");
             return ExitCode::FAILURE;
         }
-    }
-    eprintln!("\n== Python package");
-    if !python::test(true) {
-        eprintln!("\nthe tests of the Python package failed");
-        return ExitCode::FAILURE;
     }
     eprintln!("\nformatting, lints, tests and docs are in order");
     ExitCode::SUCCESS

@@ -23,15 +23,15 @@ const PACKAGES: [&str; 11] = [
 const MODULES: &str = "maturin, pytest, numpy, gymnasium, av, h5py, pandas, pyarrow, cv2, msgpack, websockets";
 const OPTIONAL: &str = "ray>=2.40";
 
-/// Builds the package and runs its tests; false where one failed. A machine without Python is no failure. `built`: the program is there already, as it is after the workspace's tests.
-pub fn test(built: bool) -> bool {
+/// Builds the package and runs its tests; false where one failed. A machine without Python is no failure.
+pub fn test() -> bool {
     let Some(python) = environment() else {
         eprintln!("   skipped: Python 3.10 or newer with venv, and network the first time, are needed");
         return true;
     };
     let (Ok(folder), Ok(source)) = (std::path::absolute(FOLDER), std::path::absolute("python")) else { return false };
     // The program evaluates Python policies in one of the tests.
-    if !built && !crate::cargo(&["build", "--release", "--locked", "-p", "trocar"], &[]) {
+    if !crate::cargo(&["build", "--release", "--locked", "-p", "trocar"], &[]) {
         return false;
     }
     let run = |arguments: &[&str]| {
