@@ -31,7 +31,7 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
         plan.task,
         r.policies.iter().map(|p| p.policy.as_str()).collect::<Vec<_>>().join(", ")
     );
-    let overview = page::section("Outcome", &lead, &cards(r));
+    let overview = page::section("Outcome", &lead, &cards(plan, r));
     let policies = page::section("Policies", "", &outcome(r));
     let stages = page::section(
         "Stages",
@@ -87,7 +87,7 @@ fn or_dash(value: Option<f64>, decimals: usize) -> String {
     value.map_or("\u{2013}".to_owned(), |v| fixed(v, decimals))
 }
 
-fn cards(r: &CampaignResult) -> String {
+fn cards(plan: &Plan, r: &CampaignResult) -> String {
     let mut all: Vec<Card> = Vec::new();
     if let [only] = r.policies.as_slice() {
         all.push(Card::new("Passed", format!("{} of {}", only.passed, only.episodes), share(&only.interval)));
@@ -100,9 +100,9 @@ fn cards(r: &CampaignResult) -> String {
     all.push(Card::new("Held to the end", format!("{held} of {attached}"), "of the episodes that attached the organ"));
     let within: usize = r.policies.iter().map(|p| p.rcm_within).sum();
     all.push(Card::new(
-        "RCM within 3 mm",
+        "RCM within the threshold",
         format!("{within} of {attached}"),
-        "the largest of the whole episode, of the attached",
+        format!("{} mm, the largest of the whole episode, of the attached", plan.rcm_threshold_mm),
     ));
     let inverted = r.policies.iter().map(|p| p.inverted_peak).max().unwrap_or(0);
     let diverged: usize = r.policies.iter().map(|p| p.ends[3]).sum();

@@ -1,75 +1,12 @@
-//! A small analytic tube as a specimen, as in the tests of the cell.
+//! The analytic tube of the cell's tests, and a task for it.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(dead_code, reason = "not every test uses all of it")]
 
-use glam::DVec3;
-use trocar_geometry::{LatticeMesher, SignedDistance, TetQuality};
-use trocar_scene::{Scene, SpecimenSource};
-use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
+#[path = "../../../cell/tests/common/mod.rs"]
+mod tube;
 
-/// A tube along x, 60 mm long and 9 mm thick: about the appendix.
-struct Tube;
-
-pub const RADIUS: f64 = 0.0045;
-pub const HALF_LENGTH: f64 = 0.030;
-
-impl SignedDistance for Tube {
-    fn distance(&self, p: DVec3) -> f64 {
-        (p - DVec3::X * p.x.clamp(RADIUS - HALF_LENGTH, HALF_LENGTH - RADIUS)).length() - RADIUS
-    }
-}
-
-pub const ONE_END: Pins = Pins::End { end: End::Base, length: 0.15, band_length: 0.0, band_share: 0.0 };
-
-/// The tube as a specimen under a camera that looks straight down.
-pub fn specimen(pins: Pins) -> Specimen {
-    meshed(pins, 2.2e-3)
-}
-
-/// The same in elements of edge `edge` [m].
-pub fn meshed(pins: Pins, edge: f64) -> Specimen {
-    let half = DVec3::new(HALF_LENGTH, RADIUS, RADIUS);
-    let body = LatticeMesher::uniform(edge).mesh_shape(&Tube, (-half, half)).unwrap();
-    let quality = TetQuality::of(&body);
-    let surface = body.boundary().0;
-    Specimen {
-        name: "tube".into(),
-        up: -DVec3::Z,
-        placement: trocar_geometry::Pose::IDENTITY,
-        camera: None,
-        organs: vec![Organ {
-            name: "tube".into(),
-            surface,
-            material: Material::default(),
-            pins,
-            base: -HALF_LENGTH * DVec3::X,
-            facts: OrganFacts { nodes: body.vertices.len(), inverted: quality.inverted, ..OrganFacts::default() },
-            body,
-        }],
-        background: None,
-        provenance: Provenance::default(),
-    }
-}
-
-/// The tube in elements of edge `edge` [m], and a second one, 25 mm beside it and 12 mm lower, which keeps the cell's floor away from the first.
-pub fn two_tubes(pins: Pins, edge: f64) -> Specimen {
-    let mut both = meshed(pins, edge);
-    let mut low = meshed(Pins::Band { share: 0.42 }, 4e-3).organs.remove(0);
-    let by = DVec3::new(0.0, 0.025, 0.012);
-    low.name = "low".into();
-    low.body.vertices.iter_mut().chain(&mut low.surface.vertices).for_each(|p| *p += by);
-    low.base += by;
-    both.organs.push(low);
-    both
-}
-
-/// The paper's cell with the tube along x below the middle between the ports.
-pub fn scene() -> Scene {
-    let mut scene = Scene::new("tube-cell", SpecimenSource::phantom("phantom-a", 1));
-    scene.placement.position_m = [0.0, 0.46, 0.045];
-    scene
-}
+use trocar_scene::Scene;
+pub use tube::*;
 
 /// A resection of the tube: pinned at its base, no start varied but by the scene's variation.
 pub fn resection() -> Scene {
