@@ -56,6 +56,7 @@ pub struct Session<'a> {
     frame: usize,
     stepping: Duration,
     last_step: Duration,
+    last_iterations: usize,
     summary: Summary,
     samples: Vec<Sample>,
     snapshots: Vec<Snapshot>,
@@ -112,6 +113,7 @@ impl<'a> Session<'a> {
             frame: 0,
             stepping: Duration::ZERO,
             last_step: Duration::ZERO,
+            last_iterations: 0,
             summary,
             samples: Vec::new(),
             snapshots: Vec::new(),
@@ -131,6 +133,11 @@ impl<'a> Session<'a> {
     /// Wall time of the stepping in the last frame.
     pub fn last_step(&self) -> Duration {
         self.last_step
+    }
+
+    /// The solver's iterations in the last frame, of all organs and substeps.
+    pub fn last_iterations(&self) -> usize {
+        self.last_iterations
     }
 
     /// What was measured, frame by frame, so far.
@@ -238,6 +245,7 @@ impl<'a> Session<'a> {
         let clock = Instant::now();
         let report = self.world.step(&self.gripper.motions_to(&next));
         self.last_step = clock.elapsed();
+        self.last_iterations = report.iterations;
         self.stepping += self.last_step;
         self.gripper = next;
         self.frame += 1;

@@ -45,6 +45,10 @@ pub struct GraspPhaseTiming {
     pub with_contact_ms: f64,
     /// The same without [ms].
     pub without_contact_ms: f64,
+    /// Mean number of the solver's iterations in a frame with contact, of all organs and substeps.
+    pub with_contact_iterations: f64,
+    /// The same without.
+    pub without_contact_iterations: f64,
     /// The slowest frame with contact [ms].
     pub worst_ms: f64,
     /// Share of the time with contact that contact costs, from the sums over the frames.
@@ -80,8 +84,27 @@ pub struct GraspBenchResult {
     pub machine: Machine,
 }
 
-/// One frame of a pair: phase, seconds with contact and without.
-type Pair = (&'static str, f64, f64);
+/// One frame of a pair.
+struct Pair {
+    phase: &'static str,
+    with: Frame,
+    without: Frame,
+}
+
+/// One frame of one run.
+#[derive(Clone, Copy)]
+struct Frame {
+    /// Wall time [s].
+    seconds: f64,
+    /// The solver's iterations.
+    iterations: usize,
+}
+
+impl Frame {
+    fn of(session: &Session<'_>) -> Self {
+        Self { seconds: session.last_step().as_secs_f64(), iterations: session.last_iterations() }
+    }
+}
 
 impl GraspBench {
     /// Runs the pairs; a phantom that has to be recorded and its specimen go to the folder `output`.
@@ -150,23 +173,27 @@ fn pair(a: &mut Session<'_>, b: &mut Session<'_>, progress: &dyn Progress) -> Re
         if let (Some(phase), Some(other)) = (phase(a), phase(b))
             && phase == other
         {
-            times.push((phase, a.last_step().as_secs_f64(), b.last_step().as_secs_f64()));
+            times.push(Pair { phase, with: Frame::of(a), without: Frame::of(b) });
         }
     }
     Ok(times)
 }
 
 fn timing(phase: &'static str, pairs: &[Pair]) -> GraspPhaseTiming {
-    let chosen = |p: &&Pair| if phase == "all" { PHASES.contains(&p.0) } else { p.0 == phase };
-    let (mut with, mut without): (Vec<f64>, Vec<f64>) = pairs.iter().filter(chosen).map(|p| (p.1, p.2)).unzip();
-    let sum = |times: &[f64]| times.iter().sum::<f64>();
-    let contact_share = 1.0 - sum(&without) / sum(&with);
+    let chosen = |p: &&Pair| if phase == "all" { PHASES.contains(&p.phase) } else { p.phase == phase };
+    let (with, without): (Vec<Frame>, Vec<Frame>) = pairs.iter().filter(chosen).map(|p| (p.with, p.without)).unzip();
+    let seconds = |frames: &[Frame]| frames.iter().map(|f| f.seconds).collect::<Vec<f64>>();
+    let iterations = |frames: &[Frame]| frames.iter().map(|f| f.iterations as f64).sum::<f64>() / frames.len() as f64;
+    let (mut with_s, mut without_s) = (seconds(&with), seconds(&without));
+    let contact_share = 1.0 - without_s.iter().sum::<f64>() / with_s.iter().sum::<f64>();
     GraspPhaseTiming {
         phase,
         frames: with.len(),
-        with_contact_ms: 1e3 * median(&mut with),
-        without_contact_ms: 1e3 * median(&mut without),
-        worst_ms: 1e3 * with.last().copied().unwrap_or(f64::NAN),
+        with_contact_ms: 1e3 * median(&mut with_s),
+        without_contact_ms: 1e3 * median(&mut without_s),
+        with_contact_iterations: iterations(&with),
+        without_contact_iterations: iterations(&without),
+        worst_ms: 1e3 * with_s.last().copied().unwrap_or(f64::NAN),
         contact_share,
     }
 }
@@ -177,7 +204,9 @@ mod tests {
 
     #[test]
     fn the_share_is_of_the_time_with_contact() {
-        let pairs: Vec<Pair> = vec![("settle", 9.0, 0.1), ("close", 0.004, 0.001), ("lift", 0.002, 0.002)];
+        let frame = |seconds| Frame { seconds, iterations: 8 };
+        let pair = |phase, with, without| Pair { phase, with: frame(with), without: frame(without) };
+        let pairs = vec![pair("settle", 9.0, 0.1), pair("close", 0.004, 0.001), pair("lift", 0.002, 0.002)];
         let all = timing("all", &pairs);
         assert_eq!(all.frames, 2);
         assert!((all.contact_share - 0.5).abs() < 1e-12 && (all.with_contact_ms - 3.0).abs() < 1e-12);

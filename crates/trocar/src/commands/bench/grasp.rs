@@ -19,13 +19,15 @@ pub fn run(arguments: &GraspBench, json: bool, progress: &dyn Progress) -> Resul
 }
 
 fn text(r: &GraspBenchResult) -> String {
-    let header = ["phase", "frames", "contact ms", "without ms", "worst ms", "contact's share"];
+    let header = ["phase", "frames", "contact ms", "without ms", "iterations", "without", "worst ms", "contact's share"];
     let row = |p: &GraspPhaseTiming| {
         vec![
             p.phase.to_owned(),
             p.frames.to_string(),
             format!("{:.2}", p.with_contact_ms),
             format!("{:.2}", p.without_contact_ms),
+            format!("{:.1}", p.with_contact_iterations),
+            format!("{:.1}", p.without_contact_iterations),
             format!("{:.2}", p.worst_ms),
             format!("{:.1}%", 100.0 * p.contact_share),
         ]
