@@ -44,6 +44,6 @@ pub use mouth::{CONTACT_SKIN, Mouth, Mouthful, attached};
 pub use phase::Phase;
 pub use policy::Policy;
 pub use random_actions::RandomActions;
-pub use session::Session;
+pub use session::{Moment, Session};
 pub use severance::{CutOrgan, Severance, SeveredPiece};
 pub use world::{FRAME, Surroundings, VISCOSITY_TIME, World};

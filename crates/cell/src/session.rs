@@ -16,7 +16,7 @@ use crate::{
 use glam::DVec3;
 use std::time::{Duration, Instant};
 use trocar_specimen::Specimen;
-use trocar_tissue::{Event, State, StepReport};
+use trocar_tissue::{Event, Load, State, StepReport};
 
 /// The one gripper's.
 const TOOLS: Tools = Tools::of(0);
@@ -32,6 +32,13 @@ enum JawCommand {
     Squeeze,
     /// Stay.
     Stay,
+}
+
+/// Where a [`Session`] is in an instant.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    state: State,
+    gripper: Gripper,
 }
 
 /// A [`GraspLift`] in progress: [`advance`](Self::advance) until it is over, then [`finish`](Self::finish).
@@ -55,6 +62,8 @@ pub struct Session<'a> {
     resection: Option<Resection>,
     frame: usize,
     stepping: Duration,
+    /// Loads on nodes and the gripper's place in the next frame, if they are given.
+    given: Option<(Vec<Load>, Gripper)>,
     last_step: Duration,
     last_iterations: usize,
     summary: Summary,
@@ -112,6 +121,7 @@ impl<'a> Session<'a> {
             resection: None,
             frame: 0,
             stepping: Duration::ZERO,
+            given: None,
             last_step: Duration::ZERO,
             last_iterations: 0,
             summary,
@@ -149,6 +159,28 @@ impl<'a> Session<'a> {
     pub fn size(&self) -> (usize, usize) {
         let bodies = self.world.model.bodies();
         (bodies.iter().map(|b| b.len()).sum(), bodies.iter().map(|b| b.tets().len()).sum())
+    }
+
+    /// Where all nodes are and how fast, and the gripper.
+    pub fn moment(&self) -> Moment {
+        Moment { state: self.world.state.clone(), gripper: self.gripper }
+    }
+
+    /// Does the frame that `other` has done from the moment `before`: from the same places and velocities, with the same gripper, under what contact did to nodes there. So a run without
+    /// contact moves, frame by frame, as one that has it. As [`advance`](Self::advance) else.
+    ///
+    /// # Errors
+    /// As [`advance`](Self::advance).
+    pub fn shadow(&mut self, other: &Session<'_>, before: &Moment) -> Result<bool> {
+        self.world.state.copy_motion(&before.state);
+        self.gripper = before.gripper;
+        self.given = Some((other.world.contact_loads(), other.gripper));
+        self.advance()
+    }
+
+    /// Largest distance between a node of this run and the same one of another [m].
+    pub fn off(&self, other: &Session<'_>) -> f64 {
+        self.largest_motion_since(&other.world.state)
     }
 
     /// Does one frame; false when there is none left, or the run has diverged.
@@ -239,11 +271,13 @@ impl<'a> Session<'a> {
 
     /// One frame: move the gripper, step the world, measure. `share` of the phase is over at the frame's end.
     fn step(&mut self, phase: Phase, share: f64) -> Result<()> {
-        let next = self.gripper_at(phase, share);
+        let given = self.given.take();
+        let next = given.as_ref().map_or_else(|| self.gripper_at(phase, share), |(_, gripper)| *gripper);
+        let loads = given.as_ref().map_or(&[][..], |(loads, _)| loads);
         let activation = phase == Phase::Lift && self.frame_of_phase == 1;
         let before = activation.then(|| self.world.state.clone());
         let clock = Instant::now();
-        let report = self.world.step(&self.gripper.motions_to(&next));
+        let report = self.world.step_under(&self.gripper.motions_to(&next), loads);
         self.last_step = clock.elapsed();
         self.last_iterations = report.iterations;
         self.stepping += self.last_step;

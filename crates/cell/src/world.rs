@@ -5,8 +5,8 @@ use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Material, Model, ModelBuilder, Schedule, State,
-    Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
+    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder, Schedule,
+    State, Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
 };
 
 /// Length of a frame [s].
@@ -187,7 +187,17 @@ impl World {
 
     /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and colliders.
     pub fn step(&mut self, tools: &[ToolMotion]) -> trocar_tissue::StepReport {
-        self.stepper.step(&self.model, &mut self.state, tools)
+        self.step_under(tools, &[])
+    }
+
+    /// The same under `loads` on nodes.
+    pub fn step_under(&mut self, tools: &[ToolMotion], loads: &[Load]) -> trocar_tissue::StepReport {
+        self.stepper.step_under(&self.model, &mut self.state, tools, loads)
+    }
+
+    /// What tools and other organs did to nodes at the end of the last frame.
+    pub fn contact_loads(&self) -> Vec<Load> {
+        self.stepper.contact_loads(&self.model, &self.state)
     }
 }
 

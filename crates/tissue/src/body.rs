@@ -194,6 +194,13 @@ impl Body {
         f64::from(self.vertices[self.internal[node] as usize].mass)
     }
 
+    /// The node of every vertex.
+    pub(crate) fn nodes_of_vertices(&self) -> Vec<usize> {
+        let mut nodes = vec![0; self.len()];
+        self.internal.iter().enumerate().for_each(|(node, vertex)| nodes[*vertex as usize] = node);
+        nodes
+    }
+
     /// Young's modulus times the size of a vertex [N/m].
     pub(crate) fn tissue_stiffness(&self, vertex: usize) -> f32 {
         self.vertices[vertex].contact_stiffness / self.contact_stiffness as f32

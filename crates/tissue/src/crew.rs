@@ -1,10 +1,11 @@
 //! The bodies of a model with their solvers: those that may touch each other are stepped together, islands of them in parallel.
 
-use crate::contact::{Contacts, Coupling, Pairs, Reaction};
+use crate::contact::{Contacts, Coupling, Pairs, Reaction, Source};
 use crate::integrator::{Frame, Solver, Worker, for_each};
-use crate::report::Divergence;
+use crate::report::{Divergence, Measured};
 use crate::untangle::Untangler;
 use crate::{Body, BodyContact, Model, State, StepReport};
+use glam::DVec3;
 
 /// What the stepper knows of the solvers' kind: nothing.
 pub(crate) trait Crew: Send + Sync {
@@ -25,6 +26,9 @@ pub(crate) trait Crew: Send + Sync {
 
     /// Calls `tell` for every body with what it did to the tools in the last frame.
     fn for_bodies(&self, tell: &mut dyn FnMut(usize, &Reaction, Option<&Contacts>));
+
+    /// Calls `tell` for every force [N] that tools and other bodies did to a vertex at the end of the last frame, which left `state`, with its body.
+    fn for_contact(&self, state: &State, tell: &mut dyn FnMut(usize, u32, DVec3));
 }
 
 /// Makes the solver of a body; the flag says whether the calling thread is to do all the work.
@@ -85,6 +89,7 @@ impl<S: Solver> Crew for Workers<S> {
                     island: index,
                     reaction: Reaction::new(body),
                     untangler: Untangler::new(&state),
+                    measured: Measured::nothing(body.len()),
                     before: state.clone(),
                     state,
                 },
@@ -145,6 +150,27 @@ impl<S: Solver> Crew for Workers<S> {
     fn for_bodies(&self, tell: &mut dyn FnMut(usize, &Reaction, Option<&Contacts>)) {
         self.list.iter().for_each(|worker| tell(worker.index, &worker.reaction, worker.solver.contacts()));
     }
+
+    fn for_contact(&self, state: &State, tell: &mut dyn FnMut(usize, u32, DVec3)) {
+        for island in self.list.chunk_by(|a, b| a.island == b.island) {
+            let x = |m: usize, vertex: u32| state.bodies[island[m].index].x[vertex as usize];
+            for (m, worker) in island.iter().enumerate() {
+                let touches = worker.solver.contacts().map_or(&[][..], Contacts::touches);
+                for touch in touches.iter().filter(|touch| matches!(touch.source, Source::Collider(_))) {
+                    if let Some(push) = touch.push(x(m, touch.vertex)) {
+                        tell(worker.index, touch.vertex, -push.gradient.as_dvec3());
+                    }
+                }
+            }
+            for pair in island[0].pairs.list() {
+                if let Some(push) = pair.touch.push(pair.offset(x)) {
+                    for (m, vertex, share) in pair.shares() {
+                        tell(island[m].index, vertex, (-share * push.gradient).as_dvec3());
+                    }
+                }
+            }
+        }
+    }
 }
 
 /// Does the same with every island, in parallel: who is free takes the next.
@@ -183,8 +209,8 @@ fn advance<S: Solver>(island: &mut [Worker<S>], coupling: Option<&Coupling>, fra
     }
     island[0].pairs = pairs;
     S::advance(island, frame);
-    for_each(island, frame, |Worker { index, body, solver, state, report, reaction, .. }| {
-        report.measure(*index, body, state);
+    for_each(island, frame, |Worker { index, body, solver, state, report, reaction, measured, .. }| {
+        report.measure(*index, body, state, measured);
         reaction.take(&frame.of(*index), body, state, solver.contacts().is_none());
     });
     press_tools(island, frame);

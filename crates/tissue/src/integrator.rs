@@ -1,9 +1,10 @@
 //! What every solver is: it advances bodies by one frame, those that may touch each other together.
 
 use crate::contact::{Contacts, Pairs, Reaction};
+use crate::report::Measured;
 use crate::state::BodyState;
 use crate::untangle::Untangler;
-use crate::{Body, Collider, Grasp, StepReport, ToolMotion};
+use crate::{Body, Collider, Grasp, Load, StepReport, ToolMotion};
 use glam::{DVec3, Vec3A};
 use rayon::prelude::*;
 
@@ -37,6 +38,7 @@ pub(crate) struct Worker<S> {
     pub island: usize,
     pub reaction: Reaction,
     pub untangler: Untangler,
+    pub measured: Measured,
     /// The state at the frame's beginning.
     pub before: BodyState,
 }
@@ -54,6 +56,8 @@ pub(crate) struct Frame<'a> {
     pub grasps: &'a [Grasp],
     /// Motions of the tools, by tool.
     pub tools: &'a [ToolMotion],
+    /// Forces on nodes.
+    pub loads: &'a [Load],
     /// What touches bodies.
     pub colliders: &'a [Collider],
     /// Whether the calling thread is to do all the work.

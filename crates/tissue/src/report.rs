@@ -2,6 +2,7 @@
 
 use crate::Body;
 use crate::state::BodyState;
+use glam::Vec3A;
 
 /// A node at this speed [m/s] has diverged (the paper's particle velocity limit).
 pub(crate) const SPEED_LIMIT: f64 = 20.0;
@@ -22,7 +23,7 @@ pub enum Divergence {
         /// The body.
         body: usize,
     },
-    /// The state or the model is not the one that the stepper was made for, or a grasp holds nodes that the model lacks; nothing was stepped.
+    /// The state or the model is not the one that the stepper was made for, or a grasp or load is of nodes that the model lacks; nothing was stepped.
     OtherModel,
     /// An edge is longer than 10 times its rest length.
     OverStretch {
@@ -39,7 +40,7 @@ pub enum Divergence {
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::OtherModel => write!(f, "the stepper or a grasp was made for another model"),
+            Self::OtherModel => write!(f, "the stepper, a grasp or a load was made for another model"),
             Self::NonFinite { body } => write!(f, "body {body} has a position that is not finite"),
             Self::OverSpeed { body } => write!(f, "a node of body {body} is at the speed limit of {SPEED_LIMIT} m/s"),
             Self::Unsolved { body } => write!(f, "no minimum was found for body {body}"),
@@ -83,6 +84,21 @@ impl Default for StepReport {
     }
 }
 
+/// What was seen of a body, and where it was then.
+pub(crate) struct Measured {
+    x: Vec<Vec3A>,
+    v: Vec<Vec3A>,
+    seen: StepReport,
+}
+
+impl Measured {
+    /// Nothing yet, of a body of so many vertices.
+    pub fn nothing(vertices: usize) -> Self {
+        let nowhere = vec![Vec3A::NAN; vertices];
+        Self { x: nowhere.clone(), v: nowhere, seen: StepReport::default() }
+    }
+}
+
 impl StepReport {
     /// Both together.
     pub(crate) fn with(self, other: &Self) -> Self {
@@ -101,8 +117,20 @@ impl StepReport {
         }
     }
 
-    /// Fills in what is seen of a body at the end of the frame.
-    pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState) {
+    /// Fills in what is seen of a body at the end of the frame; `last` remembers it for a body that stays where it is.
+    pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState, last: &mut Measured) {
+        if last.seen.divergence.is_some() || state.x != last.x || state.v != last.v {
+            let mut seen = Self::default();
+            seen.look(index, body, state);
+            last.x.clone_from(&state.x);
+            last.v.clone_from(&state.v);
+            last.seen = seen;
+        }
+        let Self { max_speed, inverted, min_volume_ratio, divergence, .. } = last.seen;
+        *self = Self { max_speed, inverted, min_volume_ratio, divergence: divergence.or(self.divergence), ..*self };
+    }
+
+    fn look(&mut self, index: usize, body: &Body, state: &BodyState) {
         let finite = state.x.iter().chain(&state.v).all(|p| p.is_finite());
         if !finite {
             self.divergence = Some(Divergence::NonFinite { body: index });

@@ -92,6 +92,19 @@ impl State {
         (0..model.bodies[body].len()).map(|node| self.position(model, body, node)).collect()
     }
 
+    /// Takes over where all nodes are and how fast from another state, and nothing else: not what friction remembers, nor grasps. False, and nothing is changed, if that has other bodies.
+    pub fn copy_motion(&mut self, other: &Self) -> bool {
+        let sizes = |state: &Self| state.bodies.iter().map(|body| body.x.len()).collect::<Vec<_>>();
+        if sizes(self) != sizes(other) {
+            return false;
+        }
+        for (to, from) in self.bodies.iter_mut().zip(&other.bodies) {
+            to.x.copy_from_slice(&from.x);
+            to.v.copy_from_slice(&from.v);
+        }
+        true
+    }
+
     /// Velocity of a node [m/s].
     pub fn velocity(&self, model: &Model, body: usize, node: usize) -> DVec3 {
         self.bodies[body].v[model.bodies[body].internal[node] as usize].as_dvec3()

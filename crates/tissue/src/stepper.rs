@@ -7,7 +7,8 @@ use crate::integrator::Frame;
 use crate::oracle::NewtonIntegrator;
 use crate::quasi_newton::QuasiNewtonSolver;
 use crate::report::Divergence;
-use crate::{Error, Event, Model, Result, Schedule, State, StepReport, ToolForce, ToolMotion};
+use crate::{Error, Event, Load, Model, Result, Schedule, State, StepReport, ToolForce, ToolMotion};
+use glam::DVec3;
 
 /// Advances states of one model; owns all scratch memory, so stepping allocates nothing, but for lists of what bodies touch that get longer than they ever were.
 pub struct Stepper {
@@ -68,17 +69,35 @@ impl Stepper {
         &self.events
     }
 
+    /// What tools and other bodies did to nodes at the end of the last frame, which left `state`: the loads that would do the same. Supports and grasps are left out.
+    pub fn contact_loads(&self, model: &Model, state: &State) -> Vec<Load> {
+        let mut loads = Vec::new();
+        if self.crew.fits(model, state) {
+            self.crew.for_contact(state, &mut |body, vertex, force| loads.push((body, vertex, force)));
+        }
+        let nodes: Vec<Vec<usize>> = model.bodies.iter().map(crate::Body::nodes_of_vertices).collect();
+        let load =
+            |(body, vertex, force): (usize, u32, DVec3)| Load { body, node: nodes[body][vertex as usize], force };
+        loads.into_iter().map(load).collect()
+    }
+
     /// Advances `state` by one frame. `tools` are the motions of the tools that carry the state's grasps; what is held by a tool without a motion stays where it is.
     pub fn step(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion]) -> StepReport {
+        self.step_under(model, state, tools, &[])
+    }
+
+    /// The same under `loads` on nodes.
+    pub fn step_under(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion], loads: &[Load]) -> StepReport {
         self.events.clear();
         self.forces.clear();
-        if !self.crew.fits(model, state) || !state.grasps_fit(model) {
+        let fit = || state.grasps_fit(model) && loads.iter().all(|load| load.fits(model));
+        if !self.crew.fits(model, state) || !fit() {
             return StepReport { divergence: Some(Divergence::OtherModel), ..StepReport::default() };
         }
         let grasps = std::mem::take(&mut state.grasps);
         let (gravity, colliders) = (model.gravity, &model.colliders[..]);
         let alone = self.pool.is_none();
-        let frame = Frame { dt: self.dt, gravity, index: 0, grasps: &grasps, tools, colliders, alone };
+        let frame = Frame { dt: self.dt, gravity, index: 0, grasps: &grasps, tools, loads, colliders, alone };
         let report = self.crew.advance(model, state, &frame, self.pool.as_ref());
         state.grasps = grasps;
         if !matches!(report.divergence, Some(Divergence::NonFinite { .. })) {

@@ -156,6 +156,7 @@ mod tests {
             index: 0,
             grasps: &[],
             tools: &[],
+            loads: &[],
             colliders: &[],
             alone: true,
         };

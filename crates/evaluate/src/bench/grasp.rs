@@ -1,4 +1,8 @@
-//! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole specimen with all contact and with none, frame beside frame.
+//! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole specimen with all contact, and without, frame beside frame.
+//!
+//! Without contact there are two runs. In one nothing takes its place: jaws pass through tissue that stays at rest, and what is saved is contact and all motion that it causes. In the other every
+//! frame starts where the run with contact started it, and every node gets the force that contact did to it there, so that tissue moves alike: what is saved is contact alone (finding it, its forces, and
+//! the iterations that its stiffness costs).
 
 use super::machine::Machine;
 use super::timing::median;
@@ -28,7 +32,7 @@ pub struct GraspBench {
     pub design: GraspDesign,
     /// Force of the jaws [N].
     pub jaw_force: f64,
-    /// Times that the pair of runs is repeated.
+    /// Times that the runs are repeated.
     pub repeats: usize,
     /// Worker threads, 0 for all.
     pub threads: usize,
@@ -39,20 +43,28 @@ pub struct GraspBench {
 pub struct GraspPhaseTiming {
     /// Its name; "all" for all of them.
     pub phase: &'static str,
-    /// Frames timed, each with contact and without.
+    /// Frames timed, of each run.
     pub frames: usize,
     /// Median wall time of a frame with contact [ms].
     pub with_contact_ms: f64,
-    /// The same without [ms].
+    /// The same without, under the forces that contact did [ms].
+    pub same_motion_ms: f64,
+    /// How far a node was from where contact had it after a frame under contact's forces, median over the frames [mm].
+    pub same_motion_off_mm: f64,
+    /// The same without contact and its forces [ms].
     pub without_contact_ms: f64,
     /// Mean number of the solver's iterations in a frame with contact, of all organs and substeps.
     pub with_contact_iterations: f64,
-    /// The same without.
+    /// The same without, under the forces that contact did.
+    pub same_motion_iterations: f64,
+    /// The same without contact and its forces.
     pub without_contact_iterations: f64,
     /// The slowest frame with contact [ms].
     pub worst_ms: f64,
-    /// Share of the time with contact that contact costs, from the sums over the frames.
+    /// Share of the time with contact that contact costs: more than the same motion without, from the sums over the frames.
     pub contact_share: f64,
+    /// Share of it that contact and all motion it causes cost: more than without contact and its forces.
+    pub contact_and_motion_share: f64,
 }
 
 /// The benchmark's outcome.
@@ -62,8 +74,10 @@ pub struct GraspBenchResult {
     pub real_time_factor: f64,
     /// The same without contact.
     pub real_time_factor_without_contact: f64,
-    /// Share of the time that contact costs.
+    /// Share of the time that contact costs: more than the same motion without.
     pub contact_share: f64,
+    /// Share of it that contact and all motion it causes cost.
+    pub contact_and_motion_share: f64,
     /// Phase by phase, and all of them first.
     pub phases: Vec<GraspPhaseTiming>,
     /// The grasp design's name.
@@ -76,7 +90,7 @@ pub struct GraspBenchResult {
     pub nodes: usize,
     /// Elements.
     pub tets: usize,
-    /// Pairs of runs.
+    /// Times that they were run.
     pub repeats: usize,
     /// Worker threads.
     pub threads: usize,
@@ -84,10 +98,13 @@ pub struct GraspBenchResult {
     pub machine: Machine,
 }
 
-/// One frame of a pair.
-struct Pair {
+/// One frame of each run.
+struct Frames {
     phase: &'static str,
     with: Frame,
+    same_motion: Frame,
+    /// How far a node of the same motion was from where contact had it, at most [m].
+    off: f64,
     without: Frame,
 }
 
@@ -107,7 +124,7 @@ impl Frame {
 }
 
 impl GraspBench {
-    /// Runs the pairs; a phantom that has to be recorded and its specimen go to the folder `output`.
+    /// Does the runs; a phantom that has to be recorded and its specimen go to the folder `output`.
     ///
     /// # Errors
     /// A specimen that cannot be had or simulated, an option out of range, an interruption.
@@ -123,22 +140,24 @@ impl GraspBench {
         let with =
             GraspLift { design: self.design, jaw_force: self.jaw_force, threads: self.threads, ..GraspLift::default() };
         let without = GraspLift { contact: false, ..with.clone() };
-        let (mut pairs, mut size, mut held) = (Vec::new(), (0, 0), false);
+        let (mut times, mut size, mut held) = (Vec::new(), (0, 0), false);
         for _ in 0..self.repeats {
-            let (mut a, mut b) = (Session::new(&with, &specimen)?, Session::new(&without, &specimen)?);
+            let mut a = Session::new(&with, &specimen)?;
+            let (mut b, mut c) = (Session::new(&without, &specimen)?, Session::new(&without, &specimen)?);
             size = a.size();
-            progress.begin("pair of runs", a.frames() as u64);
-            let timed = pair(&mut a, &mut b, progress);
+            progress.begin("three runs side by side", a.frames() as u64);
+            let timed = together([&mut a, &mut b, &mut c], progress);
             progress.end();
-            pairs.extend(timed?);
+            times.extend(timed?);
             held = a.finish().summary.held;
         }
-        let all = timing("all", &pairs);
+        let all = timing("all", &times);
         Ok(GraspBenchResult {
             real_time_factor: 1e3 * FRAME / all.with_contact_ms,
             real_time_factor_without_contact: 1e3 * FRAME / all.without_contact_ms,
             contact_share: all.contact_share,
-            phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &pairs))).collect(),
+            contact_and_motion_share: all.contact_and_motion_share,
+            phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &times))).collect(),
             design: self.design.name(),
             held,
             organs: specimen.organs.len(),
@@ -151,50 +170,73 @@ impl GraspBench {
     }
 }
 
-/// Steps both runs frame by frame, each first in every second frame, so that what disturbs the machine disturbs both.
-fn pair(a: &mut Session<'_>, b: &mut Session<'_>, progress: &dyn Progress) -> Result<Vec<Pair>> {
+/// Steps the runs frame by frame in changing order, so that what disturbs the machine disturbs all.
+fn together(runs: [&mut Session<'_>; 3], progress: &dyn Progress) -> Result<Vec<Frames>> {
+    let [a, b, c] = runs;
     let mut times = Vec::new();
     for frame in 0.. {
         if progress.interrupted() {
             return Err(Error::Interrupted);
         }
-        let both = if frame % 2 == 0 {
-            let first = a.advance()?;
-            b.advance()? && first
-        } else {
-            let first = b.advance()?;
-            a.advance()? && first
+        let before = a.moment();
+        let all = match frame % 3 {
+            0 => [b.advance()?, a.advance()?, c.shadow(a, &before)?],
+            1 => [a.advance()?, b.advance()?, c.shadow(a, &before)?],
+            _ => [a.advance()?, c.shadow(a, &before)?, b.advance()?],
         };
-        if !both {
+        if all.contains(&false) {
             break;
         }
         progress.advance(1);
         let phase = |s: &Session<'_>| s.samples().last().map(|s| s.phase);
-        if let (Some(phase), Some(other)) = (phase(a), phase(b))
-            && phase == other
-        {
-            times.push(Pair { phase, with: Frame::of(a), without: Frame::of(b) });
+        if let Some(phase) = phase(a).filter(|p| [phase(b), phase(c)] == [Some(*p); 2]) {
+            times.push(Frames {
+                phase,
+                off: c.off(a),
+                with: Frame::of(a),
+                same_motion: Frame::of(c),
+                without: Frame::of(b),
+            });
         }
     }
     Ok(times)
 }
 
-fn timing(phase: &'static str, pairs: &[Pair]) -> GraspPhaseTiming {
-    let chosen = |p: &&Pair| if phase == "all" { PHASES.contains(&p.phase) } else { p.phase == phase };
-    let (with, without): (Vec<Frame>, Vec<Frame>) = pairs.iter().filter(chosen).map(|p| (p.with, p.without)).unzip();
-    let seconds = |frames: &[Frame]| frames.iter().map(|f| f.seconds).collect::<Vec<f64>>();
-    let iterations = |frames: &[Frame]| frames.iter().map(|f| f.iterations as f64).sum::<f64>() / frames.len() as f64;
-    let (mut with_s, mut without_s) = (seconds(&with), seconds(&without));
-    let contact_share = 1.0 - without_s.iter().sum::<f64>() / with_s.iter().sum::<f64>();
+fn timing(phase: &'static str, frames: &[Frames]) -> GraspPhaseTiming {
+    let chosen = |f: &&Frames| if phase == "all" { PHASES.contains(&f.phase) } else { f.phase == phase };
+    let of = |run: fn(&Frames) -> Frame| Run(frames.iter().filter(chosen).map(run).collect());
+    let (with, same_motion, without) = (of(|f| f.with), of(|f| f.same_motion), of(|f| f.without));
+    let mut off: Vec<f64> = frames.iter().filter(chosen).map(|f| f.off).collect();
     GraspPhaseTiming {
         phase,
-        frames: with.len(),
-        with_contact_ms: 1e3 * median(&mut with_s),
-        without_contact_ms: 1e3 * median(&mut without_s),
-        with_contact_iterations: iterations(&with),
-        without_contact_iterations: iterations(&without),
-        worst_ms: 1e3 * with_s.last().copied().unwrap_or(f64::NAN),
-        contact_share,
+        frames: with.0.len(),
+        with_contact_ms: with.median_ms(),
+        same_motion_ms: same_motion.median_ms(),
+        same_motion_off_mm: 1e3 * median(&mut off),
+        without_contact_ms: without.median_ms(),
+        with_contact_iterations: with.iterations(),
+        same_motion_iterations: same_motion.iterations(),
+        without_contact_iterations: without.iterations(),
+        worst_ms: 1e3 * with.0.iter().map(|f| f.seconds).fold(f64::NAN, f64::max),
+        contact_share: 1.0 - same_motion.seconds() / with.seconds(),
+        contact_and_motion_share: 1.0 - without.seconds() / with.seconds(),
+    }
+}
+
+/// Frames of one run.
+struct Run(Vec<Frame>);
+
+impl Run {
+    fn seconds(&self) -> f64 {
+        self.0.iter().map(|f| f.seconds).sum()
+    }
+
+    fn iterations(&self) -> f64 {
+        self.0.iter().map(|f| f.iterations as f64).sum::<f64>() / self.0.len() as f64
+    }
+
+    fn median_ms(&self) -> f64 {
+        1e3 * median(&mut self.0.iter().map(|f| f.seconds).collect::<Vec<f64>>())
     }
 }
 
@@ -205,12 +247,23 @@ mod tests {
     #[test]
     fn the_share_is_of_the_time_with_contact() {
         let frame = |seconds| Frame { seconds, iterations: 8 };
-        let pair = |phase, with, without| Pair { phase, with: frame(with), without: frame(without) };
-        let pairs = vec![pair("settle", 9.0, 0.1), pair("close", 0.004, 0.001), pair("lift", 0.002, 0.002)];
-        let all = timing("all", &pairs);
+        let frames = |phase, [with, same_motion, without]: [f64; 3]| Frames {
+            phase,
+            with: frame(with),
+            same_motion: frame(same_motion),
+            off: 0.0,
+            without: frame(without),
+        };
+        let timed = vec![
+            frames("settle", [9.0, 9.0, 0.1]),
+            frames("close", [0.004, 0.003, 0.001]),
+            frames("lift", [0.002, 0.0015, 0.002]),
+        ];
+        let all = timing("all", &timed);
         assert_eq!(all.frames, 2);
-        assert!((all.contact_share - 0.5).abs() < 1e-12 && (all.with_contact_ms - 3.0).abs() < 1e-12);
-        assert!((timing("close", &pairs).contact_share - 0.75).abs() < 1e-12);
-        assert!(timing("open", &pairs).with_contact_ms.is_nan());
+        assert!((all.contact_share - 0.25).abs() < 1e-12 && (all.contact_and_motion_share - 0.5).abs() < 1e-12);
+        assert!((all.with_contact_ms - 3.0).abs() < 1e-12);
+        assert!((timing("close", &timed).contact_share - 0.25).abs() < 1e-12);
+        assert!(timing("open", &timed).with_contact_ms.is_nan());
     }
 }

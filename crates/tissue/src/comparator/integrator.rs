@@ -12,6 +12,8 @@ pub(crate) struct ComparatorIntegrator {
     scheme: Scheme,
     mechanics: Mechanics,
     particles: Particles,
+    /// Of gravity and loads [m/s2].
+    accelerations: Vec<DVec3>,
     fixed: Vec<bool>,
     targets: Vec<DVec3>,
 }
@@ -41,6 +43,7 @@ impl ComparatorIntegrator {
             scheme: scheme(&mechanics),
             mechanics,
             particles: Particles { x: zeros.clone(), v: zeros.clone() },
+            accelerations: zeros.clone(),
             fixed: vec![false; body.len()],
             targets: zeros,
         }
@@ -59,7 +62,7 @@ impl Solver for ComparatorIntegrator {
 
 impl ComparatorIntegrator {
     fn step(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState, report: &mut StepReport) {
-        let Self { scheme, mechanics, particles, fixed, targets } = self;
+        let Self { scheme, mechanics, particles, accelerations, fixed, targets } = self;
         for i in 0..state.x.len() {
             fixed[i] = body.vertices[i].pinned;
             particles.x[i] = state.x[i].as_dvec3();
@@ -70,7 +73,9 @@ impl ComparatorIntegrator {
         }
         targets.copy_from_slice(&particles.x);
         frame.for_all_held(body, 1.0, |vertex, x| targets[vertex] = x.as_dvec3());
-        let span = Span { dt: frame.dt, gravity: frame.gravity, fixed, targets };
+        accelerations.fill(frame.gravity);
+        frame.for_loads(body, |i, force| accelerations[i] += force / mechanics.masses[i]);
+        let span = Span { dt: frame.dt, accelerations, fixed, targets };
         // A body at the speed limit is one in the report too, which looks at the state that is left here.
         match scheme {
             Scheme::SemiImplicit { substeps, force } => {

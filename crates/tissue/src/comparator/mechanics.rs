@@ -34,8 +34,8 @@ pub(crate) struct Particles {
 pub(crate) struct Span<'a> {
     /// [s]
     pub dt: f64,
-    /// [m/s2]
-    pub gravity: DVec3,
+    /// Of gravity and loads, by vertex [m/s2].
+    pub accelerations: &'a [DVec3],
     /// Pinned or held vertices.
     pub fixed: &'a [bool],
     /// Read for fixed vertices only [m].

@@ -136,12 +136,12 @@ impl Form<'_> {
         }
     }
 
-    /// Velocities after gravity, elastic forces and supports.
+    /// Velocities after gravity, loads, elastic forces and supports.
     fn accelerate(&self, h: f64, x: &[DVec3], v: &mut [DVec3], force: &[DVec3]) {
         let (m, span) = (self.mechanics, &self.span);
         for i in (0..x.len()).filter(|i| !span.fixed[*i]) {
             let per_mass = h / m.masses[i];
-            v[i] += h * span.gravity + per_mass * force[i];
+            v[i] += h * span.accelerations[i] + per_mass * force[i];
             for support in &m.supports {
                 let touch = support.touch(x[i] + m.origin);
                 let depth = -touch.height;

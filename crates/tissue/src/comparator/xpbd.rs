@@ -117,7 +117,11 @@ pub(crate) fn advance(
         // What is left of a fixed vertex's way is spread over what is left of the span.
         let share = 1.0 / (settings.substeps + 1 - substep) as f64;
         for (i, x) in x.iter_mut().enumerate() {
-            *x = if span.fixed[i] { span.prescribed(i, *x, share) } else { *x + h * v[i] + h * h * span.gravity };
+            *x = if span.fixed[i] {
+                span.prescribed(i, *x, share)
+            } else {
+                *x + h * v[i] + h * h * span.accelerations[i]
+            };
         }
         scratch.elements.fill([0.0; 6]);
         scratch.planes.fill(0.0);

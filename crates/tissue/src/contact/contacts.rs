@@ -323,6 +323,7 @@ impl Contacts {
             index: 0,
             grasps: &[],
             tools: &[],
+            loads: &[],
             colliders: &[],
             alone: true,
         };

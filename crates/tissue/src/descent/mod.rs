@@ -124,10 +124,10 @@ pub(crate) fn sweep_substep<S: Sweeps>(island: &mut [Worker<S>], pairs: &mut Pai
             descent.sweep(frame, body, contacts, state);
         }
     }
-    for Worker { solver, state, report, .. } in island.iter_mut() {
+    for Worker { index, body, solver, state, report, .. } in island.iter_mut() {
         let descent = solver.sweeps().0;
         report.iterations += iterations;
-        descent.take_velocities(frame, state);
+        descent.take_velocities(&frame.of(*index), body, state);
     }
 }
 
@@ -173,6 +173,9 @@ impl DescentIntegrator {
         for (y, (x, v)) in self.predictor.iter_mut().zip(state.x.iter().zip(&state.v)) {
             *y = x + h * v + reach * gravity;
         }
+        frame.for_loads(body, |i, force| {
+            self.predictor[i] += force.as_vec3a() * (h * h / body.vertices[i].mass);
+        });
         self.guess(flies, h, gravity, state);
         self.place_fixed(frame, share, body);
         report.grasp_limited += usize::from(!self.start_sweeps(body, state));
@@ -214,7 +217,7 @@ impl DescentIntegrator {
 
     /// The velocity after the substep: v + h g + (x - y)/h. That is (x - x_start)/h for implicit Euler's predictor, and exact for the one of free
     /// flight; but the rounding of positions far from the body's origin does not enter it.
-    fn take_velocities(&self, frame: &Frame<'_>, state: &mut BodyState) {
+    fn take_velocities(&self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         let (h, gravity) = (self.step(frame), frame.gravity.as_vec3a());
         let strength = gravity.length_squared();
         let direction = if strength > 0.0 { gravity / strength } else { Vec3A::ZERO };
@@ -228,6 +231,11 @@ impl DescentIntegrator {
             state.falling[i] = ((velocity - state.v[i]) / h).dot(direction).clamp(0.0, 1.0);
             state.v[i] = velocity;
         }
+        frame.for_loads(body, |i, force| {
+            if !self.fixed[i] {
+                state.v[i] += force.as_vec3a() * (h / body.vertices[i].mass);
+            }
+        });
     }
 
     /// Marks the vertices that are fixed during this frame.

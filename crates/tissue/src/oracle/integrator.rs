@@ -64,8 +64,11 @@ impl NewtonIntegrator {
                 }
             }
             let elastic = &self.elastic;
-            let motion = Some(Motion::new(elastic, &nodes, frame.gravity, h));
-            let mut potential = Potential { elastic, motion, gravity: frame.gravity, limits: Vec::new() };
+            let mut motion = Motion::new(elastic, &nodes, frame.gravity, h);
+            for load in frame.loads.iter().filter(|load| load.body == frame.index) {
+                motion.push(elastic, load.node, load.force);
+            }
+            let mut potential = Potential { elastic, motion: Some(motion), gravity: frame.gravity, limits: Vec::new() };
             let mut x = nodes.x.clone();
             match friction::minimise(&mut self.solver, &mut potential, &fixed, &targets, &nodes.v, &mut x) {
                 Ok(solution) => report.iterations += solution.iterations,

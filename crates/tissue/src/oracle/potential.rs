@@ -89,6 +89,11 @@ impl Motion {
         Self { dt, lengths: elastic.dashpots.iter().map(length).collect(), predictor, places, start }
     }
 
+    /// Lets a force [N] act on a node throughout the step.
+    pub fn push(&mut self, elastic: &Elastic, node: usize, force: DVec3) {
+        self.predictor[node] += self.dt * self.dt / elastic.masses[node] * force;
+    }
+
     pub fn dt(&self) -> f64 {
         self.dt
     }

@@ -198,8 +198,7 @@ impl Factor {
 
 /// Adds what the dashpots resist within a substep to the stiffness, nodes numbered by `rank`.
 fn add_dashpots(body: &Body, rank: &[u32], h: f64, stiffness: &mut Stiffness) {
-    let mut node_of = vec![0; body.len()];
-    body.internal.iter().enumerate().for_each(|(node, i)| node_of[*i as usize] = node);
+    let node_of = body.nodes_of_vertices();
     for (i, node) in node_of.iter().enumerate() {
         for edge in body.edges_of(i).iter().filter(|edge| edge.damping > 0.0) {
             let to = node_of[edge.to as usize];

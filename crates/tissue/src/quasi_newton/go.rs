@@ -82,7 +82,7 @@ impl QuasiNewtonSolver {
         self.yielded = yielded;
         self.carried = carried || yielded;
         if !moves {
-            self.pass(h);
+            self.pass_in_place(h);
             return Guess::Still;
         }
         self.x[..free].copy_from_slice(&self.targets[..free]);

@@ -99,8 +99,7 @@ impl Island<'_> {
         let h = self.h;
         for_each(self.workers, self.frame, |Worker { solver, .. }| {
             solver.active = true;
-            solver.pass(h);
-            solver.elements.accept();
+            solver.pass_in_place(h);
         });
     }
 

@@ -43,6 +43,8 @@ pub(crate) struct QuasiNewtonSolver {
     /// Of a body that touches others and that nothing holds.
     pub(super) rigid: Option<Rigid>,
     pub(super) contacts: Contacts,
+    /// Forces from outside on free nodes [N].
+    loads: Vec<(u32, Vec3A)>,
     /// Limits of friction of what is touched [N], held during a search.
     pub(super) limits: Vec<f32>,
     pub(super) fallback: DescentIntegrator,
@@ -70,6 +72,11 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) was_resting: bool,
     /// Whether it moved in this substep, is where it is to be, and is left alone until others push it.
     pub(super) dozes: bool,
+    /// Where the elements were last looked at in place and accepted, and where that substep had begun; whether nothing else was looked at since, and whether the warp is that of there.
+    place_x: Vec<Row>,
+    place_start: Vec<Row>,
+    in_place: bool,
+    warped_in_place: bool,
     /// Where the body was last asked whether it is at rest, the gradient there, and its correction [m], if the factor is still the same.
     rest_x: Vec<Row>,
     rest_gradient: Vec<Row>,
@@ -119,6 +126,7 @@ impl QuasiNewtonSolver {
             warp: Warp::new(&layout),
             rigid: None,
             contacts: Contacts::new(body),
+            loads: Vec::new(),
             limits: Vec::with_capacity(2 * body.len()),
             fallback: DescentIntegrator::new(sweeps, body, alone),
             x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
@@ -142,6 +150,10 @@ impl QuasiNewtonSolver {
             pressed: false,
             was_resting: false,
             dozes: false,
+            place_x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
+            place_start: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
+            in_place: false,
+            warped_in_place: false,
             rest_x: rows(),
             rest_gradient: rows(),
             rest_correction: None,
@@ -162,6 +174,13 @@ impl QuasiNewtonSolver {
     pub fn begin(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         self.load(state);
         self.hold(frame, body);
+        self.loads.clear();
+        frame.for_loads(body, |vertex, force| {
+            let i = self.layout.number[vertex];
+            if (i as usize) < self.layout.free && !self.held[i as usize] {
+                self.loads.push((i, force.as_vec3a()));
+            }
+        });
         self.contacts.begin(frame, body, state);
         self.refresh_factor(frame, body, state);
     }
@@ -182,8 +201,21 @@ impl QuasiNewtonSolver {
 
     /// Forces and volume ratios where the nodes are; whether an element has lost too much of its accepted volume.
     pub fn pass(&mut self, h: f32) -> bool {
+        self.in_place = false;
         let Self { level, elements, layout, x, start, .. } = self;
         dispatch!(*level, simd => elements.pass(simd, layout, x, start, h))
+    }
+
+    /// The pass where a body is and stays, and those are the accepted positions. What has not moved since it was last looked at in place is not looked at again.
+    pub fn pass_in_place(&mut self, h: f32) {
+        if self.in_place && self.x == self.place_x && self.start == self.place_start {
+            return;
+        }
+        self.pass(h);
+        self.elements.accept();
+        self.place_x.copy_from_slice(&self.x);
+        self.place_start.copy_from_slice(&self.start);
+        (self.in_place, self.warped_in_place) = (true, false);
     }
 
     /// Begins a substep: where nodes would be without forces but gravity.
@@ -203,6 +235,9 @@ impl QuasiNewtonSolver {
 
     /// The warp of the nodes where they are.
     pub fn update_warp(&mut self) {
+        if self.in_place && std::mem::replace(&mut self.warped_in_place, true) {
+            return;
+        }
         let Self { level, warp, layout, x, .. } = self;
         dispatch!(*level, simd => warp.update(simd, layout, x));
     }
@@ -216,6 +251,9 @@ impl QuasiNewtonSolver {
             if let Some(push) = touch.push_within(position(&self.x[i]), *limit) {
                 add(&mut self.next_gradient[i], push.gradient);
             }
+        }
+        for (i, force) in &self.loads {
+            add(&mut self.next_gradient[*i as usize], -*force);
         }
     }
 

@@ -19,21 +19,35 @@ pub fn run(arguments: &GraspBench, json: bool, progress: &dyn Progress) -> Resul
 }
 
 fn text(r: &GraspBenchResult) -> String {
-    let header = ["phase", "frames", "contact ms", "without ms", "iterations", "without", "worst ms", "contact's share"];
+    let header = [
+        "phase",
+        "frames",
+        "contact ms",
+        "same motion",
+        "off mm",
+        "nothing",
+        "iterations",
+        "worst ms",
+        "contact",
+        "with motion",
+    ];
     let row = |p: &GraspPhaseTiming| {
+        let iterations = [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations];
         vec![
             p.phase.to_owned(),
             p.frames.to_string(),
             format!("{:.2}", p.with_contact_ms),
+            format!("{:.2}", p.same_motion_ms),
+            format!("{:.4}", p.same_motion_off_mm),
             format!("{:.2}", p.without_contact_ms),
-            format!("{:.1}", p.with_contact_iterations),
-            format!("{:.1}", p.without_contact_iterations),
+            iterations.map(|n| format!("{n:.0}")).join("/"),
             format!("{:.2}", p.worst_ms),
             format!("{:.1}%", 100.0 * p.contact_share),
+            format!("{:.1}%", 100.0 * p.contact_and_motion_share),
         ]
     };
     format!(
-        "{}\n{:.2}x real time with contact, {:.2}x without; {} grasp, {}; {} organs, {} nodes, {} tets; {} threads on {} cores{}",
+        "{}\nSame motion: every frame anew without contact but with its forces. Nothing: no contact, no forces.\n{:.2}x real time with contact, {:.2}x without; {} grasp, {}; {} organs, {} nodes, {} tets; {} threads on {} cores{}",
         output::table(&header, &r.phases.iter().map(row).collect::<Vec<_>>()),
         r.real_time_factor,
         r.real_time_factor_without_contact,

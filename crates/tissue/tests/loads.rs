@@ -1,0 +1,140 @@
+//! Forces on nodes: Newton's second law, a pulled column against its analytic length, and contact that is done over again by its own forces.
+
+mod common;
+
+use common::{FRAME, GRAVITY, block, model, nodes, schedules, tissue};
+use glam::{DQuat, DVec3};
+use trocar_geometry::Pose;
+use trocar_tissue::{
+    BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Newton, Schedule, SemiImplicit, Shape,
+    State, Stepper, ToolMotion, Xpbd,
+};
+
+/// Every solver that there is.
+fn solvers(model: &Model) -> Vec<(&'static str, Schedule)> {
+    let mut all: Vec<_> = schedules().into_iter().map(|judged| (judged.name, judged.schedule)).collect();
+    all.push(("Newton", Schedule::Newton(Newton { substeps: 2 })));
+    all.push(("semi-implicit", Schedule::SemiImplicit(SemiImplicit::stable(model, FRAME))));
+    all.push(("XPBD", Schedule::Xpbd(Xpbd::default())));
+    all
+}
+
+/// A free block whose nodes are pushed by their mass times an acceleration has that acceleration, in every solver.
+#[test]
+fn a_load_accelerates() {
+    let mesh = block([2, 2, 2], 2e-3);
+    let model = model(&mesh, tissue(12e3), vec![], DVec3::ZERO);
+    let acceleration = DVec3::new(0.3, -0.2, 0.5);
+    let body = &model.bodies()[0];
+    let loads: Vec<Load> =
+        (0..body.len()).map(|node| Load { body: 0, node, force: body.mass(node) * acceleration }).collect();
+    for (name, schedule) in solvers(&model) {
+        let mut state = State::new(&model);
+        let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+        for _ in 0..30 {
+            assert_eq!(stepper.step_under(&model, &mut state, &[], &loads).divergence, None);
+        }
+        for node in 0..body.len() {
+            let off = state.velocity(&model, 0, node) - 0.5 * acceleration;
+            assert!(off.length() < 1e-4, "{name}: node {node} is {off} m/s off after half a second");
+        }
+    }
+}
+
+/// A column that is pulled at its end is longer by F L / (E A) (nu = 0; 2% strain).
+#[test]
+fn a_pulled_column_stretches() {
+    let (cells, edge, length, side) = ([4, 4, 10], 2e-3, 0.02, 8e-3);
+    let mesh = block(cells, edge);
+    let material = Material { poisson_ratio: 0.0, viscosity: 40.0, ..tissue(12e3) };
+    let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), DVec3::ZERO);
+    let top = nodes(&mesh, |p| (p.z - length).abs() < 1e-9);
+    let pull = 0.02 * 12e3 * side * side;
+    // Each node's part of a uniform traction: its share of the area.
+    let share = |i: u32| {
+        let part = |x: f64| if x < 1e-9 || x > side - 1e-9 { 0.5 } else { 1.0 };
+        let p = mesh.vertices[i as usize];
+        part(p.x) * part(p.y) * (edge / side).powi(2)
+    };
+    let total: f64 = top.iter().map(|i| share(*i)).sum();
+    assert!((total - 1.0).abs() < 1e-12);
+    let loads: Vec<Load> =
+        top.iter().map(|i| Load { body: 0, node: *i as usize, force: DVec3::Z * (pull * share(*i)) }).collect();
+    for schedule in [Schedule::FAST, common::many_sweeps()] {
+        let mut state = State::new(&model);
+        let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
+        for _ in 0..120 {
+            stepper.step_under(&model, &mut state, &[], &loads);
+        }
+        let longer = state.centroid(&model, 0, &top).z - length;
+        assert!((longer / (0.02 * length) - 1.0).abs() < 0.03, "{schedule:?}: {:.4} mm longer", longer * 1e3);
+        // Without loads it goes back.
+        for _ in 0..120 {
+            stepper.step(&model, &mut state, &[]);
+        }
+        let left = state.centroid(&model, 0, &top).z - length;
+        assert!(left.abs() < 2e-5, "{schedule:?}: {:.4} mm are left", left * 1e3);
+    }
+}
+
+/// A ball pressed slowly into a pinned block, and the same block under the forces that the ball did: both come to the same dent.
+#[test]
+fn contact_is_done_over_by_its_forces() {
+    let mesh = block([8, 8, 4], 2e-3);
+    let build = |ball: bool| {
+        let mut builder = ModelBuilder::new().gravity(GRAVITY);
+        let (material, pinned) = (Material { viscosity: 4.0, ..tissue(12e3) }, nodes(&mesh, |p| p.z == 0.0));
+        builder
+            .body(BodyDescription { name: "block".into(), mesh: &mesh, material, pinned, supports: vec![] })
+            .unwrap();
+        if ball {
+            builder
+                .collider(Collider {
+                    name: "ball".into(),
+                    tool: 0,
+                    shape: Shape::Sphere { centre: DVec3::ZERO, radius: 5e-3 },
+                    rest_offset: 0.0,
+                    friction: 0.6,
+                })
+                .unwrap();
+        }
+        builder.build().unwrap()
+    };
+    let (touched, loaded) = (build(true), build(false));
+    let (mut a, mut b) = (State::new(&touched), State::new(&loaded));
+    let mut with = Stepper::new(&touched, Schedule::FAST, FRAME, 1).unwrap();
+    let mut under = Stepper::new(&loaded, Schedule::FAST, FRAME, 1).unwrap();
+    let at = |frame: usize| {
+        let depth = 1.5e-3 * (frame as f64 / 60.0).min(1.0);
+        Pose { translation: DVec3::new(8e-3, 8e-3, 13e-3 - depth), rotation: DQuat::IDENTITY }
+    };
+    for frame in 0..90 {
+        with.step(&touched, &mut a, &[ToolMotion { from: at(frame), to: at(frame + 1) }]);
+        let loads = with.contact_loads(&touched, &a);
+        under.step_under(&loaded, &mut b, &[], &loads);
+    }
+    let loads = with.contact_loads(&touched, &a);
+    let sum: DVec3 = loads.iter().map(|load| load.force).sum();
+    let told = with.forces()[0].contact.force;
+    assert!(told.length() > 0.02 && (sum + told).length() < 1e-3 * told.length(), "{sum} against {told}");
+    let place = |model: &Model, state: &State, i: usize| state.position(model, 0, i);
+    let dent = (0..mesh.vertices.len()).map(|i| place(&touched, &a, i).distance(mesh.vertices[i])).fold(0.0, f64::max);
+    let off =
+        (0..mesh.vertices.len()).map(|i| place(&touched, &a, i).distance(place(&loaded, &b, i))).fold(0.0, f64::max);
+    assert!(dent > 1e-3 && off < 0.01 * dent, "{:.4} mm off in a dent of {:.4} mm", off * 1e3, dent * 1e3);
+}
+
+/// A load on what is not there stops the step, and nothing has moved.
+#[test]
+fn a_load_on_no_node_is_refused() {
+    let mesh = block([1, 1, 1], 2e-3);
+    let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
+    let mut state = State::new(&model);
+    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let before = state.hash();
+    for (body, node) in [(1, 0), (0, 8)] {
+        let report = stepper.step_under(&model, &mut state, &[], &[Load { body, node, force: DVec3::X }]);
+        assert_eq!(report.divergence, Some(Divergence::OtherModel));
+    }
+    assert_eq!(state.hash(), before);
+}
