@@ -1,7 +1,7 @@
 """Reinforcement learning on GraspLift: Stable-Baselines3's SAC, with a few scripted demonstrations, learns to grasp and lift, and draws its learning curve.
 
     pip install stable-baselines3 matplotlib
-    python examples/python/train_grasp_lift.py --decisions 5000
+    python examples/python/train_grasp_lift.py --decisions 3000
 
 What is learned: the left arm's five targets, five decisions a second; the right arm stays. The policy sees what the robot measures
 (coordinates, tip, force, whether the jaws hold tissue, the stage). Only the reward knows more: the gain in stages is joined by how much
@@ -35,6 +35,8 @@ EVERY = 6
 STEP = np.array([0.07, 0.07, 0.009, 0.35])
 #: The left arm's numbers among an action's and among a state's.
 ARM, JAW = slice(0, 5), 4
+#: Episodes that shares and means are of.
+PART = 20
 #: Widths of the networks' hidden layers.
 NET = [128, 128]
 #: Within this distance of the organ the reward begins to pull [mm].
@@ -254,31 +256,30 @@ class Log(BaseCallback):
             if "episode" in info:
                 minutes = (time.perf_counter() - self.begun) / 60.0
                 self.rows.append((self.num_timesteps, minutes, info["episode"]["r"], info["stage"], info["is_success"]))
-                if len(self.rows) % 20 == 0:
-                    last = np.array(self.rows[-20:], float)
+                if len(self.rows) % PART == 0:
+                    last = np.array(self.rows[-PART:], float)
                     print(
-                        f"{self.num_timesteps} decisions, {minutes:.1f} min, {len(self.rows)} episodes; last 20: "
+                        f"{self.num_timesteps} decisions, {minutes:.1f} min, {len(self.rows)} episodes; last {PART}: "
                         f"return {last[:, 2].mean():.2f}, grasped {np.mean(last[:, 3] > 0):.0%}, passed {last[:, 4].mean():.0%}",
                         flush=True,
                     )
         return True
 
 
-def smooth(values: np.ndarray, part: int) -> np.ndarray:
-    return np.convolve(values, np.ones(part) / part, "valid")
-
-
 def draw(rows: np.ndarray, path: Path, script: float | None) -> None:
     """The learning curve: success and return of the episodes against decisions."""
-    part = max(1, min(20, len(rows) // 5))
+
+    def smooth(values: np.ndarray) -> np.ndarray:
+        return np.array([values[max(0, k + 1 - PART) : k + 1].mean() for k in range(len(values))])
+
     figure, axes = plt.subplots(2, 1, sharex=True, figsize=(7, 6))
-    axes[0].plot(rows[part - 1 :, 0], smooth((rows[:, 3] > 0).astype(float), part), label="grasped")
-    axes[0].plot(rows[part - 1 :, 0], smooth(rows[:, 4], part), label="passed: lifted and held")
-    axes[0].set_ylabel(f"share of the last {part} episodes")
+    axes[0].plot(rows[:, 0], smooth(rows[:, 3] > 0), label="grasped")
+    axes[0].plot(rows[:, 0], smooth(rows[:, 4]), label="passed: lifted and held")
+    axes[0].set_ylabel(f"share of the last {PART} episodes")
     axes[0].set_ylim(-0.02, 1.02)
     axes[0].legend(loc="lower right")
     axes[1].plot(rows[:, 0], rows[:, 2], ".", alpha=0.3)
-    axes[1].plot(rows[part - 1 :, 0], smooth(rows[:, 2], part))
+    axes[1].plot(rows[:, 0], smooth(rows[:, 2]))
     if script is not None:
         axes[1].axhline(script, color="grey", linestyle=":", label="scripted controller")
         axes[1].legend(loc="lower right")
@@ -291,7 +292,7 @@ def draw(rows: np.ndarray, path: Path, script: float | None) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--decisions", type=int, default=5000, help="five a second of simulated time")
+    parser.add_argument("--decisions", type=int, default=3000, help="five a second of simulated time")
     parser.add_argument("--demonstrations", type=int, default=10, help="scripted episodes in the replay buffer")
     parser.add_argument("--cells", type=int, default=4)
     parser.add_argument("--seconds", type=float, default=7.0, help="longest episode")
@@ -332,6 +333,7 @@ def main() -> None:
     if not len(rows):
         print("no episode was finished; give it more --decisions")
         return
+    options.output.parent.mkdir(parents=True, exist_ok=True)
     model.save(options.output.with_suffix(".zip"))
     np.savetxt(options.output.with_suffix(".csv"), rows, delimiter=",", header="decisions,minutes,return,stage,passed", fmt="%.4g")
     draw(rows, options.output, script)
