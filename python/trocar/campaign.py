@@ -177,6 +177,8 @@ def main(arguments: list[str] | None = None) -> int:
 
     def tell(done: int, missing: int) -> None:
         print(f"\r{done} of {missing} episodes", end="" if done < missing else "\n", file=sys.stderr, flush=True)
+        if done == missing:
+            print("writing the report, with moving pictures of the first failures", file=sys.stderr, flush=True)
 
     try:
         result = run(
