@@ -34,12 +34,23 @@ def program():
     return found
 
 
+def changed_scene(folder, task, seconds):
+    """The built-in scene as a file, with another task and another longest episode."""
+    text = (Path(__file__).parents[2] / "crates/scene/scenes/cell-a.toml").read_text()
+    text = text.replace('name = "appendix-resection"', f'name = "{task}"').replace("episode_s = 40.0", f"episode_s = {seconds}")
+    assert task in text and f"episode_s = {seconds}" in text
+    path = folder / f"{task}.toml"
+    path.write_text(text)
+    return path
+
+
 @pytest.fixture(scope="session")
 def short_scene(tmp_path_factory):
     """A scene file whose episodes of port-reach are over after half a second."""
-    text = (Path(__file__).parents[2] / "crates/scene/scenes/cell-a.toml").read_text()
-    text = text.replace('name = "appendix-resection"', 'name = "port-reach"').replace("episode_s = 40.0", "episode_s = 0.5")
-    assert "port-reach" in text and "episode_s = 0.5" in text
-    path = tmp_path_factory.mktemp("scene") / "short.toml"
-    path.write_text(text)
-    return path
+    return changed_scene(tmp_path_factory.mktemp("scene"), "port-reach", 0.5)
+
+
+@pytest.fixture(scope="session")
+def lift_scene(tmp_path_factory):
+    """A scene file of grasp-lift, with time enough to pass."""
+    return changed_scene(tmp_path_factory.mktemp("scene"), "grasp-lift", 20.0)

@@ -1,6 +1,7 @@
 """Datasets are read back by those who define the layouts, as far as they are installed: pyarrow and h5py always, LeRobot where it is."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ h5py = pytest.importorskip("h5py")
 import pandas as pd
 import pyarrow.parquet as pq
 from trocar.datasets import LeRobotWriter, RobomimicWriter
-from trocar.datasets import _stats, _video
+from trocar.datasets import _layouts, _stats, _video, lerobot
 
 FEATURES = {
     "observation.state": {"dtype": "float32", "shape": (3,), "names": ["x", "y", "z"]},
@@ -80,20 +81,74 @@ def test_a_dataset_is_gone_on_with_and_looks_as_if_written_at_once(tmp_path, ver
             assert (tmp_path / "whole" / name).read_text() == (tmp_path / "parts" / name).read_text(), name
 
 
-def test_an_episode_that_was_not_finished_leaves_nothing(tmp_path):
-    root = tmp_path / "set"
-    writer = write(root, "v3.0", [0])
-    before = (root / "meta/info.json").read_text()
+class Killed(Exception):
+    """In place of a kill: nothing after it is done."""
+
+
+def same(a, b):
+    """Two datasets hold the same files with the same contents."""
+    names = sorted(p.relative_to(a) for p in a.rglob("*") if p.is_file())
+    assert names == sorted(p.relative_to(b) for p in b.rglob("*") if p.is_file())
+    for name in names:
+        if name.suffix == ".parquet":
+            assert pq.read_table(a / name).equals(pq.read_table(b / name)), name
+        else:
+            assert (a / name).read_bytes() == (b / name).read_bytes(), name
+
+
+@pytest.mark.parametrize(("version", "mb"), [("v3.0", 0), ("v3.0", 16), ("v2.1", 16)])
+def test_killed_between_any_two_files_it_is_gone_on_with_as_if_never(tmp_path, monkeypatch, version, mb):
+    # With 0 every file is full after an episode, so that the next one begins new files.
+    monkeypatch.setattr(_layouts, "DATA_FILE_MB", mb)
+    write(tmp_path / "whole", version)
+    replace = os.replace
+    for kill in range(100):
+        root, left = tmp_path / f"killed-{kill}", [kill]
+
+        def counted(source, target):
+            if left[0] == 0:
+                raise Killed
+            left[0] -= 1
+            replace(source, target)
+
+        monkeypatch.setattr(os, "replace", counted)
+        try:
+            write(root, version)
+            assert kill > 12
+            break
+        except Killed:
+            pass
+        monkeypatch.setattr(os, "replace", replace)
+        kept = LeRobotWriter(root, fps=30, features=FEATURES, version=version).episodes
+        if kept:
+            write(tmp_path / f"short-{kill}", version, range(kept))
+            same(tmp_path / f"short-{kill}", root)
+        write(root, version, range(kept, len(LENGTHS)))
+        same(tmp_path / "whole", root)
+    else:
+        raise AssertionError("the loop ends when nothing is killed any more")
+
+
+def test_an_episode_that_could_not_be_written_is_written_again(tmp_path, monkeypatch):
+    monkeypatch.setattr(_layouts, "DATA_FILE_MB", 0)
+    write(tmp_path / "whole", "v3.0")
+    writer = write(tmp_path / "set", "v3.0", [0])
     for frame in frames(1):
         writer.add_frame(frame)
-    writer.save_episode("lift")
-    # As after a crash just before `info` was written.
-    (root / "meta/info.json").write_text(before)
-    write(root, "v3.0", [1, 2])
-    table = pd.read_parquet(root / "data/chunk-000/file-000.parquet")
-    assert table["index"].tolist() == list(range(sum(LENGTHS)))
-    episodes = pd.read_parquet(root / "meta/episodes/chunk-000/file-000.parquet")
-    assert episodes["length"].tolist() == LENGTHS
+    write_json, full = lerobot.write_json, [True]
+
+    def once(path, value):
+        if path.name == "info.json" and full.pop():
+            raise OSError("no space left")
+        write_json(path, value)
+
+    monkeypatch.setattr(lerobot, "write_json", once)
+    with pytest.raises(OSError, match="no space"):
+        writer.save_episode("cut")
+    monkeypatch.setattr(lerobot, "write_json", write_json)
+    assert writer.save_episode("lift") == 1
+    write(tmp_path / "set", "v3.0", [2])
+    same(tmp_path / "whole", tmp_path / "set")
 
 
 def test_wrong_frames_are_named_and_not_kept(tmp_path):

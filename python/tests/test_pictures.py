@@ -16,6 +16,14 @@ def test_gymnasium_finds_nothing_wrong_with_pictures(seeing):
     assert space["depth"]["endoscope"].shape == (48, 64, 1) and space["depth"]["endoscope"].dtype == np.float32
 
 
+def test_gymnasium_finds_nothing_wrong_with_colours_alone():
+    env = trocar.TrocarEnv(task="grasp-lift", obs="rgb", image_size=(16, 24), **SHORT)
+    check_env(env, skip_render_check=True, skip_close_check=True)
+    assert set(env.observation_space) == {"pixels"} and env.observation_space["pixels"]["d405"].shape == (16, 24, 3)
+    seen, _ = env.reset(seed=1)
+    assert set(seen) == {"pixels"} and env.observation_space.contains(seen)
+
+
 def test_pictures_show_the_cell(seeing):
     seen, _ = seeing.reset(seed=1)
     for camera in ("endoscope", "d405"):

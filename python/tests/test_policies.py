@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 import threading
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,6 +18,8 @@ websockets = pytest.importorskip("websockets")
 from trocar import serve
 
 STILL = """
+import os
+import time
 import numpy as np
 
 class Still:
@@ -31,6 +35,15 @@ def raises(obs):
         raise RuntimeError("no idea what to do")
     state = obs["observation/state"]
     return np.r_[state[:5], state[23:28]]
+
+def reads(obs):
+    raise RuntimeError("asked to " + obs["prompt"])
+
+def sleeps(obs):
+    with open("served.partial", "w") as file:
+        file.write(str(os.getpid()))
+    os.rename("served.partial", "served")
+    time.sleep(600)
 """
 
 
@@ -93,26 +106,92 @@ def test_a_server_answers_resets_and_tells_errors():
         assert client.recv().strip().splitlines()[-1] == "KeyError: 'bad'"
 
 
-def evaluated(program, scene, tmp_path, policies):
+def steps(file):
+    """Actions and state hashes of an episode file (docs/task.md)."""
+    _, _, body = file.read_bytes().partition(b"\n")
+    kind = np.dtype([("space", "u1"), ("action", "<f8", 10), ("hash", "<u8")])
+    return np.frombuffer(body[:-8], kind)
+
+
+@pytest.mark.parametrize("command", ["episode", "evaluate"])
+def test_the_scripted_controller_is_the_programs_bit_for_bit(program, lift_scene, tmp_path, command):
+    out, phantoms = tmp_path / "out", trocar.envs.cells.phantoms_folder()
+    words = {"episode": ["--policy", "scripted"], "evaluate": ["--policy", "scripted", "--episodes", "1"]}[command]
+    called = [program, "--quiet", command, lift_scene, *words, "--seed", 11, "-o", out, "--phantoms", phantoms]
+    subprocess.run(list(map(str, called)), check=True, capture_output=True)
+    told = steps(next(out.rglob("episode.trocar")))
+    env = trocar.TrocarEnv(scene=str(lift_scene), threads=2)
+    expert = trocar.Policy("scripted")
+    env.reset(seed=11)
+    expert.reset(env)
+    for k, step in enumerate(told):
+        action = expert(env)
+        assert np.array_equal(action, step["action"]), f"action {k}"
+        *_, ended, late, info = env.step(action)
+        assert env.state_hash == step["hash"], f"state {k}"
+        assert (ended or late) == (k == len(told) - 1)
+    assert info["is_success"] and len(told) > 100
+
+
+def command_of(program, scene, tmp_path, policies):
+    """`trocar evaluate` of Python policies with what it is started with."""
     (tmp_path / "mine.py").write_text(STILL)
     named = [word for policy in policies for word in ("--policy", policy)]
     command = [program, "--quiet", "--json", "evaluate", scene, *named, "--episodes", "2", "-o", tmp_path / "out"]
     paths = os.pathsep.join(filter(None, [str(tmp_path), os.environ.get("PYTHONPATH")]))
     phantoms = trocar.envs.cells.phantoms_folder()
     environment = os.environ | {"TROCAR_PYTHON": sys.executable, "PYTHONPATH": paths}
-    done = subprocess.run([*map(str, command), "--phantoms", str(phantoms)], capture_output=True, text=True, env=environment)
+    return {"args": [*map(str, command), "--phantoms", str(phantoms)], "env": environment, "cwd": tmp_path}
+
+
+def evaluated(program, scene, tmp_path, policies):
+    done = subprocess.run(**command_of(program, scene, tmp_path, policies), capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
+def runs(process):
+    """Whether the process of that number runs; one that nobody has waited for does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] not in "ZX"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are looked up in /proc")
+def test_a_served_policy_ends_when_the_program_is_killed(program, short_scene, tmp_path):
+    served = tmp_path / "served"
+    command = command_of(program, short_scene, tmp_path, ["sleeps=python:mine:sleeps"])
+    started = subprocess.Popen(**command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        until(served.exists, 60)
+        assert runs(served.read_text())
+    finally:
+        started.kill()
+        started.wait()
+    until(lambda: not runs(served.read_text()), 10)
+
+
+def until(true, seconds):
+    """Waits for something to be true."""
+    begun = time.monotonic()
+    while not true():
+        assert time.monotonic() - begun < seconds, "it did not come true"
+        time.sleep(0.05)
+
+
 def test_the_program_evaluates_a_python_policy_and_outlives_one_that_raises(program, short_scene, tmp_path):
-    result = evaluated(program, short_scene, tmp_path, ["still=python:mine:Still", "raises=python:mine:raises"])
-    still, raises = result["policies"]
+    result = evaluated(program, short_scene, tmp_path, ["still=python:mine:Still", "raises=python:mine:raises", "reads=python:mine:reads"])
+    still, raises, reads = result["policies"]
     assert (still["episodes"], still["ends"][4]) == (2, 0), still
     assert (raises["episodes"], raises["ends"][4]) == (2, 2), raises
     for episode in range(2):
         kept = json.loads((tmp_path / f"out/episodes/raises/{episode:06}/result.json").read_text())
         assert "RuntimeError: no idea what to do" in kept["end"]["why"], kept["end"]
+    assert reads["ends"][4] == 2
+    kept = json.loads((tmp_path / "out/episodes/reads/000000/result.json").read_text())
+    asked = trocar.TrocarEnv(scene=str(short_scene)).task_description
+    assert f"asked to {asked}" in kept["end"]["why"], "a served policy and an environment are told the same"
 
 
 def test_a_policy_that_cannot_be_imported_is_one_line(tmp_path):

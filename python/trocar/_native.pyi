@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 
 __version__: str
 
+#: What steps write, (cells, numbers) each: states, figures, channels.
+Arrays = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]
+
 def scenes() -> list[str]:
     """Names of the built-in scenes."""
 
@@ -40,7 +43,7 @@ class Cells:
     @property
     def task(self) -> str: ...
     @property
-    def organ(self) -> str: ...
+    def prompt(self) -> str: ...
     @property
     def max_steps(self) -> int: ...
     @property
@@ -59,22 +62,8 @@ class Cells:
     def stage_names(self) -> list[str]: ...
     @property
     def action_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-    def reset(
-        self,
-        which: NDArray[np.int64],
-        seeds: NDArray[np.uint64],
-        state: NDArray[np.float32],
-        figures: NDArray[np.float64],
-        channels: NDArray[np.float64],
-    ) -> None: ...
-    def step(
-        self,
-        actions: NDArray[np.float64],
-        active: NDArray[np.bool_],
-        state: NDArray[np.float32],
-        figures: NDArray[np.float64],
-        channels: NDArray[np.float64],
-    ) -> None: ...
+    def reset(self, which: NDArray[np.int64], seeds: NDArray[np.uint64], arrays: Arrays) -> None: ...
+    def step(self, actions: NDArray[np.float64], active: NDArray[np.bool_], arrays: Arrays) -> None: ...
     def see(
         self,
         cameras: Sequence[str],
@@ -90,14 +79,7 @@ class Cells:
     def summary(self, k: int) -> str: ...
     def state_hash(self, k: int) -> int: ...
     def save(self, k: int) -> State: ...
-    def restore(
-        self,
-        k: int,
-        saved: State,
-        state: NDArray[np.float32],
-        figures: NDArray[np.float64],
-        channels: NDArray[np.float64],
-    ) -> None: ...
+    def restore(self, k: int, saved: State, arrays: Arrays) -> None: ...
 
 class Controller:
     """A controller of the program."""

@@ -47,6 +47,7 @@ def run(
     `ray_address`: `auto` for a cluster that runs, `local` for a new one on this machine, `host:port`; None does without Ray.
     `workers`: as many as there are CPUs if not given.
     """
+    _own_interpreter()
     folder = phantoms_folder()
     folder.mkdir(parents=True, exist_ok=True)
     campaign = Campaign(scene, list(policies), episodes, seed, folder, Path(output))
@@ -58,6 +59,11 @@ def run(
         else:
             _on_ray(campaign, scene, jobs, workers, ray_address, progress)
     return json.loads(campaign.finish())
+
+
+def _own_interpreter() -> None:
+    """Policies `python:MODULE:NAME` are served by the interpreter that runs this, which has `trocar`, unless another is named."""
+    os.environ.setdefault("TROCAR_PYTHON", sys.executable)
 
 
 def _on_threads(campaign: Campaign, scene: str, jobs: list[str], workers: int | None, progress: Progress) -> None:
@@ -137,8 +143,10 @@ class _Actor:
     def __init__(self, scene: str, plan: str):
         # By name: what Ray sends over holds no native class.
         from trocar._native import Worker
+        from trocar.campaign import _own_interpreter
         from trocar.envs.cells import phantoms_folder
 
+        _own_interpreter()
         folder = phantoms_folder()
         folder.mkdir(parents=True, exist_ok=True)
         self.worker = Worker(scene, folder, plan)
@@ -169,6 +177,8 @@ def main(arguments: list[str] | None = None) -> int:
 
     def tell(done: int, missing: int) -> None:
         print(f"\r{done} of {missing} episodes", end="" if done < missing else "\n", file=sys.stderr, flush=True)
+        if done == missing:
+            print("writing the report, with moving pictures of the first failures", file=sys.stderr, flush=True)
 
     try:
         result = run(

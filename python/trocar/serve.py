@@ -187,13 +187,24 @@ def serve(policy: Served, host: str = "127.0.0.1", port: int = 0, *, told: Calla
         server.serve_forever()
 
 
+def _end_with_input() -> None:
+    """Ends this process at the end of its standard input: whoever held the other end is gone, killed or not."""
+    # The descriptor itself: a buffered reader that a thread is in blocks the interpreter's own end.
+    while os.read(0, 4096):
+        pass
+    os._exit(0)
+
+
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns its exit status."""
     parser = argparse.ArgumentParser(prog="python -m trocar.serve", description=__doc__.splitlines()[0])
     parser.add_argument("policy", metavar="MODULE:NAME", help="a callable, a class, or an object with infer(obs)")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default %(default)s: this machine alone)")
     parser.add_argument("--port", type=int, default=8000, help="0 for any that is free (default %(default)s)")
+    parser.add_argument("--until-eof", action="store_true", help="end when standard input does, as the process behind it has ended")
     options = parser.parse_args(arguments)
+    if options.until_eof:
+        threading.Thread(target=_end_with_input, daemon=True).start()
     # What a policy prints while it is imported must not stand before the address.
     out, sys.stdout = sys.stdout, sys.stderr
     try:

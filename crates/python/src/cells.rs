@@ -29,8 +29,19 @@ pub struct Cells {
     bounds: Bounds,
     pub(crate) pool: rayon::ThreadPool,
     task_name: &'static str,
-    organ: String,
+    prompt: String,
     steps: usize,
+}
+
+/// The caller's arrays that steps write, as a tuple: (cells, numbers) each.
+#[derive(FromPyObject)]
+struct Arrays<'py> {
+    #[pyo3(item(0))]
+    state: Bound<'py, PyArrayDyn<f32>>,
+    #[pyo3(item(1))]
+    figures: Bound<'py, PyArrayDyn<f64>>,
+    #[pyo3(item(2))]
+    channels: Bound<'py, PyArrayDyn<f64>>,
 }
 
 /// A cell with what is written of it.
@@ -108,9 +119,9 @@ impl Cells {
             let episodes = built.map_err(|e| crate::error::task(&e))?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
-            let organ = scene.task.organ.clone();
+            let prompt = trocar_task::prompt(&scene);
             let eyes = Eyes::new(specimen, count, sensor_noise);
-            Ok(Self { episodes, eyes, bounds, pool, task_name: scene.task.name.name(), organ, steps })
+            Ok(Self { episodes, eyes, bounds, pool, task_name: scene.task.name.name(), prompt, steps })
         })
     }
 
@@ -126,10 +137,10 @@ impl Cells {
         self.task_name
     }
 
-    /// The organ it is about.
+    /// What the task asks for, in words.
     #[getter]
-    fn organ(&self) -> &str {
-        &self.organ
+    fn prompt(&self) -> &str {
+        &self.prompt
     }
 
     /// Control periods of an episode, at most.
@@ -218,9 +229,7 @@ impl Cells {
         py: Python<'_>,
         which: PyReadonlyArray1<'_, i64>,
         seeds: PyReadonlyArray1<'_, u64>,
-        state: &Bound<'_, PyArrayDyn<f32>>,
-        figures: &Bound<'_, PyArrayDyn<f64>>,
-        channels: &Bound<'_, PyArrayDyn<f64>>,
+        arrays: Arrays<'_>,
     ) -> PyResult<()> {
         let count = self.episodes.len();
         let (which, seeds) = (which.as_slice().map_err(wrong)?, seeds.as_slice().map_err(wrong)?);
@@ -236,7 +245,7 @@ impl Cells {
             Some(seed) => place.episode.reset(*seed).map(|_| place.write(0.0)),
             None => Ok(()),
         };
-        self.each(py, state, figures, channels, &wanted, begin)
+        self.each(py, &arrays, &wanted, begin)
     }
 
     /// Does one control period in every cell that `active` says, by its row of `actions`. An action that is not finite is refused before anything changes.
@@ -245,9 +254,7 @@ impl Cells {
         py: Python<'_>,
         actions: PyReadonlyArray2<'_, f64>,
         active: PyReadonlyArray1<'_, bool>,
-        state: &Bound<'_, PyArrayDyn<f32>>,
-        figures: &Bound<'_, PyArrayDyn<f64>>,
-        channels: &Bound<'_, PyArrayDyn<f64>>,
+        arrays: Arrays<'_>,
     ) -> PyResult<()> {
         let (count, numbers) = (self.episodes.len(), self.bounds.low.len());
         if actions.shape() != [count, numbers] {
@@ -266,7 +273,7 @@ impl Cells {
             Some(action) => place.step(action),
             None => Ok(()),
         };
-        self.each(py, state, figures, channels, &told, go)
+        self.each(py, &arrays, &told, go)
     }
 
     /// Why the episode in cell `k` ended; None while it goes on.
@@ -295,15 +302,7 @@ impl Cells {
     }
 
     /// Puts `state` into cell `k`, and writes what is seen there.
-    fn restore(
-        &mut self,
-        py: Python<'_>,
-        k: usize,
-        saved: &State,
-        state: &Bound<'_, PyArrayDyn<f32>>,
-        figures: &Bound<'_, PyArrayDyn<f64>>,
-        channels: &Bound<'_, PyArrayDyn<f64>>,
-    ) -> PyResult<()> {
+    fn restore(&mut self, py: Python<'_>, k: usize, saved: &State, arrays: Arrays<'_>) -> PyResult<()> {
         self.at(k)?;
         self.eyes.moved(k, self.episodes[k].scene());
         let which: Vec<Option<&State>> = (0..self.episodes.len()).map(|j| (j == k).then_some(saved)).collect();
@@ -311,7 +310,7 @@ impl Cells {
             Some(saved) => place.episode.restore(&saved.0).map(|()| place.write(0.0)),
             None => Ok(()),
         };
-        self.each(py, state, figures, channels, &which, put)
+        self.each(py, &arrays, &which, put)
     }
 }
 
@@ -325,16 +324,14 @@ impl Cells {
     fn each<T: Sync>(
         &mut self,
         py: Python<'_>,
-        state: &Bound<'_, PyArrayDyn<f32>>,
-        figures: &Bound<'_, PyArrayDyn<f64>>,
-        channels: &Bound<'_, PyArrayDyn<f64>>,
+        arrays: &Arrays<'_>,
         with: &[T],
         work: impl Fn((&mut Place<'_>, &T)) -> Result<(), trocar_task::Error> + Sync,
     ) -> PyResult<()> {
         let count = self.episodes.len();
-        let mut state = Rows::new(state, "state", count, &[STATE_SIZE])?;
-        let mut figures = Rows::new(figures, "figures", count, &[FIGURES.len()])?;
-        let mut channels = Rows::new(channels, "channels", count, &[Channels::COUNT])?;
+        let mut state = Rows::new(&arrays.state, "state", count, &[STATE_SIZE])?;
+        let mut figures = Rows::new(&arrays.figures, "figures", count, &[FIGURES.len()])?;
+        let mut channels = Rows::new(&arrays.channels, "channels", count, &[Channels::COUNT])?;
         let mut places: Vec<Place<'_>> = self
             .episodes
             .iter_mut()

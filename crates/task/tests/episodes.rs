@@ -221,3 +221,24 @@ fn a_strong_cutter_closes_through_tissue_and_harms_nothing_else() {
         assert!(worst(|c| c.right.unhooked) == 0.0 && s.arms.iter().all(|a| a.unhooked == 0));
     }
 }
+
+#[test]
+fn an_offset_is_the_same_in_every_phase() {
+    // The other arm stays where it is while the first approaches, enters and closes: what is told to it must not wander off by the offset again with each of these phases.
+    let mut episode = Episode::new(&resection(), &specimen(), 1).unwrap();
+    episode.reset(5).unwrap();
+    let start = episode.cell().observe()[1].commanded;
+    let mut offset = policy::named("offset").unwrap();
+    offset.begin(&episode, 5).unwrap();
+    let mut told: Vec<Vec<f64>> = Vec::new();
+    while told.len() < 100 {
+        for action in offset.act(&episode).unwrap() {
+            episode.step(&action).unwrap();
+            told.push(action.numbers[5..10].to_vec());
+        }
+    }
+    assert!(told.iter().all(|numbers| *numbers == told[0]), "{:?} {:?}", told[0], told[99]);
+    let [a, b, deeper] = [told[0][0] - start.pivots[0], told[0][1] - start.pivots[1], told[0][2] - start.insertion];
+    let way = (0.12 * a).hypot(0.12 * b).hypot(deeper);
+    assert!((way - 1e-3 * policy::OFFSET_MM).abs() < 1e-4, "{way} m");
+}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any, Sequence
+from typing import Any, Sequence, TypedDict
 
 import gymnasium as gym
 import numpy as np
@@ -16,12 +16,19 @@ from .._native import cameras as scene_cameras
 #: What can be observed.
 KINDS = ("state", "rgb", "depth")
 
-#: What the task asks for, in words for policies that read.
-DESCRIPTIONS = {
-    "appendix-resection": "grasp the {organ} with the left instrument, lift it, and close the right instrument's blades through it",
-    "grasp-lift": "grasp the {organ} with the left instrument, lift it and hold it",
-    "port-reach": "move both instruments through their ports to one place after the other",
-}
+class Options(TypedDict, total=False):
+    """Options of every environment, as `trocar.envs` tells them; their defaults are those of `Cells`."""
+
+    task: str | None
+    obs: str
+    actions: str
+    normalize: bool
+    episode_s: float | None
+    threads: int
+    privileged: bool
+    cameras: Sequence[str] | None
+    image_size: tuple[int, int] | None
+    sensor_noise: bool
 
 
 def phantoms_folder() -> Path:
@@ -37,15 +44,15 @@ class Cells:
     def __init__(
         self,
         count: int,
+        scene: str = "cell-a",
         *,
-        scene: str,
-        task: str | None,
-        obs: str,
-        actions: str,
-        normalize: bool,
-        episode_s: float | None,
-        threads: int,
-        privileged: bool,
+        task: str | None = None,
+        obs: str = "state",
+        actions: str = "pivots",
+        normalize: bool = False,
+        episode_s: float | None = None,
+        threads: int = 0,
+        privileged: bool = False,
         cameras: Sequence[str] | None = None,
         image_size: tuple[int, int] | None = None,
         sensor_noise: bool = False,
@@ -73,13 +80,13 @@ class Cells:
         self.seeds = np.zeros(count, np.uint64)
         self.figures = np.zeros((count, len(native.figure_names)), np.float64)
         self.channels = np.zeros((count, len(native.channel_names)), np.float64)
+        self.written = (self.state, self.figures, self.channels)
         self.low, self.high = native.action_limits
         self.action_kind = actions
         self.color = {c: np.zeros((count, *s, 3), np.uint8) for c, s in self.sizes.items() if "rgb" in self.kinds}
         self.depth = {c: np.zeros((count, *s, 1), np.float32) for c, s in self.sizes.items() if "depth" in self.kinds}
         self.ends = native.end_names
         self.stages = native.stage_names
-        self.task_description = DESCRIPTIONS[native.task].format(organ=native.organ)
 
     def action_space(self) -> gym.spaces.Box:
         if self.normalize:
@@ -150,7 +157,7 @@ class Cells:
     def reset(self, which: np.ndarray, seeds: np.ndarray) -> None:
         """Begins the episodes of `seeds` in the cells `which`."""
         which, seeds = np.asarray(which, np.int64), np.asarray(seeds, np.uint64)
-        self.native.reset(which, seeds, self.state, self.figures, self.channels)
+        self.native.reset(which, seeds, self.written)
         self.seeds[which] = seeds
         flags = np.zeros(self.count, bool)
         flags[which] = True
@@ -164,7 +171,7 @@ class Cells:
         if self.normalize:
             actions = self.low + 0.5 * (np.clip(actions, -1.0, 1.0) + 1.0) * (self.high - self.low)
         active = np.ones(self.count, bool) if active is None else np.asarray(active, bool)
-        self.native.step(np.ascontiguousarray(actions), active, self.state, self.figures, self.channels)
+        self.native.step(np.ascontiguousarray(actions), active, self.written)
         self._look(active)
 
     def save(self, k: int) -> Any:
@@ -172,7 +179,7 @@ class Cells:
         return self.native.save(k)
 
     def restore(self, k: int, state: Any) -> None:
-        self.native.restore(k, state, self.state, self.figures, self.channels)
+        self.native.restore(k, state, self.written)
         self._look(np.arange(self.count) == k)
 
     # What the figures say; their columns are reward, score, stage, end, time.
@@ -213,3 +220,45 @@ class Cells:
         if end >= 0:
             info |= {"end": self.ends[int(end)], "why": self.native.why(k), "summary": json.loads(self.native.summary(k))}
         return info
+
+
+class OfCells:
+    """What environments say of their cells, whether they are one or many."""
+
+    cells: Cells
+
+    def _begin(self, count: int, scene: str, render_mode: str | None, options: Options) -> None:
+        """Builds the cells; what is wrong with an option is told by its name."""
+        if render_mode not in (None, "rgb_array"):
+            raise ValueError(f"render_mode: '{render_mode}' is unknown; rgb_array is known")
+        self.render_mode = render_mode
+        self.cells = Cells(count, scene, **options)
+
+    @property
+    def task(self) -> str:
+        """Name of the task."""
+        return self.cells.native.task
+
+    @property
+    def task_description(self) -> str:
+        """What is asked for, in words: the `prompt` of policies."""
+        return self.cells.native.prompt
+
+    @property
+    def state_names(self) -> list[str]:
+        """Names of the numbers of a state."""
+        return self.cells.native.state_names
+
+    @property
+    def action_names(self) -> list[str]:
+        """Names of the numbers of an action."""
+        return self.cells.native.action_names
+
+    @property
+    def channel_names(self) -> list[str]:
+        """Names of the privileged channels."""
+        return self.cells.native.channel_names
+
+    @property
+    def _max_episode_steps(self) -> int:
+        return self.cells.native.max_steps

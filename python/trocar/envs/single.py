@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, Sequence
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 
-from .cells import Cells
+from .cells import OfCells, Options
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
-class TrocarEnv(gym.Env):
+class TrocarEnv(OfCells, gym.Env):
     """One episode after the other in one two-arm cell; see `trocar.envs` for the options.
 
     `info["is_success"]` says whether the task is passed. An episode ends with `terminated` when it is passed or cannot go on (the
@@ -20,70 +23,15 @@ class TrocarEnv(gym.Env):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 30}
 
-    def __init__(
-        self,
-        scene: str = "cell-a",
-        *,
-        task: str | None = None,
-        obs: str = "state",
-        actions: str = "pivots",
-        normalize: bool = False,
-        episode_s: float | None = None,
-        threads: int = 0,
-        privileged: bool = False,
-        cameras: Sequence[str] | None = None,
-        image_size: tuple[int, int] | None = None,
-        sensor_noise: bool = False,
-        render_mode: str | None = None,
-    ):
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode: '{render_mode}' is unknown; rgb_array is known")
-        self.render_mode = render_mode
-        self.cells = Cells(
-            1,
-            scene=scene,
-            task=task,
-            obs=obs,
-            actions=actions,
-            normalize=normalize,
-            episode_s=episode_s,
-            threads=threads,
-            privileged=privileged,
-            cameras=cameras,
-            image_size=image_size,
-            sensor_noise=sensor_noise,
-        )
+    def __init__(self, scene: str = "cell-a", *, render_mode: str | None = None, **options: Unpack[Options]):
+        self._begin(1, scene, render_mode, options)
         self.observation_space = self.cells.observation_space()
         self.action_space = self.cells.action_space()
 
     @property
-    def task(self) -> str:
-        """Name of the task."""
-        return self.cells.native.task
-
-    @property
-    def task_description(self) -> str:
-        """What is asked for, in words."""
-        return self.cells.task_description
-
-    @property
-    def _max_episode_steps(self) -> int:
-        return self.cells.native.max_steps
-
-    @property
     def privileged_channels(self) -> dict[str, float]:
         """Channels of the last step by name: tissue and all, for rewards of one's own and for scripts, not for policies."""
-        return dict(zip(self.cells.native.channel_names, self.cells.channels[0].tolist()))
-
-    @property
-    def state_names(self) -> list[str]:
-        """Names of the numbers of a state."""
-        return self.cells.native.state_names
-
-    @property
-    def action_names(self) -> list[str]:
-        """Names of the numbers of an action."""
-        return self.cells.native.action_names
+        return dict(zip(self.channel_names, self.cells.channels[0].tolist()))
 
     @property
     def state_hash(self) -> int:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, Sequence
+from typing import TYPE_CHECKING, Any
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
-from .cells import Cells
+from .cells import OfCells, Options
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class _View:
@@ -17,7 +20,7 @@ class _View:
 
     def __init__(self, env: TrocarVectorEnv):
         self.task, self.task_description = env.task, env.task_description
-        self._max_episode_steps = env.cells.native.max_steps
+        self._max_episode_steps = env._max_episode_steps
         self.metadata, self.spec = env.metadata, env.spec
         self.observation_space, self.action_space = env.single_observation_space, env.single_action_space
 
@@ -26,7 +29,7 @@ class _View:
         return self
 
 
-class TrocarVectorEnv(gym.vector.VectorEnv):
+class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
     """`num_envs` episodes side by side, stepped in parallel without the interpreter's lock; see `trocar.envs` for the options.
 
     Observations, rewards and channels are arrays that native code writes; with `copy=False` they are handed out as they are and
@@ -44,39 +47,15 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
         num_envs: int = 1,
         scene: str = "cell-a",
         *,
-        task: str | None = None,
-        obs: str = "state",
-        actions: str = "pivots",
-        normalize: bool = False,
-        episode_s: float | None = None,
-        threads: int = 0,
-        privileged: bool = False,
-        cameras: Sequence[str] | None = None,
-        image_size: tuple[int, int] | None = None,
-        sensor_noise: bool = False,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         copy: bool = True,
         render_mode: str | None = None,
+        **options: Unpack[Options],
     ):
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode: '{render_mode}' is unknown; rgb_array is known")
-        self.render_mode, self.num_envs, self.copy = render_mode, num_envs, copy
+        self.num_envs, self.copy = num_envs, copy
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
-        self.cells = Cells(
-            num_envs,
-            scene=scene,
-            task=task,
-            obs=obs,
-            actions=actions,
-            normalize=normalize,
-            episode_s=episode_s,
-            threads=threads,
-            privileged=privileged,
-            cameras=cameras,
-            image_size=image_size,
-            sensor_noise=sensor_noise,
-        )
+        self._begin(num_envs, scene, render_mode, options)
         self.single_observation_space = self.cells.observation_space()
         self.single_action_space = self.cells.action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
@@ -84,16 +63,6 @@ class TrocarVectorEnv(gym.vector.VectorEnv):
         self._over = np.zeros(num_envs, bool)
         self._dice = [np.random.default_rng() for _ in range(num_envs)]
         self.envs = [_View(self) for _ in range(num_envs)]
-
-    @property
-    def task(self) -> str:
-        """Name of the task."""
-        return self.cells.native.task
-
-    @property
-    def task_description(self) -> str:
-        """What is asked for, in words."""
-        return self.cells.task_description
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """An attribute, or what a method gives, of each environment."""

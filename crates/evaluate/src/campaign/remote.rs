@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use trocar_cell::{Action, ActionSpace};
 use trocar_remote::{Array, Client, Endpoint, Observation, Value};
 use trocar_render::Settings;
-use trocar_scene::{Frame, Scene, TaskName};
+use trocar_scene::Frame;
 use trocar_sight::Sight;
 use trocar_specimen::Specimen;
 use trocar_task::policy::CHUNK;
@@ -101,7 +101,7 @@ impl Remote {
             sight: None,
             stop,
             cameras,
-            prompt: prompt(scene),
+            prompt: trocar_task::prompt(scene),
             seed: 0,
         })
     }
@@ -169,20 +169,6 @@ impl Remote {
     }
 }
 
-/// What the task asks for, in words.
-fn prompt(scene: &Scene) -> String {
-    let organ = &scene.task.organ;
-    match scene.task.name {
-        TaskName::AppendixResection => {
-            format!(
-                "grasp the {organ} with the left instrument, lift it, and close the right instrument's blades through it"
-            )
-        }
-        TaskName::GraspLift => format!("grasp the {organ} with the left instrument, lift it and hold it"),
-        TaskName::PortReach => "move both instruments through their ports to one place after the other".to_owned(),
-    }
-}
-
 impl Policy for Remote {
     fn name(&self) -> &str {
         &self.name
@@ -208,8 +194,9 @@ impl Policy for Remote {
 fn serve(module: &str, stop: &AtomicBool) -> std::result::Result<Served, String> {
     let python = std::env::var("TROCAR_PYTHON").unwrap_or_else(|_| PYTHON.to_owned());
     let mut child = Command::new(&python)
-        .args(["-m", "trocar.serve", module, "--port", "0"])
-        .stdin(Stdio::null())
+        .args(["-m", "trocar.serve", module, "--port", "0", "--until-eof"])
+        // Nothing is written into it. It closes with this process, however that ends, and so the child ends too.
+        .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()

@@ -80,6 +80,8 @@ pub struct Scripted {
     /// Where each arm goes from and to in this phase.
     from: Vec<Coordinates>,
     to: Vec<Coordinates>,
+    /// What it asked of each arm last. Not what the cell was told: who changes its actions on the way must not shift where its next phase begins, or a constant offset grows with every phase.
+    last: Vec<Coordinates>,
     /// The grasp, as it was aimed at.
     grasp: Option<Aim>,
     lift: f64,
@@ -93,8 +95,8 @@ impl Scripted {
             Style::Careful => "scripted",
             Style::Greedy => "greedy",
         };
-        let (from, to) = (Vec::new(), Vec::new());
-        Self { style, name, phase: Phase::Rest, done: 0, count: 0, from, to, grasp: None, lift: 0.0, tries: 0 }
+        let [from, to, last] = [const { Vec::new() }; 3];
+        Self { style, name, phase: Phase::Rest, done: 0, count: 0, from, to, last, grasp: None, lift: 0.0, tries: 0 }
     }
 
     /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on, an appendix whose base is held is pinned, and pinned tissue feels no blade.
@@ -117,7 +119,10 @@ impl Scripted {
     fn enter(&mut self, episode: &Episode) -> Result<()> {
         let cell = episode.cell();
         let arms: Vec<&str> = cell.arms().iter().map(|(side, _)| side.name()).collect();
-        self.from = arms.iter().map(|arm| cell.setpoint(arm)).collect::<std::result::Result<_, _>>()?;
+        self.from = match self.last.len() == arms.len() {
+            true => self.last.clone(),
+            false => arms.iter().map(|arm| cell.setpoint(arm)).collect::<std::result::Result<_, _>>()?,
+        };
         self.to = self.from.clone();
         let (grasper, cutter) = episode.roles();
         let greedy = self.style == Style::Greedy;
@@ -257,7 +262,9 @@ impl Scripted {
         let limits = episode.cell().arms().into_iter().map(|(side, _)| episode.cell().limits(side.name()));
         let limits: Vec<_> = limits.collect::<std::result::Result<_, _>>()?;
         let kept: Vec<Coordinates> = targets.iter().zip(limits).map(|(c, l)| l.clamp(c).0).collect();
-        Ok(Action::pivots(&kept))
+        let action = Action::pivots(&kept);
+        self.last = kept;
+        Ok(action)
     }
 }
 
