@@ -3,13 +3,13 @@
 mod follow;
 
 use crate::camera::{Room, Viewer, is_endoscope};
-use crate::depth::OWN_WIDTH;
 use crate::field::{Field, Recorded};
 use crate::instrument::Shapes;
 use crate::organ::{Draped, Whole};
-use crate::{DepthNoise, Error, OUTSIDE, Result, arm, furniture};
+use crate::{Error, OUTSIDE, Result, arm, furniture};
 use glam::{DQuat, DVec3};
-use trocar_camera::{Camera, Pose};
+use std::path::PathBuf;
+use trocar_camera::{Camera, DepthNoise, Pose};
 use trocar_cell::{Cell, Placed};
 use trocar_geometry::TriMesh;
 use trocar_render::{BodyId, Look, Noise, Picture, Settings, ShapeId, Stage, SurfaceKind, render_into};
@@ -20,6 +20,9 @@ use trocar_specimen::Specimen;
 const INSTRUMENTS: u16 = 101;
 const ARMS: u16 = 111;
 const REST: u16 = 201;
+
+/// Width of the picture in which a depth camera finds its disparities, however small the picture is that is asked for [px].
+const OWN_WIDTH: f64 = 848.0;
 
 /// Sides of pictures [px].
 const SIDES: std::ops::RangeInclusive<usize> = 8..=8192;
@@ -46,7 +49,6 @@ pub struct Sight {
     arms: Vec<Arm>,
     section: Option<(DVec3, DVec3)>,
     picture: Picture,
-    scratch: Vec<f32>,
     /// What the sensors do.
     pub sensor: Sensor,
 }
@@ -68,6 +70,9 @@ struct Shown {
 /// An arm on the stage.
 struct Arm {
     name: &'static str,
+    /// The description that it is drawn from, with the flange, and the shapes of base and links.
+    drawn: Option<(PathBuf, Option<String>)>,
+    shapes: Vec<ShapeId>,
     links: Vec<BodyId>,
     shaft: BodyId,
     motor: BodyId,
@@ -87,7 +92,7 @@ impl Sight {
         let room = Room { middle: middle(&placed) };
         let viewers = Viewer::all(scene, specimen.camera.as_ref(), room, &mut sight.stage)?;
         for (k, (described, _, instrument)) in scene.stations().iter().enumerate() {
-            sight.add_arm(k, described.name.name(), instrument, cell)?;
+            sight.add_arm(k, (scene, described), instrument, cell)?;
         }
         sight.organs.iter_mut().for_each(|o| o.shape = None);
         sight.follow(cell)?;
@@ -135,7 +140,6 @@ impl Sight {
             arms: Vec::new(),
             section: None,
             picture: Picture::default(),
-            scratch: Vec::new(),
             sensor: Sensor::default(),
         };
         for (k, organ) in placed.organs.iter().enumerate() {
@@ -192,18 +196,34 @@ impl Sight {
         Ok(())
     }
 
-    fn add_arm(&mut self, k: usize, name: &'static str, held: &trocar_scene::Instrument, cell: &Cell) -> Result<()> {
+    fn add_arm(
+        &mut self,
+        k: usize,
+        (scene, arm): (&Scene, &trocar_scene::Arm),
+        held: &trocar_scene::Instrument,
+        cell: &Cell,
+    ) -> Result<()> {
+        let name = arm.name.name();
         let poses = cell.link_poses(name)?;
         let label = ARMS + k as u16;
         self.labels.push((label, format!("{name} arm")));
         let shell =
             Look { color: [232; 3], surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, wander: [0.0; 3] } };
+        // Arms of one description share its shapes.
+        let drawn = arm.drawn().map(|file| (scene.resolve(file), arm.flange.clone()));
+        let known = self.arms.iter().find(|a| drawn.is_some() && a.drawn == drawn).map(|a| a.shapes.clone());
+        let shapes = match known {
+            Some(shapes) => shapes,
+            None => {
+                let meshes = arm::links(scene, arm, cell.arm_model(name)?, &poses)?;
+                meshes.iter().map(|mesh| self.base.add_shape(mesh)).collect::<std::result::Result<Vec<_>, _>>()?
+            }
+        };
         let mut links = Vec::new();
-        for (mesh, pose) in arm::links(cell.arm_model(name)?, &poses).iter().zip(&poses) {
-            let shape = self.base.add_shape(mesh)?;
-            links.push(self.base.add_body(shape, pose, label, &shell)?);
+        for (shape, pose) in shapes.iter().zip(&poses) {
+            links.push(self.base.add_body(*shape, pose, label, &shell)?);
         }
-        let shapes = Shapes::of(held);
+        let held_shapes = Shapes::of(held);
         let label = INSTRUMENTS + k as u16;
         self.labels.push((label, held.name.clone()));
         let polished = Look { surface: SurfaceKind::Metal { roughness: 0.3 }, ..Look::steel() };
@@ -212,10 +232,10 @@ impl Sight {
             let shape = self.base.add_shape(mesh)?;
             Ok(self.base.add_body(shape, &Pose::IDENTITY, label, look)?)
         };
-        let shaft = body(&shapes.shaft, &polished)?;
-        let motor = body(&shapes.motor, if held.kind == InstrumentKind::Grasper { &dark } else { &shell })?;
-        let blades = [body(&shapes.blades[0], &polished)?, body(&shapes.blades[1], &polished)?];
-        self.arms.push(Arm { name, links, shaft, motor, blades });
+        let shaft = body(&held_shapes.shaft, &polished)?;
+        let motor = body(&held_shapes.motor, if held.kind == InstrumentKind::Grasper { &dark } else { &shell })?;
+        let blades = [body(&held_shapes.blades[0], &polished)?, body(&held_shapes.blades[1], &polished)?];
+        self.arms.push(Arm { name, drawn, shapes, links, shaft, motor, blades });
         Ok(())
     }
 
@@ -303,7 +323,7 @@ impl Sight {
         }
         let at = self.viewer(camera)?;
         let sensor = self.sensor;
-        let Self { viewers, stage, picture, scratch, .. } = self;
+        let Self { viewers, stage, picture, .. } = self;
         let viewer = &mut viewers[at];
         stage.lights.clone_from(&viewer.lights);
         stage.environment = viewer.environment;
@@ -314,7 +334,9 @@ impl Sight {
         let (pose, depth) = (viewer.pose, viewer.depth);
         render_into(picture, stage, viewer.eye(size), &pose, settings, &film);
         if let Some(noise) = sensor.depth.filter(|_| depth) {
-            noise.spoil(&mut picture.depth, scratch, focal, [sensor.seed, frame]);
+            let camera = viewer.sized(size);
+            let seeds = [u64::from(sensor.seed), u64::from(frame)];
+            noise.spoil(&mut picture.depth, Some(&picture.color), &camera, focal, seeds)?;
         }
         Ok(&self.picture)
     }

@@ -1,8 +1,7 @@
 //! The scripted grasp-lift as something to film.
 
-use crate::{Error, Result};
+use crate::Result;
 use trocar_cell::{Cell, CellLift, CellLiftPolicy, Policy};
-use trocar_progress::Progress;
 use trocar_scene::Scene;
 
 /// The scripted grasp-lift, a control period at a time.
@@ -22,22 +21,6 @@ impl Script {
         task.organ = cell.world().model.bodies().iter().any(|b| b.name() == organ).then(|| organ.clone());
         task.design = Some(cell.grasp_design(&task.arm)?);
         Ok(Self { policy: CellLiftPolicy::new(&task, &cell)?, cell })
-    }
-
-    /// Goes on to a time [s].
-    pub fn until(&mut self, time: f64, progress: &dyn Progress) -> Result<()> {
-        progress.begin("simulate", 1);
-        while self.cell.time() < time - 1e-9 {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
-            if !self.advance()? {
-                let end = self.cell.time();
-                return Err(Error::Mismatch(format!("--at is {time} s; the grasp-lift ends after {end:.2} s")));
-            }
-        }
-        progress.end();
-        Ok(())
     }
 
     /// Does one control period; false when the task is over.
