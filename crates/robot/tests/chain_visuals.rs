@@ -30,7 +30,8 @@ fn mjcf(text: &str) -> Result<Vec<Vec<Visual>>, Error> {
 /// The arm of both files with looks: a foot, a mesh on the first link, a red box that is fixed to it, a rod on the second.
 fn shown_urdf() -> String {
     let mesh = r#"<link name="a"><visual><origin xyz="0 0 0.1"/><geometry><mesh filename="meshes/a.stl" scale="2 2 2"/></geometry></visual>"#;
-    let red = r#"<link name="box"><visual><geometry><box size="0.2 0.4 0.6"/></geometry><material name="red"/></visual>"#;
+    let red =
+        r#"<link name="box"><visual><geometry><box size="0.2 0.4 0.6"/></geometry><material name="red"/></visual>"#;
     let rod = r#"<link name="b"><visual><origin rpy="0 1.5707963267948966 0"/><geometry><cylinder radius="0.01" length="0.2"/></geometry></visual>"#;
     URDF.replace(r#"<link name="a">"#, mesh)
         .replace(r#"<link name="box">"#, red)
@@ -49,9 +50,18 @@ fn shown_mjcf() -> String {
     )
     .replace(r#"angle="degree""#, r#"angle="degree" meshdir="meshes""#)
     .replace(r#"<default><joint damping="0.5"/>"#, r#"<default><joint damping="0.5"/><geom group="2"/>"#)
-    .replace(r#"childclass="arm">"#, r#"childclass="arm"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom size="0.05" pos="0 0 -0.5"/>"#)
-    .replace(r#"<joint name="j1""#, r#"<geom type="mesh" mesh="a" pos="0 0 0.1"/><geom type="mesh" mesh="none" group="3"/><joint name="j1""#)
-    .replace(r#"<body name="box" pos="0.3 0 0">"#, r#"<body name="box" pos="0.3 0 0"><geom type="box" size="0.1 0.2 0.3" material="red"/>"#)
+    .replace(
+        r#"childclass="arm">"#,
+        r#"childclass="arm"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom size="0.05" pos="0 0 -0.5"/>"#,
+    )
+    .replace(
+        r#"<joint name="j1""#,
+        r#"<geom type="mesh" mesh="a" pos="0 0 0.1"/><geom type="mesh" mesh="none" group="3"/><joint name="j1""#,
+    )
+    .replace(
+        r#"<body name="box" pos="0.3 0 0">"#,
+        r#"<body name="box" pos="0.3 0 0"><geom type="box" size="0.1 0.2 0.3" material="red"/>"#,
+    )
     .replace(r#"<joint name="j2""#, r#"<geom type="cylinder" size="0.01" fromto="-0.1 0 0 0.1 0 0"/><joint name="j2""#)
 }
 

@@ -136,6 +136,7 @@ fn a_missing_mesh_and_another_arm_are_told_in_a_line() {
         )
     };
     let (specimen, scene) = (specimen(), with_model("franka_fr3", file.to_str()));
+    std::fs::write(&file, arm(7)).unwrap();
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
     let refused = |count: usize, words: &[&str]| {
         std::fs::write(&file, arm(count)).unwrap();

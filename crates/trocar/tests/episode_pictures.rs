@@ -44,7 +44,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
     let (run, file) = (run.to_str().unwrap().to_owned(), run.join("episode.trocar").to_str().unwrap().to_owned());
     let at = |name: &str| dir.path().join(name).to_str().unwrap().to_owned();
     let render = |source: &str, out: &str, more: &[&str]| {
-        trocar(&[&["render", source, "-o", out, "--json"], &SMALL[..], more].concat())
+        trocar(&[&["render", source, "-o", out, "--json"][..], &SMALL[..], more].concat())
     };
 
     // A still at the end, by the folder and by the file; another at a time.
@@ -100,6 +100,8 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
     std::fs::write(at("bad.trocar"), bytes).unwrap();
     refused(&at("bad.trocar"), "no.png", &[], &["bad.trocar", "checksum"]);
     // Nothing half-written is left.
-    let hidden = std::fs::read_dir(dir.path()).unwrap().filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
+    let hidden = std::fs::read_dir(dir.path())
+        .unwrap()
+        .filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));
     assert_eq!(hidden.count(), 0);
 }
