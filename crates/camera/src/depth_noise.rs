@@ -4,6 +4,7 @@
 
 use crate::{Camera, ColorImage, DepthImage, Error, Result};
 use glam::DVec3;
+use rayon::prelude::*;
 
 /// A stereo camera's noise. [`DepthNoise::d405`] is a RealSense D405.
 ///
@@ -80,6 +81,24 @@ impl DepthNoise {
         seed: u64,
         frame: u64,
     ) -> Result<DepthImage> {
+        let mut told = depth.clone();
+        self.spoil(&mut told, color, camera, camera.fx, [seed, frame])?;
+        Ok(told)
+    }
+
+    /// As [`Self::apply`], in place, for a picture that is not what the sensor's imagers see but was made smaller or cut out of it: `focal` is the focal length of the imagers [px], in whose
+    /// pixels disparity is told, `camera` the one of the picture.
+    ///
+    /// # Errors
+    /// Images whose pixels are not as many as their size or the camera's says; then nothing is changed.
+    pub fn spoil(
+        &self,
+        depth: &mut DepthImage,
+        color: Option<&ColorImage>,
+        camera: &Camera,
+        focal: f64,
+        [seed, frame]: [u64; 2],
+    ) -> Result<()> {
         let (width, height) = (depth.width, depth.height);
         let fits = |w: usize, h: usize, n: usize| (w, h) == (camera.width, camera.height) && n == w * h;
         if !fits(width, height, depth.depth.len()) || color.is_some_and(|c| !fits(c.width, c.height, c.pixels.len())) {
@@ -88,19 +107,19 @@ impl DepthNoise {
                 camera.width, camera.height
             )));
         }
-        let scale = camera.fx * self.baseline.max(1e-9);
+        let scale = focal * self.baseline.max(1e-9);
         let disparity: Vec<f64> =
             depth.depth.iter().map(|z| if *z > 0.0 && z.is_finite() { scale / f64::from(*z) } else { 0.0 }).collect();
-        let hidden = if self.occlusion { hidden(&disparity, width) } else { Vec::new() };
-        let mut out = DepthImage::new(width, height);
-        for (i, told) in out.depth.iter_mut().enumerate() {
+        let hidden = if self.occlusion { hidden(&disparity, width, camera.fx / focal) } else { Vec::new() };
+        let truth = depth.clone();
+        let tell = |i: usize| {
             let d = disparity[i];
             if d <= 0.0 || hidden.get(i).is_some_and(|h| *h) {
-                continue;
+                return 0.0;
             }
             let mut bits = key(&[seed, 0x6465_7074, frame, i as u64]);
             let mut kept = 1.0 - self.speckle.clamp(0.0, 1.0);
-            let facing = facing(depth, camera, i);
+            let facing = facing(&truth, camera, i);
             if facing < self.grazing {
                 kept *= facing / self.grazing;
             }
@@ -114,11 +133,21 @@ impl DepthNoise {
             let noisy = d + self.disparity_sigma * normal(&mut bits);
             let z = scale / stepped(noisy, self.disparity_step).max(1e-9);
             let z = stepped(z, self.depth_step);
-            if !lost && z >= self.range[0] && z <= self.range[1] {
-                *told = z as f32;
+            if !lost && z >= self.range[0] && z <= self.range[1] { z as f32 } else { 0.0 }
+        };
+        depth.depth.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, line)| {
+            for (column, told) in line.iter_mut().enumerate() {
+                *told = tell(row * width + column);
             }
-        }
-        Ok(out)
+        });
+        Ok(())
+    }
+}
+
+impl Default for DepthNoise {
+    /// [`Self::d405`].
+    fn default() -> Self {
+        Self::d405()
     }
 }
 
@@ -126,8 +155,8 @@ fn stepped(value: f64, step: f64) -> f64 {
     if step > 0.0 { (value / step).round() * step } else { value }
 }
 
-/// Which pixels the right imager does not see: a pixel farther right, being nearer, lands on or beyond them there.
-fn hidden(disparity: &[f64], width: usize) -> Vec<bool> {
+/// Which pixels the right imager does not see: a pixel farther right, being nearer, lands on or beyond them there. `stretch` is pixels of the picture in one of the imagers.
+fn hidden(disparity: &[f64], width: usize, stretch: f64) -> Vec<bool> {
     let mut out = vec![false; disparity.len()];
     if width == 0 {
         return out;
@@ -135,7 +164,7 @@ fn hidden(disparity: &[f64], width: usize) -> Vec<bool> {
     for (row, hidden) in disparity.chunks(width).zip(out.chunks_mut(width)) {
         let mut leftmost = f64::INFINITY;
         for u in (0..row.len()).rev().filter(|u| row[*u] > 0.0) {
-            let lands = u as f64 - row[u];
+            let lands = u as f64 - stretch * row[u];
             // Beside the right imager's picture nothing matches either, but rectified sensors are wider than what they show.
             hidden[u] = lands >= leftmost;
             leftmost = leftmost.min(lands);
@@ -295,5 +324,38 @@ mod tests {
         assert!(differing(&told(1, 4), &told(1, 5)) > 40_000 && differing(&told(1, 4), &told(2, 4)) > 40_000);
         let other = Camera { width: 10, ..CAMERA };
         assert!(model.apply(&flat, None, &other, 1, 0).unwrap_err().to_string().contains("300 x 200"));
+    }
+
+    #[test]
+    fn a_picture_cut_out_of_the_sensors_has_the_sensors_noise() {
+        let camera = Camera { width: 200, height: 200, fx: 208.0, fy: 208.0, cx: 99.5, cy: 99.5, ..CAMERA };
+        let exact = DepthNoise { disparity_step: 0.0, speckle: 0.0, ..DepthNoise::d405() };
+        let model = DepthNoise { disparity_sigma: 0.05, edge_loss: 0.6, ..exact };
+        let spread = |z: f32| {
+            let mut image = DepthImage::new(200, 200);
+            image.depth.fill(z);
+            model.spoil(&mut image, None, &camera, 445.0, [1, 2]).unwrap();
+            let all: Vec<f64> = image.depth.iter().map(|d| f64::from(d - z)).collect();
+            (all.iter().map(|d| d * d).sum::<f64>() / all.len() as f64).sqrt()
+        };
+        let (near, far) = (spread(0.2), spread(0.4));
+        assert!((far / near - 4.0).abs() < 0.1, "{near} {far}");
+        assert!((0.0008..0.0012).contains(&far), "{far}");
+
+        let camera = Camera { width: 64, height: 64, ..camera };
+        let mut image = DepthImage::new(64, 64);
+        for (i, d) in image.depth.iter_mut().enumerate() {
+            *d = if i % 64 < 32 { 0.2 } else { 0.3 };
+        }
+        let mut shadowed = image.clone();
+        shadowed.depth.iter_mut().for_each(|d| *d = 0.5 - *d);
+        model.spoil(&mut image, None, &camera, 445.0, [1, 2]).unwrap();
+        let lost = |column: usize| (0..64).filter(|r| image.depth[r * 64 + column] == 0.0).count();
+        assert!((25..55).contains(&lost(31)) && (25..55).contains(&lost(32)) && lost(10) == 0 && lost(33) == 0);
+        assert!(image.depth.iter().all(|d| (f64::from(*d) / 1e-4 - (f64::from(*d) / 1e-4).round()).abs() < 1e-3));
+        // 445 * 0.018 / 0.2 - 445 * 0.018 / 0.3 = 13.4 px of the imagers, 6.2 of the picture, are hidden beside what is nearer on the right.
+        model.spoil(&mut shadowed, None, &camera, 445.0, [1, 2]).unwrap();
+        let lost = |column: usize| (0..64).filter(|r| shadowed.depth[r * 64 + column] == 0.0).count();
+        assert!(lost(26) == 64 && lost(24) == 0, "{} {}", lost(26), lost(24));
     }
 }

@@ -11,6 +11,7 @@ mod inspect;
 mod moving;
 mod paper;
 mod rendering;
+mod replayed;
 pub mod report;
 pub mod scenes;
 mod segment;

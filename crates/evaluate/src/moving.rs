@@ -39,8 +39,7 @@ impl Moving {
             let reason = "the program ffmpeg makes .mp4 and is not installed; install it, or write a .webp";
             return Err(Error::Mismatch(format!("{}: {reason}", output.display())));
         }
-        let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok(Self::Mp4 { part: output.with_file_name(format!(".{}-{name}", std::process::id())), encoder: None })
+        Ok(Self::Mp4 { part: beside(output), encoder: None })
     }
 
     /// Adds a frame that is shown from `time_ms` on; `hz` frames are shown a second.
@@ -80,8 +79,13 @@ impl Moving {
     pub fn finish(mut self, output: &Path) -> Result<()> {
         match &mut self {
             Self::Webp(frames) => {
-                let bytes = webp(frames)?;
-                std::fs::write(output, bytes).map_err(|source| Error::Io { path: output.to_owned(), source })
+                let part = beside(output);
+                let written = std::fs::write(&part, webp(frames)?).and_then(|()| std::fs::rename(&part, output));
+                written.map_err(|source| {
+                    // What could not be written whole is not left behind.
+                    let _ = std::fs::remove_file(&part);
+                    Error::Io { path: output.to_owned(), source }
+                })
             }
             Self::Mp4 { part, encoder } => {
                 let status = encoder.take().map(|mut child| {
@@ -95,6 +99,12 @@ impl Moving {
             }
         }
     }
+}
+
+/// Where a picture is while it is not whole.
+fn beside(output: &Path) -> PathBuf {
+    let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    output.with_file_name(format!(".{}-{name}", std::process::id()))
 }
 
 impl Drop for Moving {

@@ -1,25 +1,38 @@
-//! `trocar render`: what a camera sees of a specimen or of a scene, as a picture or as a moving picture of the scripted grasp-lift.
+//! `trocar render`: what a camera sees of a specimen, of a scene or of an episode, as a picture or as a moving picture of the scripted grasp-lift or of the episode.
+
+mod colors;
+mod play;
+mod rendered;
+mod script;
+
+pub(crate) use colors::{averaged, label_color, shown};
+pub use rendered::{Rendered, Seen};
+pub(crate) use script::Script;
+
+use play::Play;
+use rendered::seen;
 
 use crate::cell_run::scene_specimen;
 use crate::moving::Moving;
+use crate::replayed::Replayed;
 use crate::{Error, Result};
 use glam::DVec3;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 use trocar_camera::ColorImage;
-use trocar_cell::{Cell, CellLift, CellLiftPolicy, Policy};
+use trocar_cell::Cell;
 use trocar_progress::Progress;
 use trocar_render::{Picture, Settings};
 use trocar_scene::Scene;
 use trocar_sight::{DepthNoise, OUTSIDE, Sensor, Sight};
 use trocar_specimen::Specimen;
+use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
 
 /// Steps of depth in the files of depth [m].
 const DEPTH_STEP: f64 = 1e-4;
 
-/// Frames a second of moving pictures, by what they are: WebP shows every second control period of 1/30 s.
+/// Most frames a second of moving pictures, by what they are: a frame each control period or each second, third... of them. At 30 periods a second a WebP shows every second.
 const WEBP_HZ: u32 = 15;
-const MP4_HZ: u32 = 30;
+const MP4_HZ: u32 = 60;
 
 /// Height of moving pictures of cameras that see more [px].
 const MOVING_HEIGHT: usize = 360;
@@ -27,7 +40,7 @@ const MOVING_HEIGHT: usize = 360;
 /// What is to be rendered, and how.
 #[derive(Clone, Debug)]
 pub struct Rendering {
-    /// Specimen folder, scene file or built-in scene.
+    /// Specimen folder, scene file or built-in scene; or an episode's folder or file.
     pub source: String,
     /// Name of the camera; the specimen's or the scene's first if left out.
     pub camera: Option<String>,
@@ -39,7 +52,7 @@ pub struct Rendering {
     pub depth: bool,
     /// Write labels, too.
     pub labels: bool,
-    /// Seconds into the scripted grasp-lift; its start if left out.
+    /// Seconds into the scripted grasp-lift, whose start is shown if left out, or into the episode, whose end is.
     pub at: Option<f64>,
     /// Add the noise of the sensors.
     pub noise: bool,
@@ -49,44 +62,8 @@ pub struct Rendering {
     pub threads: usize,
     /// Folder in which a scene's phantom is recorded and reconstructed; what is there is used again.
     pub phantoms: PathBuf,
-}
-
-/// A picture that was made.
-#[derive(Clone, Debug, Serialize)]
-pub struct Rendered {
-    /// The camera.
-    pub camera: String,
-    /// Width of the picture [px].
-    pub width: usize,
-    /// Height of the picture [px].
-    pub height: usize,
-    /// Simulated time of the picture, of a moving one of its last frame [s].
-    pub time_s: f64,
-    /// Frames.
-    pub frames: usize,
-    /// Paths a pixel; 0 for direct light alone.
-    pub samples: u32,
-    /// Triangles on the stage.
-    pub triangles: usize,
-    /// Wall time of the pictures [s].
-    pub render_s: f64,
-    /// What was seen: name and label, colour in the picture of labels, share of the picture.
-    pub seen: Vec<Seen>,
-    /// Files.
-    pub files: Vec<String>,
-}
-
-/// Something in a picture.
-#[derive(Clone, Debug, Serialize)]
-pub struct Seen {
-    /// Its name.
-    pub name: String,
-    /// Its label.
-    pub label: u16,
-    /// Its sRGB colour in the picture of labels.
-    pub color: [u8; 3],
-    /// Share of the pixels.
-    pub share: f64,
+    /// Specimen folder of an episode, where it is no longer where the scene says.
+    pub specimen: Option<PathBuf>,
 }
 
 impl Rendering {
@@ -112,7 +89,18 @@ impl Rendering {
         if let Some(samples) = self.samples.filter(|n| !(1..=65_536).contains(n)) {
             return Err(Error::Mismatch(format!("--samples is {samples}; 1 to 65536")));
         }
+        if let Some(size) = self.size.filter(|size| moving.is_some() && size.iter().any(|n| n % 2 == 1)) {
+            return Err(Error::Mismatch(format!("--size is {}x{}; moving pictures have even sides", size[0], size[1])));
+        }
         let folder = Path::new(&self.source);
+        let begin = || moving.map(|most| Ok::<_, Error>((most, Moving::begin(output, &extension)?))).transpose();
+        if let Some(file) = episode_file(folder) {
+            return self.episode(&file, begin()?, output, progress);
+        }
+        if self.specimen.is_some() {
+            let reason = "--specimen is for episodes, whose specimen may have moved";
+            return Err(Error::Mismatch(format!("{}: {reason}", self.source)));
+        }
         if folder.join("result.json").is_file() {
             let reason = "a run keeps figures, no shapes; render its scene instead: trocar render SCENE --at SECONDS";
             return Err(Error::Mismatch(format!("{}: {reason}", self.source)));
@@ -120,23 +108,59 @@ impl Rendering {
         if folder.is_dir() {
             if moving.is_some() || self.at.is_some() {
                 return Err(Error::Mismatch(format!(
-                    "{}: a specimen does not move; moving pictures and --at are for scenes",
+                    "{}: a specimen does not move; moving pictures and --at are for scenes and episodes",
                     self.source
                 )));
             }
-            return self.specimen(folder, output);
+            return self.specimen(folder, output, progress);
         }
         let scene = Scene::read(&self.source)?;
-        let moving = moving.map(|hz| Ok::<_, Error>((hz, Moving::begin(output, &extension)?))).transpose()?;
+        let film = begin()?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let cell = Cell::new(&scene, &specimen, self.threads)?;
-        let sight = self.ready(Sight::new(&scene, &specimen, &cell)?);
+        let sight = Sight::new(&scene, &specimen, &cell)?;
+        self.play(&mut Script::new(&scene, cell)?, sight, (self.at.or(Some(0.0)), film), output, progress)
+    }
+
+    /// An episode, done again from its file.
+    fn episode(
+        &self,
+        file: &Path,
+        film: Option<(u32, Moving)>,
+        output: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Rendered> {
+        let episode = EpisodeFile::read(file)?;
+        let scene = episode.scene(self.specimen.as_deref())?;
+        let specimen = match &self.specimen {
+            Some(folder) => Specimen::read(folder)?,
+            None => scene_specimen(&scene, &self.phantoms, progress)?,
+        };
+        if let Some(other) = episode.other(&scene, &specimen)? {
+            let right = "--specimen names the folder of the one that was recorded";
+            return Err(Error::Mismatch(format!("{}: {other}; {right}", file.display())));
+        }
+        let mut again = Episode::new(&scene, &specimen, self.threads)?;
+        let mut again = Replayed::begin(&mut again, &episode)?;
+        let sight = again.sight(&specimen)?;
+        self.play(&mut again, sight, (self.at, film), output, progress)
+    }
+
+    /// What goes on in a cell: one picture of it after `at` seconds or at its end, or a moving one of all of it.
+    fn play(
+        &self,
+        play: &mut dyn Play,
+        sight: Sight,
+        (at, film): (Option<f64>, Option<(u32, Moving)>),
+        output: &Path,
+        progress: &dyn Progress,
+    ) -> Result<Rendered> {
+        let sight = self.ready(sight);
         let camera = self.camera.clone().or_else(|| sight.cameras().first().map(|c| (*c).to_owned()));
         let camera = camera.unwrap_or_else(|| OUTSIDE.to_owned());
-        let script = Script::new(&scene, cell)?;
-        match moving {
-            None => self.still(script, sight, &camera, output, progress),
-            Some((hz, film)) => self.moving(script, sight, &camera, (hz, film), output, progress),
+        match film {
+            None => self.still(play, sight, (&camera, at), output, progress),
+            Some(film) => self.moving(play, sight, &camera, film, output, progress),
         }
     }
 
@@ -156,7 +180,7 @@ impl Rendering {
         if self.samples.is_none() && !self.noise { 2 } else { 1 }
     }
 
-    fn specimen(&self, folder: &Path, output: &Path) -> Result<Rendered> {
+    fn specimen(&self, folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Rendered> {
         let specimen = Specimen::read(folder)?;
         let mut sight = self.ready(Sight::of_specimen(&specimen)?);
         let camera = self.camera.clone().or_else(|| sight.cameras().first().map(|c| (*c).to_owned()));
@@ -168,6 +192,9 @@ impl Rendering {
             averaged(&sight.see_still(&camera, size.map(|n| n * self.finer()), &self.settings())?.color, self.finer());
         let picture = sight.see_still(&camera, size, &Settings::Preview { shadows: false })?.clone();
         let render_s = clock.elapsed().as_secs_f64();
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
         self.write(&sight, &camera, &color, &picture, output, (0.0, render_s))
     }
 
@@ -183,33 +210,40 @@ impl Rendering {
 
     fn still(
         &self,
-        mut script: Script,
+        play: &mut dyn Play,
         mut sight: Sight,
-        camera: &str,
+        (camera, at): (&str, Option<f64>),
         output: &Path,
         progress: &dyn Progress,
     ) -> Result<Rendered> {
-        let size = self.size.map_or_else(|| sight.size(camera), Ok)?;
-        script.until(self.at.unwrap_or(0.0), progress)?;
-        let world = script.cell.world();
+        let own = sight.size(camera)?;
+        let size = self.size.unwrap_or(own);
+        play::until(play, at, progress)?;
+        let world = play.cell().world();
         let points: Vec<DVec3> =
             (0..world.model.bodies().len()).flat_map(|b| world.state.positions(&world.model, b)).collect();
         self.cut(&mut sight, camera, size, &points)?;
         let clock = std::time::Instant::now();
         let finer = self.finer();
-        let fine = sight.see(&script.cell, camera, size.map(|n| n * finer), &self.settings())?;
+        progress.begin("picture", 1);
+        let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
         let color = averaged(&fine.color, finer);
-        let picture = sight.see(&script.cell, camera, size, &Settings::Preview { shadows: false })?.clone();
+        let picture = sight.see(play.cell(), camera, size, &Settings::Preview { shadows: false })?.clone();
+        progress.end();
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
         let render_s = clock.elapsed().as_secs_f64();
-        self.write(&sight, camera, &color, &picture, output, (script.cell.time(), render_s))
+        let made = self.write(&sight, camera, &color, &picture, output, (play.cell().time(), render_s))?;
+        Ok(Rendered { differs: play.differs(), ..made })
     }
 
     fn moving(
         &self,
-        mut script: Script,
+        play: &mut dyn Play,
         mut sight: Sight,
         camera: &str,
-        (hz, mut film): (u32, Moving),
+        (most, mut film): (u32, Moving),
         output: &Path,
         progress: &dyn Progress,
     ) -> Result<Rendered> {
@@ -217,33 +251,32 @@ impl Rendering {
         let small = |n: usize| if height > MOVING_HEIGHT { n * MOVING_HEIGHT / height } else { n };
         let even = |n: usize| n & !1;
         let size = self.size.unwrap_or([even(small(width)), even(small(height))]);
-        if size.iter().any(|n| n % 2 == 1) {
-            return Err(Error::Mismatch(format!("--size is {}x{}; moving pictures have even sides", size[0], size[1])));
-        }
+        let hz = frame_rate(play.cell().period(), most);
         let (mut frames, mut render_s) = (0, 0.0);
         let mut picture = Picture::new(size[0], size[1]);
-        progress.begin("film", 1);
+        progress.begin("film", play.periods().unwrap_or(1) as u64);
         loop {
             if progress.interrupted() {
                 return Err(Error::Interrupted);
             }
-            if script.cell.time() >= f64::from(frames) / f64::from(hz) - 1e-9 {
+            if play.cell().time() >= f64::from(frames) / f64::from(hz) - 1e-9 {
                 let clock = std::time::Instant::now();
                 let finer = self.finer();
-                let fine = sight.see(&script.cell, camera, size.map(|n| n * finer), &self.settings())?;
+                let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
                 film.add(averaged(&fine.color, finer), 1000.0 * f64::from(frames) / f64::from(hz), hz)?;
                 picture.labels.clone_from(&fine.labels);
                 render_s += clock.elapsed().as_secs_f64();
                 frames += 1;
             }
-            if !script.advance()? {
+            if !play.advance()? {
                 break;
             }
+            progress.advance(1);
         }
         progress.end();
         film.finish(output)?;
         let files = vec![output.display().to_string()];
-        let (time_s, samples) = (script.cell.time(), self.samples.unwrap_or(0));
+        let (time_s, samples) = (play.cell().time(), self.samples.unwrap_or(0));
         let seen = seen(&sight, &picture.labels);
         let (triangles, frames) = (sight.triangles(), frames as usize);
         let [width, height] = size;
@@ -258,6 +291,7 @@ impl Rendering {
             render_s,
             seen,
             files,
+            differs: play.differs(),
         })
     }
 
@@ -296,130 +330,24 @@ impl Rendering {
             render_s,
             seen: seen(sight, &picture.labels),
             files: files.iter().map(|f| f.display().to_string()).collect(),
+            differs: None,
         })
     }
 }
 
-/// The scripted grasp-lift, a control period at a time.
-pub(crate) struct Script {
-    pub cell: Cell,
-    policy: CellLiftPolicy,
+/// The episode file that `source` is or that is in the folder `source`.
+fn episode_file(source: &Path) -> Option<PathBuf> {
+    let inside = source.join(EPISODE_FILE);
+    let named = source.extension().is_some_and(|e| e == "trocar");
+    if inside.is_file() { Some(inside) } else { (named && !source.is_dir()).then(|| source.to_owned()) }
 }
 
-impl Script {
-    /// The task of `scene`: its organ, grasped in the middle, lifted 15 mm.
-    pub fn new(scene: &Scene, cell: Cell) -> Result<Self> {
-        let mut task = CellLift::default();
-        if let Some(arm) = scene.grasping_arm() {
-            task.arm = arm.name.name().to_owned();
-        }
-        let organ = &scene.task.organ;
-        task.organ = cell.world().model.bodies().iter().any(|b| b.name() == organ).then(|| organ.clone());
-        task.design = Some(cell.grasp_design(&task.arm)?);
-        Ok(Self { policy: CellLiftPolicy::new(&task, &cell)?, cell })
-    }
-
-    /// Goes on to a time [s].
-    fn until(&mut self, time: f64, progress: &dyn Progress) -> Result<()> {
-        progress.begin("simulate", 1);
-        while self.cell.time() < time - 1e-9 {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
-            if !self.advance()? {
-                let end = self.cell.time();
-                return Err(Error::Mismatch(format!("--at is {time} s; the grasp-lift ends after {end:.2} s")));
-            }
-        }
-        progress.end();
-        Ok(())
-    }
-
-    /// Does one control period; false when the task is over.
-    pub fn advance(&mut self) -> Result<bool> {
-        let Some(action) = self.policy.act(&self.cell)? else { return Ok(false) };
-        let report = self.cell.step(&action)?;
-        Ok(report.tissue.divergence.is_none())
-    }
+/// The highest rate of frames, at most `most` a second, that shows whole control periods of `period` seconds.
+fn frame_rate(period: f64, most: u32) -> u32 {
+    let control = (1.0 / period).round().max(1.0) as u32;
+    (1..=control).filter(|k| control.is_multiple_of(*k)).map(|k| control / k).find(|hz| *hz <= most).unwrap_or(1)
 }
 
 fn specimen_points(specimen: &Specimen) -> Vec<DVec3> {
     specimen.organs.iter().flat_map(|o| o.body.vertices.iter().copied()).collect()
-}
-
-/// A picture of `finer` times the size, averaged.
-pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
-    if finer <= 1 {
-        return image.clone();
-    }
-    let (width, height) = (image.width / finer, image.height / finer);
-    let count = (finer * finer) as u32;
-    let pixel = |i: usize| {
-        let (x, y) = (i % width * finer, i / width * finer);
-        let block = (0..finer * finer).map(|k| image.pixels[(y + k / finer) * image.width + x + k % finer]);
-        let sum = block.fold([0_u32; 3], |s, p| [0, 1, 2].map(|c| s[c] + u32::from(p[c])));
-        sum.map(|s| ((s + count / 2) / count) as u8)
-    };
-    ColorImage { width, height, pixels: (0..width * height).map(pixel).collect() }
-}
-
-fn seen(sight: &Sight, labels: &[u16]) -> Vec<Seen> {
-    let count = |label: u16| labels.iter().filter(|l| **l == label).count() as f64 / labels.len().max(1) as f64;
-    let row = |(label, name): &(u16, String)| Seen {
-        name: name.clone(),
-        label: *label,
-        color: label_color(*label),
-        share: count(*label),
-    };
-    sight.labels().iter().map(row).filter(|s| s.share > 0.0).collect()
-}
-
-/// Colours far from each other: steps of the golden angle round the circle of hues.
-pub(crate) fn label_color(label: u16) -> [u8; 3] {
-    if label == 0 {
-        return [0; 3];
-    }
-    let hue = (f64::from(label) * 0.618_033_988_75).fract() * 6.0;
-    let light = if label.is_multiple_of(2) { 0.95 } else { 0.72 };
-    let x = 1.0 - (hue % 2.0 - 1.0).abs();
-    let rgb = match hue as u32 {
-        0 => [1.0, x, 0.0],
-        1 => [x, 1.0, 0.0],
-        2 => [0.0, 1.0, x],
-        3 => [0.0, x, 1.0],
-        4 => [x, 0.0, 1.0],
-        _ => [1.0, 0.0, x],
-    };
-    rgb.map(|c| (255.0 * light * (0.18 + 0.82 * c)) as u8)
-}
-
-/// Depth in colours from near (bright) to far; black where there is none.
-pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
-    // Whole millimetres: what is flat has one rank, not that of its rounding.
-    let whole = |d: f32| (d * 1e3).round() * 1e-3;
-    let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).map(whole).collect();
-    valid.sort_by(f32::total_cmp);
-    let at = |share: f64| valid.get((share * valid.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(1.0);
-    let (near, far) = (at(0.01), at(0.97));
-    // Viridis by its corners.
-    let stops: [[f64; 3]; 6] = [
-        [253.0, 231.0, 37.0],
-        [122.0, 209.0, 81.0],
-        [34.0, 168.0, 132.0],
-        [42.0, 120.0, 142.0],
-        [65.0, 68.0, 135.0],
-        [68.0, 1.0, 84.0],
-    ];
-    let color = |d: &f32| {
-        if *d <= 0.0 {
-            return [0; 3];
-        }
-        // Half by depth and half by how many pixels are nearer, so that what lies flat on a table is not all one colour.
-        let rank = valid.partition_point(|v| *v < whole(*d)) as f64 / valid.len().max(1) as f64;
-        let share = f64::from((d - near) / (far - near).max(1e-6));
-        let x = 5.0 * (0.5 * share.clamp(0.0, 1.0) + 0.5 * rank).min(0.9999);
-        let (i, t) = (x as usize, x.fract());
-        [0, 1, 2].map(|k| (stops[i][k] + t * (stops[i + 1][k] - stops[i][k])) as u8)
-    };
-    ColorImage { width: depth.width, height: depth.height, pixels: depth.depth.iter().map(color).collect() }
 }

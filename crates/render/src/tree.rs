@@ -4,10 +4,13 @@
 //! Nothing is fused and lanes never meet, so every instruction set gives the same bits.
 
 mod beam;
+mod block;
 mod build;
 
 pub(crate) use beam::Beam;
+pub(crate) use block::Hit;
 
+use block::{Block, bounds_of, corners_of};
 use build::{build, fit, whole};
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 use glam::Vec3A;
@@ -58,31 +61,12 @@ pub(crate) struct Ray {
     shear: [f32; 3],
 }
 
-/// Where a ray meets a triangle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Hit {
-    /// Distance in units of the ray's direction.
-    pub t: f32,
-    /// Weights of the second and the third corner.
-    pub u: f32,
-    pub v: f32,
-    pub triangle: u32,
-}
-
 /// Boxes of the children, by bound (low x y z, high x y z).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Node {
     bounds: [[f32; WIDE]; 6],
     child: [u32; WIDE],
-}
-
-/// The corners of eight triangles, by corner and axis; not a number where there are fewer.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[repr(C, align(64))]
-struct Block {
-    corners: [[[f32; WIDE]; 3]; 3],
-    triangle: [u32; WIDE],
 }
 
 /// The tree of boxes alone; leaves are numbers.
@@ -361,181 +345,5 @@ impl<S: Simd> Visitor<S> for Any<'_> {
     }
 }
 
-impl Block {
-    /// The nearest of eight triangles before `reach`, both sides, without gaps between neighbours: Woop, Benthin and
-    /// Wald, "Watertight Ray/Triangle Intersection" (2013).
-    #[inline(always)]
-    fn meet<S: Simd>(&self, simd: S, ray: &Ray, reach: f32) -> Option<Hit> {
-        let [kx, ky, kz] = ray.axes;
-        let [sx, sy, sz] = ray.shear;
-        let (sx, sy, sz) = (f32x8::splat(simd, sx), f32x8::splat(simd, sy), f32x8::splat(simd, sz));
-        let origin = ray.origin.to_array();
-        let ox = f32x8::splat(simd, origin[kx]);
-        let oy = f32x8::splat(simd, origin[ky]);
-        let oz = f32x8::splat(simd, origin[kz]);
-        let zero = f32x8::splat(simd, 0.0);
-        let (mut x, mut y, mut z) = ([zero; 3], [zero; 3], [zero; 3]);
-        for c in 0..3 {
-            let height = f32x8::from_slice(simd, &self.corners[c][kz]) - oz;
-            x[c] = (f32x8::from_slice(simd, &self.corners[c][kx]) - ox) - sx * height;
-            y[c] = (f32x8::from_slice(simd, &self.corners[c][ky]) - oy) - sy * height;
-            z[c] = sz * height;
-        }
-        let a = x[2] * y[1] - y[2] * x[1];
-        let b = x[0] * y[2] - y[0] * x[2];
-        let c = x[1] * y[0] - y[1] * x[0];
-        // All of one sign or 0; not a number is neither.
-        let low = a.min(b).min(c);
-        let high = a.max(b).max(c);
-        let inside = low.simd_ge(zero) | high.simd_le(zero);
-        if !inside.any_true() {
-            return None;
-        }
-        let sum = a + b + c;
-        let t = (a * z[0] + b * z[1] + c * z[2]) / sum;
-        let hit = inside & t.simd_gt(zero) & t.simd_lt(f32x8::splat(simd, reach));
-        let mut lanes = hit.to_bitmask();
-        if lanes == 0 {
-            return None;
-        }
-        let distances: [f32; WIDE] = t.into();
-        let mut best = lanes.trailing_zeros() as usize & (WIDE - 1);
-        lanes &= lanes - 1;
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize & (WIDE - 1);
-            lanes &= lanes - 1;
-            if distances[lane] < distances[best] {
-                best = lane;
-            }
-        }
-        let share = 1.0 / sum[best];
-        Some(Hit { t: distances[best], u: b[best] * share, v: c[best] * share, triangle: self.triangle[best] })
-    }
-}
-
-/// The corners of a triangle; `None` where one is missing or not finite.
-fn corners_of(positions: &[Vec3A], triangle: &[u32; 3]) -> Option<[Vec3A; 3]> {
-    let [a, b, c] = triangle.map(|v| positions.get(v as usize).copied().filter(|p| p.is_finite()));
-    Some([a?, b?, c?])
-}
-
-fn bounds_of(positions: &[Vec3A], triangle: &[u32; 3]) -> Option<Bounds> {
-    Some(corners_of(positions, triangle)?.into_iter().fold(Bounds::EMPTY, Bounds::with))
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use fearless_simd::{Level, dispatch};
-    use glam::Vec3;
-
-    fn noise(seed: u32) -> impl FnMut() -> f32 {
-        let mut n = seed;
-        move || {
-            n += 1;
-            crate::random::numbers([n, seed, 0, 0])[0] * 2.0 - 1.0
-        }
-    }
-
-    fn soup(count: u32, size: f32) -> (Vec<Vec3A>, Vec<[u32; 3]>) {
-        let mut r = noise(5);
-        let mut positions = Vec::new();
-        for _ in 0..count {
-            let middle = Vec3A::new(r(), r(), r());
-            positions.extend((0..3).map(|_| middle + size * Vec3A::new(r(), r(), r())));
-        }
-        (positions, (0..count).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect())
-    }
-
-    /// Moeller and Trumbore in double precision over all triangles.
-    fn by_hand(positions: &[Vec3A], triangles: &[[u32; 3]], ray: &Ray) -> Option<(f64, u32)> {
-        let (o, d) = (Vec3::from(ray.origin).as_dvec3(), Vec3::from(ray.direction).as_dvec3());
-        let mut best: Option<(f64, u32)> = None;
-        for (i, t) in triangles.iter().enumerate() {
-            let [a, b, c] = t.map(|v| Vec3::from(positions[v as usize]).as_dvec3());
-            let p = d.cross(c - a);
-            let det = (b - a).dot(p);
-            let u = (o - a).dot(p) / det;
-            let q = (o - a).cross(b - a);
-            let (v, t) = (d.dot(q) / det, (c - a).dot(q) / det);
-            if u >= 0.0 && v >= 0.0 && u + v <= 1.0 && t > 0.0 && best.is_none_or(|b| t < b.0) {
-                best = Some((t, i as u32));
-            }
-        }
-        best
-    }
-
-    #[test]
-    fn the_first_of_all_triangles_is_found_on_every_instruction_set() {
-        let (positions, triangles) = soup(3000, 0.1);
-        let tree = Tree::new(&positions, &triangles);
-        let mut r = noise(9);
-        let (mut hits, mut differ) = (0, 0);
-        for _ in 0..2000 {
-            let ray = Ray::new(2.0 * Vec3A::new(r(), r(), r()), Vec3A::new(r(), r(), r()));
-            let ours = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
-            assert_eq!(
-                ours,
-                dispatch!(Level::baseline(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]))
-            );
-            let theirs = by_hand(&positions, &triangles, &ray);
-            let any = dispatch!(Level::new(), simd => tree.any(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
-            assert_eq!(any, ours.is_some());
-            match (ours, theirs) {
-                (Some(a), Some(b)) if (f64::from(a.t) - b.0).abs() < 1e-5 * (1.0 + b.0) => hits += 1,
-                (None, None) => {}
-                _ => differ += 1,
-            }
-        }
-        assert!(hits > 300, "{hits} rays hit");
-        assert!(differ <= 2, "{differ} rays end elsewhere; only grazed edges may");
-    }
-
-    #[test]
-    fn refitted_is_as_good_as_rebuilt() {
-        let (mut positions, triangles) = soup(2000, 0.05);
-        let mut tree = Tree::new(&positions, &triangles);
-        for p in &mut positions {
-            *p += 0.2 * Vec3A::new((3.0 * p.y).sin(), (2.0 * p.z).cos(), p.x * p.y);
-        }
-        tree.refit(&positions, &triangles);
-        let anew = Tree::new(&positions, &triangles);
-        assert_eq!(tree.bounds(), anew.bounds());
-        let mut r = noise(3);
-        let level = Level::new();
-        for _ in 0..2000 {
-            let ray = Ray::new(2.0 * Vec3A::new(r(), r(), r()), Vec3A::new(r(), r(), r()));
-            let hits = [&tree, &anew]
-                .map(|t| dispatch!(level, simd => t.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK])));
-            assert_eq!(hits[0], hits[1]);
-        }
-    }
-
-    #[test]
-    fn hostile_meshes_are_survived() {
-        // A thousand triangles at one place, and ever smaller ones towards a point: nothing that boxes could tell apart.
-        let mut positions: Vec<Vec3A> = (0..3000).map(|i| [Vec3A::X, Vec3A::Y, Vec3A::Z][i % 3]).collect();
-        for i in 0..200 {
-            let scale = 0.5_f32.powi(i);
-            positions.extend([Vec3A::X * scale, Vec3A::Y * scale, Vec3A::splat(scale)]);
-        }
-        positions.extend([Vec3A::NAN, Vec3A::INFINITY, Vec3A::splat(1e38)]);
-        let mut triangles: Vec<[u32; 3]> = (0..1201).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
-        triangles.push([0, 1, 99_999]);
-        let tree = Tree::new(&positions, &triangles);
-        let ray = Ray::new(Vec3A::splat(-1.0), Vec3A::ONE);
-        assert!(
-            dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK])).is_some()
-        );
-        for bad in [Vec3A::ZERO, Vec3A::NAN, Vec3A::INFINITY] {
-            let ray = Ray::new(bad, bad);
-            let _ = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
-        }
-        let order: Vec<u32> = (0..1000).collect();
-        let mut leaves = Vec::new();
-        let nodes = build::by_order(&order, WIDE, &mut leaves);
-        let held = nodes.iter().flat_map(|n| n.child).filter(|c| *c != NONE && c & LEAF != 0).count();
-        assert_eq!((held, leaves.len()), (125, 125));
-        assert!(Tree::new(&[], &[]).bounds().low.x > 0.0);
-    }
-}
+mod tests;

@@ -10,6 +10,9 @@ use trocar_geometry::Pose;
 /// Name of the built-in arm model.
 pub const FRANKA_FR3: &str = "franka_fr3";
 
+/// What an arm's `shapes` says for shapes without a description.
+pub(crate) const SIMPLE: &str = "simple";
+
 /// Where something is and how it is turned.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -71,6 +74,9 @@ pub struct Arm {
     /// The link or body in a model file on which the instrument is mounted; the last one if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flange: Option<String>,
+    /// What it looks like in pictures: simple, or a URDF or MJCF file relative to the scene file whose visual meshes are drawn; if left out, those of a model file, and simple shapes for franka_fr3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shapes: Option<String>,
     /// Pose of the base in the cell frame.
     pub base: Frame,
     /// Joint angles towards which the elbow is drawn [degrees], as many as the arm has joints; the model's own if left out.
@@ -115,6 +121,16 @@ impl Arm {
         }
     }
 
+    /// The description, relative to the scene file, whose meshes pictures show; `None` for simple shapes.
+    pub fn drawn(&self) -> Option<&str> {
+        match (self.shapes.as_deref(), self.source()) {
+            (Some(SIMPLE), _) => None,
+            (Some(file), _) => Some(file),
+            (None, Some(ArmModel::Urdf(file) | ArmModel::Mjcf(file))) => Some(file),
+            (None, _) => None,
+        }
+    }
+
     /// An FR3 on its side of the paper's cell, facing the phantom.
     pub(crate) fn paper(name: Side, x: f64, instrument: &str, start: Start) -> Self {
         let half = std::f64::consts::FRAC_1_SQRT_2;
@@ -122,6 +138,7 @@ impl Arm {
             name,
             model: franka_fr3(),
             flange: None,
+            shapes: None,
             base: Frame { position_m: [x, 0.0, 0.0], rotation_wxyz: [half, 0.0, 0.0, half] },
             posture_deg: Vec::new(),
             controller: Controller::default(),
@@ -165,6 +182,14 @@ pub struct Port {
     /// Thickness of the wall [mm]; of a wall of 0 the hole is one edge, as in the paper's formula of the clearance (SPEC K3). One of 2 mm leaves a shaft of 5 mm in 6 mm 19 degrees of tilt.
     #[serde(default = "sheet")]
     pub sheet_thickness_mm: f64,
+    /// Diameter of the piece of abdominal wall that pictures show round the hole [mm]; of 0 they show a ring on a holder alone. Nothing but pictures knows of it.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub sheet_diameter_mm: f64,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(value: &f64) -> bool {
+    *value == 0.0
 }
 
 fn upwards() -> [f64; 3] {
@@ -183,7 +208,14 @@ impl Port {
     /// A port of the paper's size at `centre_m`.
     pub(crate) fn paper(side: Side, centre_m: [f64; 3]) -> Self {
         let name = side.name().to_owned();
-        Self { name, centre_m, normal: upwards(), hole_diameter_mm: hole(), sheet_thickness_mm: sheet() }
+        Self {
+            name,
+            centre_m,
+            normal: upwards(),
+            hole_diameter_mm: hole(),
+            sheet_thickness_mm: sheet(),
+            sheet_diameter_mm: 0.0,
+        }
     }
 
     /// Its frame in the cell: origin at the centre, z along the normal, x the cell's x as far as it lies in the wall (the cell's y where it does not).

@@ -46,7 +46,7 @@ fn form() {
         Case(
             "hole_diameter_mm = 6.0",
             "hole_diamter_mm = 6.0§",
-            "port[0].hole_diamter_mm: unknown field `hole_diamter_mm`, expected one of `name`, `centre_m`, `normal`, `hole_diameter_mm`, `sheet_thickness_mm`; did you mean `hole_diameter_mm`?",
+            "port[0].hole_diamter_mm: unknown field `hole_diamter_mm`, expected one of `name`, `centre_m`, `normal`, `hole_diameter_mm`, `sheet_thickness_mm`, `sheet_diameter_mm`; did you mean `hole_diameter_mm`?",
         ),
         Case(
             "control_hz = 30 ",

@@ -1,8 +1,10 @@
-//! Shapes of the arms' links: the FR3 from its published dimensions, any other arm as rods from joint to joint.
+//! Shapes of the arms' links: those of a description, the FR3 from its published dimensions, any other arm as rods from joint to joint.
 
 use crate::solid::{Part, Solid};
+use crate::{Error, Result, described};
 use glam::DVec3;
 use trocar_geometry::{Pose, TriMesh};
+use trocar_scene::{Arm, Scene};
 
 /// Cell of the links' surfaces [m].
 const SPACING: f64 = 0.0045;
@@ -71,8 +73,28 @@ fn fr3() -> Vec<TriMesh> {
     links.iter().map(|link| link.surface(SPACING)).collect()
 }
 
-/// The shapes of an arm's base and links, each in its own frame, as many as `poses` (base, links, flange) less the flange.
-pub(crate) fn links(model: &str, poses: &[Pose]) -> Vec<TriMesh> {
+/// The shapes of an arm's base and links, each in its own frame, as many as `poses` (base, links, flange) less the flange; empty for a link that shows nothing.
+///
+/// # Errors
+/// A description that cannot be read or is of another arm, a mesh that is missing.
+pub(crate) fn links(scene: &Scene, arm: &Arm, model: &str, poses: &[Pose]) -> Result<Vec<TriMesh>> {
+    let Some(said) = arm.drawn() else { return Ok(simple(model, poses)) };
+    let file = scene.resolve(said);
+    let links = described::links(arm.name.name(), &file, arm.flange.as_deref())?;
+    if arm.shapes.is_none() && links.iter().all(|link| link.triangles.is_empty()) {
+        // A model that says nothing of its looks.
+        return Ok(simple(model, poses));
+    }
+    if links.len() + 1 == poses.len() {
+        return Ok(links);
+    }
+    let (found, has) = (links.len().saturating_sub(1), poses.len().saturating_sub(2));
+    let reason = format!("{} shows {found} links that joints move; the arm has {has}", file.display());
+    Err(Error::Shapes { arm: arm.name.name().to_owned(), reason })
+}
+
+/// The shapes without a description.
+fn simple(model: &str, poses: &[Pose]) -> Vec<TriMesh> {
     if model == "fr3" && poses.len() == 9 {
         return fr3();
     }

@@ -22,12 +22,23 @@ pub enum Error {
         /// What is wrong and what would be right.
         reason: String,
     },
+    /// An arm cannot be drawn from its description.
+    #[error("arm '{arm}': {reason}")]
+    Shapes {
+        /// The arm.
+        arm: String,
+        /// File and link, what is wrong and what would be right.
+        reason: String,
+    },
     /// A size that no picture has.
     #[error("a picture of {0} x {1} pixels; 8 to 8192 each")]
     Size(usize, usize),
     /// A cell of another scene or specimen.
     #[error("the cell is not of this scene and specimen: {0}")]
     Mismatch(String),
+    /// A depth image cannot be given its noise.
+    #[error(transparent)]
+    Images(#[from] trocar_camera::Error),
     /// Something does not fit on the stage.
     #[error(transparent)]
     Render(#[from] trocar_render::Error),

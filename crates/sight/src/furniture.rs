@@ -22,6 +22,10 @@ const RIM: [f64; 2] = [0.008, 0.007];
 const SCOPE: [f64; 2] = [0.005, 0.30];
 const HEAD: [f64; 2] = [0.021, 0.11];
 
+/// Radius to which gas domes the abdominal wall, and rings of which a piece of it is made [m].
+const DOME: f64 = 0.25;
+const SHEET_RINGS: u32 = 12;
+
 fn plastic(color: [u8; 3], roughness: f32) -> Look {
     Look { color, surface: SurfaceKind::Coated { roughness, ior: 1.46, wander: [0.0; 3] } }
 }
@@ -40,6 +44,7 @@ pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Piece> {
     ];
     let mut rings = TriMesh::default();
     let mut holders = TriMesh::default();
+    let mut sheets = TriMesh::default();
     let n = ports.len().max(1) as f64;
     let middle = ports.iter().map(|p| DVec3::from(p.centre_m)).sum::<DVec3>() / n;
     for port in ports {
@@ -66,12 +71,38 @@ pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Piece> {
         let mut ring = along(&ring, centre, centre + z);
         ring.flip();
         join(&mut rings, &ring);
+        join(&mut sheets, &sheet(port, outer, half));
         let aside = centre - middle;
         let out = (aside - aside.dot(z) * z).try_normalize().unwrap_or(frame.rotation * DVec3::X);
         join(&mut holders, &holder(field, centre, out, z, outer, table));
     }
     all.push(Piece { name: "ports", mesh: rings, look: plastic([206, 112, 70], 0.5) });
+    if !sheets.triangles.is_empty() {
+        all.push(Piece { name: "wall", mesh: sheets, look: plastic([255; 3], 0.55) });
+    }
     all.push(Piece { name: "holders", mesh: holders, look: Look { color: [150, 153, 158], ..Look::steel() } });
+    all
+}
+
+/// A round piece of the abdominal wall from under the port's ring outwards, a little domed as gas does it: skin, fat at its edge, peritoneum inside. Nothing where the scene wants none.
+fn sheet(port: &Port, ring: f64, half: f64) -> TriMesh {
+    let rim = 0.5e-3 * port.sheet_diameter_mm;
+    let near = ring - 0.004;
+    let mut all = TriMesh::default();
+    if rim <= ring {
+        return all;
+    }
+    let sunk = |r: f64| (near * near - r * r) / (2.0 * DOME);
+    let radii = || (0..=SHEET_RINGS).map(|k| near + (rim - near) * f64::from(k) / f64::from(SHEET_RINGS));
+    let skin: Vec<[f64; 2]> = radii().map(|r| [half + sunk(r), r]).collect();
+    let inside: Vec<[f64; 2]> = radii().map(|r| [sunk(r) - half, r]).collect();
+    let edge = [[half + sunk(rim), rim], [half + sunk(rim) - 0.0008, rim + 0.0004], [sunk(rim) - half, rim]];
+    let frame = port.frame();
+    for (profile, color) in [(&skin[..], [222, 176, 148]), (&inside[..], [186, 92, 84]), (&edge[..], [232, 204, 128])] {
+        let mut part = along(&turned(profile), frame.translation, frame.translation + frame.rotation * DVec3::Z);
+        part.colors = vec![color; part.vertices.len()];
+        join(&mut all, &part);
+    }
     all
 }
 

@@ -6,7 +6,7 @@
 
 mod arm;
 mod camera;
-mod depth;
+mod described;
 mod error;
 mod field;
 mod furniture;
@@ -17,6 +17,6 @@ mod sight;
 mod solid;
 
 pub use camera::OUTSIDE;
-pub use depth::DepthNoise;
 pub use error::{Error, Result};
 pub use sight::{Sensor, Sight};
+pub use trocar_camera::DepthNoise;

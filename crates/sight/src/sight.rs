@@ -1,14 +1,15 @@
 //! The cell as cameras see it.
 
+mod follow;
+
 use crate::camera::{Room, Viewer, is_endoscope};
-use crate::depth::OWN_WIDTH;
 use crate::field::{Field, Recorded};
 use crate::instrument::Shapes;
-use crate::organ::{Draped, Piece, Whole};
-use crate::section::section;
-use crate::{DepthNoise, Error, OUTSIDE, Result, arm, furniture};
+use crate::organ::{Draped, Whole};
+use crate::{Error, OUTSIDE, Result, arm, furniture};
 use glam::{DQuat, DVec3};
-use trocar_camera::{Camera, Pose};
+use std::path::PathBuf;
+use trocar_camera::{Camera, DepthNoise, Pose};
 use trocar_cell::{Cell, Placed};
 use trocar_geometry::TriMesh;
 use trocar_render::{BodyId, Look, Noise, Picture, Settings, ShapeId, Stage, SurfaceKind, render_into};
@@ -19,6 +20,9 @@ use trocar_specimen::Specimen;
 const INSTRUMENTS: u16 = 101;
 const ARMS: u16 = 111;
 const REST: u16 = 201;
+
+/// Width of the picture in which a depth camera finds its disparities, however small the picture is that is asked for [px].
+const OWN_WIDTH: f64 = 848.0;
 
 /// Sides of pictures [px].
 const SIDES: std::ops::RangeInclusive<usize> = 8..=8192;
@@ -45,7 +49,6 @@ pub struct Sight {
     arms: Vec<Arm>,
     section: Option<(DVec3, DVec3)>,
     picture: Picture,
-    scratch: Vec<f32>,
     /// What the sensors do.
     pub sensor: Sensor,
 }
@@ -67,6 +70,9 @@ struct Shown {
 /// An arm on the stage.
 struct Arm {
     name: &'static str,
+    /// The description that it is drawn from, with the flange, and the shapes of base and links.
+    drawn: Option<(PathBuf, Option<String>)>,
+    shapes: Vec<ShapeId>,
     links: Vec<BodyId>,
     shaft: BodyId,
     motor: BodyId,
@@ -86,7 +92,7 @@ impl Sight {
         let room = Room { middle: middle(&placed) };
         let viewers = Viewer::all(scene, specimen.camera.as_ref(), room, &mut sight.stage)?;
         for (k, (described, _, instrument)) in scene.stations().iter().enumerate() {
-            sight.add_arm(k, described.name.name(), instrument, cell)?;
+            sight.add_arm(k, (scene, described), instrument, cell)?;
         }
         sight.organs.iter_mut().for_each(|o| o.shape = None);
         sight.follow(cell)?;
@@ -134,7 +140,6 @@ impl Sight {
             arms: Vec::new(),
             section: None,
             picture: Picture::default(),
-            scratch: Vec::new(),
             sensor: Sensor::default(),
         };
         for (k, organ) in placed.organs.iter().enumerate() {
@@ -191,18 +196,34 @@ impl Sight {
         Ok(())
     }
 
-    fn add_arm(&mut self, k: usize, name: &'static str, held: &trocar_scene::Instrument, cell: &Cell) -> Result<()> {
+    fn add_arm(
+        &mut self,
+        k: usize,
+        (scene, arm): (&Scene, &trocar_scene::Arm),
+        held: &trocar_scene::Instrument,
+        cell: &Cell,
+    ) -> Result<()> {
+        let name = arm.name.name();
         let poses = cell.link_poses(name)?;
         let label = ARMS + k as u16;
         self.labels.push((label, format!("{name} arm")));
         let shell =
             Look { color: [232; 3], surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, wander: [0.0; 3] } };
+        // Arms of one description share its shapes.
+        let drawn = arm.drawn().map(|file| (scene.resolve(file), arm.flange.clone()));
+        let known = self.arms.iter().find(|a| drawn.is_some() && a.drawn == drawn).map(|a| a.shapes.clone());
+        let shapes = match known {
+            Some(shapes) => shapes,
+            None => {
+                let meshes = arm::links(scene, arm, cell.arm_model(name)?, &poses)?;
+                meshes.iter().map(|mesh| self.base.add_shape(mesh)).collect::<std::result::Result<Vec<_>, _>>()?
+            }
+        };
         let mut links = Vec::new();
-        for (mesh, pose) in arm::links(cell.arm_model(name)?, &poses).iter().zip(&poses) {
-            let shape = self.base.add_shape(mesh)?;
-            links.push(self.base.add_body(shape, pose, label, &shell)?);
+        for (shape, pose) in shapes.iter().zip(&poses) {
+            links.push(self.base.add_body(*shape, pose, label, &shell)?);
         }
-        let shapes = Shapes::of(held);
+        let held_shapes = Shapes::of(held);
         let label = INSTRUMENTS + k as u16;
         self.labels.push((label, held.name.clone()));
         let polished = Look { surface: SurfaceKind::Metal { roughness: 0.3 }, ..Look::steel() };
@@ -211,10 +232,10 @@ impl Sight {
             let shape = self.base.add_shape(mesh)?;
             Ok(self.base.add_body(shape, &Pose::IDENTITY, label, look)?)
         };
-        let shaft = body(&shapes.shaft, &polished)?;
-        let motor = body(&shapes.motor, if held.kind == InstrumentKind::Grasper { &dark } else { &shell })?;
-        let blades = [body(&shapes.blades[0], &polished)?, body(&shapes.blades[1], &polished)?];
-        self.arms.push(Arm { name, links, shaft, motor, blades });
+        let shaft = body(&held_shapes.shaft, &polished)?;
+        let motor = body(&held_shapes.motor, if held.kind == InstrumentKind::Grasper { &dark } else { &shell })?;
+        let blades = [body(&held_shapes.blades[0], &polished)?, body(&held_shapes.blades[1], &polished)?];
+        self.arms.push(Arm { name, drawn, shapes, links, shaft, motor, blades });
         Ok(())
     }
 
@@ -302,7 +323,7 @@ impl Sight {
         }
         let at = self.viewer(camera)?;
         let sensor = self.sensor;
-        let Self { viewers, stage, picture, scratch, .. } = self;
+        let Self { viewers, stage, picture, .. } = self;
         let viewer = &mut viewers[at];
         stage.lights.clone_from(&viewer.lights);
         stage.environment = viewer.environment;
@@ -313,96 +334,11 @@ impl Sight {
         let (pose, depth) = (viewer.pose, viewer.depth);
         render_into(picture, stage, viewer.eye(size), &pose, settings, &film);
         if let Some(noise) = sensor.depth.filter(|_| depth) {
-            noise.spoil(&mut picture.depth, scratch, focal, [sensor.seed, frame]);
+            let camera = viewer.sized(size);
+            let seeds = [u64::from(sensor.seed), u64::from(frame)];
+            noise.spoil(&mut picture.depth, Some(&picture.color), &camera, focal, seeds)?;
         }
         Ok(&self.picture)
-    }
-
-    /// Brings the stage to where the cell is; [`Self::see`] does it itself.
-    ///
-    /// # Errors
-    /// A cell of another scene.
-    pub fn follow(&mut self, cell: &Cell) -> Result<()> {
-        let world = cell.world();
-        let bodies = world.model.bodies();
-        let mut same = true;
-        for organ in &mut self.organs {
-            let name = organ.whole.name.as_str();
-            let of = |b: &str| b.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-            let is_same = organ.shape.is_some()
-                && bodies.iter().filter(|b| of(b.name())).count() == organ.bodies.len()
-                && organ
-                    .bodies
-                    .iter()
-                    .zip(&organ.tets)
-                    .all(|(b, tets)| bodies.get(*b).is_some_and(|b| of(b.name()) && b.tets() == tets));
-            if !is_same {
-                same = false;
-                organ.bodies = (0..bodies.len()).filter(|b| of(bodies[*b].name())).collect();
-                organ.tets = organ.bodies.iter().map(|b| bodies[*b].tets().to_vec()).collect();
-                let pieces: Vec<Piece<'_>> = organ
-                    .bodies
-                    .iter()
-                    .map(|b| Piece { rest: bodies[*b].rest_positions(), tets: bodies[*b].tets() })
-                    .collect();
-                let whole = pieces.len() == 1 && pieces[0].tets == organ.whole.body.tets;
-                let draped = if whole { Some(organ.whole.draped()) } else { organ.whole.in_pieces(&pieces) };
-                organ.draped =
-                    draped.ok_or_else(|| Error::Mismatch(format!("its organ '{name}' has other elements")))?;
-            }
-            organ.nodes.clear();
-            for b in &organ.bodies {
-                organ.nodes.extend((0..bodies[*b].len()).map(|i| world.state.position(&world.model, *b, i)));
-            }
-        }
-        if same && self.section.is_none() {
-            for organ in &mut self.organs {
-                if organ.nodes == organ.before {
-                    continue;
-                }
-                organ.draped.positions(&organ.nodes, &mut organ.skin);
-                if let Some(shape) = organ.shape {
-                    self.stage.deform(shape, &organ.skin)?;
-                }
-                organ.before.clone_from(&organ.nodes);
-            }
-            self.pose_arms(cell)
-        } else {
-            self.rebuild(Some(cell))
-        }
-    }
-
-    /// Puts everything on a new stage: what stays the same is copied, organs are added.
-    fn rebuild(&mut self, cell: Option<&Cell>) -> Result<()> {
-        self.stage = self.base.clone();
-        for organ in &mut self.organs {
-            organ.draped.positions(&organ.nodes, &mut organ.skin);
-            let mut mesh = organ.draped.mesh.clone();
-            mesh.vertices.clone_from(&organ.skin);
-            let in_one = organ.nodes.len() == organ.whole.body.vertices.len();
-            if let Some((point, normal)) = self.section.filter(|_| in_one) {
-                mesh = section(&organ.whole, &organ.skin, &organ.nodes, point, normal);
-            }
-            let (shape, _) = self.stage.add_mesh(&mesh, organ.label, &wet(0.3))?;
-            organ.shape = Some(shape);
-            organ.before.clone_from(&organ.nodes);
-        }
-        cell.map_or(Ok(()), |cell| self.pose_arms(cell))
-    }
-
-    fn pose_arms(&mut self, cell: &Cell) -> Result<()> {
-        for arm in &self.arms {
-            for (body, pose) in arm.links.iter().zip(cell.link_poses(arm.name)?) {
-                self.stage.place(*body, &pose)?;
-            }
-            let gripper = cell.gripper(arm.name)?;
-            self.stage.place(arm.shaft, &gripper.pose)?;
-            self.stage.place(arm.motor, &gripper.pose)?;
-            for (body, side) in arm.blades.iter().zip([1.0, -1.0]) {
-                self.stage.place(*body, &gripper.blade(side))?;
-            }
-        }
-        Ok(())
     }
 
     /// Triangles on the stage.

@@ -225,6 +225,22 @@ impl EpisodeFile {
         Ok(scene)
     }
 
+    /// Whether specimen, scene or an arm's model are others than the recorded ones, in a sentence; `None` where they are the same.
+    ///
+    /// # Errors
+    /// A model file that cannot be read.
+    pub fn other(&self, scene: &Scene, specimen: &Specimen) -> Result<Option<String>> {
+        let header = &self.header;
+        let found = specimen_hash(specimen);
+        if hex(found) != header.specimen_hash {
+            let said = format!("the specimen is another one: {}, not {}", hex(found), header.specimen_hash);
+            return Ok(Some(said));
+        }
+        let found = hex(scene_hash(scene, found)?);
+        Ok((found != header.scene_hash)
+            .then(|| format!("the scene or an arm's model is another one: {found}, not {}", header.scene_hash)))
+    }
+
     /// Does the episode again with `specimen` and compares every step. What differs is a verdict, not an error.
     ///
     /// # Errors
@@ -239,14 +255,7 @@ impl EpisodeFile {
             recorded_by: header.program.clone(),
             replayed_by: env!("CARGO_PKG_VERSION").to_owned(),
         };
-        let found = specimen_hash(specimen);
-        if hex(found) != header.specimen_hash {
-            let said = format!("the specimen is another one: {}, not {}", hex(found), header.specimen_hash);
-            return Ok(differs(None, said));
-        }
-        let found = scene_hash(scene, found)?;
-        if hex(found) != header.scene_hash {
-            let said = format!("the scene or an arm's model is another one: {}, not {}", hex(found), header.scene_hash);
+        if let Some(said) = self.other(scene, specimen)? {
             return Ok(differs(None, said));
         }
         let mut episode = Episode::new(scene, specimen, threads)?;

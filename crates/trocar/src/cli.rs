@@ -51,7 +51,7 @@ pub enum Command {
     Reconstruct(Reconstruct),
     /// List, print and check scene files: the whole two-arm cell in one TOML file.
     Scene(Scene),
-    /// Make a picture of a specimen or a scene through one of its cameras, or a moving one of the scene's grasp-lift.
+    /// Make a picture of a specimen, a scene or an episode through one of its cameras, or a moving one of the scene's grasp-lift or of the episode.
     Render(Render),
     /// Run a scripted task on a specimen without a window.
     Simulate(Simulate),

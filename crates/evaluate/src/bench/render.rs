@@ -1,20 +1,20 @@
 //! What pictures cost: a policy's preview with an organ refitted, a path-traced frame, and rays a second beside Embree.
 
+mod rays;
+
+pub use rays::RayRow;
+
 use super::Machine;
-use super::embree::{Embree, EmbreeRows};
 use super::median;
 use crate::cell_run::scene_specimen;
 use crate::rendering::Script;
 use crate::scenes::{LaparoscopicScene, endoscope_view};
 use crate::{Error, Result};
-use glam::Vec3;
-use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use trocar_camera::{Camera, Endoscope, Pose};
 use trocar_cell::Cell;
-use trocar_geometry::TriMesh;
 use trocar_progress::Progress;
 use trocar_render::{BodyId, Eye, Film, Light, Look, Settings, ShapeId, Stage, render};
 use trocar_scene::Scene;
@@ -24,8 +24,6 @@ use trocar_sight::Sight;
 const MOVING: usize = 1;
 /// Frames that are timed, after a tenth as many that are not.
 const FRAMES: usize = 60;
-/// Times that rays are cast; the fastest counts, for the machine may be shared.
-const TRIES: usize = 5;
 
 /// The benchmark's options.
 #[derive(Clone, Debug)]
@@ -110,27 +108,6 @@ pub struct CameraRow {
     pub best_ms: f64,
     /// Median without shadows [ms].
     pub unshadowed_ms: f64,
-}
-
-/// First hits of one kind of ray on one thread.
-#[derive(Clone, Debug, Serialize)]
-pub struct RayRow {
-    /// `camera` (neighbours alike) or `scattered` (to all sides from where camera rays hit).
-    pub kind: &'static str,
-    /// Rays.
-    pub rays: usize,
-    /// Ours a second.
-    pub rays_per_second: f64,
-    /// Embree's a second.
-    pub embree_rays_per_second: Option<f64>,
-    /// Ours over Embree's.
-    pub ratio: Option<f64>,
-    /// Rays that only one of the two has hitting, away from edges of the picture.
-    pub differing: Option<usize>,
-    /// Rays looked at for that: all but those at edges.
-    pub compared: Option<usize>,
-    /// Largest difference of hits there [m].
-    pub largest_difference_m: Option<f64>,
 }
 
 /// The scene on a stage.
@@ -229,7 +206,7 @@ impl RenderBench {
         step()?;
         let loops_refit_ms = set.refit()?;
         step()?;
-        let whole = merged(&set.scene.organs);
+        let whole = rays::merged(&set.scene.organs);
         let (mut rays, embree_failure) = self.rays(&whole, &set.view)?;
         rays.shrink_to_fit();
         step()?;
@@ -321,106 +298,4 @@ impl RenderBench {
         }
         Ok(took)
     }
-
-    /// Both kinds of rays, by us and by Embree.
-    fn rays(&self, mesh: &TriMesh, view: &Pose) -> Result<(Vec<RayRow>, Option<String>)> {
-        let mut stage = Stage::new();
-        stage.add_mesh(mesh, 1, &Look::matte([128; 3]))?;
-        let camera = Camera::centred(self.rays, self.rays, 1.2);
-        let eye = view.translation.as_vec3();
-        let ahead: Vec<(Vec3, Vec3)> = (0..self.rays * self.rays)
-            .map(|i| (eye, (view.rotation * camera.ray((i % self.rays) as f64, (i / self.rays) as f64)).as_vec3()))
-            .collect();
-        let away: Vec<(Vec3, Vec3)> = ahead
-            .iter()
-            .enumerate()
-            .map(|(i, (o, d))| {
-                let t = stage.cast(*o, *d).map_or(0.1, |m| m.t);
-                // A millimetre back, to where a golden spiral over the sphere points, far from its neighbour's.
-                let turn = i as f32 * 2.399_963_2;
-                let z = 1.0 - 2.0 * ((i * 7_919) % 10_007) as f32 / 10_007.0;
-                let r = (1.0 - z * z).max(0.0).sqrt();
-                (*o + *d * (t - 1e-3 / d.length()), Vec3::new(r * turn.cos(), r * turn.sin(), z))
-            })
-            .collect();
-        let one = ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::Format(e.to_string()))?;
-        let mut rows = Vec::new();
-        let mut failure = None;
-        for (kind, rays) in [("camera", &ahead), ("scattered", &away)] {
-            let mut seconds = f64::INFINITY;
-            let mut ours = Vec::new();
-            for _ in 0..TRIES {
-                let clock = Instant::now();
-                ours = one.install(|| {
-                    rays.iter().map(|(o, d)| stage.cast(*o, *d).map_or(f32::INFINITY, |m| m.t)).collect::<Vec<_>>()
-                });
-                seconds = seconds.min(clock.elapsed().as_secs_f64());
-            }
-            let mut row = RayRow {
-                kind,
-                rays: rays.len(),
-                rays_per_second: rays.len() as f64 / seconds,
-                embree_rays_per_second: None,
-                ratio: None,
-                differing: None,
-                compared: None,
-                largest_difference_m: None,
-            };
-            match (Embree { python: &self.python, tries: TRIES }).cast(mesh, rays) {
-                Ok(theirs) => row.compare(rays, &ours, &theirs, self.rays),
-                Err(why) => failure = Some(why),
-            }
-            rows.push(row);
-        }
-        Ok((rows, failure))
-    }
-}
-
-impl RayRow {
-    fn compare(&mut self, rays: &[(Vec3, Vec3)], ours: &[f32], theirs: &EmbreeRows, width: usize) {
-        let per_second = rays.len() as f64 / theirs.seconds;
-        self.embree_rays_per_second = Some(per_second);
-        self.ratio = Some(self.rays_per_second / per_second);
-        // An edge of the picture: a neighbour misses, or is nearer or farther by more than a twentieth.
-        let inner = |i: usize| {
-            let (u, v) = (i % width, i / width);
-            if u == 0 || v == 0 || u + 1 == width || v + 1 == width {
-                return false;
-            }
-            let here = theirs.distances[i];
-            let alike = |j: usize| {
-                let there = theirs.distances[j];
-                here.is_finite() == there.is_finite() && (here.is_infinite() || (here - there).abs() < 0.05 * here)
-            };
-            [i - width - 1, i - width, i - width + 1, i - 1, i + 1, i + width - 1, i + width, i + width + 1]
-                .into_iter()
-                .all(alike)
-        };
-        let camera = self.kind == "camera";
-        let (mut compared, mut differing, mut largest) = (0, 0, 0.0_f64);
-        for i in 0..rays.len() {
-            if camera && !inner(i) {
-                continue;
-            }
-            compared += 1;
-            let (a, b) = (ours[i], theirs.distances[i]);
-            if a.is_finite() != b.is_finite() {
-                differing += 1;
-            } else if a.is_finite() {
-                largest = largest.max(f64::from((a - b).abs() * rays[i].1.length()));
-            }
-        }
-        (self.compared, self.differing, self.largest_difference_m) = (Some(compared), Some(differing), Some(largest));
-    }
-}
-
-/// All organs as one mesh.
-fn merged(organs: &[TriMesh]) -> TriMesh {
-    let mut whole = TriMesh::default();
-    for organ in organs {
-        let first = whole.vertices.len() as u32;
-        whole.vertices.extend(&organ.vertices);
-        whole.triangles.extend(organ.triangles.iter().map(|t| t.map(|v| v + first)));
-    }
-    whole
 }

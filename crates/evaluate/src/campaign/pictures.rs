@@ -2,12 +2,12 @@
 
 use super::{Kept, Plan, Store};
 use crate::moving::webp;
+use crate::replayed::Replayed;
 use crate::{Error, Result};
 use std::path::PathBuf;
 use trocar_progress::Progress;
 use trocar_render::Settings;
 use trocar_scene::Scene;
-use trocar_sight::Sight;
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
 
@@ -64,26 +64,27 @@ pub(super) fn film(
     progress.begin("pictures", chosen.len() as u64);
     for kept in chosen {
         let file = EpisodeFile::read(&store.episode(&kept.name, kept.index).join(EPISODE_FILE))?;
-        episode.reset(kept.seed)?;
-        let mut sight = Sight::new(&episode.arranged_scene(), specimen, episode.cell())?;
+        let mut again = Replayed::begin(&mut episode, &file)?;
+        let mut sight = again.sight(specimen)?;
         let every = file.steps.len().div_ceil(FRAMES).max(1);
         let mut frames = Vec::new();
-        for (k, (action, _)) in file.steps.iter().enumerate() {
+        let mut see = |again: &Replayed<'_>, time_ms: i32| -> Result<()> {
+            let settings = Settings::Preview { shadows: false };
+            let picture = sight.see(again.episode().cell(), "endoscope", SIZE, &settings)?;
+            frames.push((picture.color.clone(), time_ms));
+            Ok(())
+        };
+        while again.advance() {
             if progress.interrupted() {
                 return Err(Error::Interrupted);
             }
-            // A step that cannot be done is where an episode of another build would end.
-            if episode.step(action).is_err() {
-                break;
-            }
+            let k = again.done() - 1;
             if k % every == 0 || k + 1 == file.steps.len() {
-                let picture = sight.see(episode.cell(), "endoscope", SIZE, &Settings::Preview { shadows: false })?;
-                frames.push((picture.color.clone(), (1e3 * episode.time()).round() as i32));
+                see(&again, (1e3 * again.episode().time()).round() as i32)?;
             }
         }
-        if frames.is_empty() {
-            let picture = sight.see(episode.cell(), "endoscope", SIZE, &Settings::Preview { shadows: false })?;
-            frames.push((picture.color.clone(), 0));
+        if again.done() == 0 {
+            see(&again, 0)?;
         }
         store.write(&name(&kept.name, kept.index), &webp(&frames)?)?;
         progress.advance(1);

@@ -20,6 +20,7 @@ mod resist;
 mod step;
 
 pub use arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
+pub use describe::{Visual, VisualShape, mjcf_visuals, urdf_visuals};
 pub use dynamics::{Dynamics, LinkLoad};
 pub use frames::{Frames, Jacobian};
 pub use inverse::{InverseOptions, Reached};

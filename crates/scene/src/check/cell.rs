@@ -2,6 +2,7 @@
 
 use super::unit::{hint, show};
 use super::{Checked, join, name, names, number, numbers, one_of, point, problem, quaternion, unit};
+use crate::cell::SIMPLE;
 use crate::{Arm, ArmModel, Frame, Instrument, Port, Scene, Start};
 use glam::DVec3;
 
@@ -81,6 +82,7 @@ fn port(at: &str, p: &Port) -> Checked {
         &[
             ("hole_diameter_mm", p.hole_diameter_mm, 1.0..=50.0),
             ("sheet_thickness_mm", p.sheet_thickness_mm, 0.0..=50.0),
+            ("sheet_diameter_mm", p.sheet_diameter_mm, 0.0..=400.0),
         ],
     )
 }
@@ -110,6 +112,7 @@ fn frame(at: &str, frame: &Frame) -> Checked {
 
 fn arm(at: &str, one: &Arm, scene: &Scene) -> Checked {
     model(at, one, scene)?;
+    shapes(&join(at, "shapes"), one, scene)?;
     frame(&join(at, "base"), &one.base)?;
     posture(&join(at, "posture_deg"), one)?;
     name(&join(at, "controller.name"), &one.controller.name)?;
@@ -142,6 +145,21 @@ fn model(at: &str, one: &Arm, scene: &Scene) -> Checked {
         }
         _ => Ok(()),
     }
+}
+
+/// What an arm looks like is said by a word or by a file that is there.
+fn shapes(field: &str, one: &Arm, scene: &Scene) -> Checked {
+    let Some(said) = one.shapes.as_deref().filter(|said| *said != SIMPLE) else { return Ok(()) };
+    let shown: String = said.chars().take(200).flat_map(char::escape_default).collect();
+    let end = said.to_ascii_lowercase();
+    if ![".urdf", ".xml", ".mjcf"].iter().any(|e| end.ends_with(e)) {
+        return Err(problem(field, format!(" is '{shown}'; simple, or a file that ends in .urdf, .xml or .mjcf")));
+    }
+    if scene.resolve(said).is_file() {
+        return Ok(());
+    }
+    let path = scene.resolve(said).display().to_string().replace(['\n', '\r'], " ");
+    Err(problem(field, format!(" is {path}, which is no file; a path from the scene file's folder")))
 }
 
 fn posture(field: &str, one: &Arm) -> Checked {

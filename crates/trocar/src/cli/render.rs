@@ -6,7 +6,8 @@ use std::path::PathBuf;
 /// Arguments of `render`.
 #[derive(Debug, Args)]
 pub struct Render {
-    /// Specimen folder; or a scene file or built-in scene such as cell-a, whose scripted grasp-lift moving pictures show.
+    /// Specimen folder; a scene file or built-in scene such as cell-a, whose scripted grasp-lift moving pictures show; or an episode's folder or its
+    /// episode.trocar, which is done again and filmed.
     pub source: String,
     /// Camera: recording or outside of a specimen; the scene's (endoscope, d405, recording) or outside of a scene; the first by default.
     #[arg(long)]
@@ -29,7 +30,7 @@ pub struct Render {
     /// Write what each pixel shows, too: FILE-labels.png.
     #[arg(long)]
     pub labels: bool,
-    /// Seconds into the scripted grasp-lift of a scene.
+    /// Seconds into the scripted grasp-lift of a scene (its start by default) or into an episode (its end by default).
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     pub at: Option<f64>,
     /// Add the noise of sensors.
@@ -44,6 +45,9 @@ pub struct Render {
     /// Folder for a scene's phantom, which is recorded and reconstructed there.
     #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
     pub phantoms: PathBuf,
+    /// Specimen folder of an episode, where it is no longer where the scene says.
+    #[arg(long, value_name = "FOLDER")]
+    pub specimen: Option<PathBuf>,
 }
 
 fn size(text: &str) -> Result<[usize; 2], String> {

@@ -21,6 +21,7 @@ pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()
         cut_away: arguments.cut_away,
         threads: arguments.threads,
         phantoms: arguments.phantoms.clone(),
+        specimen: arguments.specimen.clone(),
     };
     output::print(json, &rendering.run(&arguments.output, progress)?, text);
     Ok(())
@@ -29,8 +30,9 @@ pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()
 fn text(r: &Rendered) -> String {
     let seen: Vec<String> = r.seen.iter().map(|s| format!("{} {:.1}%", s.name, 1e2 * s.share)).collect();
     let how = if r.samples > 0 { format!("{} paths a pixel", r.samples) } else { "direct light".to_owned() };
+    let note = r.differs.as_ref().map_or(String::new(), |why| format!("\nnot the recorded episode: {why}"));
     format!(
-        "{}: {} x {}, {} frame{}, {how}, {} triangles, {:.1} s; at {:.2} s\n{}\n{}",
+        "{}: {} x {}, {} frame{}, {how}, {} triangles, {:.1} s; at {:.2} s\n{}\n{}{note}",
         r.camera,
         r.width,
         r.height,

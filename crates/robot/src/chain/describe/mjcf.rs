@@ -2,6 +2,10 @@
 //!
 //! What would change the dynamics and is not understood is an error, never left out in silence.
 
+mod visual;
+
+pub use visual::mjcf_visuals;
+
 use super::xml::{Source, children, place, shown};
 use crate::Result;
 use crate::chain::arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
@@ -279,7 +283,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(DQuat::IDENTITY)
     }
 
-    /// The attribute of a joint, its own or of its default class or of one around that.
+    /// The attribute of a joint or another element that has defaults, its own or of its default class or of one around that.
     fn attribute(&self, joint: Node<'a, 'i>, name: &str) -> Result<Option<&'a str>> {
         if let Some(own) = joint.attribute(name) {
             return Ok(Some(own));
@@ -287,7 +291,8 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         let around = || joint.ancestors().skip(1).find_map(|n| n.attribute("childclass"));
         let class = joint.attribute("class").or_else(around);
         let mut all = self.root.descendants().filter(|n| n.has_tag_name("default"));
-        let in_class = |d: Node<'a, 'i>| children(d, "joint").filter_map(|j| j.attribute(name)).last();
+        let kind = if joint.has_tag_name("freejoint") { "joint" } else { joint.tag_name().name() };
+        let in_class = |d: Node<'a, 'i>| children(d, kind).filter_map(|j| j.attribute(name)).last();
         if let Some(class) = class {
             match all.find(|d| d.attribute("class") == Some(class)) {
                 Some(d) => {

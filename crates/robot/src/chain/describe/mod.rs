@@ -5,4 +5,9 @@
 
 mod mjcf;
 mod urdf;
+mod visual;
 mod xml;
+
+pub use mjcf::mjcf_visuals;
+pub use urdf::urdf_visuals;
+pub use visual::{Visual, VisualShape};

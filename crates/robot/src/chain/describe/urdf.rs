@@ -1,5 +1,9 @@
 //! Arms from URDF, ROS's format: the links from a base to a tip.
 
+mod visual;
+
+pub use visual::urdf_visuals;
+
 use super::xml::{Source, children, place, shown};
 use crate::chain::arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
 use crate::chain::frames::compose;
@@ -30,7 +34,8 @@ impl SerialArm {
         if let Some(node) = root.descendants().find(is_xacro) {
             return Err(source.fail(format!("{} is xacro; expand the file first", place(node))));
         }
-        Reader::new(source, root)?.arm(base, tip)
+        let reader = Reader::new(source, root)?;
+        reader.build(&reader.joints(base, tip)?)
     }
 }
 
@@ -83,7 +88,8 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
         found.ok_or_else(|| self.source.fail(format!("no link '{}'; links: {}", shown(name), known())))
     }
 
-    fn arm(&self, base: Option<&str>, tip: Option<&str>) -> Result<SerialArm> {
+    /// The joints from `base` to `tip`.
+    fn joints(&self, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Node<'a, 'i>>> {
         let tip = match tip {
             Some(tip) => self.link(tip)?,
             None => {
@@ -121,7 +127,7 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
             at = self.end(joint, "parent")?;
         }
         joints.reverse();
-        self.build(&joints)
+        Ok(joints)
     }
 
     fn build(&self, joints: &[Node<'a, 'i>]) -> Result<SerialArm> {

@@ -1,0 +1,69 @@
+//! Pictures out of pictures: smaller ones, labels and depth in colours.
+
+use trocar_camera::ColorImage;
+
+/// A picture of `finer` times the size, averaged.
+pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
+    if finer <= 1 {
+        return image.clone();
+    }
+    let (width, height) = (image.width / finer, image.height / finer);
+    let count = (finer * finer) as u32;
+    let pixel = |i: usize| {
+        let (x, y) = (i % width * finer, i / width * finer);
+        let block = (0..finer * finer).map(|k| image.pixels[(y + k / finer) * image.width + x + k % finer]);
+        let sum = block.fold([0_u32; 3], |s, p| [0, 1, 2].map(|c| s[c] + u32::from(p[c])));
+        sum.map(|s| ((s + count / 2) / count) as u8)
+    };
+    ColorImage { width, height, pixels: (0..width * height).map(pixel).collect() }
+}
+
+/// Colours far from each other: steps of the golden angle round the circle of hues.
+pub(crate) fn label_color(label: u16) -> [u8; 3] {
+    if label == 0 {
+        return [0; 3];
+    }
+    let hue = (f64::from(label) * 0.618_033_988_75).fract() * 6.0;
+    let light = if label.is_multiple_of(2) { 0.95 } else { 0.72 };
+    let x = 1.0 - (hue % 2.0 - 1.0).abs();
+    let rgb = match hue as u32 {
+        0 => [1.0, x, 0.0],
+        1 => [x, 1.0, 0.0],
+        2 => [0.0, 1.0, x],
+        3 => [0.0, x, 1.0],
+        4 => [x, 0.0, 1.0],
+        _ => [1.0, 0.0, x],
+    };
+    rgb.map(|c| (255.0 * light * (0.18 + 0.82 * c)) as u8)
+}
+
+/// Depth in colours from near (bright) to far; black where there is none.
+pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
+    // Whole millimetres: what is flat has one rank, not that of its rounding.
+    let whole = |d: f32| (d * 1e3).round() * 1e-3;
+    let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).map(whole).collect();
+    valid.sort_by(f32::total_cmp);
+    let at = |share: f64| valid.get((share * valid.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(1.0);
+    let (near, far) = (at(0.01), at(0.97));
+    // Viridis by its corners.
+    let stops: [[f64; 3]; 6] = [
+        [253.0, 231.0, 37.0],
+        [122.0, 209.0, 81.0],
+        [34.0, 168.0, 132.0],
+        [42.0, 120.0, 142.0],
+        [65.0, 68.0, 135.0],
+        [68.0, 1.0, 84.0],
+    ];
+    let color = |d: &f32| {
+        if *d <= 0.0 {
+            return [0; 3];
+        }
+        // Half by depth and half by how many pixels are nearer, so that what lies flat on a table is not all one colour.
+        let rank = valid.partition_point(|v| *v < whole(*d)) as f64 / valid.len().max(1) as f64;
+        let share = f64::from((d - near) / (far - near).max(1e-6));
+        let x = 5.0 * (0.5 * share.clamp(0.0, 1.0) + 0.5 * rank).min(0.9999);
+        let (i, t) = (x as usize, x.fract());
+        [0, 1, 2].map(|k| (stops[i][k] + t * (stops[i + 1][k] - stops[i][k])) as u8)
+    };
+    ColorImage { width: depth.width, height: depth.height, pixels: depth.depth.iter().map(color).collect() }
+}

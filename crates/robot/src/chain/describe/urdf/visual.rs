@@ -1,0 +1,117 @@
+//! What a URDF file's links look like: `<visual>` of each link from the base to the tip, and of what is fixed to them.
+
+use super::super::visual::{PLAIN, Visual, VisualShape, opaque};
+use super::super::xml::{Source, children, place, shown};
+use super::Reader;
+use crate::Result;
+use crate::chain::frames::compose;
+use glam::DVec3;
+use roxmltree::Node;
+use std::path::{Path, PathBuf};
+use trocar_geometry::Pose;
+
+/// What the arm between `base` and `tip` of a URDF file looks like, as [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf) reads it: of the base first, then of each link that a joint moves.
+/// `package://NAME/...` is looked for where a folder NAME lies beside the file or above it.
+///
+/// # Errors
+/// As [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf); a shape that is not understood, a package that is nowhere.
+pub fn urdf_visuals(path: &Path, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> {
+    let (source, text) = Source::read(path)?;
+    let document = source.parse(&text, "robot")?;
+    let reader = Reader::new(source, document.root_element())?;
+    let joints = reader.joints(base, tip)?;
+    let mut links = vec![Vec::new()];
+    let mut here = Pose::IDENTITY;
+    if let Some(first) = joints.first() {
+        reader.seen(reader.end(*first, "parent")?, Some(*first), &here, &mut links[0])?;
+    }
+    for (k, &node) in joints.iter().enumerate() {
+        here = compose(&here, &reader.origin(node)?);
+        if reader.joint(node, &here)?.is_some() {
+            links.push(Vec::new());
+            here = Pose::IDENTITY;
+        }
+        let child = reader.end(node, "child")?;
+        let Some(of) = links.last_mut() else { continue };
+        match joints.get(k + 1) {
+            Some(next) => reader.seen(child, Some(*next), &here, of)?,
+            None => reader.visuals(child, &here, of)?,
+        }
+    }
+    Ok(links)
+}
+
+impl<'a, 'i> Reader<'_, 'a, 'i> {
+    /// Of a link and of what is fixed to it beside the joint `next`.
+    fn seen(&self, link: &'a str, next: Option<Node<'a, 'i>>, here: &Pose, into: &mut Vec<Visual>) -> Result<()> {
+        let mut open = vec![(link, *here)];
+        let mut count = 0;
+        while let Some((link, pose)) = open.pop() {
+            self.visuals(link, &pose, into)?;
+            for &joint in self.by_parent.get(link).into_iter().flatten().filter(|j| Some(**j) != next) {
+                // More than there are links would be a loop.
+                count += 1;
+                if joint.attribute("type") == Some("fixed") && count <= self.links.len() {
+                    open.push((self.end(joint, "child")?, compose(&pose, &self.origin(joint)?)));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    fn visuals(&self, name: &'a str, here: &Pose, into: &mut Vec<Visual>) -> Result<()> {
+        let Some(&link) = self.links.get(name) else { return Ok(()) };
+        for visual in children(link, "visual") {
+            let at = |complaint: String| self.source.fail(format!("link '{}': {complaint}", shown(name)));
+            let shape = children(visual, "geometry").next().and_then(|g| g.children().find(Node::is_element));
+            let shape = shape.ok_or_else(|| at("a <visual> has no shape in its <geometry>".to_owned()))?;
+            let number = |key: &str| -> Result<f64> {
+                let value = self.source.number(shape, key)?;
+                value.filter(|v| *v > 0.0).ok_or_else(|| at(format!("{} needs a positive {key}", place(shape))))
+            };
+            let shape = match shape.tag_name().name() {
+                "mesh" => {
+                    let file = self.file(self.source.required(shape, "filename")?).map_err(at)?;
+                    VisualShape::Mesh { file, scale: self.source.vector(shape, "scale")?.unwrap_or(DVec3::ONE) }
+                }
+                "box" => {
+                    let size = self.source.vector(shape, "size")?;
+                    VisualShape::Block(0.5 * size.ok_or_else(|| at("a <box> has no size".to_owned()))?.abs())
+                }
+                "cylinder" => VisualShape::Cylinder { radius: number("radius")?, half: 0.5 * number("length")? },
+                "sphere" => VisualShape::Ball(number("radius")?),
+                other => return Err(at(format!("a <visual> is a <{}>; mesh, box, cylinder or sphere", shown(other)))),
+            };
+            let Some(color) = self.color(visual)? else { continue };
+            into.push(Visual { link: shown(name), shape, pose: compose(here, &self.origin(visual)?), color });
+        }
+        Ok(())
+    }
+
+    /// The colour of a visual, its own or that of the material that it names; `None` if it cannot be seen.
+    fn color(&self, visual: Node<'a, 'i>) -> Result<Option<[f64; 3]>> {
+        let Some(own) = children(visual, "material").next() else { return Ok(Some(PLAIN)) };
+        let of = |material: Node<'a, 'i>| children(material, "color").next();
+        let name = own.attribute("name");
+        let named = || children(self.root, "material").find(|m| name.is_some() && m.attribute("name") == name);
+        let Some(node) = of(own).or_else(|| named().and_then(of)) else { return Ok(Some(PLAIN)) };
+        Ok(self.source.numbers::<4>(node, "rgba")?.map_or(Some(PLAIN), opaque))
+    }
+
+    /// The file that a mesh's name stands for.
+    fn file(&self, name: &str) -> std::result::Result<PathBuf, String> {
+        let folder = self.source.path.parent().unwrap_or(Path::new(""));
+        let Some(inside) = name.strip_prefix("package://") else {
+            return Ok(folder.join(name.strip_prefix("file://").unwrap_or(name)));
+        };
+        let (package, _) = inside.split_once('/').unwrap_or((inside, ""));
+        let full = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let found = full.ancestors().find(|f| f.join(package).is_dir());
+        found.map(|f| f.join(inside)).ok_or_else(|| {
+            format!(
+                "its mesh is in the package '{}', of which no folder lies beside the file or above it",
+                shown(package)
+            )
+        })
+    }
+}

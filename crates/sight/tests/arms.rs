@@ -1,0 +1,182 @@
+//! Arms drawn from their descriptions, and the abdominal wall round the ports. The tests with the FR3's files are skipped, saying so, where these are not.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic")]
+
+use glam::DVec3;
+use std::path::{Path, PathBuf};
+use trocar_camera::{Camera, Pose};
+use trocar_cell::{Action, Cell};
+use trocar_geometry::TetMesh;
+use trocar_render::Settings;
+use trocar_robot::instrument::Coordinates;
+use trocar_scene::{Scene, SpecimenSource};
+use trocar_sight::Sight;
+use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
+
+/// A cube of 40 mm, 150 mm before the recording camera.
+fn specimen() -> Specimen {
+    let mut body = TetMesh::default();
+    for i in 0..27_u32 {
+        let p = DVec3::new(f64::from(i / 9), f64::from(i / 3 % 3), f64::from(i % 3)) - 1.0;
+        body.vertices.push(DVec3::new(0.0, 0.0, 0.13) + 0.02 * p);
+    }
+    let at = |i: u32, j: u32, k: u32| 9 * i + 3 * j + k;
+    for cube in 0..8_u32 {
+        let (i, j, k) = (cube & 1, cube >> 1 & 1, cube >> 2);
+        let corner = |c: u32| at(i + (c & 1), j + (c >> 1 & 1), k + (c >> 2));
+        for [a, b] in [[1, 3], [3, 2], [2, 6], [6, 4], [4, 5], [5, 1]] {
+            body.tets.push([corner(0), corner(a), corner(b), corner(7)]);
+        }
+    }
+    let (mut surface, _) = body.boundary();
+    surface.colors = vec![[200, 120, 90]; surface.vertices.len()];
+    let organ = Organ {
+        name: "appendix".to_owned(),
+        base: body.vertices[0],
+        body,
+        surface,
+        material: Material::default(),
+        pins: Pins::Band { share: 0.4 },
+        facts: OrganFacts::default(),
+    };
+    Specimen {
+        name: "cube".to_owned(),
+        up: -DVec3::Z,
+        placement: Pose::IDENTITY,
+        camera: Some(Camera::centred(212, 120, 1.5)),
+        organs: vec![organ],
+        background: None,
+        provenance: Provenance::default(),
+    }
+}
+
+fn scene() -> Scene {
+    Scene::new("cube", SpecimenSource::phantom("phantom-a", 1))
+}
+
+fn menagerie() -> Option<PathBuf> {
+    let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/franka_fr3/fr3.xml"));
+    if !path.is_file() {
+        println!("skipped: no {}", path.display());
+        return None;
+    }
+    Some(path.to_owned())
+}
+
+fn with_model(model: &str, shapes: Option<&str>) -> Scene {
+    let mut scene = scene();
+    for arm in &mut scene.arms {
+        (arm.model, arm.shapes) = (model.to_owned(), shapes.map(str::to_owned));
+        arm.flange = model.ends_with(".xml").then(|| "attachment_site".to_owned());
+    }
+    scene
+}
+
+/// Share of the outside picture that shows an arm.
+fn seen(sight: &mut Sight, cell: &Cell) -> f64 {
+    let label = sight.labels().iter().find(|(_, n)| n == "left arm").unwrap().0;
+    let picture = sight.see(cell, "outside", [192, 108], &Settings::preview()).unwrap();
+    picture.labels.iter().filter(|l| **l == label).count() as f64 / picture.labels.len() as f64
+}
+
+#[test]
+fn a_cell_runs_with_arms_out_of_mjcf_and_shows_their_meshes() {
+    let Some(file) = menagerie() else { return };
+    let specimen = specimen();
+    let run = |scene: &Scene| {
+        let mut cell = Cell::new(scene, &specimen, 1).unwrap();
+        for k in 0..15 {
+            let deeper = |a: &trocar_cell::ArmObservation| {
+                let insertion = a.commanded.insertion - 4e-4 * f64::from(k % 5);
+                Coordinates { insertion, jaw: 0.8, ..a.commanded }
+            };
+            let action: Vec<Coordinates> = cell.observe().iter().map(deeper).collect();
+            let report = cell.step(&Action::pivots(&action)).unwrap();
+            assert!(report.tissue.divergence.is_none());
+        }
+        cell
+    };
+    let file = std::path::absolute(&file).unwrap();
+    let described = with_model(file.to_str().unwrap(), None);
+    described.validate().unwrap();
+    let (plain, built_in) = (run(&described), run(&scene()));
+    for arm in ["left", "right"] {
+        let tips = [&plain, &built_in].map(|cell| cell.gripper(arm).unwrap().pose.translation);
+        // Other friction and no rotor inertia of the gears: the same motion, not the same bits.
+        assert!(tips[0].distance(tips[1]) < 1e-3, "{arm}: {} m apart", tips[0].distance(tips[1]));
+    }
+    let mut sight = Sight::new(&described, &specimen, &plain).unwrap();
+    let mut simple = Sight::new(&scene(), &specimen, &built_in).unwrap();
+    assert!(sight.triangles() > simple.triangles() + 100_000, "{} triangles", sight.triangles());
+    let shares = [seen(&mut sight, &plain), seen(&mut simple, &built_in)];
+    assert!((shares[0] / shares[1] - 1.0).abs() < 0.25, "meshes {}, housings {}", shares[0], shares[1]);
+    // The same meshes on the built-in arm, and no meshes on the described one.
+    let drawn = with_model("franka_fr3", file.to_str());
+    let mut on_built_in = Sight::new(&drawn, &specimen, &built_in).unwrap();
+    assert_eq!(on_built_in.triangles(), sight.triangles());
+    assert!((seen(&mut on_built_in, &built_in) / shares[0] - 1.0).abs() < 0.02);
+    let bare = Sight::new(&with_model(file.to_str().unwrap(), Some("simple")), &specimen, &plain).unwrap();
+    assert!(bare.triangles() < sight.triangles());
+}
+
+#[test]
+fn a_missing_mesh_and_another_arm_are_told_in_a_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("arm.xml");
+    let arm = |count: usize| {
+        let body = |k: usize| {
+            format!(
+                "<body name='l{k}' pos='0 0 0.1'><inertial pos='0 0 0' mass='1' diaginertia='1 1 1'/><joint name='j{k}' axis='0 0 1'/><geom type='mesh' mesh='part' group='1'/>"
+            )
+        };
+        let bodies: String = (1..=count).map(body).collect();
+        format!(
+            "<mujoco><asset><mesh name='part' file='part.obj'/></asset><worldbody>{bodies}{}</worldbody></mujoco>",
+            "</body>".repeat(count)
+        )
+    };
+    let (specimen, scene) = (specimen(), with_model("franka_fr3", file.to_str()));
+    std::fs::write(&file, arm(7)).unwrap();
+    let cell = Cell::new(&scene, &specimen, 1).unwrap();
+    let refused = |count: usize, words: &[&str]| {
+        std::fs::write(&file, arm(count)).unwrap();
+        let said = Sight::new(&scene, &specimen, &cell).err().unwrap().to_string();
+        assert!(words.iter().all(|w| said.contains(w)) && !said.contains('\n'), "{said}");
+    };
+    refused(7, &["arm 'left'", "link 'l1'", "arm.xml", "part.obj: no such file", "shapes = \"simple\""]);
+    std::fs::write(folder.path().join("part.obj"), "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n").unwrap();
+    refused(3, &["arm 'left'", "arm.xml", "3 links", "the arm has 7"]);
+    std::fs::write(&file, arm(7)).unwrap();
+    assert!(Sight::new(&scene, &specimen, &cell).is_ok());
+}
+
+#[test]
+fn the_wall_is_where_the_scene_has_it() {
+    let specimen = specimen();
+    let mut scene = scene();
+    let cell = Cell::new(&scene, &specimen, 1).unwrap();
+    let bare = Sight::new(&scene, &specimen, &cell).unwrap();
+    assert!(bare.labels().iter().all(|(_, n)| n != "wall"));
+    scene.ports.iter_mut().for_each(|p| p.sheet_diameter_mm = 70.0);
+    scene.validate().unwrap();
+    let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
+    let wall = sight.labels().iter().find(|(_, n)| n == "wall").unwrap().0;
+    let port = DVec3::from(scene.ports[0].centre_m);
+    let model = Camera::centred(101, 101, 0.6);
+    for (name, eye, skin) in [("above", 0.2, true), ("below", -0.1, false)] {
+        // Beside the shaft: 25 mm from the hole.
+        let target = port + DVec3::new(0.0, 0.025, 0.0);
+        sight.add_camera(name, model, Pose::look_at(target + eye * DVec3::Z, target, DVec3::Y));
+        let picture = sight.see(&cell, name, [101, 101], &Settings::preview()).unwrap();
+        let middle = 50 * 101 + 50;
+        assert_eq!(picture.labels[middle], wall, "{name}");
+        let depth = f64::from(picture.depth.depth[middle]);
+        assert!((depth - f64::from(eye as f32).abs()).abs() < 3e-3, "{name}: {depth} m");
+        let [red, green, _] = picture.color.pixels[middle].map(f64::from);
+        // Skin is paler than peritoneum.
+        assert_eq!(green > 0.65 * red, skin, "{name}: {:?}", picture.color.pixels[middle]);
+    }
+    // The hole is open: nothing of the wall is within 3 mm of its middle.
+    let (_, pose) = sight.model("above", [101, 101]).unwrap();
+    assert!(pose.translation.z > port.z);
+}
