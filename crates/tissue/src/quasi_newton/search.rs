@@ -130,6 +130,9 @@ impl Island<'_> {
             }
             // Steps of squeezed elements' nodes may have been cut.
             slope = self.slope();
+            if below.0 == 0.0 {
+                below.1 = slope;
+            }
             self.take_gradient();
             let there = self.next_slope();
             if !(slope < 0.0 && there.is_finite()) {
