@@ -96,8 +96,15 @@ impl QuasiNewtonSolver {
     }
 
     /// Goes from where the substep began, held nodes with their tools and the free ones as a linear body would follow; the forces there are those of the last pass then.
+    ///
+    /// In a body that something holds other forces have no part in it, since nobody asks whether it gets better by them: a crushed element presses on its nodes a thousand times harder than
+    /// the stiffness at rest explains, and would throw them out of the body. They are for searches.
     pub(super) fn pull(&mut self, h: f32) -> Pulled {
-        self.direction.copy_from_slice(&self.gradient);
+        if self.is_free() {
+            self.direction.copy_from_slice(&self.gradient);
+        } else {
+            self.direction.fill([0.0; 4]);
+        }
         for i in (0..self.layout.free).filter(|i| self.held[*i]) {
             for c in 0..3 {
                 self.direction[i][c] = -self.holding(i) * (self.targets[i][c] - self.x[i][c]);

@@ -64,6 +64,9 @@ impl Sweeps for QuasiNewtonSolver {
 /// Times a minimum is looked for, each with friction's limits as they were at the last.
 const ROUNDS: usize = 4;
 
+/// Where no step helps any more, what was found is taken for the minimum if its correction is no longer than so many times the one that ends a substep: rounding, and not a search gone astray.
+const FAR: f32 = 100.0;
+
 /// Bodies that may touch each other, in a frame.
 struct Island<'a> {
     workers: &'a mut [Worker<QuasiNewtonSolver>],
@@ -191,6 +194,7 @@ impl Island<'_> {
                 part.patch();
             }
         });
+        let held = self.is_held();
         let (mut stepped, mut rounds) = (false, 0);
         if behind {
             stepped = self.pull();
@@ -234,7 +238,7 @@ impl Island<'_> {
             match self.search() {
                 Found::Step => stepped = true,
                 Found::Nothing if stepped && !alone && self.wake(tolerance, relative) => {}
-                Found::Nothing if stepped => break,
+                Found::Nothing if stepped && (!held || self.is_solved(FAR * tolerance, FAR * relative)) => break,
                 // What an earlier substep taught may mislead where contacts have changed.
                 Found::Nothing if self.history.forget() => {}
                 Found::Nothing => {
@@ -313,11 +317,17 @@ impl Island<'_> {
         active.for_each(|worker| worker.report.iterations += 1);
     }
 
+    /// Whether something holds each of the bodies. What flies goes far in a substep without being deformed, and sweeps would carry that badly: it is left as it was found.
+    fn is_held(&mut self) -> bool {
+        !self.all().any(|part| part.is_free())
+    }
+
     /// Goes on where bodies would not bear to be moved to where they go by themselves; whether anything moved.
     fn pull(&mut self) -> bool {
         let h = self.h;
         let mut stepped = false;
-        let behind = |solver: &QuasiNewtonSolver| solver.active && solver.guess == Guess::Behind;
+        let pulled = |solver: &QuasiNewtonSolver| solver.carried || solver.is_free();
+        let behind = |solver: &QuasiNewtonSolver| solver.active && solver.guess == Guess::Behind && pulled(solver);
         for Worker { solver, report, .. } in self.workers.iter_mut().filter(|worker| behind(&worker.solver)) {
             report.iterations += 1;
             let pulled = solver.pull(h);

@@ -121,6 +121,7 @@ impl Island<'_> {
         }
         self.parts().for_each(|part| part.base.copy_from_slice(&part.x[..part.layout.rows]));
         // The minimum lies between a share where the slope still falls and one where it rises.
+        let held = self.is_held();
         let (mut share, mut below, mut above) = (1.0f32, (0.0f32, slope), None);
         for attempt in 0..=MOST_SHARES {
             let h = self.h;
@@ -130,6 +131,9 @@ impl Island<'_> {
             }
             // Steps of squeezed elements' nodes may have been cut.
             slope = self.slope();
+            if held && below.0 == 0.0 {
+                below.1 = slope;
+            }
             self.take_gradient();
             let there = self.next_slope();
             if !(slope < 0.0 && there.is_finite()) {
