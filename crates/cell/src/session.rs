@@ -180,7 +180,7 @@ impl<'a> Session<'a> {
 
     /// Largest distance between a node of this run and the same one of another [m].
     pub fn off(&self, other: &Session<'_>) -> f64 {
-        self.largest_motion_since(&other.world.state)
+        1e-3 * self.largest_motion_since(&other.world.state)
     }
 
     /// Does one frame; false when there is none left, or the run has diverged.
