@@ -1,5 +1,7 @@
 //! Crushed tissue that is let go comes back: its nodes are not thrown out of the body.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
 mod common;
 
 use common::{FRAME, block, tissue};
