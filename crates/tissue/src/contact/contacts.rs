@@ -4,13 +4,14 @@
 //! of what it touches, so that a tool carries it along.
 
 use super::force::ToolForce;
+use super::hanging::Hanging;
+use super::placed::Placed;
 use super::touch::{Friction, Source, Touch};
+use crate::Body;
 use crate::integrator::Frame;
 use crate::state::BodyState;
 use crate::support::LocalSupport;
-use crate::{Body, Collider};
 use glam::Vec3A;
-use trocar_geometry::Pose;
 
 /// A vertex this much away from a surface [m], and what it may travel in two frames, may touch it in a frame.
 const NEAR: f32 = 1e-3;
@@ -27,21 +28,6 @@ pub(crate) struct Anchor {
     pub place: Vec3A,
 }
 
-/// A node that hangs compliantly on a tool.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Hanging {
-    pub vertex: u32,
-    /// The grasp among all, and the node's place in it.
-    pub grasp: u32,
-    pub node: u32,
-    /// How far it has slipped, in the tool's frame [m].
-    pub slid: Vec3A,
-    /// Whether it slipped in the last substep.
-    pub slides: bool,
-    /// Pull at the tool after the last substep [N].
-    pub pull: Vec3A,
-}
-
 /// What one body touches.
 pub(crate) struct Contacts {
     supports: Vec<LocalSupport>,
@@ -49,7 +35,7 @@ pub(crate) struct Contacts {
     surface: Vec<u32>,
     /// Those that may touch something in this frame, and those that hang on a tool, ascending.
     near: Vec<u32>,
-    hanging: Vec<Hanging>,
+    pub(super) hanging: Vec<Hanging>,
     touches: Vec<Touch>,
     /// Each vertex's first touch; the next one's is their end.
     first: Vec<u32>,
@@ -62,13 +48,13 @@ pub(crate) struct Contacts {
     anchors: Vec<Anchor>,
     next_anchors: Vec<Anchor>,
     /// Where the colliders are in the substep; None: nowhere.
-    placed: Vec<Option<Placed>>,
+    pub(super) placed: Vec<Option<Placed>>,
     /// Whether a vertex is one of `surface`.
     outer: Vec<bool>,
     /// Vertices that touch at the frame's beginning or are about to.
     touching: Vec<bool>,
     /// Vertices that no contact moves: pinned or held rigidly.
-    fixed: Vec<bool>,
+    pub(super) fixed: Vec<bool>,
     /// How far a vertex may be from a surface to touch it in this frame [m].
     reach: f32,
     /// By tool, of the last substep.
@@ -126,40 +112,6 @@ impl Contacts {
         for grasp in frame.rigid_grasps() {
             grasp.nodes.iter().for_each(|i| self.fixed[body.internal[*i as usize] as usize] = true);
         }
-    }
-
-    /// Finds the nodes that hang on tools. A node in several grasps follows the last.
-    fn hang(&mut self, frame: &Frame<'_>, body: &Body) {
-        self.hanging.clear();
-        for (g, grasp) in frame
-            .grasps
-            .iter()
-            .enumerate()
-            .filter(|(_, g)| g.body == frame.index && g.hangs() && g.tool < frame.tools.len())
-        {
-            for (k, (node, slid)) in grasp.nodes.iter().zip(&grasp.slid).enumerate() {
-                let vertex = body.internal[*node as usize];
-                if !self.fixed[vertex as usize] {
-                    let (grasp, node) = (g as u32, k as u32);
-                    let hanging = Hanging { vertex, grasp, node, slid: *slid, slides: false, pull: Vec3A::ZERO };
-                    self.hanging.push(hanging);
-                }
-            }
-        }
-        self.hanging.sort_unstable_by_key(|h| (h.vertex, std::cmp::Reverse(h.grasp), h.node));
-        self.hanging.dedup_by_key(|h| h.vertex);
-    }
-
-    fn place_tools(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64) {
-        self.placed.clear();
-        let grasps = || frame.grasps.iter().filter(|g| g.body == frame.index && g.hangs());
-        let placed = |collider: &Collider| {
-            let motion = frame.tools.get(collider.tool)?;
-            let blades = |g: &crate::Grasp| g.compliance.and_then(|c| c.blades);
-            let held = grasps().filter_map(blades).any(|blades| blades.contains(&collider.tool));
-            Some(Placed::new(collider, motion.at(from), motion.at(to), body, held))
-        };
-        self.placed.extend(frame.colliders.iter().map(placed));
     }
 
     fn find_near(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
@@ -453,58 +405,6 @@ impl Contacts {
 
 /// Marks a vertex's first touch while they are being found.
 const MARK: u32 = 1 << 31;
-
-impl Hanging {
-    /// The touch of a node where its tool is when `share` of the frame is over.
-    fn touch(&self, frame: &Frame<'_>, body: &Body, share: f64) -> Option<Touch> {
-        let grasp = &frame.grasps[self.grasp as usize];
-        let (compliance, tool) = (grasp.compliance?, frame.tools.get(grasp.tool)?);
-        let pose = tool.at(share);
-        let (_, captured) = grasp.prescribed_node(&pose, self.node as usize);
-        let place = (captured - body.origin).as_vec3a() + (pose.rotation * self.slid.as_dvec3()).as_vec3a();
-        Some(Touch {
-            vertex: self.vertex,
-            source: Source::Grasp(self.grasp, self.node),
-            normal: (pose.rotation * compliance.closing.normalize_or_zero()).as_vec3a(),
-            point: place,
-            place,
-            stiffness: compliance.stiffness as f32,
-            friction: Friction::Clamped(
-                (2.0 * compliance.friction * compliance.jaw_force / grasp.nodes.len() as f64) as f32,
-            ),
-        })
-    }
-}
-
-/// A collider in a substep.
-struct Placed {
-    /// From the world into its frame at the beginning, and out of it at the end.
-    from: Pose,
-    to: Pose,
-    /// A ball round it at the beginning, in the body's frame [m].
-    centre: Vec3A,
-    radius: f32,
-    /// How far from it a vertex may be that it touches without moving itself [m].
-    reach: f32,
-    /// Whether it is a blade of jaws that hold the body compliantly.
-    grips: bool,
-}
-
-impl Placed {
-    fn new(collider: &Collider, from: Pose, to: Pose, body: &Body, grips: bool) -> Self {
-        let (centre, radius) = collider.shape.bounds(0.0);
-        // How far a half-space turns is not bounded.
-        let arm = if radius.is_finite() { centre.length() + radius } else { 0.0 };
-        Self {
-            from: from.inverse(),
-            to,
-            centre: (from.transform(centre) - body.origin).as_vec3a(),
-            radius: radius as f32,
-            reach: (collider.rest_offset + crate::grasp::way(&from, &to, arm)) as f32,
-            grips,
-        }
-    }
-}
 
 fn outer(surface: &[u32], vertices: usize) -> Vec<bool> {
     let mut outer = vec![false; vertices];

@@ -6,8 +6,10 @@ mod collider;
 mod contacts;
 mod coupling;
 mod force;
+mod hanging;
 mod hull;
 mod pairs;
+mod placed;
 pub(crate) mod proximity;
 #[cfg(test)]
 mod proximity_tests;
@@ -19,9 +21,10 @@ mod touch;
 
 pub use body_contact::BodyContact;
 pub use collider::Collider;
-pub(crate) use contacts::{Anchor, Contacts, Hanging};
+pub(crate) use contacts::{Anchor, Contacts};
 pub(crate) use coupling::Coupling;
 pub use force::{Event, ToolForce, Wrench};
+pub(crate) use hanging::Hanging;
 pub use hull::Hull;
 pub(crate) use pairs::{Pairs, Stretch};
 pub(crate) use reaction::Reaction;

@@ -7,12 +7,14 @@
 //!
 //! Bodies that may touch each other are minimised together: one history and one line search over all of them, while each keeps its own factor.
 
+mod at_rest;
 mod dissection;
 mod elements;
 mod factor;
 mod go;
 mod history;
 mod layout;
+mod matrix;
 mod part;
 mod patch;
 mod rigid;

@@ -8,7 +8,7 @@ use super::layout::Layout;
 use super::patch::Patch;
 use super::rigid::Rigid;
 use super::warp::Warp;
-use crate::contact::{Contacts, Source};
+use crate::contact::Contacts;
 use crate::descent::DescentIntegrator;
 use crate::integrator::Frame;
 use crate::lanes::{Row, dot_rows};
@@ -39,12 +39,12 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) memory: Memory,
     /// The island's, of its first body.
     pub(super) history: History,
-    warp: Warp,
+    pub(super) warp: Warp,
     /// Of a body that touches others and that nothing holds.
     pub(super) rigid: Option<Rigid>,
     pub(super) contacts: Contacts,
     /// Forces from outside on free nodes [N].
-    loads: Vec<(u32, Vec3A)>,
+    pub(super) loads: Vec<(u32, Vec3A)>,
     /// Limits of friction of what is touched [N], held during a search.
     pub(super) limits: Vec<f32>,
     pub(super) fallback: DescentIntegrator,
@@ -53,7 +53,7 @@ pub(crate) struct QuasiNewtonSolver {
     /// Over free nodes: where the substep began, velocities, inertial predictor.
     pub(super) start: Vec<Row>,
     pub(super) v: Vec<Row>,
-    predictor: Vec<Row>,
+    pub(super) predictor: Vec<Row>,
     pub(super) gradient: Vec<Row>,
     pub(super) next_gradient: Vec<Row>,
     pub(super) direction: Vec<Row>,
@@ -61,9 +61,9 @@ pub(crate) struct QuasiNewtonSolver {
     pub(super) right: Vec<f32>,
     /// Nodes that a tool carries, now and in the factor.
     pub(super) held: Vec<bool>,
-    held_in_factor: Vec<bool>,
+    pub(super) held_in_factor: Vec<bool>,
     /// Stiffness of what free nodes touch or hang on that is in the factor [N/m].
-    touches_in_factor: Vec<f32>,
+    pub(super) touches_in_factor: Vec<f32>,
     /// Whether the factor is that of the matrix.
     pub(super) usable: bool,
     /// Whether the body takes part in the search: one that is at rest among others is left alone until they push it.
@@ -73,14 +73,14 @@ pub(crate) struct QuasiNewtonSolver {
     /// Whether it moved in this substep, is where it is to be, and is left alone until others push it.
     pub(super) dozes: bool,
     /// Where the elements were last looked at in place and accepted, and where that substep had begun; whether nothing else was looked at since, and whether the warp is that of there.
-    place_x: Vec<Row>,
-    place_start: Vec<Row>,
-    in_place: bool,
-    warped_in_place: bool,
+    pub(super) place_x: Vec<Row>,
+    pub(super) place_start: Vec<Row>,
+    pub(super) in_place: bool,
+    pub(super) warped_in_place: bool,
     /// Where the body was last asked whether it is at rest, the gradient there, and its correction [m], if the factor is still the same.
-    rest_x: Vec<Row>,
-    rest_gradient: Vec<Row>,
-    rest_correction: Option<f32>,
+    pub(super) rest_x: Vec<Row>,
+    pub(super) rest_gradient: Vec<Row>,
+    pub(super) rest_correction: Option<f32>,
     /// Whether others push it otherwise than when it was left alone.
     pub(super) stirred: bool,
     /// Whether it bore the last step along a direction.
@@ -204,18 +204,6 @@ impl QuasiNewtonSolver {
         self.in_place = false;
         let Self { level, elements, layout, x, start, .. } = self;
         dispatch!(*level, simd => elements.pass(simd, layout, x, start, h))
-    }
-
-    /// The pass where a body is and stays, and those are the accepted positions. What has not moved since it was last looked at in place is not looked at again.
-    pub fn pass_in_place(&mut self, h: f32) {
-        if self.in_place && self.x == self.place_x && self.start == self.place_start {
-            return;
-        }
-        self.pass(h);
-        self.elements.accept();
-        self.place_x.copy_from_slice(&self.x);
-        self.place_start.copy_from_slice(&self.start);
-        (self.in_place, self.warped_in_place) = (true, false);
     }
 
     /// Begins a substep: where nodes would be without forces but gravity.
@@ -344,12 +332,6 @@ impl QuasiNewtonSolver {
         dispatch!(self.level, _simd => longest(&self.x[..self.layout.free]))
     }
 
-    /// Looks how long the direction is, and how far the body went; nowhere before the `first` step.
-    pub fn look(&mut self, first: bool) {
-        self.longest = dispatch!(self.level, _simd => longest(&self.direction));
-        self.gone = if first { 0.0 } else { self.way() };
-    }
-
     /// Sum of the gradient over the nodes [N].
     pub fn force(&self) -> Vec3A {
         self.gradient[..self.layout.free].iter().fold(Vec3A::ZERO, |sum, row| sum + position(row))
@@ -363,63 +345,6 @@ impl QuasiNewtonSolver {
     /// Moves all nodes alike [m].
     pub fn shift(&mut self, by: Vec3A) {
         self.x[..self.layout.free].iter_mut().for_each(|row| add(row, by));
-    }
-
-    /// How far any coordinate is from where the node would have gone by itself [m]: what the substep was found to be about, without any rigid motion.
-    fn way(&self) -> f32 {
-        let Self { level, layout, held, x, targets, .. } = self;
-        dispatch!(*level, _simd => {
-            let mut most = [0.0f32; 4];
-            for ((x, to), held) in x[..layout.free].iter().zip(targets).zip(held) {
-                let counts = if *held { 0.0 } else { 1.0 };
-                for c in 0..4 {
-                    most[c] = most[c].max(counts * (x[c] - to[c]).abs());
-                }
-            }
-            most[0].max(most[1]).max(most[2])
-        })
-    }
-
-    /// Whether no node goes farther than `way` [m] by itself in a substep of `h` [s], and no tool carries any.
-    pub fn is_quiet(&self, h: f32, way: f32) -> bool {
-        !self.carried && h * dispatch!(self.level, _simd => longest(&self.v)) <= way
-    }
-
-    /// How far the gradient would move any node [m], without what was learnt. The direction is lost.
-    pub fn correction(&mut self) -> f32 {
-        self.direction.copy_from_slice(&self.gradient);
-        self.precondition();
-        dispatch!(self.level, _simd => longest(&self.direction))
-    }
-
-    /// The same where it may have been asked for before; without what the factor does not know of.
-    pub fn correction_at_rest(&mut self) -> f32 {
-        let free = self.layout.free;
-        let same = self.gradient == self.rest_gradient && self.x[..free] == self.rest_x[..free];
-        if let Some(correction) = self.rest_correction.filter(|_| same) {
-            return correction;
-        }
-        self.rest_x[..free].copy_from_slice(&self.x[..free]);
-        self.rest_gradient.copy_from_slice(&self.gradient);
-        let correction = self.correction();
-        self.rest_correction = Some(correction);
-        correction
-    }
-
-    /// Forgets where nodes would have gone by themselves.
-    pub fn aim_nowhere(&mut self) {
-        let free = self.layout.free;
-        self.targets[..free].copy_from_slice(&self.x[..free]);
-    }
-
-    /// Leaves the body where the substep began.
-    pub fn rest(&mut self, h: f32) {
-        self.restore();
-        for (y, v) in self.predictor.iter_mut().zip(&self.v) {
-            (0..3).for_each(|c| y[c] -= h * v[c]);
-        }
-        self.v.fill([0.0; 4]);
-        self.active = false;
     }
 
     /// Puts the substep's beginning back.
@@ -445,62 +370,6 @@ impl QuasiNewtonSolver {
     /// Whether no tool and no support holds or touches the body.
     pub fn flies(&self) -> bool {
         self.is_free() && self.contacts.flies(|vertex| position(&self.x[self.layout.number[vertex] as usize]))
-    }
-
-    /// Marks the nodes that tools carry; a factor in which others are held is made anew.
-    fn hold(&mut self, frame: &Frame<'_>, body: &Body) {
-        self.held.fill(false);
-        for grasp in frame.rigid_grasps() {
-            for node in &grasp.nodes {
-                let i = self.layout.number[body.internal[*node as usize] as usize] as usize;
-                if i < self.layout.free {
-                    self.held[i] = true;
-                }
-            }
-        }
-    }
-
-    /// Makes the factor anew if it is not the one for the nodes that are held, pressed or hang on a tool.
-    fn refresh_factor(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
-        let Some(factor) = &mut self.factor else { return };
-        let mut stale = !self.usable || self.held != self.held_in_factor;
-        for i in 0..self.layout.free {
-            let stiffness = self.contacts.stiffness(frame, body, state, self.layout.vertex[i] as usize);
-            stale |= stiffness != self.touches_in_factor[i];
-            self.touches_in_factor[i] = stiffness;
-        }
-        if stale {
-            self.patch.clear();
-            self.rest_correction = None;
-            self.known.clear();
-            for (i, vertex) in self.layout.vertex[..self.layout.free].iter().enumerate() {
-                if state.supported[*vertex as usize] {
-                    self.known.push((i as u32, body.vertices[*vertex as usize].contact_stiffness));
-                }
-            }
-            self.usable = factor.factorise(&self.held, &self.touches_in_factor);
-            self.held_in_factor.copy_from_slice(&self.held);
-        }
-    }
-
-    /// Lets the matrix know of what presses where a substep began or would have gone by itself; false if it did already.
-    pub fn learn_touches(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
-        let (x, targets, number) = (&self.x, &self.targets, &self.layout.number);
-        let places = |vertex: u32| {
-            let i = number[vertex as usize] as usize;
-            [position(&x[i]), position(&targets[i])]
-        };
-        let mut new = false;
-        for touch in self.contacts.touches().iter().filter(|touch| !matches!(touch.source, Source::Grasp(..))) {
-            let presses = places(touch.vertex).iter().any(|x| touch.height(*x) < 0.0);
-            let known = &mut state.supported[touch.vertex as usize];
-            new |= presses && !*known;
-            *known |= presses;
-        }
-        if new {
-            self.refresh_factor(frame, body, state);
-        }
-        new
     }
 
     pub fn load(&mut self, state: &BodyState) {
@@ -533,7 +402,7 @@ pub(super) fn position(row: &Row) -> Vec3A {
 
 /// Largest coordinate of any row; not a number counts as infinite.
 #[inline(always)]
-fn longest(rows: &[Row]) -> f32 {
+pub(super) fn longest(rows: &[Row]) -> f32 {
     let mut most = [0.0f32; 4];
     let mut sane = true;
     for row in rows {
