@@ -166,7 +166,7 @@ impl<'a> Session<'a> {
         Moment { state: self.world.state.clone(), gripper: self.gripper }
     }
 
-    /// Does the frame that `other` has done from the moment `before`: from the same places and velocities, with the same gripper, under what contact did to nodes there. So a run without
+    /// Does the frame that `other` has done from the moment `before`: from the same places and velocities, with the same gripper, under what contact did to nodes at its end. So a run without
     /// contact moves, frame by frame, as one that has it. As [`advance`](Self::advance) else.
     ///
     /// # Errors

@@ -16,9 +16,9 @@ pub struct Load {
 }
 
 impl Load {
-    /// Whether `model` has such a node.
+    /// Whether `model` has such a node, and the force is one.
     pub(crate) fn fits(&self, model: &Model) -> bool {
-        model.bodies.get(self.body).is_some_and(|body| self.node < body.len())
+        self.force.is_finite() && model.bodies.get(self.body).is_some_and(|body| self.node < body.len())
     }
 }
 

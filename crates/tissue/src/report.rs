@@ -23,7 +23,7 @@ pub enum Divergence {
         /// The body.
         body: usize,
     },
-    /// The state or the model is not the one that the stepper was made for, or a grasp or load is of nodes that the model lacks; nothing was stepped.
+    /// The state or the model is not the one that the stepper was made for, or a grasp or load is of nodes that the model lacks or a load is not finite; nothing was stepped.
     OtherModel,
     /// An edge is longer than 10 times its rest length.
     OverStretch {

@@ -92,7 +92,7 @@ impl State {
         (0..model.bodies[body].len()).map(|node| self.position(model, body, node)).collect()
     }
 
-    /// Takes over where all nodes are and how fast from another state, and nothing else: not what friction remembers, nor grasps. False, and nothing is changed, if that has other bodies.
+    /// Takes over where all nodes are and how fast from another state, and where friction holds them on supports; nothing else of what contact remembers, nor grasps. False, and nothing is changed, if that has other bodies.
     pub fn copy_motion(&mut self, other: &Self) -> bool {
         let sizes = |state: &Self| state.bodies.iter().map(|body| body.x.len()).collect::<Vec<_>>();
         if sizes(self) != sizes(other) {
@@ -101,6 +101,8 @@ impl State {
         for (to, from) in self.bodies.iter_mut().zip(&other.bodies) {
             to.x.copy_from_slice(&from.x);
             to.v.copy_from_slice(&from.v);
+            to.anchors.clear();
+            to.anchors.extend(from.anchors.iter().filter(|anchor| matches!(anchor.source, Source::Support(_))));
         }
         true
     }

@@ -69,7 +69,7 @@ impl Stepper {
         &self.events
     }
 
-    /// What tools and other bodies did to nodes at the end of the last frame, which left `state`: the loads that would do the same. Supports and grasps are left out.
+    /// What tools and other bodies did to nodes at the end of the last frame, which left `state`: the loads that would do the same throughout a frame that ends there. Supports and grasps are left out.
     pub fn contact_loads(&self, model: &Model, state: &State) -> Vec<Load> {
         let mut loads = Vec::new();
         if self.crew.fits(model, state) {

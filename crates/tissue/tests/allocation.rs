@@ -9,8 +9,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_geometry::Pose;
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, Compliance, Grasp, Material, ModelBuilder, Schedule, Shape, State, Stepper,
-    ToolMotion,
+    BodyContact, BodyDescription, Collider, Compliance, Grasp, Load, Material, ModelBuilder, Schedule, Shape, State,
+    Stepper, ToolMotion,
 };
 
 /// The system's allocator, counting.
@@ -98,8 +98,9 @@ fn stepping_allocates_nothing() {
     let still = ToolMotion { from: Pose::IDENTITY, to: Pose::IDENTITY };
     stepper.step(&model, &mut state, &[still]);
     let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let load = Load { body: 0, node: mesh.vertices.len() - 1, force: DVec3::Z * 1e-3 };
     for _ in 0..FRAMES {
-        stepper.step(&model, &mut state, &[still]);
+        stepper.step_under(&model, &mut state, &[still], &[load]);
     }
     let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
     // The thread pool's queue takes a new block now and then, once in dozens of frames; our own code would show in every frame.

@@ -6,8 +6,8 @@ use common::{FRAME, GRAVITY, block, model, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
 use trocar_geometry::Pose;
 use trocar_tissue::{
-    BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Newton, Schedule, SemiImplicit, Shape,
-    State, Stepper, ToolMotion, Xpbd,
+    BodyContact, BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Newton, Schedule,
+    SemiImplicit, Shape, State, Stepper, ToolMotion, Xpbd,
 };
 
 /// Every solver that there is.
@@ -124,7 +124,7 @@ fn contact_is_done_over_by_its_forces() {
     assert!(dent > 1e-3 && off < 0.01 * dent, "{:.4} mm off in a dent of {:.4} mm", off * 1e3, dent * 1e3);
 }
 
-/// A load on what is not there stops the step, and nothing has moved.
+/// A load on what is not there, or that is no force, stops the step, and nothing has moved.
 #[test]
 fn a_load_on_no_node_is_refused() {
     let mesh = block([1, 1, 1], 2e-3);
@@ -132,9 +132,53 @@ fn a_load_on_no_node_is_refused() {
     let mut state = State::new(&model);
     let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
     let before = state.hash();
-    for (body, node) in [(1, 0), (0, 8)] {
-        let report = stepper.step_under(&model, &mut state, &[], &[Load { body, node, force: DVec3::X }]);
+    for (body, node, force) in [(1, 0, DVec3::X), (0, 8, DVec3::X), (0, 0, DVec3::NAN)] {
+        let report = stepper.step_under(&model, &mut state, &[], &[Load { body, node, force }]);
         assert_eq!(report.divergence, Some(Divergence::OtherModel));
     }
     assert_eq!(state.hash(), before);
+}
+
+/// A block that falls on a pinned one: what they do to each other adds up to nothing, bears the block, and moves both alike as loads.
+#[test]
+fn what_bodies_do_to_each_other_is_equal_and_opposite() {
+    let low = block([6, 6, 3], 2.5e-3);
+    let mut high = block([4, 4, 3], 2.5e-3);
+    high.vertices.iter_mut().for_each(|p| *p += DVec3::new(2e-3, 1.5e-3, 8.6e-3));
+    let build = |contact: Option<BodyContact>| {
+        let mut builder = ModelBuilder::new().gravity(GRAVITY);
+        if let Some(contact) = contact {
+            builder = builder.body_contact(contact);
+        }
+        let material = Material { viscosity: 40.0, ..tissue(12e3) };
+        for (mesh, pinned) in [(&low, nodes(&low, |p| p.z == 0.0)), (&high, vec![])] {
+            builder.body(BodyDescription { name: "block".into(), mesh, material, pinned, supports: vec![] }).unwrap();
+        }
+        builder.build().unwrap()
+    };
+    let (touching, apart) = (build(Some(BodyContact::default())), build(None));
+    let mut a = State::new(&touching);
+    let mut with = Stepper::new(&touching, Schedule::FAST, FRAME, 1).unwrap();
+    let mut under = Stepper::new(&apart, Schedule::FAST, FRAME, 1).unwrap();
+    for _ in 0..180 {
+        with.step(&touching, &mut a, &[]);
+    }
+    let sum = |loads: &[Load], body: usize| -> DVec3 {
+        loads.iter().filter(|load| load.body == body).map(|load| load.force).sum()
+    };
+    let loads = with.contact_loads(&touching, &a);
+    let weight = 9.81 * (0..high.vertices.len()).map(|i| touching.bodies()[1].mass(i)).sum::<f64>();
+    let (below, above) = (sum(&loads, 0), sum(&loads, 1));
+    assert!((above + below).length() < 1e-4 * weight, "{above} and {below}");
+    assert!((above - DVec3::Z * weight).length() < 0.02 * weight, "{above} bears {weight} N");
+    // From there, without contact, under the same forces, nothing falls.
+    let mut b = State::new(&apart);
+    assert!(b.copy_motion(&a));
+    let before = a.positions(&touching, 1);
+    under.step_under(&apart, &mut b, &[], &loads);
+    let most = (0..before.len()).map(|i| b.position(&apart, 1, i).distance(before[i])).fold(0.0, f64::max);
+    let fall = 9.81 * FRAME * FRAME;
+    assert!(most < 0.01 * fall, "{:.5} mm in a frame; it would fall {:.5} mm", most * 1e3, fall * 1e3);
+    let mut other = State::new(&model(&low, tissue(12e3), vec![], GRAVITY));
+    assert!(!other.copy_motion(&a), "a state of other bodies is refused");
 }

@@ -1,7 +1,7 @@
 //! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole specimen with all contact, and without, frame beside frame.
 //!
 //! Without contact there are two runs. In one nothing takes its place: jaws pass through tissue that stays at rest, and what is saved is contact and all motion that it causes. In the other every
-//! frame starts where the run with contact started it, and every node gets the force that contact did to it there, so that tissue moves alike: what is saved is contact alone (finding it, its forces, and
+//! frame starts where the run with contact started it, and every node gets the force that contact did to it at the frame's end, so that tissue moves alike: what is saved is contact alone (finding it, its forces, and
 //! the iterations that its stiffness costs).
 
 use super::machine::Machine;
@@ -62,9 +62,9 @@ pub struct GraspPhaseTiming {
     /// The slowest frame with contact [ms].
     pub worst_ms: f64,
     /// Share of the time with contact that contact costs: more than the same motion without, from the sums over the frames.
-    pub contact_share: f64,
+    pub own_share: f64,
     /// Share of it that contact and all motion it causes cost: more than without contact and its forces.
-    pub contact_and_motion_share: f64,
+    pub contact_share: f64,
 }
 
 /// The benchmark's outcome.
@@ -72,12 +72,12 @@ pub struct GraspPhaseTiming {
 pub struct GraspBenchResult {
     /// 1/60 s over the median wall time of a frame with contact, all phases in which the gripper is near.
     pub real_time_factor: f64,
-    /// The same without contact.
+    /// The same without contact and its forces.
     pub real_time_factor_without_contact: f64,
     /// Share of the time that contact costs: more than the same motion without.
-    pub contact_share: f64,
+    pub own_share: f64,
     /// Share of it that contact and all motion it causes cost.
-    pub contact_and_motion_share: f64,
+    pub contact_share: f64,
     /// Phase by phase, and all of them first.
     pub phases: Vec<GraspPhaseTiming>,
     /// The grasp design's name.
@@ -155,8 +155,8 @@ impl GraspBench {
         Ok(GraspBenchResult {
             real_time_factor: 1e3 * FRAME / all.with_contact_ms,
             real_time_factor_without_contact: 1e3 * FRAME / all.without_contact_ms,
+            own_share: all.own_share,
             contact_share: all.contact_share,
-            contact_and_motion_share: all.contact_and_motion_share,
             phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &times))).collect(),
             design: self.design.name(),
             held,
@@ -218,8 +218,8 @@ fn timing(phase: &'static str, frames: &[Frames]) -> GraspPhaseTiming {
         same_motion_iterations: same_motion.iterations(),
         without_contact_iterations: without.iterations(),
         worst_ms: 1e3 * with.0.iter().map(|f| f.seconds).fold(f64::NAN, f64::max),
-        contact_share: 1.0 - same_motion.seconds() / with.seconds(),
-        contact_and_motion_share: 1.0 - without.seconds() / with.seconds(),
+        own_share: 1.0 - same_motion.seconds() / with.seconds(),
+        contact_share: 1.0 - without.seconds() / with.seconds(),
     }
 }
 
@@ -261,9 +261,9 @@ mod tests {
         ];
         let all = timing("all", &timed);
         assert_eq!(all.frames, 2);
-        assert!((all.contact_share - 0.25).abs() < 1e-12 && (all.contact_and_motion_share - 0.5).abs() < 1e-12);
+        assert!((all.own_share - 0.25).abs() < 1e-12 && (all.contact_share - 0.5).abs() < 1e-12);
         assert!((all.with_contact_ms - 3.0).abs() < 1e-12);
-        assert!((timing("close", &timed).contact_share - 0.25).abs() < 1e-12);
+        assert!((timing("close", &timed).own_share - 0.25).abs() < 1e-12);
         assert!(timing("open", &timed).with_contact_ms.is_nan());
     }
 }

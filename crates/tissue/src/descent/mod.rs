@@ -34,6 +34,8 @@ pub(crate) struct DescentIntegrator {
     guess: Vec<Vec3A>,
     fixed: Vec<bool>,
     held: Vec<bool>,
+    /// Whether loads act on it in the frame.
+    loaded: bool,
     /// Whether another body presses it when a substep begins.
     pressed: bool,
     isa: Isa,
@@ -142,6 +144,7 @@ impl DescentIntegrator {
             guess: zeros,
             fixed: vec![false; body.len()],
             held: vec![false; body.len()],
+            loaded: false,
             pressed: false,
             isa: Isa::detect(),
             alone,
@@ -167,9 +170,9 @@ impl DescentIntegrator {
         let gravity = frame.gravity.as_vec3a();
         self.start.copy_from_slice(&state.x);
         let flies = self.schedule.start == Start::Adaptive && !self.pressed && self.flies_freely(contacts);
-        // A body in free flight falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere
+        // A body in free flight that no load pushes falls exactly: gravity's part of its motion is uniform and integrated as h^2/2 g. Elsewhere
         // implicit Euler's h^2 g.
-        let reach = if flies { 0.5 * h * h } else { h * h };
+        let reach = if flies && !self.loaded { 0.5 * h * h } else { h * h };
         for (y, (x, v)) in self.predictor.iter_mut().zip(state.x.iter().zip(&state.v)) {
             *y = x + h * v + reach * gravity;
         }
@@ -217,10 +220,12 @@ impl DescentIntegrator {
 
     /// The velocity after the substep: v + h g + (x - y)/h. That is (x - x_start)/h for implicit Euler's predictor, and exact for the one of free
     /// flight; but the rounding of positions far from the body's origin does not enter it.
-    fn take_velocities(&self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
+    fn take_velocities(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         let (h, gravity) = (self.step(frame), frame.gravity.as_vec3a());
         let strength = gravity.length_squared();
         let direction = if strength > 0.0 { gravity / strength } else { Vec3A::ZERO };
+        // What a load does to a node by itself; falling counts what is left of gravity beside it.
+        frame.for_loads(body, |i, force| self.predictor[i] -= force.as_vec3a() * (h * h / body.vertices[i].mass));
         for i in 0..state.x.len() {
             if self.fixed[i] {
                 state.v[i] = Vec3A::ZERO;
@@ -231,15 +236,11 @@ impl DescentIntegrator {
             state.falling[i] = ((velocity - state.v[i]) / h).dot(direction).clamp(0.0, 1.0);
             state.v[i] = velocity;
         }
-        frame.for_loads(body, |i, force| {
-            if !self.fixed[i] {
-                state.v[i] += force.as_vec3a() * (h / body.vertices[i].mass);
-            }
-        });
     }
 
     /// Marks the vertices that are fixed during this frame.
     pub fn begin(&mut self, frame: &Frame<'_>, body: &Body) {
+        self.loaded = frame.loads.iter().any(|load| load.body == frame.index);
         self.held.fill(false);
         for grasp in frame.rigid_grasps() {
             for node in &grasp.nodes {

@@ -43,8 +43,9 @@ pub(crate) struct QuasiNewtonSolver {
     /// Of a body that touches others and that nothing holds.
     pub(super) rigid: Option<Rigid>,
     pub(super) contacts: Contacts,
-    /// Forces from outside on free nodes [N].
-    pub(super) loads: Vec<(u32, Vec3A)>,
+    /// Forces from outside on free nodes [N], and whether there are any.
+    loads: Vec<Row>,
+    loaded: bool,
     /// Limits of friction of what is touched [N], held during a search.
     pub(super) limits: Vec<f32>,
     pub(super) fallback: DescentIntegrator,
@@ -126,7 +127,8 @@ impl QuasiNewtonSolver {
             warp: Warp::new(&layout),
             rigid: None,
             contacts: Contacts::new(body),
-            loads: Vec::new(),
+            loads: rows(),
+            loaded: false,
             limits: Vec::with_capacity(2 * body.len()),
             fallback: DescentIntegrator::new(sweeps, body, alone),
             x: vec![[0.0; 4]; layout.nodes.max(layout.rows)],
@@ -174,11 +176,14 @@ impl QuasiNewtonSolver {
     pub fn begin(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         self.load(state);
         self.hold(frame, body);
-        self.loads.clear();
+        if std::mem::take(&mut self.loaded) {
+            self.loads.fill([0.0; 4]);
+        }
         frame.for_loads(body, |vertex, force| {
-            let i = self.layout.number[vertex];
-            if (i as usize) < self.layout.free && !self.held[i as usize] {
-                self.loads.push((i, force.as_vec3a()));
+            let i = self.layout.number[vertex] as usize;
+            if i < self.layout.free && !self.held[i] {
+                add(&mut self.loads[i], force.as_vec3a());
+                self.loaded = true;
             }
         });
         self.contacts.begin(frame, body, state);
@@ -240,8 +245,10 @@ impl QuasiNewtonSolver {
                 add(&mut self.next_gradient[i], push.gradient);
             }
         }
-        for (i, force) in &self.loads {
-            add(&mut self.next_gradient[*i as usize], -*force);
+        if self.loaded {
+            for (sum, force) in self.next_gradient.iter_mut().zip(&self.loads) {
+                (0..3).for_each(|c| sum[c] -= force[c]);
+            }
         }
     }
 
@@ -367,9 +374,11 @@ impl QuasiNewtonSolver {
         });
     }
 
-    /// Whether no tool and no support holds or touches the body.
+    /// Whether no tool and no support holds or touches the body, and no load acts on it.
     pub fn flies(&self) -> bool {
-        self.is_free() && self.contacts.flies(|vertex| position(&self.x[self.layout.number[vertex] as usize]))
+        !self.loaded
+            && self.is_free()
+            && self.contacts.flies(|vertex| position(&self.x[self.layout.number[vertex] as usize]))
     }
 
     pub fn load(&mut self, state: &BodyState) {

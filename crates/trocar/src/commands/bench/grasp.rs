@@ -42,8 +42,8 @@ fn text(r: &GraspBenchResult) -> String {
             format!("{:.2}", p.without_contact_ms),
             iterations.map(|n| format!("{n:.0}")).join("/"),
             format!("{:.2}", p.worst_ms),
+            format!("{:.1}%", 100.0 * p.own_share),
             format!("{:.1}%", 100.0 * p.contact_share),
-            format!("{:.1}%", 100.0 * p.contact_and_motion_share),
         ]
     };
     format!(
