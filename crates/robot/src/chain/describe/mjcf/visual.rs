@@ -25,7 +25,7 @@ pub fn mjcf_visuals(path: &Path, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> 
     let compiler = Compiler::read(&source, root)?;
     let reader = Reader { source, root, compiler };
     let moved = |n: &Node<'_, '_>| n.has_tag_name("body") && children(*n, "joint").next().is_some();
-    let last = || root.descendants().filter(moved).filter_map(|n| n.attribute("name")).last();
+    let last = || root.descendants().filter(moved).filter_map(|n| n.attribute("name")).next_back();
     let tip = tip.or_else(last).ok_or_else(|| source.fail("no joint moves a body that has a name"))?;
     reader.visuals(tip)
 }
