@@ -225,11 +225,11 @@ impl Rendering {
         self.cut(&mut sight, camera, size, &points)?;
         let clock = std::time::Instant::now();
         let finer = self.finer();
-        progress.begin("picture", 1);
-        let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
-        let color = averaged(&fine.color, finer);
-        let picture = sight.see(play.cell(), camera, size, &Settings::Preview { shadows: false })?.clone();
-        progress.end();
+        let (color, picture) = play::stage(progress, "picture", 1, || {
+            let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
+            let color = averaged(&fine.color, finer);
+            Ok((color, sight.see(play.cell(), camera, size, &Settings::Preview { shadows: false })?.clone()))
+        })?;
         if progress.interrupted() {
             return Err(Error::Interrupted);
         }
@@ -254,26 +254,26 @@ impl Rendering {
         let hz = frame_rate(play.cell().period(), most);
         let (mut frames, mut render_s) = (0, 0.0);
         let mut picture = Picture::new(size[0], size[1]);
-        progress.begin("film", play.periods().unwrap_or(1) as u64);
-        loop {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
+        play::stage(progress, "film", play.periods().unwrap_or(1) as u64, || {
+            loop {
+                if progress.interrupted() {
+                    return Err(Error::Interrupted);
+                }
+                if play.cell().time() >= f64::from(frames) / f64::from(hz) - 1e-9 {
+                    let clock = std::time::Instant::now();
+                    let finer = self.finer();
+                    let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
+                    film.add(averaged(&fine.color, finer), 1000.0 * f64::from(frames) / f64::from(hz), hz)?;
+                    picture.labels.clone_from(&fine.labels);
+                    render_s += clock.elapsed().as_secs_f64();
+                    frames += 1;
+                }
+                if !play.advance()? {
+                    return Ok(());
+                }
+                progress.advance(1);
             }
-            if play.cell().time() >= f64::from(frames) / f64::from(hz) - 1e-9 {
-                let clock = std::time::Instant::now();
-                let finer = self.finer();
-                let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
-                film.add(averaged(&fine.color, finer), 1000.0 * f64::from(frames) / f64::from(hz), hz)?;
-                picture.labels.clone_from(&fine.labels);
-                render_s += clock.elapsed().as_secs_f64();
-                frames += 1;
-            }
-            if !play.advance()? {
-                break;
-            }
-            progress.advance(1);
-        }
-        progress.end();
+        })?;
         film.finish(output)?;
         let files = vec![output.display().to_string()];
         let (time_s, samples) = (play.cell().time(), self.samples.unwrap_or(0));

@@ -1,10 +1,10 @@
 //! What descriptions show of an arm: every shape on the link that carries it, at its pose, in its colour; what is wrong is told.
 
-#![allow(clippy::unwrap_used, reason = "helper functions of tests")]
+#![allow(clippy::unwrap_used, reason = "what tests share may panic")]
 
 mod common;
 
-use common::files::{MJCF, URDF};
+use common::files::{shown_mjcf, shown_urdf};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use trocar_robot::Error;
@@ -25,44 +25,6 @@ fn urdf(text: &str) -> Result<Vec<Vec<Visual>>, Error> {
 fn mjcf(text: &str) -> Result<Vec<Vec<Visual>>, Error> {
     let (_folder, path) = write("arm.xml", text);
     mjcf_visuals(&path, Some("tool"))
-}
-
-/// The arm of both files with looks: a foot, a mesh on the first link, a red box that is fixed to it, a rod on the second.
-fn shown_urdf() -> String {
-    let mesh = r#"<link name="a"><visual><origin xyz="0 0 0.1"/><geometry><mesh filename="meshes/a.stl" scale="2 2 2"/></geometry></visual>"#;
-    let red =
-        r#"<link name="box"><visual><geometry><box size="0.2 0.4 0.6"/></geometry><material name="red"/></visual>"#;
-    let rod = r#"<link name="b"><visual><origin rpy="0 1.5707963267948966 0"/><geometry><cylinder radius="0.01" length="0.2"/></geometry></visual>"#;
-    URDF.replace(r#"<link name="a">"#, mesh)
-        .replace(r#"<link name="box">"#, red)
-        .replace(r#"<link name="b">"#, rod)
-        .replace(
-            r#"<link name="world"/>"#,
-            r#"<material name="red"><color rgba="1 0 0 1"/></material>
-            <link name="world"><visual><geometry><sphere radius="0.05"/></geometry></visual></link>"#,
-        )
-}
-
-fn shown_mjcf() -> String {
-    MJCF.replace(
-        "<worldbody>",
-        r#"<asset><mesh file="a.stl" scale="2 2 2"/><material name="red" rgba="1 0 0 1"/></asset><worldbody>"#,
-    )
-    .replace(r#"angle="degree""#, r#"angle="degree" meshdir="meshes""#)
-    .replace(r#"<default><joint damping="0.5"/>"#, r#"<default><joint damping="0.5"/><geom group="2"/>"#)
-    .replace(
-        r#"childclass="arm">"#,
-        r#"childclass="arm"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom size="0.05" pos="0 0 -0.5"/>"#,
-    )
-    .replace(
-        r#"<joint name="j1""#,
-        r#"<geom type="mesh" mesh="a" pos="0 0 0.1"/><geom type="mesh" mesh="none" group="3"/><joint name="j1""#,
-    )
-    .replace(
-        r#"<body name="box" pos="0.3 0 0">"#,
-        r#"<body name="box" pos="0.3 0 0"><geom type="box" size="0.1 0.2 0.3" material="red"/>"#,
-    )
-    .replace(r#"<joint name="j2""#, r#"<geom type="cylinder" size="0.01" fromto="-0.1 0 0 0.1 0 0"/><joint name="j2""#)
 }
 
 #[test]
@@ -97,6 +59,55 @@ fn what_is_wrong_names_file_and_place() {
     said(urdf(&shown_urdf().replace("<box size=\"0.2 0.4 0.6\"/>", "<cone/>")), &["arm.urdf", "link 'box'", "<cone>"]);
     said(urdf(&shown_urdf().replace("meshes/a.stl", "package://nowhere/a.stl")), &["link 'a'", "package 'nowhere'"]);
     said(urdf(&shown_urdf().replace("radius=\"0.01\"", "radius=\"-1\"")), &["link 'b'", "positive radius"]);
+}
+
+#[test]
+fn default_classes_place_geoms() {
+    let placed = |default: &str, own: &str| {
+        let text = shown_mjcf()
+            .replace(r#"<geom group="2"/>"#, r#"<geom group="2"/><default class="turned"><geom DEFAULT/></default>"#)
+            .replace("DEFAULT", default)
+            .replace(
+                r#"<geom type="mesh" mesh="a" pos="0 0 0.1"/>"#,
+                r#"<geom class="turned" type="mesh" mesh="a" OWN/>"#,
+            )
+            .replace("OWN", own);
+        mjcf(&text).map(|links| links[1][0].pose)
+    };
+    let pose = placed(r#"pos="0 0 0.2" euler="0 90 0""#, "").unwrap();
+    assert!((pose.translation - DVec3::new(0.0, 0.0, 0.2)).length() < 1e-12, "{}", pose.translation);
+    assert!((pose.rotation * DVec3::Z - DVec3::X).length() < 1e-9);
+    let pose = placed(r#"pos="0 0 0.2" euler="0 90 0""#, r#"pos="0 0 0.1" euler="0 0 0""#).unwrap();
+    assert!((pose.translation - DVec3::new(0.0, 0.0, 0.1)).length() < 1e-12, "{}", pose.translation);
+    assert!((pose.rotation * DVec3::Z - DVec3::Z).length() < 1e-9);
+    let said = placed(r#"quat="0 1 0 0""#, r#"euler="0 90 0""#).unwrap_err().to_string();
+    assert!(said.contains("arm.xml") && said.contains("quat and euler"), "{said}");
+}
+
+#[test]
+fn sizes_are_numbers_and_may_be_longer_than_needed() {
+    let ball = |size: &str| mjcf(&shown_mjcf().replace(r#"size="0.05""#, &format!("size=\"{size}\"")));
+    assert_eq!(ball("0.05 0 0").unwrap()[0][0].shape, VisualShape::Ball(0.05));
+    for (size, word) in [
+        ("0.05 wide", "'wide' in size"),
+        ("wide 0.05", "'wide' in size"),
+        ("nan", "'nan' in size"),
+        ("0 0.05", "1 positive"),
+        ("", "1 positive"),
+        ("1 1 1 1", "1 positive"),
+    ] {
+        let said = ball(size).unwrap_err().to_string();
+        assert!(said.contains(word) && said.contains("arm.xml") && !said.contains('\n'), "{size}: {said}");
+    }
+}
+
+#[test]
+fn paths_do_not_leave_their_package() {
+    for path in ["/a.stl", "", "../a.stl", "./a.stl", "two/../../a.stl", "two//etc/a.stl", "two/meshes/.."] {
+        let name = format!("package://{path}");
+        let said = urdf(&shown_urdf().replace("meshes/a.stl", &name)).unwrap_err().to_string();
+        assert!(["arm.urdf", "link 'a'", &name, "without '..'"].iter().all(|w| said.contains(w)), "{said}");
+    }
 }
 
 #[test]

@@ -70,13 +70,23 @@ struct Shown {
 /// An arm on the stage.
 struct Arm {
     name: &'static str,
-    /// The description that it is drawn from, with the flange, and the shapes of base and links.
-    drawn: Option<(PathBuf, Option<String>)>,
+    /// The description that it is drawn from, and the shapes of base and links.
+    drawn: Option<Drawn>,
     shapes: Vec<ShapeId>,
     links: Vec<BodyId>,
     shaft: BodyId,
     motor: BodyId,
     blades: [BodyId; 2],
+}
+
+/// All that the shapes of an arm with a description hang on, but for the number of its links.
+#[derive(PartialEq)]
+struct Drawn {
+    file: PathBuf,
+    flange: Option<String>,
+    /// The scene asks for the file's shapes: where it shows none there are none, and no simple ones.
+    asked: bool,
+    model: String,
 }
 
 impl Sight {
@@ -210,12 +220,19 @@ impl Sight {
         let shell =
             Look { color: [232; 3], surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, wander: [0.0; 3] } };
         // Arms of one description share its shapes.
-        let drawn = arm.drawn().map(|file| (scene.resolve(file), arm.flange.clone()));
-        let known = self.arms.iter().find(|a| drawn.is_some() && a.drawn == drawn).map(|a| a.shapes.clone());
+        let model = cell.arm_model(name)?;
+        let drawn = arm.drawn().map(|file| Drawn {
+            file: scene.resolve(file),
+            flange: arm.flange.clone(),
+            asked: arm.shapes.is_some(),
+            model: model.to_owned(),
+        });
+        let same = |a: &&Arm| drawn.is_some() && a.drawn == drawn && a.shapes.len() + 1 == poses.len();
+        let known = self.arms.iter().find(same).map(|a| a.shapes.clone());
         let shapes = match known {
             Some(shapes) => shapes,
             None => {
-                let meshes = arm::links(scene, arm, cell.arm_model(name)?, &poses)?;
+                let meshes = arm::links(scene, arm, model, &poses)?;
                 meshes.iter().map(|mesh| self.base.add_shape(mesh)).collect::<std::result::Result<Vec<_>, _>>()?
             }
         };

@@ -1,6 +1,6 @@
 //! Arms drawn from their descriptions, and the abdominal wall round the ports. The tests with the FR3's files are skipped, saying so, where these are not.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "what tests share may panic")]
 
 use glam::DVec3;
 use std::path::{Path, PathBuf};
@@ -120,6 +120,30 @@ fn a_cell_runs_with_arms_out_of_mjcf_and_shows_their_meshes() {
 }
 
 #[test]
+fn arms_share_shapes_only_where_they_are_drawn_alike() {
+    let Some(file) = menagerie() else { return };
+    // The same arm without looks: simple shapes where nobody asks for its own, nothing where the scene does.
+    let folder = tempfile::tempdir().unwrap();
+    let bare = folder.path().join("bare.xml");
+    let text = std::fs::read_to_string(file).unwrap();
+    std::fs::write(&bare, text.replace("group=\"2\"", "group=\"3\"")).unwrap();
+    let bare = bare.to_str().unwrap();
+    let specimen = specimen();
+    let cell = Cell::new(&with_model(bare, None), &specimen, 1).unwrap();
+    let triangles = |asked: [bool; 2]| {
+        let mut scene = with_model(bare, None);
+        for (arm, asked) in scene.arms.iter_mut().zip(asked) {
+            arm.shapes = asked.then(|| bare.to_owned());
+        }
+        Sight::new(&scene, &specimen, &cell).unwrap().triangles()
+    };
+    let [neither, left, right, both] = [[false, false], [true, false], [false, true], [true, true]].map(triangles);
+    assert_eq!(left, right);
+    assert_eq!(neither - left, left - both);
+    assert!(neither > left, "{neither} triangles, {left} without one arm");
+}
+
+#[test]
 fn a_missing_mesh_and_another_arm_are_told_in_a_line() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("arm.xml");
@@ -176,7 +200,21 @@ fn the_wall_is_where_the_scene_has_it() {
         // Skin is paler than peritoneum.
         assert_eq!(green > 0.65 * red, skin, "{name}: {:?}", picture.color.pixels[middle]);
     }
-    // The hole is open: nothing of the wall is within 3 mm of its middle.
-    let (_, pose) = sight.model("above", [101, 101]).unwrap();
-    assert!(pose.translation.z > port.z);
+    // The hole is open: the wall begins under the ring, 5 mm from the hole's edge.
+    for (name, eye) in [("in from above", 0.2), ("in from below", -0.1)] {
+        sight.add_camera(name, model, Pose::look_at(port + eye * DVec3::Z, port, DVec3::Y));
+        let picture = sight.see(&cell, name, [101, 101], &Settings::preview()).unwrap();
+        assert_ne!(picture.labels[50 * 101 + 50], wall, "{name}");
+        let (labels, depth) = (picture.labels.clone(), picture.depth.depth.clone());
+        let (model, pose) = sight.model(name, [101, 101]).unwrap();
+        let shows = (0..labels.len()).filter(|k| labels[*k] == wall);
+        let aside = shows.map(|k| {
+            let ray = model.ray((k % 101) as f64, (k / 101) as f64);
+            let away = pose.transform(ray / ray.z * f64::from(depth[k])) - port;
+            away.truncate().length()
+        });
+        let nearest = aside.reduce(f64::min).unwrap();
+        let hole = 0.5e-3 * scene.ports[0].hole_diameter_mm;
+        assert!((hole + 0.004..hole + 0.012).contains(&nearest), "{name}: the wall is {nearest} m from the middle");
+    }
 }

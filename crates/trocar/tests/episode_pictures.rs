@@ -1,6 +1,6 @@
 //! `trocar render EPISODE`: an episode is done again and filmed, at its end or at a time; what is missing or another is told in a line.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell what is skipped")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "what tests share may panic and tell what is skipped")]
 
 #[path = "../../task/tests/common/mod.rs"]
 mod common;

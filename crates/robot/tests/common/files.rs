@@ -37,3 +37,41 @@ pub const MJCF: &str = r#"<mujoco model="two">
   </worldbody>
   <keyframe><key name="home" qpos="0.2 0.1"/></keyframe>
 </mujoco>"#;
+
+/// The arm of both files with looks: a foot, a mesh on the first link, a red box that is fixed to it, a rod on the second.
+pub fn shown_urdf() -> String {
+    let mesh = r#"<link name="a"><visual><origin xyz="0 0 0.1"/><geometry><mesh filename="meshes/a.stl" scale="2 2 2"/></geometry></visual>"#;
+    let red =
+        r#"<link name="box"><visual><geometry><box size="0.2 0.4 0.6"/></geometry><material name="red"/></visual>"#;
+    let rod = r#"<link name="b"><visual><origin rpy="0 1.5707963267948966 0"/><geometry><cylinder radius="0.01" length="0.2"/></geometry></visual>"#;
+    URDF.replace(r#"<link name="a">"#, mesh)
+        .replace(r#"<link name="box">"#, red)
+        .replace(r#"<link name="b">"#, rod)
+        .replace(
+            r#"<link name="world"/>"#,
+            r#"<material name="red"><color rgba="1 0 0 1"/></material>
+            <link name="world"><visual><geometry><sphere radius="0.05"/></geometry></visual></link>"#,
+        )
+}
+
+pub fn shown_mjcf() -> String {
+    MJCF.replace(
+        "<worldbody>",
+        r#"<asset><mesh file="a.stl" scale="2 2 2"/><material name="red" rgba="1 0 0 1"/></asset><worldbody>"#,
+    )
+    .replace(r#"angle="degree""#, r#"angle="degree" meshdir="meshes""#)
+    .replace(r#"<default><joint damping="0.5"/>"#, r#"<default><joint damping="0.5"/><geom group="2"/>"#)
+    .replace(
+        r#"childclass="arm">"#,
+        r#"childclass="arm"><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/><geom size="0.05" pos="0 0 -0.5"/>"#,
+    )
+    .replace(
+        r#"<joint name="j1""#,
+        r#"<geom type="mesh" mesh="a" pos="0 0 0.1"/><geom type="mesh" mesh="none" group="3"/><joint name="j1""#,
+    )
+    .replace(
+        r#"<body name="box" pos="0.3 0 0">"#,
+        r#"<body name="box" pos="0.3 0 0"><geom type="box" size="0.1 0.2 0.3" material="red"/>"#,
+    )
+    .replace(r#"<joint name="j2""#, r#"<geom type="cylinder" size="0.01" fromto="-0.1 0 0 0.1 0 0"/><joint name="j2""#)
+}

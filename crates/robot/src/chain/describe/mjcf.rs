@@ -236,8 +236,13 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
     }
 
     fn pose(&self, node: Node<'a, 'i>) -> Result<Pose> {
-        let translation = self.source.vector(node, "pos")?.unwrap_or(DVec3::ZERO);
+        let translation = self.placing::<3>(node, "pos")?.map_or(DVec3::ZERO, DVec3::from_array);
         Ok(Pose { rotation: self.rotation(node)?, translation })
+    }
+
+    /// Numbers that place an element: of a geom also those of its default classes; bodies and inertias have none.
+    fn placing<const N: usize>(&self, node: Node<'a, 'i>, name: &str) -> Result<Option<[f64; N]>> {
+        if node.has_tag_name("geom") { self.numbers(node, name) } else { self.source.numbers(node, name) }
     }
 
     fn radians(&self, angle: f64) -> f64 {
@@ -246,7 +251,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
 
     fn rotation(&self, node: Node<'a, 'i>) -> Result<DQuat> {
         let unit = |v: DVec3, name: &str| v.try_normalize().ok_or_else(|| self.at(node, &format!("has a zero {name}")));
-        if let Some([w, x, y, z]) = self.source.numbers::<4>(node, "quat")? {
+        if let Some([w, x, y, z]) = self.placing::<4>(node, "quat")? {
             let q = DQuat::from_xyzw(x, y, z, w);
             let length = q.length();
             if !(length.is_finite() && length > 1e-10) {
@@ -254,7 +259,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
             }
             return Ok(q * (1.0 / length));
         }
-        if let Some(angles) = self.source.numbers::<3>(node, "euler")? {
+        if let Some(angles) = self.placing::<3>(node, "euler")? {
             let mut q = DQuat::IDENTITY;
             for (letter, angle) in self.compiler.sequence.into_iter().zip(angles) {
                 let axis = match letter.to_ascii_lowercase() {
@@ -268,17 +273,17 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
             }
             return Ok(q);
         }
-        if let Some([x, y, z, angle]) = self.source.numbers::<4>(node, "axisangle")? {
+        if let Some([x, y, z, angle]) = self.placing::<4>(node, "axisangle")? {
             return Ok(DQuat::from_axis_angle(unit(DVec3::new(x, y, z), "axisangle")?, self.radians(angle)));
         }
-        if let Some([a, b, c, d, e, f]) = self.source.numbers::<6>(node, "xyaxes")? {
+        if let Some([a, b, c, d, e, f]) = self.placing::<6>(node, "xyaxes")? {
             let x = unit(DVec3::new(a, b, c), "xyaxes")?;
             let y = DVec3::new(d, e, f);
             let y = unit(y - x * x.dot(y), "y axis")?;
             return Ok(DQuat::from_mat3(&DMat3::from_cols(x, y, x.cross(y))).normalize());
         }
-        if let Some(z) = self.source.vector(node, "zaxis")? {
-            return Ok(DQuat::from_rotation_arc(DVec3::Z, unit(z, "zaxis")?));
+        if let Some(z) = self.placing::<3>(node, "zaxis")? {
+            return Ok(DQuat::from_rotation_arc(DVec3::Z, unit(DVec3::from_array(z), "zaxis")?));
         }
         Ok(DQuat::IDENTITY)
     }

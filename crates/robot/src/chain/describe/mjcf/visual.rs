@@ -25,7 +25,7 @@ pub fn mjcf_visuals(path: &Path, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> 
     let compiler = Compiler::read(&source, root)?;
     let reader = Reader { source, root, compiler };
     let moved = |n: &Node<'_, '_>| n.has_tag_name("body") && children(*n, "joint").next().is_some();
-    let last = || root.descendants().filter(moved).filter_map(|n| n.attribute("name")).last();
+    let last = || root.descendants().filter(moved).filter_map(|n| n.attribute("name")).next_back();
     let tip = tip.or_else(last).ok_or_else(|| source.fail("no joint moves a body that has a name"))?;
     reader.visuals(tip)
 }
@@ -69,14 +69,25 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         }
         let mesh = self.attribute(geom, "mesh")?;
         let kind = self.attribute(geom, "type")?.unwrap_or(if mesh.is_some() { "mesh" } else { "sphere" });
+        // Numbers that a shape has no use for may follow, as MuJoCo lets them.
         let size = |count: usize| -> Result<Vec<f64>> {
             let text = self.attribute(geom, "size")?.unwrap_or_default();
-            let all: Vec<f64> = text.split_whitespace().filter_map(|w| w.parse().ok()).collect();
-            if all.len() < count || all.iter().any(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(self.at(geom, &format!("needs a size of {count} positive numbers")));
+            let number = |word| self.source.parse_numbers::<1>(word, &place(geom), "size").map(|[v]| v);
+            let all = text.split_whitespace().map(number).collect::<Result<Vec<_>>>()?;
+            if !(count..=3).contains(&all.len()) || all[..count].iter().any(|v| *v <= 0.0) {
+                return Err(self.at(geom, &format!("needs a size of {count} positive numbers, 3 with unused ones")));
             }
             Ok(all)
         };
+        let mut turns = Vec::new();
+        for key in ["quat", "euler", "axisangle", "xyaxes", "zaxis"] {
+            turns.extend(self.attribute(geom, key)?.map(|_| key));
+        }
+        if turns.len() > 1 {
+            // Which of them counts is not plain where one is of a default class.
+            let turns = turns.join(" and ");
+            return Err(self.at(geom, &format!("has {turns}, of its own or of its default classes; must have one")));
+        }
         let mut pose = self.pose(geom)?;
         // The length of what is told by its ends.
         let mut between = None;

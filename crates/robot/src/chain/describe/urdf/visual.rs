@@ -7,14 +7,14 @@ use crate::Result;
 use crate::chain::frames::compose;
 use glam::DVec3;
 use roxmltree::Node;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use trocar_geometry::Pose;
 
 /// What the arm between `base` and `tip` of a URDF file looks like, as [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf) reads it: of the base first, then of each link that a joint moves.
 /// `package://NAME/...` is looked for where a folder NAME lies beside the file or above it.
 ///
 /// # Errors
-/// As [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf); a shape that is not understood, a package that is nowhere.
+/// As [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf); a shape that is not understood, a package that is nowhere, a path that leaves its package.
 pub fn urdf_visuals(path: &Path, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> {
     let (source, text) = Source::read(path)?;
     let document = source.parse(&text, "robot")?;
@@ -104,7 +104,13 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         let Some(inside) = name.strip_prefix("package://") else {
             return Ok(folder.join(name.strip_prefix("file://").unwrap_or(name)));
         };
-        let (package, _) = inside.split_once('/').unwrap_or((inside, ""));
+        let (package, rest) = inside.split_once('/').unwrap_or((inside, ""));
+        // What is not inside the package is not looked for.
+        let plain = Path::new(inside).components().all(|c| matches!(c, Component::Normal(_)));
+        if package.is_empty() || rest.starts_with('/') || !plain {
+            let right = "must be package://NAME/PATH with a PATH inside the package, without '..'";
+            return Err(format!("its mesh is '{}', {right}", shown(name)));
+        }
         let full = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
         let found = full.ancestors().find(|f| f.join(package).is_dir());
         found.map(|f| f.join(inside)).ok_or_else(|| {
