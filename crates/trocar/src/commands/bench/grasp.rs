@@ -28,8 +28,8 @@ fn text(r: &GraspBenchResult) -> String {
         "nothing",
         "iterations",
         "worst ms",
-        "contact",
-        "with motion",
+        "own share",
+        "contact's share",
     ];
     let row = |p: &GraspPhaseTiming| {
         let iterations = [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations];
