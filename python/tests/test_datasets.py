@@ -151,6 +151,56 @@ def test_an_episode_that_could_not_be_written_is_written_again(tmp_path, monkeyp
     same(tmp_path / "whole", tmp_path / "set")
 
 
+def test_a_first_episode_that_could_not_be_written_is_written_again(tmp_path, monkeypatch):
+    write(tmp_path / "whole", "v3.0", [0])
+    write_json = lerobot.write_json
+    for failing in range(2):
+        root, calls = tmp_path / f"set-{failing}", [0]
+        writer = LeRobotWriter(root, fps=30, features=FEATURES, version="v3.0")
+        for frame in frames(0):
+            writer.add_frame(frame)
+
+        def full(path, value):
+            if path.name == "info.json":
+                calls[0] += 1
+                if calls[0] == failing + 1:
+                    raise OSError("no space left")
+            write_json(path, value)
+
+        monkeypatch.setattr(lerobot, "write_json", full)
+        with pytest.raises(OSError, match="no space"):
+            writer.save_episode("lift")
+        monkeypatch.setattr(lerobot, "write_json", write_json)
+        assert writer.save_episode("lift") == 0
+        same(tmp_path / "whole", root)
+
+
+def test_two_writers_of_a_folder_take_turns(tmp_path, monkeypatch):
+    write(tmp_path / "whole", "v3.0")
+    one = write(tmp_path / "set", "v3.0", [0])
+    write(tmp_path / "set", "v3.0", [1])
+    for frame in frames(2):
+        one.add_frame(frame)
+    # While one saves, another that opens the folder takes nothing away, and may not save.
+    inside, save = [], lerobot.LeRobotWriter._save
+
+    def watched(self, task):
+        monkeypatch.setattr(lerobot.LeRobotWriter, "_save", save)
+        (tmp_path / "set/meta/under-way.partial").write_text("")
+        other = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version="v3.0")
+        other.add_frame(next(frames(0)))
+        assert (tmp_path / "set/meta/under-way.partial").exists()
+        with pytest.raises(RuntimeError, match="another writer"), other._alone(0.0):
+            pass
+        (tmp_path / "set/meta/under-way.partial").unlink()
+        inside.append(other.episodes)
+        return save(self, task)
+
+    monkeypatch.setattr(lerobot.LeRobotWriter, "_save", watched)
+    assert one.save_episode("cut") == 2 and inside == [2]
+    same(tmp_path / "whole", tmp_path / "set")
+
+
 def test_wrong_frames_are_named_and_not_kept(tmp_path):
     writer = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES)
     good = next(frames(0))

@@ -63,7 +63,8 @@ def run(
 
 def _own_interpreter() -> None:
     """Policies `python:MODULE:NAME` are served by the interpreter that runs this, which has `trocar`, unless another is named."""
-    os.environ.setdefault("TROCAR_PYTHON", sys.executable)
+    if sys.executable:
+        os.environ.setdefault("TROCAR_PYTHON", sys.executable)
 
 
 def _on_threads(campaign: Campaign, scene: str, jobs: list[str], workers: int | None, progress: Progress) -> None:

@@ -1,6 +1,6 @@
 """Serves a Python policy over openpi's WebSocket protocol, which `trocar evaluate` and robots speak.
 
-    python -m trocar.serve MODULE:NAME [--host 127.0.0.1] [--port 8000]
+    python -m trocar.serve MODULE:NAME [--host 127.0.0.1] [--port 8000] [--until-eof]
 
 NAME in MODULE (the current folder is searched too) is one of
 
@@ -190,7 +190,11 @@ def serve(policy: Served, host: str = "127.0.0.1", port: int = 0, *, told: Calla
 def _end_with_input() -> None:
     """Ends this process at the end of its standard input: whoever held the other end is gone, killed or not."""
     # The descriptor itself: a buffered reader that a thread is in blocks the interpreter's own end.
-    while os.read(0, 4096):
+    try:
+        while os.read(0, 4096):
+            pass
+    except OSError:
+        # Closed before we began: nobody holds it.
         pass
     os._exit(0)
 

@@ -6,8 +6,12 @@ features are, how long each episode is, what was asked for in it, and statistics
 
 from __future__ import annotations
 
+import contextlib
+import fcntl
 import json
 import os
+import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +23,9 @@ from ._frames import Feature, Frames, write_json
 from ._layouts import CHUNK, V3, V21
 
 VERSIONS = ("v3.0", "v2.1")
+
+#: How long another writer is waited for that saves an episode [s].
+SAVING_SECONDS = 60.0
 
 #: What every frame has besides the features.
 INDICES: dict[str, Feature] = {
@@ -36,7 +43,7 @@ class LeRobotWriter:
     `features` maps names such as `observation.state`, `action` or `observation.images.endoscope` to `{"dtype", "shape", "names"}`;
     a feature with dtype `video` takes 8-bit pictures (height, width, 3). A folder with the same features is gone on with. An episode
     is in the dataset once `save_episode` has returned: a process that dies later takes nothing back, and what one that dies earlier
-    has left of an episode goes when the folder is opened again.
+    has left of an episode goes when the folder is opened again. Of several writers of a folder one saves at a time.
 
     >>> writer = LeRobotWriter("lifts", fps=30, features=features)
     >>> for frame in episode:
@@ -88,15 +95,36 @@ class LeRobotWriter:
         #: An episode has been begun to be written and is not in the dataset yet.
         self._torn = False
         if (self.root / "meta/info.json").exists():
-            self._go_on()
+            self._read_info()
+            # Where another writer is at work nothing is torn.
+            with contextlib.suppress(RuntimeError), self._alone(0.0):
+                self._go_on()
         elif any(path.is_file() and path.suffix != ".partial" for path in self.root.rglob("*")):
             raise FileExistsError(f"{self.root} is not empty and is no LeRobot dataset (meta/info.json is missing)")
 
     def _video_keys(self) -> list[str]:
         return [key for key, f in self.features.items() if f["dtype"] == "video"]
 
-    def _go_on(self) -> None:
-        """Takes up what a dataset already holds."""
+    @contextlib.contextmanager
+    def _alone(self, seconds: float = SAVING_SECONDS) -> Iterator[None]:
+        """Has the folder to itself. Another writer is waited for; a lock goes with its process, however that ends."""
+        self.root.mkdir(parents=True, exist_ok=True)
+        folder, until = os.open(self.root, os.O_RDONLY), time.monotonic() + seconds
+        try:
+            while True:
+                try:
+                    fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError as why:
+                    if time.monotonic() > until:
+                        raise RuntimeError(f"{self.root} is being written by another writer; wait for it, or write into another folder") from why
+                    time.sleep(0.05)
+            yield
+        finally:
+            os.close(folder)
+
+    def _read_info(self) -> None:
+        """Reads what a dataset already holds, and changes nothing."""
         info = json.loads((self.root / "meta/info.json").read_text())
         if info.get("codebase_version") != self.version:
             raise ValueError(f"{self.root} is a dataset of version {info.get('codebase_version')}, not {self.version}")
@@ -107,6 +135,11 @@ class LeRobotWriter:
         if meant(info["features"]) != meant(self._info["features"]) or info["fps"] != self.fps:
             raise ValueError(f"{self.root} has other features or another rate; write into another folder")
         self._info = info
+
+    def _go_on(self) -> None:
+        """Takes up what a dataset already holds."""
+        self._read_info()
+        info = self._info
         # `info` is written last. What lies there beyond it is of an episode that was not finished.
         for path in self.root.rglob("*.partial"):
             path.unlink()
@@ -137,15 +170,20 @@ class LeRobotWriter:
 
         What cannot be written (a disk that is full) is told; the frames are kept, so that it may be tried again.
         """
-        if self._torn:
+        if len(self._frames) == 0:
+            raise ValueError("the episode has no frames")
+        with self._alone():
+            return self._save(task)
+
+    def _save(self, task: str) -> int:
+        known = self.root / "meta/info.json"
+        if known.exists() and (self._torn or json.loads(known.read_text())["total_episodes"] != self.episodes):
             self._go_on()
         length, episode = len(self._frames), self.episodes
-        if length == 0:
-            raise ValueError("the episode has no frames")
-        self._torn = True
         if episode == 0:
             # From now on the folder is a dataset, whatever happens.
-            write_json(self.root / "meta/info.json", self._info)
+            write_json(known, self._info)
+        self._torn = True
         if task not in self._tasks:
             self._tasks.append(task)
         columns = self._frames.columns
