@@ -23,8 +23,10 @@ pub enum Divergence {
         /// The body.
         body: usize,
     },
-    /// The state or the model is not the one that the stepper was made for, or a grasp or load is of nodes that the model lacks or a load is not finite; nothing was stepped.
+    /// The state or the model is not the one that the stepper was made for, or a grasp holds nodes that the model lacks; nothing was stepped.
     OtherModel,
+    /// A load is on a node that the model lacks, or not finite; nothing was stepped.
+    WrongLoad,
     /// An edge is longer than 10 times its rest length.
     OverStretch {
         /// The body.
@@ -40,7 +42,8 @@ pub enum Divergence {
 impl std::fmt::Display for Divergence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::OtherModel => write!(f, "the stepper, a grasp or a load was made for another model"),
+            Self::OtherModel => write!(f, "the stepper or a grasp was made for another model"),
+            Self::WrongLoad => write!(f, "a load is on a node that the model lacks, or its force is not finite"),
             Self::NonFinite { body } => write!(f, "body {body} has a position that is not finite"),
             Self::OverSpeed { body } => write!(f, "a node of body {body} is at the speed limit of {SPEED_LIMIT} m/s"),
             Self::Unsolved { body } => write!(f, "no minimum was found for body {body}"),

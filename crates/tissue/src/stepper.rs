@@ -90,9 +90,12 @@ impl Stepper {
     pub fn step_under(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion], loads: &[Load]) -> StepReport {
         self.events.clear();
         self.forces.clear();
-        let fit = || state.grasps_fit(model) && loads.iter().all(|load| load.fits(model));
-        if !self.crew.fits(model, state) || !fit() {
-            return StepReport { divergence: Some(Divergence::OtherModel), ..StepReport::default() };
+        let refused = |why| StepReport { divergence: Some(why), ..StepReport::default() };
+        if !self.crew.fits(model, state) || !state.grasps_fit(model) {
+            return refused(Divergence::OtherModel);
+        }
+        if !loads.iter().all(|load| load.fits(model)) {
+            return refused(Divergence::WrongLoad);
         }
         let grasps = std::mem::take(&mut state.grasps);
         let (gravity, colliders) = (model.gravity, &model.colliders[..]);

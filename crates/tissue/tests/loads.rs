@@ -134,7 +134,7 @@ fn a_load_on_no_node_is_refused() {
     let before = state.hash();
     for (body, node, force) in [(1, 0, DVec3::X), (0, 8, DVec3::X), (0, 0, DVec3::NAN)] {
         let report = stepper.step_under(&model, &mut state, &[], &[Load { body, node, force }]);
-        assert_eq!(report.divergence, Some(Divergence::OtherModel));
+        assert_eq!(report.divergence, Some(Divergence::WrongLoad));
     }
     assert_eq!(state.hash(), before);
 }
