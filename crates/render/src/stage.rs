@@ -247,24 +247,29 @@ impl Stage {
     }
 
     /// The lights, prepared.
+    #[inline]
     pub(crate) fn lamps(&self) -> &[Lamp] {
         &self.lamps
     }
 
+    #[inline]
     pub(crate) fn label(&self, touch: &Touch) -> u16 {
         self.bodies[touch.body as usize].label
     }
 
+    #[inline]
     pub(crate) fn material(&self, touch: &Touch) -> &Material {
         &self.bodies[touch.body as usize].material
     }
 
     /// The material for paths that have bounced before, see [`crate::SurfaceKind`].
+    #[inline]
     pub(crate) fn blunt(&self, touch: &Touch) -> &Material {
         &self.bodies[touch.body as usize].blunt
     }
 
     /// The surface that a ray in `direction` met.
+    #[inline]
     pub(crate) fn surface(&self, touch: &Touch, direction: Vec3A) -> Surface {
         let body = &self.bodies[touch.body as usize];
         let shape = &self.shapes[body.shape];

@@ -37,6 +37,7 @@ pub(crate) struct Stacks {
 }
 
 impl Stacks {
+    #[inline]
     pub fn new() -> Self {
         Self { top: [0; STACK], below: [0; STACK] }
     }
@@ -112,12 +113,14 @@ impl Bounds {
     pub const EMPTY: Self = Self { low: Vec3A::INFINITY, high: Vec3A::NEG_INFINITY };
 
     /// Half the surface [m2].
+    #[inline]
     pub fn half_area(&self) -> f32 {
         let d = self.high - self.low;
         d.x * d.y + d.y * d.z + d.z * d.x
     }
 
     /// Grown by a point; one that is no number changes nothing.
+    #[inline]
     pub fn with(self, p: Vec3A) -> Self {
         if p.is_finite() { Self { low: self.low.min(p), high: self.high.max(p) } } else { self }
     }

@@ -76,11 +76,13 @@ impl Block {
 }
 
 /// The corners of a triangle; `None` where one is missing or not finite.
+#[inline]
 pub(super) fn corners_of(positions: &[Vec3A], triangle: &[u32; 3]) -> Option<[Vec3A; 3]> {
     let [a, b, c] = triangle.map(|v| positions.get(v as usize).copied().filter(|p| p.is_finite()));
     Some([a?, b?, c?])
 }
 
+#[inline]
 pub(super) fn bounds_of(positions: &[Vec3A], triangle: &[u32; 3]) -> Option<Bounds> {
     Some(corners_of(positions, triangle)?.into_iter().fold(Bounds::EMPTY, Bounds::with))
 }
