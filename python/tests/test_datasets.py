@@ -201,6 +201,44 @@ def test_two_writers_of_a_folder_take_turns(tmp_path, monkeypatch):
     same(tmp_path / "whole", tmp_path / "set")
 
 
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+def test_what_another_writer_left_when_it_died_is_not_built_upon(tmp_path, monkeypatch, version):
+    monkeypatch.setattr(_layouts, "DATA_FILE_MB", 0)
+    write(tmp_path / "whole", version)
+    dying = write(tmp_path / "set", version, [0])
+    # Opened before the other's death, once while it holds the folder and once while it does not.
+    before = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version=version)
+    with dying._alone():
+        amid = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version=version)
+    for frame in frames(2):
+        dying.add_frame(frame)
+    write_json = lerobot.write_json
+
+    def die(path, value):
+        raise Killed
+
+    monkeypatch.setattr(lerobot, "write_json", die)
+    with pytest.raises(Killed):
+        dying.save_episode("fold")
+    monkeypatch.setattr(lerobot, "write_json", write_json)
+    for episode, writer, task in [(1, before, "lift"), (2, amid, "cut")]:
+        for frame in frames(episode):
+            writer.add_frame(frame)
+        assert writer.save_episode(task) == episode
+    same(tmp_path / "whole", tmp_path / "set")
+
+
+def test_a_writer_opened_while_another_saves_keeps_what_is_there(tmp_path):
+    write(tmp_path / "whole", "v3.0")
+    one = write(tmp_path / "set", "v3.0", [0, 1])
+    with one._alone():
+        other = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version="v3.0")
+    for frame in frames(2):
+        other.add_frame(frame)
+    assert other.save_episode("cut") == 2
+    same(tmp_path / "whole", tmp_path / "set")
+
+
 def test_wrong_frames_are_named_and_not_kept(tmp_path):
     writer = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES)
     good = next(frames(0))

@@ -172,6 +172,14 @@ def test_a_served_policy_ends_when_the_program_is_killed(program, short_scene, t
     until(lambda: not runs(served.read_text()), 10)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="a shell closes the input")
+def test_a_server_whose_input_is_closed_ends(tmp_path):
+    (tmp_path / "mine.py").write_text("def still(obs):\n    return [0.0] * 10\n")
+    served = [sys.executable, "-m", "trocar.serve", "mine:still", "--port", "0", "--until-eof"]
+    done = subprocess.run(["sh", "-c", 'exec "$@" <&-', "sh", *served], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0 and "Exception" not in done.stderr, done.stderr
+
+
 def until(true, seconds):
     """Waits for something to be true."""
     begun = time.monotonic()

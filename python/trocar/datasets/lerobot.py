@@ -27,6 +27,9 @@ VERSIONS = ("v3.0", "v2.1")
 #: How long another writer is waited for that saves an episode [s].
 SAVING_SECONDS = 60.0
 
+#: Lies in the folder while an episode is written, so that other writers see that one was not finished.
+UNDER_WAY = "meta/under-way.partial"
+
 #: What every frame has besides the features.
 INDICES: dict[str, Feature] = {
     "timestamp": {"dtype": "float32", "shape": (1,), "names": None},
@@ -92,13 +95,15 @@ class LeRobotWriter:
             self._info["video_path"] = None
         self._tasks: list[str] = []
         self._stats: dict[str, _stats.Stats] = {}
-        #: An episode has been begun to be written and is not in the dataset yet.
+        #: What the folder holds has to be taken up, and what was not finished taken away, before anything is written.
         self._torn = False
         if (self.root / "meta/info.json").exists():
             self._read_info()
-            # Where another writer is at work nothing is torn.
+            # Where another writer is at work it is for the first save: that one may end well, or die.
+            self._torn = True
             with contextlib.suppress(RuntimeError), self._alone(0.0):
                 self._go_on()
+                self._torn = False
         elif any(path.is_file() and path.suffix != ".partial" for path in self.root.rglob("*")):
             raise FileExistsError(f"{self.root} is not empty and is no LeRobot dataset (meta/info.json is missing)")
 
@@ -176,14 +181,17 @@ class LeRobotWriter:
             return self._save(task)
 
     def _save(self, task: str) -> int:
-        known = self.root / "meta/info.json"
-        if known.exists() and (self._torn or json.loads(known.read_text())["total_episodes"] != self.episodes):
+        known, mark = self.root / "meta/info.json", self.root / UNDER_WAY
+        if known.exists() and (
+            self._torn or mark.exists() or json.loads(known.read_text())["total_episodes"] != self.episodes
+        ):
             self._go_on()
         length, episode = len(self._frames), self.episodes
         if episode == 0:
             # From now on the folder is a dataset, whatever happens.
             write_json(known, self._info)
         self._torn = True
+        mark.touch()
         if task not in self._tasks:
             self._tasks.append(task)
         columns = self._frames.columns
@@ -227,6 +235,7 @@ class LeRobotWriter:
             self._info["total_chunks"] = episode // CHUNK + 1
         write_json(self.root / "meta/info.json", self._info)
         self._frames.clear()
+        mark.unlink(missing_ok=True)
         self._torn = False
         return episode
 
