@@ -47,7 +47,12 @@ pub(super) struct Strain {
 impl Strain {
     /// Beyond what tissue bears.
     pub fn is_too_much(&self) -> bool {
-        self.stretch > MOST || self.volume < CRUSHED
+        self.is_beyond(false)
+    }
+
+    /// Beyond what an instrument stays for. One that holds by its latch alone presses on nothing: how hard it may pull is for the tearing force to say, and the stretch only ends what solvers bear.
+    pub fn is_beyond(&self, bare: bool) -> bool {
+        self.stretch > if bare { FAR_TOO_MUCH } else { MOST } || self.volume < CRUSHED
     }
 
     /// Not as good as at rest.
