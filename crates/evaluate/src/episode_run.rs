@@ -99,15 +99,40 @@ pub fn replay(
         Some(folder) => Specimen::read(folder)?,
         None => scene_specimen(&scene, phantoms, progress)?,
     };
-    Ok(episode.verify(&scene, &specimen, threads)?)
+    progress.begin("replay", episode.steps.len() as u64);
+    let verdict = episode.verify(&scene, &specimen, threads, &mut || {
+        progress.advance(1);
+        !progress.interrupted()
+    })?;
+    progress.end();
+    Ok(verdict)
 }
 
 /// Judges stored channels at every combination of the gates that `ranges` say.
 ///
 /// # Errors
-/// A file that is damaged, a range that cannot be read.
-pub fn sweep_files(files: &[PathBuf], ranges: &[String]) -> Result<Sweep> {
+/// A file that is damaged or named twice, a range that cannot be read.
+pub fn sweep_files(files: &[PathBuf], ranges: &[String], progress: &dyn Progress) -> Result<Sweep> {
     let ranges: Vec<GateRange> = ranges.iter().map(|r| GateRange::parse(r)).collect::<std::result::Result<_, _>>()?;
-    let episodes: Vec<_> = files.iter().map(|f| read_channels(f)).collect::<std::result::Result<_, _>>()?;
-    Ok(sweep(&episodes, &ranges)?)
+    if let Some((_, twice)) = files.iter().enumerate().find(|(k, f)| files[..*k].contains(f)) {
+        return Err(Error::Mismatch(format!("{}: named twice; it would count twice", twice.display())));
+    }
+    progress.begin("channels", files.len() as u64);
+    let mut episodes = Vec::with_capacity(files.len());
+    for file in files {
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
+        episodes.push(read_channels(file)?);
+        progress.advance(1);
+    }
+    progress.end();
+    let combinations = ranges.iter().fold(1_u64, |n, r| n.saturating_mul(r.values.len() as u64));
+    progress.begin("gates", combinations);
+    let swept = sweep(&episodes, &ranges, &mut || {
+        progress.advance(1);
+        !progress.interrupted()
+    })?;
+    progress.end();
+    Ok(swept)
 }

@@ -46,7 +46,7 @@ pub use experiment::{
 pub use inspect::{Inspection, inspect};
 pub use rendering::{Rendered, Rendering, Seen};
 pub use segment::{Segment, Segmented, Wanted, wanted_weights};
-pub use trocar_task::SweepRow;
+pub use trocar_task::{Header as EpisodeHeader, SweepRow};
 pub use truth::TruthFigures;
 pub use workflow::{
     CompositeFigures, OrganRow, Reconstructed, SimulatedRun, reconstruct_recording, reconstruct_surface, simulate,

@@ -84,6 +84,8 @@ pub struct Step {
 /// An episode's whole state; what follows from a restored one is the same to the bit.
 #[derive(Clone, Debug)]
 pub struct EpisodeState {
+    /// Hash of the scene with the specimen.
+    scene: u64,
     cell: CellState,
     arrangement: Arrangement,
     now: Now,
@@ -105,6 +107,8 @@ pub struct Episode {
     scene: Scene,
     specimen: Specimen,
     specimen_hash: u64,
+    /// Hash of the scene with the specimen: states of others do not belong here.
+    key: u64,
     threads: usize,
     cell: Cell,
     /// Where the specimen is in `cell`, and the tissue there when it has settled.
@@ -130,9 +134,11 @@ impl Episode {
             events: Vec::new(),
             end: None,
         };
+        let specimen_hash = specimen_hash(specimen);
         let mut made = Self {
             scene: scene.clone(),
-            specimen_hash: specimen_hash(specimen),
+            specimen_hash,
+            key: scene.hash(&[specimen_hash])?,
             specimen: specimen.clone(),
             threads,
             cell,
@@ -204,11 +210,13 @@ impl Episode {
         let report = match self.cell.step(action) {
             Ok(report) => report,
             Err(refused @ trocar_cell::Error::Action { .. }) => return Err(refused.into()),
-            // An arm whose numbers are lost; the row stays the last that was right.
+            // An arm whose numbers are lost: the last row that was right again, but for the time and that it diverged.
             Err(lost) => {
                 self.now.end = Some(End::Diverged { why: lost.to_string() });
                 let mut channels = self.now.rows.last().copied().unwrap_or_default();
+                channels.time_s += self.cell.period();
                 channels.task.diverged = 1.0;
+                self.now.rows.push(channels);
                 let (progress, end) = (self.progress().clone(), self.now.end.clone());
                 return Ok(Step { channels, progress, end, events: Vec::new() });
             }
@@ -324,14 +332,17 @@ impl Episode {
 
     /// The state as it is now.
     pub fn save(&self) -> EpisodeState {
-        EpisodeState { cell: self.cell.save(), arrangement: self.arrangement, now: self.now.clone() }
+        EpisodeState { scene: self.key, cell: self.cell.save(), arrangement: self.arrangement, now: self.now.clone() }
     }
 
     /// Puts back a state that this episode, or another of the same scene and specimen, gave.
     ///
     /// # Errors
-    /// A state of another scene.
+    /// A state of another scene or specimen; the episode stays as it was.
     pub fn restore(&mut self, state: &EpisodeState) -> Result<()> {
+        if state.scene != self.key {
+            return Err(Error::Option("the state is of another scene, task or specimen than this episode".to_owned()));
+        }
         if state.arrangement != self.arrangement {
             (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
             self.arrangement = state.arrangement;

@@ -241,11 +241,17 @@ impl EpisodeFile {
             .then(|| format!("the scene or an arm's model is another one: {found}, not {}", header.scene_hash)))
     }
 
-    /// Does the episode again with `specimen` and compares every step. What differs is a verdict, not an error.
+    /// Does the episode again with `specimen` and compares every step. What differs is a verdict, not an error. `watch` is asked before each step and returns false to stop.
     ///
     /// # Errors
-    /// An episode that cannot be built.
-    pub fn verify(&self, scene: &Scene, specimen: &Specimen, threads: usize) -> Result<Verdict> {
+    /// An episode that cannot be built; [`trocar_cell::Error::Interrupted`] when `watch` stops it.
+    pub fn verify(
+        &self,
+        scene: &Scene,
+        specimen: &Specimen,
+        threads: usize,
+        watch: &mut dyn FnMut() -> bool,
+    ) -> Result<Verdict> {
         let header = &self.header;
         let differs = |at: Option<usize>, said: String| Verdict {
             same: false,
@@ -265,6 +271,9 @@ impl EpisodeFile {
             return Ok(differs(Some(0), format!("the start is another one: {start}, not {}", header.start_hash)));
         }
         for (k, (action, hash)) in self.steps.iter().enumerate() {
+            if !watch() {
+                return Err(trocar_cell::Error::Interrupted.into());
+            }
             if let Err(why) = episode.step(action) {
                 return Ok(differs(Some(k + 1), format!("step {} cannot be done: {why}", k + 1)));
             }

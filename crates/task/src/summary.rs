@@ -105,7 +105,8 @@ impl Summary {
         let arms: Vec<ArmSummary> = arms.iter().map(|name| arm(name, rows)).collect();
         let rcm_peak_mm = arms.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max);
         Self {
-            passed: progress.passed(),
+            // The last gate may fall in the very period in which an arm or the tissue is lost.
+            passed: progress.passed() && matches!(end, None | Some(End::Passed)),
             stage: progress.stage,
             next: progress.name().to_owned(),
             score: progress.score(),

@@ -94,9 +94,18 @@ pub struct Sweep {
 
 /// Judges `episodes` at every combination of `ranges`.
 ///
+/// `watch` is asked before each combination and returns false to stop.
+///
 /// # Errors
-/// No episodes, episodes of different tasks, too many combinations.
-pub fn sweep(episodes: &[(ChannelsInfo, Vec<Channels>)], ranges: &[GateRange]) -> Result<Sweep> {
+/// No episodes, episodes of different tasks, a gate named twice, too many combinations; [`trocar_cell::Error::Interrupted`] when `watch` stops it.
+pub fn sweep(
+    episodes: &[(ChannelsInfo, Vec<Channels>)],
+    ranges: &[GateRange],
+    watch: &mut dyn FnMut() -> bool,
+) -> Result<Sweep> {
+    if let Some((_, twice)) = ranges.iter().enumerate().find(|(k, r)| ranges[..*k].iter().any(|o| o.gate == r.gate)) {
+        return Err(Error::Option(format!("gate {} is given twice; give all its values at once", twice.gate)));
+    }
     let Some(task) = episodes.first().map(|(info, _)| info.task) else {
         return Err(Error::Option("no channels to sweep; name at least one channels.parquet".to_owned()));
     };
@@ -110,6 +119,9 @@ pub fn sweep(episodes: &[(ChannelsInfo, Vec<Channels>)], ranges: &[GateRange]) -
     let stages = Stage::of(task);
     let mut rows = Vec::with_capacity(count);
     for k in 0..count {
+        if !watch() {
+            return Err(trocar_cell::Error::Interrupted.into());
+        }
         let mut rest = k;
         let mut values = vec![0.0; ranges.len()];
         for (value, range) in values.iter_mut().zip(ranges).rev() {

@@ -44,7 +44,7 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
     let path = folder.path().join("channels.parquet");
     let (info, rows) = read_channels(&path).unwrap();
     assert_eq!((&info, &rows), (&recording.info, &recording.channels));
-    let swept = sweep(&[(info, rows)], &[GateRange::parse("lift_mm=8,30").unwrap()]).unwrap();
+    let swept = sweep(&[(info, rows)], &[GateRange::parse("lift_mm=8,30").unwrap()], &mut || true).unwrap();
     assert_eq!((swept.rows[0].stages[0], swept.rows[1].stages[0]), (5, 1));
     // A damaged file is an error that names it.
     let good = std::fs::read(&path).unwrap();
@@ -63,23 +63,24 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
     let path = folder.path().join("episode.trocar");
     let file = EpisodeFile::read(&path).unwrap();
     assert_eq!(file, recording.file);
-    let verdict = file.verify(&scene, &specimen, 2).unwrap();
+    let verdict = file.verify(&scene, &specimen, 2, &mut || true).unwrap();
     assert!(verdict.same, "{verdict:?}");
     // Another action at step 50 is found there.
     let mut tampered = file.clone();
     tampered.steps[49].0.numbers[4] -= 0.25;
-    let verdict = tampered.verify(&scene, &specimen, 1).unwrap();
+    let verdict = tampered.verify(&scene, &specimen, 1, &mut || true).unwrap();
     assert_eq!((verdict.same, verdict.first_difference), (false, Some(50)), "{verdict:?}");
+    assert!(file.verify(&scene, &specimen, 1, &mut || false).is_err(), "stopped, which is no verdict");
     // Another seed at the start, another specimen before that.
     let mut other = file.clone();
     other.header.seed += 1;
-    assert_eq!(other.verify(&scene, &specimen, 1).unwrap().first_difference, Some(0));
+    assert_eq!(other.verify(&scene, &specimen, 1, &mut || true).unwrap().first_difference, Some(0));
     let mut soft = specimen.clone();
     soft.organs[0].material.young_modulus_pa *= 1.001;
-    assert!(file.verify(&scene, &soft, 1).unwrap().said.contains("specimen"));
+    assert!(file.verify(&scene, &soft, 1, &mut || true).unwrap().said.contains("specimen"));
     let mut stricter = scene;
     stricter.task.gates.lift_mm = 9.0;
-    assert!(file.verify(&stricter, &specimen, 1).unwrap().said.contains("scene"));
+    assert!(file.verify(&stricter, &specimen, 1, &mut || true).unwrap().said.contains("scene"));
     damaged(&path);
 }
 
@@ -142,6 +143,14 @@ fn a_reset_gives_the_same_bits_whatever_was_before() {
     episode.reset(1).unwrap();
     episode.restore(&saved).unwrap();
     assert_eq!(after(&mut episode), one);
+    // An episode of another task is not gone on with.
+    let mut other = scene.clone();
+    other.task.name = TaskName::GraspLift;
+    let mut other = Episode::new(&other, &specimen, 1).unwrap();
+    let hash = other.state_hash();
+    let said = other.restore(&saved).unwrap_err().to_string();
+    assert!(said.contains("another scene, task or specimen"), "{said}");
+    assert_eq!(other.state_hash(), hash);
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 use trocar_scene::{Gates, TaskName};
 use trocar_task::stages::{self, HELD_FOLLOW, HELD_SLIP_MM};
-use trocar_task::{Channels, ChannelsInfo, GateRange, Progress, Stage, Tracker, sweep};
+use trocar_task::{Channels, ChannelsInfo, End, GateRange, Progress, Stage, Summary, Tracker, sweep};
 
 const PERIOD: f64 = 1.0 / 30.0;
 
@@ -50,6 +50,11 @@ fn changed(change: impl Fn(usize, &mut Channels)) -> usize {
 fn what_just_passes_passes() {
     let progress = judge(&good(), &Gates::default());
     assert!(progress.passed() && progress.score() == 1.0, "{progress:?}");
+    // Who passes the last gate as the tissue is lost, or an arm leaves its port, has not passed.
+    let passed = |end: Option<End>| Summary::of(&good(), &progress, end.as_ref(), &["left"], 3.0).passed;
+    assert!(passed(Some(End::Passed)) && passed(None));
+    assert!(!passed(Some(End::Diverged { why: "lost".into() })));
+    assert!(!passed(Some(End::RcmAbort { arm: "left".into(), deviation_mm: 6.0 })));
     let times: Vec<f64> = progress.stages.iter().map(|s| s.time_s.unwrap()).collect();
     assert!(times.windows(2).all(|w| w[0] <= w[1]), "{times:?}");
     assert!((times[0] - 6.0 * PERIOD).abs() < 1e-9, "the grasp is the first row that has one");
@@ -131,7 +136,7 @@ fn sweeps_agree_with_the_gates_and_refuse_what_is_none() {
     };
     let episodes = vec![(info.clone(), good()), (info.clone(), good()[..20].to_vec())];
     let ranges = [GateRange::parse("lift_mm=4..12").unwrap(), GateRange::parse("cut_closed=0.10,0.15,0.5").unwrap()];
-    let swept = sweep(&episodes, &ranges).unwrap();
+    let swept = sweep(&episodes, &ranges, &mut || true).unwrap();
     assert_eq!(swept.rows.len(), 27);
     for row in &swept.rows {
         let gates = Gates { lift_mm: row.values[0], cut_closed: row.values[1], ..Gates::default() };
@@ -146,7 +151,20 @@ fn sweeps_agree_with_the_gates_and_refuse_what_is_none() {
         assert!(GateRange::parse(bad).is_err(), "{bad}");
     }
     let other = ChannelsInfo { task: TaskName::GraspLift, ..info };
-    assert!(sweep(&[episodes[0].clone(), (other, good())], &ranges).unwrap_err().to_string().contains("grasp-lift"));
-    assert!(sweep(&[], &ranges).is_err());
+    assert!(
+        sweep(&[episodes[0].clone(), (other, good())], &ranges, &mut || true)
+            .unwrap_err()
+            .to_string()
+            .contains("grasp-lift")
+    );
+    assert!(sweep(&[], &ranges, &mut || true).is_err());
+    let twice = ["lift_mm=4,8", "cut_open=0.5", "lift_mm=10"].map(|r| GateRange::parse(r).unwrap());
+    assert!(sweep(&episodes, &twice, &mut || true).unwrap_err().to_string().contains("lift_mm is given twice"));
+    let mut left = 5;
+    let stopped = sweep(&episodes, &ranges, &mut || {
+        left -= 1;
+        left > 0
+    });
+    assert_eq!((stopped.unwrap_err().to_string(), left), (trocar_cell::Error::Interrupted.to_string(), 0));
     assert!(stages::with_gate(Gates::default(), "lift_mm", f64::NAN).is_err());
 }

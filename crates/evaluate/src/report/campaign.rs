@@ -283,17 +283,21 @@ fn swept(task: &str) -> &'static [(&'static str, &'static str)] {
 fn sweeps(plan: &Plan, kept: &[Kept], store: &Store) -> Result<Vec<String>> {
     let mut made = Vec::new();
     let mut channels = Vec::new();
+    let of = |name: &str| kept.iter().filter(|k| k.name == name).count();
+    let cut = plan.policies.iter().any(|p| of(&p.name) > SWEPT);
     for policy in &plan.policies {
-        let own = kept.iter().filter(|k| k.name == policy.name && k.summary.duration_s > 0.0).take(SWEPT);
-        let read = own.map(|k| read_channels(&store.episode(&k.name, k.index).join(CHANNELS_FILE)));
-        channels.push(read.collect::<std::result::Result<Vec<_>, _>>()?);
+        let own: Vec<&Kept> = kept.iter().filter(|k| k.name == policy.name).take(SWEPT).collect();
+        // One that ended before its first step has no channels and passes no gate.
+        let begun = own.iter().filter(|k| k.summary.duration_s > 0.0);
+        let read = begun.map(|k| read_channels(&store.episode(&k.name, k.index).join(CHANNELS_FILE)));
+        channels.push((own.len(), read.collect::<std::result::Result<Vec<_>, _>>()?));
     }
     for (range, x) in swept(&plan.task) {
         let range = GateRange::parse(range)?;
         let mut lines = Vec::new();
-        for (policy, episodes) in plan.policies.iter().zip(&channels).filter(|(_, e)| !e.is_empty()) {
-            let swept = sweep(episodes, std::slice::from_ref(&range))?;
-            let points = swept.rows.iter().map(|r| (r.values[0], r.passed as f64 / swept.episodes as f64));
+        for (policy, (taken, episodes)) in plan.policies.iter().zip(&channels).filter(|(_, (_, e))| !e.is_empty()) {
+            let swept = sweep(episodes, std::slice::from_ref(&range), &mut || true)?;
+            let points = swept.rows.iter().map(|r| (r.values[0], r.passed as f64 / *taken as f64));
             lines.push(Line { points: points.collect(), color: color(plan, &policy.name), filled: false });
         }
         let plot = Plot {
@@ -307,7 +311,8 @@ fn sweeps(plan: &Plan, kept: &[Kept], store: &Store) -> Result<Vec<String>> {
             log_x: false,
             log_y: false,
         };
-        made.push(page::figure(&plot.svg()?, &format!("<b>{x}.</b>{}", legend(plan))));
+        let of = if cut { format!(" The first {SWEPT} episodes of each policy.") } else { String::new() };
+        made.push(page::figure(&plot.svg()?, &format!("<b>{x}.</b>{of}{}", legend(plan))));
     }
     Ok(made)
 }

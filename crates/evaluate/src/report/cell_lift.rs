@@ -27,10 +27,13 @@ pub(super) fn body(made: &CellRun, run: &CellLiftRun, pictures: &Pictures) -> Re
         Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * s.follow_ratio, 0)))
             .met(s.follow_ratio >= 0.8),
         Card::new("Slip", mm(s.slip_mm), "less than 3 mm counts as held").met(s.slip_mm < 3.0),
-        Card::new("RCM deviation under load", mm(s.rcm_median_mm), format!("median; the paper: {PAPER_RCM_MM} mm"))
-            .met(s.rcm_median_mm <= PAPER_RCM_MM),
-        Card::new("Largest RCM deviation", mm(s.rcm_run_max_mm), "of the whole run; the threshold is 3 mm")
-            .met(s.rcm_run_max_mm < THRESHOLD_MM),
+        Card::new("RCM deviation under load", mm(s.rcm_median_mm), "median"),
+        Card::new(
+            "Peak RCM deviation",
+            mm(s.rcm_run_max_mm),
+            format!("of the whole run; the paper: {PAPER_RCM_MM} mm, median of 84; the threshold is 3 mm"),
+        )
+        .met(s.rcm_run_max_mm < THRESHOLD_MM),
         Card::new(
             "Peak force",
             format!("{} N", fixed(s.peak_constraint_n, 2)),

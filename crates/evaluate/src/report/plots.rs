@@ -11,6 +11,9 @@ const SIZE: (u32, u32) = (560, 300);
 const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_HEX: &str = "\"#010203\"";
 
+/// What is larger has blown up and is left out: an axis round it would have no room left in a double.
+const MOST: f64 = 1e300;
+
 /// A curve.
 pub(super) struct Line {
     pub(super) points: Vec<(f64, f64)>,
@@ -48,7 +51,7 @@ pub(super) struct Plot<'a> {
 impl Plot<'_> {
     /// The plot as an `<svg>`, or a sentence when there is nothing to plot.
     pub(super) fn svg(&self) -> Result<String> {
-        let shown_on = |log: bool, v: f64| v.is_finite() && (!log || v > 0.0);
+        let shown_on = |log: bool, v: f64| v.abs() <= MOST && (!log || v > 0.0);
         let keep = |&(x, y): &(f64, f64)| shown_on(self.log_x, x) && shown_on(self.log_y, y);
         let scale = |y: f64| if self.log_y { y.log10() } else { y };
         let along = |x: f64| if self.log_x { x.log10() } else { x };
@@ -199,6 +202,8 @@ mod tests {
         assert!(plot(vec![(1.0, 2.0)], false).contains("<svg"));
         assert!(plot(vec![(0.0, 1e-9), (1.0, 1e5)], true).contains("10⁻⁹"));
         assert!(plot(vec![(0.0, 1e300), (1.0, -1e300)], false).contains("<svg"));
+        // What summaries write of what has blown up.
+        assert!(plot(vec![(0.0, 0.0), (1.0, f64::MAX), (f64::MAX, 1.0)], false).contains("<svg"));
     }
 
     #[test]

@@ -44,7 +44,8 @@ fn beside_paper(r: &RolloutsResult) -> String {
         row("Attached", of(r.attached, r.rollouts), of(p.attached, p.rollouts)),
         row("Held to the end", of(r.held_to_end, r.attached), of(p.held_to_end, p.attached)),
         row("Lift, median [mm]", or_dash(r.lift_median_mm, 1), fixed(p.lift_median_mm, 1)),
-        row("RCM deviation under load, median [mm]", or_dash(r.rcm_median_mm, 3), fixed(p.rcm_median_mm, 2)),
+        row("Peak RCM deviation, median [mm]", or_dash(r.rcm_peak_median_mm, 3), fixed(p.rcm_peak_median_mm, 2)),
+        row("RCM deviation under load, median of medians [mm]", or_dash(r.rcm_loaded_median_mm, 4), or_dash(None, 0)),
         row("RCM within 3 mm", of(r.rcm_within_3_mm, r.attached), of(p.rcm_within_3_mm, p.attached)),
         row("RCM within 5 mm", of(r.rcm_within_5_mm, r.attached), of(p.rcm_within_5_mm, p.attached)),
     ];

@@ -2,7 +2,8 @@
 
 use crate::cli;
 use crate::output;
-use trocar_evaluate::{EpisodeMade, EpisodeRun, Error, Result, read_episode, replay, sweep_files};
+use serde::Serialize;
+use trocar_evaluate::{EpisodeHeader, EpisodeMade, EpisodeRun, Error, Result, read_episode, replay, sweep_files};
 use trocar_progress::Progress;
 
 pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Result<()> {
@@ -18,19 +19,23 @@ pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Res
     Ok(())
 }
 
+/// What an episode file says of itself.
+#[derive(Serialize)]
+struct Told<'a> {
+    steps: usize,
+    #[serde(flatten)]
+    header: &'a EpisodeHeader,
+}
+
 /// Does again, or tells what the file says of itself. What differs is told and then an error, so that scripts hear of it.
 pub fn replay_file(arguments: &cli::Replay, json: bool, progress: &dyn Progress) -> Result<()> {
     if !arguments.verify {
         let file = read_episode(&arguments.file)?;
-        output::print(json, &file.header, |h| {
+        output::print(json, &Told { steps: file.steps.len(), header: &file.header }, |told| {
+            let h = told.header;
             format!(
                 "{} steps by {} with seed {}, recorded by trocar {}; scene {}, specimen {}; --verify does them again",
-                file.steps.len(),
-                h.policy,
-                h.seed,
-                h.program,
-                h.scene_hash,
-                h.specimen_hash
+                told.steps, h.policy, h.seed, h.program, h.scene_hash, h.specimen_hash
             )
         });
         return Ok(());
@@ -44,8 +49,8 @@ pub fn replay_file(arguments: &cli::Replay, json: bool, progress: &dyn Progress)
     Err(Error::Mismatch(format!("{}: the replay differs: {}", arguments.file.display(), verdict.said)))
 }
 
-pub fn sweep(arguments: &cli::Sweep, json: bool) -> Result<()> {
-    let sweep = sweep_files(&arguments.channels, &arguments.gates)?;
+pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Result<()> {
+    let sweep = sweep_files(&arguments.channels, &arguments.gates, progress)?;
     output::print(json, &sweep, |s| {
         let mut header: Vec<&str> = s.gates.iter().map(String::as_str).collect();
         header.extend(s.stages.iter().map(|stage| stage.name()));

@@ -25,7 +25,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Evaluate(arguments) => evaluate::run(arguments, cli.json, progress),
         Command::Episode(arguments) => episode::run(arguments, cli.json, progress),
         Command::Replay(arguments) => episode::replay_file(arguments, cli.json, progress),
-        Command::Sweep(arguments) => episode::sweep(arguments, cli.json),
+        Command::Sweep(arguments) => episode::sweep(arguments, cli.json, progress),
         Command::Inspect(arguments) => inspect::run(arguments, cli.json),
         Command::Record(arguments) => record::run(arguments, cli.json, progress),
         Command::Render(arguments) => render::run(arguments, cli.json, progress),

@@ -26,7 +26,8 @@ fn text(r: &RolloutsResult) -> String {
         row("attached", of(r.attached, r.rollouts), of(p.attached, p.rollouts)),
         row("held to the end", of(r.held_to_end, r.attached), of(p.held_to_end, p.attached)),
         row("lift, median mm", or_dash(r.lift_median_mm, 1), format!("{:.1}", p.lift_median_mm)),
-        row("RCM, median mm", or_dash(r.rcm_median_mm, 3), format!("{:.2}", p.rcm_median_mm)),
+        row("peak RCM, median mm", or_dash(r.rcm_peak_median_mm, 3), format!("{:.2}", p.rcm_peak_median_mm)),
+        row("RCM under load, median mm", or_dash(r.rcm_loaded_median_mm, 4), "-".to_owned()),
         row("RCM within 3 mm", of(r.rcm_within_3_mm, r.attached), of(p.rcm_within_3_mm, p.attached)),
         row("RCM within 5 mm", of(r.rcm_within_5_mm, r.attached), of(p.rcm_within_5_mm, p.attached)),
     ];
