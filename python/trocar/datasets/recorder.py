@@ -104,6 +104,13 @@ def robomimic_observations(env: gym.Env) -> dict[str, Feature]:
     }
 
 
+def robomimic_environment(env: gym.Env) -> dict[str, Any]:
+    """What a `RobomimicWriter` writes down to make an environment anew: `env_name` and `env_kwargs`. It must be of `gym.make`."""
+    if env.spec is None:
+        raise ValueError("env: it has no spec; make it by gym.make, or give env_name and env_kwargs yourself")
+    return {"env_name": env.spec.id, "env_kwargs": dict(env.spec.kwargs)}
+
+
 def _short(key: str) -> str:
     words = key.removeprefix("observation.").split(".")
     return f"{words[1]}_{'image' if words[0] == 'images' else words[0]}" if len(words) > 1 else words[0]
