@@ -1,18 +1,20 @@
-"""Datasets are read back by those who define the layouts, as far as they are installed: pyarrow and h5py always, LeRobot where it is."""
+"""LeRobot datasets are read back: by pyarrow always, by LeRobot where it is installed."""
 
 import json
 import os
+import subprocess
+import sys
 
 import numpy as np
 import pytest
 
 pytest.importorskip("pyarrow")
 pytest.importorskip("av")
-h5py = pytest.importorskip("h5py")
+pytest.importorskip("h5py")
 
 import pandas as pd
 import pyarrow.parquet as pq
-from trocar.datasets import LeRobotWriter, RobomimicWriter
+from trocar.datasets import LeRobotWriter
 from trocar.datasets import _layouts, _stats, _video, lerobot
 
 FEATURES = {
@@ -288,23 +290,50 @@ def test_lerobot_reads_it(tmp_path):
     assert dataset.meta.stats["observation.state"]["max"].shape == (3,)
 
 
-def test_robomimic_layout(tmp_path):
-    observations = {"state": {"dtype": "float32", "shape": (3,)}, "endoscope_image": {"dtype": "image", "shape": (64, 96, 3)}}
-    for part in ([0, 1], [2]):
-        writer = RobomimicWriter(tmp_path / "set.hdf5", observations=observations, actions=2, env_args={"obs": "state+rgb"})
-        for episode in part:
-            for k in range(LENGTHS[episode]):
-                frame = {"state": np.full(3, k, np.float32), "endoscope_image": picture(episode, k)}
-                writer.add_frame(frame | {"actions": np.array([k, 1.0]), "rewards": float(k)})
-            last = {"state": np.full(3, 99, np.float32), "endoscope_image": picture(episode, 9)}
-            assert writer.save_episode(last, success=episode == 1) == episode
-    with h5py.File(tmp_path / "set.hdf5") as file:
-        data = file["data"]
-        assert data.attrs["total"] == sum(LENGTHS)
-        assert json.loads(data.attrs["env_args"])["env_kwargs"] == {"obs": "state+rgb"}
-        demo = data["demo_1"]
-        assert demo.attrs["num_samples"] == LENGTHS[1] and demo.attrs["success"]
-        assert demo["dones"][:].tolist() == [0] * (LENGTHS[1] - 1) + [1]
-        assert demo["obs/state"][:, 0].tolist() == list(range(LENGTHS[1]))
-        assert demo["next_obs/state"][:, 0].tolist() == [*range(1, LENGTHS[1]), 99]
-        assert np.array_equal(demo["obs/endoscope_image"][4], picture(1, 4))
+#: Types of numbers that a feature may have.
+NUMBERS = [*("bool float16 float32 float64".split()), *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))]
+
+
+@pytest.mark.parametrize("version", ["v3.0", "v2.1"])
+def test_each_type_of_numbers_is_written(tmp_path, version):
+    features = {dtype: {"dtype": dtype, "shape": (n,)} for dtype in NUMBERS for n in [1 + len(dtype) % 2]}
+    writer = LeRobotWriter(tmp_path / "set", fps=30, features=features, version=version)
+    for k in range(3):
+        writer.add_frame({key: np.full(f["shape"], k % 2, key) for key, f in features.items()})
+    writer.save_episode("count")
+    table = pd.concat(pd.read_parquet(p) for p in sorted((tmp_path / "set/data").rglob("*.parquet")))
+    for key in NUMBERS:
+        assert [np.ravel(value)[0] for value in table[key]] == [0, 1, 0], key
+
+
+def test_features_that_cannot_be_written_are_refused_at_once(tmp_path):
+    for feature, words in [
+        ({"dtype": "image", "shape": (64, 96, 3)}, "view has dtype 'image'.* video, "),
+        ({"dtype": "string", "shape": (1,)}, "view has dtype 'string'"),
+        ({"dtype": "complex64", "shape": (1,)}, "view has dtype 'complex64'"),
+        ({"shape": (1,)}, "view has dtype 'None'"),
+        ({"dtype": "video", "shape": (64, 96)}, r"view has shape \(64, 96\)"),
+        ({"dtype": "video", "shape": (64, 96, 1)}, "view has 1 channels"),
+        ({"dtype": "video", "shape": (64, 95, 3)}, "view is 95x64; a video needs even"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            LeRobotWriter(tmp_path / "set", fps=30, features={"view": feature})
+    for fps in (0, 29.97):
+        with pytest.raises(ValueError, match="no whole number of frames"):
+            LeRobotWriter(tmp_path / "set", fps=fps, features=FEATURES)
+    assert LeRobotWriter(tmp_path / "set", fps=30.0, features=FEATURES).fps == 30
+    assert not (tmp_path / "set").exists()
+
+
+def test_without_fcntl_datasets_are_written(tmp_path):
+    # As on Windows, where writers do not take turns.
+    lines = [
+        "import sys",
+        "sys.modules['fcntl'] = None",
+        "from trocar.datasets import LeRobotWriter",
+        "writer = LeRobotWriter(sys.argv[1], fps=30, features={'action': {'dtype': 'float32', 'shape': (1,)}})",
+        "writer.add_frame({'action': 1.0})",
+        "assert writer.save_episode('wait') == 0",
+    ]
+    done = subprocess.run([sys.executable, "-c", "\n".join(lines), tmp_path / "set"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -14,7 +14,7 @@ import json
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Iterable
+from typing import Any, Iterable
 
 import cv2
 import numpy as np
@@ -40,14 +40,18 @@ class Board:
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
         """The board as OpenCV knows it."""
-        number = getattr(cv2.aruco, self.dictionary, None)
+        number = getattr(cv2.aruco, self.dictionary, None) if self.dictionary.startswith("DICT_") else None
         if number is None:
             raise ValueError(f"dictionary: OpenCV knows no '{self.dictionary}'; DICT_4X4_50 and DICT_5X5_100 are such names")
+        if min(self.squares) < 2:
+            raise ValueError(f"squares: {self.squares[0]}x{self.squares[1]} make no board; at least 2x2 are needed")
         if not 0 < self.marker < self.square:
             raise ValueError(f"markers of {1e3 * self.marker} mm do not fit into squares of {1e3 * self.square} mm")
-        board = cv2.aruco.CharucoBoard(
-            self.squares, self.square, self.marker, cv2.aruco.getPredefinedDictionary(number)
-        )
+        dictionary = cv2.aruco.getPredefinedDictionary(number)
+        held, needed = len(dictionary.bytesList), self.squares[0] * self.squares[1] // 2
+        if held < needed:
+            raise ValueError(f"dictionary: {self.dictionary} has {held} markers; {self.squares[0]}x{self.squares[1]} squares need {needed}")
+        board = cv2.aruco.CharucoBoard(self.squares, self.square, self.marker, dictionary)
         board.setLegacyPattern(self.legacy)
         return board
 
@@ -97,6 +101,7 @@ def calibrate(pictures: Iterable[np.ndarray], board: Board, *, model: str = "pin
     """Calibrates from pictures (height, width[, 3], 8 bits, all of one size) of `board`.
 
     Pictures with fewer than 8 corners are passed over; with fewer than 5 others this is a `ValueError` that says how many there were.
+    So are pictures that OpenCV finds no camera for.
     """
     if model not in MODELS:
         raise ValueError(f"model: '{model}' is unknown; {', '.join(MODELS)} can be estimated")
@@ -122,13 +127,10 @@ def calibrate(pictures: Iterable[np.ndarray], board: Board, *, model: str = "pin
             f"the board was found in {len(used)} of {count} pictures; {MIN_VIEWS} are needed with {MIN_CORNERS} corners each. "
             "Are its squares, sizes and dictionary right?"
         )
-    if model == "fisheye":
-        flags = cv2.fisheye.CALIB_RECOMPUTE_EXTRINSIC | cv2.fisheye.CALIB_FIX_SKEW
-        wide = [p.astype(np.float64) for p in points], [p.astype(np.float64) for p in places]
-        rms, matrix, distortion, turns, shifts = cv2.fisheye.calibrate(*wide, size, None, None, flags=flags)
-    else:
-        flags = cv2.CALIB_RATIONAL_MODEL if model == "pinhole-8" else 0
-        rms, matrix, distortion, turns, shifts = cv2.calibrateCamera(points, places, size, None, None, flags=flags)
+    try:
+        rms, matrix, distortion, turns, shifts = _estimated(points, places, size, model)
+    except cv2.error as why:
+        raise ValueError(f"OpenCV cannot estimate {model} from these {len(used)} pictures: {why.err or why}") from why
     distortion = np.asarray(distortion).reshape(-1)[: {"pinhole-5": 5, "pinhole-8": 8, "fisheye": 4}[model]]
     project = cv2.fisheye.projectPoints if model == "fisheye" else cv2.projectPoints
     views = {}
@@ -136,6 +138,22 @@ def calibrate(pictures: Iterable[np.ndarray], board: Board, *, model: str = "pin
         seen = project(of_board.astype(np.float64), turn, shift, matrix, distortion)[0].reshape(-1, 2)
         views[index] = float(np.sqrt(np.mean(np.sum((seen - in_picture.reshape(-1, 2)) ** 2, axis=1))))
     return Calibration(size, np.asarray(matrix), distortion, model, float(rms), views)
+
+
+def _estimated(points: list[np.ndarray], places: list[np.ndarray], size: tuple[int, int], model: str) -> tuple[Any, ...]:
+    """RMS error [px], matrix, distortion, turns and shifts of the boards; `cv2.error` where OpenCV finds no camera."""
+    if model == "fisheye":
+        flags = _fisheye_flag("CALIB_RECOMPUTE_EXTRINSIC") | _fisheye_flag("CALIB_FIX_SKEW")
+        # OpenCV 5 takes rows of points only, OpenCV 4 columns too.
+        wide = [[p.astype(np.float64).reshape(1, -1, p.shape[-1]) for p in of] for of in (points, places)]
+        return cv2.fisheye.calibrate(*wide, size, None, None, flags=flags)
+    flags = cv2.CALIB_RATIONAL_MODEL if model == "pinhole-8" else 0
+    return cv2.calibrateCamera(points, places, size, None, None, flags=flags)
+
+
+def _fisheye_flag(name: str) -> int:
+    """A flag of fisheye calibration: of `cv2.fisheye` in OpenCV 4, whose numbers are its own, of `cv2` from 5 on."""
+    return int(getattr(cv2.fisheye, name) if hasattr(cv2.fisheye, name) else getattr(cv2, name))
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -152,11 +170,11 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args(arguments)
     try:
-        across, _, down = options.squares.partition("x")
-        board = Board((int(across), int(down)), 1e-3 * options.square_mm, 1e-3 * options.marker_mm, options.dictionary, options.legacy)
+        board = Board(_squares(options.squares), 1e-3 * options.square_mm, 1e-3 * options.marker_mm, options.dictionary, options.legacy)
         made = calibrate(map(_read, options.pictures), board, model=options.model)
         made.write(options.output)
-    except (ValueError, OSError) as why:
+    # What OpenCV refuses in ways of its own is an error like others, not a traceback.
+    except (ValueError, OSError, TypeError, SystemError, cv2.error) as why:
         print(f"error: {why}", file=sys.stderr)
         return 1
     wide, high = made.field_of_view()
@@ -170,6 +188,13 @@ def main(arguments: list[str] | None = None) -> int:
         worst = max(made.views, key=made.views.__getitem__)
         print(f"worst picture: {options.pictures[worst]} with {made.views[worst]:.3f} px; written: {options.output}")
     return 0
+
+
+def _squares(text: str) -> tuple[int, int]:
+    across, _, down = text.partition("x")
+    if not (across.isdecimal() and down.isdecimal()):
+        raise ValueError(f"--squares: '{text}' is not such as 11x8, squares across and down")
+    return int(across), int(down)
 
 
 def _read(path: Path) -> np.ndarray:

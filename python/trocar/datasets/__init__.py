@@ -8,7 +8,7 @@ They need the optional packages of `pip install .[datasets]`.
 """
 
 from .lerobot import LeRobotWriter
-from .recorder import Recorder, features_of, robomimic_observations
+from .recorder import Recorder, features_of, robomimic_environment, robomimic_observations
 from .robomimic import RobomimicWriter
 
-__all__ = ["LeRobotWriter", "Recorder", "RobomimicWriter", "features_of", "robomimic_observations"]
+__all__ = ["LeRobotWriter", "Recorder", "RobomimicWriter", "features_of", "robomimic_environment", "robomimic_observations"]

@@ -12,6 +12,9 @@ import numpy as np
 #: A feature: `{"dtype": "float32" | "int64" | ... | "video", "shape": (...), "names": [...] | None}`.
 Feature = dict[str, Any]
 
+#: Types of numbers that a feature may have.
+NUMBERS = ("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "float16", "float32", "float64")
+
 
 class Frames:
     """The frames of one episode: checked against their features as they come."""
@@ -29,28 +32,42 @@ class Frames:
 
     def add(self, frame: dict[str, Any]) -> None:
         """Takes a frame. What is wrong with it is told by the feature's name, and nothing of it is kept."""
-        missing, unknown = self.features.keys() - frame.keys(), frame.keys() - self.features.keys()
-        if missing or unknown:
-            words = [f"{', '.join(sorted(keys))} {what}" for keys, what in ((missing, "missing"), (unknown, "unknown")) if keys]
-            raise ValueError(f"frame: {'; '.join(words)}; the features are {', '.join(self.features)}")
-        checked = {key: checked_value(key, frame[key], feature) for key, feature in self.features.items()}
-        for key, value in checked.items():
+        for key, value in checked_values("frame", frame, self.features).items():
             self.columns[key].append(value)
 
 
-def checked_value(key: str, value: Any, feature: Feature) -> np.ndarray:
+def check_dtypes(features: dict[str, Feature], pictures: tuple[str, ...]) -> None:
+    """Raises a `ValueError` that names the first feature that is neither of numbers nor of one of the kinds of `pictures`."""
+    for key, feature in features.items():
+        dtype = feature.get("dtype")
+        if dtype not in NUMBERS and dtype not in pictures:
+            raise ValueError(f"features: {key} has dtype '{dtype}', which cannot be written; it must be one of {', '.join((*pictures, *NUMBERS))}")
+        if dtype in pictures and len(feature["shape"]) != 3:
+            raise ValueError(f"features: {key} has shape {tuple(feature['shape'])}; pictures are (height, width, channels)")
+
+
+def checked_values(what: str, values: dict[str, Any], features: dict[str, Feature]) -> dict[str, np.ndarray]:
+    """`values` as arrays of the features' types and shapes, one for each; `what` is what errors call them."""
+    missing, unknown = features.keys() - values.keys(), values.keys() - features.keys()
+    if missing or unknown:
+        words = [f"{', '.join(sorted(keys))} {how}" for keys, how in ((missing, "missing"), (unknown, "unknown")) if keys]
+        raise ValueError(f"{what}: {'; '.join(words)}; the features are {', '.join(features)}")
+    return {key: _checked_value(f"{what}: {key}", values[key], feature) for key, feature in features.items()}
+
+
+def _checked_value(name: str, value: Any, feature: Feature) -> np.ndarray:
     """`value` as an array of the feature's type and shape."""
     kind = "uint8" if feature["dtype"] in ("video", "image") else feature["dtype"]
     array = np.asarray(value)
     shape = tuple(feature["shape"])
     if array.shape != shape and not (array.shape == () and shape == (1,)):
-        raise ValueError(f"frame: {key} has shape {array.shape}; it must be {shape}")
+        raise ValueError(f"{name} has shape {array.shape}; it must be {shape}")
     if kind == "uint8" and array.dtype != np.uint8:
-        raise ValueError(f"frame: {key} is {array.dtype}; pictures are uint8")
+        raise ValueError(f"{name} is {array.dtype}; pictures are uint8")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise ValueError(f"frame: {key} holds a number that is not finite")
+        raise ValueError(f"{name} holds a number that is not finite")
     if not np.can_cast(array.dtype, kind, casting="same_kind"):
-        raise ValueError(f"frame: {key} is {array.dtype}; it must be {kind}")
+        raise ValueError(f"{name} is {array.dtype}; it must be {kind}")
     # A copy: environments write the next observation into the same array.
     return np.array(array, dtype=kind).reshape(shape)
 

@@ -10,14 +10,21 @@ import av
 import numpy as np
 
 
+def check_shape(key: str, shape: tuple[int, ...]) -> None:
+    """Raises a `ValueError` if pictures of this shape make no video; `key` is what it calls them."""
+    height, width, channels = shape
+    if channels != 3:
+        raise ValueError(f"features: {key} has {channels} channels; a video needs 3")
+    if height % 2 or width % 2:
+        raise ValueError(f"features: {key} is {width}x{height}; a video needs even numbers of pixels")
+
+
 def write(path: Path, pictures: list[np.ndarray], fps: int, *, codec: str = "libx264", crf: int = 18) -> dict[str, Any]:
     """Writes 8-bit RGB pictures (height, width, 3) as a video with a key frame every two frames, so that any frame is found quickly.
 
     The file appears whole or not at all. Returns what a LeRobot dataset's `info` says of a video.
     """
     height, width, _ = pictures[0].shape
-    if height % 2 or width % 2:
-        raise ValueError(f"{path.name}: pictures are {width}x{height}; a video needs even numbers of pixels")
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + ".partial")
     with av.open(str(partial), "w", format="mp4") as output:

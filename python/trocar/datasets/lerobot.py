@@ -7,11 +7,8 @@ features are, how long each episode is, what was asked for in it, and statistics
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
-import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +16,11 @@ import numpy as np
 import pyarrow as pa
 
 from . import _stats, _video
-from ._frames import Feature, Frames, write_json
+from ._frames import Feature, Frames, check_dtypes, write_json
 from ._layouts import CHUNK, V3, V21
+from ._turns import SAVING_SECONDS, alone
 
 VERSIONS = ("v3.0", "v2.1")
-
-#: How long another writer is waited for that saves an episode [s].
-SAVING_SECONDS = 60.0
 
 #: Lies in the folder while an episode is written, so that other writers see that one was not finished.
 UNDER_WAY = "meta/under-way.partial"
@@ -44,9 +39,10 @@ class LeRobotWriter:
     """Writes a LeRobot dataset, an episode at a time.
 
     `features` maps names such as `observation.state`, `action` or `observation.images.endoscope` to `{"dtype", "shape", "names"}`;
-    a feature with dtype `video` takes 8-bit pictures (height, width, 3). A folder with the same features is gone on with. An episode
-    is in the dataset once `save_episode` has returned: a process that dies later takes nothing back, and what one that dies earlier
-    has left of an episode goes when the folder is opened again. Of several writers of a folder one saves at a time.
+    a feature with dtype `video` takes 8-bit pictures (height, width, 3), height and width even; other types are those of numbers
+    (`float32`, `int64`, `bool`), and anything else (`image`, `string`) is a `ValueError`. A folder with the same features is gone on
+    with. An episode is in the dataset once `save_episode` has returned: a process that dies later takes nothing back, and what one
+    that dies earlier has left of an episode goes when the folder is opened again. Of several writers of a folder one saves at a time.
 
     >>> writer = LeRobotWriter("lifts", fps=30, features=features)
     >>> for frame in episode:
@@ -73,7 +69,14 @@ class LeRobotWriter:
         slashed = [key for key in features if "/" in key]
         if slashed:
             raise ValueError(f"features: '{slashed[0]}' has a slash in its name; LeRobot joins words by dots")
-        self.root, self.fps, self.version = Path(root), fps, version
+        if fps <= 0 or fps != int(fps):
+            raise ValueError(f"fps: {fps} is no whole number of frames a second")
+        # What only saving would find out is found out before anything is recorded.
+        check_dtypes(features, ("video",))
+        for key, feature in features.items():
+            if feature["dtype"] == "video":
+                _video.check_shape(key, feature["shape"])
+        self.root, self.fps, self.version = Path(root), int(fps), version
         self.codec, self.crf = codec, crf
         self.features = {key: dict(f, shape=tuple(f["shape"]), names=f.get("names")) for key, f in features.items()}
         self._frames = Frames(self.features)
@@ -86,7 +89,7 @@ class LeRobotWriter:
             "total_frames": 0,
             "total_tasks": 0,
             "chunks_size": CHUNK,
-            "fps": fps,
+            "fps": self.fps,
             "splits": {},
             **layout.PATHS,
             "features": self.features | INDICES,
@@ -110,23 +113,10 @@ class LeRobotWriter:
     def _video_keys(self) -> list[str]:
         return [key for key, f in self.features.items() if f["dtype"] == "video"]
 
-    @contextlib.contextmanager
-    def _alone(self, seconds: float = SAVING_SECONDS) -> Iterator[None]:
-        """Has the folder to itself. Another writer is waited for; a lock goes with its process, however that ends."""
+    def _alone(self, seconds: float = SAVING_SECONDS) -> contextlib.AbstractContextManager[None]:
+        """Has the folder to itself; it is made if it is missing."""
         self.root.mkdir(parents=True, exist_ok=True)
-        folder, until = os.open(self.root, os.O_RDONLY), time.monotonic() + seconds
-        try:
-            while True:
-                try:
-                    fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                    break
-                except BlockingIOError as why:
-                    if time.monotonic() > until:
-                        raise RuntimeError(f"{self.root} is being written by another writer; wait for it, or write into another folder") from why
-                    time.sleep(0.05)
-            yield
-        finally:
-            os.close(folder)
+        return alone(self.root, seconds)
 
     def _read_info(self) -> None:
         """Reads what a dataset already holds, and changes nothing."""

@@ -56,11 +56,19 @@ def _values(observation: Any, space: gym.Space) -> dict[str, np.ndarray]:
 class Recorder(gym.Wrapper):
     """Writes each episode of `env` with `writer` when it ends: all of them, or with `only_successful` those that reached their goal.
 
-    >>> env = Recorder(gym.make("trocar/GraspLift-v0"), LeRobotWriter("lifts", fps=30, features=features_of(env)))
+    A writer with a rate must have the environment's, `env.metadata["render_fps"]` (`ValueError` otherwise): the times of frames follow
+    from it. A wrapper that does several steps in one says so in its own `metadata`.
+
+    >>> env = gym.make("trocar/GraspLift-v0")
+    >>> writer = LeRobotWriter("lifts", fps=env.metadata["render_fps"], features=features_of(env))
+    >>> env = Recorder(env, writer)
     """
 
     def __init__(self, env: gym.Env, writer: LeRobotWriter | RobomimicWriter, *, only_successful: bool = False):
         super().__init__(env)
+        steps, written = env.metadata.get("render_fps"), getattr(writer, "fps", None)
+        if steps is not None and written is not None and written != steps:
+            raise ValueError(f"fps: the writer has {written}, the environment does {steps} steps a second; make the writer with fps={steps}")
         self.writer, self.only_successful = writer, only_successful
         self._observation: Any = None
 
@@ -102,6 +110,13 @@ def robomimic_observations(env: gym.Env) -> dict[str, Feature]:
         _short(key): {"dtype": kinds[space.dtype.kind], "shape": space.shape, "names": None}
         for key, space in _leaves(env.observation_space)
     }
+
+
+def robomimic_environment(env: gym.Env) -> dict[str, Any]:
+    """What a `RobomimicWriter` writes down to make an environment anew: `env_name` and `env_kwargs`. It must be of `gym.make`."""
+    if env.spec is None:
+        raise ValueError("env: it has no spec; make it by gym.make, or give env_name and env_kwargs yourself")
+    return {"env_name": env.spec.id, "env_kwargs": dict(env.spec.kwargs)}
 
 
 def _short(key: str) -> str:
