@@ -1,6 +1,6 @@
 //! `Cells`: episodes of one scene, side by side in one process.
 
-use crate::error::{task, wrong};
+use crate::error::{forked, task, wrong};
 use crate::frames::Rows;
 use crate::pictures::Eyes;
 use crate::prepare;
@@ -31,6 +31,8 @@ pub struct Cells {
     task_name: &'static str,
     prompt: String,
     steps: usize,
+    /// The process that made them. The pool's threads do not live on in a child made by `fork`, and work given to them there would wait for ever.
+    process: u32,
 }
 
 /// The caller's arrays that steps write, as a tuple: (cells, numbers) each.
@@ -114,14 +116,13 @@ impl Cells {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(wrong)?;
             // One cell uses all threads; of many, each has its own.
             let each = if count == 1 { threads } else { 1 };
-            let built: Result<Vec<Episode>, trocar_task::Error> =
-                pool.install(|| (0..count).into_par_iter().map(|_| Episode::new(&scene, &specimen, each)).collect());
-            let episodes = built.map_err(|e| crate::error::task(&e))?;
+            let episodes = built(&pool, count, || Episode::new(&scene, &specimen, each))?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let prompt = trocar_task::prompt(&scene);
             let eyes = Eyes::new(specimen, count, sensor_noise);
-            Ok(Self { episodes, eyes, bounds, pool, task_name: scene.task.name.name(), prompt, steps })
+            let (task_name, process) = (scene.task.name.name(), std::process::id());
+            Ok(Self { episodes, eyes, bounds, pool, task_name, prompt, steps, process })
         })
     }
 
@@ -314,8 +315,32 @@ impl Cells {
     }
 }
 
+/// `count` episodes, as many at a time as the pool has threads. In between the interpreter's signals are looked at: many cells take minutes.
+fn built(
+    pool: &rayon::ThreadPool,
+    count: usize,
+    one: impl Fn() -> trocar_task::Result<Episode> + Sync,
+) -> PyResult<Vec<Episode>> {
+    let mut episodes = Vec::with_capacity(count);
+    while episodes.len() < count {
+        let batch = pool.current_num_threads().clamp(1, count - episodes.len());
+        let more: trocar_task::Result<Vec<Episode>> =
+            pool.install(|| (0..batch).into_par_iter().map(|_| one()).collect());
+        episodes.extend(more.map_err(|e| task(&e))?);
+        // Signals are told to the thread that called, not to those of the pool.
+        Python::attach(|py| py.check_signals())?;
+    }
+    Ok(episodes)
+}
+
 impl Cells {
+    /// Cells are refused in another process than that which made them.
+    pub(crate) fn here(&self) -> PyResult<()> {
+        if std::process::id() == self.process { Ok(()) } else { Err(forked()) }
+    }
+
     pub(crate) fn at(&self, k: usize) -> PyResult<&Episode> {
+        self.here()?;
         let count = self.episodes.len();
         self.episodes.get(k).ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))
     }
@@ -328,6 +353,7 @@ impl Cells {
         with: &[T],
         work: impl Fn((&mut Place<'_>, &T)) -> Result<(), trocar_task::Error> + Sync,
     ) -> PyResult<()> {
+        self.here()?;
         let count = self.episodes.len();
         let mut state = Rows::new(&arrays.state, "state", count, &[STATE_SIZE])?;
         let mut figures = Rows::new(&arrays.figures, "figures", count, &[FIGURES.len()])?;
