@@ -120,12 +120,21 @@ def test_a_restored_state_has_its_seed_and_draws_the_same_seeds(one):
     assert [one.reset()[1]["seed"] for _ in range(2)] == after, "a saved state stays as it was"
 
 
-def test_a_state_of_something_else_is_refused_and_changes_nothing(one):
+def test_a_state_of_something_else_is_refused_and_changes_nothing(one, tmp_path):
     other = trocar.TrocarEnv(task="port-reach", **SHORT)
+    path = changed_scene(tmp_path, "grasp-lift", 0.4)
+    path.write_text(path.read_text().replace("control_hz = 30", "control_hz = 60"))
+    faster = trocar.TrocarEnv(str(path))
     other.reset(seed=5)
+    faster.reset(seed=5)
     one.reset(seed=6)
     before = one.state_hash
-    for state, error, words in [(other.save_state(), ValueError, "port-reach"), (None, TypeError, "save_state"), (3, TypeError, "int")]:
+    for state, error, words in [
+        (other.save_state(), ValueError, "port-reach"),
+        (faster.save_state(), ValueError, "another scene"),
+        (None, TypeError, "save_state"),
+        (3, TypeError, "int"),
+    ]:
         with pytest.raises(error, match=f"state: .*{words}"):
             one.restore_state(state)
     *_, info = one.step(one.action_space.low)
@@ -208,10 +217,15 @@ def test_a_forked_child_is_refused_and_makes_its_own(one):
     one.step(one.action_space.low)
 
 
+@pytest.mark.skipif(os.name == "nt", reason="a process cannot be sent Ctrl-C so")
 def test_ctrl_c_ends_the_building_of_many_cells():
     # All of them would take minutes.
-    threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT)).start()
+    press = threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT))
+    press.start()
     began = time.monotonic()
-    with pytest.raises(KeyboardInterrupt):
-        trocar.TrocarVectorEnv(400, task="port-reach", threads=2)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            trocar.TrocarVectorEnv(400, task="port-reach", threads=2)
+    finally:
+        press.cancel()
     assert time.monotonic() - began < 30

@@ -30,7 +30,6 @@ class Saved:
     """A cell as it was, with what Python keeps of it; an object of this process."""
 
     native: State
-    task: str
     seed: int
     #: Draws the seeds of the episodes that follow, and what it was made with (-1 where that is not known).
     dice: np.random.Generator
@@ -198,14 +197,12 @@ class Cells:
         """Cell `k` as it is, with the `dice` that draw its next seeds."""
         native = self.native
         self._need_begun(np.arange(self.count) == k)
-        return Saved(native.save(k), self.task, int(self.seeds[k]), copy.deepcopy(dice), dice_seed)
+        return Saved(native.save(k), int(self.seeds[k]), copy.deepcopy(dice), dice_seed)
 
     def restore(self, k: int, saved: Saved) -> np.random.Generator:
         """Puts `saved` into cell `k` and gives its dice, which are the caller's to put in place. What is refused changes nothing."""
         if not isinstance(saved, Saved):
             raise TypeError(f"state: is {type(saved).__name__}; what save_state gave is needed")
-        if saved.task != self.task:
-            raise ValueError(f"state: is of {saved.task}; this environment has {self.task}")
         self.native.restore(k, saved.native, self.written)
         self.seeds[k], self.begun[k] = saved.seed, True
         self._look(np.arange(self.count) == k)

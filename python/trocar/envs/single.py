@@ -59,7 +59,7 @@ class TrocarEnv(OfOneCell, gym.Env):
 
     def restore_state(self, state: Saved) -> Any:
         """Goes back to a state that `save_state` of this environment, or of one like it, gave; returns what is seen there. A state of
-        another task is a ValueError."""
+        another scene or task is a ValueError."""
         self._np_random = self.cells.restore(0, state)
         self._np_random_seed = state.dice_seed
         return self._observation()

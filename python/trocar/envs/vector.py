@@ -141,7 +141,8 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
         return self.cells.save(k, self._dice[k])
 
     def restore_state(self, k: int, state: Saved) -> Any:
-        """Puts a state that `save_state` gave, here or of `TrocarEnv`, into cell `k`; returns what is seen there."""
+        """Puts a state that `save_state` gave, here or of `TrocarEnv`, into cell `k`; returns what is seen there. A state of
+        another scene or task is a ValueError."""
         k = whole("k", k, 0, self.num_envs - 1)
         self._dice[k] = self.cells.restore(k, state)
         self._over[k] = self.cells.ended[k] >= 0
