@@ -5,6 +5,7 @@ import os
 import shutil
 
 import gymnasium as gym
+import numpy as np
 import pytest
 import trocar  # noqa: F401  (registers the environments)
 
@@ -54,3 +55,23 @@ def short_scene(tmp_path_factory):
 def lift_scene(tmp_path_factory):
     """A scene file of grasp-lift, with time enough to pass."""
     return changed_scene(tmp_path_factory.mktemp("scene"), "grasp-lift", 20.0)
+
+
+def rollout(env, seed, actions):
+    """Observations, rewards and hashes of an episode."""
+    seen, _ = env.reset(seed=seed)
+    all_seen, rewards, hashes = [seen], [], []
+    for action in actions:
+        seen, reward, ended, late, _ = env.step(action)
+        all_seen.append(seen)
+        rewards.append(reward)
+        hashes.append(env.unwrapped.state_hash)
+        if ended or late:
+            break
+    return np.array(all_seen), np.array(rewards), hashes
+
+
+def actions_of(env, seed, count):
+    dice = np.random.default_rng(seed)
+    low, high = env.action_space.low, env.action_space.high
+    return [dice.uniform(low, high).astype(np.float32) for _ in range(count)]

@@ -1,17 +1,21 @@
-"""The environments keep Gymnasium's contract, and one cell and many give the same numbers."""
+"""One cell keeps Gymnasium's contract: seeds, saved states, ends, errors by name."""
 
 import os
+import signal
 import subprocess
 import sys
+import threading
+import time
+import typing
 
 import gymnasium as gym
 import numpy as np
 import pytest
 import trocar
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
-from gymnasium.vector import AutoresetMode
 
-from conftest import SHORT
+from conftest import SHORT, actions_of, changed_scene, rollout
 
 NAMES = list(trocar.TASKS)
 
@@ -19,31 +23,12 @@ NAMES = list(trocar.TASKS)
 @pytest.mark.parametrize("name", NAMES)
 def test_gymnasium_finds_nothing_wrong(name):
     env = gym.make(name, **SHORT)
+    assert type(env) is trocar.TrocarEnv, "nothing is wrapped around it that hides its attributes"
     # The check of closing builds another cell; one environment's is enough.
-    check_env(env.unwrapped, skip_render_check=True, skip_close_check=name != NAMES[0])
+    check_env(env, skip_render_check=True, skip_close_check=name != NAMES[0])
     assert env.unwrapped.task_description and env.unwrapped._max_episode_steps == 12
     assert len(env.unwrapped.state_names) == env.observation_space.shape[0]
     assert len(env.unwrapped.action_names) == env.action_space.shape[0] == 10
-
-
-def rollout(env, seed, actions):
-    """Observations, rewards and hashes of an episode."""
-    seen, _ = env.reset(seed=seed)
-    all_seen, rewards, hashes = [seen], [], []
-    for action in actions:
-        seen, reward, ended, late, _ = env.step(action)
-        all_seen.append(seen)
-        rewards.append(reward)
-        hashes.append(env.unwrapped.state_hash)
-        if ended or late:
-            break
-    return np.array(all_seen), np.array(rewards), hashes
-
-
-def actions_of(env, seed, count):
-    dice = np.random.default_rng(seed)
-    low, high = env.action_space.low, env.action_space.high
-    return [dice.uniform(low, high).astype(np.float32) for _ in range(count)]
 
 
 def test_a_seed_gives_the_same_bits_again_and_from_a_saved_state(one):
@@ -94,49 +79,17 @@ def test_wrong_actions_are_refused_by_name_and_change_nothing(one):
         ({"obs": "smell"}, "smell"),
         ({"actions": "joints"}, "pivots"),
         ({"episode_s": -1.0}, "episode_s"),
+        ({"threads": -1}, "threads: is -1"),
+        ({"threads": 10**6}, "threads: .* 1024"),
+        ({"obs": "state+agent_pos"}, "obs: .*once"),
+        ({"image_size": 64}, "image_size: is 64"),
+        ({"image_size": (64.5, 64)}, "image_size: .*whole"),
+        ({"image_size": "64"}, "image_size"),
     ]:
         with pytest.raises(ValueError, match=words):
             trocar.TrocarEnv(**({"task": "grasp-lift"} | options))
     with pytest.raises(ValueError, match="grasp-lift"):
         trocar.TrocarEnv(task="sew")
-
-
-def test_many_cells_give_what_one_gives(one):
-    envs = gym.make_vec("trocar/GraspLift-v0", num_envs=3, vectorization_mode="vector_entry_point", **SHORT)
-    assert envs.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
-    actions = [actions_of(one, seed, 12) for seed in (10, 11, 12)]
-    alone = [rollout(one, seed, actions[k]) for k, seed in enumerate((10, 11, 12))]
-    seen, _ = envs.reset(seed=10)
-    for step in range(12):
-        assert np.array_equal(seen, np.stack([a[0][step] for a in alone]))
-        seen, rewards, ended, late, infos = envs.step(np.stack([a[step] for a in actions]))
-        assert np.array_equal(rewards, [a[1][step] for a in alone])
-    assert late.all() and not ended.any() and infos["end"].tolist() == ["time-out"] * 3
-    # The next step begins new episodes and gives no reward.
-    seen, rewards, ended, late, _ = envs.step(np.stack([a[0] for a in actions]))
-    assert not late.any() and not rewards.any() and not np.array_equal(seen, np.stack([a[0][0] for a in alone]))
-    assert list(envs.call("task")) == ["grasp-lift"] * 3 and len(envs.envs) == 3
-
-
-def test_the_other_ways_to_begin_anew(one):
-    options = {"num_envs": 2, "task": "grasp-lift", "episode_s": 0.1}
-    actions = np.stack([actions_of(one, 3, 1)[0]] * 2)
-    same = trocar.TrocarVectorEnv(**options, autoreset_mode="same-step")
-    same.reset(seed=4)
-    for _ in range(3):
-        seen, _, _, late, infos = same.step(actions)
-    assert late.all() and infos["final_info"]["end"].tolist() == ["time-out"] * 2 and "end" not in infos
-    assert not np.array_equal(infos["final_obs"][0], seen[0])
-    same.step(actions)
-    disabled = trocar.TrocarVectorEnv(**options, autoreset_mode="disabled", copy=False)
-    first, _ = disabled.reset(seed=4)
-    start = first.copy()
-    for _ in range(3):
-        disabled.step(actions)
-    with pytest.raises(RuntimeError, match="reset_mask"):
-        disabled.step(actions)
-    again, _ = disabled.reset(seed=4, options={"reset_mask": np.array([True, True])})
-    assert again is first and np.array_equal(again, start), "the arrays are the cells' own"
 
 
 def test_two_processes_give_the_same_numbers(one):
@@ -152,3 +105,127 @@ def test_two_processes_give_the_same_numbers(one):
     for _ in range(8):
         one.unwrapped.step(dice.uniform(one.action_space.low, one.action_space.high))
     assert int(printed.stdout) == one.unwrapped.state_hash
+
+
+def test_a_restored_state_has_its_seed_and_draws_the_same_seeds(one):
+    one.reset(seed=3)
+    saved = one.save_state()
+    after = [one.reset()[1]["seed"] for _ in range(2)]
+    one.reset(seed=4)
+    one.restore_state(saved)
+    *_, info = one.step(one.action_space.low)
+    assert info["seed"] == 3 and one.np_random_seed == 3
+    assert [one.reset()[1]["seed"] for _ in range(2)] == after
+    one.restore_state(saved)
+    assert [one.reset()[1]["seed"] for _ in range(2)] == after, "a saved state stays as it was"
+
+
+def test_a_state_of_something_else_is_refused_and_changes_nothing(one, tmp_path):
+    other = trocar.TrocarEnv(task="port-reach", **SHORT)
+    path = changed_scene(tmp_path, "grasp-lift", 0.4)
+    path.write_text(path.read_text().replace("control_hz = 30", "control_hz = 60"))
+    faster = trocar.TrocarEnv(str(path))
+    other.reset(seed=5)
+    faster.reset(seed=5)
+    one.reset(seed=6)
+    before = one.state_hash
+    for state, error, words in [
+        (other.save_state(), ValueError, "port-reach"),
+        (faster.save_state(), ValueError, "another scene"),
+        (None, TypeError, "save_state"),
+        (3, TypeError, "int"),
+    ]:
+        with pytest.raises(error, match=f"state: .*{words}"):
+            one.restore_state(state)
+    *_, info = one.step(one.action_space.low)
+    assert info["seed"] == 6 and one.state_hash != before
+
+
+def test_order_is_kept_without_wrappers():
+    env = trocar.TrocarEnv(task="port-reach", render_mode="rgb_array", **SHORT)
+    for too_early in (lambda: env.step(env.action_space.low), env.render, env.save_state):
+        with pytest.raises(ResetNeeded, match="reset first"):
+            too_early()
+    env.reset(seed=1)
+    env.step(env.action_space.low)
+    saved = env.save_state()
+    env.close()
+    env.close()
+    for too_late in (env.reset, lambda: env.step(env.action_space.low), env.render, env.save_state, lambda: env.restore_state(saved)):
+        with pytest.raises(ClosedEnvironmentError, match="closed"):
+            too_late()
+    assert env.cells._native is None, "the cell is freed"
+    assert env.task == "port-reach" and len(env.state_names) == env.observation_space.shape[0]
+
+
+def test_seeds_are_told_by_name(one):
+    assert one.reset(seed=np.int64(3))[1]["seed"] == 3 and one.reset(seed=2**63 - 1)[1]["seed"] == 2**63 - 1
+    for seed in (-1, 2**63, 2**64, 1.5):
+        with pytest.raises(ValueError, match="seed: is "):
+            one.reset(seed=seed)
+
+
+def test_the_state_alone_may_be_in_a_dict():
+    env = trocar.TrocarEnv(task="grasp-lift", obs="agent_pos", **SHORT)
+    check_env(env, skip_render_check=True, skip_close_check=True)
+    assert set(env.observation_space) == {"agent_pos"} and set(env.reset(seed=1)[0]) == {"agent_pos"}
+
+
+def test_the_rate_is_the_scenes(one, tmp_path):
+    path = changed_scene(tmp_path, "port-reach", 0.5)
+    path.write_text(path.read_text().replace("control_hz = 30", "control_hz = 60"))
+    env = trocar.TrocarEnv(str(path))
+    assert env.metadata["render_fps"] == 60 and one.metadata["render_fps"] == 30
+    assert trocar.TrocarEnv.metadata["render_fps"] == 30, "the class is as it was"
+    envs = trocar.TrocarVectorEnv(1, str(path))
+    assert envs.metadata["render_fps"] == envs.envs[0].metadata["render_fps"] == 60
+
+
+def test_types_of_options_can_be_asked_for():
+    for kind in (trocar.TrocarEnv, trocar.TrocarVectorEnv):
+        assert "options" in typing.get_type_hints(kind.__init__)
+
+
+def refuses(use):
+    """Whether `use` says that the environment is another process's."""
+    try:
+        use()
+    except RuntimeError as why:
+        return "another process" in str(why)
+    return False
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="the platform has no fork")
+@pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
+def test_a_forked_child_is_refused_and_makes_its_own(one):
+    one.reset(seed=1)
+    saved = one.save_state()
+    child = os.fork()
+    if child == 0:
+        # Nothing of the tests' own is to run in the child, whatever happens.
+        try:
+            signal.alarm(60)
+            refused = [refuses(use) for use in (lambda: one.reset(seed=1), lambda: one.step(one.action_space.low), one.save_state,
+                                                lambda: one.restore_state(saved), lambda: one.cells.render(0))]
+            own = trocar.TrocarEnv(task="grasp-lift", **SHORT)
+            own.reset(seed=1)
+            own.step(own.action_space.low)
+            os._exit(sum(refused))
+        finally:
+            os._exit(99)
+    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 5
+    one.step(one.action_space.low)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="a process cannot be sent Ctrl-C so")
+def test_ctrl_c_ends_the_building_of_many_cells():
+    # All of them would take minutes.
+    press = threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT))
+    press.start()
+    began = time.monotonic()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            trocar.TrocarVectorEnv(400, task="port-reach", threads=2)
+    finally:
+        press.cancel()
+    assert time.monotonic() - began < 30

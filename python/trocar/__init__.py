@@ -32,4 +32,8 @@ for _name, _task in TASKS.items():
             kwargs={"task": _task},
             # The episode's time is the task's and ends it from within.
             max_episode_steps=None,
+            # Wrappers hand no attributes on, so `gym.make` gives the environment itself: LeRobot asks it for `task_description`. It
+            # says itself that a reset is missing, and the tests check what the checker would.
+            order_enforce=False,
+            disable_env_checker=True,
         )

@@ -21,10 +21,13 @@ def cameras(scene: str) -> list[tuple[str, int, int, bool]]:
     """A scene's cameras: name, height and width [px] of what policies see, whether it measures depth."""
 
 class State:
-    """A saved cell; it stays in the process."""
+    """A saved cell with the scene and specimen that it is of; it stays in the process."""
 
 class Cells:
-    """Episodes of one scene, stepped side by side without the interpreter's lock; arrays are the caller's."""
+    """Episodes of one scene, stepped side by side without the interpreter's lock; arrays are the caller's.
+
+    In another process than that which made them (a child made by `fork`) they raise RuntimeError. Building them listens to Ctrl-C.
+    """
 
     def __init__(
         self,
@@ -79,7 +82,8 @@ class Cells:
     def summary(self, k: int) -> str: ...
     def state_hash(self, k: int) -> int: ...
     def save(self, k: int) -> State: ...
-    def restore(self, k: int, saved: State, arrays: Arrays) -> None: ...
+    def restore(self, k: int, saved: State, arrays: Arrays) -> None:
+        """ValueError, and nothing changed, where the state is of another scene, task or specimen."""
 
 class Controller:
     """A controller of the program."""

@@ -32,19 +32,21 @@ class Policy:
 
     def reset(self, env: Any, k: int = 0) -> None:
         """Begins anew; call it after each reset of the environment."""
-        self._native.begin(self._cells(env).native, k)
+        cells, k = self._place(env, k)
+        self._native.begin(cells.native, k)
 
     def __call__(self, env: Any, k: int = 0) -> np.ndarray:
         """The next action, for `env.step`: float64 (a cell's exact targets), or -1 to 1 where the environment is normalized."""
-        cells = self._cells(env)
+        cells, k = self._place(env, k)
         action = self._native.act(cells.native, k)
         if cells.normalize:
             return 2.0 * (action - cells.low) / (cells.high - cells.low) - 1.0
         return action
 
     @staticmethod
-    def _cells(env: Any) -> Any:
+    def _place(env: Any, k: int) -> tuple[Any, int]:
+        """The cells of an environment, and which of them is its `k`th: `envs.envs[3]` has one, the fourth of `envs`."""
         cells = env.unwrapped.cells
         if cells.action_kind != "pivots":
             raise ValueError(f"policy: the environment has actions='{cells.action_kind}'; controllers give 'pivots'")
-        return cells
+        return cells, env.unwrapped.cell + k

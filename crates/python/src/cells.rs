@@ -1,6 +1,6 @@
 //! `Cells`: episodes of one scene, side by side in one process.
 
-use crate::error::{task, wrong};
+use crate::error::{forked, task, wrong};
 use crate::frames::Rows;
 use crate::pictures::Eyes;
 use crate::prepare;
@@ -9,6 +9,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
 use trocar_cell::{Action, ActionSpace};
+use trocar_scene::Scene;
 use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it goes on), time [s].
@@ -17,9 +18,30 @@ const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 /// Names of the ends, by their number in `figures`.
 const ENDS: [&str; 5] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error"];
 
-/// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
+/// A saved episode and what it is of. It stays in the process: nothing loaded from disk is trusted with so much.
 #[pyclass(frozen, module = "trocar._native")]
-pub struct State(EpisodeState);
+pub struct State {
+    state: EpisodeState,
+    scene: Scene,
+    specimen: u64,
+}
+
+impl State {
+    /// A state goes into cells of the same scene, task and specimen alone; how long an episode may be does not matter.
+    fn check(&self, episode: &Episode) -> PyResult<()> {
+        let (own, saved) = (episode.scene(), &self.scene);
+        if own.task.name != saved.task.name {
+            let (own, saved) = (own.task.name.name(), saved.task.name.name());
+            return Err(wrong(format!("state: is of the task {saved}; this environment has {own}")));
+        }
+        let mut own = own.clone();
+        own.task.episode_s = saved.task.episode_s;
+        if own != *saved || episode.specimen_hash() != self.specimen {
+            return Err(wrong("state: is of another scene or specimen than this environment's"));
+        }
+        Ok(())
+    }
+}
 
 /// Episodes of one scene, stepped side by side.
 #[pyclass(module = "trocar._native")]
@@ -31,6 +53,8 @@ pub struct Cells {
     task_name: &'static str,
     prompt: String,
     steps: usize,
+    /// The process that made them. The pool's threads do not live on in a child made by `fork`, and work given to them there would wait for ever.
+    process: u32,
 }
 
 /// The caller's arrays that steps write, as a tuple: (cells, numbers) each.
@@ -114,14 +138,13 @@ impl Cells {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(wrong)?;
             // One cell uses all threads; of many, each has its own.
             let each = if count == 1 { threads } else { 1 };
-            let built: Result<Vec<Episode>, trocar_task::Error> =
-                pool.install(|| (0..count).into_par_iter().map(|_| Episode::new(&scene, &specimen, each)).collect());
-            let episodes = built.map_err(|e| crate::error::task(&e))?;
+            let episodes = built(&pool, count, || Episode::new(&scene, &specimen, each))?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let prompt = trocar_task::prompt(&scene);
             let eyes = Eyes::new(specimen, count, sensor_noise);
-            Ok(Self { episodes, eyes, bounds, pool, task_name: scene.task.name.name(), prompt, steps })
+            let (task_name, process) = (scene.task.name.name(), std::process::id());
+            Ok(Self { episodes, eyes, bounds, pool, task_name, prompt, steps, process })
         })
     }
 
@@ -298,24 +321,49 @@ impl Cells {
 
     /// The state of cell `k`.
     fn save(&self, k: usize) -> PyResult<State> {
-        Ok(State(self.at(k)?.save()))
+        let episode = self.at(k)?;
+        Ok(State { state: episode.save(), scene: episode.scene().clone(), specimen: episode.specimen_hash() })
     }
 
-    /// Puts `state` into cell `k`, and writes what is seen there.
+    /// Puts `saved` into cell `k`, and writes what is seen there. A state of something else is refused before anything changes.
     fn restore(&mut self, py: Python<'_>, k: usize, saved: &State, arrays: Arrays<'_>) -> PyResult<()> {
-        self.at(k)?;
+        saved.check(self.at(k)?)?;
         self.eyes.moved(k, self.episodes[k].scene());
         let which: Vec<Option<&State>> = (0..self.episodes.len()).map(|j| (j == k).then_some(saved)).collect();
         let put = |(place, saved): (&mut Place<'_>, &Option<&State>)| match saved {
-            Some(saved) => place.episode.restore(&saved.0).map(|()| place.write(0.0)),
+            Some(saved) => place.episode.restore(&saved.state).map(|()| place.write(0.0)),
             None => Ok(()),
         };
         self.each(py, &arrays, &which, put)
     }
 }
 
+/// `count` episodes, as many at a time as the pool has threads. In between the interpreter's signals are looked at: many cells take minutes.
+fn built(
+    pool: &rayon::ThreadPool,
+    count: usize,
+    one: impl Fn() -> trocar_task::Result<Episode> + Sync,
+) -> PyResult<Vec<Episode>> {
+    let mut episodes = Vec::with_capacity(count);
+    while episodes.len() < count {
+        let batch = pool.current_num_threads().clamp(1, count - episodes.len());
+        let more: trocar_task::Result<Vec<Episode>> =
+            pool.install(|| (0..batch).into_par_iter().map(|_| one()).collect());
+        episodes.extend(more.map_err(|e| task(&e))?);
+        // Signals are told to the thread that called, not to those of the pool.
+        Python::attach(|py| py.check_signals())?;
+    }
+    Ok(episodes)
+}
+
 impl Cells {
+    /// Cells are refused in another process than that which made them.
+    pub(crate) fn here(&self) -> PyResult<()> {
+        if std::process::id() == self.process { Ok(()) } else { Err(forked()) }
+    }
+
     pub(crate) fn at(&self, k: usize) -> PyResult<&Episode> {
+        self.here()?;
         let count = self.episodes.len();
         self.episodes.get(k).ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))
     }
@@ -328,6 +376,7 @@ impl Cells {
         with: &[T],
         work: impl Fn((&mut Place<'_>, &T)) -> Result<(), trocar_task::Error> + Sync,
     ) -> PyResult<()> {
+        self.here()?;
         let count = self.episodes.len();
         let mut state = Rows::new(&arrays.state, "state", count, &[STATE_SIZE])?;
         let mut figures = Rows::new(&arrays.figures, "figures", count, &[FIGURES.len()])?;

@@ -8,6 +8,11 @@ pub fn wrong(why: impl std::fmt::Display) -> PyErr {
     PyValueError::new_err(why.to_string())
 }
 
+/// Cells that a forked child has from its parent.
+pub fn forked() -> PyErr {
+    PyRuntimeError::new_err("this environment was made in another process, before a fork; make it anew in this one")
+}
+
 /// An error of making or reading a specimen or scene.
 pub fn evaluate(error: &trocar_evaluate::Error) -> PyErr {
     match error {

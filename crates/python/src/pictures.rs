@@ -96,6 +96,7 @@ impl Cells {
         color: &[Bound<'_, PyArrayDyn<u8>>],
         depth: &[Bound<'_, PyArrayDyn<f32>>],
     ) -> PyResult<()> {
+        self.here()?;
         let count = self.episodes.len();
         let active = active.as_slice().map_err(wrong)?;
         let fits = |n: usize| n == 0 || n == cameras.len();

@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import os
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Sequence, TypedDict
+from typing import Any, Sequence
 
 import gymnasium as gym
 import numpy as np
 
 from .._native import Cells as Native
+from .._native import State
 from .._native import cameras as scene_cameras
-
-#: What can be observed.
-KINDS = ("state", "rgb", "depth")
-
-class Options(TypedDict, total=False):
-    """Options of every environment, as `trocar.envs` tells them; their defaults are those of `Cells`."""
-
-    task: str | None
-    obs: str
-    actions: str
-    normalize: bool
-    episode_s: float | None
-    threads: int
-    privileged: bool
-    cameras: Sequence[str] | None
-    image_size: tuple[int, int] | None
-    sensor_noise: bool
+from .options import Options, kinds_of, size_of, whole
 
 
 def phantoms_folder() -> Path:
@@ -36,6 +23,17 @@ def phantoms_folder() -> Path:
     if given := os.environ.get("TROCAR_PHANTOMS"):
         return Path(given)
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "trocar" / "phantoms"
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A cell as it was, with what Python keeps of it; an object of this process."""
+
+    native: State
+    seed: int
+    #: Draws the seeds of the episodes that follow, and what it was made with (-1 where that is not known).
+    dice: np.random.Generator
+    dice_seed: int = -1
 
 
 class Cells:
@@ -57,14 +55,12 @@ class Cells:
         image_size: tuple[int, int] | None = None,
         sensor_noise: bool = False,
     ):
-        self.kinds = obs.split("+")
-        unknown = [kind for kind in self.kinds if kind not in KINDS]
-        if unknown or len(set(self.kinds)) != len(self.kinds):
-            raise ValueError(f"obs: '{obs}' cannot be observed; join any of {', '.join(KINDS)} by '+'")
-        self._choose_cameras(scene, cameras, image_size)
+        self.kinds, self.in_dict = kinds_of(obs)
+        count, threads = whole("num_envs", count, 1, 4096), whole("threads", threads, 0, 1024)
+        self._choose_cameras(scene, cameras, size_of(image_size))
         folder = phantoms_folder()
         folder.mkdir(parents=True, exist_ok=True)
-        self.native = Native(
+        native = self._native = Native(
             scene,
             count,
             phantoms=folder,
@@ -75,11 +71,16 @@ class Cells:
             sensor_noise=sensor_noise,
         )
         self.count, self.privileged, self.normalize = count, privileged, normalize
-        native = self.native
-        self.state = np.zeros((count, len(native.state_names)), np.float32)
+        self.task, self.prompt, self.max_steps = native.task, native.prompt, native.max_steps
+        self.state_names, self.action_names, self.channel_names = native.state_names, native.action_names, native.channel_names
+        #: Steps a second. Scenes have whole ones, which films and datasets want.
+        self.fps = round(native.control_hz)
+        #: Cells whose first episode has begun.
+        self.begun = np.zeros(count, bool)
+        self.state = np.zeros((count, len(self.state_names)), np.float32)
         self.seeds = np.zeros(count, np.uint64)
         self.figures = np.zeros((count, len(native.figure_names)), np.float64)
-        self.channels = np.zeros((count, len(native.channel_names)), np.float64)
+        self.channels = np.zeros((count, len(self.channel_names)), np.float64)
         self.written = (self.state, self.figures, self.channels)
         self.low, self.high = native.action_limits
         self.action_kind = actions
@@ -87,6 +88,22 @@ class Cells:
         self.depth = {c: np.zeros((count, *s, 1), np.float32) for c, s in self.sizes.items() if "depth" in self.kinds}
         self.ends = native.end_names
         self.stages = native.stage_names
+
+    @property
+    def native(self) -> Native:
+        """The native cells, until they are closed."""
+        if self._native is None:
+            raise gym.error.ClosedEnvironmentError("the environment is closed; make another")
+        return self._native
+
+    def close(self) -> None:
+        """Frees the cells and the arrays of pictures."""
+        self._native, self.color, self.depth = None, {}, {}
+
+    def _need_begun(self, which: np.ndarray) -> None:
+        """Cells that are used are flagged by `which`; each must have been reset once."""
+        if missing := np.flatnonzero(which & ~self.begun).tolist():
+            raise gym.error.ResetNeeded(f"call reset first: cells {missing} have no episode")
 
     def action_space(self) -> gym.spaces.Box:
         if self.normalize:
@@ -103,14 +120,12 @@ class Cells:
         strange = [name for name in wanted if name not in known]
         if strange or len(set(wanted)) != len(wanted):
             raise ValueError(f"cameras: {wanted} cannot be seen; any of {', '.join(known)} can, each once")
-        if size is not None and (len(size) != 2 or not all(8 <= n <= 8192 for n in size)):
-            raise ValueError(f"image_size: is {size}; height and width are wanted, 8 to 8192 pixels each")
-        sizes = {name: known[name] if size is None else (int(size[0]), int(size[1])) for name in wanted}
+        sizes = {name: size or known[name] for name in wanted}
         sees = {"rgb", "depth"} & set(self.kinds)
         if sees and not wanted:
             raise ValueError(f"cameras: {' and '.join(sorted(sees))} need at least one; there are {', '.join(known)}")
         self.sizes = sizes if sees else {}
-        self.render_size = known.get("endoscope", (224, 224)) if size is None else (int(size[0]), int(size[1]))
+        self.render_size = size or known.get("endoscope", (224, 224))
         self.render_camera = "endoscope" if "endoscope" in known else next(iter(known), None)
 
     def _look(self, which: np.ndarray) -> None:
@@ -124,11 +139,13 @@ class Cells:
         """The endoscope's picture of cell `k` (height, width, 3)."""
         if self.render_camera is None:
             raise ValueError("render: the scene has no camera")
-        return self.native.picture(k, self.render_camera, *self.render_size)
+        native = self.native
+        self._need_begun(np.arange(self.count) == k)
+        return native.picture(k, self.render_camera, *self.render_size)
 
     def observation_space(self) -> gym.Space:
         state = gym.spaces.Box(-np.inf, np.inf, (self.state.shape[1],), np.float32)
-        if self.kinds == ["state"]:
+        if not self.in_dict:
             return state
         parts: dict[str, gym.Space] = {}
         if "state" in self.kinds:
@@ -143,7 +160,7 @@ class Cells:
 
     def observation(self) -> Any:
         """What is seen now: the arrays themselves, which the next step writes again."""
-        if self.kinds == ["state"]:
+        if not self.in_dict:
             return self.state
         parts: dict[str, Any] = {}
         if "state" in self.kinds:
@@ -158,29 +175,38 @@ class Cells:
         """Begins the episodes of `seeds` in the cells `which`."""
         which, seeds = np.asarray(which, np.int64), np.asarray(seeds, np.uint64)
         self.native.reset(which, seeds, self.written)
-        self.seeds[which] = seeds
+        self.seeds[which], self.begun[which] = seeds, True
         flags = np.zeros(self.count, bool)
         flags[which] = True
         self._look(flags)
 
     def step(self, actions: np.ndarray, active: np.ndarray | None = None) -> None:
         """Steps the cells that are `active` (all if not given) by their rows of `actions`."""
+        native = self.native
+        active = np.ones(self.count, bool) if active is None else np.asarray(active, bool)
+        self._need_begun(active)
         actions = np.asarray(actions, np.float64)
         if actions.shape != (self.count, len(self.low)):
             raise ValueError(f"actions have shape {actions.shape}; {(self.count, len(self.low))} is needed")
         if self.normalize:
             actions = self.low + 0.5 * (np.clip(actions, -1.0, 1.0) + 1.0) * (self.high - self.low)
-        active = np.ones(self.count, bool) if active is None else np.asarray(active, bool)
-        self.native.step(np.ascontiguousarray(actions), active, self.written)
+        native.step(np.ascontiguousarray(actions), active, self.written)
         self._look(active)
 
-    def save(self, k: int) -> Any:
-        """The state of cell `k`: an object of this process."""
-        return self.native.save(k)
+    def save(self, k: int, dice: np.random.Generator, dice_seed: int = -1) -> Saved:
+        """Cell `k` as it is, with the `dice` that draw its next seeds."""
+        native = self.native
+        self._need_begun(np.arange(self.count) == k)
+        return Saved(native.save(k), int(self.seeds[k]), copy.deepcopy(dice), dice_seed)
 
-    def restore(self, k: int, state: Any) -> None:
-        self.native.restore(k, state, self.written)
+    def restore(self, k: int, saved: Saved) -> np.random.Generator:
+        """Puts `saved` into cell `k` and gives its dice, which are the caller's to put in place. What is refused changes nothing."""
+        if not isinstance(saved, Saved):
+            raise TypeError(f"state: is {type(saved).__name__}; what save_state gave is needed")
+        self.native.restore(k, saved.native, self.written)
+        self.seeds[k], self.begun[k] = saved.seed, True
         self._look(np.arange(self.count) == k)
+        return copy.deepcopy(saved.dice)
 
     # What the figures say; their columns are reward, score, stage, end, time.
 
@@ -220,45 +246,3 @@ class Cells:
         if end >= 0:
             info |= {"end": self.ends[int(end)], "why": self.native.why(k), "summary": json.loads(self.native.summary(k))}
         return info
-
-
-class OfCells:
-    """What environments say of their cells, whether they are one or many."""
-
-    cells: Cells
-
-    def _begin(self, count: int, scene: str, render_mode: str | None, options: Options) -> None:
-        """Builds the cells; what is wrong with an option is told by its name."""
-        if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode: '{render_mode}' is unknown; rgb_array is known")
-        self.render_mode = render_mode
-        self.cells = Cells(count, scene, **options)
-
-    @property
-    def task(self) -> str:
-        """Name of the task."""
-        return self.cells.native.task
-
-    @property
-    def task_description(self) -> str:
-        """What is asked for, in words: the `prompt` of policies."""
-        return self.cells.native.prompt
-
-    @property
-    def state_names(self) -> list[str]:
-        """Names of the numbers of a state."""
-        return self.cells.native.state_names
-
-    @property
-    def action_names(self) -> list[str]:
-        """Names of the numbers of an action."""
-        return self.cells.native.action_names
-
-    @property
-    def channel_names(self) -> list[str]:
-        """Names of the privileged channels."""
-        return self.cells.native.channel_names
-
-    @property
-    def _max_episode_steps(self) -> int:
-        return self.cells.native.max_steps

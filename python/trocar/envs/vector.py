@@ -2,31 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any, Sequence
 
 import gymnasium as gym
 import numpy as np
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
+from typing_extensions import Unpack
 
-from .cells import OfCells, Options
-
-if TYPE_CHECKING:
-    from typing_extensions import Unpack
-
-
-class _View:
-    """What evaluation code asks of one environment of many."""
-
-    def __init__(self, env: TrocarVectorEnv):
-        self.task, self.task_description = env.task, env.task_description
-        self._max_episode_steps = env._max_episode_steps
-        self.metadata, self.spec = env.metadata, env.spec
-        self.observation_space, self.action_space = env.single_observation_space, env.single_action_space
-
-    @property
-    def unwrapped(self) -> _View:
-        return self
+from .cells import Saved
+from .of_cells import OfCells, row_of
+from .options import Options, mask_of, seed_of, whole
+from .view import View
 
 
 class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
@@ -37,7 +24,10 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
 
     `autoreset_mode` is one of Gymnasium's: `next-step` (the step after an ended episode resets it and ignores its action),
     `same-step` (the step that ends an episode resets it; `info` has `final_obs` and `final_info`), `disabled`
-    (`reset(options={"reset_mask": ...})` is the caller's).
+    (`reset(options={"reset_mask": ...})` is the caller's). LeRobot's evaluation reads success from `final_info`, which only
+    `same-step` gives.
+
+    `envs[k]` shows cell `k` as an environment of its own, which is not stepped alone; `call`, `get_attr` and `set_attr` go to these.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}
@@ -52,17 +42,17 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
         render_mode: str | None = None,
         **options: Unpack[Options],
     ):
-        self.num_envs, self.copy = num_envs, copy
-        self.autoreset_mode = _mode(autoreset_mode)
-        self.metadata = type(self).metadata | {"autoreset_mode": self.autoreset_mode}
+        self.autoreset_mode, self.copy = _mode(autoreset_mode), copy
         self._begin(num_envs, scene, render_mode, options)
+        num_envs = self.num_envs = self.cells.count
+        self.metadata["autoreset_mode"] = self.autoreset_mode
         self.single_observation_space = self.cells.observation_space()
         self.single_action_space = self.cells.action_space()
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._over = np.zeros(num_envs, bool)
         self._dice = [np.random.default_rng() for _ in range(num_envs)]
-        self.envs = [_View(self) for _ in range(num_envs)]
+        self.envs = [View(self, k) for k in range(num_envs)]
 
     def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
         """An attribute, or what a method gives, of each environment."""
@@ -73,23 +63,38 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
         """An attribute of each environment."""
         return self.call(name)
 
+    def set_attr(self, name: str, values: Any) -> None:
+        """Sets an attribute of each environment's view: a list or tuple has one value for each, anything else is for all."""
+        values = values if isinstance(values, (list, tuple)) else [values] * self.num_envs
+        if len(values) != self.num_envs:
+            raise ValueError(f"values: has {len(values)}; {self.num_envs} are needed")
+        for env, value in zip(self.envs, values):
+            setattr(env, name, value)
+
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, dict[str, Any]]:
-        mask = (options or {}).get("reset_mask")
-        which = np.arange(self.num_envs) if mask is None else np.flatnonzero(np.asarray(mask))
-        seeds = [None] * self.num_envs if seed is None else seed
-        if isinstance(seeds, (int, np.integer)):
-            seeds = [int(seeds) + k for k in range(self.num_envs)]
-        if len(seeds) != self.num_envs:
-            raise ValueError(f"seed: has {len(seeds)} seeds; {self.num_envs} are needed")
+        """Begins the episodes of the seeds (0 to 2^63 - 1; one is for the first cell, the next ones for the others) in the cells that
+        `options["reset_mask"]`, flags (num_envs,), says, or in all. Nothing is reset where either is wrong."""
+        which = np.flatnonzero(mask_of((options or {}).get("reset_mask"), self.num_envs))
+        seeds = self._seeds(seed)
         for k in which:
             if seeds[k] is not None:
                 self._dice[k] = np.random.default_rng(seeds[k])
-        drawn = np.array([self._draw(k) if seeds[k] is None else seeds[k] for k in which], np.uint64)
-        self.cells.reset(which, drawn)
+        self.cells.reset(which, np.array([self._draw(k) if seeds[k] is None else seeds[k] for k in which], np.uint64))
         self._over[which] = False
         return self._observation(), self._infos()
+
+    def _seeds(self, seed: int | Sequence[int | None] | None) -> list[int | None]:
+        """A seed, or None, for each cell."""
+        if seed is None:
+            return [None] * self.num_envs
+        if np.ndim(seed) == 0:
+            first = seed_of(seed)
+            return [seed_of(first + k) for k in range(self.num_envs)]
+        if len(seed) != self.num_envs:
+            raise ValueError(f"seed: has {len(seed)} seeds; {self.num_envs} are needed")
+        return [None if one is None else seed_of(one) for one in seed]
 
     def step(self, actions: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         cells = self.cells
@@ -110,7 +115,7 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
                 final = self._add_info(final, cells.info(k), k)
             seen = np.full(self.num_envs, None, dtype=object)
             for k in over:
-                seen[k] = _row(cells.observation(), k)
+                seen[k] = row_of(cells.observation(), k)
             cells.reset(over, np.array([self._draw(k) for k in over], np.uint64))
             # What stands outside of "final_" is of the episodes that have begun.
             infos = self._infos()
@@ -125,14 +130,23 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
             return None
         return tuple(self.cells.render(k) for k in range(self.num_envs))
 
-    def save_state(self, k: int) -> Any:
-        """The whole state of cell `k`; it stays in the process."""
-        return self.cells.save(k), self._over[k]
+    def close_extras(self, **kwargs: Any) -> None:
+        """Frees the cells; names and spaces stay."""
+        if hasattr(self, "cells"):
+            self.cells.close()
 
-    def restore_state(self, k: int, state: Any) -> None:
-        """Puts a state that `save_state` gave into cell `k`."""
-        saved, self._over[k] = state
-        self.cells.restore(k, saved)
+    def save_state(self, k: int) -> Saved:
+        """The whole state of cell `k`, the seeds of its episodes to come included; it stays in the process."""
+        k = whole("k", k, 0, self.num_envs - 1)
+        return self.cells.save(k, self._dice[k])
+
+    def restore_state(self, k: int, state: Saved) -> Any:
+        """Puts a state that `save_state` gave, here or of `TrocarEnv`, into cell `k`; returns what is seen there. A state of
+        another scene or task is a ValueError."""
+        k = whole("k", k, 0, self.num_envs - 1)
+        self._dice[k] = self.cells.restore(k, state)
+        self._over[k] = self.cells.ended[k] >= 0
+        return row_of(self.cells.observation(), k)
 
     def _draw(self, k: int) -> int:
         return int(self._dice[k].integers(2**31))
@@ -152,14 +166,12 @@ def _mode(given: AutoresetMode | str) -> AutoresetMode:
     if isinstance(given, AutoresetMode):
         return given
     names = {"next-step": AutoresetMode.NEXT_STEP, "same-step": AutoresetMode.SAME_STEP, "disabled": AutoresetMode.DISABLED}
-    if given not in names:
+    # Gymnasium's own words too.
+    known = names | {mode.value: mode for mode in AutoresetMode}
+    if given not in known:
         raise ValueError(f"autoreset_mode: '{given}' is unknown; {', '.join(names)} are known")
-    return names[given]
+    return known[given]
 
 
 def _copied(value: Any) -> Any:
     return {key: _copied(part) for key, part in value.items()} if isinstance(value, dict) else value.copy()
-
-
-def _row(value: Any, k: int) -> Any:
-    return {key: _row(part, k) for key, part in value.items()} if isinstance(value, dict) else value[k].copy()
