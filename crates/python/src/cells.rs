@@ -9,7 +9,6 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
 use trocar_cell::{Action, ActionSpace};
-use trocar_scene::Scene;
 use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it goes on), time [s].
@@ -18,30 +17,9 @@ const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 /// Names of the ends, by their number in `figures`.
 const ENDS: [&str; 5] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error"];
 
-/// A saved episode and what it is of. It stays in the process: nothing loaded from disk is trusted with so much.
+/// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
 #[pyclass(frozen, module = "trocar._native")]
-pub struct State {
-    state: EpisodeState,
-    scene: Scene,
-    specimen: u64,
-}
-
-impl State {
-    /// A state goes into cells of the same scene, task and specimen alone; how long an episode may be does not matter.
-    fn check(&self, episode: &Episode) -> PyResult<()> {
-        let (own, saved) = (episode.scene(), &self.scene);
-        if own.task.name != saved.task.name {
-            let (own, saved) = (own.task.name.name(), saved.task.name.name());
-            return Err(wrong(format!("state: is of the task {saved}; this environment has {own}")));
-        }
-        let mut own = own.clone();
-        own.task.episode_s = saved.task.episode_s;
-        if own != *saved || episode.specimen_hash() != self.specimen {
-            return Err(wrong("state: is of another scene or specimen than this environment's"));
-        }
-        Ok(())
-    }
-}
+pub struct State(EpisodeState);
 
 /// Episodes of one scene, stepped side by side.
 #[pyclass(module = "trocar._native")]
@@ -321,17 +299,16 @@ impl Cells {
 
     /// The state of cell `k`.
     fn save(&self, k: usize) -> PyResult<State> {
-        let episode = self.at(k)?;
-        Ok(State { state: episode.save(), scene: episode.scene().clone(), specimen: episode.specimen_hash() })
+        Ok(State(self.at(k)?.save()))
     }
 
     /// Puts `saved` into cell `k`, and writes what is seen there. A state of something else is refused before anything changes.
     fn restore(&mut self, py: Python<'_>, k: usize, saved: &State, arrays: Arrays<'_>) -> PyResult<()> {
-        saved.check(self.at(k)?)?;
+        self.at(k)?;
         self.eyes.moved(k, self.episodes[k].scene());
         let which: Vec<Option<&State>> = (0..self.episodes.len()).map(|j| (j == k).then_some(saved)).collect();
         let put = |(place, saved): (&mut Place<'_>, &Option<&State>)| match saved {
-            Some(saved) => place.episode.restore(&saved.state).map(|()| place.write(0.0)),
+            Some(saved) => place.episode.restore(&saved.0).map(|()| place.write(0.0)),
             None => Ok(()),
         };
         self.each(py, &arrays, &which, put)

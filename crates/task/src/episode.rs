@@ -84,8 +84,9 @@ pub struct Step {
 /// An episode's whole state; what follows from a restored one is the same to the bit.
 #[derive(Clone, Debug)]
 pub struct EpisodeState {
-    /// Hash of the scene with the specimen.
-    scene: u64,
+    task: TaskName,
+    /// See [`key`].
+    key: u64,
     cell: CellState,
     arrangement: Arrangement,
     now: Now,
@@ -107,7 +108,7 @@ pub struct Episode {
     scene: Scene,
     specimen: Specimen,
     specimen_hash: u64,
-    /// Hash of the scene with the specimen: states of others do not belong here.
+    /// See [`key`].
     key: u64,
     threads: usize,
     cell: Cell,
@@ -138,7 +139,7 @@ impl Episode {
         let mut made = Self {
             scene: scene.clone(),
             specimen_hash,
-            key: scene.hash(&[specimen_hash])?,
+            key: key(scene, specimen_hash)?,
             specimen: specimen.clone(),
             threads,
             cell,
@@ -332,7 +333,13 @@ impl Episode {
 
     /// The state as it is now.
     pub fn save(&self) -> EpisodeState {
-        EpisodeState { scene: self.key, cell: self.cell.save(), arrangement: self.arrangement, now: self.now.clone() }
+        EpisodeState {
+            task: self.scene.task.name,
+            key: self.key,
+            cell: self.cell.save(),
+            arrangement: self.arrangement,
+            now: self.now.clone(),
+        }
     }
 
     /// Puts back a state that this episode, or another of the same scene and specimen, gave.
@@ -340,8 +347,13 @@ impl Episode {
     /// # Errors
     /// A state of another scene or specimen; the episode stays as it was.
     pub fn restore(&mut self, state: &EpisodeState) -> Result<()> {
-        if state.scene != self.key {
-            return Err(Error::Option("the state is of another scene, task or specimen than this episode".to_owned()));
+        let own = self.scene.task.name;
+        if state.task != own {
+            let (saved, own) = (state.task.name(), own.name());
+            return Err(Error::Option(format!("state: is of the task {saved}; this episode has {own}")));
+        }
+        if state.key != self.key {
+            return Err(Error::Option("state: is of another scene or specimen than this episode".to_owned()));
         }
         if state.arrangement != self.arrangement {
             (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
@@ -361,6 +373,13 @@ impl Episode {
         }
         hash.digest()
     }
+}
+
+/// What a state is known by to belong to an episode: the scene and the specimen. How long an episode may be does not matter.
+fn key(scene: &Scene, specimen: u64) -> Result<u64> {
+    let mut scene = scene.clone();
+    scene.task.episode_s = 0.0;
+    Ok(scene.hash(&[specimen])?)
 }
 
 /// The cell with the specimen as arranged, and its state once the organs have settled.

@@ -149,8 +149,15 @@ fn a_reset_gives_the_same_bits_whatever_was_before() {
     let mut other = Episode::new(&other, &specimen, 1).unwrap();
     let hash = other.state_hash();
     let said = other.restore(&saved).unwrap_err().to_string();
-    assert!(said.contains("another scene, task or specimen"), "{said}");
+    assert!(said.contains("of the task appendix-resection"), "{said}");
     assert_eq!(other.state_hash(), hash);
+    // Nor one of another scene; how long it may be does not matter.
+    let mut near = scene.clone();
+    near.task.episode_s += 1.0;
+    Episode::new(&near, &specimen, 1).unwrap().restore(&saved).unwrap();
+    near.task.gates.lift_mm += 1.0;
+    let said = Episode::new(&near, &specimen, 1).unwrap().restore(&saved).unwrap_err().to_string();
+    assert!(said.contains("another scene or specimen"), "{said}");
 }
 
 #[test]

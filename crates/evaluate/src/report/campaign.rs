@@ -215,7 +215,10 @@ fn stage_table(r: &CampaignResult) -> String {
 pub(super) fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
     let attached: Vec<&Kept> = kept.iter().filter(|k| k.summary.attached).collect();
     let most = |of: &dyn Fn(&Kept) -> f64| attached.iter().map(|k| of(k)).fold(1e-3, f64::max);
-    let (width, height) = (most(&|k| k.summary.lift_mm), most(&|k| k.summary.rcm_peak_mm));
+    let height = most(&|k| k.summary.rcm_peak_mm);
+    // The x axis begins where the values do, the y axis at zero: marks are as long as they look.
+    let least = attached.iter().map(|k| k.summary.lift_mm).fold(f64::INFINITY, f64::min);
+    let width = (most(&|k| k.summary.lift_mm) - least).max(1.0);
     let mut lines = Vec::new();
     for k in &attached {
         let (x, y, color) = (k.summary.lift_mm, k.summary.rcm_peak_mm, color(plan, &k.name));

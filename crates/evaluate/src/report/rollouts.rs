@@ -53,7 +53,17 @@ fn beside_paper(r: &RolloutsResult) -> String {
 }
 
 fn controllers(rows: &[PolicyRow]) -> String {
-    let head = ["controller", "rollouts", "passed", "attached", "held", "lift mm", "RCM mm", "RCM max mm", "diverged"];
+    let head = [
+        "controller",
+        "rollouts",
+        "passed",
+        "attached",
+        "held",
+        "lift mm",
+        "RCM mm, loaded median",
+        "RCM mm, max",
+        "diverged",
+    ];
     let row = |p: &PolicyRow| {
         vec![
             p.policy.clone(),
@@ -62,7 +72,7 @@ fn controllers(rows: &[PolicyRow]) -> String {
             count(p.attached),
             count(p.held_to_end),
             or_dash(p.lift_median_mm, 1),
-            or_dash(p.rcm_median_mm, 3),
+            or_dash(p.rcm_median_mm, 4),
             or_dash(p.rcm_max_mm, 3),
             count(p.ends[3]),
         ]
