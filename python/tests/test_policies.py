@@ -204,7 +204,7 @@ def test_the_program_evaluates_a_python_policy_and_outlives_one_that_raises(prog
 
 @pytest.mark.parametrize("policy, said", [
     ("nothing.here:Policy", "No module named 'nothing'"),
-    ("nothing.py:Policy", "there is no file"),
+    ("nothing.py:Policy", "FileNotFoundError: there is no file"),
     ("os:nothing", "there is no nothing in os"),
     ("os", "FILE.py:NAME or MODULE:NAME"),
 ])
@@ -227,9 +227,11 @@ def test_a_file_is_a_policy_by_its_path(tmp_path, monkeypatch):
     assert sys.modules["json"] is json
 
 
-@pytest.mark.parametrize("policy, said", [("python:mine.py:nothing", "no nothing in mine.py"), ("python:other.py:Still", "other.py")])
+@pytest.mark.parametrize("policy, said", [("python:mine.py:nothing", "no nothing in mine.py"), ("python:other.py:Still", "loaded: FileNotFoundError: ")])
 def test_the_program_stops_at_a_policy_that_cannot_be_loaded(program, short_scene, tmp_path, policy, said):
-    done = subprocess.run(**command_of(program, short_scene, tmp_path, ["random", policy]), capture_output=True, text=True, timeout=120)
+    command = command_of(program, short_scene, tmp_path, ["random", policy])
+    command["args"] += ["--jobs", "1"]
+    done = subprocess.run(**command, capture_output=True, text=True, timeout=120)
     assert done.returncode == 2 and not list((tmp_path / "out/episodes").rglob("result.json"))
     (line,) = done.stderr.strip().splitlines()
     assert line.startswith(f"error: {policy}: cannot be loaded: ") and said in line

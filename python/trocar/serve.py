@@ -245,16 +245,19 @@ def main(arguments: list[str] | None = None) -> int:
     out, sys.stdout = sys.stdout, sys.stderr
     try:
         policy = load(options.policy)
+    except KeyboardInterrupt:
+        return 0
+    except Exception as why:
+        traceback.print_exc()
+        # The last line is what the program that started this tells.
+        print(f"{type(why).__name__}: {' '.join(str(why).split())}", file=sys.stderr)
+        return 1
+    try:
         serve(policy, options.host, options.port, told=lambda address: print(address, file=out, flush=True))
     except KeyboardInterrupt:
         return 0
     except OSError as why:
         print(f"error: {options.host}:{options.port}: {why}", file=sys.stderr)
-        return 1
-    except Exception as why:
-        traceback.print_exc()
-        # The last line is what the program that started this tells.
-        print(f"{type(why).__name__}: {' '.join(str(why).split())}", file=sys.stderr)
         return 1
     return 0
 
