@@ -15,9 +15,14 @@ from trocar import campaign
 def measured(scene: str, policy: str, episodes: int, workers: int, address: str | None, folder: Path) -> dict[str, object]:
     """A campaign from nothing. The rate is that after each worker's first episode: until then Ray starts and workers build their cells."""
     ends: list[float] = []
+
+    def tell(done: int, _: int) -> None:
+        if done:
+            ends.append(time.perf_counter())
+
     begun = time.perf_counter()
     result = campaign.run(
-        scene, [policy], folder, episodes=episodes, workers=workers, ray_address=address, progress=lambda *_: ends.append(time.perf_counter())
+        scene, [policy], folder, episodes=episodes, workers=workers, ray_address=address, progress=tell
     )
     whole = time.perf_counter() - begun
     rate = 3600.0 * (episodes - workers) / (ends[-1] - ends[workers - 1])

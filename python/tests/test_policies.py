@@ -202,9 +202,41 @@ def test_the_program_evaluates_a_python_policy_and_outlives_one_that_raises(prog
     assert f"asked to {asked}" in kept["end"]["why"], "a served policy and an environment are told the same"
 
 
-def test_a_policy_that_cannot_be_imported_is_one_line(tmp_path):
-    done = subprocess.run(
-        [sys.executable, "-m", "trocar.serve", "nothing.here:Policy", "--port", "0"], capture_output=True, text=True, timeout=60
-    )
+@pytest.mark.parametrize("policy, said", [
+    ("nothing.here:Policy", "No module named 'nothing'"),
+    ("nothing.py:Policy", "FileNotFoundError: there is no file"),
+    ("os:nothing", "there is no nothing in os"),
+    ("os", "FILE.py:NAME or MODULE:NAME"),
+])
+def test_a_policy_that_cannot_be_imported_is_one_line(policy, said):
+    done = subprocess.run([sys.executable, "-m", "trocar.serve", policy, "--port", "0"], capture_output=True, text=True, timeout=60)
     assert done.returncode == 1 and not done.stdout
-    assert "No module named 'nothing'" in done.stderr.strip().splitlines()[-1]
+    assert said in done.stderr.strip().splitlines()[-1]
+
+
+def test_a_file_is_a_policy_by_its_path(tmp_path, monkeypatch):
+    """It finds what lies beside it, may be called like a module that is there, and a module is found as before."""
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    for name in ("json", "by_path"):
+        (tmp_path / f"{name}.py").write_text("import beside\nclass Acts:\n    class Inner:\n        def infer(self, obs):\n            return beside.ACTION\n")
+    (tmp_path / "beside.py").write_text("ACTION = [1.0, 2.0]\n")
+    for source in (f"{tmp_path}/json.py:Acts.Inner", f"{tmp_path}/by_path.py:Acts.Inner", "by_path:Acts.Inner"):
+        assert serve.load(source).infer({})["actions"].tolist() == [[1.0, 2.0]], source
+    monkeypatch.chdir(tmp_path)
+    assert serve.load("by_path.py:Acts.Inner").infer({})["actions"].shape == (1, 2)
+    assert sys.modules["json"] is json
+
+
+@pytest.mark.parametrize("policy, said", [("python:mine.py:nothing", "no nothing in mine.py"), ("python:other.py:Still", "loaded: FileNotFoundError: ")])
+def test_the_program_stops_at_a_policy_that_cannot_be_loaded(program, short_scene, tmp_path, policy, said):
+    command = command_of(program, short_scene, tmp_path, ["random", policy])
+    command["args"] += ["--jobs", "1"]
+    done = subprocess.run(**command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and not list((tmp_path / "out/episodes").rglob("result.json"))
+    (line,) = done.stderr.strip().splitlines()
+    assert line.startswith(f"error: {policy}: cannot be loaded: ") and said in line
+
+
+def test_the_program_serves_a_file(program, short_scene, tmp_path):
+    (still,) = evaluated(program, short_scene, tmp_path, [f"still=python:{tmp_path}/mine.py:Still"])["policies"]
+    assert (still["episodes"], still["ends"][4]) == (2, 0), still

@@ -110,8 +110,23 @@ class Campaign:
     def put(self, job: str, files: list[tuple[str, bytes]]) -> None: ...
     def finish(self) -> str: ...
 
+class Stop:
+    """What tells workers to give up, whichever thread they are in and whatever they wait for."""
+
+    def set(self) -> None: ...
+
 class Worker:
     """A cell that runs one job after the other."""
 
-    def __init__(self, scene: str, phantoms: str | PathLike[str], plan: str) -> None: ...
+    def __init__(
+        self,
+        scene: str,
+        phantoms: str | PathLike[str],
+        plan: str,
+        *,
+        stop: Stop | None = None,
+        python: str | None = None,
+    ) -> None: ...
+    def start(self, jobs: list[str]) -> None:
+        """Makes the policies of `jobs` ready; `ValueError` for a Python policy that cannot be loaded."""
     def run(self, job: str) -> list[tuple[str, bytes]]: ...

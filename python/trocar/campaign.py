@@ -5,7 +5,7 @@
 An episode's bits depend on scene, specimen, policy and seed alone, so it does not matter who runs it: `hash` in `result.json` is the
 same however many workers there were, and whether they were on one machine or on many. Each worker builds its own cell (about a
 second) and runs one episode after the other on one CPU. A worker that is lost has its episode run again elsewhere. Finished episodes
-are kept one by one; the same command goes on where it was stopped.
+are kept one by one; the same command goes on where it was stopped, be it by Ctrl-C.
 
 With Ray, a scene file and a policy's module must be found under the same names on every machine. It needs `pip install .[ray]`.
 """
@@ -16,17 +16,16 @@ import argparse
 import json
 import os
 import sys
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, Callable, Sequence
 
-from ._native import Campaign, Worker
+from ._native import Campaign
+from ._progress import Bar
+from ._ray import run_on_ray
+from ._threads import run_on_threads
 from .envs.cells import phantoms_folder
 
-#: How often a job is tried whose workers are lost.
-TRIES = 3
-
-#: Called after each episode with how many are done and how many were missing.
+#: Called with how many episodes are done and how many were missing: before the first one, and after each.
 Progress = Callable[[int, int], None]
 
 
@@ -45,9 +44,12 @@ def run(
     """Runs what is missing of the campaign in `output` and gives what `result.json` says.
 
     `ray_address`: `auto` for a cluster that runs, `local` for a new one on this machine, `host:port`; None does without Ray.
-    `workers`: as many as there are CPUs if not given.
+    `workers`: as many as there are CPUs if not given. Policies `python:...` are served by the interpreter that runs this, unless
+    `$TROCAR_PYTHON` names another.
+
+    Ctrl-C ends it within moments, whatever is waited for: `KeyboardInterrupt`, with the finished episodes kept. ValueError for a
+    scene, policy or folder that cannot be used; on Ray, RuntimeError says what went wrong in a worker.
     """
-    _own_interpreter()
     folder = phantoms_folder()
     folder.mkdir(parents=True, exist_ok=True)
     campaign = Campaign(scene, list(policies), episodes, seed, folder, Path(output))
@@ -55,105 +57,10 @@ def run(
     progress = progress or (lambda done, all: None)
     if jobs:
         if ray_address is None:
-            _on_threads(campaign, scene, jobs, workers, progress)
+            run_on_threads(campaign, scene, jobs, workers, progress)
         else:
-            _on_ray(campaign, scene, jobs, workers, ray_address, progress)
+            run_on_ray(campaign, scene, jobs, workers, ray_address, progress)
     return json.loads(campaign.finish())
-
-
-def _own_interpreter() -> None:
-    """Policies `python:MODULE:NAME` are served by the interpreter that runs this, which has `trocar`, unless another is named."""
-    if sys.executable:
-        os.environ.setdefault("TROCAR_PYTHON", sys.executable)
-
-
-def _on_threads(campaign: Campaign, scene: str, jobs: list[str], workers: int | None, progress: Progress) -> None:
-    """Native code holds no interpreter's lock, so threads are enough."""
-    count = min(workers or os.cpu_count() or 1, len(jobs))
-    idle = [Worker(scene, phantoms_folder(), campaign.plan) for _ in range(count)]
-    waiting, done = jobs[::-1], 0
-    with ThreadPoolExecutor(count) as pool:
-        under_way: dict[Future[Any], tuple[str, Worker]] = {}
-        try:
-            while waiting or under_way:
-                while idle and waiting:
-                    worker, job = idle.pop(), waiting.pop()
-                    under_way[pool.submit(worker.run, job)] = (job, worker)
-                for future in wait(under_way, return_when=FIRST_COMPLETED).done:
-                    job, worker = under_way.pop(future)
-                    campaign.put(job, future.result())
-                    idle.append(worker)
-                    done += 1
-                    progress(done, len(jobs))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
-
-
-def _on_ray(
-    campaign: Campaign, scene: str, jobs: list[str], workers: int | None, address: str, progress: Progress
-) -> None:
-    try:
-        import ray
-    except ImportError as why:
-        raise ModuleNotFoundError("ray is not installed; pip install trocar[ray], or leave --ray out") from why
-    begun = not ray.is_initialized()
-    if begun:
-        options: dict[str, Any] = {} if address != "local" else {"num_cpus": workers or os.cpu_count()}
-        ray.init(address=address, log_to_driver=False, include_dashboard=False if address == "local" else None, **options)
-    try:
-        actor = ray.remote(num_cpus=1, max_restarts=0)(_Actor)
-        room = int(ray.cluster_resources().get("CPU", 1))
-        count = max(1, min(workers or room, room, len(jobs)))
-        plan = campaign.plan
-        waiting, done = jobs[::-1], 0
-        tries: dict[str, int] = {}
-        idle = [actor.remote(scene, plan) for _ in range(count)]
-        under_way: dict[Any, tuple[str, Any]] = {}
-        while waiting or under_way:
-            while idle and waiting:
-                worker, job = idle.pop(), waiting.pop()
-                under_way[worker.run.remote(job)] = (job, worker)
-            ready, _ = ray.wait(list(under_way), num_returns=1)
-            for reference in ready:
-                job, worker = under_way.pop(reference)
-                try:
-                    files = ray.get(reference)
-                except ray.exceptions.RayTaskError as why:
-                    raise RuntimeError(str(why).strip().splitlines()[-1]) from why
-                except (ray.exceptions.RayActorError, ray.exceptions.ObjectLostError) as why:
-                    # The machine or process is gone; the episode has left nothing.
-                    tries[job] = tries.get(job, 0) + 1
-                    if tries[job] >= TRIES:
-                        raise RuntimeError(f"{TRIES} workers were lost over {job}: {why}") from why
-                    waiting.append(job)
-                    idle.append(actor.remote(scene, plan))
-                    continue
-                campaign.put(job, files)
-                idle.append(worker)
-                done += 1
-                progress(done, len(jobs))
-    finally:
-        if begun:
-            ray.shutdown()
-
-
-class _Actor:
-    """A worker in a process of Ray's."""
-
-    def __init__(self, scene: str, plan: str):
-        # By name: what Ray sends over holds no native class.
-        from trocar._native import Worker
-        from trocar.campaign import _own_interpreter
-        from trocar.envs.cells import phantoms_folder
-
-        _own_interpreter()
-        folder = phantoms_folder()
-        folder.mkdir(parents=True, exist_ok=True)
-        self.worker = Worker(scene, folder, plan)
-
-    def run(self, job: str) -> list[tuple[str, bytes]]:
-        return self.worker.run(job)
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -176,10 +83,12 @@ def main(arguments: list[str] | None = None) -> int:
     if options.seed < 0 or options.episodes < 1:
         parser.error("--seed and --episodes must not be negative, and an episode is needed")
 
+    bar = Bar()
+
     def tell(done: int, missing: int) -> None:
-        print(f"\r{done} of {missing} episodes", end="" if done < missing else "\n", file=sys.stderr, flush=True)
+        bar(done, missing)
         if done == missing:
-            print("writing the report, with moving pictures of the first failures", file=sys.stderr, flush=True)
+            bar.say("writing the report, with moving pictures of the first failures")
 
     try:
         result = run(
@@ -194,10 +103,10 @@ def main(arguments: list[str] | None = None) -> int:
             progress=tell,
         )
     except (ValueError, OSError, RuntimeError, ImportError) as why:
-        print(f"error: {why}", file=sys.stderr)
+        bar.say(f"error: {why}")
         return 1
     except KeyboardInterrupt:
-        print("error: interrupted; the same command goes on", file=sys.stderr)
+        bar.say("interrupted; finished episodes are kept, and the same command goes on")
         return 130
     if options.json:
         print(json.dumps(result))

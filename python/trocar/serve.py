@@ -1,15 +1,16 @@
 """Serves a Python policy over openpi's WebSocket protocol, which `trocar evaluate` and robots speak.
 
-    python -m trocar.serve MODULE:NAME [--host 127.0.0.1] [--port 8000] [--until-eof]
+    python -m trocar.serve FILE.py:NAME [--host 127.0.0.1] [--port 8000] [--until-eof]
+    python -m trocar.serve MODULE:NAME
 
-NAME in MODULE (the current folder is searched too) is one of
+NAME in the file FILE.py (whose folder is searched for what it imports), or in MODULE (the current folder is searched too), is one of
 
 - an object with `infer(obs) -> {"actions": array}` and, if it keeps anything between chunks, `reset()`;
 - a class of such objects, or a function without parameters that makes one;
 - a function of the observation that gives the actions, as an array or as `{"actions": array}`.
 
 Actions are a chunk (steps, numbers); a single row is taken as a chunk of one. The address, `ws://HOST:PORT`, is the first line on
-standard output. `trocar evaluate SCENE --policy python:MODULE:NAME` starts this by itself, with the interpreter that
+standard output. `trocar evaluate SCENE --policy python:FILE.py:NAME` (or `python:MODULE:NAME`) starts this by itself, with the interpreter that
 `$TROCAR_PYTHON` names (`python3` if it is not set).
 
 Messages are MessagePack with arrays as maps of bytes, type and shape; nothing is ever unpickled. The server listens on this
@@ -20,12 +21,15 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import importlib.util
 import inspect
 import os
 import sys
 import threading
 import time
 import traceback
+from pathlib import Path
+from types import ModuleType
 from typing import Any, Callable
 
 import msgpack
@@ -128,16 +132,44 @@ def _parameters(function: Any) -> list[inspect.Parameter]:
 
 
 def load(source: str) -> Served:
-    """The policy `MODULE:NAME`; names may have dots."""
-    module, colon, name = source.partition(":")
-    if not (module and colon and name):
-        raise ValueError(f"'{source}' names no policy; MODULE:NAME is wanted")
-    if "" not in sys.path and os.getcwd() not in sys.path:
-        sys.path.insert(0, os.getcwd())
-    value: Any = importlib.import_module(module)
+    """The policy `FILE.py:NAME` or `MODULE:NAME`; names may have dots.
+
+    ValueError for what names none, FileNotFoundError or ImportError for what is not there; whatever the file itself raises.
+    """
+    # The last colon: a path may have one after its drive.
+    place, colon, name = source.rpartition(":")
+    if not (place and colon and name):
+        raise ValueError(f"'{source}' names no policy; FILE.py:NAME or MODULE:NAME is wanted")
+    value: Any = _file(Path(place)) if place.endswith(".py") else _module(place)
     for part in name.split("."):
+        if not hasattr(value, part):
+            raise AttributeError(f"there is no {name} in {place}")
         value = getattr(value, part)
     return Served(value)
+
+
+def _module(name: str) -> ModuleType:
+    if "" not in sys.path and os.getcwd() not in sys.path:
+        sys.path.insert(0, os.getcwd())
+    return importlib.import_module(name)
+
+
+def _file(path: Path) -> ModuleType:
+    """The module that a file is, whatever it is called and wherever it lies."""
+    path = path.resolve()
+    if not path.is_file():
+        raise FileNotFoundError(f"there is no file {path}")
+    # What lies beside it can be imported, as when Python runs it.
+    sys.path.insert(0, str(path.parent))
+    # A file may be called like a module that is there already.
+    name = f"policy_{path.stem}" if path.stem in sys.modules else path.stem
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} cannot be imported")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 def serve(policy: Served, host: str = "127.0.0.1", port: int = 0, *, told: Callable[[str], None] | None = None) -> None:
@@ -202,7 +234,7 @@ def _end_with_input() -> None:
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns its exit status."""
     parser = argparse.ArgumentParser(prog="python -m trocar.serve", description=__doc__.splitlines()[0])
-    parser.add_argument("policy", metavar="MODULE:NAME", help="a callable, a class, or an object with infer(obs)")
+    parser.add_argument("policy", metavar="FILE.py:NAME|MODULE:NAME", help="a callable, a class, or an object with infer(obs)")
     parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default %(default)s: this machine alone)")
     parser.add_argument("--port", type=int, default=8000, help="0 for any that is free (default %(default)s)")
     parser.add_argument("--until-eof", action="store_true", help="end when standard input does, as the process behind it has ended")
@@ -213,15 +245,19 @@ def main(arguments: list[str] | None = None) -> int:
     out, sys.stdout = sys.stdout, sys.stderr
     try:
         policy = load(options.policy)
+    except KeyboardInterrupt:
+        return 0
+    except Exception as why:
+        traceback.print_exc()
+        # The last line is what the program that started this tells.
+        print(f"{type(why).__name__}: {' '.join(str(why).split())}", file=sys.stderr)
+        return 1
+    try:
         serve(policy, options.host, options.port, told=lambda address: print(address, file=out, flush=True))
     except KeyboardInterrupt:
         return 0
     except OSError as why:
         print(f"error: {options.host}:{options.port}: {why}", file=sys.stderr)
-        return 1
-    except Exception as why:
-        traceback.print_exc()
-        print(f"{options.policy}: {type(why).__name__}: {why}", file=sys.stderr)
         return 1
     return 0
 

@@ -8,8 +8,9 @@ use crate::progress::Signals;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard};
-use trocar_evaluate::{Files, Job, Plan, PolicySpec, Store};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard};
+use trocar_evaluate::{Error, Files, Job, Plan, PolicySpec, Store};
 use trocar_progress::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
@@ -101,15 +102,56 @@ impl Campaign {
     }
 }
 
+/// What tells workers to give up: Python shows its signals to its main thread alone, and a worker that waits for a policy looks at nothing else.
+#[pyclass(frozen, module = "trocar._native")]
+#[derive(Default)]
+pub struct Stop(Arc<AtomicBool>);
+
+#[pymethods]
+impl Stop {
+    #[new]
+    fn new() -> Self {
+        Self::default()
+    }
+
+    /// Ends within moments whatever workers with this do or wait for; it cannot be taken back.
+    fn set(&self) {
+        self.0.store(true, Ordering::Relaxed);
+    }
+}
+
 /// A cell that runs one job after the other.
 #[pyclass(frozen, module = "trocar._native")]
-pub struct Worker(Mutex<trocar_evaluate::Worker>);
+pub struct Worker {
+    worker: Mutex<trocar_evaluate::Worker>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Worker {
+    fn worker(&self) -> PyResult<MutexGuard<'_, trocar_evaluate::Worker>> {
+        self.worker.lock().map_err(|_| wrong("the worker failed before; make another"))
+    }
+}
+
+/// Gives up what has been asked to stop.
+fn go_on(stop: &AtomicBool) -> PyResult<()> {
+    if stop.load(Ordering::Relaxed) { Err(evaluate(&Error::Interrupted)) } else { Ok(()) }
+}
 
 #[pymethods]
 impl Worker {
-    /// Builds the cell of `scene`; it must be what `plan` is of.
+    /// Builds the cell of `scene`; it must be what `plan` is of. `stop` ends what it does; `python` serves `python:` policies, unless `$TROCAR_PYTHON` names another interpreter.
     #[new]
-    fn new(py: Python<'_>, scene: &str, phantoms: PathBuf, plan: &str) -> PyResult<Self> {
+    #[pyo3(signature = (scene, phantoms, plan, *, stop=None, python=None))]
+    fn new(
+        py: Python<'_>,
+        scene: &str,
+        phantoms: PathBuf,
+        plan: &str,
+        stop: Option<&Stop>,
+        python: Option<String>,
+    ) -> PyResult<Self> {
+        let stop = stop.map(|s| Arc::clone(&s.0)).unwrap_or_default();
         let plan: Plan = serde_json::from_str(plan).map_err(|e| wrong(format!("plan: {e}")))?;
         py.detach(|| {
             let scene = prepare::scene(scene, None, None)?;
@@ -120,9 +162,17 @@ impl Worker {
                     "this worker has another scene, specimen or program than the campaign; give all machines the same files",
                 ));
             }
+            go_on(&stop)?;
             let worker = trocar_evaluate::Worker::new(&scene, &specimen).map_err(|e| evaluate(&e))?;
-            Ok(Self(Mutex::new(worker)))
+            let worker = Mutex::new(worker.stopped_by(Arc::clone(&stop)).served_by(python));
+            Ok(Self { worker, stop })
         })
+    }
+
+    /// Makes the policies of `jobs` ready; ValueError for a Python policy that cannot be loaded.
+    fn start(&self, py: Python<'_>, jobs: Vec<String>) -> PyResult<()> {
+        let jobs: Vec<Job> = jobs.iter().map(|j| job(j)).collect::<PyResult<_>>()?;
+        py.detach(|| self.worker()?.start(jobs.iter().map(|j| &j.policy)).map_err(|e| evaluate(&e)))
     }
 
     /// Runs a job and gives its episode's files: names and bytes.
@@ -130,8 +180,9 @@ impl Worker {
         let job = self::job(job)?;
         let signals = Signals::new();
         let files = py.detach(|| {
-            let mut worker = self.0.lock().map_err(|_| wrong("the worker failed before; make another"))?;
-            worker.run_until(&job, &|| signals.interrupted()).map_err(|e| evaluate(&e))
+            // A job may have waited for its turn.
+            go_on(&self.stop)?;
+            self.worker()?.run_until(&job, &|| signals.interrupted()).map_err(|e| evaluate(&e))
         })?;
         Ok(files.0.into_iter().map(|(name, bytes)| (name, PyBytes::new(py, &bytes))).collect())
     }

@@ -24,6 +24,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<cells::State>()?;
     module.add_class::<policy::Controller>()?;
     module.add_class::<campaign::Campaign>()?;
+    module.add_class::<campaign::Stop>()?;
     module.add_class::<campaign::Worker>()?;
     module.add_function(wrap_pyfunction!(pictures::cameras, module)?)?;
     module.add_function(wrap_pyfunction!(policy::policies, module)?)?;

@@ -78,8 +78,12 @@ impl Campaign {
         let (next, stop) = (AtomicUsize::new(0), Arc::new(AtomicBool::new(false)));
         let at_work = AtomicUsize::new(workers);
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
-        let work = || -> Result<()> {
+        let work = |first: bool| -> Result<()> {
             let mut worker = Worker::new(&scene, &specimen)?.stopped_by(Arc::clone(&stop));
+            if first {
+                // A policy that cannot be loaded is told before episodes of the others are run.
+                worker.start(missing.iter().map(|job| &job.policy))?;
+            }
             while let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
                 let files = worker.run(job)?;
                 store.put(job, &files)?;
@@ -88,10 +92,11 @@ impl Campaign {
             Ok(())
         };
         std::thread::scope(|scope| {
-            for _ in 0..workers {
-                scope.spawn(|| {
-                    let _leaves = Leaves(&at_work);
-                    if let Err(why) = work() {
+            for k in 0..workers {
+                let (work, at_work, stop, first_error) = (&work, &at_work, &stop, &first_error);
+                scope.spawn(move || {
+                    let _leaves = Leaves(at_work);
+                    if let Err(why) = work(k == 0) {
                         stop.store(true, Ordering::Relaxed);
                         // The first is told; those of the others are its consequence.
                         if let Ok(mut told) = first_error.lock() {

@@ -10,7 +10,7 @@ use trocar_task::{scene_hash, specimen_hash};
 /// Most episodes of a policy.
 const MOST_EPISODES: usize = 100_000;
 
-/// A policy of a campaign, by what the user wrote: `scripted`, `ws://HOST:PORT`, `python:MODULE:NAME`, or `NAME=` and one of those.
+/// A policy of a campaign, by what the user wrote: `scripted`, `ws://HOST:PORT`, `python:MODULE:NAME` or `python:FILE.py:NAME`, or `NAME=` and one of those.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PolicySpec {
     /// Its name in tables and folders.
@@ -31,7 +31,7 @@ impl PolicySpec {
         let python = source.strip_prefix("python:");
         if !(remote || python.is_some_and(|p| p.contains(':')) || POLICIES.contains(&source)) {
             return Err(Error::Mismatch(format!(
-                "--policy {text:.80}: is none of {}, ws://HOST:PORT, python:MODULE:NAME; or NAME= and one of those",
+                "--policy {text:.80}: is none of {}, ws://HOST:PORT, python:FILE.py:NAME, python:MODULE:NAME; or NAME= and one of those",
                 POLICIES.join(", ")
             )));
         }

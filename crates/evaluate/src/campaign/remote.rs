@@ -45,6 +45,8 @@ pub(super) struct Remote {
     name: String,
     endpoint: Endpoint,
     module: Option<String>,
+    /// The interpreter that serves it.
+    python: String,
     child: Option<Served>,
     client: Option<Client>,
     bounds: Bounds,
@@ -74,7 +76,17 @@ impl Drop for Served {
 }
 
 impl Remote {
-    pub fn new(spec: &PolicySpec, specimen: &Specimen, episode: &Episode, stop: Arc<AtomicBool>) -> Result<Self> {
+    /// Of a server, or of a Python callable, which is served from here on by `$TROCAR_PYTHON`, or by `python`, or by `python3`.
+    ///
+    /// # Errors
+    /// A callable that cannot be loaded: unlike one that fails in an episode, it never says anything.
+    pub fn new(
+        spec: &PolicySpec,
+        specimen: &Specimen,
+        episode: &Episode,
+        stop: Arc<AtomicBool>,
+        python: Option<&str>,
+    ) -> Result<Self> {
         let scene = episode.scene();
         let module = spec.source.strip_prefix("python:").map(str::to_owned);
         let mut endpoint = Endpoint::new(if module.is_some() { "ws://127.0.0.1:1" } else { &spec.source });
@@ -90,10 +102,12 @@ impl Remote {
         endpoint.actions.dim = Some(bounds.low.len());
         let seen = scene.cameras.iter().filter(|c| c.name != RECORDING);
         let cameras = seen.map(|c| (c.name.clone(), c.policy_size_px.map(|n| n as usize))).collect();
-        Ok(Self {
+        let python = std::env::var("TROCAR_PYTHON").ok().or_else(|| python.map(str::to_owned));
+        let mut made = Self {
             name: spec.name.clone(),
             endpoint,
             module,
+            python: python.unwrap_or_else(|| PYTHON.to_owned()),
             child: None,
             client: None,
             bounds,
@@ -103,19 +117,30 @@ impl Remote {
             cameras,
             prompt: trocar_task::prompt(scene),
             seed: 0,
-        })
+        };
+        match made.serve() {
+            Err(_) if made.stop.load(Ordering::Relaxed) => Err(Error::Interrupted),
+            Err(why) => Err(Error::Mismatch(why)),
+            Ok(()) => Ok(made),
+        }
     }
 
-    /// The connection, made when it is first needed and after it was lost.
-    fn client(&mut self) -> std::result::Result<&mut Client, String> {
+    /// Serves the callable, if it is one and its server does not run.
+    fn serve(&mut self) -> std::result::Result<(), String> {
         if let Some(module) = &self.module
             && self.child.is_none()
         {
-            let served = serve(module, &self.stop)?;
+            let served = serve(&self.python, module, &self.stop)?;
             self.endpoint.url.clone_from(&served.url);
             self.child = Some(served);
             self.client = None;
         }
+        Ok(())
+    }
+
+    /// The connection, made when it is first needed and after it was lost.
+    fn client(&mut self) -> std::result::Result<&mut Client, String> {
+        self.serve()?;
         if self.client.as_ref().is_none_or(|c| !c.is_connected()) {
             self.client = Some(Client::connect(&self.endpoint).map_err(|e| e.to_string())?);
         }
@@ -191,9 +216,12 @@ impl Policy for Remote {
 }
 
 /// Starts the server of a callable and waits for its address.
-fn serve(module: &str, stop: &AtomicBool) -> std::result::Result<Served, String> {
-    let python = std::env::var("TROCAR_PYTHON").unwrap_or_else(|_| PYTHON.to_owned());
-    let mut child = Command::new(&python)
+fn serve(python: &str, module: &str, stop: &AtomicBool) -> std::result::Result<Served, String> {
+    let mut command = Command::new(python);
+    // A terminal's Ctrl-C is for this process, which ends the child; one that ended by itself would look like a policy that fails.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    let mut child = command
         .args(["-m", "trocar.serve", module, "--port", "0", "--until-eof"])
         // Nothing is written into it. It closes with this process, however that ends, and so the child ends too.
         .stdin(Stdio::piped())
@@ -228,7 +256,7 @@ fn serve(module: &str, stop: &AtomicBool) -> std::result::Result<Served, String>
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => {
                 let words = served.last_words().unwrap_or_default();
-                return Err(format!("python:{module}: cannot be served: {words}"));
+                return Err(format!("python:{module}: cannot be loaded: {words}"));
             }
         }
     }

@@ -8,7 +8,7 @@ use std::path::PathBuf;
 pub struct Evaluate {
     /// Scene file, or a built-in scene such as cell-a.
     pub scene: String,
-    /// A policy: scripted, noise, delay, offset, greedy, random; ws://HOST:PORT for an openpi server; python:MODULE:NAME for a Python callable. NAME=... names it. Several are compared.
+    /// A policy: scripted, noise, delay, offset, greedy, random; ws://HOST:PORT for an openpi server; python:FILE.py:NAME or python:MODULE:NAME for a Python callable. NAME=... names it. Several are compared.
     #[arg(long = "policy", value_name = "POLICY", default_value = "scripted")]
     pub policies: Vec<String>,
     /// Episodes of each policy.

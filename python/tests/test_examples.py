@@ -1,0 +1,73 @@
+"""What examples and documents say, without the packages that they need beside this one."""
+
+import importlib.util
+import json
+import sys
+import types
+from pathlib import Path
+
+import numpy as np
+import pytest
+from trocar import campaign
+
+ROOT = Path(__file__).parents[2]
+
+
+class Anything(types.ModuleType):
+    """A module with a class of every name."""
+
+    __path__: list[str] = []
+
+    def __getattr__(self, name):
+        return type(name, (), {}) if name[0].isupper() else lambda *_, **__: None
+
+
+@pytest.fixture
+def learning(monkeypatch):
+    """The learning example, whether Stable-Baselines3 is there or not."""
+    names = ["common", "common.buffers", "common.callbacks", "common.torch_layers", "common.vec_env"]
+    for name in ["torch", "matplotlib", "matplotlib.pyplot", "stable_baselines3", *(f"stable_baselines3.{n}" for n in names)]:
+        monkeypatch.setitem(sys.modules, name, Anything(name))
+    spec = importlib.util.spec_from_file_location("train_grasp_lift", ROOT / "examples/python/train_grasp_lift.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize("episodes", [4, 9, 10])
+def test_the_test_of_what_was_learned_takes_as_many_episodes_of_every_cell(learning, monkeypatch, episodes):
+    class Cells:
+        """Cell 0 always passes, after a step; cells 1 and 2 never do, after ten."""
+
+        def __init__(self, *_, **__):
+            self.steps = 0
+
+        def reset(self):
+            return np.zeros((3, 1))
+
+        def step_async(self, actions):
+            self.steps += 1
+
+        def step_wait(self):
+            over = np.array([True, self.steps % 10 == 0, self.steps % 10 == 0])
+            return np.zeros((3, 1)), np.zeros(3), over, [{"is_success": k == 0} for k in range(3)]
+
+    monkeypatch.setattr(learning, "LiftCells", Cells)
+    model = types.SimpleNamespace(predict=lambda seen, deterministic: (np.zeros((3, 5)), None))
+    passed = learning.test(model, 3, 7.0, episodes)
+    assert len(passed) == episodes and sum(passed) == -(-episodes // 3)
+
+
+def test_the_policy_of_the_document_stays_where_it_is(short_scene, tmp_path):
+    """It is served as it is written there; only the server of another package is left out."""
+    pytest.importorskip("msgpack")
+    pytest.importorskip("websockets")
+    text = (ROOT / "docs/policies.md").read_text()
+    (code,) = [block.partition("```")[0] for block in text.split("```python\n")[1:]]
+    kept = [line for line in code.splitlines() if "openpi_server" not in line and not line.startswith("WebsocketPolicyServer")]
+    (tmp_path / "still.py").write_text("\n".join(kept))
+    policy = f"still=python:{tmp_path / 'still.py'}:Still"
+    result = campaign.run(str(short_scene), [policy], tmp_path / "out", episodes=1)
+    (row,) = result["policies"]
+    kept = json.loads((tmp_path / "out/episodes/still/000000/result.json").read_text())
+    assert row["ends"][4] == 0, kept["end"]
