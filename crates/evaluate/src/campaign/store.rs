@@ -180,8 +180,8 @@ impl Store {
         if let Some(parent) = target.parent() {
             fs::create_dir_all(parent).map_err(io(parent))?;
         }
-        // An episode that is done again goes aside whole, so that at no moment a part of it is there.
-        let aside = partial.with_extension("old");
+        // An episode that is done again goes aside whole, so that at no moment a part of it is there. The name is made whole: a policy's may have dots, and what follows the last is no extension.
+        let aside = self.folder.join(UNDER_WAY).join(format!("{}-{:06}.old", job.policy.name, job.index));
         if target.exists() {
             fs::rename(&target, &aside).map_err(io(&target))?;
             // What was filmed is of the episode before; that there is no film is no error.
