@@ -5,6 +5,8 @@
 
 use super::PolicySpec;
 use crate::{Error, Result};
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -55,6 +57,10 @@ pub(super) struct Remote {
     cameras: Vec<(String, [usize; 2])>,
     prompt: String,
     seed: u64,
+    /// The server is still to be told that an episode begins.
+    begins: bool,
+    /// RoboArena's name of the episode at hand.
+    session: String,
 }
 
 /// A child process that serves a Python callable; it ends with this.
@@ -77,15 +83,8 @@ impl Remote {
     pub fn new(spec: &PolicySpec, specimen: &Specimen, episode: &Episode, stop: Arc<AtomicBool>) -> Result<Self> {
         let scene = episode.scene();
         let module = spec.source.strip_prefix("python:").map(str::to_owned);
-        let mut endpoint = Endpoint::new(if module.is_some() { "ws://127.0.0.1:1" } else { &spec.source });
-        endpoint.api_key = std::env::var(KEY).ok();
+        let mut endpoint = endpoint(spec)?;
         endpoint.interrupt = Some(Arc::clone(&stop));
-        if let Ok(text) = std::env::var(TIMEOUT) {
-            let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);
-            let seconds =
-                seconds.ok_or_else(|| Error::Mismatch(format!("${TIMEOUT} is '{text:.40}'; seconds are wanted")))?;
-            endpoint.timeouts.infer = Duration::from_secs_f64(seconds);
-        }
         let bounds = Bounds::new(episode.cell(), ActionSpace::Pivots)?;
         endpoint.actions.dim = Some(bounds.low.len());
         let seen = scene.cameras.iter().filter(|c| c.name != RECORDING);
@@ -103,11 +102,13 @@ impl Remote {
             cameras,
             prompt: trocar_task::prompt(scene),
             seed: 0,
+            begins: false,
+            session: String::new(),
         })
     }
 
-    /// The connection, made when it is first needed and after it was lost.
-    fn client(&mut self) -> std::result::Result<&mut Client, String> {
+    /// Makes the connection when it is first needed and after it was lost, and tells a server that an episode begins.
+    fn connect(&mut self) -> std::result::Result<&mut Client, String> {
         if let Some(module) = &self.module
             && self.child.is_none()
         {
@@ -116,8 +117,22 @@ impl Remote {
             self.child = Some(served);
             self.client = None;
         }
-        if self.client.as_ref().is_none_or(|c| !c.is_connected()) {
-            self.client = Some(Client::connect(&self.endpoint).map_err(|e| e.to_string())?);
+        let said = |e: trocar_remote::Error| e.to_string();
+        if self.begins
+            && let Some(client) = &mut self.client
+            && client.reset(&session(client, &self.session).map_err(said)?).is_ok()
+        {
+            self.begins = false;
+        }
+        // A connection that an earlier episode left behind may be dead without having been seen to be: it is made anew once.
+        if self.begins || self.client.as_ref().is_none_or(|c| !c.is_connected()) {
+            self.client = None;
+            let mut client = Client::connect(&self.endpoint).map_err(said)?;
+            if self.begins {
+                client.reset(&session(&client, &self.session).map_err(said)?).map_err(said)?;
+                self.begins = false;
+            }
+            self.client = Some(client);
         }
         self.client.as_mut().ok_or_else(|| "there is no connection".to_owned())
     }
@@ -143,14 +158,18 @@ impl Remote {
             seen.insert(format!("observation/images/{camera}"), Value::Array(array));
         }
         seen.insert("prompt".to_owned(), Value::Text(self.prompt.clone()));
-        seen.insert("episode/seed".to_owned(), Value::Int(self.seed as i64));
+        let seed = i64::try_from(self.seed).map_err(|_| format!("the seed {} is beyond {}", self.seed, i64::MAX))?;
+        seen.insert("episode/seed".to_owned(), Value::Int(seed));
         seen.insert("episode/step".to_owned(), Value::Int(episode.rows().len() as i64));
         Ok(seen)
     }
 
     fn chunk(&mut self, episode: &Episode) -> std::result::Result<Vec<Action>, String> {
-        let observation = self.observation(episode)?;
-        let reply = match self.client()?.infer(&observation) {
+        let mut observation = self.observation(episode)?;
+        let name = self.session.clone();
+        let client = self.connect()?;
+        observation.extend(session(client, &name).map_err(|e| e.to_string())?);
+        let reply = match client.infer(&observation) {
             Ok(reply) => reply,
             Err(why) => {
                 // A child that has died says why on its last line.
@@ -169,6 +188,30 @@ impl Remote {
     }
 }
 
+/// Where the policy `spec` is asked, with what the environment says of it. A Python callable has no address before it is served.
+///
+/// # Errors
+/// An address, a key or a longest wait that cannot be used.
+pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
+    let served = spec.source.starts_with("python:");
+    let mut endpoint = Endpoint::new(if served { "ws://127.0.0.1:1" } else { &spec.source });
+    endpoint.api_key = std::env::var(KEY).ok();
+    if let Ok(text) = std::env::var(TIMEOUT) {
+        let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);
+        let seconds =
+            seconds.ok_or_else(|| Error::Mismatch(format!("${TIMEOUT} is '{text:.40}'; seconds are wanted")))?;
+        endpoint.timeouts.infer = Duration::from_secs_f64(seconds);
+    }
+    endpoint.check().map_err(|why| Error::Mismatch(format!("--policy {}: {why}", spec.name)))?;
+    Ok(endpoint)
+}
+
+/// What each message has besides: the episode's name, where a RoboArena server asks for one.
+fn session(client: &Client, name: &str) -> trocar_remote::Result<Observation> {
+    let asked = client.server_config()?.is_some_and(|c| c.needs_session_id);
+    Ok(asked.then(|| ("session_id".to_owned(), Value::Text(name.to_owned()))).into_iter().collect())
+}
+
 impl Policy for Remote {
     fn name(&self) -> &str {
         &self.name
@@ -176,12 +219,10 @@ impl Policy for Remote {
 
     fn begin(&mut self, _episode: &Episode, seed: u64) -> trocar_task::Result<()> {
         self.seed = seed;
-        // A server that keeps a history forgets it; one that cannot be reached is told by the first action.
-        if let Some(client) = &mut self.client
-            && client.reset(&Observation::new()).is_err()
-        {
-            self.client = None;
-        }
+        // A server that keeps a history is told before the first observation, on whatever connection there is then.
+        self.begins = true;
+        // No two episodes have the same, not even of one policy and seed: several processes may ask one server.
+        self.session = format!("{}-{seed}-{:016x}", self.name, RandomState::new().build_hasher().finish());
         Ok(())
     }
 
