@@ -5,26 +5,54 @@ use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
 /// Crates whose code decides what a phantom's specimen is.
-const MAKERS: [&str; 8] =
-    ["camera", "geometry", "phantom", "recording", "reconstruct", "render", "segment", "specimen"];
+const MAKERS: [&str; 8] = [
+    "camera/src",
+    "geometry/src",
+    "phantom/src",
+    "recording/src",
+    "reconstruct/src",
+    "render/src",
+    "segment/src",
+    "specimen/src",
+];
 
-/// Crates whose code decides what an episode is.
-const PLAYERS: [&str; 10] =
-    ["camera", "cell", "geometry", "render", "robot", "scene", "sight", "specimen", "task", "tissue"];
+/// What decides what an episode is: crates, what policies of other processes are shown and how they are asked, and the versions of all that is built in.
+const PLAYERS: [&str; 13] = [
+    "camera/src",
+    "cell/src",
+    "geometry/src",
+    "remote/src",
+    "render/src",
+    "robot/src",
+    "scene/src",
+    "sight/src",
+    "specimen/src",
+    "task/src",
+    "tissue/src",
+    "evaluate/src/campaign/remote.rs",
+    "../Cargo.lock",
+];
 
 fn main() -> std::io::Result<()> {
     println!("cargo:rustc-env=TROCAR_SPECIMEN_MAKERS={:016x}", hash_of(&MAKERS)?);
     println!("cargo:rustc-env=TROCAR_EPISODE_MAKERS={:016x}", hash_of(&PLAYERS)?);
+    // A test compares it with what is depended on.
+    println!("cargo:rustc-env=TROCAR_EPISODE_SOURCES={}", PLAYERS.join(" "));
     Ok(())
 }
 
-fn hash_of(crates: &[&str]) -> std::io::Result<u64> {
+/// Hash of files, and of all files in folders; both as seen from the folder of the crates.
+fn hash_of(sources: &[&str]) -> std::io::Result<u64> {
     let mut hash = Xxh3::new();
-    for name in crates {
-        let folder = Path::new("..").join(name).join("src");
-        println!("cargo:rerun-if-changed={}", folder.display());
+    for name in sources {
+        let place = Path::new("..").join(name);
+        println!("cargo:rerun-if-changed={}", place.display());
         let mut files = Vec::new();
-        list(&folder, &mut files)?;
+        if place.is_dir() {
+            list(&place, &mut files)?;
+        } else {
+            files.push(place);
+        }
         files.sort();
         for file in files {
             hash.update(file.to_string_lossy().as_bytes());

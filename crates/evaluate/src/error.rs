@@ -61,6 +61,16 @@ pub enum Error {
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,
+    /// The user asked a campaign to stop.
+    #[error(
+        "interrupted; {kept} of {planned} episodes are kept, with their table and report; the same command goes on"
+    )]
+    Stopped {
+        /// Episodes that are kept.
+        kept: usize,
+        /// Episodes that are to be in all.
+        planned: usize,
+    },
     /// A scene blew up.
     #[error("scene '{scene}', frame {frame}: {why}")]
     Diverged {

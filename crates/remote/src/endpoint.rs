@@ -115,12 +115,25 @@ impl Endpoint {
         self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
+    /// Whether it can be connected to as it is written: address, key, waits, and what this build can do. Nothing is sent.
+    ///
+    /// # Errors
+    /// [`Error::Endpoint`] with what would be right; no password, query or key stands in it.
+    pub fn check(&self) -> Result<()> {
+        self.parts().map(|_| ())
+    }
+
     /// The address and the header of the key.
-    pub(crate) fn check(&self) -> Result<(Uri, Option<HeaderValue>)> {
+    pub(crate) fn parts(&self) -> Result<(Uri, Option<HeaderValue>)> {
         let wrong = |field, reason: String| Err(Error::Endpoint { field, reason });
-        let uri: Uri = match self.full().parse() {
+        let full = self.full();
+        let place = full.split_once("://").map_or("", |(_, place)| place);
+        if place.is_empty() || place.starts_with(['/', '?', '#', ':']) {
+            return wrong("url", format!("'{}' has no host; such as ws://127.0.0.1:8000", self.shown()));
+        }
+        let uri: Uri = match full.parse() {
             Ok(uri) => uri,
-            Err(e) => return wrong("url", format!("'{}': {e}; such as ws://127.0.0.1:8000", one_line(&self.url))),
+            Err(e) => return wrong("url", format!("'{}': {e}; such as ws://127.0.0.1:8000", self.shown())),
         };
         match uri.scheme_str() {
             Some("ws") => {}

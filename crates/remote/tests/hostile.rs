@@ -402,3 +402,17 @@ fn a_server_that_never_stops_talking_is_told() {
         assert!(!error.to_string().contains('\n'), "{error}");
     }
 }
+
+#[test]
+fn an_address_is_checked_without_being_connected_to_and_shows_no_secret() {
+    assert_eq!(Endpoint::new("ws://user:secret@127.0.0.1:1/a?token=secret").check(), Ok(()));
+    for bad in ["ws://", "ws://:1", "ws://user:secret@two words?secret", "http://user:secret@h", "ws://h:0?secret"] {
+        let why = Endpoint::new(bad).check().unwrap_err();
+        assert!(matches!(why, Error::Endpoint { field: "url", .. }), "{bad}: {why:?}");
+        assert!(!why.to_string().contains("secret"), "{why}");
+    }
+    let mut endpoint = Endpoint::new("ws://h");
+    endpoint.api_key = Some("secret\nsecret".to_owned());
+    let why = endpoint.check().unwrap_err().to_string();
+    assert!(why.contains("api_key") && !why.contains("secret"), "{why}");
+}

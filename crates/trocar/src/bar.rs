@@ -1,13 +1,21 @@
-//! Progress bars on standard error, and Ctrl-C.
+//! Progress on standard error, as a bar or as plain lines, and Ctrl-C.
 
+use crate::lines::Lines;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Instant;
 use trocar_progress::Progress;
 
-/// Shows one bar a stage; hidden when standard error is no terminal, or on request.
+/// What is shown of the stage at hand.
+enum Shown {
+    Bar(ProgressBar),
+    Lines(Lines),
+}
+
+/// Shows one bar a stage, or a line now and then when standard error is no terminal; nothing on request.
 pub struct Bar {
-    current: Mutex<Option<ProgressBar>>,
+    current: Mutex<Option<Shown>>,
     stop: Arc<AtomicBool>,
     quiet: bool,
 }
@@ -27,29 +35,39 @@ impl Bar {
         self.stop.load(Ordering::Relaxed)
     }
 
-    fn current(&self) -> std::sync::MutexGuard<'_, Option<ProgressBar>> {
+    fn current(&self) -> std::sync::MutexGuard<'_, Option<Shown>> {
         self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Progress for Bar {
     fn begin(&self, stage: &str, total: u64) {
-        let target = if self.quiet { ProgressDrawTarget::hidden() } else { ProgressDrawTarget::stderr() };
-        let style = ProgressStyle::with_template("{msg:>14} [{bar:40}] {pos}/{len}  {elapsed} of {duration}");
-        let bar = ProgressBar::with_draw_target(Some(total), target)
+        if self.quiet {
+            return;
+        }
+        let style = ProgressStyle::with_template("{msg:>14} [{bar:40}] {pos}/{len}  {elapsed}, {eta} left");
+        let bar = ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr())
             .with_message(stage.to_owned())
             .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()).progress_chars("=> "));
-        *self.current() = Some(bar);
+        let hidden = bar.is_hidden();
+        *self.current() =
+            Some(if hidden { Shown::Lines(Lines::begin(stage, total, Instant::now())) } else { Shown::Bar(bar) });
     }
 
     fn advance(&self, units: u64) {
-        if let Some(bar) = self.current().as_ref() {
-            bar.inc(units);
+        match self.current().as_mut() {
+            Some(Shown::Bar(bar)) => bar.inc(units),
+            Some(Shown::Lines(lines)) => {
+                if let Some(line) = lines.advance(units, Instant::now()) {
+                    eprintln!("{line}");
+                }
+            }
+            None => {}
         }
     }
 
     fn end(&self) {
-        if let Some(bar) = self.current().take() {
+        if let Some(Shown::Bar(bar)) = self.current().take() {
             bar.finish_and_clear();
         }
     }

@@ -5,6 +5,7 @@
 mod bar;
 mod cli;
 mod commands;
+mod lines;
 mod output;
 
 use clap::Parser;
@@ -23,8 +24,12 @@ fn main() -> ExitCode {
     match commands::run(&cli, &progress) {
         Ok(()) if output::lost() => ExitCode::from(NOT_PRINTED),
         Ok(()) => ExitCode::SUCCESS,
-        Err(_) if progress.was_interrupted() => {
-            eprintln!("interrupted; nothing half-written was left behind");
+        Err(error) if progress.was_interrupted() => {
+            match error {
+                // It says what is kept and how to go on.
+                trocar_evaluate::Error::Stopped { .. } => eprintln!("{error}"),
+                _ => eprintln!("interrupted; nothing half-written was left behind"),
+            }
             ExitCode::from(INTERRUPTED)
         }
         Err(error) => {

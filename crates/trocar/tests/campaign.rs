@@ -148,6 +148,10 @@ fn other_folders_scenes_and_seeds_are_refused_in_one_line() {
     refused(&long, &folder, &[], "another scene");
     refused(&short, &folder, &["--seed", "1"], "another seed");
     refused(&short, &folder, &["--policy", "genius"], "genius");
+    // An address that cannot be connected to is no failed episode.
+    for (address, why) in [("a=ws://", "host"), ("ws://h:0", "port"), ("ws://user:word@h", "TROCAR_POLICY_KEY")] {
+        refused(&short, &folder, &["--policy", address], why);
+    }
     let other = ["--policy", "random=scripted"];
     let output = evaluate(&short, &folder, &other).output().unwrap();
     assert!(String::from_utf8_lossy(&output.stderr).contains("another policy named 'random'"));
@@ -215,4 +219,31 @@ fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
     assert_eq!(result["policies"][0]["ends"][4], 1);
     let report = std::fs::read_to_string(gone.join("report.html")).unwrap();
     assert!(report.contains("connect"), "the page tells why");
+    // So does the text, with what to do.
+    let mut command = Command::new(env!("CARGO_BIN_EXE_trocar"));
+    command.args(["-q", "evaluate"]).arg(&scene).arg("-o").arg(&gone).args(["--policy", &url, "--episodes", "1"]);
+    let output = command.output().unwrap();
+    let said = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(output.status.success() && said.contains("cannot connect") && said.contains("--retry-failed"), "{said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_campaign_says_what_is_kept_and_how_to_go_on() {
+    let dir = TempDir::new().unwrap();
+    let scene = scene(dir.path(), 1.0);
+    let folder = dir.path().join("campaign");
+    let more = ["--policy", "random", "--episodes", "1000", "--jobs", "1"];
+    let mut command = evaluate(&scene, &folder, &more);
+    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    while !folder.join("episodes/random/000001").exists() {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(130), "{said}");
+    let kept = kept(&folder).len();
+    assert!(said.contains(&format!("{kept} of 1000 episodes are kept")) && said.contains("goes on"), "{said}");
+    assert_eq!(table(&folder).lines().count(), 1 + kept);
 }

@@ -6,11 +6,14 @@
 pub(crate) mod pictures;
 mod plan;
 mod remote;
+mod served;
+mod source;
 mod store;
 pub(crate) mod table;
 mod worker;
 
-pub use plan::{Job, Plan, PolicySpec};
+pub use plan::{Job, Plan};
+pub use source::PolicySpec;
 pub use store::{Files, Kept, Store};
 pub use table::{CampaignResult, Comparison, Interval, PolicyRow, StageCount};
 pub use worker::Worker;
@@ -30,6 +33,11 @@ use trocar_specimen::Specimen;
 
 /// How often it is looked whether the user asks to stop.
 const GLANCE: Duration = Duration::from_millis(50);
+
+/// Most episodes at once for each core; each has a cell of its own. Up to [`LEAST_JOBS`] are always allowed: policies that are waited for need no core.
+const JOBS_PER_CORE: usize = 8;
+/// See there.
+const LEAST_JOBS: usize = 32;
 
 /// What a campaign is to do on this machine.
 #[derive(Clone, Debug)]
@@ -54,7 +62,7 @@ impl Campaign {
     /// Runs what is missing in the campaign folder `output`, then writes the table and the report there.
     ///
     /// # Errors
-    /// One line that names the file, field or option. Finished episodes stay; an interruption loses only those under way.
+    /// One line that names the file, field or option. Finished episodes stay; an interruption ([`Error::Stopped`]) loses only those under way, and leaves table and report of what is kept.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<CampaignResult> {
         let (store, plan) = self.keep(output, None, progress)?;
         store.finish(&plan)
@@ -67,25 +75,59 @@ impl Campaign {
     pub(crate) fn keep(&self, output: &Path, most: Option<usize>, progress: &dyn Progress) -> Result<(Store, Plan)> {
         let scene = Scene::read(&self.scene)?;
         refuse_overlap(Path::new(&self.scene), output)?;
+        // What can be said without the specimen is said before one is made, which takes minutes.
+        plan::check(&self.policies, self.episodes, self.seed, most)?;
+        let cores = std::thread::available_parallelism().map_or(1, usize::from);
+        let allowed = JOBS_PER_CORE.saturating_mul(cores).max(LEAST_JOBS);
+        if self.jobs > allowed {
+            let reason =
+                format!("--jobs {}: at most {allowed} on {cores} cores; each has a cell of its own", self.jobs);
+            return Err(Error::Mismatch(reason));
+        }
+        store::look(output, &self.policies, self.seed)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let plan = Plan::new(&scene, &specimen, &self.policies, self.episodes, self.seed)?;
         let plan = most.map_or(plan.clone(), |most| plan.at_most(most));
         let store = Store::open(output, &plan)?;
-        let missing = store.missing(&plan, self.retry_failed)?;
-        let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let workers = if self.jobs == 0 { cores } else { self.jobs }.min(missing.len());
+        let workers = if self.jobs == 0 { cores } else { self.jobs };
+        let done = self
+            .run_missing(&scene, &specimen, &plan, &store, workers, progress)
+            .and_then(|()| store.film(&plan, &scene, &specimen, progress));
+        match done {
+            Ok(()) => Ok((store, plan)),
+            Err(Error::Interrupted) => {
+                progress.end();
+                let kept = store.finish(&plan)?.episodes;
+                Err(Error::Stopped { kept, planned: plan.count() })
+            }
+            Err(why) => Err(why),
+        }
+    }
+
+    /// Runs the episodes that are not kept yet, `workers` at once.
+    fn run_missing(
+        &self,
+        scene: &Scene,
+        specimen: &Specimen,
+        plan: &Plan,
+        store: &Store,
+        workers: usize,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        let missing = store.missing(plan, self.retry_failed)?;
+        let workers = workers.min(missing.len());
         progress.begin("episodes", missing.len() as u64);
         let (next, stop) = (AtomicUsize::new(0), Arc::new(AtomicBool::new(false)));
         let at_work = AtomicUsize::new(workers);
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
         let work = |first: bool| -> Result<()> {
-            let mut worker = Worker::new(&scene, &specimen)?.stopped_by(Arc::clone(&stop));
+            let mut worker = Worker::new(scene, specimen)?.stopped_by(Arc::clone(&stop));
             if first {
                 // A policy that cannot be loaded is told before episodes of the others are run.
                 worker.start(missing.iter().map(|job| &job.policy))?;
             }
             while let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
-                let files = worker.run(job)?;
+                let files = worker.run_until(job, &|| progress.interrupted())?;
                 store.put(job, &files)?;
                 progress.advance(1);
             }
@@ -97,28 +139,27 @@ impl Campaign {
                 scope.spawn(move || {
                     let _leaves = Leaves(at_work);
                     if let Err(why) = work(k == 0) {
-                        stop.store(true, Ordering::Relaxed);
-                        // The first is told; those of the others are its consequence.
+                        // The first is told; those of the others are its consequence. So it is kept before they hear that they are to stop.
                         if let Ok(mut told) = first_error.lock() {
                             told.get_or_insert(why);
                         }
+                        stop.store(true, Ordering::SeqCst);
                     }
                 });
             }
             // Whoever waits for a server is told by the flag.
             while at_work.load(Ordering::Relaxed) > 0 {
                 if progress.interrupted() {
-                    stop.store(true, Ordering::Relaxed);
+                    stop.store(true, Ordering::SeqCst);
                 }
                 std::thread::sleep(GLANCE);
             }
         });
         if let Some(why) = first_error.into_inner().ok().flatten() {
-            return Err(if progress.interrupted() { Error::Interrupted } else { why });
+            return Err(why);
         }
         progress.end();
-        store.film(&plan, &scene, &specimen, progress)?;
-        Ok((store, plan))
+        Ok(())
     }
 }
 
@@ -147,9 +188,13 @@ impl Store {
     pub fn finish(&self, plan: &Plan) -> Result<CampaignResult> {
         let kept = self.kept(plan)?;
         let result = CampaignResult::of(plan, &kept, self.folder());
-        self.write("table.csv", table::csv(&kept)?.as_bytes())?;
-        self.write("report.html", report::campaign(plan, &result, &kept, self)?.as_bytes())?;
+        // All three are made before the first is written, so that they are of the same episodes.
+        let csv = table::csv(&kept)?;
+        let page = report::campaign(plan, &result, &kept, self)
+            .map_err(|why| self.unreadable_channels(&kept).unwrap_or(why))?;
         let text = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
+        self.write("table.csv", csv.as_bytes())?;
+        self.write("report.html", page.as_bytes())?;
         self.write("result.json", &text)?;
         Ok(result)
     }

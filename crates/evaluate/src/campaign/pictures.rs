@@ -43,7 +43,7 @@ pub(crate) fn failures<'a>(plan: &Plan, kept: &'a [Kept]) -> Vec<&'a Kept> {
     (0..longest).flat_map(|k| by_policy.iter_mut().filter_map(|own| own.get(k).copied()).collect::<Vec<_>>()).collect()
 }
 
-/// Films the first failures that have no moving picture yet.
+/// Films the first failures that have no moving picture yet. One that does not come out as it was, as on another machine, is left out.
 ///
 /// # Errors
 /// A kept episode that is damaged, a picture that cannot be written, an interruption.
@@ -63,7 +63,12 @@ pub(super) fn film(
     let mut episode = Episode::new(scene, specimen, 0)?;
     progress.begin("pictures", chosen.len() as u64);
     for kept in chosen {
-        let file = EpisodeFile::read(&store.episode(&kept.name, kept.index).join(EPISODE_FILE))?;
+        let path = store.episode(&kept.name, kept.index).join(EPISODE_FILE);
+        let file = EpisodeFile::read(&path).map_err(|why| store.unread(kept, why))?;
+        if file.header.seed != kept.seed {
+            let why = format!("{EPISODE_FILE}: its seed is {}, not {}", file.header.seed, kept.seed);
+            return Err(store.damaged(&kept.name, kept.index, &why));
+        }
         let mut again = Replayed::begin(&mut episode, &file)?;
         let mut sight = again.sight(specimen)?;
         let every = file.steps.len().div_ceil(FRAMES).max(1);
@@ -78,16 +83,23 @@ pub(super) fn film(
             if progress.interrupted() {
                 return Err(Error::Interrupted);
             }
+            if again.differs().is_some() {
+                break;
+            }
             let k = again.done() - 1;
             if k % every == 0 || k + 1 == file.steps.len() {
                 see(&again, (1e3 * again.episode().time()).round() as i32)?;
             }
         }
+        progress.advance(1);
+        // What became another episode is no picture of this one: better none.
+        if again.differs().is_some() {
+            continue;
+        }
         if again.done() == 0 {
             see(&again, 0)?;
         }
         store.write(&name(&kept.name, kept.index), &webp(&frames)?)?;
-        progress.advance(1);
     }
     progress.end();
     Ok(())

@@ -1,50 +1,14 @@
 //! What a campaign consists of: policies, seeds, and one job for each pair.
 
+use super::{PolicySpec, remote};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
-use trocar_task::policy::POLICIES;
 use trocar_task::{scene_hash, specimen_hash};
 
 /// Most episodes of a policy.
 const MOST_EPISODES: usize = 100_000;
-
-/// A policy of a campaign, by what the user wrote: `scripted`, `ws://HOST:PORT`, `python:MODULE:NAME` or `python:FILE.py:NAME`, or `NAME=` and one of those.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct PolicySpec {
-    /// Its name in tables and folders.
-    pub name: String,
-    /// What it is.
-    pub source: String,
-}
-
-impl PolicySpec {
-    /// # Errors
-    /// Says what can be written.
-    pub fn parse(text: &str) -> Result<Self> {
-        let (name, source) = match text.split_once('=') {
-            Some((name, source)) if !name.contains([':', '/']) => (Some(name), source),
-            _ => (None, text),
-        };
-        let remote = source.starts_with("ws://") || source.starts_with("wss://");
-        let python = source.strip_prefix("python:");
-        if !(remote || python.is_some_and(|p| p.contains(':')) || POLICIES.contains(&source)) {
-            return Err(Error::Mismatch(format!(
-                "--policy {text:.80}: is none of {}, ws://HOST:PORT, python:FILE.py:NAME, python:MODULE:NAME; or NAME= and one of those",
-                POLICIES.join(", ")
-            )));
-        }
-        let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
-        let name: String = name.unwrap_or(source).chars().map(plain).collect();
-        if name.is_empty() || name.len() > 80 || name.starts_with('.') {
-            return Err(Error::Mismatch(format!(
-                "--policy {text:.80}: its name must have 1 to 80 letters, not a dot first"
-            )));
-        }
-        Ok(Self { name, source: source.to_owned() })
-    }
-}
 
 /// One episode of a campaign.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -55,6 +19,48 @@ pub struct Job {
     pub index: usize,
     /// The seed.
     pub seed: u64,
+}
+
+/// Version of this program, and hash of the sources that decide what an episode is.
+pub(super) fn program() -> String {
+    format!("{} {}", env!("CARGO_PKG_VERSION"), env!("TROCAR_EPISODE_MAKERS"))
+}
+
+/// Whether there can be such a campaign, as far as that can be said without its specimen. `most` is how many `experiment rollouts` was asked for.
+///
+/// # Errors
+/// Names the option and says what can be.
+pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, most: Option<usize>) -> Result<()> {
+    let wrong = |why: String| Err(Error::Mismatch(why));
+    if policies.is_empty() {
+        return wrong("a campaign needs a --policy".to_owned());
+    }
+    if !(1..=MOST_EPISODES).contains(&episodes) {
+        return wrong(match most {
+            Some(most) => {
+                format!("--rollouts {most}: 1 to {} can be run", MOST_EPISODES.saturating_mul(policies.len()))
+            }
+            None => format!("--episodes {episodes}: 1 to {MOST_EPISODES} can be run"),
+        });
+    }
+    for (k, policy) in policies.iter().enumerate() {
+        let name = &policy.name;
+        if policies[..k].iter().any(|p| p.name == *name) {
+            return wrong(format!("two policies are named '{name}'; name one, as in --policy b={name}"));
+        }
+        if policy.is_remote() {
+            remote::endpoint(policy)?;
+        }
+    }
+    let last = seed.checked_add(episodes as u64 - 1);
+    if last.is_none() {
+        return wrong(format!("--seed {seed}: the seeds of {episodes} episodes end beyond {}", u64::MAX));
+    }
+    if last.is_some_and(|s| i64::try_from(s).is_err()) && policies.iter().any(PolicySpec::is_remote) {
+        let most = i64::MAX;
+        return wrong(format!("--seed {seed}: policies of other processes are told seeds of up to {most} only"));
+    }
+    Ok(())
 }
 
 /// What a campaign is: its folder's `campaign.json`.
@@ -85,7 +91,7 @@ pub struct Plan {
 
 impl Plan {
     /// # Errors
-    /// No policy, two of one name, too many episodes, an arm's model that cannot be read.
+    /// No policy, two of one name, a server that cannot be connected to as it is written, too many episodes, seeds that are none, an arm's model that cannot be read.
     pub fn new(
         scene: &Scene,
         specimen: &Specimen,
@@ -93,23 +99,10 @@ impl Plan {
         episodes: usize,
         seed: u64,
     ) -> Result<Self> {
-        if !(1..=MOST_EPISODES).contains(&episodes) {
-            return Err(Error::Mismatch(format!("--episodes {episodes}: 1 to {MOST_EPISODES} can be run")));
-        }
-        if policies.is_empty() {
-            return Err(Error::Mismatch("a campaign needs a --policy".to_owned()));
-        }
-        for (k, policy) in policies.iter().enumerate() {
-            if policies[..k].iter().any(|p| p.name == policy.name) {
-                let name = &policy.name;
-                return Err(Error::Mismatch(format!(
-                    "two policies are named '{name}'; name one, as in --policy b={name}"
-                )));
-            }
-        }
+        check(policies, episodes, seed, None)?;
         let hash = specimen_hash(specimen);
         Ok(Self {
-            program: format!("{} {}", env!("CARGO_PKG_VERSION"), env!("TROCAR_EPISODE_MAKERS")),
+            program: program(),
             scene: scene.name.clone(),
             task: scene.task.name.name().to_owned(),
             scene_hash: format!("{:016x}", scene_hash(scene, hash)?),
@@ -137,7 +130,8 @@ impl Plan {
     /// All jobs; the policies take turns, so that a campaign that was stopped compares what it has.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + '_ {
         let all = (0..self.episodes).flat_map(move |index| {
-            let seed = self.seed.wrapping_add(index as u64);
+            // Plans are checked: no seed is beyond the last.
+            let seed = self.seed.saturating_add(index as u64);
             self.policies.iter().map(move |policy| Job { policy: policy.clone(), index, seed })
         });
         all.take(self.count())
@@ -147,6 +141,7 @@ impl Plan {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use trocar_task::policy::POLICIES;
 
     #[test]
     fn the_first_policies_have_one_episode_more() {
@@ -172,15 +167,43 @@ mod tests {
     }
 
     #[test]
-    fn policies_are_named_for_folders() {
-        let name = |text| PolicySpec::parse(text).map(|p| (p.name, p.source));
-        let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
-        assert_eq!(name("scripted").unwrap(), pair("scripted", "scripted"));
-        assert_eq!(name("mine=ws://127.0.0.1:8000").unwrap(), pair("mine", "ws://127.0.0.1:8000"));
-        assert_eq!(name("ws://h:1/a?b=c").unwrap(), pair("ws---h-1-a-b-c", "ws://h:1/a?b=c"));
-        assert_eq!(name("python:policies.lift:make").unwrap().1, "python:policies.lift:make");
-        for bad in ["", "genius", "=scripted", "..=scripted", "python:lift"] {
-            assert!(name(bad).is_err(), "{bad}");
+    fn what_cannot_be_run_is_refused_by_its_option() {
+        let spec = |text: &str| PolicySpec::parse(text).unwrap();
+        let (scripted, server) = (vec![spec("scripted")], vec![spec("a=ws://127.0.0.1:1")]);
+        let said = |policies: &[PolicySpec], episodes, seed, most| {
+            check(policies, episodes, seed, most).map_err(|e| e.to_string()).err().unwrap_or_default()
+        };
+        assert_eq!(said(&scripted, 2, u64::MAX - 1, None), "");
+        assert_eq!(said(&server, 2, i64::MAX as u64 - 1, None), "");
+        assert!(said(&scripted, 0, 0, None).starts_with("--episodes 0"));
+        // What the user wrote is named, not what was made of it.
+        assert!(said(&scripted, 900_000, 0, Some(900_000)).starts_with("--rollouts 900000: "));
+        assert!(said(&scripted, 2, u64::MAX, None).starts_with("--seed 18446744073709551615: "));
+        assert!(said(&server, 2, i64::MAX as u64, None).starts_with("--seed 9223372036854775807: "));
+        assert!(said(&[&scripted[..], &scripted].concat(), 1, 0, None).contains("two policies"));
+        assert!(said(&[], 1, 0, None).contains("--policy"));
+        let made_by_hand = PolicySpec { name: "a".to_owned(), source: "ws://".to_owned() };
+        assert!(said(&[made_by_hand], 1, 0, None).contains("--policy a: "));
+    }
+
+    #[test]
+    fn the_program_is_all_that_decides_what_an_episode_is() {
+        let hashed: Vec<&str> = env!("TROCAR_EPISODE_SOURCES").split(' ').collect();
+        for file in ["remote/src", "evaluate/src/campaign/remote.rs", "../Cargo.lock"] {
+            assert!(hashed.contains(&file), "{file} is not among {hashed:?}");
+        }
+        // Whatever an episode, its policies or what they see is made of.
+        let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let mut open = vec!["task".to_owned(), "sight".to_owned(), "remote".to_owned()];
+        let mut seen = Vec::new();
+        while let Some(name) = open.pop() {
+            let text = std::fs::read_to_string(crates.join(&name).join("Cargo.toml")).unwrap();
+            let table: toml::Table = text.parse().unwrap();
+            let own = table["dependencies"].as_table().unwrap().keys().filter_map(|k| k.strip_prefix("trocar-"));
+            open.extend(own.filter(|k| !seen.iter().any(|s| s == k)).map(str::to_owned));
+            // How far work is decides nothing.
+            assert!(name == "progress" || hashed.contains(&format!("{name}/src").as_str()), "{name} is not hashed");
+            seen.push(name);
         }
     }
 }

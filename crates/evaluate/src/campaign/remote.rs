@@ -4,13 +4,13 @@
 //! `episode/seed` and `episode/step`. What they answer: `actions`, a chunk of absolute targets (two pivots [rad], insertion [m], roll [rad], jaw opening, for each arm), of which up to 8 are done.
 
 use super::PolicySpec;
+use super::served::{Served, serve};
 use crate::{Error, Result};
-use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, Command, Stdio};
+use std::collections::hash_map::RandomState;
+use std::hash::{BuildHasher, Hasher};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{self, RecvTimeoutError};
-use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use trocar_cell::{Action, ActionSpace};
 use trocar_remote::{Array, Client, Endpoint, Observation, Value};
 use trocar_render::Settings;
@@ -25,15 +25,6 @@ const RECORDING: &str = "recording";
 
 /// The interpreter that serves `python:` policies, unless `$TROCAR_PYTHON` names another.
 const PYTHON: &str = "python3";
-
-/// Longest that an interpreter takes to import a policy.
-const START: Duration = Duration::from_secs(120);
-
-/// How often a child that is waited for is looked at.
-const GLANCE: Duration = Duration::from_millis(50);
-
-/// Longest line of a child that is kept in one piece [bytes].
-const LONGEST: u64 = 4096;
 
 /// The key that a server may want.
 const KEY: &str = "TROCAR_POLICY_KEY";
@@ -57,22 +48,10 @@ pub(super) struct Remote {
     cameras: Vec<(String, [usize; 2])>,
     prompt: String,
     seed: u64,
-}
-
-/// A child process that serves a Python callable; it ends with this.
-struct Served {
-    child: Child,
-    url: String,
-    /// The last line of its standard error.
-    said: Arc<Mutex<String>>,
-}
-
-impl Drop for Served {
-    fn drop(&mut self) {
-        // It may have ended by itself; either way it is gone.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-    }
+    /// The server is still to be told that an episode begins.
+    begins: bool,
+    /// RoboArena's name of the episode at hand.
+    session: String,
 }
 
 impl Remote {
@@ -89,15 +68,8 @@ impl Remote {
     ) -> Result<Self> {
         let scene = episode.scene();
         let module = spec.source.strip_prefix("python:").map(str::to_owned);
-        let mut endpoint = Endpoint::new(if module.is_some() { "ws://127.0.0.1:1" } else { &spec.source });
-        endpoint.api_key = std::env::var(KEY).ok();
+        let mut endpoint = endpoint(spec)?;
         endpoint.interrupt = Some(Arc::clone(&stop));
-        if let Ok(text) = std::env::var(TIMEOUT) {
-            let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);
-            let seconds =
-                seconds.ok_or_else(|| Error::Mismatch(format!("${TIMEOUT} is '{text:.40}'; seconds are wanted")))?;
-            endpoint.timeouts.infer = Duration::from_secs_f64(seconds);
-        }
         let bounds = Bounds::new(episode.cell(), ActionSpace::Pivots)?;
         endpoint.actions.dim = Some(bounds.low.len());
         let seen = scene.cameras.iter().filter(|c| c.name != RECORDING);
@@ -117,6 +89,8 @@ impl Remote {
             cameras,
             prompt: trocar_task::prompt(scene),
             seed: 0,
+            begins: false,
+            session: String::new(),
         };
         match made.serve() {
             Err(_) if made.stop.load(Ordering::Relaxed) => Err(Error::Interrupted),
@@ -138,11 +112,25 @@ impl Remote {
         Ok(())
     }
 
-    /// The connection, made when it is first needed and after it was lost.
-    fn client(&mut self) -> std::result::Result<&mut Client, String> {
+    /// Makes the connection when it is first needed and after it was lost, and tells a server that an episode begins.
+    fn connect(&mut self) -> std::result::Result<&mut Client, String> {
         self.serve()?;
-        if self.client.as_ref().is_none_or(|c| !c.is_connected()) {
-            self.client = Some(Client::connect(&self.endpoint).map_err(|e| e.to_string())?);
+        let said = |e: trocar_remote::Error| e.to_string();
+        if self.begins
+            && let Some(client) = &mut self.client
+            && client.reset(&session(client, &self.session).map_err(said)?).is_ok()
+        {
+            self.begins = false;
+        }
+        // A connection that an earlier episode left behind may be dead without having been seen to be: it is made anew once.
+        if self.begins || self.client.as_ref().is_none_or(|c| !c.is_connected()) {
+            self.client = None;
+            let mut client = Client::connect(&self.endpoint).map_err(said)?;
+            if self.begins {
+                client.reset(&session(&client, &self.session).map_err(said)?).map_err(said)?;
+                self.begins = false;
+            }
+            self.client = Some(client);
         }
         self.client.as_mut().ok_or_else(|| "there is no connection".to_owned())
     }
@@ -168,14 +156,18 @@ impl Remote {
             seen.insert(format!("observation/images/{camera}"), Value::Array(array));
         }
         seen.insert("prompt".to_owned(), Value::Text(self.prompt.clone()));
-        seen.insert("episode/seed".to_owned(), Value::Int(self.seed as i64));
+        let seed = i64::try_from(self.seed).map_err(|_| format!("the seed {} is beyond {}", self.seed, i64::MAX))?;
+        seen.insert("episode/seed".to_owned(), Value::Int(seed));
         seen.insert("episode/step".to_owned(), Value::Int(episode.rows().len() as i64));
         Ok(seen)
     }
 
     fn chunk(&mut self, episode: &Episode) -> std::result::Result<Vec<Action>, String> {
-        let observation = self.observation(episode)?;
-        let reply = match self.client()?.infer(&observation) {
+        let mut observation = self.observation(episode)?;
+        let name = self.session.clone();
+        let client = self.connect()?;
+        observation.extend(session(client, &name).map_err(|e| e.to_string())?);
+        let reply = match client.infer(&observation) {
             Ok(reply) => reply,
             Err(why) => {
                 // A child that has died says why on its last line.
@@ -194,6 +186,30 @@ impl Remote {
     }
 }
 
+/// Where the policy `spec` is asked, with what the environment says of it. A Python callable has no address before it is served.
+///
+/// # Errors
+/// An address, a key or a longest wait that cannot be used.
+pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
+    let served = spec.source.starts_with("python:");
+    let mut endpoint = Endpoint::new(if served { "ws://127.0.0.1:1" } else { &spec.source });
+    endpoint.api_key = std::env::var(KEY).ok();
+    if let Ok(text) = std::env::var(TIMEOUT) {
+        let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);
+        let seconds =
+            seconds.ok_or_else(|| Error::Mismatch(format!("${TIMEOUT} is '{text:.40}'; seconds are wanted")))?;
+        endpoint.timeouts.infer = Duration::from_secs_f64(seconds);
+    }
+    endpoint.check().map_err(|why| Error::Mismatch(format!("--policy {}: {why}", spec.name)))?;
+    Ok(endpoint)
+}
+
+/// What each message has besides: the episode's name, where a RoboArena server asks for one.
+fn session(client: &Client, name: &str) -> trocar_remote::Result<Observation> {
+    let asked = client.server_config()?.is_some_and(|c| c.needs_session_id);
+    Ok(asked.then(|| ("session_id".to_owned(), Value::Text(name.to_owned()))).into_iter().collect())
+}
+
 impl Policy for Remote {
     fn name(&self) -> &str {
         &self.name
@@ -201,99 +217,14 @@ impl Policy for Remote {
 
     fn begin(&mut self, _episode: &Episode, seed: u64) -> trocar_task::Result<()> {
         self.seed = seed;
-        // A server that keeps a history forgets it; one that cannot be reached is told by the first action.
-        if let Some(client) = &mut self.client
-            && client.reset(&Observation::new()).is_err()
-        {
-            self.client = None;
-        }
+        // A server that keeps a history is told before the first observation, on whatever connection there is then.
+        self.begins = true;
+        // No two episodes have the same, not even of one policy and seed: several processes may ask one server.
+        self.session = format!("{}-{seed}-{:016x}", self.name, RandomState::new().build_hasher().finish());
         Ok(())
     }
 
     fn act(&mut self, episode: &Episode) -> trocar_task::Result<Vec<Action>> {
         self.chunk(episode).map_err(trocar_task::Error::Option)
-    }
-}
-
-/// Starts the server of a callable and waits for its address.
-fn serve(python: &str, module: &str, stop: &AtomicBool) -> std::result::Result<Served, String> {
-    let mut command = Command::new(python);
-    // A terminal's Ctrl-C is for this process, which ends the child; one that ended by itself would look like a policy that fails.
-    #[cfg(unix)]
-    std::os::unix::process::CommandExt::process_group(&mut command, 0);
-    let mut child = command
-        .args(["-m", "trocar.serve", module, "--port", "0", "--until-eof"])
-        // Nothing is written into it. It closes with this process, however that ends, and so the child ends too.
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .map_err(|e| format!("python:{module}: {python} cannot be started: {e}"))?;
-    let (out, err) = (child.stdout.take(), child.stderr.take());
-    let mut served = Served { child, url: String::new(), said: Arc::default() };
-    // Both pipes are read for as long as they are open: one that is full would hold the child up. The threads end with the child, or with whoever keeps its pipes.
-    let said = Arc::clone(&served.said);
-    each_line(err, move |line| {
-        if let Ok(mut said) = said.lock() {
-            *said = line;
-        }
-        true
-    });
-    let (tell, told) = mpsc::channel();
-    each_line(out, move |line| {
-        // Whatever else is printed first is not the address.
-        let _ = !line.starts_with("ws://") || tell.send(line).is_ok();
-        true
-    });
-    let begun = Instant::now();
-    while begun.elapsed() < START {
-        match told.recv_timeout(GLANCE) {
-            Ok(url) => {
-                served.url = url;
-                return Ok(served);
-            }
-            Err(RecvTimeoutError::Timeout) if stop.load(Ordering::Relaxed) => return Err("interrupted".to_owned()),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => {
-                let words = served.last_words().unwrap_or_default();
-                return Err(format!("python:{module}: cannot be loaded: {words}"));
-            }
-        }
-    }
-    Err(format!("python:{module}: was not served within {} s", START.as_secs()))
-}
-
-/// Gives every line of a child's output, cut to [`LONGEST`] bytes, to `take`, on a thread of its own.
-fn each_line(from: Option<impl Read + Send + 'static>, take: impl Fn(String) -> bool + Send + 'static) {
-    let Some(from) = from else { return };
-    std::thread::spawn(move || {
-        let mut lines = BufReader::new(from);
-        let mut line = Vec::new();
-        while lines.by_ref().take(LONGEST).read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
-            let text = String::from_utf8_lossy(&line).trim().to_owned();
-            if !text.is_empty() && !take(text) {
-                return;
-            }
-            line.clear();
-        }
-    });
-}
-
-impl Served {
-    /// The last line that a child which has ended wrote to its standard error; None while it runs.
-    fn last_words(&mut self) -> Option<String> {
-        for _ in 0..20 {
-            // The line may come a moment after the end.
-            std::thread::sleep(GLANCE);
-            if self.child.try_wait().ok().flatten().is_some() {
-                let said = self.said.lock().map(|s| s.clone()).unwrap_or_default();
-                return Some(if said.is_empty() {
-                    "it said nothing".to_owned()
-                } else {
-                    said.chars().take(300).collect()
-                });
-            }
-        }
-        None
     }
 }

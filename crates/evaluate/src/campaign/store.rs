@@ -1,11 +1,11 @@
 //! Finished episodes on disk: each in a folder of its own that appears whole or not at all.
 
-use super::{Job, Plan};
+use super::{Job, Plan, PolicySpec, plan};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::{Path, PathBuf};
-use trocar_task::{CHANNELS_FILE, EPISODE_FILE, End, RESULT_FILE, Recording, Summary};
+use trocar_task::{ArmSummary, CHANNELS_FILE, EPISODE_FILE, End, RESULT_FILE, Recording, Summary, read_channels};
 
 /// What makes a folder a campaign's.
 const PLAN: &str = "campaign.json";
@@ -61,6 +61,17 @@ impl Kept {
         let arms = self.summary.arms.iter().filter(|a| a.loaded_s > 0.0);
         arms.max_by(|a, b| a.loaded_s.total_cmp(&b.loaded_s)).map(|a| a.rcm_median_mm)
     }
+
+    /// Delay of the measured tip behind the commanded one [ms], of the arm that was farthest off its command without load: one that stands still has none. None where neither was off.
+    pub fn lag_ms(&self) -> Option<f64> {
+        let arms = self.summary.arms.iter().filter(|a| a.tracking_rms_mm > 0.0);
+        arms.max_by(|a, b| a.tracking_rms_mm.total_cmp(&b.tracking_rms_mm)).map(|a| a.lag_ms)
+    }
+
+    /// The larger of both arms of what `of` says.
+    pub(crate) fn peak(&self, of: fn(&ArmSummary) -> f64) -> f64 {
+        self.summary.arms.iter().map(of).fold(0.0, f64::max)
+    }
 }
 
 /// A campaign's folder.
@@ -74,47 +85,71 @@ fn io(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {
     |source| Error::Io { path: path.to_owned(), source }
 }
 
+/// The plan of the campaign in `folder`; None where none was begun.
+///
+/// # Errors
+/// A folder of something else, a plan that is damaged or cannot be read.
+fn begun(folder: &Path) -> Result<Option<Plan>> {
+    let path = folder.join(PLAN);
+    let exists = |reason: String| Error::Exists { path: folder.to_owned(), reason };
+    match fs::read(&path) {
+        Ok(text) => {
+            let plan = serde_json::from_slice(&text).map_err(|e| exists(format!("holds a damaged {PLAN}: {e}")))?;
+            return Ok(Some(plan));
+        }
+        // Only what is not there is missing; what cannot be read is said to be so.
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(io(&path)(e)),
+        Err(_) => {}
+    }
+    if folder.is_dir() {
+        // A campaign that was killed before it had its plan has these, and nothing in them.
+        let own = |name: &std::ffi::OsStr| [EPISODES, UNDER_WAY, LOCK].iter().any(|own| name == *own);
+        for entry in fs::read_dir(folder).map_err(io(folder))? {
+            if !own(&entry.map_err(io(folder))?.file_name()) {
+                return Err(exists(format!("is not empty and is no campaign ({PLAN} is missing); name a new folder")));
+            }
+        }
+    }
+    Ok(None)
+}
+
+/// Whether a campaign of `policies` from `seed` on can be in `folder`, as far as that can be said without its specimen.
+///
+/// # Errors
+/// As [`Store::open`].
+pub(super) fn look(folder: &Path, policies: &[PolicySpec], seed: u64) -> Result<()> {
+    let Some(old) = begun(folder)? else { return Ok(()) };
+    let exists = |reason: String| Err(Error::Exists { path: folder.to_owned(), reason });
+    let other = [("seed", old.seed != seed), ("program", old.program != plan::program())];
+    if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
+        return exists(format!("is a campaign of another {what}; write into another folder"));
+    }
+    let changed = |p: &&PolicySpec| old.policies.iter().any(|o| o.name == p.name && !p.is(o));
+    if let Some(policy) = policies.iter().find(changed) {
+        return exists(format!("has episodes of another policy named '{}'; name this one differently", policy.name));
+    }
+    Ok(())
+}
+
 impl Store {
     /// Opens the campaign in `folder` to go on with, or begins it. It may get more episodes and other policies, but not another scene, specimen or seed.
     ///
     /// # Errors
     /// A folder of something else or of another campaign; one that another process writes.
     pub fn open(folder: &Path, plan: &Plan) -> Result<Self> {
-        let path = folder.join(PLAN);
         let exists = |reason: String| Error::Exists { path: folder.to_owned(), reason };
-        // Episodes of policies that are not asked for now stay theirs.
         let mut whole = plan.clone();
-        if let Ok(text) = fs::read_to_string(&path) {
-            let old: Plan = serde_json::from_str(&text).map_err(|e| exists(format!("holds a damaged {PLAN}: {e}")))?;
-            let other = [
-                ("scene", old.scene_hash != plan.scene_hash),
-                ("specimen", old.specimen_hash != plan.specimen_hash),
-                ("seed", old.seed != plan.seed),
-                ("program", old.program != plan.program),
-            ];
+        whole.policies = plan.policies.iter().map(PolicySpec::stored).collect();
+        if let Some(old) = begun(folder)? {
+            let other =
+                [("scene", old.scene_hash != plan.scene_hash), ("specimen", old.specimen_hash != plan.specimen_hash)];
             if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
                 return Err(exists(format!("is a campaign of another {what}; write into another folder")));
             }
-            let changed =
-                |p: &&super::PolicySpec| old.policies.iter().any(|o| o.name == p.name && o.source != p.source);
-            if let Some(policy) = plan.policies.iter().find(changed) {
-                return Err(exists(format!(
-                    "has episodes of another policy named '{}'; name this one differently",
-                    policy.name
-                )));
-            }
+            look(folder, &plan.policies, plan.seed)?;
+            // Episodes of policies that are not asked for now stay theirs.
             let others = old.policies.into_iter().filter(|o| plan.policies.iter().all(|p| p.name != o.name));
             whole.policies.extend(others);
-        } else if folder.is_dir() {
-            // A campaign that was killed before it had its plan has these, and nothing in them.
-            let begun = |name: &std::ffi::OsStr| [EPISODES, UNDER_WAY, LOCK].iter().any(|own| name == *own);
-            for entry in fs::read_dir(folder).map_err(io(folder))? {
-                if !begun(&entry.map_err(io(folder))?.file_name()) {
-                    return Err(exists(format!(
-                        "is not empty and is no campaign ({PLAN} is missing); name a new folder"
-                    )));
-                }
-            }
         }
         let episodes = folder.join(EPISODES);
         fs::create_dir_all(&episodes).map_err(io(&episodes))?;
@@ -180,8 +215,8 @@ impl Store {
         if let Some(parent) = target.parent() {
             fs::create_dir_all(parent).map_err(io(parent))?;
         }
-        // An episode that is done again goes aside whole, so that at no moment a part of it is there.
-        let aside = partial.with_extension("old");
+        // An episode that is done again goes aside whole, so that at no moment a part of it is there. The name is made whole: a policy's may have dots, and what follows the last is no extension.
+        let aside = self.folder.join(UNDER_WAY).join(format!("{}-{:06}.old", job.policy.name, job.index));
         if target.exists() {
             fs::rename(&target, &aside).map_err(io(&target))?;
             // What was filmed is of the episode before; that there is no film is no error.
@@ -210,23 +245,44 @@ impl Store {
 
     fn read(&self, job: &Job) -> Result<Option<Kept>> {
         let path = self.episode(&job.policy.name, job.index).join(RESULT_FILE);
-        let text = match fs::read_to_string(&path) {
+        let text = match fs::read(&path) {
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
             text => text.map_err(io(&path))?,
         };
-        let damaged = |why: String| {
-            let folder = path.parent().map(Path::to_owned).unwrap_or_default();
-            Error::Exists {
-                path: folder,
-                reason: format!("holds a damaged episode ({why}); remove it to have it run again"),
-            }
-        };
-        let mut kept: Kept = serde_json::from_str(&text).map_err(|e| damaged(e.to_string()))?;
+        let damaged = |why: String| self.damaged(&job.policy.name, job.index, &format!("{RESULT_FILE}: {why}"));
+        let mut kept: Kept = serde_json::from_slice(&text).map_err(|e| damaged(e.to_string()))?;
         if kept.seed != job.seed {
             return Err(damaged(format!("its seed is {}, not {}", kept.seed, job.seed)));
         }
         (kept.name, kept.index) = (job.policy.name.clone(), job.index);
         Ok(Some(kept))
+    }
+
+    /// That an episode cannot be used, and what is to be done about it.
+    pub(super) fn damaged(&self, policy: &str, index: usize, why: &str) -> Error {
+        let reason = format!("holds a damaged episode ({why}); remove it to have it run again");
+        Error::Exists { path: self.episode(policy, index), reason }
+    }
+
+    /// The same of an error of reading one of its files; other errors stay what they are.
+    pub(super) fn unread(&self, kept: &Kept, why: trocar_task::Error) -> Error {
+        let file = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let why = match &why {
+            trocar_task::Error::Invalid { path, reason } => format!("{}: {reason}", file(path)),
+            trocar_task::Error::Io { path, source } if source.kind() == std::io::ErrorKind::NotFound => {
+                format!("{} is missing", file(path))
+            }
+            _ => return why.into(),
+        };
+        self.damaged(&kept.name, kept.index, &why)
+    }
+
+    /// The first of these episodes whose channels cannot be read, as what is said of it.
+    pub(super) fn unreadable_channels(&self, kept: &[Kept]) -> Option<Error> {
+        kept.iter().find_map(|k| {
+            let read = read_channels(&self.episode(&k.name, k.index).join(CHANNELS_FILE));
+            read.err().map(|why| self.unread(k, why))
+        })
     }
 
     /// Writes a file of the campaign, whole or not at all.

@@ -30,7 +30,10 @@ impl Interval {
         let (z2, scale) = (Z * Z, 1.0 + Z * Z / n);
         let middle = (p + z2 / (2.0 * n)) / scale;
         let half = Z * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt() / scale;
-        Self { share: p, low: (middle - half).max(0.0), high: (middle + half).min(1.0) }
+        // Of none the low end is 0 and of all the high end is 1, which rounding misses.
+        let low = if count == 0 { 0.0 } else { (middle - half).max(0.0) };
+        let high = if count == all { 1.0 } else { (middle + half).min(1.0) };
+        Self { share: p, low, high }
     }
 }
 
@@ -84,8 +87,14 @@ pub struct PolicyRow {
     pub peak_contact_n: Option<f64>,
     /// See there.
     pub peak_constraint_n: Option<f64>,
+    /// And of the peak force with which tissue pushed blades apart [N].
+    pub peak_jaw_n: Option<f64>,
+    /// Median over episodes of the delay of the measured tip behind the commanded one [ms].
+    pub lag_ms: Option<f64>,
     /// Most inverted elements.
     pub inverted_peak: usize,
+    /// Why the policy failed, in the first episode that ended so.
+    pub policy_error: Option<String>,
 }
 
 /// Two policies on the same seeds.
@@ -136,7 +145,10 @@ impl CampaignResult {
     /// Of the episodes `kept` so far.
     pub(super) fn of(plan: &Plan, kept: &[Kept], folder: &Path) -> Self {
         let of = |name: &str| kept.iter().filter(|k| k.name == name).collect::<Vec<_>>();
-        let policies: Vec<PolicyRow> = plan.policies.iter().map(|p| row(&p.name, &of(&p.name), plan)).collect();
+        // A policy of which nothing is kept yet has the stages of the others.
+        let stages: Vec<&'static str> =
+            kept.first().map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
+        let policies = plan.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, plan)).collect();
         let mut comparisons = Vec::new();
         for (k, a) in plan.policies.iter().enumerate() {
             for b in &plan.policies[k + 1..] {
@@ -163,10 +175,8 @@ impl CampaignResult {
     }
 }
 
-fn row(name: &str, kept: &[&Kept], plan: &Plan) -> PolicyRow {
+fn row(name: &str, kept: &[&Kept], names: &[&'static str], plan: &Plan) -> PolicyRow {
     let all = kept.len();
-    let names: Vec<&'static str> =
-        kept.first().map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
     let stages = names.iter().enumerate().map(|(n, stage)| {
         let times: Vec<f64> = kept.iter().filter_map(|k| k.summary.progress.stages.get(n)?.time_s).collect();
         let passed = kept.iter().filter(|k| k.summary.progress.stages.get(n).is_some_and(|s| s.passed)).count();
@@ -184,9 +194,11 @@ fn row(name: &str, kept: &[&Kept], plan: &Plan) -> PolicyRow {
             Some(End::PolicyError { .. }) => ends[4] += 1,
         }
     }
-    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| {
-        median(kept.iter().map(|k| k.summary.arms.iter().map(of).fold(0.0, f64::max)).collect())
-    };
+    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| median(kept.iter().map(|k| k.peak(of)).collect());
+    let policy_error = kept.iter().find_map(|k| match &k.summary.end {
+        Some(End::PolicyError { why }) => Some(why.clone()),
+        _ => None,
+    });
     let places: Vec<f64> = kept.iter().filter_map(|k| k.summary.grasp_at).collect();
     PolicyRow {
         policy: name.to_owned(),
@@ -209,7 +221,10 @@ fn row(name: &str, kept: &[&Kept], plan: &Plan) -> PolicyRow {
         }),
         peak_contact_n: peak(|a| a.peak_contact_n),
         peak_constraint_n: peak(|a| a.peak_constraint_n),
+        peak_jaw_n: peak(|a| a.peak_jaw_n),
+        lag_ms: median(kept.iter().filter_map(|k| k.lag_ms()).collect()),
         inverted_peak: kept.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+        policy_error,
     }
 }
 
@@ -251,9 +266,11 @@ pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
     (n > 0).then(|| 0.5 * (values[(n - 1) / 2] + values[n / 2]))
 }
 
-/// One line an episode.
+/// One line an episode. After the hash come when each stage of the task passed [s], empty where it did not.
 pub(super) fn csv(kept: &[Kept]) -> Result<String> {
     let format = |e: csv::Error| Error::Format(e.to_string());
+    let stages = kept.first().map_or(&[][..], |k| &k.summary.progress.stages);
+    let times: Vec<String> = stages.iter().map(|s| format!("{}_at_s", s.stage.name())).collect();
     let mut table = csv::Writer::from_writer(Vec::new());
     let head = [
         "policy",
@@ -263,6 +280,7 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
         "stages",
         "score",
         "end",
+        "why",
         "duration_s",
         "attached",
         "grasp_at",
@@ -270,16 +288,20 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
         "lift_mm",
         "slip_mm",
         "rcm_peak_mm",
+        "rcm_loaded_median_mm",
+        "lag_ms",
         "peak_contact_n",
         "peak_constraint_n",
+        "peak_jaw_n",
         "inverted_peak",
         "state_hash",
     ];
-    table.write_record(head).map_err(format)?;
+    table.write_record(head.into_iter().chain(times.iter().map(String::as_str))).map_err(format)?;
+    let or_nothing = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
     for k in kept {
         let s = &k.summary;
-        let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
         let end = s.end.as_ref().map_or(String::new(), |e| e.name().to_owned());
+        let why = if s.passed { None } else { s.end.as_ref() };
         let record = [
             k.name.clone(),
             k.index.to_string(),
@@ -288,19 +310,24 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
             s.stage.to_string(),
             s.score.to_string(),
             end,
+            why.map_or(String::new(), ToString::to_string),
             s.duration_s.to_string(),
             s.attached.to_string(),
-            s.grasp_at.map_or(String::new(), |a| a.to_string()),
+            or_nothing(s.grasp_at),
             s.held_to_end.to_string(),
             s.lift_mm.to_string(),
             s.slip_mm.to_string(),
             s.rcm_peak_mm.to_string(),
-            peak(|a| a.peak_contact_n).to_string(),
-            peak(|a| a.peak_constraint_n).to_string(),
+            or_nothing(k.loaded_rcm_mm()),
+            or_nothing(k.lag_ms()),
+            k.peak(|a| a.peak_contact_n).to_string(),
+            k.peak(|a| a.peak_constraint_n).to_string(),
+            k.peak(|a| a.peak_jaw_n).to_string(),
             s.inverted_peak.to_string(),
             k.state_hash.clone(),
         ];
-        table.write_record(record).map_err(format)?;
+        let times = (0..times.len()).map(|n| or_nothing(s.progress.stages.get(n).and_then(|p| p.time_s)));
+        table.write_record(record.into_iter().chain(times)).map_err(format)?;
     }
     let bytes = table.into_inner().map_err(|e| Error::Format(e.to_string()))?;
     String::from_utf8(bytes).map_err(|e| Error::Format(e.to_string()))
@@ -318,6 +345,9 @@ mod tests {
         let half = Interval::wilson(5, 10);
         assert!((half.low - 0.2366).abs() < 1e-4 && (half.high - 0.7634).abs() < 1e-4, "{half:?}");
         assert_eq!(Interval::wilson(0, 0).high, 1.0);
+        for n in 1..2000 {
+            assert_eq!((Interval::wilson(n, n).high, Interval::wilson(0, n).low), (1.0, 0.0), "{n}");
+        }
     }
 
     #[test]

@@ -52,6 +52,10 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
         distribution(plan, kept, "Constraint force", "peak pull of held tissue [N]", &|k| {
             peak(k, |a| a.peak_constraint_n)
         })?,
+        distribution(plan, kept, "Jaw force", "peak force of tissue on the blades of a jaw [N]", &|k| {
+            peak(k, |a| a.peak_jaw_n)
+        })?,
+        lags(plan, kept)?,
         distribution(plan, kept, "Lift", "greatest lift of held tissue [mm]", &|k| k.summary.lift_mm)?,
     ];
     let spread = page::section(
@@ -76,7 +80,7 @@ fn legend(plan: &Plan) -> String {
 }
 
 fn peak(k: &Kept, of: fn(&ArmSummary) -> f64) -> f64 {
-    k.summary.arms.iter().map(of).fold(0.0, f64::max)
+    k.peak(of)
 }
 
 fn share(i: &Interval) -> String {
@@ -126,6 +130,8 @@ fn outcome(r: &CampaignResult) -> String {
         "lift mm",
         "RCM mm, loaded median",
         "RCM mm, max",
+        "lag ms",
+        "jaw N",
         "grasp at s",
     ];
     let row = |p: &crate::campaign::PolicyRow| {
@@ -144,6 +150,8 @@ fn outcome(r: &CampaignResult) -> String {
             or_dash(p.lift_median_mm, 1),
             or_dash(p.rcm_median_mm, 3),
             or_dash(p.rcm_max_mm, 3),
+            or_dash(p.lag_ms, 0),
+            or_dash(p.peak_jaw_n, 2),
             at,
         ]
     };
@@ -245,6 +253,13 @@ pub(super) fn lift_and_rcm(plan: &Plan, kept: &[Kept]) -> Result<String> {
 pub(super) fn lifts(plan: &Plan, kept: &[Kept]) -> Result<String> {
     let attached: Vec<Kept> = kept.iter().filter(|k| k.summary.attached).cloned().collect();
     distribution(plan, &attached, "Lift", "greatest lift of held tissue [mm]", &|k| k.summary.lift_mm)
+}
+
+/// Of the episodes in which an arm was off its command.
+fn lags(plan: &Plan, kept: &[Kept]) -> Result<String> {
+    let moved: Vec<Kept> = kept.iter().filter(|k| k.lag_ms().is_some()).cloned().collect();
+    let x = "delay of the measured tip behind the commanded one [ms]";
+    distribution(plan, &moved, "Tracking lag", x, &|k| k.lag_ms().unwrap_or(0.0))
 }
 
 fn distribution(plan: &Plan, kept: &[Kept], name: &str, x: &str, of: &dyn Fn(&Kept) -> f64) -> Result<String> {

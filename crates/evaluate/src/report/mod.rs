@@ -110,7 +110,13 @@ pub(crate) fn reconstruction_experiment(result: &ReconstructionResult, made: &[R
 /// A plot that cannot be drawn, channels that cannot be read.
 pub(crate) fn campaign(plan: &Plan, result: &CampaignResult, kept: &[Kept], store: &Store) -> Result<String> {
     let title = format!("{}: {}", plan.scene, plan.task);
-    let subtitle = format!("Campaign of {} episodes, seeds from {}", result.episodes, plan.seed);
+    let failed: usize = result.policies.iter().map(|p| p.ends[4]).sum();
+    let again = match failed {
+        0 => String::new(),
+        1 => "; in one the policy failed, and --retry-failed does it again".to_owned(),
+        n => format!("; in {n} the policy failed, and --retry-failed does them again"),
+    };
+    let subtitle = format!("Campaign of {} episodes, seeds from {}{again}", result.episodes, plan.seed);
     Ok(page::page(&title, &subtitle, &campaign::body(plan, result, kept, store)?))
 }
 

@@ -257,7 +257,7 @@ fn dialect_of(endpoint: &Endpoint, metadata: &Map) -> Dialect {
 
 /// Connects, with as many attempts as it takes and are allowed.
 fn dial(endpoint: &Endpoint) -> Result<(Socket, Map)> {
-    let (uri, key) = endpoint.check()?;
+    let (uri, key) = endpoint.parts()?;
     let mut pause = endpoint.retry.first;
     let mut attempt = 1;
     let (socket, first) = loop {

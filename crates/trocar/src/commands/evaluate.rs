@@ -49,8 +49,17 @@ fn text(r: &CampaignResult) -> String {
         .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage).collect::<Vec<_>>().join(", "));
     let header =
         ["policy", "passed", "95%", "by stage", "score", "held", "lift mm", "RCM mm", "max", "diverged", "failed"];
+    let failed: String = r
+        .policies
+        .iter()
+        .filter_map(|p| Some((p, p.policy_error.as_ref()?)))
+        .map(|(p, why)| {
+            format!("{}: the policy failed in {} of {} episodes; the first: {why}\n", p.policy, p.ends[4], p.episodes)
+        })
+        .collect();
+    let again = if failed.is_empty() { "" } else { "--retry-failed does them again\n" };
     format!(
-        "{}, {}: {} of {} episodes, seeds from {}; stages: {stages}\n{}\nstates {}\nreport {}",
+        "{}, {}: {} of {} episodes, seeds from {}; stages: {stages}\n{}\n{failed}{again}states {}\nreport {}",
         r.scene,
         r.task,
         r.episodes,
