@@ -212,7 +212,7 @@ fn the_table_says_why_when_and_how_far_off() {
     let (random, scripted) = (text.lines().nth(1).unwrap(), text.lines().nth(2).unwrap());
     assert_eq!(of(random, "why"), "the time was up");
     assert!(of(scripted, "lag_ms").parse::<f64>().unwrap() > 1.0, "a tip is behind its command: {scripted}");
-    for name in ["rcm_loaded_median_mm", "peak_jaw_n", "reach-1_at_s", "reach-2_at_s", "reach-3_at_s"] {
+    for name in ["rcm_loaded_median_mm", "peak_jaw_n", "reach-1_time_s", "reach-2_time_s", "reach-3_time_s"] {
         let value = of(random, name);
         assert!(value.is_empty() || value.parse::<f64>().is_ok(), "{name}: {value}");
     }

@@ -46,7 +46,8 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, most: O
     for (k, policy) in policies.iter().enumerate() {
         let name = &policy.name;
         if policies[..k].iter().any(|p| p.name == *name) {
-            return wrong(format!("two policies are named '{name}'; name one, as in --policy b={name}"));
+            let source = policy.shown();
+            return wrong(format!("two policies are named '{name}'; name one, as in --policy b={source}"));
         }
         if policy.is_remote() {
             remote::endpoint(policy)?;

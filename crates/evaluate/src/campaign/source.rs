@@ -66,6 +66,11 @@ impl PolicySpec {
         self.source.contains(':')
     }
 
+    /// Its source for messages.
+    pub(super) fn shown(&self) -> &str {
+        if is_address(&self.source) { without_query(&self.source) } else { &self.source }
+    }
+
     /// This as it stands in files. What an address has after its `?` may be a token: a hash of it is kept, which tells another policy from this one.
     pub(super) fn stored(&self) -> Self {
         let source = match self.source.split_once('?') {

@@ -270,7 +270,7 @@ pub(crate) fn median(mut values: Vec<f64>) -> Option<f64> {
 pub(super) fn csv(kept: &[Kept]) -> Result<String> {
     let format = |e: csv::Error| Error::Format(e.to_string());
     let stages = kept.first().map_or(&[][..], |k| &k.summary.progress.stages);
-    let times: Vec<String> = stages.iter().map(|s| format!("{}_at_s", s.stage.name())).collect();
+    let times: Vec<String> = stages.iter().map(|s| format!("{}_time_s", s.stage.name())).collect();
     let mut table = csv::Writer::from_writer(Vec::new());
     let head = [
         "policy",

@@ -8,7 +8,7 @@ use super::plots::{Line, Plot};
 use super::table::{self, fixed, percent};
 use crate::Result;
 use crate::campaign::{CampaignResult, Interval, Kept, Plan, Store, pictures};
-use trocar_task::{ArmSummary, CHANNELS_FILE, GateRange, read_channels, sweep};
+use trocar_task::{CHANNELS_FILE, GateRange, read_channels, sweep};
 
 /// Failures that the page lists.
 const LISTED: usize = 40;
@@ -47,13 +47,13 @@ pub(super) fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store
             k.summary.rcm_peak_mm
         })?,
         distribution(plan, kept, "Contact force", "peak contact force on an instrument [N]", &|k| {
-            peak(k, |a| a.peak_contact_n)
+            k.peak(|a| a.peak_contact_n)
         })?,
         distribution(plan, kept, "Constraint force", "peak pull of held tissue [N]", &|k| {
-            peak(k, |a| a.peak_constraint_n)
+            k.peak(|a| a.peak_constraint_n)
         })?,
         distribution(plan, kept, "Jaw force", "peak force of tissue on the blades of a jaw [N]", &|k| {
-            peak(k, |a| a.peak_jaw_n)
+            k.peak(|a| a.peak_jaw_n)
         })?,
         lags(plan, kept)?,
         distribution(plan, kept, "Lift", "greatest lift of held tissue [mm]", &|k| k.summary.lift_mm)?,
@@ -77,10 +77,6 @@ fn color(plan: &Plan, name: &str) -> [u8; 3] {
 
 fn legend(plan: &Plan) -> String {
     page::legend(plan.policies.iter().map(|p| (p.name.as_str(), color(plan, &p.name))))
-}
-
-fn peak(k: &Kept, of: fn(&ArmSummary) -> f64) -> f64 {
-    k.peak(of)
 }
 
 fn share(i: &Interval) -> String {

@@ -17,7 +17,7 @@ pub struct Evaluate {
     /// Seed of the first episode; the next have the next. All policies get the same.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Episodes at once; as many as the machine has cores by default. The result does not depend on it.
+    /// Episodes at once, up to eight a core; as many as the machine has cores by default. The result does not depend on it.
     #[arg(long, default_value_t = 0)]
     pub jobs: usize,
     /// Episodes that ended because their policy failed are done again.
