@@ -158,6 +158,9 @@ def test_ctrl_c_ends_a_campaign_that_waits_for_a_policy(short_scene, tmp_path, h
     assert ends(served, 10)
     kept = [str(p.parent.relative_to(tmp_path / "out/episodes")) for p in (tmp_path / "out/episodes").rglob("result.json")]
     assert kept == (["random/000000"] if how == "acts" else [])
+    # There are table and page of what is kept.
+    assert len((tmp_path / "out/table.csv").read_text().splitlines()) == 1 + len(kept)
+    assert (tmp_path / "out/report.html").exists()
 
 
 def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(short_scene, tmp_path, monkeypatch):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
 import sys
@@ -148,7 +149,8 @@ class _Crew:
             self._tries[job] = self._tries.get(job, 0) + 1
             self.waiting.append(job)
         if self._stillborn >= TRIES or self._tries.get(job or "", 0) >= TRIES:
-            over = job or "their cells"
+            # Not the whole job: an address may have a token in it.
+            over = _named(job) if job else "their cells"
             raise RuntimeError(f"{TRIES} workers were lost over {over}: {_last_line(why)}") from why
         self._ask([])
 
@@ -164,6 +166,11 @@ class _Crew:
             self.campaign.put(self.under_way[reference][1], files)
         for actor in [*self.idle, *(actor for actor, _ in self.under_way.values())]:
             self.ray.kill(actor)
+
+
+def _named(job: str) -> str:
+    told = json.loads(job)
+    return f"episode {told['index']} of {told['policy']['name']}"
 
 
 def _last_line(why: Exception) -> str:

@@ -22,6 +22,7 @@ from typing import Any, Callable, Sequence
 from ._native import Campaign
 from ._progress import Bar
 from ._ray import run_on_ray
+from ._signals import deaf
 from ._threads import run_on_threads
 from .envs.cells import phantoms_folder
 
@@ -47,7 +48,7 @@ def run(
     `workers`: as many as there are CPUs if not given. Policies `python:...` are served by the interpreter that runs this, unless
     `$TROCAR_PYTHON` names another.
 
-    Ctrl-C ends it within moments, whatever is waited for: `KeyboardInterrupt`, with the finished episodes kept. ValueError for a
+    Ctrl-C ends it within moments, whatever is waited for: `KeyboardInterrupt`, with the finished episodes kept and in table and report. ValueError for a
     scene, policy or folder that cannot be used; on Ray, RuntimeError says what went wrong in a worker.
     """
     folder = phantoms_folder()
@@ -55,12 +56,17 @@ def run(
     campaign = Campaign(scene, list(policies), episodes, seed, folder, Path(output))
     jobs = campaign.missing(retry_failed)
     progress = progress or (lambda done, all: None)
-    if jobs:
-        if ray_address is None:
+    try:
+        if jobs and ray_address is None:
             run_on_threads(campaign, scene, jobs, workers, progress)
-        else:
+        elif jobs:
             run_on_ray(campaign, scene, jobs, workers, ray_address, progress)
-    return json.loads(campaign.finish())
+        return json.loads(campaign.finish())
+    except KeyboardInterrupt:
+        # Films take long; the next time will have them.
+        with deaf():
+            campaign.finish(films=False)
+        raise
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -106,7 +112,7 @@ def main(arguments: list[str] | None = None) -> int:
         bar.say(f"error: {why}")
         return 1
     except KeyboardInterrupt:
-        bar.say("interrupted; finished episodes are kept, and the same command goes on")
+        bar.say("interrupted; finished episodes are kept, with their table and report, and the same command goes on")
         return 130
     if options.json:
         print(json.dumps(result))

@@ -91,11 +91,14 @@ impl Campaign {
         py.detach(|| self.store()?.put(&job, &Files(files)).map_err(|e| evaluate(&e)))
     }
 
-    /// Films failures, makes table and report, and gives `result.json` as text.
-    fn finish(&self, py: Python<'_>) -> PyResult<String> {
+    /// Films failures unless that takes too long now, makes table and report, and gives `result.json` as text.
+    #[pyo3(signature = (films=true))]
+    fn finish(&self, py: Python<'_>, films: bool) -> PyResult<String> {
         py.detach(|| {
             let store = self.store()?;
-            store.film(&self.plan, &self.scene, &self.specimen, &Signals::new()).map_err(|e| evaluate(&e))?;
+            if films {
+                store.film(&self.plan, &self.scene, &self.specimen, &Signals::new()).map_err(|e| evaluate(&e))?;
+            }
             let result = store.finish(&self.plan).map_err(|e| evaluate(&e))?;
             serde_json::to_string_pretty(&result).map_err(wrong)
         })
