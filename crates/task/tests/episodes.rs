@@ -152,7 +152,7 @@ fn a_reset_gives_the_same_bits_whatever_was_before() {
     assert!(said.contains("of the task appendix-resection"), "{said}");
     assert_eq!(other.state_hash(), hash);
     // Nor one of another scene; how long it may be does not matter.
-    let mut near = scene.clone();
+    let mut near = scene;
     near.task.episode_s += 1.0;
     Episode::new(&near, &specimen, 1).unwrap().restore(&saved).unwrap();
     near.task.gates.lift_mm += 1.0;
