@@ -202,6 +202,21 @@ def test_the_program_evaluates_a_python_policy_and_outlives_one_that_raises(prog
     assert f"asked to {asked}" in kept["end"]["why"], "a served policy and an environment are told the same"
 
 
+@pytest.mark.parametrize("beside", [[], ["slow=python:mortal.py:slow"]])
+def test_a_policy_whose_process_ends_after_an_episode_is_served_anew(program, short_scene, tmp_path, beside):
+    """Before the next episode's first question, or amid it; beside another policy's episode the connection is seen to be dead before."""
+    (tmp_path / "mortal.py").write_text(
+        "import os, threading, time\nimport numpy as np\n"
+        "def still(obs):\n    s = obs['observation/state']\n    return {'actions': np.tile([*s[:5], *s[23:28]], (8, 1))}\n"
+        "def act(obs):\n    if obs['episode/step'] >= 8:\n        threading.Timer(0.05, os._exit, [3]).start()\n    return still(obs)\n"
+        "def slow(obs):\n    time.sleep(1.0)\n    return still(obs)\n"
+    )
+    command = command_of(program, short_scene, tmp_path, ["mortal=python:mortal.py:act", *beside])
+    done = subprocess.run(**command | {"args": [*command["args"], "--jobs", "1"]}, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert [row["ends"][4] for row in json.loads(done.stdout)["policies"]] == [0] * (1 + len(beside)), done.stdout
+
+
 @pytest.mark.parametrize("policy, said", [
     ("nothing.here:Policy", "No module named 'nothing'"),
     ("nothing.py:Policy", "FileNotFoundError: there is no file"),

@@ -161,7 +161,8 @@ def test_order_is_kept_by_many_cells():
     for too_early in (lambda: envs.step(actions), envs.render, lambda: envs.save_state(0)):
         with pytest.raises(ResetNeeded):
             too_early()
-    envs.reset(seed=1, options={"reset_mask": np.array([True, False])})
+    _, info = envs.reset(seed=1, options={"reset_mask": np.array([True, False])})
+    assert not info["is_success"].any() and not envs.cells.terminated.any(), "nor has one ended that has not begun"
     with pytest.raises(ResetNeeded, match=r"\[1\]"):
         envs.step(actions)
     envs.reset(seed=1, options={"reset_mask": np.array([False, True])})

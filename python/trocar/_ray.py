@@ -73,7 +73,10 @@ def run_on_ray(
                     break
         finally:
             with deaf():
-                crew.stop()
+                try:
+                    crew.stop()
+                finally:
+                    crew.end()
     finally:
         if begun:
             with deaf():
@@ -99,7 +102,7 @@ class _Crew:
     def begin(self) -> None:
         """Asks for the actors."""
         for k in range(self.count):
-            # A policy that cannot be loaded is told before the others' episodes are run.
+            # A policy that cannot be loaded is told at the beginning, not when its turn comes.
             self._ask(self.jobs if k == 0 else [])
 
     def _ask(self, policies_of: list[str]) -> None:
@@ -155,7 +158,7 @@ class _Crew:
         self._ask([])
 
     def stop(self) -> None:
-        """Keeps what was finished meanwhile, and ends the actors, whatever they do."""
+        """Keeps what was finished meanwhile."""
         jobs = [reference for reference, (_, job) in self.under_way.items() if job is not None]
         finished = self.ray.wait(jobs, num_returns=len(jobs), timeout=0)[0] if jobs else []
         for reference in finished:
@@ -164,6 +167,9 @@ class _Crew:
             except self.ray.exceptions.RayError:
                 continue
             self.campaign.put(self.under_way[reference][1], files)
+
+    def end(self) -> None:
+        """Ends the actors, whatever they do."""
         for actor in [*self.idle, *(actor for actor, _ in self.under_way.values())]:
             self.ray.kill(actor)
 

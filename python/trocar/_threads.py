@@ -61,7 +61,7 @@ class _Crew:
         with self._turns:
             worker = Worker(self.scene, phantoms_folder(), self.plan, stop=self._stop, python=sys.executable or None)
         if first:
-            # A policy that cannot be loaded is told before the others' episodes are run.
+            # A policy that cannot be loaded is told at the beginning, not when its turn comes.
             worker.start(self.jobs)
         return worker
 

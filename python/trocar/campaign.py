@@ -112,13 +112,16 @@ def main(arguments: list[str] | None = None) -> int:
         bar.say(f"error: {why}")
         return 1
     except KeyboardInterrupt:
-        bar.say("interrupted; finished episodes are kept, with their table and report, and the same command goes on")
+        kept = (options.output / "result.json").exists()
+        bar.say("interrupted; " + ("finished episodes are kept, with their table and report, and the same command goes on" if kept else "no episode was begun"))
         return 130
     if options.json:
         print(json.dumps(result))
     else:
         for row in result["policies"]:
             print(f"{row['policy']}: {row['passed']} of {row['episodes']} passed, mean score {row['mean_score']:.2f}")
+            if row["policy_error"]:
+                print(f"{row['policy']} failed in {row['ends'][4]} episodes, first: {row['policy_error']}; --retry-failed does them again")
         print(f"states {result['hash']}\nreport {result['report']}")
     return 0
 

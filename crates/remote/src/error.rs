@@ -209,6 +209,11 @@ pub enum Error {
 }
 
 impl Error {
+    /// Whether the connection ended, rather than that a message or an answer was wrong: another connection may do.
+    pub fn is_disconnection(&self) -> bool {
+        matches!(self, Self::Closed { .. } | Self::NotConnected { .. })
+    }
+
     /// This error with `place` before its place, where it has one: `within("reply")` makes `actions` `reply/actions`.
     pub(crate) fn within(mut self, place: &str) -> Self {
         if let Self::Malformed { at, .. }

@@ -175,6 +175,12 @@ impl Channels {
     /// Numbers a row.
     pub const COUNT: usize = 1 + 2 * ArmChannels::NAMES.len() + TaskChannels::NAMES.len();
 
+    /// Whether the episode is lost here: tissue or an arm diverged, or an arm's RCM deviation went beyond `abort_mm`.
+    pub fn is_lost(&self, abort_mm: Option<f64>) -> bool {
+        let out = |mm: f64| abort_mm.is_some_and(|most| mm > most);
+        self.task.diverged > 0.0 || out(self.left.rcm_peak_mm) || out(self.right.rcm_peak_mm)
+    }
+
     /// Names of the numbers of a row, in order: `time_s`, `left_*`, `right_*`, then the task's.
     pub fn names() -> Vec<String> {
         let arm = |side: &'static str| ArmChannels::NAMES.into_iter().map(move |n| format!("{side}_{n}"));

@@ -211,20 +211,24 @@ impl Episode {
         let report = match self.cell.step(action) {
             Ok(report) => report,
             Err(refused @ trocar_cell::Error::Action { .. }) => return Err(refused.into()),
-            // An arm whose numbers are lost: the last row that was right again, but for the time and that it diverged.
+            // An arm whose numbers are lost: the last row that was right again, but for the time, that it diverged, and that nothing happened.
             Err(lost) => {
                 self.now.end = Some(End::Diverged { why: lost.to_string() });
                 let mut channels = self.now.rows.last().copied().unwrap_or_default();
                 channels.time_s += self.cell.period();
-                channels.task.diverged = 1.0;
+                let task = &mut channels.task;
+                (task.diverged, task.cuts, task.torn, task.yielded) = (1.0, 0.0, 0.0, 0.0);
                 self.now.rows.push(channels);
                 let (progress, end) = (self.progress().clone(), self.now.end.clone());
                 return Ok(Step { channels, progress, end, events: Vec::new() });
             }
         };
         let channels = self.now.subject.channels(&self.cell, &report)?;
-        self.now.tracker.update(&channels);
         let abort = report.arms.iter().find(|a| a.rcm_over_abort);
+        // Whoever leaves the port, or loses the tissue, passes nothing by it.
+        if !channels.is_lost(Some(self.scene.safety.rcm_abort_mm)) {
+            self.now.tracker.update(&channels);
+        }
         self.now.end = if let Some(why) = report.tissue.divergence {
             Some(End::Diverged { why: why.to_string() })
         } else if let Some(arm) = abort {

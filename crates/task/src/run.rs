@@ -111,6 +111,7 @@ pub fn run(
         task: scene.task.name,
         gates: scene.task.gates,
         rcm_threshold_mm: scene.safety.rcm_threshold_mm,
+        rcm_abort_mm: Some(scene.safety.rcm_abort_mm),
         arms: episode.cell().arms().iter().map(|(side, _)| side.name().to_owned()).collect(),
         policy: policy.name().to_owned(),
         seed,

@@ -37,6 +37,9 @@ pub struct ChannelsInfo {
     pub gates: Gates,
     /// RCM deviation that episodes are scored against [mm].
     pub rcm_threshold_mm: f64,
+    /// RCM deviation beyond which an episode is lost [mm]; None in files that were written before it was.
+    #[serde(default)]
+    pub rcm_abort_mm: Option<f64>,
     /// The arms that the scene has, left first.
     pub arms: Vec<String>,
     /// Name of the policy.

@@ -134,7 +134,8 @@ pub fn sweep(
             for (range, value) in ranges.iter().zip(&values) {
                 gates = with_gate(gates, &range.gate, *value)?;
             }
-            passed.push(Tracker::of(task, &gates, channels).stage);
+            let sound = channels.iter().position(|c| c.is_lost(info.rcm_abort_mm)).unwrap_or(channels.len());
+            passed.push(Tracker::of(task, &gates, &channels[..sound]).stage);
         }
         let by_stage = (1..=stages.len()).map(|n| passed.iter().filter(|p| **p >= n).count()).collect();
         let all = passed.iter().filter(|p| **p == stages.len()).count();

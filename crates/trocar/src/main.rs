@@ -28,7 +28,8 @@ fn main() -> ExitCode {
             match error {
                 // It says what is kept and how to go on.
                 trocar_evaluate::Error::Stopped { .. } => eprintln!("{error}"),
-                _ => eprintln!("interrupted; nothing half-written was left behind"),
+                trocar_evaluate::Error::Interrupted => eprintln!("interrupted; nothing half-written was left behind"),
+                _ => eprintln!("interrupted; and then: {error}"),
             }
             ExitCode::from(INTERRUPTED)
         }

@@ -235,8 +235,10 @@ fn an_interrupted_campaign_says_what_is_kept_and_how_to_go_on() {
     let folder = dir.path().join("campaign");
     let more = ["--policy", "random", "--episodes", "1000", "--jobs", "1"];
     let mut command = evaluate(&scene, &folder, &more);
-    let child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = command.stdout(Stdio::null()).stderr(Stdio::piped()).spawn().unwrap();
+    let begun = std::time::Instant::now();
     while !folder.join("episodes/random/000001").exists() {
+        assert!(child.try_wait().unwrap().is_none() && begun.elapsed() < Duration::from_secs(120));
         std::thread::sleep(Duration::from_millis(20));
     }
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());

@@ -80,6 +80,8 @@ class Cells:
         self.state = np.zeros((count, len(self.state_names)), np.float32)
         self.seeds = np.zeros(count, np.uint64)
         self.figures = np.zeros((count, len(native.figure_names)), np.float64)
+        # No episode has ended, nor begun.
+        self.figures[:, 3] = -1
         self.channels = np.zeros((count, len(self.channel_names)), np.float64)
         self.written = (self.state, self.figures, self.channels)
         self.low, self.high = native.action_limits

@@ -231,7 +231,7 @@ impl Cell {
                 Some(_) if patient && strain.is_too_much() => self.waits[organ] += 1,
                 Some((_, station)) => {
                     self.waits[organ] = 0;
-                    if strain.is_beyond(station.now.bare) {
+                    if strain.is_beyond(station.now.bare && station.holds(organ)) {
                         unhook(&mut self.world, station, organ);
                     }
                 }

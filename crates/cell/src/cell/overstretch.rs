@@ -51,9 +51,9 @@ impl Strain {
         self.is_beyond(false)
     }
 
-    /// Beyond what an instrument stays for. One that holds by its latch alone presses on nothing: how hard it may pull is for the tearing force to say, and the stretch only ends what solvers bear.
-    pub fn is_beyond(&self, bare: bool) -> bool {
-        self.stretch > if bare { FAR_TOO_MUCH } else { MOST } || self.volume < CRUSHED
+    /// Beyond what an instrument stays for. `latched`: its latch alone holds the organ, and its blades press on nothing. How hard that may pull is for the tearing force to say; the stretch only ends what solvers bear.
+    pub fn is_beyond(&self, latched: bool) -> bool {
+        self.stretch > if latched { FAR_TOO_MUCH } else { MOST } || self.volume < CRUSHED
     }
 
     /// Not as good as at rest.

@@ -141,7 +141,7 @@ impl EpisodeBench {
             periods,
             simulated_s: episode.time(),
             end: episode.end().map_or("no end".to_owned(), ToString::to_string),
-            passed: episode.progress().passed(),
+            passed: episode.summary().passed,
             state_hash: format!("{:016x}", hashes[0]),
             repeatable: hashes.iter().all(|h| *h == hashes[0]),
             organs: bodies.len(),

@@ -123,7 +123,7 @@ impl Campaign {
         let work = |first: bool| -> Result<()> {
             let mut worker = Worker::new(scene, specimen)?.stopped_by(Arc::clone(&stop));
             if first {
-                // A policy that cannot be loaded is told before episodes of the others are run.
+                // A policy that cannot be loaded is told at the beginning, not when its turn comes.
                 worker.start(missing.iter().map(|job| &job.policy))?;
             }
             while let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {

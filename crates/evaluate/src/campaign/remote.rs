@@ -50,6 +50,8 @@ pub(super) struct Remote {
     seed: u64,
     /// The server is still to be told that an episode begins.
     begins: bool,
+    /// The connection is an earlier episode's and was not asked in this one: it may be dead without having been seen to be.
+    left: bool,
     /// RoboArena's name of the episode at hand.
     session: String,
 }
@@ -90,6 +92,7 @@ impl Remote {
             prompt: trocar_task::prompt(scene),
             seed: 0,
             begins: false,
+            left: false,
             session: String::new(),
         };
         match made.serve() {
@@ -101,6 +104,9 @@ impl Remote {
 
     /// Serves the callable, if it is one and its server does not run.
     fn serve(&mut self) -> std::result::Result<(), String> {
+        if self.child.as_mut().is_some_and(Served::has_ended) {
+            (self.child, self.client) = (None, None);
+        }
         if let Some(module) = &self.module
             && self.child.is_none()
         {
@@ -122,7 +128,6 @@ impl Remote {
         {
             self.begins = false;
         }
-        // A connection that an earlier episode left behind may be dead without having been seen to be: it is made anew once.
         if self.begins || self.client.as_ref().is_none_or(|c| !c.is_connected()) {
             self.client = None;
             let mut client = Client::connect(&self.endpoint).map_err(said)?;
@@ -130,7 +135,7 @@ impl Remote {
                 client.reset(&session(&client, &self.session).map_err(said)?).map_err(said)?;
                 self.begins = false;
             }
-            self.client = Some(client);
+            (self.client, self.left) = (Some(client), false);
         }
         self.client.as_mut().ok_or_else(|| "there is no connection".to_owned())
     }
@@ -165,19 +170,26 @@ impl Remote {
     fn chunk(&mut self, episode: &Episode) -> std::result::Result<Vec<Action>, String> {
         let mut observation = self.observation(episode)?;
         let name = self.session.clone();
-        let client = self.connect()?;
-        observation.extend(session(client, &name).map_err(|e| e.to_string())?);
-        let reply = match client.infer(&observation) {
-            Ok(reply) => reply,
-            Err(why) => {
-                // A child that has died says why on its last line.
-                let last = self.child.as_mut().and_then(|c| c.last_words());
-                if last.is_some() {
-                    self.child = None;
-                }
-                return Err(last.map_or_else(|| why.to_string(), |words| format!("{why}; its last words: {words}")));
+        let reply = loop {
+            let client = self.connect()?;
+            observation.extend(session(client, &name).map_err(|e| e.to_string())?);
+            let why = match client.infer(&observation) {
+                Ok(reply) => break reply,
+                Err(why) => why,
+            };
+            // A child that has died says why on its last line.
+            let last = self.child.as_mut().and_then(|c| c.last_words());
+            if last.is_some() {
+                self.child = None;
             }
+            // Whoever went between two episodes is asked once more, on a new connection.
+            if std::mem::take(&mut self.left) && why.is_disconnection() {
+                (self.client, self.begins) = (None, true);
+                continue;
+            }
+            return Err(last.map_or_else(|| why.to_string(), |words| format!("{why}; its last words: {words}")));
         };
+        self.left = false;
         let steps = reply.actions.horizon().min(CHUNK);
         (0..steps)
             .filter_map(|k| reply.actions.step(k))
@@ -219,6 +231,7 @@ impl Policy for Remote {
         self.seed = seed;
         // A server that keeps a history is told before the first observation, on whatever connection there is then.
         self.begins = true;
+        self.left = self.client.is_some();
         // No two episodes have the same, not even of one policy and seed: several processes may ask one server.
         self.session = format!("{}-{seed}-{:016x}", self.name, RandomState::new().build_hasher().finish());
         Ok(())

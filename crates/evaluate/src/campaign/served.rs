@@ -58,13 +58,14 @@ pub(super) fn serve(python: &str, module: &str, stop: &AtomicBool) -> std::resul
         if let Ok(mut said) = said.lock() {
             *said = line;
         }
-        true
     });
     let (tell, told) = mpsc::channel();
     each_line(out, move |line| {
         // Whatever else is printed first is not the address.
-        let _ = !line.starts_with("ws://") || tell.send(line).is_ok();
-        true
+        if line.starts_with("ws://") {
+            // Nobody listens any more once it was told.
+            let _ = tell.send(line);
+        }
     });
     let begun = Instant::now();
     while begun.elapsed() < START {
@@ -85,15 +86,15 @@ pub(super) fn serve(python: &str, module: &str, stop: &AtomicBool) -> std::resul
 }
 
 /// Gives every line of a child's output, cut to [`LONGEST`] bytes, to `take`, on a thread of its own.
-fn each_line(from: Option<impl Read + Send + 'static>, take: impl Fn(String) -> bool + Send + 'static) {
+fn each_line(from: Option<impl Read + Send + 'static>, take: impl Fn(String) + Send + 'static) {
     let Some(from) = from else { return };
     std::thread::spawn(move || {
         let mut lines = BufReader::new(from);
         let mut line = Vec::new();
         while lines.by_ref().take(LONGEST).read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
             let text = String::from_utf8_lossy(&line).trim().to_owned();
-            if !text.is_empty() && !take(text) {
-                return;
+            if !text.is_empty() {
+                take(text);
             }
             line.clear();
         }
@@ -101,12 +102,17 @@ fn each_line(from: Option<impl Read + Send + 'static>, take: impl Fn(String) -> 
 }
 
 impl Served {
+    /// Whether the child has ended.
+    pub fn has_ended(&mut self) -> bool {
+        self.child.try_wait().ok().flatten().is_some()
+    }
+
     /// The last line that a child which has ended wrote to its standard error; None while it runs.
     pub fn last_words(&mut self) -> Option<String> {
         for _ in 0..20 {
             // The line may come a moment after the end.
             std::thread::sleep(GLANCE);
-            if self.child.try_wait().ok().flatten().is_some() {
+            if self.has_ended() {
                 let said = self.said.lock().map(|s| s.clone()).unwrap_or_default();
                 return Some(if said.is_empty() {
                     "it said nothing".to_owned()

@@ -11,7 +11,7 @@ use xxhash_rust::xxh3::xxh3_64;
 pub struct PolicySpec {
     /// Its name in tables and folders. A server's that was given none is its scheme, host and port.
     pub name: String,
-    /// What it is. A server's address is whole: what stands after its `?` may be a secret, and is in no file of the campaign.
+    /// What it is. A server's address is whole: what stands after its `?` or `#` may be a secret, and is in no file of the campaign.
     pub source: String,
 }
 
@@ -71,13 +71,13 @@ impl PolicySpec {
         if is_address(&self.source) { without_query(&self.source) } else { &self.source }
     }
 
-    /// This as it stands in files. What an address has after its `?` may be a token: a hash of it is kept, which tells another policy from this one.
+    /// This as it stands in files. What an address has after its `?` or `#` may be a token: a hash of it is kept, which tells another policy from this one.
     pub(super) fn stored(&self) -> Self {
-        let source = match self.source.split_once('?') {
-            Some((address, query)) if is_address(&self.source) => {
-                format!("{address}?hidden-{:016x}", xxh3_64(query.as_bytes()))
-            }
-            _ => self.source.clone(),
+        let address = without_query(&self.source);
+        let source = if is_address(&self.source) && address.len() < self.source.len() {
+            format!("{address}?hidden-{:016x}", xxh3_64(&self.source.as_bytes()[address.len() + 1..]))
+        } else {
+            self.source.clone()
         };
         Self { name: self.name.clone(), source }
     }
@@ -157,6 +157,8 @@ mod tests {
         let stored = spec.stored();
         assert!(secret.iter().all(|s| !format!("{stored:?}").contains(s)), "{stored:?}");
         assert!(spec.is(&stored) && spec.is(&spec));
+        let fragment = PolicySpec::parse("ws://h:1/a#secret").map(|spec| format!("{:?}", spec.stored()));
+        assert!(fragment.is_ok_and(|stored| !stored.contains("secret")));
         let other = PolicySpec::parse("ws://h:1/a?token=other").unwrap();
         assert!(!other.is(&stored), "another query is another policy");
     }

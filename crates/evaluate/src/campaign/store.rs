@@ -138,6 +138,16 @@ impl Store {
     /// A folder of something else or of another campaign; one that another process writes.
     pub fn open(folder: &Path, plan: &Plan) -> Result<Self> {
         let exists = |reason: String| Error::Exists { path: folder.to_owned(), reason };
+        // Nothing is made in a folder of something else.
+        begun(folder)?;
+        let episodes = folder.join(EPISODES);
+        fs::create_dir_all(&episodes).map_err(io(&episodes))?;
+        let lock_path = folder.join(LOCK);
+        let lock = fs::File::create(&lock_path).map_err(io(&lock_path))?;
+        if lock.try_lock().is_err() {
+            return Err(exists("is being written by another process".to_owned()));
+        }
+        // What another process has made of it is known only now.
         let mut whole = plan.clone();
         whole.policies = plan.policies.iter().map(PolicySpec::stored).collect();
         if let Some(old) = begun(folder)? {
@@ -150,13 +160,6 @@ impl Store {
             // Episodes of policies that are not asked for now stay theirs.
             let others = old.policies.into_iter().filter(|o| plan.policies.iter().all(|p| p.name != o.name));
             whole.policies.extend(others);
-        }
-        let episodes = folder.join(EPISODES);
-        fs::create_dir_all(&episodes).map_err(io(&episodes))?;
-        let lock_path = folder.join(LOCK);
-        let lock = fs::File::create(&lock_path).map_err(io(&lock_path))?;
-        if lock.try_lock().is_err() {
-            return Err(exists("is being written by another process".to_owned()));
         }
         let under_way = folder.join(UNDER_WAY);
         if under_way.exists() {

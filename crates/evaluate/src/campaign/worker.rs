@@ -58,7 +58,7 @@ impl Worker {
     fn policy(&mut self, spec: &PolicySpec) -> Result<(&mut Episode, &mut (dyn Policy + Send))> {
         let made = match self.policies.entry(spec.name.clone()) {
             Entry::Occupied(made) => made.into_mut(),
-            Entry::Vacant(place) => place.insert(if spec.source.contains(':') {
+            Entry::Vacant(place) => place.insert(if spec.is_remote() {
                 let stop = Arc::clone(&self.stop);
                 Box::new(Remote::new(spec, &self.specimen, &self.episode, stop, self.python.as_deref())?)
             } else {
