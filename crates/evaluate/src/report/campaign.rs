@@ -91,7 +91,8 @@ fn cards(plan: &Plan, r: &CampaignResult) -> String {
     let mut all: Vec<Card> = Vec::new();
     if let [only] = r.policies.as_slice() {
         all.push(Card::new("Passed", format!("{} of {}", only.passed, only.episodes), share(&only.interval)));
-    } else if let Some(best) = r.policies.iter().max_by(|a, b| a.mean_score.total_cmp(&b.mean_score)) {
+    // Of equals the first that was named.
+    } else if let Some(best) = r.policies.iter().rev().max_by(|a, b| a.mean_score.total_cmp(&b.mean_score)) {
         let note = format!("passed {} of {}", best.passed, best.episodes);
         all.push(Card::new("Best mean score", format!("{}: {}", best.policy, fixed(best.mean_score, 2)), note));
     }
