@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
 use tempfile::TempDir;
 use trocar_evaluate::{Campaign, Files, Job, Plan, PolicySpec, RolloutsExperiment, Store};
-use trocar_progress::{Progress, Silent};
+use trocar_progress::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::{SpecimenSource, TaskName};
 use trocar_task::EpisodeFile;
@@ -37,20 +37,6 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         jobs: 1,
         retry_failed: false,
         phantoms: folder.join("phantoms"),
-    }
-}
-
-/// Asks to stop once so many units of work are done.
-struct StopAfter(usize, AtomicUsize);
-
-impl Progress for StopAfter {
-    fn begin(&self, _stage: &str, _total: u64) {}
-    fn advance(&self, units: u64) {
-        self.1.fetch_add(units as usize, Ordering::SeqCst);
-    }
-    fn end(&self) {}
-    fn interrupted(&self) -> bool {
-        self.1.load(Ordering::SeqCst) >= self.0
     }
 }
 
@@ -130,7 +116,7 @@ fn an_interrupted_campaign_has_a_table_of_what_is_kept_and_says_how_to_go_on() {
     let two = ["random", "scripted"];
     let table = || std::fs::read_to_string(folder.join("table.csv")).unwrap();
     for (most, kept) in [(0, 0), (1, 1), (2, 3)] {
-        let why = campaign(dir.path(), &two, 3).run(&folder, &StopAfter(most, AtomicUsize::new(0))).unwrap_err();
+        let why = campaign(dir.path(), &two, 3).run(&folder, &StopAfter::new(most as u64)).unwrap_err();
         let said = format!("{kept} of 6 episodes are kept");
         assert!(why.to_string().contains(&said) && why.to_string().contains("goes on"), "{why}");
         assert_eq!(table().lines().count(), 1 + kept);

@@ -6,9 +6,8 @@ mod common;
 
 use common::{CENTRE, RADIUS, info, write};
 use std::path::Path;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_geometry::io::Unit;
-use trocar_progress::{Progress, Silent};
+use trocar_progress::{Silent, StopAfter};
 use trocar_reconstruct::{Settings, from_surface, reconstruct};
 use trocar_recording::Recording;
 use trocar_specimen::Specimen;
@@ -59,20 +58,6 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     assert_eq!(again.specimen.provenance, made.specimen.provenance);
 }
 
-/// Asks to stop after a number of units.
-struct StopsAfter(AtomicUsize);
-
-impl Progress for StopsAfter {
-    fn begin(&self, _stage: &str, _total: u64) {}
-    fn advance(&self, _units: u64) {
-        let _ = self.0.fetch_update(Ordering::SeqCst, Ordering::SeqCst, |n| Some(n.saturating_sub(1)));
-    }
-    fn end(&self) {}
-    fn interrupted(&self) -> bool {
-        self.0.load(Ordering::SeqCst) == 0
-    }
-}
-
 #[test]
 fn stops_when_asked_and_says_what_is_wrong() {
     let root = tempfile::tempdir().unwrap();
@@ -80,7 +65,7 @@ fn stops_when_asked_and_says_what_is_wrong() {
     write(&dir, &info(), 4);
     let recording = Recording::open(&dir).unwrap();
     for units in [0, 1, 2] {
-        let error = reconstruct(&recording, &Settings::default(), &StopsAfter(units.into())).err().unwrap();
+        let error = reconstruct(&recording, &Settings::default(), &StopAfter::new(units)).err().unwrap();
         assert_eq!(error.to_string(), "interrupted", "after {units}");
     }
     let failure = |settings: Settings| reconstruct(&recording, &settings, &Silent).err().unwrap().to_string();

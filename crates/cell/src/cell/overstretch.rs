@@ -2,7 +2,7 @@
 //!
 //! Real tissue tears at a stretch of about two; ours has no such end. So where an edge of an organ is longer than [`MOST`] times its rest length, or an element has less than [`CRUSHED`] of its rest
 //! volume, the nearest instrument lets go of what it holds and is not felt until all tissue is below [`REST`] and above [`ROUND`] again. One that holds by a latch keeps its hold at first and only presses no more;
-//! it lets go beyond [`FAR_TOO_MUCH`]. It is told as an event, and no figure of merit counts on it.
+//! it lets go beyond [`FAR_TOO_MUCH`]. Each of these is told as an event, and no figure of merit counts on it.
 //!
 //! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold lock each other, whatever the energy. An organ that is beyond these limits and that no instrument is at, or
 //! that stays beyond [`REST`] or [`ROUND`] for [`PATIENCE`], is put right outside of time ([`trocar_tissue::State::relax`]), and that is told, too.

@@ -222,7 +222,7 @@ fn program() -> &'static str {
 mod tests {
     use super::*;
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use trocar_progress::Silent;
+    use trocar_progress::{Silent, StopAfter};
 
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     struct Row {
@@ -235,20 +235,6 @@ mod tests {
         // Values that decimal digits do not give exactly.
         let value = (item as f64 + 0.1).sqrt() * 1e-7;
         Row { item, value, note: item.is_multiple_of(2).then(|| "ein \"Satz\"\nmit Umbruch".to_owned()) }
-    }
-
-    /// Asks to stop once `0` trials are done.
-    struct StopAfter(usize, AtomicUsize);
-
-    impl Progress for StopAfter {
-        fn begin(&self, _stage: &str, _total: u64) {}
-        fn advance(&self, units: u64) {
-            self.1.fetch_add(units as usize, Ordering::SeqCst);
-        }
-        fn end(&self) {}
-        fn interrupted(&self) -> bool {
-            self.1.load(Ordering::SeqCst) >= self.0
-        }
     }
 
     /// Runs 12 trials; the outcome and how often a trial was run.
@@ -276,7 +262,7 @@ mod tests {
         // Two trials run at once, so that one more may be finished than was asked for.
         for stop in [0, 1, 5, 9] {
             let dir = tempfile::tempdir().unwrap();
-            let (outcome, first) = run(dir.path(), "a", &StopAfter(stop, AtomicUsize::new(0)));
+            let (outcome, first) = run(dir.path(), "a", &StopAfter::new(stop as u64));
             assert!(matches!(outcome, Err(Error::Interrupted)) && first >= stop && first < 12, "{stop}: {first}");
             let (outcome, second) = run(dir.path(), "a", &Silent);
             let outcome = outcome.unwrap();
