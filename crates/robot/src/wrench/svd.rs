@@ -21,12 +21,15 @@ impl<const N: usize> Svd<N> {
     /// values to full relative accuracy. `None` if the rotations do not converge, as with numbers
     /// that are not finite.
     pub fn new(mut matrix: Rows<N>) -> Option<Self> {
+        // Columns shorter than rounding in the whole matrix are zero: their directions are noise.
+        let squares = matrix.iter().flatten().map(|a| a * a).sum::<f64>();
+        let zero = f64::EPSILON * f64::EPSILON * squares;
         let mut right = std::array::from_fn(|i| std::array::from_fn(|j| f64::from(u8::from(i == j))));
         for _ in 0..MAX_SWEEPS {
             let mut rotated = false;
             for p in 0..N {
                 for q in p + 1..N {
-                    rotated |= orthogonalise(&mut matrix, &mut right, p, q)?;
+                    rotated |= orthogonalise(&mut matrix, &mut right, [p, q], zero)?;
                 }
             }
             if !rotated {
@@ -54,12 +57,13 @@ impl<const N: usize> Svd<N> {
 }
 
 /// Rotates columns `p` and `q` of `matrix` (and of `right`) until they are orthogonal. Returns
-/// whether they were not, or `None` for numbers that are not finite.
+/// whether they were not, or `None` for numbers that are not finite. A column whose squared length
+/// is at most `zero` is left as it is.
 fn orthogonalise<const N: usize>(
     matrix: &mut [[f64; N]],
     right: &mut [[f64; N]; N],
-    p: usize,
-    q: usize,
+    [p, q]: [usize; 2],
+    zero: f64,
 ) -> Option<bool> {
     let (mut pp, mut qq, mut pq) = (0.0, 0.0, 0.0);
     for row in matrix.iter() {
@@ -70,7 +74,7 @@ fn orthogonalise<const N: usize>(
     if !(pp + qq + pq).is_finite() {
         return None;
     }
-    if pq.abs() <= f64::EPSILON * (pp * qq).sqrt() {
+    if pq.abs() <= f64::EPSILON * (pp * qq).sqrt() || pp.min(qq) <= zero {
         return Some(false);
     }
     let zeta = (qq - pp) / (2.0 * pq);
@@ -108,6 +112,13 @@ mod tests {
                 assert!((product - f64::from(u8::from(i == j))).abs() < 1e-13);
             }
         }
+    }
+
+    #[test]
+    fn a_dependent_column_has_a_singular_value_of_zero() {
+        let svd = Svd::new((0..9).map(|k| [f64::from(k), 2.0 * f64::from(k), 1.0]).collect()).unwrap();
+        let (least, most) = svd.values.iter().fold((f64::MAX, 0.0_f64), |(l, m), v| (l.min(*v), m.max(*v)));
+        assert!(least < 1e-14 * most, "{:?}", svd.values);
     }
 
     #[test]
