@@ -2,7 +2,7 @@
 
 use crate::Camera;
 use glam::DQuat;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// A rigid endoscope. Its shaft's frame has z along the shaft, towards the tip, and its origin at the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]

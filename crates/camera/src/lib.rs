@@ -10,6 +10,7 @@ mod endoscope;
 mod error;
 mod images;
 mod lens;
+pub mod metrics;
 mod model;
 mod raster;
 
@@ -21,4 +22,4 @@ pub use images::{ColorImage, DepthImage, Mask, pixel_neighbours};
 pub use lens::{CameraModel, UndistortionMap};
 pub use model::Camera;
 pub use raster::draw_triangle;
-pub use trocar_geometry::Pose;
+pub use trocar_core::Pose;

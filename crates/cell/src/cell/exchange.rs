@@ -7,7 +7,7 @@
 //! too large, the difference resists every motion and vanishes at the next frame: it damps. Where the tip rests, nothing is added.
 
 use glam::DVec3;
-use trocar_robot::wrench::Wrench;
+use trocar_core::Wrench;
 use trocar_tissue::ToolForce;
 
 /// The most that tissue is taken to push or pull [N]: beyond, a joint of the wrist would give way.

@@ -5,8 +5,9 @@ use crate::GraspDesign;
 use crate::blades::{Tools, opening_force};
 use crate::cell::report::{ArmObservation, TaggedForce};
 use glam::DVec3;
+use trocar_core::Wrench;
 use trocar_robot::instrument::Coordinates;
-use trocar_robot::wrench::{ForceKind, Wrench};
+use trocar_robot::wrench::ForceKind;
 use trocar_tissue::ToolForce;
 
 impl Station {

@@ -1,9 +1,9 @@
 //! Structural similarity: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli, "Image Quality Assessment: From Error Visibility to
 //! Structural Similarity", IEEE Transactions on Image Processing 13(4), 2004, equation 13.
 
-use crate::error::{Error, Result, fits};
+use super::error::{Error, Result, fits};
+use crate::Mask;
 use rayon::prelude::*;
-use trocar_camera::Mask;
 
 /// Half the window's side: 11 x 11 pixels.
 const REACH: usize = 5;

@@ -1,7 +1,7 @@
 //! Silhouettes: intersection over union of masks.
 
-use crate::error::{Error, Result, fits};
-use trocar_camera::Mask;
+use super::error::{Error, Result, fits};
+use crate::Mask;
 
 /// Pixels in both masks over pixels in either (Jaccard's index), 0 to 1; `None` where both are empty.
 ///

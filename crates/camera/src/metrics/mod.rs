@@ -9,7 +9,7 @@ mod exposure;
 mod silhouette;
 mod ssim;
 
-pub use compare::{Likeness, compare, mean_colour, psnr_db};
+pub use compare::{ImageMetrics, compare, mean_colour, psnr_db};
 pub use error::{Error, Result};
 pub use exposure::{Matched, match_exposure};
 pub use silhouette::{iou, union};

@@ -1,7 +1,7 @@
 //! Matching of exposure: one gain for each channel.
 
-use crate::error::{Error, Result};
-use trocar_camera::Mask;
+use super::error::{Error, Result};
+use crate::Mask;
 
 /// A picture after its channels' gains.
 #[derive(Clone, Debug, PartialEq)]

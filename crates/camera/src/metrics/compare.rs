@@ -1,14 +1,14 @@
 //! All figures of one picture against another.
 
-use crate::error::{Error, Result, fits};
-use crate::exposure::match_exposure;
-use crate::ssim::ssim;
+use super::error::{Error, Result, fits};
+use super::exposure::match_exposure;
+use super::ssim::ssim;
+use crate::{ColorImage, Mask};
 use serde::Serialize;
-use trocar_camera::{ColorImage, Mask};
 
 /// How like a target a picture is, within a mask.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Likeness {
+pub struct ImageMetrics {
     /// Structural similarity, 1 for the same.
     pub ssim: f64,
     /// Peak signal-to-noise ratio [dB]; infinite for the same (`null` in JSON).
@@ -25,7 +25,7 @@ pub struct Likeness {
 ///
 /// # Errors
 /// Differing sizes, an empty mask.
-pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result<Likeness> {
+pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result<ImageMetrics> {
     let size = (mask.width, mask.height);
     fits("the target", (target.width, target.height, target.pixels.len()), size)?;
     fits("the picture", (picture.width, picture.height, picture.pixels.len()), size)?;
@@ -33,7 +33,7 @@ pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result
     let [target, picture] =
         [target, picture].map(|image| -> Vec<[f64; 3]> { image.pixels.iter().map(|p| p.map(f64::from)).collect() });
     let matched = match_exposure(&picture, &target, mask)?;
-    Ok(Likeness {
+    Ok(ImageMetrics {
         ssim: ssim(&target, &picture, mask)?.mean,
         psnr_db: psnr_db(&target, &picture, mask)?,
         ssim_matched: ssim(&target, &matched.picture, mask)?.mean,
@@ -101,10 +101,10 @@ mod tests {
         let (target, mask) = textured();
         let mut picture = target.clone();
         picture.pixels.iter_mut().for_each(|p| *p = [2 * p[0], p[1], p[2] * 3 / 2]);
-        let likeness = compare(&target, &picture, &mask).unwrap();
-        assert!(likeness.psnr_db < 18.0 && likeness.psnr_matched_db > 50.0, "{likeness:?}");
-        assert!(likeness.ssim < 0.95 && likeness.ssim_matched > 0.999, "{likeness:?}");
-        assert!((likeness.gains[0] - 0.5).abs() < 1e-9 && (likeness.gains[1] - 1.0).abs() < 1e-9, "{likeness:?}");
+        let metrics = compare(&target, &picture, &mask).unwrap();
+        assert!(metrics.psnr_db < 18.0 && metrics.psnr_matched_db > 50.0, "{metrics:?}");
+        assert!(metrics.ssim < 0.95 && metrics.ssim_matched > 0.999, "{metrics:?}");
+        assert!((metrics.gains[0] - 0.5).abs() < 1e-9 && (metrics.gains[1] - 1.0).abs() < 1e-9, "{metrics:?}");
         assert_eq!(compare(&target, &target, &mask).unwrap().psnr_db, f64::INFINITY);
     }
 
@@ -115,8 +115,8 @@ mod tests {
         picture.pixels.iter_mut().for_each(|p| *p = p.map(|v| v + 5));
         // Beside the mask nothing counts.
         picture.pixels[0] = [255; 3];
-        let likeness = compare(&target, &picture, &mask).unwrap();
-        assert!((likeness.psnr_db - 20.0 * (255.0_f64 / 5.0).log10()).abs() < 1e-9);
+        let metrics = compare(&target, &picture, &mask).unwrap();
+        assert!((metrics.psnr_db - 20.0 * (255.0_f64 / 5.0).log10()).abs() < 1e-9);
     }
 
     #[test]
