@@ -1,4 +1,5 @@
-//! Calibration files: what OpenCV's samples and `FileStorage` write as YAML or JSON, and ROS's `camera_calibration` as YAML.
+//! Calibration files: what OpenCV's samples and `FileStorage` write as YAML or JSON, and ROS's
+//! `camera_calibration` as YAML.
 
 use crate::{Camera, CameraModel, Distortion, Error, Fisheye, Result};
 use serde::{Deserialize, Serialize};
@@ -37,8 +38,9 @@ struct File {
 }
 
 impl CameraModel {
-    /// Reads a calibration file: JSON if it begins with a brace, else YAML (OpenCV's `%YAML:1.0` included). The model is
-    /// fisheye where `fisheye_model` is not 0 or `distortion_model` says fisheye or equidistant.
+    /// Reads a calibration file: JSON if it begins with a brace, else YAML (OpenCV's `%YAML:1.0`
+    /// included). The model is fisheye where `fisheye_model` is not 0 or `distortion_model` says
+    /// fisheye or equidistant.
     ///
     /// # Errors
     /// One line that names the file and what is wrong with it.
@@ -76,7 +78,8 @@ impl CameraModel {
         file.model()
     }
 
-    /// Writes a calibration as OpenCV's `FileStorage` reads it: JSON where the name ends in `.json`, else YAML.
+    /// Writes a calibration as OpenCV's `FileStorage` reads it: JSON where the name ends in
+    /// `.json`, else YAML.
     ///
     /// # Errors
     /// Names the file when it cannot be written.

@@ -1,36 +1,45 @@
-//! What a stereo depth camera makes of true depth: noise of the disparity, quantisation, and holes where two views do not match.
+//! What a stereo depth camera makes of true depth: noise of the disparity, quantisation, and holes
+//! where two views do not match.
 //!
-//! Every number is drawn from (seed, frame, pixel) alone, so the same call gives the same bits in any order and on any thread.
+//! Every number is drawn from (seed, frame, pixel) alone, so the same call gives the same bits in
+//! any order and on any thread.
 
 use crate::{Camera, ColorImage, DepthImage, Error, Result};
 use glam::DVec3;
 use rayon::prelude::*;
+use trocar_core::Random;
+
+/// Separates the random numbers of depth from those of other noise: "dept" in ASCII.
+const DEPTH_KEY: u64 = 0x6465_7074;
 
 /// A stereo camera's noise. [`DepthNoise::d405`] is a RealSense D405.
 ///
-/// Depth is z = f b / d, with the focal length f [px] along x, the baseline b and the disparity d [px]. An error sigma_d of the disparity is
-/// sigma_z = z^2 sigma_d / (f b) of depth (Intel, "Best-Known-Methods for Tuning Intel RealSense D400 Depth Cameras", depth RMS error).
+/// Depth is z = f b / d, with the focal length f (px) along x, the baseline b and the disparity d
+/// (px). An error sigma_d of the disparity is sigma_z = z^2 sigma_d / (f b) of depth (Intel,
+/// "Best-Known-Methods for Tuning Intel RealSense D400 Depth Cameras", depth RMS error).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthNoise {
-    /// Distance of the two imagers [m].
+    /// Distance of the two imagers (m).
     pub baseline: f64,
-    /// Standard deviation of the disparity [px].
+    /// Standard deviation of the disparity (px).
     pub disparity_sigma: f64,
-    /// Step in which disparities are found [px]; 0 for none.
+    /// Step in which disparities are found (px); 0 for none.
     pub disparity_step: f64,
-    /// Step in which depth is told [m]; 0 for none.
+    /// Step in which depth is told (m); 0 for none.
     pub depth_step: f64,
-    /// Nearest and farthest depth that is told [m].
+    /// Nearest and farthest depth that is told (m).
     pub range: [f64; 2],
-    /// A pixel lies at an edge where a pixel within `edge_reach` differs by more than this in disparity [px].
+    /// A pixel lies at an edge where a pixel within `edge_reach` differs by more than this in
+    /// disparity (px).
     pub edge_jump: f64,
-    /// Half the side of the window that is matched, within which an edge disturbs [px].
+    /// Half the side of the window that is matched, within which an edge disturbs (px).
     pub edge_reach: usize,
     /// Share of the pixels at edges that are lost.
     pub edge_loss: f64,
     /// Cosine of view and surface below which pixels begin to be lost; all are at 0.
     pub grazing: f64,
-    /// Value of the brightest channel from which a pixel is a highlight, which each imager sees elsewhere.
+    /// Value of the brightest channel from which a pixel is a highlight, which each imager sees
+    /// elsewhere.
     pub bright: u8,
     /// Share of the highlights' pixels that are lost.
     pub bright_loss: f64,
@@ -41,10 +50,12 @@ pub struct DepthNoise {
 }
 
 impl DepthNoise {
-    /// A RealSense D405: baseline 18 mm, nearest depth 70 mm at 848 x 480, best up to 0.5 m (RealSense D400 series datasheet; it goes on
-    /// beyond, here to 1 m), depth in steps of 0.1 mm (librealsense). Its disparity is good to 0.08 px on well-textured
-    /// surfaces (the tuning guide's figure for the series), which makes 0.4 mm at 0.2 m and 2.5 mm at 0.5 m, within the datasheet's 2%. Disparities
-    /// are taken to come in 32nds of a pixel. Shares of lost pixels are ours, as the phantoms have them.
+    /// A RealSense D405: baseline 18 mm, nearest depth 70 mm at 848 x 480, best up to 0.5 m
+    /// (RealSense D400 series datasheet; it goes on beyond, here to 1 m), depth in steps of 0.1 mm
+    /// (librealsense). Its disparity is good to 0.08 px on well-textured surfaces (the tuning
+    /// guide's figure for the series), which makes 0.4 mm at 0.2 m and 2.5 mm at 0.5 m, within the
+    /// datasheet's 2%. Disparities are taken to come in 32nds of a pixel. Shares of lost pixels are
+    /// ours, as the phantoms have them.
     pub fn d405() -> Self {
         Self {
             baseline: 0.018,
@@ -63,13 +74,14 @@ impl DepthNoise {
         }
     }
 
-    /// Standard deviation of depth at `z` [m] through `camera`, quantisation aside [m].
+    /// Standard deviation of depth at `z` (m) through `camera`, quantisation aside (m).
     pub fn sigma(&self, camera: &Camera, z: f64) -> f64 {
         z * z * self.disparity_sigma / (camera.fx * self.baseline)
     }
 
-    /// The frame `frame` that the sensor tells of the true `depth`, which `camera` sees; `color` is the picture of the same pixels, where
-    /// highlights are to be found. Numbers out of range in the model itself are clamped; a depth that is no number is a hole.
+    /// The frame `frame` that the sensor tells of the true `depth`, which `camera` sees; `color` is
+    /// the picture of the same pixels, where highlights are to be found. Numbers out of range in
+    /// the model itself are clamped; a depth that is no number is a hole.
     ///
     /// # Errors
     /// Images whose pixels are not as many as their size or the camera's says.
@@ -86,11 +98,13 @@ impl DepthNoise {
         Ok(told)
     }
 
-    /// As [`Self::apply`], in place, for a picture that is not what the sensor's imagers see but was made smaller or cut out of it: `focal` is the focal length of the imagers [px], in whose
+    /// As [`Self::apply`], in place, for a picture that is not what the sensor's imagers see but
+    /// was made smaller or cut out of it: `focal` is the focal length of the imagers (px), in whose
     /// pixels disparity is told, `camera` the one of the picture.
     ///
     /// # Errors
-    /// Images whose pixels are not as many as their size or the camera's says; then nothing is changed.
+    /// Images whose pixels are not as many as their size or the camera's says; then nothing is
+    /// changed.
     pub fn spoil(
         &self,
         depth: &mut DepthImage,
@@ -117,7 +131,7 @@ impl DepthNoise {
             if d <= 0.0 || hidden.get(i).is_some_and(|h| *h) {
                 return 0.0;
             }
-            let mut bits = key(&[seed, 0x6465_7074, frame, i as u64]);
+            let mut numbers = Random::from_keys(&[seed, DEPTH_KEY, frame, i as u64]).sequence();
             let mut kept = 1.0 - self.speckle.clamp(0.0, 1.0);
             let facing = facing(&truth, camera, i);
             if facing < self.grazing {
@@ -129,8 +143,8 @@ impl DepthNoise {
             if color.is_some_and(|c| c.pixels[i].iter().any(|v| *v >= self.bright)) {
                 kept *= 1.0 - self.bright_loss.clamp(0.0, 1.0);
             }
-            let lost = unit(&mut bits) >= kept;
-            let noisy = d + self.disparity_sigma * normal(&mut bits);
+            let lost = numbers.uniform() >= kept;
+            let noisy = d + self.disparity_sigma * numbers.normal();
             let z = scale / stepped(noisy, self.disparity_step).max(1e-9);
             let z = stepped(z, self.depth_step);
             if !lost && z >= self.range[0] && z <= self.range[1] { z as f32 } else { 0.0 }
@@ -155,7 +169,8 @@ fn stepped(value: f64, step: f64) -> f64 {
     if step > 0.0 { (value / step).round() * step } else { value }
 }
 
-/// Which pixels the right imager does not see: a pixel farther right, being nearer, lands on or beyond them there. `stretch` is pixels of the picture in one of the imagers.
+/// Which pixels the right imager does not see: a pixel farther right, being nearer, lands on or
+/// beyond them there. `stretch` is pixels of the picture in one of the imagers.
 fn hidden(disparity: &[f64], width: usize, stretch: f64) -> Vec<bool> {
     let mut out = vec![false; disparity.len()];
     if width == 0 {
@@ -165,7 +180,8 @@ fn hidden(disparity: &[f64], width: usize, stretch: f64) -> Vec<bool> {
         let mut leftmost = f64::INFINITY;
         for u in (0..row.len()).rev().filter(|u| row[*u] > 0.0) {
             let lands = u as f64 - stretch * row[u];
-            // Beside the right imager's picture nothing matches either, but rectified sensors are wider than what they show.
+            // Beside the right imager's picture nothing matches either, but rectified sensors are
+            // wider than what they show.
             hidden[u] = lands >= leftmost;
             leftmost = leftmost.min(lands);
         }
@@ -184,7 +200,8 @@ fn at_edge(disparity: &[f64], width: usize, i: usize, reach: usize, jump: f64) -
     })
 }
 
-/// Cosine between view and surface at pixel `i`, by the smaller of the differences to both sides; 1 where there are none.
+/// Cosine between view and surface at pixel `i`, by the smaller of the differences to both sides; 1
+/// where there are none.
 fn facing(depth: &DepthImage, camera: &Camera, i: usize) -> f64 {
     let (u, v) = (i % depth.width, i / depth.width);
     let point = |u: usize, v: usize| {
@@ -205,30 +222,6 @@ fn facing(depth: &DepthImage, camera: &Camera, i: usize) -> f64 {
         (Some(x), Some(y)) => x.cross(y).normalize_or_zero().dot(here.normalize()).abs(),
         _ => 1.0,
     }
-}
-
-/// Scrambles 64 bits (the finaliser of SplitMix64: Steele, Lea, Flood 2014).
-fn scramble(x: u64) -> u64 {
-    let z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-fn key(parts: &[u64]) -> u64 {
-    parts.iter().fold(0, |h, p| scramble(h ^ *p))
-}
-
-/// The next uniform number in 0..1.
-fn unit(bits: &mut u64) -> f64 {
-    *bits = scramble(*bits);
-    (*bits >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-/// The next normal number, by Box and Muller's polar coordinates.
-fn normal(bits: &mut u64) -> f64 {
-    let (a, b) = (unit(bits), unit(bits));
-    (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
 }
 
 #[cfg(test)]
@@ -269,7 +262,8 @@ mod tests {
             let deviation = (valid.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / valid.len() as f64).sqrt();
             let expected = f64::from(z * z) * 0.08 / (446.8 * 0.018);
             assert!((model.sigma(&CAMERA, f64::from(z)) - expected).abs() < 1e-9);
-            // 60,000 samples: the deviation is known to 0.3%, the mean to 0.4% of a deviation; 1/d is a little crooked.
+            // 60,000 samples: the deviation is known to 0.3%, the mean to 0.4% of a deviation; 1/d
+            // is a little crooked.
             assert!((deviation / expected - 1.0).abs() < 0.015, "{z} m: {deviation} not {expected}");
             assert!((mean - f64::from(z)).abs() < 0.05 * expected, "{z} m: mean {mean}");
             let speckle = lost(&told, |_, _| true);
@@ -291,7 +285,8 @@ mod tests {
     fn edges_grazing_surfaces_highlights_and_the_far_are_lost() {
         let model = DepthNoise::d405();
         let step = model.apply(&filled(|u, _| if u < 150 { 0.25 } else { 0.2 }), None, &CAMERA, 3, 0).unwrap();
-        // 446.8 * 0.018 / 0.2 - 446.8 * 0.018 / 0.25 = 8.04 px beside the nearer surface are hidden from the right imager.
+        // 446.8 * 0.018 / 0.2 - 446.8 * 0.018 / 0.25 = 8.04 px beside the nearer surface are hidden
+        // from the right imager.
         assert_eq!(lost(&step, |u, _| (142..150).contains(&u)), 1.0, "the shadow");
         assert!((lost(&step, |u, _| u == 150) - 0.7).abs() < 0.15, "the edge");
         assert!(lost(&step, |u, _| !(141..151).contains(&u)) < 0.01, "elsewhere");
@@ -353,7 +348,8 @@ mod tests {
         let lost = |column: usize| (0..64).filter(|r| image.depth[r * 64 + column] == 0.0).count();
         assert!((25..55).contains(&lost(31)) && (25..55).contains(&lost(32)) && lost(10) == 0 && lost(33) == 0);
         assert!(image.depth.iter().all(|d| (f64::from(*d) / 1e-4 - (f64::from(*d) / 1e-4).round()).abs() < 1e-3));
-        // 445 * 0.018 / 0.2 - 445 * 0.018 / 0.3 = 13.4 px of the imagers, 6.2 of the picture, are hidden beside what is nearer on the right.
+        // 445 * 0.018 / 0.2 - 445 * 0.018 / 0.3 = 13.4 px of the imagers, 6.2 of the picture, are
+        // hidden beside what is nearer on the right.
         model.spoil(&mut shadowed, None, &camera, 445.0, [1, 2]).unwrap();
         let lost = |column: usize| (0..64).filter(|r| shadowed.depth[r * 64 + column] == 0.0).count();
         assert!(lost(26) == 64 && lost(24) == 0, "{} {}", lost(26), lost(24));

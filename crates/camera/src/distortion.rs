@@ -1,15 +1,18 @@
-//! Lens distortion as OpenCV writes it, both ways: the rational model of its `calib3d` and the equidistant one of its `fisheye`
-//! (OpenCV documentation, "Camera Calibration and 3D Reconstruction", "Fisheye camera model").
+//! Lens distortion as OpenCV writes it, both ways: the rational model of its `calib3d` and the
+//! equidistant one of its `fisheye` (OpenCV documentation, "Camera Calibration and 3D
+//! Reconstruction", "Fisheye camera model").
 
 use glam::{DMat2, DVec2};
 use serde::{Deserialize, Serialize};
 
-/// Image points are told apart down to this in units of the focal length: 1e-10 px on a lens of 1000 px.
+/// Image points are told apart down to this in units of the focal length: 1e-10 px on a lens of
+/// 1000 px.
 const CLOSE: f64 = 1e-13;
 /// Newton's method needs about five; the rest is for the lens's last pixel.
 const ITERATIONS: usize = 60;
 
-/// OpenCV's rational distortion, coefficients in its order: k1 k2 p1 p2 k3 k4 k5 k6 (4, 5 or 8 of them in a file).
+/// OpenCV's rational distortion, coefficients in its order: k1 k2 p1 p2 k3 k4 k5 k6 (4, 5 or 8 of
+/// them in a file).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Distortion(pub [f64; 8]);
@@ -32,22 +35,26 @@ impl Distortion {
         )
     }
 
-    /// The ideal image point that lands at `q`; `None` where none does on the lens's own side of the fold (a polynomial turns
-    /// back somewhere outside of the image it was fitted to, and points beyond land on others).
+    /// The ideal image point that lands at `q`; `None` where none does on the lens's own side of
+    /// the fold (a polynomial turns back somewhere outside of the image it was fitted to, and
+    /// points beyond land on others).
     pub fn invert(&self, q: DVec2) -> Option<DVec2> {
         if self.is_none() {
             return Some(q);
         }
-        // From where it would be without distortion; if that runs over the fold, from the point that the radial part alone gives.
+        // From where it would be without distortion; if that runs over the fold, from the point
+        // that the radial part alone gives.
         self.newton(q, q).or_else(|| self.newton(q, self.radial_start(q)))
     }
 
-    /// The ideal image point that lands nearest to `q` as far as is known: [`Self::invert`], or a point at the fold.
+    /// The ideal image point that lands nearest to `q` as far as is known: [`Self::invert`], or a
+    /// point at the fold.
     pub(crate) fn undo(&self, q: DVec2) -> DVec2 {
         self.invert(q).unwrap_or_else(|| self.radial_start(q))
     }
 
-    /// Newton's method, each step halved until the residual falls and the map still keeps its sense of turning.
+    /// Newton's method, each step halved until the residual falls and the map still keeps its sense
+    /// of turning.
     fn newton(&self, q: DVec2, start: DVec2) -> Option<DVec2> {
         let mut p = start;
         let mut residual = q - self.apply(p);
@@ -109,7 +116,8 @@ impl Distortion {
         )
     }
 
-    /// The point in `q`'s direction whose radial part lands as far out, or the last one before the fold.
+    /// The point in `q`'s direction whose radial part lands as far out, or the last one before the
+    /// fold.
     fn radial_start(&self, q: DVec2) -> DVec2 {
         let wanted = q.length();
         let (mut low, mut high) = (0.0, 0.0);
@@ -163,21 +171,21 @@ impl From<Distortion> for Vec<f64> {
     }
 }
 
-/// OpenCV's fisheye distortion k1 k2 k3 k4: a ray at angle a from the axis lands at distance a (1 + k1 a^2 + k2 a^4 + k3 a^6 +
-/// k4 a^8) from the middle, in units of the focal length.
+/// OpenCV's fisheye distortion k1 k2 k3 k4: a ray at angle a from the axis lands at distance a (1 +
+/// k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8) from the middle, in units of the focal length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fisheye(pub [f64; 4]);
 
 impl Fisheye {
-    /// Distance from the middle at which a ray lands that is `angle` [rad] off the axis.
+    /// Distance from the middle at which a ray lands that is `angle` (rad) off the axis.
     pub fn apply(&self, angle: f64) -> f64 {
         let [k1, k2, k3, k4] = self.0;
         let a2 = angle * angle;
         angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
     }
 
-    /// The angle [rad] of the ray that lands `distance` from the middle; `None` beyond half a turn or where the polynomial
-    /// turns back before.
+    /// The angle (rad) of the ray that lands `distance` from the middle; `None` beyond half a turn
+    /// or where the polynomial turns back before.
     pub fn invert(&self, distance: f64) -> Option<f64> {
         let [k1, k2, k3, k4] = self.0;
         let slope = |a: f64| {
@@ -216,7 +224,8 @@ impl Fisheye {
 mod tests {
     use super::*;
 
-    /// OpenCV's own sample (5 coefficients), a wide rational one, a pincushion and a barrel that folds at r = 0.82.
+    /// OpenCV's own sample (5 coefficients), a wide rational one, a pincushion and a barrel that
+    /// folds at r = 0.82.
     const LENSES: [[f64; 8]; 4] = [
         [-0.2855, 0.0792, 1.27e-3, -1.1e-4, 0.0412, 0.0, 0.0, 0.0],
         [0.5479, -0.0210, -7.21e-5, 2.06e-5, -0.00265, 0.8897, 0.0861, -0.0139],

@@ -4,21 +4,23 @@ use crate::Camera;
 use glam::DQuat;
 use trocar_core::Pose;
 
-/// A rigid endoscope. Its shaft's frame has z along the shaft, towards the tip, and its origin at the lens.
+/// A rigid endoscope. Its shaft's frame has z along the shaft, towards the tip, and its origin at
+/// the lens.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Endoscope {
     /// The camera behind the optics.
     pub camera: Camera,
-    /// Angle from the shaft to the middle of the view [rad]; 0 looks straight ahead.
+    /// Angle from the shaft to the middle of the view (rad); 0 looks straight ahead.
     pub oblique: f64,
-    /// Turn of the optics about the shaft against the camera head [rad]: the view swings round, the picture's top stays with
-    /// the head. 0 looks towards the shaft frame's +y, the picture's bottom.
+    /// Turn of the optics about the shaft against the camera head (rad): the view swings round, the
+    /// picture's top stays with the head. 0 looks towards the shaft frame's +y, the picture's
+    /// bottom.
     pub turn: f64,
 }
 
 impl Endoscope {
-    /// A thirty-degree forward-oblique laparoscope: 86.2 x 54.6 degrees at 1280 x 720, as the tower of the paper's laboratory
-    /// is after undistortion.
+    /// A thirty-degree forward-oblique laparoscope: 86.2 x 54.6 degrees at 1280 x 720, as the tower
+    /// of the paper's laboratory is after undistortion.
     pub fn thirty_degrees() -> Self {
         let (width, height) = (1280, 720);
         let focal = |pixels: usize, deg: f64| 0.5 * pixels as f64 / (0.5 * deg.to_radians()).tan();

@@ -14,9 +14,9 @@ const MAX_PACKING: u64 = 1040;
 /// An 8-bit sRGB image, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorImage {
-    /// Width [px].
+    /// Width (px).
     pub width: usize,
-    /// Height [px].
+    /// Height (px).
     pub height: usize,
     /// One colour a pixel, row by row.
     pub pixels: Vec<[u8; 3]>,
@@ -25,20 +25,20 @@ pub struct ColorImage {
 /// A depth image in metres; 0 is invalid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthImage {
-    /// Width [px].
+    /// Width (px).
     pub width: usize,
-    /// Height [px].
+    /// Height (px).
     pub height: usize,
-    /// One depth a pixel [m], row by row.
+    /// One depth a pixel (m), row by row.
     pub depth: Vec<f32>,
 }
 
 /// A yes/no image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mask {
-    /// Width [px].
+    /// Width (px).
     pub width: usize,
-    /// Height [px].
+    /// Height (px).
     pub height: usize,
     /// One flag a pixel, row by row.
     pub set: Vec<bool>,
@@ -99,7 +99,8 @@ impl DepthImage {
         Self::decode(&load(path)?, path, scale)
     }
 
-    /// Decodes the bytes of a 16-bit greyscale PNG whose unit is `scale` metres; `path` is the file that errors name.
+    /// Decodes the bytes of a 16-bit greyscale PNG whose unit is `scale` metres; `path` is the file
+    /// that errors name.
     ///
     /// # Errors
     /// Names the file when it is truncated, or not 16-bit greyscale.
@@ -111,7 +112,8 @@ impl DepthImage {
         Ok(Self { width, height, depth: image.into_raw().into_iter().map(|d| (f64::from(d) * scale) as f32).collect() })
     }
 
-    /// Writes a 16-bit greyscale PNG whose unit is `scale` metres; depths beyond its range become invalid.
+    /// Writes a 16-bit greyscale PNG whose unit is `scale` metres; depths beyond its range become
+    /// invalid.
     ///
     /// # Errors
     /// Names the file when it cannot be written.
@@ -164,7 +166,8 @@ impl Mask {
     }
 }
 
-/// The pixels left, right, above and below pixel `i` (row by row) of a `width` x `height` image, as far as there are any.
+/// The pixels left, right, above and below pixel `i` (row by row) of a `width` x `height` image, as
+/// far as there are any.
 pub fn pixel_neighbours(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
     let (u, v) = (i % width, i / width);
     let near = [
@@ -197,7 +200,8 @@ fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     if width > MAX_SIDE || height > MAX_SIDE {
         return Err(wrong(path, &format!("{width} x {height} pixels; at most {MAX_SIDE} on a side")));
     }
-    // No image format packs more tightly than deflate can: what claims to is broken, and is refused before its pixels are allocated.
+    // No image format packs more tightly than deflate can: what claims to is broken, and is refused
+    // before its pixels are allocated.
     if decoder.total_bytes() > MAX_PACKING * bytes.len() as u64 {
         return Err(wrong(
             path,

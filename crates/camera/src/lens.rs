@@ -8,7 +8,8 @@ use glam::{DVec2, DVec3};
 pub enum CameraModel {
     /// Pinhole, without or with 4, 5 or 8 coefficients of distortion.
     Pinhole(Camera),
-    /// Fisheye: size, focal lengths and principal point as a pinhole's (its `distortion` is not used), and the lens.
+    /// Fisheye: size, focal lengths and principal point as a pinhole's (its `distortion` is not
+    /// used), and the lens.
     Fisheye(Camera, Fisheye),
 }
 
@@ -18,14 +19,15 @@ impl From<Camera> for CameraModel {
     }
 }
 
-/// Where each pixel of an undistorted picture comes from, row by row: OpenCV's `initUndistortRectifyMap`.
+/// Where each pixel of an undistorted picture comes from, row by row: OpenCV's
+/// `initUndistortRectifyMap`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UndistortionMap {
-    /// Width of the undistorted picture [px].
+    /// Width of the undistorted picture (px).
     pub width: usize,
-    /// Height of the undistorted picture [px].
+    /// Height of the undistorted picture (px).
     pub height: usize,
-    /// Place in the distorted picture [px]; not a number where nothing is seen.
+    /// Place in the distorted picture (px); not a number where nothing is seen.
     pub from: Vec<DVec2>,
 }
 
@@ -37,7 +39,8 @@ impl CameraModel {
         }
     }
 
-    /// Refuses what [`Camera::validate`] refuses, and a fisheye with coefficients that are not finite.
+    /// Refuses what [`Camera::validate`] refuses, and a fisheye with coefficients that are not
+    /// finite.
     ///
     /// # Errors
     /// Names the field.
@@ -50,7 +53,8 @@ impl CameraModel {
         self.camera().validate()
     }
 
-    /// Pixel of a point in the camera frame [m]; `None` behind a pinhole camera, and straight behind a fisheye or at it.
+    /// Pixel of a point in the camera frame (m); `None` behind a pinhole camera, and straight
+    /// behind a fisheye or at it.
     pub fn project(&self, p: DVec3) -> Option<DVec2> {
         match self {
             Self::Pinhole(camera) => camera.project(p),
@@ -66,7 +70,8 @@ impl CameraModel {
         }
     }
 
-    /// Unit direction of the ray through pixel (u, v) in the camera frame; `None` where the lens shows nothing.
+    /// Unit direction of the ray through pixel (u, v) in the camera frame; `None` where the lens
+    /// shows nothing.
     pub fn unproject(&self, u: f64, v: f64) -> Option<DVec3> {
         let camera = self.camera();
         let q = DVec2::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
@@ -88,7 +93,8 @@ impl CameraModel {
 }
 
 impl UndistortionMap {
-    /// The undistorted picture, bilinear in sRGB values as OpenCV's `remap`; black where nothing is seen.
+    /// The undistorted picture, bilinear in sRGB values as OpenCV's `remap`; black where nothing is
+    /// seen.
     pub fn apply(&self, image: &ColorImage) -> ColorImage {
         let mut out = ColorImage::new(self.width, self.height, [0; 3]);
         let (right, below) = (image.width as f64 - 1.0, image.height as f64 - 1.0);

@@ -1,7 +1,7 @@
 //! What a camera sees and where it stands.
 //!
-//! Camera frame: OpenCV's (x right, y down, z forward). Depth is z in metres, not ray length; 0 is invalid. The centre of
-//! the first pixel is (0, 0).
+//! Camera frame: OpenCV's (x right, y down, z forward). Depth is z in metres, not ray length; 0 is
+//! invalid. The centre of the first pixel is (0, 0).
 
 mod calibration;
 mod depth_noise;

@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Camera {
-    /// Image width [px].
+    /// Image width (px).
     pub width: usize,
-    /// Image height [px].
+    /// Image height (px).
     pub height: usize,
-    /// Focal length along x [px].
+    /// Focal length along x (px).
     pub fx: f64,
-    /// Focal length along y [px].
+    /// Focal length along y (px).
     pub fy: f64,
-    /// Principal point, x [px].
+    /// Principal point, x (px).
     pub cx: f64,
-    /// Principal point, y [px].
+    /// Principal point, y (px).
     pub cy: f64,
     /// Lens distortion; none by default.
     #[serde(default, skip_serializing_if = "Distortion::is_none")]
@@ -26,7 +26,8 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// A camera with square pixels that sees `width_rad` from left to right, the principal point in the middle, no distortion.
+    /// A camera with square pixels that sees `width_rad` from left to right, the principal point in
+    /// the middle, no distortion.
     pub fn centred(width: usize, height: usize, width_rad: f64) -> Self {
         let f = width as f64 / 2.0 / (width_rad / 2.0).tan();
         Self {
@@ -68,7 +69,7 @@ impl Camera {
         Ok(())
     }
 
-    /// Pixel of a point in the camera frame [m]; `None` behind the camera.
+    /// Pixel of a point in the camera frame (m); `None` behind the camera.
     pub fn project(&self, p: DVec3) -> Option<DVec2> {
         if p.z <= 0.0 {
             return None;
@@ -80,7 +81,8 @@ impl Camera {
         Some(DVec2::new(q.x * self.fx + self.cx, q.y * self.fy + self.cy))
     }
 
-    /// Direction (x, y, 1) of the ray through pixel (u, v): multiplied by a depth it is the point in the camera frame.
+    /// Direction (x, y, 1) of the ray through pixel (u, v): multiplied by a depth it is the point
+    /// in the camera frame.
     pub fn ray(&self, u: f64, v: f64) -> DVec3 {
         let mut q = DVec2::new((u - self.cx) / self.fx, (v - self.cy) / self.fy);
         if !self.distortion.is_none() {

@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 
-/// Calls `draw` with the index (row by row) and the depth of every pixel of a `width` x `height` image whose centre lies in the
-/// triangle of the `corners`, which are (u, v, 1/z): pixel and inverse depth [1/m]. Inverse depth is linear on the image of a
-/// plane. The edges belong to it.
+/// Calls `draw` with the index (row by row) and the depth of every pixel of a `width` x `height`
+/// image whose centre lies in the triangle of the `corners`, which are (u, v, 1/z): pixel and
+/// inverse depth (1/m). Inverse depth is linear on the image of a plane. The edges belong to it.
 pub fn draw_triangle(corners: [DVec3; 3], width: usize, height: usize, mut draw: impl FnMut(usize, f64)) {
     let [a, b, c] = corners;
     let edge = |p: DVec3, q: DVec3, u: f64, v: f64| (q.x - p.x) * (v - p.y) - (q.y - p.y) * (u - p.x);

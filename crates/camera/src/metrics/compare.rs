@@ -11,11 +11,11 @@ use serde::Serialize;
 pub struct ImageMetrics {
     /// Structural similarity, 1 for the same.
     pub ssim: f64,
-    /// Peak signal-to-noise ratio [dB]; infinite for the same (`null` in JSON).
+    /// Peak signal-to-noise ratio (dB); infinite for the same (`null` in JSON).
     pub psnr_db: f64,
     /// Structural similarity after [`match_exposure`].
     pub ssim_matched: f64,
-    /// Peak signal-to-noise ratio after [`match_exposure`] [dB].
+    /// Peak signal-to-noise ratio after [`match_exposure`] (dB).
     pub psnr_matched_db: f64,
     /// The gains of red, green and blue that match it.
     pub gains: [f64; 3],
@@ -42,7 +42,8 @@ pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result
     })
 }
 
-/// 10 log10(255^2 / mean squared difference) over the mask's pixels and the three channels [dB]; infinite where there is none.
+/// 10 log10(255^2 / mean squared difference) over the mask's pixels and the three channels (dB);
+/// infinite where there is none.
 ///
 /// # Errors
 /// Differing sizes, an empty mask.
@@ -60,7 +61,8 @@ pub fn psnr_db(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<f64> {
     Ok(10.0 * (255.0 * 255.0 * 3.0 * count as f64 / sum).log10())
 }
 
-/// A picture all of whose pixels have the mean colour of the mask's, rounded: what says nothing but the colour.
+/// A picture all of whose pixels have the mean colour of the mask's, rounded: what says nothing but
+/// the colour.
 ///
 /// # Errors
 /// Differing sizes, an empty mask.

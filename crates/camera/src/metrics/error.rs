@@ -13,15 +13,15 @@ pub enum Error {
     Size {
         /// Which of them.
         what: &'static str,
-        /// Its width [px].
+        /// Its width (px).
         width: usize,
-        /// Its height [px].
+        /// Its height (px).
         height: usize,
         /// Its pixels.
         pixels: usize,
-        /// The width it should have [px].
+        /// The width it should have (px).
         expected_width: usize,
-        /// The height it should have [px].
+        /// The height it should have (px).
         expected_height: usize,
     },
     /// No pixel counts.

@@ -12,8 +12,9 @@ pub struct Matched {
     pub picture: Vec<[f64; 3]>,
 }
 
-/// Scales each channel of `picture` so that it comes nearest to `target` by least squares over the mask's pixels:
-/// g = sum(target picture) / sum(picture^2). A channel that is black everywhere stays so, with gain 1.
+/// Scales each channel of `picture` so that it comes nearest to `target` by least squares over the
+/// mask's pixels: g = sum(target picture) / sum(picture^2). A channel that is black everywhere
+/// stays so, with gain 1.
 ///
 /// # Errors
 /// An empty mask. (Sizes are the caller's to have checked; what one lacks is not looked at.)

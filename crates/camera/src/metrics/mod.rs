@@ -1,7 +1,8 @@
-//! How alike two pictures are: silhouettes by intersection over union, colours by SSIM and PSNR within a mask, as they are and after
-//! matching the exposure of each channel.
+//! How alike two pictures are: silhouettes by intersection over union, colours by SSIM and PSNR
+//! within a mask, as they are and after matching the exposure of each channel.
 //!
-//! Pictures are 8-bit sRGB and compared in those values, as is usual; a mask says which pixels count.
+//! Pictures are 8-bit sRGB and compared in those values, as is usual; a mask says which pixels
+//! count.
 
 mod compare;
 mod error;

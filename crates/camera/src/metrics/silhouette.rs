@@ -3,7 +3,8 @@
 use super::error::{Error, Result, fits};
 use crate::Mask;
 
-/// Pixels in both masks over pixels in either (Jaccard's index), 0 to 1; `None` where both are empty.
+/// Pixels in both masks over pixels in either (Jaccard's index), 0 to 1; `None` where both are
+/// empty.
 ///
 /// # Errors
 /// Masks of differing sizes.

@@ -1,5 +1,6 @@
-//! Structural similarity: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli, "Image Quality Assessment: From Error Visibility to
-//! Structural Similarity", IEEE Transactions on Image Processing 13(4), 2004, equation 13.
+//! Structural similarity: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli, "Image Quality
+//! Assessment: From Error Visibility to Structural Similarity", IEEE Transactions on Image
+//! Processing 13(4), 2004, equation 13.
 
 use super::error::{Error, Result, fits};
 use crate::Mask;
@@ -7,7 +8,7 @@ use rayon::prelude::*;
 
 /// Half the window's side: 11 x 11 pixels.
 const REACH: usize = 5;
-/// Standard deviation of the window's Gaussian [px].
+/// Standard deviation of the window's Gaussian (px).
 const SIGMA: f64 = 1.5;
 /// K1 L and K2 L, squared, with L = 255.
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
@@ -22,9 +23,10 @@ pub struct Ssim {
     pub map: Vec<f64>,
 }
 
-/// SSIM of two pictures of `mask`'s size, three channels a pixel in 0 to 255, with the paper's window (a Gaussian of sigma 1.5 px over
-/// 11 x 11), K1 = 0.01, K2 = 0.03 and weighted, uncorrected variances. Only pixels of the mask have weight in a window, so that what lies beside the
-/// mask changes nothing; five pixels or more inside it the map is that of the whole pictures.
+/// SSIM of two pictures of `mask`'s size, three channels a pixel in 0 to 255, with the paper's
+/// window (a Gaussian of sigma 1.5 px over 11 x 11), K1 = 0.01, K2 = 0.03 and weighted, uncorrected
+/// variances. Only pixels of the mask have weight in a window, so that what lies beside the mask
+/// changes nothing; five pixels or more inside it the map is that of the whole pictures.
 ///
 /// # Errors
 /// Differing sizes, an empty mask.
@@ -66,7 +68,8 @@ pub fn ssim(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<Ssim> {
     Ok(Ssim { mean, map })
 }
 
-/// A plane under the window, by rows and then by columns; what lies beyond the border has no weight.
+/// A plane under the window, by rows and then by columns; what lies beyond the border has no
+/// weight.
 fn blur(plane: &[f64], width: usize) -> Vec<f64> {
     let window: Vec<f64> =
         (0..=2 * REACH).map(|k| (-0.5 * ((k as f64 - REACH as f64) / SIGMA).powi(2)).exp()).collect();

@@ -33,12 +33,13 @@ impl Unit {
     }
 }
 
-/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours if there are any) or `.obj`, into metres. The
-/// vertices are those of the file: in an STL file every triangle has its own (see [`repair`](crate::repair)).
+/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours if there are any) or
+/// `.obj`, into metres. The vertices are those of the file: in an STL file every triangle has its
+/// own (see [`repair`](crate::repair)).
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read. [`Error::Parse`] for another extension, content that is damaged or cut short,
-/// an index out of range, a vertex that is not finite, or no triangles.
+/// [`Error::Io`] if the file cannot be read. [`Error::Parse`] for another extension, content that
+/// is damaged or cut short, an index out of range, a vertex that is not finite, or no triangles.
 pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let parse = match extension.as_str() {

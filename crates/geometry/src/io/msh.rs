@@ -1,7 +1,8 @@
 //! Gmsh tetrahedral meshes: versions 2.2 and 4.1, text and binary.
 //!
-//! Format: Gmsh reference manual, "Gmsh file formats". The two versions and the two encodings hold the same numbers in
-//! almost the same order, so one parser reads them all from a source of numbers that knows the encoding.
+//! Format: Gmsh reference manual, "Gmsh file formats". The two versions and the two encodings hold
+//! the same numbers in almost the same order, so one parser reads them all from a source of numbers
+//! that knows the encoding.
 
 mod groups;
 
@@ -20,19 +21,22 @@ const NODES: [usize; 31] =
 /// An element thinner than this has no volume: volume by the cube of its longest edge.
 const NO_VOLUME: f64 = 1e-12;
 
-/// Reads the tetrahedra of a Gmsh `.msh` file (2.2 or 4.1, text or binary little-endian), in metres. Turns negative
-/// elements; refuses an element without volume. Nodes that no tetrahedron uses are left out, the others keep their order.
+/// Reads the tetrahedra of a Gmsh `.msh` file (2.2 or 4.1, text or binary little-endian), in
+/// metres. Turns negative elements; refuses an element without volume. Nodes that no tetrahedron
+/// uses are left out, the others keep their order.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Parse`] if it is not such a file, is damaged or cut short, or has no
-/// tetrahedra, second-order ones, one without volume, or a coordinate that is not finite.
+/// [`Error::Io`] if the file cannot be read; [`Error::Parse`] if it is not such a file, is damaged
+/// or cut short, or has no tetrahedra, second-order ones, one without volume, or a coordinate that
+/// is not finite.
 pub fn read_msh(path: &Path) -> Result<TetMesh> {
     let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
     parse(&bytes).map_err(|reason| bad(path, reason))
 }
 
-/// Reads the tetrahedra of a Gmsh `.msh` file group by group: of each physical group with a name, name and mesh, by the groups' numbers, and before them without a
-/// name what is in none. Nodes that groups share are in each of them. Otherwise as [`read_msh`].
+/// Reads the tetrahedra of a Gmsh `.msh` file group by group: of each physical group with a name,
+/// name and mesh, by the groups' numbers, and before them without a name what is in none. Nodes
+/// that groups share are in each of them. Otherwise as [`read_msh`].
 ///
 /// # Errors
 /// As [`read_msh`].
@@ -44,7 +48,8 @@ pub fn read_msh_groups(path: &Path) -> Result<Vec<(Option<String>, TetMesh)>> {
 /// Writes a Gmsh 4.1 binary `.msh`, in metres.
 ///
 /// # Errors
-/// [`Error::Mesh`] if an element uses a node that is not there; [`Error::Io`] if the file cannot be written.
+/// [`Error::Mesh`] if an element uses a node that is not there; [`Error::Io`] if the file cannot be
+/// written.
 pub fn write_msh(path: &Path, mesh: &TetMesh) -> Result<()> {
     let nodes = mesh.vertices.len() as u64;
     if let Some(t) = mesh.tets.iter().position(|tet| tet.iter().any(|&v| u64::from(v) >= nodes)) {
@@ -172,7 +177,8 @@ fn read_elements_2(source: &mut Source<'_>, content: &mut Content) -> Parsed<()>
     source.expect(count, if source.binary { 8 } else { 6 }, "elements")?;
     let mut read = 0;
     while read < count {
-        // Text has tag, type and number of tags for each element; binary has them once for a run of elements.
+        // Text has tag, type and number of tags for each element; binary has them once for a run of
+        // elements.
         let (tag, kind, run, tags) = if source.binary {
             let (kind, run, tags) = (source.int()?, source.tag_2()?, source.tag_2()?);
             (None, kind, run, tags)
@@ -378,7 +384,8 @@ impl<'a> Source<'a> {
         Ok(DVec3::new(self.real()?, self.real()?, self.real()?))
     }
 
-    /// Refuses a count of things of at least `bytes_each` that cannot be in what is left of the file.
+    /// Refuses a count of things of at least `bytes_each` that cannot be in what is left of the
+    /// file.
     fn expect(&self, count: u64, bytes_each: u64, what: &str) -> Parsed<()> {
         let left = (self.bytes.len() - self.at) as u64;
         if count.saturating_mul(bytes_each) > left {
@@ -428,7 +435,8 @@ mod tests {
 
     #[test]
     fn all_four_kinds_are_read() {
-        // Its only tetrahedron is negative and gets turned; its first triangle and a node of no tetrahedron are left out.
+        // Its only tetrahedron is negative and gets turned; its first triangle and a node of no
+        // tetrahedron are left out.
         let turned = TetMesh { tets: vec![[0, 2, 3, 1]], ..corner() };
         assert_eq!(parse(TEXT_2.as_bytes()).unwrap(), turned);
         assert_eq!(parse(TEXT_4.as_bytes()).unwrap(), corner());

@@ -146,7 +146,8 @@ fn read<E: PropertyAccess>(
     Parser::<E>::new().read_payload_for_element(reader, element, header).map_err(|e| e.to_string())
 }
 
-/// Writes a binary little-endian `.ply` in metres (coordinates as `double`), with vertex colours when the mesh has them.
+/// Writes a binary little-endian `.ply` in metres (coordinates as `double`), with vertex colours
+/// when the mesh has them.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be written.

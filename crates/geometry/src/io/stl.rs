@@ -17,7 +17,8 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
     if let Some(facets) = promised
         && HEADER as u64 + facets * FACET as u64 == size
     {
-        // Some programs start binary files with "solid", which the reader would take for text: blank the free header.
+        // Some programs start binary files with "solid", which the reader would take for text:
+        // blank the free header.
         let mut binary = bytes.to_vec();
         binary[..80].fill(0);
         return collect(&binary);

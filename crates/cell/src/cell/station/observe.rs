@@ -16,7 +16,7 @@ impl Station {
         let Self { fixed, now, .. } = self;
         let contact: DVec3 = now.forces.iter().map(|f| f.contact.force).sum();
         let constraint: DVec3 = now.forces.iter().map(|f| f.constraint.force).sum();
-        let sum = |part: fn(&ToolForce) -> trocar_tissue::Wrench| {
+        let sum = |part: fn(&ToolForce) -> trocar_core::Wrench| {
             now.forces
                 .iter()
                 .map(part)

@@ -7,7 +7,8 @@ use crate::TetMesh;
 /// Gmsh's number for volumes.
 const VOLUME: i64 = 3;
 
-/// `$PhysicalNames`, text in every kind of file: a count, then dimension, number and quoted name, one a line.
+/// `$PhysicalNames`, text in every kind of file: a count, then dimension, number and quoted name,
+/// one a line.
 pub(super) fn read_names(source: &mut Source<'_>, content: &mut Content) -> Parsed<()> {
     let count = source.text_count()?;
     source.expect(count, 4, "names")?;
