@@ -49,9 +49,9 @@ pub(super) struct Blocks {
     /// Number of blocks along each axis.
     pub(super) count: [usize; 3],
     /// For each block, its number among the stored blocks, or `OUTSIDE` or `INSIDE`.
-    stored: Vec<u32>,
+    state: Vec<u32>,
     /// For each stored block, its number among all blocks, ascending.
-    block_of: Vec<u32>,
+    stored: Vec<u32>,
 }
 
 impl Blocks {
@@ -76,9 +76,9 @@ impl Blocks {
         }
         let origin = 0.5 * (lo + hi) - 0.5 * cell * BLOCK as f64 * blocks;
         let count = blocks.to_array().map(|n| n as usize);
-        let mut blocks = Self { origin, cell, count, stored: Vec::new(), block_of: Vec::new() };
+        let mut blocks = Self { origin, cell, count, state: Vec::new(), stored: Vec::new() };
         blocks.classify(shape);
-        if blocks.block_of.len() > MAX_SLOTS / BLOCK_POINTS { Err(too_fine()) } else { Ok(blocks) }
+        if blocks.stored.len() > MAX_SLOTS / BLOCK_POINTS { Err(too_fine()) } else { Ok(blocks) }
     }
 
     /// Fills the table of blocks.
@@ -93,13 +93,13 @@ impl Blocks {
                 known
             })
             .collect();
-        self.stored = vec![UNKNOWN; self.count.iter().product()];
+        self.state = vec![UNKNOWN; self.count.iter().product()];
         for (block, kind) in found.into_iter().flatten() {
-            self.stored[block] = kind;
+            self.state[block] = kind;
         }
-        for (block, kind) in self.stored.iter_mut().enumerate().filter(|(_, kind)| **kind == UNKNOWN) {
-            *kind = self.block_of.len() as u32;
-            self.block_of.push(block as u32);
+        for (block, kind) in self.state.iter_mut().enumerate().filter(|(_, kind)| **kind == UNKNOWN) {
+            *kind = self.stored.len() as u32;
+            self.stored.push(block as u32);
         }
     }
 
@@ -140,7 +140,7 @@ impl Blocks {
     /// The point at a slot.
     pub(super) fn point(&self, slot: u32) -> Point {
         let local = slot as usize % BLOCK_POINTS;
-        let first = self.first_cell(self.block_of[slot as usize / BLOCK_POINTS] as usize);
+        let first = self.first_cell(self.stored[slot as usize / BLOCK_POINTS] as usize);
         let (x, y, z) = (local / 2 % BLOCK, local / 2 / BLOCK % BLOCK, local / 2 / BLOCK / BLOCK);
         [x, y, z].map_with(first, |inside, first| (2 * (first + inside) + local % 2) as i32)
     }
@@ -152,7 +152,7 @@ impl Blocks {
         if (0..3).any(|a| cell[a] >= self.count[a] * BLOCK) {
             return At::Outside;
         }
-        match self.stored[self.block(cell)] {
+        match self.state[self.block(cell)] {
             OUTSIDE => At::Outside,
             INSIDE => At::Inside,
             stored => At::Slot(stored * BLOCK_POINTS as u32 + Self::local(p) as u32),
@@ -181,7 +181,7 @@ impl Blocks {
 
     /// Location of a block: its points have slots, or it is entirely inside or outside.
     pub(super) fn block_at(&self, block: usize) -> At {
-        match self.stored[block] {
+        match self.state[block] {
             OUTSIDE => At::Outside,
             INSIDE => At::Inside,
             stored => At::Slot(stored * BLOCK_POINTS as u32),
@@ -191,7 +191,7 @@ impl Blocks {
     /// The slots of each stored block.
     pub(super) fn stored_blocks(&self) -> impl IndexedParallelIterator<Item = std::ops::Range<u32>> {
         let points = BLOCK_POINTS as u32;
-        (0..self.block_of.len() as u32).into_par_iter().map(move |b| b * points..(b + 1) * points)
+        (0..self.stored.len() as u32).into_par_iter().map(move |b| b * points..(b + 1) * points)
     }
 
     /// The lower cell of a block.
@@ -202,7 +202,7 @@ impl Blocks {
 
     /// Numbers of the stored blocks among all blocks.
     pub(super) fn stored(&self) -> &[u32] {
-        &self.block_of
+        &self.stored
     }
 
     /// The field at the centre of a cube of cells, and its largest possible change from there to
