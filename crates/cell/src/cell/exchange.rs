@@ -46,7 +46,7 @@ impl Exchange {
         let mut load = Wrench::default();
         for force in forces {
             for part in [force.contact, force.constraint] {
-                load = load + Wrench { force: part.force, torque: part.torque };
+                load += part;
             }
         }
         let over = load.force.length() / MOST_LOAD;
