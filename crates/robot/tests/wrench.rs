@@ -5,6 +5,7 @@ mod common;
 
 use common::Random;
 use glam::{DQuat, DVec3};
+use trocar_core::Wrench;
 use trocar_robot::instrument::Instrument;
 use trocar_robot::wrench::*;
 
