@@ -2,7 +2,7 @@
 
 use crate::bed::Bed;
 use crate::noise;
-use crate::plan::{Organ, Plan};
+use crate::spec::{Organ, PhantomSpec};
 
 /// What lies in front of the camera, in its frame.
 pub(crate) struct Anatomy {
@@ -11,11 +11,11 @@ pub(crate) struct Anatomy {
 }
 
 impl Anatomy {
-    /// The anatomy of a seed: the plan, varied.
-    pub fn new(plan: &Plan, seed: u64) -> Self {
-        let mut bed = Bed::new(plan.bed, noise::key(&[seed, 1]));
-        let mut organs = (plan.organs)(seed, &bed);
-        organs.sort_by_key(|o| plan.listed.iter().position(|name| *name == o.name));
+    /// The anatomy of a seed: the spec, varied.
+    pub fn new(spec: &PhantomSpec, seed: u64) -> Self {
+        let mut bed = Bed::new(spec.bed, noise::key(&[seed, 1]));
+        let mut organs = (spec.organs)(seed, &bed);
+        organs.sort_by_key(|o| spec.listed.iter().position(|name| *name == o.name));
         bed.imprint(organs.iter().map(|o| o.body.clone()).collect());
         Self { organs, bed }
     }
@@ -33,12 +33,12 @@ mod tests {
     use trocar_camera::Camera;
     use trocar_geometry::{SignedDistance, isosurface, sample_distance};
 
-    const PLANS: [&Plan; 3] = [&phantom_a::PLAN, &phantom_b::PLAN, &phantom_c::PLAN];
+    const SPECS: [&PhantomSpec; 3] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC];
     const SEEDS: std::ops::Range<u64> = 0..6;
 
     /// A phantom of a seed.
     struct Case {
-        plan: &'static Plan,
+        spec: &'static PhantomSpec,
         seed: u64,
         anatomy: Anatomy,
         which: String,
@@ -48,12 +48,12 @@ mod tests {
     fn cases() -> &'static [Case] {
         static CASES: OnceLock<Vec<Case>> = OnceLock::new();
         CASES.get_or_init(|| {
-            let each = PLANS.into_iter().flat_map(|plan| SEEDS.map(move |seed| (plan, seed)));
-            let make = |(plan, seed): (&'static Plan, u64)| Case {
-                plan,
+            let each = SPECS.into_iter().flat_map(|spec| SEEDS.map(move |seed| (spec, seed)));
+            let make = |(spec, seed): (&'static PhantomSpec, u64)| Case {
+                spec,
                 seed,
-                anatomy: Anatomy::new(plan, seed),
-                which: format!("{} seed {seed}", plan.name),
+                anatomy: Anatomy::new(spec, seed),
+                which: format!("{} seed {seed}", spec.name),
             };
             each.map(make).collect()
         })
@@ -61,9 +61,9 @@ mod tests {
 
     #[test]
     fn organs_touch_but_do_not_overlap_and_are_listed_in_order() {
-        for Case { plan, anatomy, which, .. } in cases() {
+        for Case { spec, anatomy, which, .. } in cases() {
             let names: Vec<&str> = anatomy.organs.iter().map(|o| o.name).collect();
-            assert_eq!(names, plan.listed);
+            assert_eq!(names, spec.listed);
             for (i, organ) in anatomy.organs.iter().enumerate() {
                 let others = anatomy.organs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, o)| &o.body);
                 let gap = gap(&organ.body, others);
@@ -141,14 +141,14 @@ mod tests {
 
     #[test]
     fn surfaces_are_closed_of_one_piece_and_as_large_as_the_papers() {
-        for Case { plan, anatomy, which, .. } in cases() {
-            let (paper, within): (&[f64], [f64; 5]) = match plan.name {
+        for Case { spec, anatomy, which, .. } in cases() {
+            let (paper, within): (&[f64], [f64; 5]) = match spec.name {
                 "phantom-b" => (&[0.90, 3.40, 14.9, 0.59, 2.72], [0.12; 5]),
                 "phantom-c" => (&[phantom_c::LIVER * 1e6, 45.0], [0.02, 0.15, 0.0, 0.0, 0.0]),
                 _ => (&[], [0.0; 5]),
             };
             for (i, organ) in anatomy.organs.iter().enumerate() {
-                let surface = sample_distance(&organ.body, organ.body.bounds(), 2.0 * plan.fineness.surface);
+                let surface = sample_distance(&organ.body, organ.body.bounds(), 2.0 * spec.fineness.surface);
                 let surface = isosurface(&surface, 0.0);
                 assert!(surface.is_watertight(), "{which}: {}", organ.name);
                 assert_eq!(surface.components().1, 1, "{which}: {}", organ.name);
@@ -162,7 +162,7 @@ mod tests {
     #[test]
     fn seeds_vary_every_organ() {
         for (i, case) in cases().iter().enumerate() {
-            for other in cases()[..i].iter().filter(|o| o.plan.name == case.plan.name) {
+            for other in cases()[..i].iter().filter(|o| o.spec.name == case.spec.name) {
                 for (a, b) in case.anatomy.organs.iter().zip(&other.anatomy.organs) {
                     assert!(a.body.samples() != b.body.samples(), "{} is {}'s {}", case.which, other.which, a.name);
                 }

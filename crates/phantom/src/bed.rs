@@ -16,7 +16,7 @@ const EXTENT: (f64, f64) = (0.225, 0.130);
 
 /// What a bed is like.
 #[derive(Clone, Copy)]
-pub(crate) struct BedPlan {
+pub(crate) struct BedSpec {
     /// Depth where nothing bends it [m].
     pub depth: f64,
     /// Size of everything on it and of itself, relative to [`Self::MESENTERY`].
@@ -27,7 +27,7 @@ pub(crate) struct BedPlan {
     pub fat: f64,
 }
 
-impl BedPlan {
+impl BedSpec {
     /// A rabbit's, seen from 15 cm.
     pub const MESENTERY: Self = Self {
         depth: 0.150,
@@ -40,14 +40,14 @@ impl BedPlan {
 
 /// A gently undulating sheet that gives way under organs.
 pub(crate) struct Bed {
-    pub plan: BedPlan,
+    pub spec: BedSpec,
     pub seed: u64,
     organs: Vec<Body>,
 }
 
 impl Bed {
-    pub fn new(plan: BedPlan, seed: u64) -> Self {
-        Self { plan, seed, organs: Vec::new() }
+    pub fn new(spec: BedSpec, seed: u64) -> Self {
+        Self { spec, seed, organs: Vec::new() }
     }
 
     /// Lets `organs` press their shape into the bed.
@@ -57,18 +57,18 @@ impl Bed {
 
     /// Depth of the bed without its lobules and imprints: what organs are laid along [m].
     pub fn smooth_height(&self, x: f64, y: f64) -> f64 {
-        let scale = self.plan.scale;
+        let scale = self.spec.scale;
         let wide = 0.055 * scale;
         let waves = 3.5e-3 * scale * noise::smooth(self.seed, DVec3::new(x / wide, y / wide, 0.5));
         // The abdominal wall rises around the field.
         let out = ((x / (0.19 * scale)).powi(2) + (y / (0.125 * scale)).powi(2)).sqrt();
         let t = ((out - 0.45) / 0.75).clamp(0.0, 1.0);
-        self.plan.depth + waves - 0.030 * scale * t * t * (3.0 - 2.0 * t)
+        self.spec.depth + waves - 0.030 * scale * t * t * (3.0 - 2.0 * t)
     }
 
     /// Distance from the seams between the bed's lobules, in no unit: 0 on a seam.
     pub fn seams(&self, x: f64, y: f64) -> f64 {
-        let wide = 0.012 * self.plan.scale;
+        let wide = 0.012 * self.spec.scale;
         noise::fractal(self.seed + 10, DVec3::new(x / wide, y / wide, 0.5), 2).abs()
     }
 
@@ -76,7 +76,7 @@ impl Bed {
     pub fn height(&self, x: f64, y: f64) -> f64 {
         let smooth = self.smooth_height(x, y);
         let lobes = self.seams(x, y);
-        let scale = self.plan.scale;
+        let scale = self.spec.scale;
         let across = DVec3::new(x / (0.035 * scale), y / (0.06 * scale), 0.5);
         let folds = noise::fractal(self.seed + 20, across, 2).abs();
         let lobe = 1.4e-3 * scale * (lobes.min(0.5) - 0.2);
@@ -97,7 +97,7 @@ impl Bed {
 
     /// The sheet as a mesh with triangles of `spacing` [m], facing the camera.
     pub fn mesh(&self, spacing: f64) -> TriMesh {
-        let extent = (EXTENT.0 * self.plan.scale, EXTENT.1 * self.plan.scale);
+        let extent = (EXTENT.0 * self.spec.scale, EXTENT.1 * self.spec.scale);
         let columns = (2.0 * extent.0 / spacing).ceil() as usize + 1;
         let rows = (2.0 * extent.1 / spacing).ceil() as usize + 1;
         let vertices = (0..rows * columns)

@@ -7,7 +7,8 @@ use crate::still::Still;
 use glam::DVec2;
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
 use trocar_geometry::TriMesh;
-use trocar_render::{Instance, Scene, Shading, srgb};
+use trocar_render::phong::{Instance, PhongScene, Shading};
+use trocar_render::srgb;
 
 /// Frames per second.
 pub(crate) const RATE_HZ: f64 = 30.0;
@@ -117,7 +118,7 @@ impl Window {
     fn draw(&self, mesh: TriMesh, camera: &Camera, lit_at: f32, canvas: &mut Canvas) {
         let Canvas { color, depth, facing, instruments } = canvas;
         let shading = Shading { color: [160; 3], gloss: 0.8, wireframe: false };
-        let scene = Scene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]);
+        let scene = PhongScene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]);
         let centres = scene.render(&self.camera(camera, 1), &Pose::IDENTITY, 1);
         let fine = scene.render(&self.camera(camera, SAMPLES), &Pose::IDENTITY, 1);
         for v in 0..self.height {
@@ -173,7 +174,7 @@ mod tests {
             (canvas.color, canvas.instruments)
         };
         for frame in (0..180).step_by(20) {
-            for instrument in instruments::pair(&crate::phantom_a::PLAN.reach, 0.7) {
+            for instrument in instruments::pair(&crate::phantom_a::SPEC.reach, 0.7) {
                 let mesh = instrument.mesh(frame as f64 / RATE_HZ);
                 let window = Window::around(&mesh, &camera).unwrap();
                 let whole = Window { u: 0, v: 0, width: camera.width, height: camera.height };

@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn surfaces_face_outward() {
-        for instrument in pair(&crate::phantom_a::PLAN.reach, 0.3) {
+        for instrument in pair(&crate::phantom_a::SPEC.reach, 0.3) {
             let mesh = instrument.mesh(1.0);
             let volume: f64 = mesh
                 .triangles

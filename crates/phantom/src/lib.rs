@@ -13,9 +13,9 @@ mod paint;
 mod phantom_a;
 mod phantom_b;
 mod phantom_c;
-mod plan;
 mod record;
 mod sensor;
+mod spec;
 mod stereo;
 mod still;
 mod tube;
@@ -24,6 +24,6 @@ mod tube;
 mod tests;
 
 pub use error::{Error, Result};
-pub use plan::NAMES;
 pub use record::{RecordOptions, describe, record};
 pub use sensor::Sensor;
+pub use spec::NAMES;

@@ -4,7 +4,7 @@ use crate::bed::Bed;
 use crate::blend::{Blend, Part, Recipe};
 use crate::body::{Body, gap};
 use crate::noise;
-use crate::plan::{Look, Organ, PinRule};
+use crate::spec::{Look, Organ, PinRule};
 use crate::tube::{Shape, Tube};
 use glam::DVec3;
 

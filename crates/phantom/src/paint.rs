@@ -1,9 +1,9 @@
 //! The looks of tissue: base colours, mottling, branching vessels, fat, painted per vertex.
 
-use crate::bed::{Bed, BedPlan};
+use crate::bed::{Bed, BedSpec};
 use crate::body::Body;
 use crate::noise::{fractal, smooth};
-use crate::plan::{Look, Organ, Vessels};
+use crate::spec::{Look, Organ, Vessels};
 use glam::DVec3;
 use rayon::prelude::*;
 use trocar_geometry::{SignedDistance, TriMesh};
@@ -97,7 +97,7 @@ fn gallbladder_color(organ: &Organ, p: DVec3) -> DVec3 {
 fn bed_color(bed: &Bed, p: DVec3) -> DVec3 {
     let seed = bed.seed;
     let flat = p.with_z(0.0);
-    let BedPlan { meat, film, fat, scale, .. } = bed.plan;
+    let BedSpec { meat, film, fat, scale, .. } = bed.spec;
     let mut color = meat.lerp(film, (0.5 + 0.8 * fractal(seed + 31, flat / (0.018 * scale), 3)).clamp(0.0, 1.0));
     // Lobules of fat with red seams between them.
     let much = step(0.0, 0.6, fractal(seed + 32, flat / (0.04 * scale), 3));

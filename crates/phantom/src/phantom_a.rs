@@ -1,18 +1,18 @@
 //! Phantom A: a rabbit's cecum, three bowel segments, stomach and appendix.
 
-use crate::bed::{Bed, BedPlan};
+use crate::bed::{Bed, BedSpec};
 use crate::instruments::{Reach, Sweep};
 use crate::pack::{Form, Item, pack, shape};
-use crate::plan::{Look, Organ, PinRule, Plan, Vessels};
+use crate::spec::{Look, Organ, PhantomSpec, PinRule, Vessels};
 use crate::still::Fineness;
 use glam::DVec3;
 
-pub(crate) const PLAN: Plan = Plan {
+pub(crate) const SPEC: PhantomSpec = PhantomSpec {
     name: "phantom-a",
     organs,
     listed: &["cecum", "bowel-1", "bowel-2", "bowel-3", "stomach", "appendix"],
     density: 1200.0,
-    bed: BedPlan::MESENTERY,
+    bed: BedSpec::MESENTERY,
     reach: Reach {
         scale: 1.0,
         sweeps: [

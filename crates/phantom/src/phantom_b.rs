@@ -5,24 +5,24 @@
 //! A's organs have per volume and per surface area (least squares over its six). For the two smallest this leaves the range
 //! of A; they have the 0.66 mm3 an element with which the stomach is the paper's smallest organ, 0.59 cm3.
 
-use crate::bed::{Bed, BedPlan};
+use crate::bed::{Bed, BedSpec};
 use crate::instruments::{Reach, Sweep};
 use crate::pack::{Coil, Form, Item, pack, shape};
-use crate::plan::{Look, Organ, PinRule, Plan, Vessels};
+use crate::spec::{Look, Organ, PhantomSpec, PinRule, Vessels};
 use crate::still::Fineness;
 use glam::DVec3;
 
-pub(crate) const PLAN: Plan = Plan {
+pub(crate) const SPEC: PhantomSpec = PhantomSpec {
     name: "phantom-b",
     organs,
     listed: &["cecum", "small-bowel", "bowel-bloc", "stomach", "appendix"],
     density: 1050.0,
-    bed: BedPlan {
+    bed: BedSpec {
         depth: 0.140,
         meat: DVec3::new(150.0, 62.0, 54.0),
         film: DVec3::new(190.0, 104.0, 84.0),
         fat: 0.8,
-        ..BedPlan::MESENTERY
+        ..BedSpec::MESENTERY
     },
     reach: Reach {
         scale: 1.0,

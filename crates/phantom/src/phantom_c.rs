@@ -3,13 +3,13 @@
 //! The gallbladder has 45 cm3, a pig's: its count in the paper's table I says little, as the paper's meshes have an element
 //! per 16 mm3 of the liver and one per 0.7 mm3 of a rabbit's organs.
 
-use crate::bed::{Bed, BedPlan};
+use crate::bed::{Bed, BedSpec};
 use crate::blend::{Blend, Part, Recipe};
 use crate::body::Body;
 use crate::instruments::{Reach, Sweep};
 use crate::noise;
 use crate::pack::shape;
-use crate::plan::{Look, Organ, PinRule, Plan};
+use crate::spec::{Look, Organ, PhantomSpec, PinRule};
 use crate::still::Fineness;
 use crate::tube::Tube;
 use glam::{DMat3, DVec3};
@@ -20,12 +20,12 @@ pub(crate) const LIVER: f64 = 815e-6;
 /// How much larger everything around the organs is than with a rabbit.
 const SCALE: f64 = 2.6;
 
-pub(crate) const PLAN: Plan = Plan {
+pub(crate) const SPEC: PhantomSpec = PhantomSpec {
     name: "phantom-c",
     organs,
     listed: &["liver", "gallbladder"],
     density: 1050.0,
-    bed: BedPlan {
+    bed: BedSpec {
         depth: 0.410,
         scale: SCALE,
         meat: DVec3::new(168.0, 92.0, 78.0),

@@ -2,8 +2,8 @@
 
 use crate::anatomy::Anatomy;
 use crate::film::{RATE_HZ, Take, shoot};
-use crate::plan::{Organ, Plan};
 use crate::sensor::Sensor;
+use crate::spec::{Organ, PhantomSpec};
 use crate::still::{Fineness, Still};
 use crate::{Error, Result, instruments, noise, sensor};
 use rayon::prelude::*;
@@ -46,13 +46,13 @@ impl Default for RecordOptions {
 /// # Errors
 /// An unknown name, no frames, a folder that cannot be written, or an interruption; nothing is left behind then.
 pub fn record(name: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
-    let plan = Plan::named(name)?;
-    record_with(plan, options, &Camera::d405(), plan.fineness, dir, progress)
+    let spec = PhantomSpec::named(name)?;
+    record_with(spec, options, &Camera::d405(), spec.fineness, dir, progress)
 }
 
 /// [`record`] with a camera and a fineness of one's choice.
 pub(crate) fn record_with(
-    plan: &Plan,
+    spec: &PhantomSpec,
     options: &RecordOptions,
     camera: &Camera,
     fineness: Fineness,
@@ -73,10 +73,10 @@ pub(crate) fn record_with(
     if progress.interrupted() {
         return Err(Error::Interrupted);
     }
-    let anatomy = Anatomy::new(plan, seed);
-    let info = info(plan, options, camera, &anatomy);
+    let anatomy = Anatomy::new(spec, seed);
+    let info = info(spec, options, camera, &anatomy);
     let writer = RecordingWriter::create(dir, &info)?;
-    let still = Still::new(plan, &anatomy, camera, fineness);
+    let still = Still::new(spec, &anatomy, camera, fineness);
     for (index, organ) in anatomy.organs.iter().enumerate() {
         writer.organ_mask(organ.name, &still.organ_mask(index))?;
     }
@@ -85,7 +85,7 @@ pub(crate) fn record_with(
     progress.end();
 
     progress.begin("frames", frames as u64);
-    let instruments = instruments::pair(&plan.reach, std::f64::consts::TAU * noise::unit(noise::key(&[seed, 3])));
+    let instruments = instruments::pair(&spec.reach, std::f64::consts::TAU * noise::unit(noise::key(&[seed, 3])));
     let take = Take { instruments: &instruments, camera, sensor, seed };
     (0..frames).into_par_iter().try_for_each(|index| {
         if progress.interrupted() {
@@ -105,12 +105,12 @@ pub(crate) fn record_with(
 /// # Errors
 /// An unknown name.
 pub fn describe(name: &str, options: &RecordOptions) -> Result<RecordingInfo> {
-    let plan = Plan::named(name)?;
-    Ok(info(plan, options, &Camera::d405(), &Anatomy::new(plan, options.seed)))
+    let spec = PhantomSpec::named(name)?;
+    Ok(info(spec, options, &Camera::d405(), &Anatomy::new(spec, options.seed)))
 }
 
 /// Contents of `recording.toml`.
-fn info(plan: &Plan, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
+fn info(spec: &PhantomSpec, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
     let seed = options.seed;
     let noise = if options.sensor == Sensor::Stereo { ", stereo noise" } else { "" };
     let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
@@ -120,11 +120,11 @@ fn info(plan: &Plan, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy
         points: Vec::new(),
         points_outside: Vec::new(),
         base_px: pixel(o.body.base()),
-        material: o.material(plan),
+        material: o.material(spec),
         pins: o.pins(),
     };
     RecordingInfo {
-        name: plan.name.to_owned(),
+        name: spec.name.to_owned(),
         rate_hz: Some(RATE_HZ),
         depth_scale_m: Some(sensor::DEPTH_SCALE),
         up: [0.0, 0.0, -1.0],

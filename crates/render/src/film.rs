@@ -1,7 +1,7 @@
 //! From light to a picture: exposure, vignette, noise, sRGB.
 
-use crate::eye::Eye;
 use crate::random::{normal, numbers};
+use crate::rays::RayGenerator;
 use crate::srgb;
 
 /// What the sensor and its electronics do.
@@ -44,7 +44,7 @@ impl Film {
     }
 
     /// The sRGB colour of a pixel with linear radiance `light`.
-    pub(crate) fn develop(&self, eye: &Eye, pixel: usize, light: [f32; 3]) -> [u8; 3] {
+    pub(crate) fn develop(&self, eye: &RayGenerator, pixel: usize, light: [f32; 3]) -> [u8; 3] {
         let gain = self.exposure * (1.0 - self.vignette * eye.eccentricity_squared(pixel)).max(0.0);
         let mut values = light.map(|l| l * gain);
         if let Some(noise) = self.noise {

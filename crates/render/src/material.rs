@@ -6,7 +6,7 @@ use std::f32::consts::PI;
 
 /// Colour and surface of a body.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Look {
+pub struct Appearance {
     /// sRGB colour where the mesh has no vertex colours.
     pub color: [u8; 3],
     /// What light does at it.
@@ -25,7 +25,7 @@ pub enum SurfaceKind {
         /// Refractive index of the coat, 1 to 3.
         ior: f32,
         /// How far light wanders below the surface before it comes out, for red, green and blue [m]; 0 for not at all.
-        wander: [f32; 3],
+        scattering_length: [f32; 3],
     },
     /// Metal; the colour is its reflectance head-on.
     Metal {
@@ -44,16 +44,21 @@ impl SurfaceKind {
         let rough = |roughness: f32| roughness.max(BLUNT);
         match self {
             Self::Matte => Self::Matte,
-            Self::Coated { roughness, ior, wander } => Self::Coated { roughness: rough(roughness), ior, wander },
+            Self::Coated { roughness, ior, scattering_length } => {
+                Self::Coated { roughness: rough(roughness), ior, scattering_length }
+            }
             Self::Metal { roughness } => Self::Metal { roughness: rough(roughness) },
         }
     }
 }
 
-impl Look {
+impl Appearance {
     /// Wet tissue: a film of water over flesh, in which red light wanders some millimetres.
     pub fn tissue(color: [u8; 3]) -> Self {
-        Self { color, surface: SurfaceKind::Coated { roughness: 0.32, ior: 1.36, wander: [1.6e-3, 0.6e-3, 0.4e-3] } }
+        Self {
+            color,
+            surface: SurfaceKind::Coated { roughness: 0.32, ior: 1.36, scattering_length: [1.6e-3, 0.6e-3, 0.4e-3] },
+        }
     }
 
     /// Brushed steel, as of instruments.
@@ -63,7 +68,10 @@ impl Look {
 
     /// The silicone sheet that ports go through.
     pub fn sheet() -> Self {
-        Self { color: [205, 160, 138], surface: SurfaceKind::Coated { roughness: 0.6, ior: 1.43, wander: [0.0; 3] } }
+        Self {
+            color: [205, 160, 138],
+            surface: SurfaceKind::Coated { roughness: 0.6, ior: 1.43, scattering_length: [0.0; 3] },
+        }
     }
 
     /// Matte of a colour.
@@ -77,7 +85,7 @@ impl Look {
 pub(crate) struct Material {
     kind: Kind,
     /// Wandering in the body [m].
-    pub wander: Vec3A,
+    pub scattering_length: Vec3A,
 }
 
 #[derive(Clone, Debug)]
@@ -102,20 +110,20 @@ impl Material {
         let width =
             |roughness: f32| Lobe::new(if roughness.is_finite() { roughness.clamp(0.05, 1.0).powi(2) } else { 1.0 });
         match *surface {
-            SurfaceKind::Matte => Self { kind: Kind::Matte, wander: Vec3A::ZERO },
+            SurfaceKind::Matte => Self { kind: Kind::Matte, scattering_length: Vec3A::ZERO },
             SurfaceKind::Metal { roughness } => {
                 let lobe = width(roughness);
-                Self { kind: Kind::Metal { lobe, table: Table::of(&lobe) }, wander: Vec3A::ZERO }
+                Self { kind: Kind::Metal { lobe, table: Table::of(&lobe) }, scattering_length: Vec3A::ZERO }
             }
-            SurfaceKind::Coated { roughness, ior, wander } => {
+            SurfaceKind::Coated { roughness, ior, scattering_length } => {
                 let lobe = width(roughness);
                 let ior = if ior.is_finite() { ior.clamp(1.0, 3.0) } else { 1.4 };
                 let head_on = ((ior - 1.0) / (ior + 1.0)).powi(2);
                 let table = Table::of(&lobe);
                 let body_mean = 1.0 - table.mean(head_on);
                 let usable = |w: f32| if w.is_finite() { w.clamp(0.0, 0.1) } else { 0.0 };
-                let wander = Vec3A::from(wander.map(usable));
-                Self { kind: Kind::Coated { lobe, head_on, table, body_mean }, wander }
+                let scattering_length = Vec3A::from(scattering_length.map(usable));
+                Self { kind: Kind::Coated { lobe, head_on, table, body_mean }, scattering_length }
             }
         }
     }
@@ -239,7 +247,7 @@ mod tests {
         for roughness in [0.1, 0.3, 0.6, 1.0] {
             kinds.push(SurfaceKind::Metal { roughness });
             for ior in [1.0, 1.36, 2.0] {
-                kinds.push(SurfaceKind::Coated { roughness, ior, wander: [0.0; 3] });
+                kinds.push(SurfaceKind::Coated { roughness, ior, scattering_length: [0.0; 3] });
             }
         }
         for kind in kinds {
@@ -255,8 +263,10 @@ mod tests {
 
     #[test]
     fn light_goes_both_ways_alike() {
-        let kinds =
-            [SurfaceKind::Metal { roughness: 0.5 }, SurfaceKind::Coated { roughness: 0.4, ior: 1.4, wander: [0.0; 3] }];
+        let kinds = [
+            SurfaceKind::Metal { roughness: 0.5 },
+            SurfaceKind::Coated { roughness: 0.4, ior: 1.4, scattering_length: [0.0; 3] },
+        ];
         for kind in kinds {
             let material = Material::new(&kind);
             let albedo = Vec3A::new(0.8, 0.4, 0.2);

@@ -188,7 +188,7 @@ fn wander(
     key: Key,
     stacks: &mut Stacks,
 ) -> Option<Place> {
-    let lengths = material.wander;
+    let lengths = material.scattering_length;
     if lengths == Vec3A::ZERO {
         return None;
     }

@@ -1,9 +1,9 @@
 //! Rendering: colour, depth, labels and normals of a stage in one pass.
 
-use crate::eye::Eye;
 use crate::film::Film;
 use crate::path::{Key, LENS, radiance};
 use crate::preview::{self, Seen, Shades};
+use crate::rays::RayGenerator;
 use crate::stage::{Ahead, Stage, rotation_of};
 use crate::tree::Stacks;
 use glam::{Mat3A, Vec3A};
@@ -19,7 +19,7 @@ const BRIGHTEST: f32 = 24.0;
 
 /// How light is worked out.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Settings {
+pub enum RenderSettings {
     /// Direct light at the pixels' centres: for policies and windows.
     Preview {
         /// Cast hard shadows: a second ray a light.
@@ -59,7 +59,7 @@ struct Pixel {
     label: u16,
 }
 
-impl Settings {
+impl RenderSettings {
     /// Direct light with hard shadows.
     pub fn preview() -> Self {
         Self::Preview { shadows: true }
@@ -105,14 +105,21 @@ impl Default for Picture {
 
 /// The stage seen through `eye` at `pose` (camera to world). The same call gives the same bits for any number of threads and
 /// any instruction set.
-pub fn render(stage: &mut Stage, eye: &Eye, pose: &Pose, settings: &Settings, film: &Film) -> Picture {
+pub fn render(stage: &mut Stage, eye: &RayGenerator, pose: &Pose, settings: &RenderSettings, film: &Film) -> Picture {
     let mut picture = Picture::default();
     render_into(&mut picture, stage, eye, pose, settings, film);
     picture
 }
 
 /// [`render`] into a picture that is there: of the same size it is written over, and nothing is allocated for it.
-pub fn render_into(picture: &mut Picture, stage: &mut Stage, eye: &Eye, pose: &Pose, settings: &Settings, film: &Film) {
+pub fn render_into(
+    picture: &mut Picture,
+    stage: &mut Stage,
+    eye: &RayGenerator,
+    pose: &Pose,
+    settings: &RenderSettings,
+    film: &Film,
+) {
     stage.settle();
     let (width, height) = (eye.width(), eye.height());
     picture.resize(width, height);
@@ -141,10 +148,10 @@ pub fn render_into(picture: &mut Picture, stage: &mut Stage, eye: &Eye, pose: &P
 
 struct Shot<'a> {
     stage: &'a Stage,
-    eye: &'a Eye,
+    eye: &'a RayGenerator,
     rotation: Mat3A,
     origin: Vec3A,
-    settings: &'a Settings,
+    settings: &'a RenderSettings,
 }
 
 /// What a worker keeps from tile to tile.
@@ -199,13 +206,13 @@ impl Shot<'_> {
             }
         }
         match *self.settings {
-            Settings::Preview { shadows } => {
+            RenderSettings::Preview { shadows } => {
                 preview::light(self.stage, self.origin, seen, shadows, shades, stacks);
                 for (i, seen) in places.iter().zip(seen.iter()) {
                     band[*i].light = seen.light.to_array();
                 }
             }
-            Settings::Path { samples, bounces, seed } => {
+            RenderSettings::Path { samples, bounces, seed } => {
                 for (i, _) in rays.iter() {
                     let key = |sample| Key { seed, pixel: (first + i) as u32, sample };
                     let mut sum = Vec3A::ZERO;

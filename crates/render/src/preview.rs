@@ -37,12 +37,12 @@ impl Seen {
         let material = stage.material(&self.touch);
         let arriving = lamp.arriving(surface.position, [0.5; 2])?;
         let towards = frame.local(arriving.direction);
-        let back = if material.wander == Vec3A::ZERO {
+        let back = if material.scattering_length == Vec3A::ZERO {
             let parts = material.parts(surface.albedo, *out, towards);
             parts.gloss + parts.body
         } else {
             // Light that wanders comes round the terminator; what it adds there it lacks elsewhere.
-            let wrap = material.wander / (material.wander + WRAP_LENGTH);
+            let wrap = material.scattering_length / (material.scattering_length + WRAP_LENGTH);
             let wrapped =
                 (Vec3A::splat(towards.z) + wrap).max(Vec3A::ZERO) / ((Vec3A::ONE + wrap) * (Vec3A::ONE + wrap));
             material.gloss(surface.albedo, *out, towards) + surface.albedo * wrapped * std::f32::consts::FRAC_1_PI

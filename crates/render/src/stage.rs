@@ -5,7 +5,7 @@ mod rays;
 pub(crate) use rays::Ahead;
 
 use crate::light::{Lamp, Light};
-use crate::material::{Look, Material};
+use crate::material::{Appearance, Material};
 use crate::tree::{Bounds, Boxes, Ray, Tree};
 use crate::{Error, Result, srgb};
 use fearless_simd::Level;
@@ -29,7 +29,7 @@ pub struct ShapeId(usize);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BodyId(usize);
 
-/// Shapes, bodies and lights, to be rendered through any number of cameras (see [`crate::Settings`]).
+/// Shapes, bodies and lights, to be rendered through any number of cameras (see [`crate::RenderSettings`]).
 ///
 /// A *shape* is a surface with its search tree; [`Stage::deform`] refits it. A *body* is a shape at a pose with a look and a
 /// label; many bodies may show one shape. Positions are metres in one world frame.
@@ -78,7 +78,7 @@ struct Body {
 
 /// What [`Stage::cast`] found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Meeting {
+pub struct RayHit {
     /// Distance in units of the ray's direction.
     pub t: f32,
     /// The body.
@@ -177,7 +177,7 @@ impl Stage {
     ///
     /// # Errors
     /// An unknown shape.
-    pub fn add_body(&mut self, shape: ShapeId, pose: &Pose, label: u16, look: &Look) -> Result<BodyId> {
+    pub fn add_body(&mut self, shape: ShapeId, pose: &Pose, label: u16, look: &Appearance) -> Result<BodyId> {
         if shape.0 >= self.shapes.len() {
             return Err(Error::Unknown { what: "shape", index: shape.0, count: self.shapes.len() });
         }
@@ -216,7 +216,7 @@ impl Stage {
     ///
     /// # Errors
     /// A mesh that is too large.
-    pub fn add_mesh(&mut self, mesh: &TriMesh, label: u16, look: &Look) -> Result<(ShapeId, BodyId)> {
+    pub fn add_mesh(&mut self, mesh: &TriMesh, label: u16, look: &Appearance) -> Result<(ShapeId, BodyId)> {
         let shape = self.add_shape(mesh)?;
         Ok((shape, self.add_body(shape, &Pose::IDENTITY, label, look)?))
     }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::{Camera, CameraModel, ColorImage, Distortion, Fisheye, Pose};
 use trocar_geometry::TriMesh;
-use trocar_render::{Eye, Film, Look, Settings, Stage, render, srgb};
+use trocar_render::{Appearance, Film, RayGenerator, RenderSettings, Stage, render, srgb};
 
 /// Squares of the board.
 const COLUMNS: usize = 10;
@@ -121,12 +121,12 @@ fn calibrated(python: &Path, name: &str, model: &CameraModel) -> (f64, f64) {
     let mut stage = Stage::new();
     stage.environment = [1.0; 3];
     let shape = stage.add_shape(&board(&std::fs::read(folder.path().join("board")).unwrap())).unwrap();
-    let body = stage.add_body(shape, &Pose::IDENTITY, 1, &Look::matte([128; 3])).unwrap();
-    let eye = Eye::new(finer(model));
+    let body = stage.add_body(shape, &Pose::IDENTITY, 1, &Appearance::matte([128; 3])).unwrap();
+    let eye = RayGenerator::new(finer(model));
     let (width, height) = (model.camera().width, model.camera().height);
     for (i, pose) in poses(model).iter().enumerate() {
         stage.place(body, pose).unwrap();
-        let settings = Settings::Preview { shadows: false };
+        let settings = RenderSettings::Preview { shadows: false };
         let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
         let picture = reduced(&picture.light, width, height);
         picture.write_png(&folder.path().join(format!("{i:02}.png"))).unwrap();

@@ -7,7 +7,7 @@ mod common;
 use common::{quad, sphere};
 use glam::DVec3;
 use trocar_camera::{Camera, Pose};
-use trocar_render::{Eye, Film, Light, Look, Settings, Stage, render};
+use trocar_render::{Appearance, Film, Light, RayGenerator, RenderSettings, Stage, render};
 
 /// A Cornell-like box of 10 cm, open to the eye, with a tissue ball and a steel one.
 fn stage() -> Stage {
@@ -22,10 +22,10 @@ fn stage() -> Stage {
         (quad(o + x, y, z), [30, 170, 40]),
     ];
     for (wall, color) in walls {
-        stage.add_mesh(&wall, 1, &Look::matte(color)).unwrap();
+        stage.add_mesh(&wall, 1, &Appearance::matte(color)).unwrap();
     }
-    stage.add_mesh(&sphere(DVec3::new(-0.02, 0.03, 0.16), 0.02, 40), 2, &Look::tissue([200, 90, 80])).unwrap();
-    stage.add_mesh(&sphere(DVec3::new(0.02, 0.035, 0.15), 0.015, 40), 3, &Look::steel()).unwrap();
+    stage.add_mesh(&sphere(DVec3::new(-0.02, 0.03, 0.16), 0.02, 40), 2, &Appearance::tissue([200, 90, 80])).unwrap();
+    stage.add_mesh(&sphere(DVec3::new(0.02, 0.035, 0.15), 0.015, 40), 3, &Appearance::steel()).unwrap();
     stage.lights.push(Light::Panel {
         corner: DVec3::new(-0.02, -0.0499, 0.13),
         along: 0.04 * DVec3::Z,
@@ -37,10 +37,10 @@ fn stage() -> Stage {
 
 #[test]
 fn the_error_falls_with_the_root_of_the_samples() {
-    let eye = Eye::new(Camera::centred(24, 24, 0.9));
+    let eye = RayGenerator::new(Camera::centred(24, 24, 0.9));
     let mut stage = stage();
     let mut light = |samples: u32, seed: u32| -> Vec<f64> {
-        let settings = Settings::Path { samples, bounces: 6, seed };
+        let settings = RenderSettings::Path { samples, bounces: 6, seed };
         let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
         picture.light.iter().flatten().map(|l| f64::from(*l)).collect()
     };

@@ -1,6 +1,6 @@
 //! What rays meet on the stage: the first surface or any, of one ray or of a bundle from one place.
 
-use super::{BodyId, Meeting, Stage, Touch};
+use super::{BodyId, RayHit, Stage, Touch};
 use crate::tree::{Beam, ROOT, Ray, Stack, Stacks, Visitor};
 use fearless_simd::{Simd, dispatch};
 use glam::{Vec3, Vec3A};
@@ -17,10 +17,10 @@ pub(crate) struct Ahead {
 
 impl Stage {
     /// The first surface along a ray, `direction` of any length; `None` where it meets nothing.
-    pub fn cast(&mut self, origin: Vec3, direction: Vec3) -> Option<Meeting> {
+    pub fn cast(&mut self, origin: Vec3, direction: Vec3) -> Option<RayHit> {
         self.settle();
         let touch = self.first(origin.into(), direction.into(), f32::INFINITY, &mut Stacks::new())?;
-        Some(Meeting { t: touch.t, body: BodyId(touch.body as usize), triangle: touch.triangle })
+        Some(RayHit { t: touch.t, body: BodyId(touch.body as usize), triangle: touch.triangle })
     }
 
     /// The first surface along a ray.

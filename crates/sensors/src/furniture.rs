@@ -4,14 +4,14 @@ use crate::field::Field;
 use crate::solid::{Part, Solid, along, join, turned};
 use glam::{DVec2, DVec3};
 use trocar_geometry::{Pose, TriMesh};
-use trocar_render::{Look, SurfaceKind};
+use trocar_render::{Appearance, SurfaceKind};
 use trocar_scene::Port;
 
 /// A piece of furniture.
 pub(crate) struct Piece {
     pub name: &'static str,
     pub mesh: TriMesh,
-    pub look: Look,
+    pub look: Appearance,
 }
 
 /// Half the table's side [m].
@@ -26,8 +26,8 @@ const HEAD: [f64; 2] = [0.021, 0.11];
 const DOME: f64 = 0.25;
 const SHEET_RINGS: u32 = 12;
 
-fn plastic(color: [u8; 3], roughness: f32) -> Look {
-    Look { color, surface: SurfaceKind::Coated { roughness, ior: 1.46, wander: [0.0; 3] } }
+fn plastic(color: [u8; 3], roughness: f32) -> Appearance {
+    Appearance { color, surface: SurfaceKind::Coated { roughness, ior: 1.46, scattering_length: [0.0; 3] } }
 }
 
 /// Height of the table's top [m].
@@ -80,7 +80,11 @@ pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Piece> {
     if !sheets.triangles.is_empty() {
         all.push(Piece { name: "wall", mesh: sheets, look: plastic([255; 3], 0.55) });
     }
-    all.push(Piece { name: "holders", mesh: holders, look: Look { color: [150, 153, 158], ..Look::steel() } });
+    all.push(Piece {
+        name: "holders",
+        mesh: holders,
+        look: Appearance { color: [150, 153, 158], ..Appearance::steel() },
+    });
     all
 }
 
@@ -231,7 +235,7 @@ pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Piece> {
     ]);
     let axis = |mesh: &TriMesh| along(mesh, shaft.translation, back(1.0));
     let mut all = vec![
-        Piece { name: "endoscope", mesh: axis(&tube), look: Look::steel() },
+        Piece { name: "endoscope", mesh: axis(&tube), look: Appearance::steel() },
         Piece { name: "endoscope", mesh: axis(&head), look: plastic([40, 42, 46], 0.4) },
     ];
     let held = back(length + 0.5 * long);
@@ -242,7 +246,7 @@ pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Piece> {
         let base = Part::Cylinder { from: foot, to: foot + 0.014 * DVec3::Z, radius: 0.05, edge: 0.004 };
         let color = [120, 124, 130];
         let mesh = Solid::new(0.004).with(color, rod(0.009)).with(color, base).surface(0.004);
-        all.push(Piece { name: "stand", mesh, look: Look { color, ..Look::steel() } });
+        all.push(Piece { name: "stand", mesh, look: Appearance { color, ..Appearance::steel() } });
     }
     all
 }

@@ -3,10 +3,10 @@
 use crate::{Error, Result};
 use glam::DVec3;
 use trocar_camera::{Camera, Pose};
-use trocar_render::{Eye, Film, Light, Stage};
+use trocar_render::{Film, Light, RayGenerator, Stage};
 use trocar_scene::{CellCamera, Scene};
 
-/// Name of the camera that every sight has: both arms over the specimen, from the other side of the table. A scene's own camera of that name goes before it.
+/// Name of the camera that every rig has: both arms over the specimen, from the other side of the table. A scene's own camera of that name goes before it.
 pub const OUTSIDE: &str = "outside";
 
 /// Diameter of the endoscope's round picture over the image's height: the corners of wide pictures are black, little of square ones.
@@ -30,7 +30,7 @@ pub(crate) struct Viewer {
     pub film: Film,
     pub model: Camera,
     round: bool,
-    eyes: Vec<([usize; 2], Eye)>,
+    eyes: Vec<([usize; 2], RayGenerator)>,
 }
 
 /// Where the room's light hangs: above this point.
@@ -128,11 +128,11 @@ impl Viewer {
     }
 
     /// The rays of a picture of that size.
-    pub fn eye(&mut self, size: [usize; 2]) -> &Eye {
+    pub fn eye(&mut self, size: [usize; 2]) -> &RayGenerator {
         let at = match self.eyes.iter().position(|(s, _)| *s == size) {
             Some(at) => at,
             None => {
-                let eye = Eye::new(self.sized(size));
+                let eye = RayGenerator::new(self.sized(size));
                 if self.eyes.len() >= SIZES {
                     self.eyes.remove(0);
                 }

@@ -6,9 +6,9 @@ use glam::{DQuat, DVec3};
 use trocar_camera::{Camera, ColorImage, Pose};
 use trocar_cell::{Action, Cell};
 use trocar_geometry::{TetMesh, TriMesh};
-use trocar_render::{Picture, Settings};
+use trocar_render::{Picture, RenderSettings};
 use trocar_scene::{Scene, SpecimenSource};
-use trocar_sight::{DepthNoise, Sensor, Sight};
+use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 /// A bar of cubes along x, six elements each, in the recording camera's frame, on a bed 150 mm before it.
@@ -71,36 +71,36 @@ fn share(picture: &Picture, label: u16) -> f64 {
     picture.labels.iter().filter(|l| **l == label).count() as f64 / picture.labels.len() as f64
 }
 
-fn label(sight: &Sight, name: &str) -> u16 {
-    sight.labels().iter().find(|(_, n)| n == name).unwrap().0
+fn label(rig: &CameraRig, name: &str) -> u16 {
+    rig.labels().iter().find(|(_, n)| n == name).unwrap().0
 }
 
 #[test]
 fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
     let (scene, specimen) = (scene(), specimen());
     let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
-    let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
-    sight.sensor = Sensor { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
-    assert_eq!(sight.cameras(), ["endoscope", "d405", "recording", "outside"]);
-    sight.follow(&cell).unwrap();
+    let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
+    rig.noise = SensorNoise { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
+    assert_eq!(rig.cameras(), ["endoscope", "d405", "recording", "outside"]);
+    rig.update(&cell).unwrap();
     let mut run = |threads: usize| -> Vec<Picture> {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let mut seen = Vec::new();
         for camera in ["endoscope", "d405", "recording", "outside"] {
-            for settings in [Settings::preview(), Settings::path(2)] {
-                seen.push(pool.install(|| sight.see_still(camera, [96, 64], &settings).unwrap().clone()));
+            for settings in [RenderSettings::preview(), RenderSettings::path(2)] {
+                seen.push(pool.install(|| rig.render_still(camera, [96, 64], &settings).unwrap().clone()));
             }
         }
         seen
     };
     let (one, two) = (run(1), run(2));
     assert_eq!(one, two);
-    let organs = [label(&sight, "appendix"), label(&sight, "bowel")];
+    let organs = [label(&rig, "appendix"), label(&rig, "bowel")];
     for (k, picture) in one.iter().step_by(2).take(3).enumerate() {
         for organ in organs {
             assert!(share(picture, organ) > 0.0003, "camera {k} does not see organ {organ}");
         }
-        assert!(share(picture, label(&sight, "grasper")) > 0.003, "camera {k} sees no grasper");
+        assert!(share(picture, label(&rig, "grasper")) > 0.003, "camera {k} sees no grasper");
         assert!(
             picture
                 .normals
@@ -109,28 +109,28 @@ fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
                 .all(|(n, l)| *l == 0 || (glam::Vec3::from(*n).length() - 1.0).abs() < 1e-3)
         );
     }
-    assert!(share(&one[6], label(&sight, "left arm")) > 0.01);
+    assert!(share(&one[6], label(&rig, "left arm")) > 0.01);
     // Depth of a camera without noise is the truth: the bed is 150 mm before the recording camera.
-    sight.sensor = Sensor::default();
-    let size = sight.size("recording").unwrap();
-    let picture = sight.see(&cell, "recording", size, &Settings::preview()).unwrap();
+    rig.noise = SensorNoise::default();
+    let size = rig.size("recording").unwrap();
+    let picture = rig.render(&cell, "recording", size, &RenderSettings::preview()).unwrap();
     let bed = picture.depth.depth[100 * size[0] + 20];
     assert!((0.145..0.153).contains(&bed), "{bed}");
     // After a step of the arms the instruments are elsewhere in the picture, where the cell says.
-    let still = sight.see(&cell, "endoscope", [96, 64], &Settings::preview()).unwrap().clone();
+    let still = rig.render(&cell, "endoscope", [96, 64], &RenderSettings::preview()).unwrap().clone();
     let action: Vec<_> = cell.observe().iter().map(|a| trocar_cell_coordinates(a, 0.004)).collect();
     for _ in 0..10 {
         cell.step(&Action::pivots(&action)).unwrap();
     }
-    let moved = sight.see(&cell, "endoscope", [96, 64], &Settings::preview()).unwrap().clone();
+    let moved = rig.render(&cell, "endoscope", [96, 64], &RenderSettings::preview()).unwrap().clone();
     assert_ne!(still.labels, moved.labels);
-    let (model, pose) = sight.model("endoscope", [96, 64]).unwrap();
+    let (model, pose) = rig.model("endoscope", [96, 64]).unwrap();
     let gripper = cell.gripper("right").unwrap();
     let tip = pose.inverse().transform(gripper.blade(1.0).transform(DVec3::new(0.012, 0.0008, 0.0)));
     let pixel = model.project(tip).unwrap().round();
     if (0.0..96.0).contains(&pixel.x) && (0.0..64.0).contains(&pixel.y) {
         let at = pixel.y as usize * 96 + pixel.x as usize;
-        assert_eq!(moved.labels[at], label(&sight, "cutter"), "the blade is at {pixel}");
+        assert_eq!(moved.labels[at], label(&rig, "cutter"), "the blade is at {pixel}");
     }
 }
 
@@ -142,44 +142,44 @@ fn trocar_cell_coordinates(arm: &trocar_cell::ArmObservation, deeper: f64) -> tr
 fn sections_show_half_and_the_whole_again() {
     let (scene, specimen) = (scene(), specimen());
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
-    let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
+    let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
     let camera = ("recording", [212, 120]);
-    let whole = sight.see(&cell, camera.0, camera.1, &Settings::preview()).unwrap().clone();
-    let triangles = sight.triangles();
+    let whole = rig.render(&cell, camera.0, camera.1, &RenderSettings::preview()).unwrap().clone();
+    let triangles = rig.triangles();
     // Sections leave out what is on the normal's side, and show whole organs again.
-    let organ = label(&sight, "appendix");
+    let organ = label(&rig, "appendix");
     let middle = specimen.organs[0].body.vertices.iter().sum::<DVec3>() / specimen.organs[0].body.vertices.len() as f64;
     let middle = scene.placement.pose().transform(middle);
-    sight.section(Some((middle + 1e-4 * DVec3::X, DVec3::X)));
-    let half = sight.see(&cell, camera.0, camera.1, &Settings::preview()).unwrap().clone();
+    rig.set_section(Some((middle + 1e-4 * DVec3::X, DVec3::X)));
+    let half = rig.render(&cell, camera.0, camera.1, &RenderSettings::preview()).unwrap().clone();
     let ratio = share(&half, organ) / share(&whole, organ);
     assert!((0.35..0.65).contains(&ratio), "{ratio}");
-    sight.section(None);
-    assert_eq!(*sight.see(&cell, camera.0, camera.1, &Settings::preview()).unwrap(), whole);
-    assert_eq!(sight.triangles(), triangles);
+    rig.set_section(None);
+    assert_eq!(*rig.render(&cell, camera.0, camera.1, &RenderSettings::preview()).unwrap(), whole);
+    assert_eq!(rig.triangles(), triangles);
 }
 
 #[test]
 fn specimens_are_seen_alone_and_mistakes_are_told() {
     let mut specimen = specimen();
-    let mut sight = Sight::of_specimen(&specimen).unwrap();
-    assert_eq!(sight.cameras(), ["recording", "outside"]);
-    let seen = sight.see_still("recording", [212, 120], &Settings::preview()).unwrap().clone();
+    let mut rig = CameraRig::from_specimen(&specimen).unwrap();
+    assert_eq!(rig.cameras(), ["recording", "outside"]);
+    let seen = rig.render_still("recording", [212, 120], &RenderSettings::preview()).unwrap().clone();
     assert!(share(&seen, 1) > 0.01 && share(&seen, 2) > 0.01);
     // The organ's middle is where the recording camera has it.
     let at = Camera::centred(212, 120, 1.5).project(DVec3::new(0.012, 0.012, 0.141)).unwrap().round();
     assert_eq!(seen.labels[at.y as usize * 212 + at.x as usize], 1);
     assert!(
-        matches!(sight.see_still("endoscope", [96, 64], &Settings::preview()), Err(e) if e.to_string() == "there is no camera 'endoscope'; the cameras are recording, outside")
+        matches!(rig.render_still("endoscope", [96, 64], &RenderSettings::preview()), Err(e) if e.to_string() == "there is no camera 'endoscope'; the cameras are recording, outside")
     );
     assert!(
-        matches!(sight.see_still("outside", [4, 64], &Settings::preview()), Err(e) if e.to_string().contains("8 to 8192"))
+        matches!(rig.render_still("outside", [4, 64], &RenderSettings::preview()), Err(e) if e.to_string().contains("8 to 8192"))
     );
     // Turned specimens stand upright all the same, and those without a camera are seen from aside.
     specimen.up = (DQuat::from_rotation_x(0.6) * specimen.up).normalize();
     (specimen.camera, specimen.background) = (None, None);
-    let mut sight = Sight::of_specimen(&specimen).unwrap();
-    assert_eq!(sight.cameras(), ["outside"]);
-    let seen = sight.see_still("outside", [120, 80], &Settings::preview()).unwrap();
+    let mut rig = CameraRig::from_specimen(&specimen).unwrap();
+    assert_eq!(rig.cameras(), ["outside"]);
+    let seen = rig.render_still("outside", [120, 80], &RenderSettings::preview()).unwrap();
     assert!(share(seen, 1) > 0.01, "{}", share(seen, 1));
 }

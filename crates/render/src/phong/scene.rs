@@ -1,8 +1,8 @@
 //! What is rendered, and what comes of it.
 
-use crate::shade::{Lit, shade};
+use super::shade::{Lit, shade};
+use super::trace::{Hit, Tracer};
 use crate::srgb;
-use crate::trace::{Hit, Tracer};
 use glam::DVec3;
 use rayon::prelude::*;
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
@@ -31,7 +31,7 @@ pub struct Instance {
 }
 
 /// Meshes and a light, with search trees built.
-pub struct Scene {
+pub struct PhongScene {
     tracer: Tracer,
     /// Per triangle: its instance and its vertices in the arrays below.
     triangles: Vec<(u32, [u32; 3])>,
@@ -48,7 +48,7 @@ pub struct Scene {
 
 /// One rendered picture.
 #[derive(Clone, Debug)]
-pub struct Frame {
+pub struct PhongImage {
     /// Shaded colour.
     pub color: ColorImage,
     /// Metric z depth in metres; 0 where nothing was hit.
@@ -60,7 +60,7 @@ pub struct Frame {
 }
 
 /// Pixels of `frame` that show `label`.
-pub fn label_mask(frame: &Frame, label: u16) -> Mask {
+pub fn label_mask(frame: &PhongImage, label: u16) -> Mask {
     let set = frame.labels.iter().map(|l| *l == label).collect();
     Mask { width: frame.color.width, height: frame.color.height, set }
 }
@@ -78,7 +78,7 @@ impl View<'_> {
     }
 }
 
-impl Scene {
+impl PhongScene {
     /// Builds the scene. `light` is the direction towards the light; `None` puts it at the camera. Triangles with a missing
     /// or non-finite vertex are left out.
     pub fn new(instances: Vec<Instance>, light: Option<DVec3>, background: [u8; 3]) -> Self {
@@ -146,11 +146,11 @@ impl Scene {
 
     /// Renders through `camera` standing at `pose` (camera to world); `samples` x `samples` rays a pixel for the colour
     /// (depth, labels and facing come from the pixel's centre).
-    pub fn render(&self, camera: &Camera, pose: &Pose, samples: usize) -> Frame {
+    pub fn render(&self, camera: &Camera, pose: &Pose, samples: usize) -> PhongImage {
         let (width, height) = (camera.width, camera.height);
         let samples = samples.max(1);
         let view = View { camera, pose };
-        let mut frame = Frame {
+        let mut frame = PhongImage {
             color: ColorImage::new(width, height, self.background),
             depth: DepthImage::new(width, height),
             labels: vec![0; width * height],

@@ -1,6 +1,6 @@
-//! What a phantom is: its organs and how they lie, the bed, the lamp, the instruments' reach. A phantom is a file with a [`Plan`].
+//! What a phantom is: its organs and how they lie, the bed, the lamp, the instruments' reach. A phantom is a file with a [`PhantomSpec`].
 
-use crate::bed::{Bed, BedPlan};
+use crate::bed::{Bed, BedSpec};
 use crate::body::Body;
 use crate::instruments::Reach;
 use crate::still::Fineness;
@@ -9,13 +9,13 @@ use glam::DVec3;
 use trocar_specimen::{End, Material, Pins, nearest};
 
 /// The phantoms there are.
-const PLANS: [&Plan; 3] = [&phantom_a::PLAN, &phantom_b::PLAN, &phantom_c::PLAN];
+const SPECS: [&PhantomSpec; 3] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC];
 
 /// Names of the phantoms: `phantom-a` and `phantom-b` are rabbits, `phantom-c` is a porcine liver with its gallbladder.
-pub const NAMES: [&str; 3] = [PLANS[0].name, PLANS[1].name, PLANS[2].name];
+pub const NAMES: [&str; 3] = [SPECS[0].name, SPECS[1].name, SPECS[2].name];
 
 /// A phantom.
-pub(crate) struct Plan {
+pub(crate) struct PhantomSpec {
     pub name: &'static str,
     /// What to lay where, for a seed, on a bed that nothing has pressed on yet.
     pub organs: fn(u64, &Bed) -> Vec<Organ>,
@@ -23,7 +23,7 @@ pub(crate) struct Plan {
     pub listed: &'static [&'static str],
     /// Density of the organs [kg/m3].
     pub density: f64,
-    pub bed: BedPlan,
+    pub bed: BedSpec,
     pub reach: Reach,
     pub fineness: Fineness,
     /// Depth at which the lamp is as bright as the colours mean [m].
@@ -71,7 +71,7 @@ pub(crate) enum Vessels {
     Rungs,
 }
 
-impl Plan {
+impl PhantomSpec {
     /// The phantom of that name.
     pub fn named(name: &str) -> Result<&'static Self> {
         let known = || Error::Unknown {
@@ -79,14 +79,14 @@ impl Plan {
             nearest: nearest(name, NAMES).unwrap_or_default(),
             known: NAMES.join(", "),
         };
-        PLANS.into_iter().find(|p| p.name == name).ok_or_else(known)
+        SPECS.into_iter().find(|p| p.name == name).ok_or_else(known)
     }
 }
 
 impl Organ {
     /// Its material, the paper's.
-    pub fn material(&self, plan: &Plan) -> Material {
-        Material { young_modulus_pa: self.young_modulus, density_kg_m3: plan.density, ..Material::default() }
+    pub fn material(&self, spec: &PhantomSpec) -> Material {
+        Material { young_modulus_pa: self.young_modulus, density_kg_m3: spec.density, ..Material::default() }
     }
 
     /// Its pins, the paper's.

@@ -1,17 +1,17 @@
 //! The stage follows the cell: organs as they are now, whole or in pieces, arms and instruments at their poses.
 
-use super::{Sight, wet};
+use super::{CameraRig, wet};
 use crate::organ::Piece;
 use crate::section::section;
 use crate::{Error, Result};
 use trocar_cell::Cell;
 
-impl Sight {
-    /// Brings the stage to where the cell is; [`Self::see`] does it itself.
+impl CameraRig {
+    /// Brings the stage to where the cell is; [`Self::render`] does it itself.
     ///
     /// # Errors
     /// A cell of another scene.
-    pub fn follow(&mut self, cell: &Cell) -> Result<()> {
+    pub fn update(&mut self, cell: &Cell) -> Result<()> {
         let world = cell.world();
         let bodies = world.model.bodies();
         let mut same = true;

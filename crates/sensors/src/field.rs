@@ -6,7 +6,7 @@
 use glam::{DVec2, DVec3};
 use trocar_camera::{Camera, ColorImage};
 use trocar_geometry::{Pose, TriMesh};
-use trocar_render::{Eye, Film, Look, Settings, Stage, render, srgb};
+use trocar_render::{Appearance, Film, RayGenerator, RenderSettings, Stage, render, srgb};
 
 /// Most cells along a side.
 const CELLS: f64 = 360.0;
@@ -48,7 +48,7 @@ impl Field {
         let (low, high) = rectangle(low.truncate(), high.truncate(), height, recorded);
         let mut organs = Stage::new();
         for surface in surfaces {
-            organs.add_mesh(surface, 1, &Look::matte([128; 3]))?;
+            organs.add_mesh(surface, 1, &Appearance::matte([128; 3]))?;
         }
         let texture = recorded.map(|r| Texture::of(r, &mut organs));
         let cell = ((high - low).max_element() / CELLS).max(5e-4);
@@ -114,8 +114,8 @@ impl<'a> Texture<'a> {
         let Recorded { picture, camera, pose } = *recorded;
         let mut picture = picture.clone();
         if (picture.width, picture.height) == (camera.width, camera.height) {
-            let settings = Settings::Preview { shadows: false };
-            let seen = render(organs, &Eye::new(*camera), &pose, &settings, &Film::default());
+            let settings = RenderSettings::Preview { shadows: false };
+            let seen = render(organs, &RayGenerator::new(*camera), &pose, &settings, &Film::default());
             let mut hidden: Vec<bool> = seen.labels.iter().map(|l| *l != 0).collect();
             for _ in 0..RIM {
                 hidden = grown(&hidden, picture.width, picture.height);

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use trocar_camera::{Camera, Pose};
 use trocar_cell::{Action, Cell};
 use trocar_geometry::TetMesh;
-use trocar_render::Settings;
+use trocar_render::RenderSettings;
 use trocar_robot::instrument::Coordinates;
 use trocar_scene::{Scene, SpecimenSource};
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 /// A cube of 40 mm, 150 mm before the recording camera.
@@ -73,9 +73,9 @@ fn with_model(model: &str, shapes: Option<&str>) -> Scene {
 }
 
 /// Share of the outside picture that shows an arm.
-fn seen(sight: &mut Sight, cell: &Cell) -> f64 {
-    let label = sight.labels().iter().find(|(_, n)| n == "left arm").unwrap().0;
-    let picture = sight.see(cell, "outside", [192, 108], &Settings::preview()).unwrap();
+fn seen(rig: &mut CameraRig, cell: &Cell) -> f64 {
+    let label = rig.labels().iter().find(|(_, n)| n == "left arm").unwrap().0;
+    let picture = rig.render(cell, "outside", [192, 108], &RenderSettings::preview()).unwrap();
     picture.labels.iter().filter(|l| **l == label).count() as f64 / picture.labels.len() as f64
 }
 
@@ -105,18 +105,18 @@ fn a_cell_runs_with_arms_out_of_mjcf_and_shows_their_meshes() {
         // Other friction and no rotor inertia of the gears: the same motion, not the same bits.
         assert!(tips[0].distance(tips[1]) < 1e-3, "{arm}: {} m apart", tips[0].distance(tips[1]));
     }
-    let mut sight = Sight::new(&described, &specimen, &plain).unwrap();
-    let mut simple = Sight::new(&scene(), &specimen, &built_in).unwrap();
-    assert!(sight.triangles() > simple.triangles() + 100_000, "{} triangles", sight.triangles());
-    let shares = [seen(&mut sight, &plain), seen(&mut simple, &built_in)];
+    let mut rig = CameraRig::new(&described, &specimen, &plain).unwrap();
+    let mut simple = CameraRig::new(&scene(), &specimen, &built_in).unwrap();
+    assert!(rig.triangles() > simple.triangles() + 100_000, "{} triangles", rig.triangles());
+    let shares = [seen(&mut rig, &plain), seen(&mut simple, &built_in)];
     assert!((shares[0] / shares[1] - 1.0).abs() < 0.25, "meshes {}, housings {}", shares[0], shares[1]);
     // The same meshes on the built-in arm, and no meshes on the described one.
     let drawn = with_model("franka_fr3", file.to_str());
-    let mut on_built_in = Sight::new(&drawn, &specimen, &built_in).unwrap();
-    assert_eq!(on_built_in.triangles(), sight.triangles());
+    let mut on_built_in = CameraRig::new(&drawn, &specimen, &built_in).unwrap();
+    assert_eq!(on_built_in.triangles(), rig.triangles());
     assert!((seen(&mut on_built_in, &built_in) / shares[0] - 1.0).abs() < 0.02);
-    let bare = Sight::new(&with_model(file.to_str().unwrap(), Some("simple")), &specimen, &plain).unwrap();
-    assert!(bare.triangles() < sight.triangles());
+    let bare = CameraRig::new(&with_model(file.to_str().unwrap(), Some("simple")), &specimen, &plain).unwrap();
+    assert!(bare.triangles() < rig.triangles());
 }
 
 #[test]
@@ -135,7 +135,7 @@ fn arms_share_shapes_only_where_they_are_drawn_alike() {
         for (arm, asked) in scene.arms.iter_mut().zip(asked) {
             arm.shapes = asked.then(|| bare.to_owned());
         }
-        Sight::new(&scene, &specimen, &cell).unwrap().triangles()
+        CameraRig::new(&scene, &specimen, &cell).unwrap().triangles()
     };
     let [neither, left, right, both] = [[false, false], [true, false], [false, true], [true, true]].map(triangles);
     assert_eq!(left, right);
@@ -164,14 +164,14 @@ fn a_missing_mesh_and_another_arm_are_told_in_a_line() {
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
     let refused = |count: usize, words: &[&str]| {
         std::fs::write(&file, arm(count)).unwrap();
-        let said = Sight::new(&scene, &specimen, &cell).err().unwrap().to_string();
+        let said = CameraRig::new(&scene, &specimen, &cell).err().unwrap().to_string();
         assert!(words.iter().all(|w| said.contains(w)) && !said.contains('\n'), "{said}");
     };
     refused(7, &["arm 'left'", "link 'l1'", "arm.xml", "part.obj: no such file", "shapes = \"simple\""]);
     std::fs::write(folder.path().join("part.obj"), "v 0 0 0\nv 0.1 0 0\nv 0 0.1 0\nf 1 2 3\n").unwrap();
     refused(3, &["arm 'left'", "arm.xml", "3 links", "the arm has 7"]);
     std::fs::write(&file, arm(7)).unwrap();
-    assert!(Sight::new(&scene, &specimen, &cell).is_ok());
+    assert!(CameraRig::new(&scene, &specimen, &cell).is_ok());
 }
 
 #[test]
@@ -179,19 +179,19 @@ fn the_wall_is_where_the_scene_has_it() {
     let specimen = specimen();
     let mut scene = scene();
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
-    let bare = Sight::new(&scene, &specimen, &cell).unwrap();
+    let bare = CameraRig::new(&scene, &specimen, &cell).unwrap();
     assert!(bare.labels().iter().all(|(_, n)| n != "wall"));
     scene.ports.iter_mut().for_each(|p| p.sheet_diameter_mm = 70.0);
     scene.validate().unwrap();
-    let mut sight = Sight::new(&scene, &specimen, &cell).unwrap();
-    let wall = sight.labels().iter().find(|(_, n)| n == "wall").unwrap().0;
+    let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
+    let wall = rig.labels().iter().find(|(_, n)| n == "wall").unwrap().0;
     let port = DVec3::from(scene.ports[0].centre_m);
     let model = Camera::centred(101, 101, 0.6);
     for (name, eye, skin) in [("above", 0.2, true), ("below", -0.1, false)] {
         // Beside the shaft: 25 mm from the hole.
         let target = port + DVec3::new(0.0, 0.025, 0.0);
-        sight.add_camera(name, model, Pose::look_at(target + eye * DVec3::Z, target, DVec3::Y));
-        let picture = sight.see(&cell, name, [101, 101], &Settings::preview()).unwrap();
+        rig.add_camera(name, model, Pose::look_at(target + eye * DVec3::Z, target, DVec3::Y));
+        let picture = rig.render(&cell, name, [101, 101], &RenderSettings::preview()).unwrap();
         let middle = 50 * 101 + 50;
         assert_eq!(picture.labels[middle], wall, "{name}");
         let depth = f64::from(picture.depth.depth[middle]);
@@ -202,11 +202,11 @@ fn the_wall_is_where_the_scene_has_it() {
     }
     // The hole is open: the wall begins under the ring, 5 mm from the hole's edge.
     for (name, eye) in [("in from above", 0.2), ("in from below", -0.1)] {
-        sight.add_camera(name, model, Pose::look_at(port + eye * DVec3::Z, port, DVec3::Y));
-        let picture = sight.see(&cell, name, [101, 101], &Settings::preview()).unwrap();
+        rig.add_camera(name, model, Pose::look_at(port + eye * DVec3::Z, port, DVec3::Y));
+        let picture = rig.render(&cell, name, [101, 101], &RenderSettings::preview()).unwrap();
         assert_ne!(picture.labels[50 * 101 + 50], wall, "{name}");
         let (labels, depth) = (picture.labels.clone(), picture.depth.depth.clone());
-        let (model, pose) = sight.model(name, [101, 101]).unwrap();
+        let (model, pose) = rig.model(name, [101, 101]).unwrap();
         let shows = (0..labels.len()).filter(|k| labels[*k] == wall);
         let aside = shows.map(|k| {
             let ray = model.ray((k % 101) as f64, (k / 101) as f64);

@@ -1,6 +1,6 @@
 //! The cell as cameras see it.
 
-mod follow;
+mod update;
 
 use crate::camera::{Room, Viewer, is_endoscope};
 use crate::field::{Field, Recorded};
@@ -12,7 +12,7 @@ use std::path::PathBuf;
 use trocar_camera::{Camera, DepthNoise, Pose};
 use trocar_cell::{Cell, Placed};
 use trocar_geometry::TriMesh;
-use trocar_render::{BodyId, Look, Noise, Picture, Settings, ShapeId, Stage, SurfaceKind, render_into};
+use trocar_render::{Appearance, BodyId, Noise, Picture, RenderSettings, ShapeId, Stage, SurfaceKind, render_into};
 use trocar_scene::{InstrumentKind, Scene};
 use trocar_specimen::Specimen;
 
@@ -29,7 +29,7 @@ const SIDES: std::ops::RangeInclusive<usize> = 8..=8192;
 
 /// What sensors do to what they see; nothing by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Sensor {
+pub struct SensorNoise {
     /// Noise of the colours: standard deviation at white that grows with the root of the light, and that without light. Good: 0.015 and 0.003.
     pub color: Option<[f32; 2]>,
     /// Noise of the depth, of cameras that measure it.
@@ -39,7 +39,7 @@ pub struct Sensor {
 }
 
 /// The cameras of a cell, or of a specimen alone.
-pub struct Sight {
+pub struct CameraRig {
     viewers: Vec<Viewer>,
     labels: Vec<(u16, String)>,
     /// All but the organs.
@@ -50,7 +50,7 @@ pub struct Sight {
     section: Option<(DVec3, DVec3)>,
     picture: Picture,
     /// What the sensors do.
-    pub sensor: Sensor,
+    pub noise: SensorNoise,
 }
 
 /// An organ on the stage.
@@ -89,32 +89,32 @@ struct Drawn {
     model: String,
 }
 
-impl Sight {
+impl CameraRig {
     /// The cameras of `scene` in `cell`, which was made of it and of `specimen` (as [`Cell::new`] takes it).
     ///
     /// # Errors
     /// A camera with the lens of a recording that the specimen does not have, a cell of another scene.
     pub fn new(scene: &Scene, specimen: &Specimen, cell: &Cell) -> Result<Self> {
         let placed = Placed::new(scene, specimen)?.specimen;
-        let mut sight = Self::over(&placed, scene.placement.pose(), Some(scene))?;
+        let mut rig = Self::over(&placed, scene.placement.pose(), Some(scene))?;
         // Lights are set by the organs as they were recorded, so that pictures do not depend on what the cell did before.
-        sight.rebuild(None)?;
+        rig.rebuild(None)?;
         let room = Room { middle: middle(&placed) };
-        let viewers = Viewer::all(scene, specimen.camera.as_ref(), room, &mut sight.stage)?;
+        let viewers = Viewer::all(scene, specimen.camera.as_ref(), room, &mut rig.stage)?;
         for (k, (described, _, instrument)) in scene.stations().iter().enumerate() {
-            sight.add_arm(k, (scene, described), instrument, cell)?;
+            rig.add_arm(k, (scene, described), instrument, cell)?;
         }
-        sight.organs.iter_mut().for_each(|o| o.shape = None);
-        sight.follow(cell)?;
-        sight.viewers = viewers;
-        Ok(sight)
+        rig.organs.iter_mut().for_each(|o| o.shape = None);
+        rig.update(cell)?;
+        rig.viewers = viewers;
+        Ok(rig)
     }
 
     /// A specimen as it was recorded: its `recording` camera if it has one, and a look at it from aside, `outside`.
     ///
     /// # Errors
     /// A mesh that is too large.
-    pub fn of_specimen(specimen: &Specimen) -> Result<Self> {
+    pub fn from_specimen(specimen: &Specimen) -> Result<Self> {
         let pose = Pose { rotation: DQuat::from_rotation_arc(specimen.up.normalize(), DVec3::Z), ..Pose::IDENTITY };
         let mut placed = specimen.clone();
         for organ in &mut placed.organs {
@@ -122,11 +122,11 @@ impl Sight {
                 *p = pose.transform(*p);
             }
         }
-        let mut sight = Self::over(&placed, pose, None)?;
+        let mut rig = Self::over(&placed, pose, None)?;
         let middle = middle(&placed);
         let room = Room { middle };
         if let Some(camera) = specimen.camera {
-            sight.viewers.push(Viewer::lit("recording", camera, pose, true, room));
+            rig.viewers.push(Viewer::lit("recording", camera, pose, true, room));
         }
         let away = pose.rotation * DVec3::Y;
         let away = DVec3::new(away.x, away.y, 0.0).try_normalize().unwrap_or(DVec3::Y);
@@ -134,14 +134,14 @@ impl Sight {
         let size = size.map_or(0.1, |(low, high)| (high - low).length());
         let eye = middle + 1.1 * size * (0.62 * away + 0.25 * away.cross(DVec3::Z) + 0.75 * DVec3::Z);
         let model = Camera::centred(1280, 720, 58.0_f64.to_radians());
-        sight.viewers.push(Viewer::lit(OUTSIDE, model, Pose::look_at(eye, middle, DVec3::Z), false, room));
-        sight.rebuild(None)?;
-        Ok(sight)
+        rig.viewers.push(Viewer::lit(OUTSIDE, model, Pose::look_at(eye, middle, DVec3::Z), false, room));
+        rig.rebuild(None)?;
+        Ok(rig)
     }
 
     /// Organs, in the world's frame with up along z, on their field in the room of `scene`; no cameras yet. `recording` is the pose of the recording camera.
     fn over(placed: &Specimen, recording: Pose, scene: Option<&Scene>) -> Result<Self> {
-        let mut sight = Self {
+        let mut rig = Self {
             viewers: Vec::new(),
             labels: Vec::new(),
             base: Stage::new(),
@@ -150,16 +150,16 @@ impl Sight {
             arms: Vec::new(),
             section: None,
             picture: Picture::default(),
-            sensor: Sensor::default(),
+            noise: SensorNoise::default(),
         };
         for (k, organ) in placed.organs.iter().enumerate() {
             let label = 1 + k as u16;
-            sight.labels.push((label, organ.name.clone()));
+            rig.labels.push((label, organ.name.clone()));
             let whole = Whole::new(organ);
             let draped = whole.draped();
             let nodes = whole.body.vertices.clone();
             let bodies = Vec::new();
-            sight.organs.push(Shown {
+            rig.organs.push(Shown {
                 whole,
                 label,
                 draped,
@@ -177,7 +177,7 @@ impl Sight {
             _ => None,
         };
         let field = Field::under(&surfaces, recorded.as_ref())?;
-        sight.add("field", &field.mesh, &wet(0.36))?;
+        rig.add("field", &field.mesh, &wet(0.36))?;
         let ports = scene.map_or(&[][..], |s| &s.ports);
         let mut pieces = furniture::room(&field, ports);
         for (scene, camera) in scene.iter().flat_map(|s| s.cameras.iter().map(move |c| (s, c))) {
@@ -186,9 +186,9 @@ impl Sight {
             }
         }
         for piece in pieces {
-            sight.add(piece.name, &piece.mesh, &piece.look)?;
+            rig.add(piece.name, &piece.mesh, &piece.look)?;
         }
-        Ok(sight)
+        Ok(rig)
     }
 
     fn label(&mut self, first: u16, name: &str) -> u16 {
@@ -200,7 +200,7 @@ impl Sight {
         first + count
     }
 
-    fn add(&mut self, name: &str, mesh: &TriMesh, look: &Look) -> Result<()> {
+    fn add(&mut self, name: &str, mesh: &TriMesh, look: &Appearance) -> Result<()> {
         let label = self.label(REST, name);
         self.base.add_mesh(mesh, label, look)?;
         Ok(())
@@ -217,8 +217,10 @@ impl Sight {
         let poses = cell.link_poses(name)?;
         let label = ARMS + k as u16;
         self.labels.push((label, format!("{name} arm")));
-        let shell =
-            Look { color: [232; 3], surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, wander: [0.0; 3] } };
+        let shell = Appearance {
+            color: [232; 3],
+            surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, scattering_length: [0.0; 3] },
+        };
         // Arms of one description share its shapes.
         let model = cell.arm_model(name)?;
         let drawn = arm.drawn().map(|file| Drawn {
@@ -243,9 +245,9 @@ impl Sight {
         let held_shapes = Shapes::of(held);
         let label = INSTRUMENTS + k as u16;
         self.labels.push((label, held.name.clone()));
-        let polished = Look { surface: SurfaceKind::Metal { roughness: 0.3 }, ..Look::steel() };
-        let dark = Look { color: [58, 61, 66], ..shell };
-        let mut body = |mesh: &TriMesh, look: &Look| -> Result<BodyId> {
+        let polished = Appearance { surface: SurfaceKind::Metal { roughness: 0.3 }, ..Appearance::steel() };
+        let dark = Appearance { color: [58, 61, 66], ..shell };
+        let mut body = |mesh: &TriMesh, look: &Appearance| -> Result<BodyId> {
             let shape = self.base.add_shape(mesh)?;
             Ok(self.base.add_body(shape, &Pose::IDENTITY, label, look)?)
         };
@@ -299,7 +301,7 @@ impl Sight {
 
     /// Cuts the organs open for pictures by the plane through a point with a normal, and leaves out what is on the normal's side; `None` shows them whole. An organ that is in pieces
     /// is left as it is.
-    pub fn section(&mut self, plane: Option<(DVec3, DVec3)>) {
+    pub fn set_section(&mut self, plane: Option<(DVec3, DVec3)>) {
         self.section = plane.map(|(point, normal)| (point, normal.normalize_or(DVec3::X)));
         self.organs.iter_mut().for_each(|o| o.shape = None);
     }
@@ -316,7 +318,13 @@ impl Sight {
     ///
     /// # Errors
     /// A camera that is not there, a size that no picture has, a cell of another scene.
-    pub fn see(&mut self, cell: &Cell, camera: &str, size: [usize; 2], settings: &Settings) -> Result<&Picture> {
+    pub fn render(
+        &mut self,
+        cell: &Cell,
+        camera: &str,
+        size: [usize; 2],
+        settings: &RenderSettings,
+    ) -> Result<&Picture> {
         self.viewer(camera)?;
         self.follow(cell)?;
         self.expose(camera, size, settings, (1e3 * cell.time()).round() as u32)
@@ -325,8 +333,8 @@ impl Sight {
     /// What `camera` sees of the organs as they were recorded, or as they were when a cell was seen last.
     ///
     /// # Errors
-    /// As [`Self::see`].
-    pub fn see_still(&mut self, camera: &str, size: [usize; 2], settings: &Settings) -> Result<&Picture> {
+    /// As [`Self::render`].
+    pub fn render_still(&mut self, camera: &str, size: [usize; 2], settings: &RenderSettings) -> Result<&Picture> {
         self.viewer(camera)?;
         if self.organs.iter().any(|o| o.shape.is_none()) {
             self.rebuild(None)?;
@@ -334,12 +342,12 @@ impl Sight {
         self.expose(camera, size, settings, 0)
     }
 
-    fn expose(&mut self, camera: &str, size: [usize; 2], settings: &Settings, frame: u32) -> Result<&Picture> {
+    fn expose(&mut self, camera: &str, size: [usize; 2], settings: &RenderSettings, frame: u32) -> Result<&Picture> {
         if size.iter().any(|n| !SIDES.contains(n)) {
             return Err(Error::Size(size[0], size[1]));
         }
         let at = self.viewer(camera)?;
-        let sensor = self.sensor;
+        let sensor = self.noise;
         let Self { viewers, stage, picture, .. } = self;
         let viewer = &mut viewers[at];
         stage.lights.clone_from(&viewer.lights);
@@ -365,11 +373,11 @@ impl Sight {
 }
 
 /// Wet tissue whose film of water is as rough as that.
-fn wet(roughness: f32) -> Look {
-    let look = Look::tissue([190, 96, 88]);
+fn wet(roughness: f32) -> Appearance {
+    let look = Appearance::tissue([190, 96, 88]);
     match look.surface {
-        SurfaceKind::Coated { ior, wander, .. } => {
-            Look { surface: SurfaceKind::Coated { roughness, ior, wander }, ..look }
+        SurfaceKind::Coated { ior, scattering_length, .. } => {
+            Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..look }
         }
         _ => look,
     }

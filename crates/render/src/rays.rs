@@ -6,7 +6,7 @@ use trocar_camera::CameraModel;
 
 /// A camera made ready for rendering.
 #[derive(Clone, Debug)]
-pub struct Eye {
+pub struct RayGenerator {
     width: usize,
     height: usize,
     /// Rays through the pixels' centres; not a number where nothing is seen. A pinhole's have z = 1, a fisheye's length 1.
@@ -17,7 +17,7 @@ pub struct Eye {
     circle: Option<f32>,
 }
 
-impl Eye {
+impl RayGenerator {
     /// All pixels of a camera.
     pub fn new(model: impl Into<CameraModel>) -> Self {
         let model = model.into();

@@ -6,7 +6,7 @@ use common::sphere;
 use glam::{DQuat, DVec3};
 use trocar_camera::{Camera, Pose};
 use trocar_geometry::TriMesh;
-use trocar_render::{Frame, Instance, Scene, Shading, label_mask};
+use trocar_render::phong::{Instance, PhongImage, PhongScene, Shading, label_mask};
 
 const PLAIN: Shading = Shading { color: [200, 120, 110], gloss: 0.3, wireframe: false };
 
@@ -32,7 +32,7 @@ fn instance(mesh: TriMesh, label: u16) -> Instance {
     Instance { mesh, label, shading: PLAIN }
 }
 
-fn brightness(frame: &Frame, u: usize, v: usize) -> u32 {
+fn brightness(frame: &PhongImage, u: usize, v: usize) -> u32 {
     frame.color.pixels[v * frame.color.width + u].iter().map(|c| u32::from(*c)).sum()
 }
 
@@ -40,7 +40,7 @@ fn brightness(frame: &Frame, u: usize, v: usize) -> u32 {
 fn a_sphere_is_as_near_and_as_wide_as_it_is() {
     let camera = Camera::d405();
     let (z, radius) = (0.3, 0.05);
-    let scene = Scene::new(vec![instance(sphere(DVec3::new(0.0, 0.0, z), radius, 200), 3)], None, [0; 3]);
+    let scene = PhongScene::new(vec![instance(sphere(DVec3::new(0.0, 0.0, z), radius, 200), 3)], None, [0; 3]);
     let frame = scene.render(&camera, &Pose::IDENTITY, 1);
     let centre = 240 * 848 + 424;
     assert!((f64::from(frame.depth.depth[centre]) - (z - radius)).abs() < 1e-5, "{}", frame.depth.depth[centre]);
@@ -67,7 +67,7 @@ fn depth_is_exact_and_metric_on_a_tilted_plane() {
     let (wx, wy) = (pose.rotation * x, pose.rotation * y);
     let mut camera = Camera::d405();
     camera.distortion = trocar_camera::Distortion([0.05, -0.02, 1e-3, -5e-4, 0.0, 0.0, 0.0, 0.0]);
-    let scene = Scene::new(vec![instance(sheet(plane_centre, wx, wy, 40), 1)], None, [0; 3]);
+    let scene = PhongScene::new(vec![instance(sheet(plane_centre, wx, wy, 40), 1)], None, [0; 3]);
     let frame = scene.render(&camera, &pose, 1);
     let normal = x.cross(y).normalize();
     let offset = normal.dot(DVec3::new(0.01, 0.02, 0.3));
@@ -83,7 +83,7 @@ fn depth_is_exact_and_metric_on_a_tilted_plane() {
 #[test]
 fn the_nearer_instance_is_labelled() {
     let ball = |x: f64, z: f64, label| instance(sphere(DVec3::new(x, 0.0, z), 0.04, 40), label);
-    let scene = Scene::new(vec![ball(0.0, 0.3, 1), ball(0.02, 0.25, 2)], None, [9; 3]);
+    let scene = PhongScene::new(vec![ball(0.0, 0.3, 1), ball(0.02, 0.25, 2)], None, [9; 3]);
     let frame = scene.render(&Camera::d405(), &Pose::IDENTITY, 1);
     assert_eq!(frame.labels[240 * 848 + 424], 2);
     assert_eq!(frame.labels[240 * 848 + 370], 1, "the farther ball's rim shows");
@@ -96,7 +96,7 @@ fn no_ray_slips_between_triangles() {
     // Grid lines that fall exactly on pixel centres.
     let mut camera = Camera::d405();
     (camera.cx, camera.cy, camera.fx, camera.fy) = (424.0, 240.0, 400.0, 400.0);
-    let scene = Scene::new(vec![instance(sheet(DVec3::Z, 2.0 * DVec3::X, 2.0 * DVec3::Y, 160), 1)], None, [0; 3]);
+    let scene = PhongScene::new(vec![instance(sheet(DVec3::Z, 2.0 * DVec3::X, 2.0 * DVec3::Y, 160), 1)], None, [0; 3]);
     let frame = scene.render(&camera, &Pose::IDENTITY, 1);
     assert_eq!(label_mask(&frame, 1).count(), 848 * 480);
 }
@@ -106,7 +106,7 @@ fn one_thread_and_many_give_the_same_picture() {
     let scene = || {
         let ball = instance(sphere(DVec3::new(0.01, 0.0, 0.3), 0.05, 60), 1);
         let floor = instance(sheet(DVec3::new(0.0, 0.0, 0.35), DVec3::X, DVec3::Y, 30), 2);
-        let scene = Scene::new(vec![ball, floor], Some(DVec3::new(0.5, -0.2, -1.0)), [0; 3]);
+        let scene = PhongScene::new(vec![ball, floor], Some(DVec3::new(0.5, -0.2, -1.0)), [0; 3]);
         scene.with_ambient_occlusion(8, 0.02).render(&Camera::d405(), &Pose::IDENTITY, 2)
     };
     let on = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap().install(scene);
@@ -122,7 +122,11 @@ fn wires_darken_the_edges_and_only_those() {
     let picture = |wireframe| {
         let mesh = sheet(DVec3::new(0.0, 0.0, 0.3), 0.2 * DVec3::X, 0.2 * DVec3::Y, 8);
         let shading = Shading { wireframe, ..PLAIN };
-        Scene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]).render(&Camera::d405(), &Pose::IDENTITY, 3)
+        PhongScene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]).render(
+            &Camera::d405(),
+            &Pose::IDENTITY,
+            3,
+        )
     };
     let (with, without) = (picture(true), picture(false));
     let camera = Camera::d405();
@@ -130,7 +134,7 @@ fn wires_darken_the_edges_and_only_those() {
     let pixel = |x: f64, y: f64| camera.project(DVec3::new(x, y, 0.3)).unwrap();
     let edge = pixel(0.0, 0.02);
     let inside = pixel(0.015, 0.012);
-    let at = |frame: &Frame, p: glam::DVec2| brightness(frame, p.x.round() as usize, p.y.round() as usize);
+    let at = |frame: &PhongImage, p: glam::DVec2| brightness(frame, p.x.round() as usize, p.y.round() as usize);
     assert!(at(&with, edge) * 10 < at(&without, edge) * 9, "{} against {}", at(&with, edge), at(&without, edge));
     assert_eq!(at(&with, inside), at(&without, inside));
     let darker = (0..848 * 480).filter(|i| with.color.pixels[*i] != without.color.pixels[*i]).count();
@@ -143,7 +147,7 @@ fn a_light_from_the_side_casts_a_shadow() {
     let ball = instance(sphere(DVec3::new(0.0, 0.0, 0.25), 0.02, 40), 1);
     let floor = instance(sheet(DVec3::new(0.0, 0.0, 0.3), DVec3::X, DVec3::Y, 4), 2);
     let light = DVec3::new(1.0, 0.0, -1.0);
-    let frame = Scene::new(vec![ball, floor], Some(light), [0; 3]).render(&Camera::d405(), &Pose::IDENTITY, 1);
+    let frame = PhongScene::new(vec![ball, floor], Some(light), [0; 3]).render(&Camera::d405(), &Pose::IDENTITY, 1);
     let pixel = |x: f64| Camera::d405().project(DVec3::new(x, 0.0, 0.3)).unwrap().x.round() as usize;
     // The shadow's middle is where the light's ray through the ball's centre meets the floor.
     assert!(brightness(&frame, pixel(-0.05), 240) * 3 < brightness(&frame, pixel(0.05), 240) * 2);
@@ -155,8 +159,11 @@ fn creases_are_darker_with_ambient_occlusion() {
     let wall = sheet(DVec3::new(0.0, 0.0, 0.28), 0.1 * DVec3::Y, -0.02 * DVec3::Z, 40);
     let matte = |mesh| Instance { mesh, label: 1, shading: Shading { gloss: 0.0, ..PLAIN } };
     let meshes = vec![matte(floor), matte(wall)];
-    let frame =
-        Scene::new(meshes, None, [0; 3]).with_ambient_occlusion(32, 0.02).render(&Camera::d405(), &Pose::IDENTITY, 1);
+    let frame = PhongScene::new(meshes, None, [0; 3]).with_ambient_occlusion(32, 0.02).render(
+        &Camera::d405(),
+        &Pose::IDENTITY,
+        1,
+    );
     let at = |x: f64| {
         let p = Camera::d405().project(DVec3::new(x, 0.0, 0.3)).unwrap();
         brightness(&frame, p.x.round() as usize, p.y.round() as usize)
@@ -170,7 +177,7 @@ fn nothing_and_nonsense_are_drawn_as_nothing() {
     broken.vertices[0] = DVec3::NAN;
     broken.triangles = vec![[0, 1, 2], [3, 4, 99_999]];
     for instances in [vec![], vec![instance(broken, 1)]] {
-        let frame = Scene::new(instances, None, [7; 3]).render(&Camera::d405(), &Pose::IDENTITY, 2);
+        let frame = PhongScene::new(instances, None, [7; 3]).render(&Camera::d405(), &Pose::IDENTITY, 2);
         assert!(frame.color.pixels.iter().all(|p| *p == [7; 3]));
     }
 }
@@ -179,7 +186,7 @@ fn nothing_and_nonsense_are_drawn_as_nothing() {
 #[test]
 #[ignore = "a measurement"]
 fn speed() {
-    let scene = Scene::new(
+    let scene = PhongScene::new(
         vec![
             instance(sphere(DVec3::new(0.0, 0.0, 0.25), 0.06, 150), 1),
             instance(sheet(DVec3::new(0.0, 0.0, 0.3), DVec3::X, DVec3::Y, 200), 2),
