@@ -326,7 +326,7 @@ impl CameraRig {
         settings: &RenderSettings,
     ) -> Result<&Picture> {
         self.viewer(camera)?;
-        self.follow(cell)?;
+        self.update(cell)?;
         self.expose(camera, size, settings, (1e3 * cell.time()).round() as u32)
     }
 
