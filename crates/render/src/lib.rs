@@ -1,10 +1,39 @@
-//! Ray-traced camera images of meshes.
+//! Ray-traced camera images of triangle meshes.
 //!
-//! [`render`] sees a [`Stage`] (shapes that deform, bodies with poses, lights) through an [`RayGenerator`] (any camera model): colour, metric
-//! depth, labels and normals in one pass, quickly ([`RenderSettings::Preview`]) or by path tracing ([`RenderSettings::Path`]).
-//! [`phong::PhongScene`] draws the plain pictures of recordings and reports: one light, wireframes, double precision.
-//! All of it is deterministic for any number of threads.
+//! [`render`] renders a [`Stage`] (shapes that deform, bodies with poses, lights) through a
+//! [`RayGenerator`] (any camera model). One pass gives colour, metric depth, labels and normals,
+//! either with direct light only ([`RenderSettings::Preview`]) or by path tracing
+//! ([`RenderSettings::Path`]). [`phong::PhongScene`] is a second, simpler renderer for phantoms and
+//! the figures of reports: one light, wireframes, double precision.
+//!
+//! The result does not depend on the number of threads.
+//!
+//! ```
+//! use glam::DVec3;
+//! use trocar_camera::{Camera, Pose};
+//! use trocar_geometry::TriMesh;
+//! use trocar_render::{Appearance, Film, Light, RayGenerator, RenderSettings, Stage, render};
+//!
+//! // A triangle 0.2 m in front of a camera, lit by a lamp beside the lens.
+//! let corners = [[-0.1, -0.1, 0.2], [0.1, -0.1, 0.2], [0.0, 0.1, 0.2]];
+//! let mesh = TriMesh {
+//!     vertices: corners.map(DVec3::from).to_vec(),
+//!     triangles: vec![[0, 1, 2]],
+//!     colors: Vec::new(),
+//! };
+//! let mut stage = Stage::new();
+//! stage.add_mesh(&mesh, 1, &Appearance::tissue([190, 90, 80]))?;
+//! stage.lights.push(Light::endoscope(&Pose::IDENTITY, 0.0025, 0.2));
+//! let rays = RayGenerator::new(Camera::centred(64, 48, 0.9));
+//! let settings = RenderSettings::preview();
+//! let picture = render(&mut stage, &rays, &Pose::IDENTITY, &settings, &Film::endoscope());
+//! let centre = 24 * 64 + 32;
+//! assert_eq!(picture.labels[centre], 1);
+//! assert!((picture.depth.depth[centre] - 0.2).abs() < 1e-6);
+//! # Ok::<(), trocar_render::Error>(())
+//! ```
 
+mod bvh;
 mod error;
 mod film;
 mod light;
@@ -16,9 +45,9 @@ mod picture;
 mod preview;
 pub mod random;
 mod rays;
+mod shading_frame;
 pub mod srgb;
 mod stage;
-mod tree;
 
 pub use error::{Error, Result};
 pub use film::{Film, Noise};

@@ -1,8 +1,9 @@
-//! A small ray caster in double precision with Blinn-Phong shading: one light, wireframes, ambient
-//! occlusion.
+//! The simple renderer: a ray caster in double precision with Blinn-Phong shading, one light,
+//! wireframes and ambient occlusion.
 //!
-//! It draws recorded phantoms and the figures of reports. Recorded phantoms depend on its bits.
-//! Cameras of a running simulation use [`crate::Stage`] instead, which deforms and is faster.
+//! It renders recorded phantoms and the figures of reports. Recordings depend on its exact output,
+//! so it must not change. The cameras of a running simulation use [`crate::Stage`], which is faster
+//! and follows deforming shapes.
 
 mod scene;
 mod shade;

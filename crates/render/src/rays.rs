@@ -1,24 +1,25 @@
-//! The rays of a camera's pixels, worked out once; a lens costs nothing after that.
+//! Precomputed rays of a camera's pixels. The lens model costs nothing at render time.
 
 use glam::Vec3A;
 use rayon::prelude::*;
 use trocar_camera::CameraModel;
 
-/// A camera made ready for rendering.
+/// The rays of all pixels of a camera.
 #[derive(Clone, Debug)]
 pub struct RayGenerator {
     width: usize,
     height: usize,
-    /// Rays through the pixels' centres; not a number where nothing is seen. A pinhole's have z = 1, a fisheye's length 1.
+    /// Rays through pixel centres; NaN where nothing is visible. Rays of a pinhole have z = 1, rays
+    /// of a fisheye have length 1.
     centres: Vec<[f32; 3]>,
-    /// Rays through the pixels' corners, one more a row and column.
+    /// Rays through pixel corners: one row and one column more than there are pixels.
     corners: Vec<[f32; 3]>,
-    /// Radius of the round picture and the picture's half diagonal [px].
+    /// Radius of the circular image (px).
     circle: Option<f32>,
 }
 
 impl RayGenerator {
-    /// All pixels of a camera.
+    /// Computes the rays of all pixels of a camera.
     pub fn new(model: impl Into<CameraModel>) -> Self {
         let model = model.into();
         let (width, height) = (model.camera().width, model.camera().height);
@@ -42,37 +43,39 @@ impl RayGenerator {
         }
     }
 
-    /// Only what lies in a circle about the image's middle is seen, as through an endoscope; `diameter` is in image heights.
+    /// Restricts the visible image to a circle around its centre, as an endoscope shows it.
+    /// `diameter` is relative to the image height.
     #[must_use]
-    pub fn round(mut self, diameter: f32) -> Self {
+    pub fn with_circular_image(mut self, diameter: f32) -> Self {
         let radius = 0.5 * diameter * self.height as f32;
         self.circle = Some(radius);
         for i in 0..self.centres.len() {
-            if self.middle_distance_squared(i) > radius * radius {
+            if self.centre_distance_squared(i) > radius * radius {
                 self.centres[i] = [f32::NAN; 3];
             }
         }
         self
     }
 
-    /// Width [px].
+    /// Width (px).
     pub fn width(&self) -> usize {
         self.width
     }
 
-    /// Height [px].
+    /// Height (px).
     pub fn height(&self) -> usize {
         self.height
     }
 
-    /// The ray through a pixel's centre; `None` where nothing is seen.
+    /// Ray through the centre of a pixel; `None` where nothing is visible.
     pub(crate) fn centre(&self, pixel: usize) -> Option<Vec3A> {
         let ray = Vec3A::from(self.centres[pixel]);
         ray.is_finite().then_some(ray)
     }
 
-    /// The ray through a place in a pixel, (0, 0) its upper left corner; `None` where nothing is seen.
-    pub(crate) fn within(&self, pixel: usize, a: f32, b: f32) -> Option<Vec3A> {
+    /// Ray through position (`a`, `b`) in a pixel, with (0, 0) at its upper left corner; `None`
+    /// where nothing is visible.
+    pub(crate) fn at(&self, pixel: usize, a: f32, b: f32) -> Option<Vec3A> {
         let at = pixel / self.width * (self.width + 1) + pixel % self.width;
         let corner = |i: usize| Vec3A::from(self.corners[i]);
         let above = corner(at).lerp(corner(at + 1), a);
@@ -81,14 +84,15 @@ impl RayGenerator {
         ray.is_finite().then_some(ray)
     }
 
-    /// The square of how far a pixel is from the image's middle, 1 at the rim of the round picture or at the image's corner.
+    /// Squared distance of a pixel from the image centre, 1 at the rim of the circular image or at
+    /// the corner of a rectangular one.
     pub(crate) fn eccentricity_squared(&self, pixel: usize) -> f32 {
         let (width, height) = (self.width as f32, self.height as f32);
         let rim = self.circle.map_or(0.25 * (width * width + height * height), |radius| radius * radius);
-        self.middle_distance_squared(pixel) / rim.max(1e-12)
+        self.centre_distance_squared(pixel) / rim.max(1e-12)
     }
 
-    fn middle_distance_squared(&self, pixel: usize) -> f32 {
+    fn centre_distance_squared(&self, pixel: usize) -> f32 {
         let x = (pixel % self.width) as f32 - 0.5 * (self.width as f32 - 1.0);
         let y = (pixel / self.width) as f32 - 0.5 * (self.height as f32 - 1.0);
         x * x + y * y

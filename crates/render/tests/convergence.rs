@@ -1,4 +1,5 @@
-//! Path tracing in a box lit from its ceiling comes nearer to the truth with the root of the samples.
+//! The error of path tracing falls with the square root of the number of samples, in a box lit from
+//! its ceiling.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -9,7 +10,7 @@ use glam::DVec3;
 use trocar_camera::{Camera, Pose};
 use trocar_render::{Appearance, Film, Light, RayGenerator, RenderSettings, Stage, render};
 
-/// A Cornell-like box of 10 cm, open to the eye, with a tissue ball and a steel one.
+/// A Cornell-like box of 10 cm, open towards the camera, with a tissue ball and a steel ball.
 fn stage() -> Stage {
     let mut stage = Stage::new();
     let (x, y, z) = (0.1 * DVec3::X, 0.1 * DVec3::Y, 0.1 * DVec3::Z);
@@ -36,7 +37,7 @@ fn stage() -> Stage {
 }
 
 #[test]
-fn the_error_falls_with_the_root_of_the_samples() {
+fn error_falls_with_the_square_root_of_the_samples() {
     let eye = RayGenerator::new(Camera::centred(24, 24, 0.9));
     let mut stage = stage();
     let mut light = |samples: u32, seed: u32| -> Vec<f64> {
@@ -48,7 +49,7 @@ fn the_error_falls_with_the_root_of_the_samples() {
     let mean = truth.iter().sum::<f64>() / truth.len() as f64;
     assert!(mean > 0.1, "the box is lit: {mean}");
     let mut error = |samples: u32| {
-        // Several seeds, so that the figure is sharp enough to tell 1/2 from 0.45.
+        // Several seeds, so that the estimate can distinguish an exponent of 0.5 from 0.45.
         let squares: f64 =
             (0..4).map(|seed| light(samples, seed).iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>()).sum();
         (squares / (4.0 * truth.len() as f64)).sqrt()

@@ -1,4 +1,4 @@
-//! Pictures of shapes whose pictures are known.
+//! The simple renderer on shapes with known pictures.
 
 mod common;
 
@@ -10,7 +10,7 @@ use trocar_render::phong::{Instance, PhongImage, PhongScene, Shading, label_mask
 
 const PLAIN: Shading = Shading { color: [200, 120, 110], gloss: 0.3, wireframe: false };
 
-/// A square of n x n cells across the axes `x` and `y`.
+/// A square of n x n cells spanned by `x` and `y`.
 fn sheet(centre: DVec3, x: DVec3, y: DVec3, n: u32) -> TriMesh {
     let mut mesh = TriMesh::default();
     let at = |i: u32| 2.0 * f64::from(i) / f64::from(n) - 1.0;
@@ -37,7 +37,7 @@ fn brightness(frame: &PhongImage, u: usize, v: usize) -> u32 {
 }
 
 #[test]
-fn a_sphere_is_as_near_and_as_wide_as_it_is() {
+fn sphere_has_the_right_depth_and_silhouette() {
     let camera = Camera::d405();
     let (z, radius) = (0.3, 0.05);
     let scene = PhongScene::new(vec![instance(sphere(DVec3::new(0.0, 0.0, z), radius, 200), 3)], None, [0; 3]);
@@ -45,7 +45,7 @@ fn a_sphere_is_as_near_and_as_wide_as_it_is() {
     let centre = 240 * 848 + 424;
     assert!((f64::from(frame.depth.depth[centre]) - (z - radius)).abs() < 1e-5, "{}", frame.depth.depth[centre]);
     assert!(frame.facing[centre] > 0.999);
-    // A sphere's silhouette: the cone of half-angle asin(r / z).
+    // Silhouette of a sphere: the cone of half-angle asin(r / z).
     let expected = camera.fx * radius / (z * z - radius * radius).sqrt();
     let row = (0..848).filter(|u| frame.labels[240 * 848 + u] == 3).count();
     assert!((row as f64 / 2.0 - expected).abs() < 0.75, "{row} px across, radius {expected}");
@@ -56,8 +56,8 @@ fn a_sphere_is_as_near_and_as_wide_as_it_is() {
 }
 
 #[test]
-fn depth_is_exact_and_metric_on_a_tilted_plane() {
-    // Seen from elsewhere and askew, so that depth differs from ray length and from world z.
+fn depth_of_a_tilted_plane_is_exact() {
+    // An oblique pose, so that depth differs from ray length and from world z.
     let pose = Pose {
         rotation: DQuat::from_rotation_x(0.4) * DQuat::from_rotation_z(0.3),
         translation: DVec3::new(0.1, -0.2, 0.05),
@@ -81,7 +81,7 @@ fn depth_is_exact_and_metric_on_a_tilted_plane() {
 }
 
 #[test]
-fn the_nearer_instance_is_labelled() {
+fn label_is_that_of_the_nearer_instance() {
     let ball = |x: f64, z: f64, label| instance(sphere(DVec3::new(x, 0.0, z), 0.04, 40), label);
     let scene = PhongScene::new(vec![ball(0.0, 0.3, 1), ball(0.02, 0.25, 2)], None, [9; 3]);
     let frame = scene.render(&Camera::d405(), &Pose::IDENTITY, 1);
@@ -92,8 +92,8 @@ fn the_nearer_instance_is_labelled() {
 }
 
 #[test]
-fn no_ray_slips_between_triangles() {
-    // Grid lines that fall exactly on pixel centres.
+fn no_ray_passes_between_triangles() {
+    // Grid lines fall exactly on pixel centres.
     let mut camera = Camera::d405();
     (camera.cx, camera.cy, camera.fx, camera.fy) = (424.0, 240.0, 400.0, 400.0);
     let scene = PhongScene::new(vec![instance(sheet(DVec3::Z, 2.0 * DVec3::X, 2.0 * DVec3::Y, 160), 1)], None, [0; 3]);
@@ -102,7 +102,7 @@ fn no_ray_slips_between_triangles() {
 }
 
 #[test]
-fn one_thread_and_many_give_the_same_picture() {
+fn image_does_not_depend_on_thread_count() {
     let scene = || {
         let ball = instance(sphere(DVec3::new(0.01, 0.0, 0.3), 0.05, 60), 1);
         let floor = instance(sheet(DVec3::new(0.0, 0.0, 0.35), DVec3::X, DVec3::Y, 30), 2);
@@ -118,7 +118,7 @@ fn one_thread_and_many_give_the_same_picture() {
 }
 
 #[test]
-fn wires_darken_the_edges_and_only_those() {
+fn wireframe_darkens_only_edges() {
     let picture = |wireframe| {
         let mesh = sheet(DVec3::new(0.0, 0.0, 0.3), 0.2 * DVec3::X, 0.2 * DVec3::Y, 8);
         let shading = Shading { wireframe, ..PLAIN };
@@ -143,18 +143,18 @@ fn wires_darken_the_edges_and_only_those() {
 }
 
 #[test]
-fn a_light_from_the_side_casts_a_shadow() {
+fn side_light_casts_a_shadow() {
     let ball = instance(sphere(DVec3::new(0.0, 0.0, 0.25), 0.02, 40), 1);
     let floor = instance(sheet(DVec3::new(0.0, 0.0, 0.3), DVec3::X, DVec3::Y, 4), 2);
     let light = DVec3::new(1.0, 0.0, -1.0);
     let frame = PhongScene::new(vec![ball, floor], Some(light), [0; 3]).render(&Camera::d405(), &Pose::IDENTITY, 1);
     let pixel = |x: f64| Camera::d405().project(DVec3::new(x, 0.0, 0.3)).unwrap().x.round() as usize;
-    // The shadow's middle is where the light's ray through the ball's centre meets the floor.
+    // The centre of the shadow is where the light's ray through the ball's centre meets the floor.
     assert!(brightness(&frame, pixel(-0.05), 240) * 3 < brightness(&frame, pixel(0.05), 240) * 2);
 }
 
 #[test]
-fn creases_are_darker_with_ambient_occlusion() {
+fn ambient_occlusion_darkens_creases() {
     let floor = sheet(DVec3::new(0.0, 0.0, 0.3), 0.1 * DVec3::Y, 0.1 * DVec3::X, 100);
     let wall = sheet(DVec3::new(0.0, 0.0, 0.28), 0.1 * DVec3::Y, -0.02 * DVec3::Z, 40);
     let matte = |mesh| Instance { mesh, label: 1, shading: Shading { gloss: 0.0, ..PLAIN } };
@@ -172,7 +172,7 @@ fn creases_are_darker_with_ambient_occlusion() {
 }
 
 #[test]
-fn nothing_and_nonsense_are_drawn_as_nothing() {
+fn empty_and_invalid_meshes_are_invisible() {
     let mut broken = sphere(DVec3::Z, 0.1, 8);
     broken.vertices[0] = DVec3::NAN;
     broken.triangles = vec![[0, 1, 2], [3, 4, 99_999]];
@@ -182,7 +182,7 @@ fn nothing_and_nonsense_are_drawn_as_nothing() {
     }
 }
 
-/// How fast it is: `cargo test --release -p trocar-render -- --ignored --nocapture speed`.
+/// Measures the speed: `cargo test --release -p trocar-render -- --ignored --nocapture speed`.
 #[test]
 #[ignore = "a measurement"]
 fn speed() {

@@ -1,4 +1,4 @@
-//! The ray tracer on scenes whose pictures are known.
+//! The ray tracer on stages with known pictures.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -45,7 +45,7 @@ fn models() -> Vec<CameraModel> {
 }
 
 #[test]
-fn depth_labels_and_normals_are_exact_through_every_lens() {
+fn depth_labels_and_normals_are_exact_for_every_lens() {
     let pose = askew();
     let middle = DVec3::new(0.01, 0.02, 0.3);
     let normal = DVec3::new(0.25, -0.4, -1.0).normalize();
@@ -63,7 +63,7 @@ fn depth_labels_and_normals_are_exact_through_every_lens() {
             let ray = model.unproject((i % 160) as f64, (i / 160) as f64).unwrap();
             let along = ray.dot(ball);
             let aside2 = ball.length_squared() - along * along;
-            // Off the ball's edge, which is a polygon's.
+            // Skip the edge of the ball, which is a polygon.
             if (aside2.sqrt() - radius).abs() < 1e-4 {
                 continue;
             }
@@ -88,7 +88,7 @@ fn depth_labels_and_normals_are_exact_through_every_lens() {
 }
 
 #[test]
-fn a_placed_body_is_as_if_its_vertices_had_been_moved() {
+fn placing_a_body_equals_moving_its_vertices() {
     let pose = Pose { rotation: DQuat::from_rotation_y(0.7), translation: DVec3::new(0.02, -0.01, 0.25) };
     let shape = sphere(DVec3::new(0.03, 0.0, 0.0), 0.04, 12);
     let moved = TriMesh { vertices: shape.vertices.iter().map(|p| pose.transform(*p)).collect(), ..shape.clone() };
@@ -114,7 +114,7 @@ fn a_placed_body_is_as_if_its_vertices_had_been_moved() {
 }
 
 #[test]
-fn a_deformed_shape_is_as_one_built_anew() {
+fn deformed_shape_equals_rebuilt_shape() {
     let rest = sphere(DVec3::new(0.0, 0.0, 0.3), 0.06, 40);
     let bent: Vec<DVec3> = rest
         .vertices
@@ -133,7 +133,7 @@ fn a_deformed_shape_is_as_one_built_anew() {
 }
 
 #[test]
-fn one_thread_and_two_give_the_same_bits() {
+fn picture_does_not_depend_on_thread_count() {
     let picture = |threads: usize, settings: &RenderSettings| {
         let mut stage = lit(Vec::new(), 0.1);
         stage.lights.push(Light::endoscope(&Pose::IDENTITY, 0.005, 0.2));
@@ -152,7 +152,7 @@ fn one_thread_and_two_give_the_same_bits() {
 }
 
 #[test]
-fn in_a_white_room_a_white_body_cannot_be_seen() {
+fn white_body_is_invisible_in_a_white_room() {
     let kinds = [
         SurfaceKind::Matte,
         SurfaceKind::Metal { roughness: 0.3 },
@@ -177,8 +177,9 @@ fn in_a_white_room_a_white_body_cannot_be_seen() {
 }
 
 #[test]
-fn a_panel_lights_as_its_form_factor_says() {
-    // A point below the middle of a parallel square of half side a at height h: the view factor has a closed form.
+fn panel_light_matches_its_form_factor() {
+    // View factor of a point below the centre of a parallel square with half side a at height h, in
+    // closed form.
     let (a, h) = (0.1_f64, 0.15_f64);
     let mut stage = Stage::new();
     stage.lights.push(Light::Panel {
@@ -189,7 +190,7 @@ fn a_panel_lights_as_its_form_factor_says() {
     });
     let floor = quad(DVec3::new(-1.0, -1.0, 0.3), 2.0 * DVec3::X, 2.0 * DVec3::Y);
     stage.add_mesh(&floor, 1, &Appearance::matte([255; 3])).unwrap();
-    // From aside, below the panel; a view of a millimetre about the middle.
+    // Seen from the side, below the panel, with a field of view of a millimetre around the centre.
     let pose = Pose::look_at(DVec3::new(0.1, 0.0, 0.2), DVec3::new(0.0, 0.0, 0.3), DVec3::Y);
     let eye = RayGenerator::new(Camera::centred(8, 8, 0.005));
     let settings = RenderSettings::Path { samples: 4000, bounces: 4, seed: 0 };
@@ -201,7 +202,7 @@ fn a_panel_lights_as_its_form_factor_says() {
 }
 
 #[test]
-fn a_spot_falls_off_with_the_square_and_ends_at_its_cone() {
+fn spot_light_falls_off_with_the_square_and_ends_at_its_cone() {
     let light = |distance: f64, aim: DVec3| {
         let mut stage = Stage::new();
         let (inner, outer) = (0.3, 0.4);
@@ -220,7 +221,7 @@ fn a_spot_falls_off_with_the_square_and_ends_at_its_cone() {
 }
 
 #[test]
-fn a_lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
+fn lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
     let mut stage = Stage::new();
     let position = DVec3::new(0.1, 0.0, 0.0);
     stage.lights.push(Light::Spot { position, direction: DVec3::Z, intensity: [0.1; 3], inner: PI, outer: PI });
@@ -234,7 +235,7 @@ fn a_lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
         assert_eq!(picture.labels[i], 1, "the floor at {x}");
         picture.light[i][0]
     };
-    // The lamp's ray through the ball's middle meets the floor at x = -0.05.
+    // The lamp's ray through the centre of the ball meets the floor at x = -0.05.
     for settings in [RenderSettings::preview(), RenderSettings::Path { samples: 4, bounces: 1, seed: 0 }] {
         let picture = render(&mut stage, &RayGenerator::new(camera), &Pose::IDENTITY, &settings, &Film::default());
         assert_eq!(at(&picture, -0.05), 0.0, "{settings:?}");
@@ -246,9 +247,9 @@ fn a_lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
 }
 
 #[test]
-fn the_film_does_what_it_says() {
+fn film_applies_exposure_vignette_noise_and_shoulder() {
     let mut stage = lit(Vec::new(), 0.25);
-    let eye = RayGenerator::new(camera(200, 100)).round(0.9);
+    let eye = RayGenerator::new(camera(200, 100)).with_circular_image(0.9);
     let shot =
         |stage: &mut Stage, film: &Film| render(stage, &eye, &Pose::IDENTITY, &RenderSettings::preview(), film).color;
     let plain = shot(&mut stage, &Film { exposure: 2.0, ..Film::default() });
@@ -277,7 +278,7 @@ fn the_film_does_what_it_says() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_nonsense_is_survived() {
+fn mismatches_are_rejected_and_invalid_input_is_handled() {
     let mut stage = Stage::new();
     let (shape, _) = stage.add_mesh(&sphere(DVec3::Z, 0.1, 8), 1, &Appearance::steel()).unwrap();
     let other = Stage::new().add_body(shape, &Pose::IDENTITY, 1, &Appearance::steel());
@@ -300,7 +301,7 @@ fn what_does_not_fit_is_refused_and_nonsense_is_survived() {
     let (shape, body) = stage.add_mesh(&broken, 2, &odd).unwrap();
     stage.lights.push(Light::endoscope(&Pose::IDENTITY, 0.0, f64::NAN));
     stage.lights.push(Light::Panel { corner: DVec3::ZERO, along: DVec3::ZERO, across: DVec3::NAN, radiance: [1.0; 3] });
-    let eyes = [RayGenerator::new(camera(16, 16)), RayGenerator::new(camera(16, 16)).round(f32::NAN)];
+    let eyes = [RayGenerator::new(camera(16, 16)), RayGenerator::new(camera(16, 16)).with_circular_image(f32::NAN)];
     for eye in &eyes {
         for settings in [RenderSettings::preview(), RenderSettings::path(2)] {
             render(&mut stage, eye, &Pose::IDENTITY, &settings, &Film { exposure: f32::NAN, ..Film::default() });
@@ -313,12 +314,12 @@ fn what_does_not_fit_is_refused_and_nonsense_is_survived() {
 }
 
 #[test]
-fn a_tile_finds_what_each_of_its_rays_finds() {
+fn tile_agrees_with_single_rays() {
     let mut stage = Stage::new();
     let shape = stage.add_shape(&sphere(DVec3::ZERO, 0.03, 60)).unwrap();
     for i in 0..40 {
         let turn = DQuat::from_rotation_y(f64::from(i)) * DQuat::from_rotation_x(2.0 * f64::from(i));
-        // All round the camera, which some enclose.
+        // Balls in all directions around the camera; some enclose it.
         let pose = Pose { rotation: turn, translation: turn * DVec3::new(0.0, 0.0, 0.004 * f64::from(i)) };
         stage.add_body(shape, &pose, i as u16 + 1, &Appearance::steel()).unwrap();
     }
@@ -332,11 +333,11 @@ fn a_tile_finds_what_each_of_its_rays_finds() {
                 let ray = if matches!(model, CameraModel::Pinhole(_)) { ray / ray.z } else { ray };
                 let found = stage.cast(pose.translation.as_vec3(), (pose.rotation * ray).as_vec3());
                 let depth = found.map_or(0.0, |m| m.t * ray.z as f32);
-                // The ray is turned in another precision here.
+                // This test rotates the ray in another precision.
                 let off = (depth - picture.depth.depth[i]).abs();
                 differing += usize::from(off > 1e-4);
             }
-            // At silhouettes only.
+            // Differences occur at silhouettes only.
             assert!(differing <= 8, "{differing} of 2743 pixels");
         }
     }

@@ -1,4 +1,4 @@
-//! What is rendered, and what comes of it.
+//! Scenes of the simple renderer and their images.
 
 use super::shade::{Lit, shade};
 use super::trace::{Hit, Tracer};
@@ -8,79 +8,99 @@ use rayon::prelude::*;
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
 use trocar_geometry::TriMesh;
 
-/// How an instance is shaded.
+/// Shading of an instance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shading {
-    /// sRGB base colour where the mesh has no vertex colours.
+    /// sRGB base colour, used if the mesh has no vertex colours.
     pub color: [u8; 3],
-    /// Strength of the specular highlight, 0 (matte) to 1.
+    /// Strength of the specular highlight, from 0 (matte) to 1.
     pub gloss: f32,
-    /// Draw triangle edges as thin dark lines.
+    /// Draws triangle edges as thin dark lines.
     pub wireframe: bool,
 }
 
-/// A mesh in the scene, in world coordinates.
+/// A mesh of a scene, in world coordinates.
 #[derive(Clone, Debug)]
 pub struct Instance {
     /// The surface.
     pub mesh: TriMesh,
-    /// Non-zero label written to the label image.
+    /// Non-zero label for the label image.
     pub label: u16,
-    /// Its look.
+    /// Its shading.
     pub shading: Shading,
 }
 
-/// Meshes and a light, with search trees built.
+/// Meshes and a light with their search tree.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_camera::{Camera, Pose};
+/// use trocar_geometry::TriMesh;
+/// use trocar_render::phong::{Instance, PhongScene, Shading};
+///
+/// let corners = [[-0.1, -0.1, 0.2], [0.1, -0.1, 0.2], [0.0, 0.1, 0.2]];
+/// let mesh = TriMesh {
+///     vertices: corners.map(DVec3::from).to_vec(),
+///     triangles: vec![[0, 1, 2]],
+///     colors: Vec::new(),
+/// };
+/// let shading = Shading { color: [200, 120, 110], gloss: 0.3, wireframe: false };
+/// let scene = PhongScene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]);
+/// let image = scene.render(&Camera::centred(64, 48, 0.9), &Pose::IDENTITY, 1);
+/// assert_eq!(image.labels[24 * 64 + 32], 1);
+/// ```
 pub struct PhongScene {
     tracer: Tracer,
-    /// Per triangle: its instance and its vertices in the arrays below.
+    /// Per triangle: the index of its instance and its vertices in the arrays below.
     triangles: Vec<(u32, [u32; 3])>,
     looks: Vec<(u16, Shading)>,
     positions: Vec<DVec3>,
     normals: Vec<DVec3>,
     /// Linear base colour per vertex.
     albedo: Vec<[f32; 3]>,
-    /// Share of the surroundings each vertex sees; empty where it was not asked for.
+    /// Ambient visibility per vertex; empty without ambient occlusion.
     open: Vec<f32>,
     light: Option<DVec3>,
     background: [u8; 3],
 }
 
-/// One rendered picture.
+/// A rendered image with its depth and labels.
 #[derive(Clone, Debug)]
 pub struct PhongImage {
     /// Shaded colour.
     pub color: ColorImage,
-    /// Metric z depth in metres; 0 where nothing was hit.
+    /// Depth along the camera's z axis (m); 0 where no surface is.
     pub depth: DepthImage,
-    /// Label of the instance hit, 0 where nothing was.
+    /// Label of the visible instance; 0 where no surface is.
     pub labels: Vec<u16>,
-    /// Cosine between the surface normal and the ray at each hit (1 head-on, of either side), 0 where nothing was.
+    /// Cosine between the surface normal and the ray, 1 for a surface seen head-on from either
+    /// side; 0 where no surface is.
     pub facing: Vec<f32>,
 }
 
-/// Pixels of `frame` that show `label`.
+/// The pixels of `image` that show `label`.
 pub fn label_mask(frame: &PhongImage, label: u16) -> Mask {
     let set = frame.labels.iter().map(|l| *l == label).collect();
     Mask { width: frame.color.width, height: frame.color.height, set }
 }
 
-/// A camera at its place, for one picture.
+/// A camera at its pose.
 struct View<'a> {
     camera: &'a Camera,
     pose: &'a Pose,
 }
 
 impl View<'_> {
-    /// Direction through a pixel in world coordinates, of z 1 in the camera: a hit's `t` is its depth.
+    /// World direction through a pixel, with z = 1 in the camera frame: the ray parameter of a hit
+    /// is its depth.
     fn direction(&self, u: f64, v: f64) -> DVec3 {
         self.pose.rotation * self.camera.ray(u, v)
     }
 }
 
 impl PhongScene {
-    /// Builds the scene. `light` is the direction towards the light; `None` puts it at the camera. Triangles with a missing
-    /// or non-finite vertex are left out.
+    /// Builds the scene. `light` is the direction towards the light; `None` puts the light at the
+    /// camera. Triangles with a missing or non-finite vertex are left out.
     pub fn new(instances: Vec<Instance>, light: Option<DVec3>, background: [u8; 3]) -> Self {
         let mut scene = Self {
             tracer: Tracer::new(&[]),
@@ -119,8 +139,8 @@ impl PhongScene {
         scene
     }
 
-    /// Darkens creases: `rays` rays a vertex look for anything closer than `reach` metres (ambient occlusion). Meant for
-    /// meshes that are fine against `reach`.
+    /// Adds ambient occlusion: `rays` rays per vertex look for surfaces closer than `reach` (m).
+    /// The meshes must be fine compared with `reach`.
     pub fn with_ambient_occlusion(mut self, rays: usize, reach: f64) -> Self {
         const GOLDEN_ANGLE: f64 = 2.399_963_229_728_653;
         let seen = |index: usize| {
@@ -130,7 +150,8 @@ impl PhongScene {
             }
             let (x, y) = normal.any_orthonormal_pair();
             let origin = self.positions[index] + normal * (0.02 * reach);
-            // A spiral over the cosine-weighted hemisphere, turned differently for each vertex so that no pattern shows.
+            // A spiral over the cosine-weighted hemisphere. It starts at a different angle for each
+            // vertex, so no pattern shows.
             let turn = index as f64 * 1.324_717_957_244_746;
             let free = (0..rays).filter(|&k| {
                 let r2 = (k as f64 + 0.5) / rays as f64;
@@ -144,8 +165,8 @@ impl PhongScene {
         self
     }
 
-    /// Renders through `camera` standing at `pose` (camera to world); `samples` x `samples` rays a pixel for the colour
-    /// (depth, labels and facing come from the pixel's centre).
+    /// Renders through `camera` at `pose` (camera to world). Colour averages `samples` x `samples`
+    /// rays per pixel; depth, labels and facing use the pixel centre.
     pub fn render(&self, camera: &Camera, pose: &Pose, samples: usize) -> PhongImage {
         let (width, height) = (camera.width, camera.height);
         let samples = samples.max(1);
@@ -181,7 +202,7 @@ impl PhongScene {
         frame
     }
 
-    /// Colour of a pixel from a regular grid of rays over it.
+    /// Colour of a pixel from a regular grid of rays.
     fn averaged(&self, view: &View<'_>, u: usize, v: usize, samples: usize) -> [u8; 3] {
         let offset = |i: usize| (i as f64 + 0.5) / samples as f64 - 0.5;
         let mut sum = [0.0; 3];
@@ -191,7 +212,7 @@ impl PhongScene {
                 let hit = self.tracer.first(view.pose.translation, direction, f64::INFINITY);
                 let light = self.light_of(view, direction, hit);
                 for k in 0..3 {
-                    // Clipped before it is averaged, or a highlight would keep its edge jagged.
+                    // Clip before averaging; otherwise the edge of a highlight stays jagged.
                     sum[k] += light[k].min(1.0);
                 }
             }
@@ -199,13 +220,13 @@ impl PhongScene {
         srgb::from_linear(sum.map(|s| s / (samples * samples) as f32))
     }
 
-    /// Unit normal of the triangle hit.
+    /// Unit normal of the triangle that was hit.
     fn flat_normal(&self, hit: &Hit) -> DVec3 {
         let [a, b, c] = self.triangles[hit.triangle as usize].1.map(|v| self.positions[v as usize]);
         (b - a).cross(c - a).normalize_or_zero()
     }
 
-    /// Linear light that comes back along `direction`.
+    /// Linear radiance along `direction`.
     fn light_of(&self, view: &View<'_>, direction: DVec3, hit: Option<Hit>) -> [f32; 3] {
         let Some(hit) = hit else { return srgb::to_linear(self.background) };
         let (instance, corners) = self.triangles[hit.triangle as usize];
@@ -221,7 +242,8 @@ impl PhongScene {
         let point = view.pose.translation + direction * hit.t;
         let to_light = self.light.unwrap_or(to_eye);
         let shadowed = self.light.is_some_and(|light| {
-            // Off the surface by a fraction of the viewing distance, beyond the rounding of the hit.
+            // Offset from the surface by a fraction of the viewing distance, larger than the
+            // rounding error of the hit.
             let origin = point + side * flat * (1e-4 * (point - view.pose.translation).length());
             self.tracer.blocked(origin, light, f64::INFINITY)
         });
@@ -237,7 +259,8 @@ impl PhongScene {
         light.map(|l| l * (1.0 - 0.8 * line))
     }
 
-    /// 1 on a triangle's edge, falling to 0 half a pixel away (each of two neighbours draws its half of the line).
+    /// Line intensity: 1 on a triangle's edge, 0 half a pixel away. Each of two neighbours draws
+    /// its half of the line.
     fn edge_line(&self, corners: [u32; 3], weights: [f64; 3], pixel: f64) -> f32 {
         let [a, b, c] = corners.map(|v| self.positions[v as usize]);
         let double_area = (b - a).cross(c - a).length();

@@ -1,4 +1,4 @@
-//! The search tree over all triangles, and the exact first hit of a ray.
+//! The search tree over all triangles and the exact first hit of a ray.
 
 use glam::DVec3;
 use obvhs::aabb::Aabb;
@@ -6,28 +6,30 @@ use obvhs::cwbvh::{CwBvh, builder::build_cwbvh};
 use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 
-/// Growth of the triangles' boxes in units of half the scene's extent: covers the rounding of single precision.
+/// Margin of the triangles' boxes in units of half the scene's extent. It covers single-precision
+/// rounding.
 const BOX_MARGIN: f32 = 1e-5;
-/// Barycentric coordinates this far outside still hit, so that no ray slips between two triangles.
+/// Tolerance of the barycentric coordinates. It closes the gap between two triangles.
 const EDGE_TOLERANCE: f64 = 1e-9;
 
-/// A tree in single precision finds the candidates; they are intersected in double precision. The scene is moved and scaled
-/// into the unit cube for the tree, whose builder has absolute tolerances.
+/// A single-precision tree finds candidates; their intersection is computed in double precision.
+/// The tree's builder has absolute tolerances, so the scene is shifted and scaled into the unit
+/// cube for it.
 pub(crate) struct Tracer {
     bvh: CwBvh,
-    /// Triangles in the tree's order: first corner, the two edges from it [m].
+    /// Triangles in the order of the tree: first corner and the two edges from it (m).
     corners: Vec<[DVec3; 3]>,
     centre: DVec3,
-    /// Half the largest extent [m].
+    /// Half the largest extent (m).
     radius: f64,
 }
 
-/// Where a ray first meets the scene.
+/// First intersection of a ray with the scene.
 #[derive(Clone, Copy)]
 pub(crate) struct Hit {
     /// Index among the triangles given to [`Tracer::new`].
     pub triangle: u32,
-    /// In units of the ray's direction.
+    /// Ray parameter, in units of the ray's direction.
     pub t: f64,
     /// Barycentric coordinates of the second and third corner.
     pub u: f64,
@@ -43,7 +45,7 @@ impl Boundable for Bounds {
 }
 
 impl Tracer {
-    /// `triangles` as three corners each, all finite.
+    /// Builds the tree. `triangles` are three finite corners each.
     pub fn new(triangles: &[[DVec3; 3]]) -> Self {
         let (mut low, mut high) = (DVec3::MAX, DVec3::MIN);
         for p in triangles.as_flattened() {
@@ -78,7 +80,7 @@ impl Tracer {
         Self { bvh, corners, centre, radius }
     }
 
-    /// First hit with `t` in (0, `reach`]; `direction` needs no unit length.
+    /// First hit with `t` in (0, `reach`]. `direction` need not be of unit length.
     pub fn first(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<Hit> {
         let mut best: Option<Hit> = None;
         let mut nearest = reach;
@@ -95,7 +97,7 @@ impl Tracer {
         best
     }
 
-    /// True when anything lies on the ray with `t` in (0, `reach`].
+    /// Whether a surface lies on the ray with `t` in (0, `reach`].
     pub fn blocked(&self, origin: DVec3, direction: DVec3, reach: f64) -> bool {
         let Some((ray, _, _)) = self.tree_ray(origin, direction, reach) else { return false };
         !self.bvh.ray_traverse_miss(ray, |_, id| match intersect(&self.corners[id], origin, direction) {
@@ -104,8 +106,9 @@ impl Tracer {
         })
     }
 
-    /// The ray in the tree's coordinates, begun where it enters the scene's bounding sphere so that single precision
-    /// suffices from any distance; with the `t` of that entry and the tree's length per unit of `t`.
+    /// The ray in the coordinates of the tree. It starts where the ray enters the scene's bounding
+    /// sphere, so that single precision suffices from any distance. Also returns the `t` of that
+    /// entry and the tree length per unit of `t`.
     fn tree_ray(&self, origin: DVec3, direction: DVec3, reach: f64) -> Option<(Ray, f64, f64)> {
         if self.corners.is_empty() {
             return None;
@@ -133,7 +136,7 @@ impl Tracer {
     }
 }
 
-/// Moeller and Trumbore 1997, in double precision, both sides.
+/// Two-sided intersection in double precision (Moeller and Trumbore 1997).
 fn intersect([a, ab, ac]: &[DVec3; 3], origin: DVec3, direction: DVec3) -> Option<(f64, f64, f64)> {
     let p = direction.cross(*ac);
     let det = ab.dot(p);

@@ -1,31 +1,32 @@
-//! Eight triangles that a ray meets at once.
+//! Intersection of a ray with eight triangles at once.
 
-use super::{Bounds, Ray, WIDE};
+use super::node::{Bounds, WIDTH};
+use super::ray::Ray;
 use fearless_simd::{Simd, SimdBase, SimdMask, f32x8};
 use glam::Vec3A;
 
-/// Where a ray meets a triangle.
+/// Intersection of a ray with a triangle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Hit {
-    /// Distance in units of the ray's direction.
+    /// Ray parameter, in units of the ray's direction.
     pub t: f32,
-    /// Weights of the second and the third corner.
+    /// Barycentric coordinates of the second and third corner.
     pub u: f32,
     pub v: f32,
     pub triangle: u32,
 }
 
-/// The corners of eight triangles, by corner and axis; not a number where there are fewer.
+/// Corners of eight triangles, by corner and axis; NaN for unused lanes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(super) struct Block {
-    pub corners: [[[f32; WIDE]; 3]; 3],
-    pub triangle: [u32; WIDE],
+    pub corners: [[[f32; WIDTH]; 3]; 3],
+    pub triangle: [u32; WIDTH],
 }
 
 impl Block {
-    /// The nearest of eight triangles before `reach`, both sides, without gaps between neighbours: Woop, Benthin and
-    /// Wald, "Watertight Ray/Triangle Intersection" (2013).
+    /// The nearest of eight triangles before `reach`. Two-sided and without gaps between neighbours
+    /// (Woop, Benthin and Wald, "Watertight Ray/Triangle Intersection", 2013).
     #[inline(always)]
     pub fn meet<S: Simd>(&self, simd: S, ray: &Ray, reach: f32) -> Option<Hit> {
         let [kx, ky, kz] = ray.axes;
@@ -46,7 +47,7 @@ impl Block {
         let a = x[2] * y[1] - y[2] * x[1];
         let b = x[0] * y[2] - y[0] * x[2];
         let c = x[1] * y[0] - y[1] * x[0];
-        // All of one sign or 0; not a number is neither.
+        // All of one sign or 0; NaN passes neither test.
         let low = a.min(b).min(c);
         let high = a.max(b).max(c);
         let inside = low.simd_ge(zero) | high.simd_le(zero);
@@ -60,11 +61,11 @@ impl Block {
         if lanes == 0 {
             return None;
         }
-        let distances: [f32; WIDE] = t.into();
-        let mut best = lanes.trailing_zeros() as usize & (WIDE - 1);
+        let distances: [f32; WIDTH] = t.into();
+        let mut best = lanes.trailing_zeros() as usize & (WIDTH - 1);
         lanes &= lanes - 1;
         while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize & (WIDE - 1);
+            let lane = lanes.trailing_zeros() as usize & (WIDTH - 1);
             lanes &= lanes - 1;
             if distances[lane] < distances[best] {
                 best = lane;
@@ -75,7 +76,7 @@ impl Block {
     }
 }
 
-/// The corners of a triangle; `None` where one is missing or not finite.
+/// Corners of a triangle; `None` if one is missing or not finite.
 #[inline]
 pub(super) fn corners_of(positions: &[Vec3A], triangle: &[u32; 3]) -> Option<[Vec3A; 3]> {
     let [a, b, c] = triangle.map(|v| positions.get(v as usize).copied().filter(|p| p.is_finite()));

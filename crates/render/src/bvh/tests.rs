@@ -1,8 +1,9 @@
-//! The tree against all triangles by hand, after it was refitted, and with meshes that mean it ill.
+//! Tests of the tree: against a test of all triangles, after a refit, and with degenerate meshes.
 
-use super::*;
+use super::node::{LEAF_BIT, NO_CHILD, ROOT, STACK_SIZE, WIDTH};
+use super::{Ray, TriangleTree, build};
 use fearless_simd::{Level, dispatch};
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 fn noise(seed: u32) -> impl FnMut() -> f32 {
     let mut n = seed;
@@ -41,20 +42,20 @@ fn by_hand(positions: &[Vec3A], triangles: &[[u32; 3]], ray: &Ray) -> Option<(f6
 }
 
 #[test]
-fn the_first_of_all_triangles_is_found_on_every_instruction_set() {
+fn first_hit_matches_brute_force_on_every_instruction_set() {
     let (positions, triangles) = soup(3000, 0.1);
-    let tree = Tree::new(&positions, &triangles);
+    let tree = TriangleTree::new(&positions, &triangles);
     let mut r = noise(9);
     let (mut hits, mut differ) = (0, 0);
     for _ in 0..2000 {
         let ray = Ray::new(2.0 * Vec3A::new(r(), r(), r()), Vec3A::new(r(), r(), r()));
-        let ours = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
+        let ours = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK_SIZE]));
         assert_eq!(
             ours,
-            dispatch!(Level::baseline(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]))
+            dispatch!(Level::baseline(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK_SIZE]))
         );
         let theirs = by_hand(&positions, &triangles, &ray);
-        let any = dispatch!(Level::new(), simd => tree.any(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
+        let any = dispatch!(Level::new(), simd => tree.any(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK_SIZE]));
         assert_eq!(any, ours.is_some());
         match (ours, theirs) {
             (Some(a), Some(b)) if (f64::from(a.t) - b.0).abs() < 1e-5 * (1.0 + b.0) => hits += 1,
@@ -67,28 +68,29 @@ fn the_first_of_all_triangles_is_found_on_every_instruction_set() {
 }
 
 #[test]
-fn refitted_is_as_good_as_rebuilt() {
+fn refitted_tree_equals_rebuilt_tree() {
     let (mut positions, triangles) = soup(2000, 0.05);
-    let mut tree = Tree::new(&positions, &triangles);
+    let mut tree = TriangleTree::new(&positions, &triangles);
     for p in &mut positions {
         *p += 0.2 * Vec3A::new((3.0 * p.y).sin(), (2.0 * p.z).cos(), p.x * p.y);
     }
     tree.refit(&positions, &triangles);
-    let anew = Tree::new(&positions, &triangles);
+    let anew = TriangleTree::new(&positions, &triangles);
     assert_eq!(tree.bounds(), anew.bounds());
     let mut r = noise(3);
     let level = Level::new();
     for _ in 0..2000 {
         let ray = Ray::new(2.0 * Vec3A::new(r(), r(), r()), Vec3A::new(r(), r(), r()));
-        let hits =
-            [&tree, &anew].map(|t| dispatch!(level, simd => t.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK])));
+        let hits = [&tree, &anew]
+            .map(|t| dispatch!(level, simd => t.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK_SIZE])));
         assert_eq!(hits[0], hits[1]);
     }
 }
 
 #[test]
-fn hostile_meshes_are_survived() {
-    // A thousand triangles at one place, and ever smaller ones towards a point: nothing that boxes could tell apart.
+fn degenerate_meshes_are_handled() {
+    // A thousand triangles at one place, and ever smaller ones towards a point: boxes cannot
+    // separate them.
     let mut positions: Vec<Vec3A> = (0..3000).map(|i| [Vec3A::X, Vec3A::Y, Vec3A::Z][i % 3]).collect();
     for i in 0..200 {
         let scale = 0.5_f32.powi(i);
@@ -97,17 +99,19 @@ fn hostile_meshes_are_survived() {
     positions.extend([Vec3A::NAN, Vec3A::INFINITY, Vec3A::splat(1e38)]);
     let mut triangles: Vec<[u32; 3]> = (0..1201).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     triangles.push([0, 1, 99_999]);
-    let tree = Tree::new(&positions, &triangles);
+    let tree = TriangleTree::new(&positions, &triangles);
     let ray = Ray::new(Vec3A::splat(-1.0), Vec3A::ONE);
-    assert!(dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK])).is_some());
+    assert!(
+        dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK_SIZE])).is_some()
+    );
     for bad in [Vec3A::ZERO, Vec3A::NAN, Vec3A::INFINITY] {
         let ray = Ray::new(bad, bad);
-        let _ = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK]));
+        let _ = dispatch!(Level::new(), simd => tree.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK_SIZE]));
     }
     let order: Vec<u32> = (0..1000).collect();
     let mut leaves = Vec::new();
-    let nodes = build::by_order(&order, WIDE, &mut leaves);
-    let held = nodes.iter().flat_map(|n| n.child).filter(|c| *c != NONE && c & LEAF != 0).count();
+    let nodes = build::by_order(&order, WIDTH, &mut leaves);
+    let held = nodes.iter().flat_map(|n| n.child).filter(|c| *c != NO_CHILD && c & LEAF_BIT != 0).count();
     assert_eq!((held, leaves.len()), (125, 125));
-    assert!(Tree::new(&[], &[]).bounds().low.x > 0.0);
+    assert!(TriangleTree::new(&[], &[]).bounds().low.x > 0.0);
 }

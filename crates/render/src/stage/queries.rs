@@ -1,36 +1,48 @@
-//! What rays meet on the stage: the first surface or any, of one ray or of a bundle from one place.
+//! Ray queries on a stage: first hit or any hit, of a single ray or of a bundle from one origin.
 
-use super::{BodyId, RayHit, Stage, Touch};
-use crate::tree::{Beam, ROOT, Ray, Stack, Stacks, Visitor};
+use super::model::{BodyId, Stage, StageHit};
+use crate::bvh::{Beam, ROOT, Ray, Stack, Stacks, Visitor};
 use fearless_simd::{Simd, dispatch};
 use glam::{Vec3, Vec3A};
 
-/// What a bundle of rays from one place may meet.
+/// Result of [`Stage::cast`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayHit {
+    /// Ray parameter, in units of the ray's direction.
+    pub t: f32,
+    /// The body that was hit.
+    pub body: BodyId,
+    /// Index among the triangles of its shape.
+    pub triangle: u32,
+}
+
+/// Candidates for a bundle of rays from one origin.
 #[derive(Debug, Default)]
-pub(crate) struct Ahead {
+pub(crate) struct BundleCandidates {
     leaves: Vec<(f32, u32)>,
-    /// The bundle in the frames of bodies that are not still.
+    /// The bundle in the frames of bodies whose pose is not the identity.
     beams: Vec<(u32, Beam)>,
-    /// Least distance, body, and entry to its shape's tree; the nearest first.
+    /// Minimum distance, body, and entry node of its shape's tree; nearest first.
     parts: Vec<(f32, u32, u32)>,
 }
 
 impl Stage {
-    /// The first surface along a ray, `direction` of any length; `None` where it meets nothing.
+    /// First surface along a ray; `None` if there is none. `direction` can have any length.
     pub fn cast(&mut self, origin: Vec3, direction: Vec3) -> Option<RayHit> {
-        self.settle();
-        let touch = self.first(origin.into(), direction.into(), f32::INFINITY, &mut Stacks::new())?;
-        Some(RayHit { t: touch.t, body: BodyId(touch.body as usize), triangle: touch.triangle })
+        self.update_acceleration();
+        let hit = self.first(origin.into(), direction.into(), f32::INFINITY, &mut Stacks::new())?;
+        Some(RayHit { t: hit.t, body: BodyId(hit.body as usize), triangle: hit.triangle })
     }
 
-    /// The first surface along a ray.
-    pub(crate) fn first(&self, origin: Vec3A, direction: Vec3A, reach: f32, stacks: &mut Stacks) -> Option<Touch> {
+    /// First surface along a ray.
+    pub(crate) fn first(&self, origin: Vec3A, direction: Vec3A, reach: f32, stacks: &mut Stacks) -> Option<StageHit> {
         dispatch!(self.level, simd => self.first_in(simd, origin, direction, reach, stacks))
     }
 
-    /// What rays from `origin` in any of `directions` may meet; for [`Self::first_ahead`] and [`Self::blocked_ahead`].
-    pub(crate) fn ahead(&self, origin: Vec3A, directions: &[Vec3A], found: &mut Ahead) {
-        let Ahead { leaves, beams, parts } = found;
+    /// Collects the candidates for rays from `origin` in any of `directions`, for
+    /// [`Self::first_of_bundle`] and [`Self::bundle_blocked`].
+    pub(crate) fn collect_bundle(&self, origin: Vec3A, directions: &[Vec3A], candidates: &mut BundleCandidates) {
+        let BundleCandidates { leaves, beams, parts } = candidates;
         parts.clear();
         beams.clear();
         if directions.is_empty() {
@@ -44,13 +56,13 @@ impl Stage {
             let body = &self.bodies[index as usize];
             let found = |near: f32, entry: u32| parts.push((near, index, entry));
             let tree = &self.shapes[body.shape].tree;
-            if body.still {
+            if body.is_identity {
                 tree.narrow(&world, entry, *near, found);
                 continue;
             }
             let at = beams.iter().position(|(b, _)| *b == index).unwrap_or_else(|| {
-                let local = directions.iter().map(|d| body.back * *d);
-                beams.push((index, Beam::new(body.back * (origin - body.translation), local)));
+                let local = directions.iter().map(|d| body.inverse_rotation * *d);
+                beams.push((index, Beam::new(body.inverse_rotation * (origin - body.translation), local)));
                 beams.len() - 1
             });
             tree.narrow(&beams[at].1, entry, *near, found);
@@ -58,31 +70,31 @@ impl Stage {
         parts.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then((a.1, a.2).cmp(&(b.1, b.2))));
     }
 
-    /// The first surface along one of the rays of which [`Self::ahead`] knows.
-    pub(crate) fn first_ahead(
+    /// First surface along one ray of a bundle for which [`Self::collect_bundle`] was called.
+    pub(crate) fn first_of_bundle(
         &self,
-        ahead: &Ahead,
+        candidates: &BundleCandidates,
         origin: Vec3A,
         direction: Vec3A,
         stacks: &mut Stacks,
-    ) -> Option<Touch> {
-        dispatch!(self.level, simd => self.first_ahead_in(simd, ahead, origin, direction, stacks))
+    ) -> Option<StageHit> {
+        dispatch!(self.level, simd => self.first_of_bundle_in(simd, candidates, origin, direction, stacks))
     }
 
     #[inline(always)]
-    fn first_ahead_in<S: Simd>(
+    fn first_of_bundle_in<S: Simd>(
         &self,
         simd: S,
-        ahead: &Ahead,
+        candidates: &BundleCandidates,
         origin: Vec3A,
         direction: Vec3A,
         stacks: &mut Stacks,
-    ) -> Option<Touch> {
+    ) -> Option<StageHit> {
         let ray = Ray::new(origin, direction);
         let mut reach = f32::INFINITY;
         let mut best = None;
         let (mut last, mut local) = (u32::MAX, ray);
-        for (near, index, entry) in &ahead.parts {
+        for (near, index, entry) in &candidates.parts {
             if *near > reach {
                 break;
             }
@@ -92,29 +104,30 @@ impl Stage {
             }
             if let Some(hit) = self.shapes[body.shape].tree.first(simd, &local, *entry, reach, &mut stacks.below) {
                 reach = hit.t;
-                best = Some(Touch { t: hit.t, body: *index, triangle: hit.triangle, u: hit.u, v: hit.v });
+                best = Some(StageHit { t: hit.t, body: *index, triangle: hit.triangle, u: hit.u, v: hit.v });
             }
         }
         best
     }
 
-    /// Whether anything lies before `reach` on one of the rays of which [`Self::ahead`] knows.
-    pub(crate) fn blocked_ahead(
+    /// Whether a surface lies before `reach` on one ray of a bundle for which
+    /// [`Self::collect_bundle`] was called.
+    pub(crate) fn bundle_blocked(
         &self,
-        ahead: &Ahead,
+        candidates: &BundleCandidates,
         origin: Vec3A,
         direction: Vec3A,
         reach: f32,
         stacks: &mut Stacks,
     ) -> bool {
-        dispatch!(self.level, simd => self.blocked_ahead_in(simd, ahead, origin, direction, reach, stacks))
+        dispatch!(self.level, simd => self.bundle_blocked_in(simd, candidates, origin, direction, reach, stacks))
     }
 
     #[inline(always)]
-    fn blocked_ahead_in<S: Simd>(
+    fn bundle_blocked_in<S: Simd>(
         &self,
         simd: S,
-        ahead: &Ahead,
+        candidates: &BundleCandidates,
         origin: Vec3A,
         direction: Vec3A,
         reach: f32,
@@ -122,7 +135,7 @@ impl Stage {
     ) -> bool {
         let ray = Ray::new(origin, direction);
         let (mut last, mut local) = (u32::MAX, ray);
-        for (near, index, entry) in &ahead.parts {
+        for (near, index, entry) in &candidates.parts {
             if *near > reach {
                 break;
             }
@@ -137,12 +150,12 @@ impl Stage {
         false
     }
 
-    /// Whether anything lies on the ray before `reach`.
+    /// Whether a surface lies on the ray before `reach`.
     pub(crate) fn blocked(&self, origin: Vec3A, direction: Vec3A, reach: f32, stacks: &mut Stacks) -> bool {
         dispatch!(self.level, simd => self.blocked_in(simd, origin, direction, reach, stacks))
     }
 
-    /// The first surface of one body along a ray.
+    /// First surface of one body along a ray.
     pub(crate) fn first_of(
         &self,
         body: u32,
@@ -150,12 +163,12 @@ impl Stage {
         direction: Vec3A,
         reach: f32,
         stacks: &mut Stacks,
-    ) -> Option<Touch> {
+    ) -> Option<StageHit> {
         let held = &self.bodies[body as usize];
         let ray = held.local(&Ray::new(origin, direction));
         let tree = &self.shapes[held.shape].tree;
         let hit = dispatch!(self.level, simd => tree.first(simd, &ray, ROOT, reach, &mut stacks.below))?;
-        Some(Touch { t: hit.t, body, triangle: hit.triangle, u: hit.u, v: hit.v })
+        Some(StageHit { t: hit.t, body, triangle: hit.triangle, u: hit.u, v: hit.v })
     }
 
     #[inline(always)]
@@ -166,7 +179,7 @@ impl Stage {
         direction: Vec3A,
         reach: f32,
         stacks: &mut Stacks,
-    ) -> Option<Touch> {
+    ) -> Option<StageHit> {
         let Stacks { top, below } = stacks;
         let mut nearest = Nearest { stage: self, stack: below, best: None };
         self.top.walk(simd, &Ray::new(origin, direction), ROOT, reach, top, &mut nearest);
@@ -182,14 +195,14 @@ impl Stage {
     }
 }
 
-/// Looks for the first surface of all bodies.
+/// Searches the first surface of all bodies.
 struct Nearest<'a> {
     stage: &'a Stage,
     stack: &'a mut Stack,
-    best: Option<Touch>,
+    best: Option<StageHit>,
 }
 
-/// Looks for any surface.
+/// Searches any surface.
 struct Any<'a> {
     stage: &'a Stage,
     stack: &'a mut Stack,
@@ -202,14 +215,14 @@ impl<S: Simd> Visitor<S> for Nearest<'_> {
         let (index, entry) = self.stage.entries[leaf as usize];
         let body = &self.stage.bodies[index as usize];
         let tree = &self.stage.shapes[body.shape].tree;
-        let hit = if body.still {
+        let hit = if body.is_identity {
             tree.first(simd, ray, entry, reach, self.stack)
         } else {
             tree.first(simd, &body.local(ray), entry, reach, self.stack)
         };
         match hit {
             Some(hit) => {
-                self.best = Some(Touch { t: hit.t, body: index, triangle: hit.triangle, u: hit.u, v: hit.v });
+                self.best = Some(StageHit { t: hit.t, body: index, triangle: hit.triangle, u: hit.u, v: hit.v });
                 hit.t
             }
             None => reach,
