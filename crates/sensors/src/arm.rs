@@ -1,18 +1,19 @@
-//! Shapes of the arms' links: those of a description, the FR3 from its published dimensions, any other arm as rods from joint to joint.
+//! Shapes of an arm's links: from its description file, from the published dimensions of the FR3,
+//! or as rods between the joints for any other arm.
 
 use crate::solid::{Part, Solid};
-use crate::{Error, Result, described};
+use crate::{Error, Result, visuals};
 use glam::DVec3;
 use trocar_geometry::{Pose, TriMesh};
 use trocar_scene::{Arm, Scene};
 
-/// Cell of the links' surfaces [m].
+/// Cell size of the links' surfaces (m).
 const SPACING: f64 = 0.0045;
 
 const SHELL: [u8; 3] = [208, 210, 210];
 const JOINT: [u8; 3] = [86, 92, 99];
 
-/// Radius of the rods of an arm that is not known [m].
+/// Radius of the rods of an unknown arm (m).
 const ROD: f64 = 0.045;
 
 fn v(x: f64, y: f64, z: f64) -> DVec3 {
@@ -27,8 +28,9 @@ fn cone(from: DVec3, to: DVec3, a: f64, b: f64) -> Part {
     Part::Cone { from, to, radii: [a, b] }
 }
 
-/// The shapes of the base and the seven links of a Franka FR3, each in its own frame. Housings and their radii are those of the coarse collision bodies of `franka_description`
-/// (`robots/common`, cylinders of 60, 50 and 40 mm radius); what joins them is ours.
+/// Shapes of the base and the seven links of a Franka FR3, each in its own frame. Housings and
+/// their radii follow the coarse collision bodies of `franka_description` (`robots/common`,
+/// cylinders of 60, 50 and 40 mm radius). The shapes between the housings are invented.
 fn fr3() -> Vec<TriMesh> {
     let blend = 0.03;
     let shell = || Solid::new(blend);
@@ -73,27 +75,28 @@ fn fr3() -> Vec<TriMesh> {
     links.iter().map(|link| link.surface(SPACING)).collect()
 }
 
-/// The shapes of an arm's base and links, each in its own frame, as many as `poses` (base, links, flange) less the flange; empty for a link that shows nothing.
+/// Shapes of an arm's base and links, each in its own frame: one per entry of `poses` (base, links,
+/// flange) except the flange. The mesh of an invisible link is empty.
 ///
 /// # Errors
-/// A description that cannot be read or is of another arm, a mesh that is missing.
+/// The description cannot be read or describes another arm, or a mesh is missing.
 pub(crate) fn links(scene: &Scene, arm: &Arm, model: &str, poses: &[Pose]) -> Result<Vec<TriMesh>> {
     let Some(said) = arm.drawn() else { return Ok(simple(model, poses)) };
     let file = scene.resolve(said);
-    let links = described::links(arm.name.name(), &file, arm.flange.as_deref())?;
+    let links = visuals::links(arm.name.name(), &file, arm.flange.as_deref())?;
     if arm.shapes.is_none() && links.iter().all(|link| link.triangles.is_empty()) {
-        // A model that says nothing of its looks.
+        // The description contains no visuals.
         return Ok(simple(model, poses));
     }
     if links.len() + 1 == poses.len() {
         return Ok(links);
     }
     let (found, has) = (links.len().saturating_sub(1), poses.len().saturating_sub(2));
-    let reason = format!("{} shows {found} links that joints move; the arm has {has}", file.display());
+    let reason = format!("{} has shapes for {found} links; the arm has {has} moving links", file.display());
     Err(Error::Shapes { arm: arm.name.name().to_owned(), reason })
 }
 
-/// The shapes without a description.
+/// Shapes of an arm without a description.
 fn simple(model: &str, poses: &[Pose]) -> Vec<TriMesh> {
     if model == "fr3" && poses.len() == 9 {
         return fr3();

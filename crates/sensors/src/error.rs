@@ -1,48 +1,48 @@
-//! What can go wrong with a cell's cameras.
+//! Errors of a camera rig.
 
-/// Result of this crate.
+/// Result type of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A picture that cannot be made.
+/// Why a camera rig cannot be built or cannot render.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// No such camera.
+    /// The rig has no such camera.
     #[error("there is no camera '{name}'; the cameras are {known}")]
     UnknownCamera {
-        /// What was asked for.
+        /// The name that was given.
         name: String,
-        /// All names.
+        /// Names of all cameras.
         known: String,
     },
-    /// A camera has no lens.
+    /// A camera has no lens model.
     #[error("camera '{name}' {reason}")]
     Camera {
-        /// The camera.
+        /// Name of the camera.
         name: String,
-        /// What is wrong and what would be right.
+        /// The cause and the remedy.
         reason: String,
     },
     /// An arm cannot be drawn from its description.
     #[error("arm '{arm}': {reason}")]
     Shapes {
-        /// The arm.
+        /// Name of the arm.
         arm: String,
-        /// File and link, what is wrong and what would be right.
+        /// File, link, cause and remedy.
         reason: String,
     },
-    /// A size that no picture has.
-    #[error("a picture of {0} x {1} pixels; 8 to 8192 each")]
+    /// The picture is too small or too large.
+    #[error("picture size {0} x {1} px is out of range; width and height must be in [8, 8192]")]
     Size(usize, usize),
-    /// A cell of another scene or specimen.
-    #[error("the cell is not of this scene and specimen: {0}")]
+    /// The cell belongs to another scene or specimen.
+    #[error("the cell belongs to another scene or specimen: {0}")]
     Mismatch(String),
-    /// A depth image cannot be given its noise.
+    /// Depth noise cannot be applied.
     #[error(transparent)]
     Images(#[from] trocar_camera::Error),
-    /// Something does not fit on the stage.
+    /// A mesh or an identifier does not fit the stage.
     #[error(transparent)]
     Render(#[from] trocar_render::Error),
-    /// The cell cannot be asked.
+    /// The cell rejects a query.
     #[error(transparent)]
     Cell(#[from] trocar_cell::Error),
 }

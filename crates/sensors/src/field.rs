@@ -1,37 +1,40 @@
-//! What the organs lie on: a plane at their feet with their imprints, in the colours of the recorded picture.
+//! The surgical field below the organs: a plane at their lowest points with their imprints, in the
+//! colours of the recorded picture.
 //!
-//! A specimen does not say where the field is. It is put at the median of the organs' lowest points, gives way where an organ reaches deeper, and has a relief of half a millimetre from
-//! its picture, without which wet tissue would look like glass. Where organs hid it, its colour flows in from around them.
+//! A specimen does not record the position of the field. It is placed at the median of the organs'
+//! lowest points and sinks where an organ reaches deeper. The brightness of the picture gives it a
+//! relief of half a millimetre; without relief, wet tissue looks like glass. Where organs covered
+//! the field, colours are interpolated from their surroundings.
 
 use glam::{DVec2, DVec3};
 use trocar_camera::{Camera, ColorImage};
 use trocar_geometry::{Pose, TriMesh};
 use trocar_render::{Appearance, Film, RayGenerator, RenderSettings, Stage, render, srgb};
 
-/// Most cells along a side.
-const CELLS: f64 = 360.0;
-/// Most that it reaches beyond the organs [m].
-const BEYOND: f64 = 0.16;
-/// Space under an organ [m].
-const SPACE: f64 = 0.4e-3;
-/// Relief from the picture's brightness [m].
+/// Maximum number of cells along a side.
+const MAX_CELLS: f64 = 360.0;
+/// Maximum extent beyond the organs (m).
+const MAX_EXTENT: f64 = 0.16;
+/// Gap below an organ (m).
+const GAP: f64 = 0.4e-3;
+/// Height of the relief (m).
 const RELIEF: f64 = 0.6e-3;
-/// Colour without a picture.
-const PLAIN: [u8; 3] = [150, 66, 58];
-/// Pixels around organs whose colour is the organs' shadow.
-const RIM: usize = 5;
+/// Colour without a recorded picture.
+const DEFAULT_COLOR: [u8; 3] = [150, 66, 58];
+/// Width of the border around organs that their shadow colours (px).
+const SHADOW_BORDER: usize = 5;
 
-/// The field of organs whose `surfaces` are as they were recorded, up along z.
+/// The field below organs in their recorded pose, with up along z.
 pub(crate) struct Field {
     pub mesh: TriMesh,
-    /// Its rectangle in the plane [m].
+    /// Corners of its rectangle in the plane (m).
     pub low: DVec2,
     pub high: DVec2,
-    /// Its height [m].
+    /// Height of the plane (m).
     pub height: f64,
 }
 
-/// The picture that the field is coloured from, and the camera that took it with its pose.
+/// The recorded picture with the camera that took it and the pose of the camera.
 pub(crate) struct Recorded<'a> {
     pub picture: &'a ColorImage,
     pub camera: &'a Camera,
@@ -42,7 +45,7 @@ impl Field {
     pub fn under(surfaces: &[&TriMesh], recorded: Option<&Recorded<'_>>) -> trocar_render::Result<Self> {
         let mut feet: Vec<f64> = surfaces.iter().filter_map(|s| s.bounds()).map(|(low, _)| low.z).collect();
         feet.sort_by(f64::total_cmp);
-        let height = feet.get(feet.len() / 2).copied().unwrap_or(0.0) + SPACE;
+        let height = feet.get(feet.len() / 2).copied().unwrap_or(0.0) + GAP;
         let bounds = surfaces.iter().filter_map(|s| s.bounds()).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         let (low, high) = bounds.unwrap_or((DVec3::ZERO, DVec3::ZERO));
         let (low, high) = rectangle(low.truncate(), high.truncate(), height, recorded);
@@ -51,19 +54,19 @@ impl Field {
             organs.add_mesh(surface, 1, &Appearance::matte([128; 3]))?;
         }
         let texture = recorded.map(|r| Texture::of(r, &mut organs));
-        let cell = ((high - low).max_element() / CELLS).max(5e-4);
-        let [nx, ny] = ((high - low) / cell).to_array().map(|n| (n.ceil() as usize).clamp(2, CELLS as usize));
+        let cell = ((high - low).max_element() / MAX_CELLS).max(5e-4);
+        let [nx, ny] = ((high - low) / cell).to_array().map(|n| (n.ceil() as usize).clamp(2, MAX_CELLS as usize));
         let mut mesh = TriMesh::default();
         for j in 0..=ny {
             for i in 0..=nx {
                 let share = DVec2::new(i as f64 / nx as f64, j as f64 / ny as f64);
                 let at = low + share * (high - low);
                 let rim = i == 0 || j == 0 || i == nx || j == ny;
-                let color = texture.as_ref().map_or(PLAIN, |t| t.at(at.extend(height)));
+                let color = texture.as_ref().map_or(DEFAULT_COLOR, |t| t.at(at.extend(height)));
                 let mut z = height + RELIEF * (brightness(color) - 0.3).clamp(-1.0, 1.0);
                 let below = at.extend(height - 0.2);
                 if let Some(under) = organs.cast(below.as_vec3(), glam::Vec3::Z) {
-                    z = z.min(below.z + f64::from(under.t) - SPACE);
+                    z = z.min(below.z + f64::from(under.t) - GAP);
                 }
                 mesh.vertices.push(at.extend(if rim { height - 0.004 } else { z }));
                 mesh.colors.push(color);
@@ -84,7 +87,8 @@ fn brightness([r, g, b]: [u8; 3]) -> f64 {
     (0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)) / 255.0
 }
 
-/// What the recording camera saw of the plane, within [`BEYOND`] of the organs and a little more than them at least.
+/// The part of the plane that the recording camera saw, limited to [`MAX_EXTENT`] beyond the
+/// organs. It exceeds the organs by a margin in any case.
 fn rectangle(low: DVec2, high: DVec2, height: f64, recorded: Option<&Recorded<'_>>) -> (DVec2, DVec2) {
     let least = 0.25 * (high - low).max_element().max(0.02);
     let (mut seen_low, mut seen_high) = (low - least, high + least);
@@ -99,7 +103,7 @@ fn rectangle(low: DVec2, high: DVec2, height: f64, recorded: Option<&Recorded<'_
             }
         }
     }
-    (seen_low.max(low - BEYOND), seen_high.min(high + BEYOND))
+    (seen_low.max(low - MAX_EXTENT), seen_high.min(high + MAX_EXTENT))
 }
 
 /// The recorded picture without the organs.
@@ -117,17 +121,17 @@ impl<'a> Texture<'a> {
             let settings = RenderSettings::Preview { shadows: false };
             let seen = render(organs, &RayGenerator::new(*camera), &pose, &settings, &Film::default());
             let mut hidden: Vec<bool> = seen.labels.iter().map(|l| *l != 0).collect();
-            for _ in 0..RIM {
-                hidden = grown(&hidden, picture.width, picture.height);
+            for _ in 0..SHADOW_BORDER {
+                hidden = dilated(&hidden, picture.width, picture.height);
             }
             fill(&mut picture, &hidden);
         }
         Self { picture, camera, from_world: pose.inverse() }
     }
 
-    /// The colour at a place of the world; beyond the picture it goes on mirrored.
+    /// Colour at a world position. Beyond its border the picture is mirrored.
     fn at(&self, p: DVec3) -> [u8; 3] {
-        let Some(pixel) = self.camera.project(self.from_world.transform(p)) else { return PLAIN };
+        let Some(pixel) = self.camera.project(self.from_world.transform(p)) else { return DEFAULT_COLOR };
         let (width, height) = (self.picture.width, self.picture.height);
         let mirror = |x: f64, n: usize| {
             let most = (n - 1) as f64;
@@ -145,11 +149,12 @@ impl<'a> Texture<'a> {
     }
 }
 
-fn grown(set: &[bool], width: usize, height: usize) -> Vec<bool> {
+fn dilated(set: &[bool], width: usize, height: usize) -> Vec<bool> {
     (0..set.len()).map(|i| set[i] || trocar_camera::pixel_neighbours(i, width, height).any(|n| set[n])).collect()
 }
 
-/// Fills what is hidden by halving the picture until nothing is missing, and back (Burt 1988, "Moment images, polynomial fit filters, and the problem of surface interpolation").
+/// Fills hidden pixels: halves the picture until no pixel is missing, then interpolates back (Burt
+/// 1988, "Moment images, polynomial fit filters, and the problem of surface interpolation").
 fn fill(picture: &mut ColorImage, hidden: &[bool]) {
     struct Level {
         width: usize,
@@ -187,7 +192,7 @@ fn fill(picture: &mut ColorImage, hidden: &[bool]) {
             if missing <= 0.0 {
                 continue;
             }
-            // Between the four coarse values around.
+            // Bilinear interpolation of the coarse level.
             let (x, y) = ((i % level.width) as f32 * 0.5 - 0.25, (i / level.width) as f32 * 0.5 - 0.25);
             let (x, y) = (x.max(0.0), y.max(0.0));
             let (cx, cy) = (x as usize, y as usize);
@@ -216,7 +221,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_was_hidden_is_as_what_is_around_it() {
+    fn hidden_pixels_get_the_colours_around_them() {
         let mut picture = ColorImage::new(40, 30, [0; 3]);
         let hidden: Vec<bool> =
             (0..1200).map(|i| (10..25).contains(&(i % 40)) && (8..20).contains(&(i / 40))).collect();

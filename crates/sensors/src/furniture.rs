@@ -1,46 +1,47 @@
-//! The room: table, tray, what carries the ports, the endoscope and its stand.
+//! The surroundings: table, tray, ports with their holders, endoscope and its stand.
 
 use crate::field::Field;
-use crate::solid::{Part, Solid, along, join, turned};
+use crate::solid::{Part, Solid, align_x, append, revolve};
 use glam::{DVec2, DVec3};
 use trocar_geometry::{Pose, TriMesh};
 use trocar_render::{Appearance, SurfaceKind};
 use trocar_scene::Port;
 
-/// A piece of furniture.
-pub(crate) struct Piece {
+/// A static object of the surroundings.
+pub(crate) struct Prop {
     pub name: &'static str,
     pub mesh: TriMesh,
-    pub look: Appearance,
+    pub appearance: Appearance,
 }
 
-/// Half the table's side [m].
-const TABLE: f64 = 20.0;
-/// Height of the tray's rim above the field, and its width [m].
-const RIM: [f64; 2] = [0.008, 0.007];
-/// Radius of an endoscope's shaft, its length, and the same of its camera head [m].
-const SCOPE: [f64; 2] = [0.005, 0.30];
-const HEAD: [f64; 2] = [0.021, 0.11];
+/// Half the side of the table (m).
+const TABLE_HALF_SIDE: f64 = 20.0;
+/// Height of the tray's rim above the field, and its width (m).
+const TRAY_RIM: [f64; 2] = [0.008, 0.007];
+/// Radius and length of an endoscope's shaft, and of its camera head (m).
+const SCOPE_SHAFT: [f64; 2] = [0.005, 0.30];
+const CAMERA_HEAD: [f64; 2] = [0.021, 0.11];
 
-/// Radius to which gas domes the abdominal wall, and rings of which a piece of it is made [m].
-const DOME: f64 = 0.25;
+/// Radius of curvature of the abdominal wall under gas pressure (m), and the number of rings of its
+/// mesh.
+const DOME_RADIUS: f64 = 0.25;
 const SHEET_RINGS: u32 = 12;
 
 fn plastic(color: [u8; 3], roughness: f32) -> Appearance {
     Appearance { color, surface: SurfaceKind::Coated { roughness, ior: 1.46, scattering_length: [0.0; 3] } }
 }
 
-/// Height of the table's top [m].
+/// Height of the table top (m).
 pub(crate) fn table(field: &Field) -> f64 {
     (field.height - 0.012).min(0.0)
 }
 
-/// Table, tray, ports with their holders.
-pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Piece> {
+/// Table, tray, and ports with their holders.
+pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Prop> {
     let table = table(field);
     let mut all = vec![
-        Piece { name: "table", mesh: square(table), look: plastic([92, 126, 138], 0.7) },
-        Piece { name: "tray", mesh: tray(field, table), look: plastic([214, 216, 218], 0.45) },
+        Prop { name: "table", mesh: square(table), appearance: plastic([92, 126, 138], 0.7) },
+        Prop { name: "tray", mesh: tray(field, table), appearance: plastic([214, 216, 218], 0.45) },
     ];
     let mut rings = TriMesh::default();
     let mut holders = TriMesh::default();
@@ -54,8 +55,8 @@ pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Piece> {
         let hole = 0.5e-3 * port.hole_diameter_mm;
         let half = 0.5 * (1e-3 * port.sheet_thickness_mm).max(0.002);
         let outer = hole + 0.009;
-        // A lip that is round inside, as silicone is.
-        let ring = turned(&[
+        // A lip with a rounded inside, as of silicone.
+        let ring = revolve(&[
             [-half, outer],
             [-half, hole + 0.0012],
             [-0.5 * half, hole + 0.0003],
@@ -67,28 +68,29 @@ pub(crate) fn room(field: &Field, ports: &[Port]) -> Vec<Piece> {
             [half, outer],
             [-half, outer],
         ]);
-        // The profile goes round the other way than one from pole to pole.
-        let mut ring = along(&ring, centre, centre + z);
+        // This closed profile runs in the opposite direction of a profile from pole to pole.
+        let mut ring = align_x(&ring, centre, centre + z);
         ring.flip();
-        join(&mut rings, &ring);
-        join(&mut sheets, &sheet(port, outer, half));
+        append(&mut rings, &ring);
+        append(&mut sheets, &sheet(port, outer, half));
         let aside = centre - middle;
         let out = (aside - aside.dot(z) * z).try_normalize().unwrap_or(frame.rotation * DVec3::X);
-        join(&mut holders, &holder(field, centre, out, z, outer, table));
+        append(&mut holders, &holder(field, centre, out, z, outer, table));
     }
-    all.push(Piece { name: "ports", mesh: rings, look: plastic([206, 112, 70], 0.5) });
+    all.push(Prop { name: "ports", mesh: rings, appearance: plastic([206, 112, 70], 0.5) });
     if !sheets.triangles.is_empty() {
-        all.push(Piece { name: "wall", mesh: sheets, look: plastic([255; 3], 0.55) });
+        all.push(Prop { name: "wall", mesh: sheets, appearance: plastic([255; 3], 0.55) });
     }
-    all.push(Piece {
+    all.push(Prop {
         name: "holders",
         mesh: holders,
-        look: Appearance { color: [150, 153, 158], ..Appearance::steel() },
+        appearance: Appearance { color: [150, 153, 158], ..Appearance::steel() },
     });
     all
 }
 
-/// A round piece of the abdominal wall from under the port's ring outwards, a little domed as gas does it: skin, fat at its edge, peritoneum inside. Nothing where the scene wants none.
+/// A disc of the abdominal wall around the port, slightly domed by gas pressure: skin, fat at the
+/// rim, peritoneum inside. Empty if the scene has no wall.
 fn sheet(port: &Port, ring: f64, half: f64) -> TriMesh {
     let rim = 0.5e-3 * port.sheet_diameter_mm;
     let near = ring - 0.004;
@@ -96,23 +98,23 @@ fn sheet(port: &Port, ring: f64, half: f64) -> TriMesh {
     if rim <= ring {
         return all;
     }
-    let sunk = |r: f64| (near * near - r * r) / (2.0 * DOME);
+    let sunk = |r: f64| (near * near - r * r) / (2.0 * DOME_RADIUS);
     let radii = || (0..=SHEET_RINGS).map(|k| near + (rim - near) * f64::from(k) / f64::from(SHEET_RINGS));
     let skin: Vec<[f64; 2]> = radii().map(|r| [half + sunk(r), r]).collect();
     let inside: Vec<[f64; 2]> = radii().map(|r| [sunk(r) - half, r]).collect();
     let edge = [[half + sunk(rim), rim], [half + sunk(rim) - 0.0008, rim + 0.0004], [sunk(rim) - half, rim]];
     let frame = port.frame();
     for (profile, color) in [(&skin[..], [222, 176, 148]), (&inside[..], [186, 92, 84]), (&edge[..], [232, 204, 128])] {
-        let mut part = along(&turned(profile), frame.translation, frame.translation + frame.rotation * DVec3::Z);
+        let mut part = align_x(&revolve(profile), frame.translation, frame.translation + frame.rotation * DVec3::Z);
         part.colors = vec![color; part.vertices.len()];
-        join(&mut all, &part);
+        append(&mut all, &part);
     }
     all
 }
 
-/// A flat bar from a port's ring outwards and a post down to the table.
+/// A flat bar from the port's ring outwards, and a post from its end down to the table.
 fn holder(field: &Field, centre: DVec3, out: DVec3, z: DVec3, ring: f64, table: f64) -> TriMesh {
-    // As far as the tray's side and a hand's breadth beyond.
+    // The bar ends a hand's breadth beyond the tray.
     let inside = |p: DVec2| p.cmpge(field.low - 0.03).all() && p.cmple(field.high + 0.03).all();
     let mut reach = ring + 0.05;
     while reach < 0.6 && inside((centre + reach * out).truncate()) {
@@ -134,7 +136,7 @@ fn holder(field: &Field, centre: DVec3, out: DVec3, z: DVec3, ring: f64, table: 
     let foot = DVec3::new(top.x, top.y, table);
     if top.z > table + 0.01 {
         let length = top.z - table;
-        let post = turned(&[
+        let post = revolve(&[
             [0.0, 0.0],
             [0.0, 0.022],
             [0.006, 0.022],
@@ -144,7 +146,7 @@ fn holder(field: &Field, centre: DVec3, out: DVec3, z: DVec3, ring: f64, table: 
             [length, 0.005],
             [length, 0.0],
         ]);
-        join(&mut bar, &along(&post, foot, foot + DVec3::Z));
+        append(&mut bar, &align_x(&post, foot, foot + DVec3::Z));
     }
     bar
 }
@@ -157,14 +159,14 @@ fn quad(mesh: &mut TriMesh, corners: [DVec3; 4]) {
 
 fn square(height: f64) -> TriMesh {
     let mut mesh = TriMesh::default();
-    let corner = |x: f64, y: f64| DVec3::new(x * TABLE, y * TABLE, height);
+    let corner = |x: f64, y: f64| DVec3::new(x * TABLE_HALF_SIDE, y * TABLE_HALF_SIDE, height);
     quad(&mut mesh, [corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)]);
     mesh
 }
 
-/// A frame with round corners about the field.
+/// A frame with rounded corners around the field.
 fn tray(field: &Field, table: f64) -> TriMesh {
-    let [rise, wide] = RIM;
+    let [rise, wide] = TRAY_RIM;
     let top = field.height + rise;
     let profile = [
         [wide, table],
@@ -176,7 +178,7 @@ fn tray(field: &Field, table: f64) -> TriMesh {
         [0.0, top - 0.002],
         [0.0, field.height - 0.006],
     ];
-    // Corners as quarter circles of eight steps about points inside the rectangle.
+    // Corners are quarter circles of eight steps around points inside the rectangle.
     let inner = 0.006;
     let corners = [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)];
     let round: Vec<(DVec2, DVec2)> = corners
@@ -208,15 +210,16 @@ fn tray(field: &Field, table: f64) -> TriMesh {
     mesh
 }
 
-/// An endoscope whose shaft's frame (z towards the tip, origin at the lens) is `shaft`, and its stand on the table.
-pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Piece> {
+/// An endoscope with its stand on the table. `shaft` is the frame of its shaft: z towards the tip,
+/// origin at the lens.
+pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Prop> {
     let z = shaft.rotation * DVec3::Z;
     let back = |d: f64| shaft.translation - d * z;
-    let [radius, length] = SCOPE;
-    let [wide, long] = HEAD;
-    // The lens looks out of the end: nothing of the shaft lies before it.
+    let [radius, length] = SCOPE_SHAFT;
+    let [wide, long] = CAMERA_HEAD;
+    // The tube ends behind the lens, so that it does not block the view.
     let end = 0.0015;
-    let tube = turned(&[
+    let tube = revolve(&[
         [end, 0.0],
         [end, radius - 0.0004],
         [end + 0.0004, radius],
@@ -225,7 +228,7 @@ pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Piece> {
         [length + 0.02, 0.013],
         [length + 0.02, 0.0],
     ]);
-    let head = turned(&[
+    let head = revolve(&[
         [length + 0.018, 0.0],
         [length + 0.018, wide - 0.004],
         [length + 0.023, wide],
@@ -233,10 +236,10 @@ pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Piece> {
         [length + long, wide - 0.005],
         [length + long, 0.0],
     ]);
-    let axis = |mesh: &TriMesh| along(mesh, shaft.translation, back(1.0));
+    let axis = |mesh: &TriMesh| align_x(mesh, shaft.translation, back(1.0));
     let mut all = vec![
-        Piece { name: "endoscope", mesh: axis(&tube), look: Appearance::steel() },
-        Piece { name: "endoscope", mesh: axis(&head), look: plastic([40, 42, 46], 0.4) },
+        Prop { name: "endoscope", mesh: axis(&tube), appearance: Appearance::steel() },
+        Prop { name: "endoscope", mesh: axis(&head), appearance: plastic([40, 42, 46], 0.4) },
     ];
     let held = back(length + 0.5 * long);
     if held.z > table + 0.08 {
@@ -246,7 +249,7 @@ pub(crate) fn scope(shaft: &Pose, table: f64) -> Vec<Piece> {
         let base = Part::Cylinder { from: foot, to: foot + 0.014 * DVec3::Z, radius: 0.05, edge: 0.004 };
         let color = [120, 124, 130];
         let mesh = Solid::new(0.004).with(color, rod(0.009)).with(color, base).surface(0.004);
-        all.push(Piece { name: "stand", mesh, look: Appearance { color, ..Appearance::steel() } });
+        all.push(Prop { name: "stand", mesh, appearance: Appearance { color, ..Appearance::steel() } });
     }
     all
 }

@@ -1,12 +1,14 @@
-//! What the cameras of a cell see.
+//! Pictures from the cameras of a simulated cell.
 //!
-//! A [`CameraRig`] joins a scene's cameras, a cell that is stepped, and the ray tracer: organs with their surfaces (in their pieces after a cut), what they lie on,
-//! instruments with jaws that open, arms, ports and the room. [`CameraRig::render`] gives colour, metric depth, labels and normals. The same state gives the same bits for any
-//! number of threads.
+//! A [`CameraRig`] combines the cameras of a scene, a running cell and the ray tracer of
+//! `trocar-render`. It shows the organs with their surfaces (in pieces after a cut), the field
+//! below them, instruments with moving jaws, arms, ports and the room. [`CameraRig::render`]
+//! returns colour, metric depth, labels and normals. The result depends on the state of the cell
+//! only, not on the number of threads.
 
 mod arm;
 mod camera;
-mod described;
+mod cell_stage;
 mod error;
 mod field;
 mod furniture;
@@ -15,6 +17,7 @@ mod organ;
 mod rig;
 mod section;
 mod solid;
+mod visuals;
 
 pub use camera::OUTSIDE;
 pub use error::{Error, Result};

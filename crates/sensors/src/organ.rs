@@ -1,19 +1,20 @@
-//! The surface of an organ as it is drawn: the recorded skin carried by the body, and after a cut the faces that it laid bare.
+//! Drawn surface of an organ: the recorded skin moves with the body; a cut adds the faces that it
+//! exposes.
 
 use glam::DVec3;
 use std::collections::BTreeMap;
 use trocar_geometry::{Skin, TetMesh, TriMesh};
 use trocar_specimen::Organ;
 
-/// Colour of what a cut laid bare.
-pub(crate) const BARED: [u8; 3] = [158, 34, 40];
+/// Colour of the faces that a cut exposes.
+pub(crate) const EXPOSED: [u8; 3] = [158, 34, 40];
 
 /// Corners of the face opposite each corner of an element, counter-clockwise seen from outside.
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// An organ and its skin at rest.
+/// An organ and its skin in the rest pose.
 #[derive(Clone, Debug)]
-pub(crate) struct Whole {
+pub(crate) struct OrganSkin {
     pub name: String,
     pub surface: TriMesh,
     pub body: TetMesh,
@@ -22,15 +23,16 @@ pub(crate) struct Whole {
     elements: BTreeMap<[u32; 4], u32>,
 }
 
-/// A surface whose vertices are mixtures of nodes; the nodes of all pieces are numbered one piece after the other.
+/// A surface whose vertices are weighted sums of nodes. Nodes of all pieces are numbered
+/// consecutively.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Draped {
-    /// At rest, with colours.
+pub(crate) struct BoundSurface {
+    /// Rest pose, with colours.
     pub mesh: TriMesh,
-    carried: Vec<([u32; 4], [f64; 4])>,
+    weights: Vec<([u32; 4], [f64; 4])>,
 }
 
-/// A piece of an organ: rest positions of its nodes and its elements.
+/// A piece of an organ: rest positions of its nodes, and its elements.
 pub(crate) struct Piece<'a> {
     pub rest: &'a [DVec3],
     pub tets: &'a [[u32; 4]],
@@ -45,7 +47,7 @@ fn sorted<const N: usize>(mut nodes: [u32; N]) -> [u32; N] {
     nodes
 }
 
-impl Whole {
+impl OrganSkin {
     pub fn new(organ: &Organ) -> Self {
         let mut surface = organ.surface.clone();
         if surface.colors.len() != surface.vertices.len() {
@@ -62,15 +64,16 @@ impl Whole {
         }
     }
 
-    /// The surface of the organ in one piece.
-    pub fn draped(&self) -> Draped {
-        let carried = self.skin.bindings.iter().map(|(t, w)| (self.body.tets[*t as usize], *w)).collect();
-        Draped { mesh: self.surface.clone(), carried }
+    /// Surface of the organ in one piece.
+    pub fn whole_surface(&self) -> BoundSurface {
+        let weights = self.skin.bindings.iter().map(|(t, w)| (self.body.tets[*t as usize], *w)).collect();
+        BoundSurface { mesh: self.surface.clone(), weights }
     }
 
-    /// The surface of the organ in `pieces`; `None` where they are not of this organ. The recorded skin knows nothing of cuts: where elements fell apart, and beside them, the
-    /// elements' own faces take its place.
-    pub fn in_pieces(&self, pieces: &[Piece<'_>]) -> Option<Draped> {
+    /// Surface of the organ in `pieces`; `None` if they are not pieces of this organ. The recorded
+    /// skin has no cut. The faces of the elements replace it at elements that were separated and
+    /// beside them.
+    pub fn surface_of_pieces(&self, pieces: &[Piece<'_>]) -> Option<BoundSurface> {
         let mut tets = vec![[u32::MAX; 4]; self.body.tets.len()];
         let mut piece_of = vec![0_usize; tets.len()];
         let mut parents = Vec::new();
@@ -82,7 +85,7 @@ impl Whole {
             for tet in piece.tets {
                 let whole = tet.map(|i| parents.get((first + i) as usize).copied().unwrap_or(u32::MAX));
                 let element = *self.elements.get(&sorted(whole))? as usize;
-                // Corners in the specimen's order, in which the skin's weights are.
+                // Corners in the order of the specimen, which the skin's weights use.
                 tets[element] =
                     self.body.tets[element].map(|node| first + tet[whole.iter().position(|w| *w == node).unwrap_or(0)]);
                 piece_of[element] = k;
@@ -96,7 +99,8 @@ impl Whole {
         let beside = |nodes: &dyn Fn(u32) -> bool| -> Vec<bool> {
             self.body.tets.iter().map(|tet| tet.iter().any(|i| nodes(*i))).collect()
         };
-        // Elements at the cut, and with them those that share a node: skin and faces overlap there, so that nothing gapes.
+        // Separated elements and those that share a node with them: skin and faces overlap there,
+        // so that no gap shows.
         let at_cut = beside(&|i| copies[i as usize] > 1);
         let mut near = vec![false; copies.len()];
         for (tet, _) in self.body.tets.iter().zip(&at_cut).filter(|(_, at)| **at) {
@@ -107,22 +111,22 @@ impl Whole {
             let of = triangle.map(|v| self.skin.bindings[v as usize].0 as usize);
             of.iter().all(|t| !at_cut[*t] && piece_of[*t] == piece_of[of[0]])
         };
-        let mut draped = Draped {
+        let mut bound = BoundSurface {
             mesh: TriMesh {
                 triangles: self.surface.triangles.iter().filter(stays).copied().collect(),
                 ..self.surface.clone()
             },
-            carried: self.skin.bindings.iter().map(|(t, w)| (tets[*t as usize], *w)).collect(),
+            weights: self.skin.bindings.iter().map(|(t, w)| (tets[*t as usize], *w)).collect(),
         };
         let neighbours = |tets: &[[u32; 4]]| TetMesh { vertices: Vec::new(), tets: tets.to_vec() }.neighbours();
         let (before, after) = (neighbours(&self.body.tets), neighbours(&tets));
-        let (mut outer, mut bared) = (Vec::new(), Vec::new());
+        let (mut outer, mut exposed) = (Vec::new(), Vec::new());
         for (t, tet) in tets.iter().enumerate() {
             for (corner, face) in FACES.iter().enumerate() {
                 let nodes = face.map(|c| tet[c]);
                 match (before[t][corner], after[t][corner]) {
                     (None, _) if around[t] => outer.push(nodes),
-                    (Some(_), None) => bared.push(nodes),
+                    (Some(_), None) => exposed.push(nodes),
                     _ => {}
                 }
             }
@@ -132,34 +136,35 @@ impl Whole {
             let nearest = self.surface.vertices.iter().zip(&self.surface.colors);
             nearest
                 .min_by(|a, b| a.0.distance_squared(p).total_cmp(&b.0.distance_squared(p)))
-                .map_or(BARED, |(_, c)| *c)
+                .map_or(EXPOSED, |(_, c)| *c)
         };
         let place = |node: u32| self.body.vertices[parents[node as usize] as usize];
-        draped.add(&outer, &place, &tint);
-        draped.add(&bared, &place, &|_| BARED);
-        Some(draped)
+        bound.add(&outer, &place, &tint);
+        bound.add(&exposed, &place, &|_| EXPOSED);
+        Some(bound)
     }
 }
 
-impl Draped {
-    /// Adds faces of nodes with vertices of their own, so that no colour runs over into what is beside them.
+impl BoundSurface {
+    /// Adds faces between nodes with new vertices, so that their colours do not blend with adjacent
+    /// faces.
     fn add(&mut self, faces: &[[u32; 3]], place: &dyn Fn(u32) -> DVec3, color: &dyn Fn(u32) -> [u8; 3]) {
         let mut number = BTreeMap::new();
         for node in faces.iter().flatten() {
             number.entry(*node).or_insert_with(|| {
                 self.mesh.vertices.push(place(*node));
                 self.mesh.colors.push(color(*node));
-                self.carried.push(([*node; 4], [1.0, 0.0, 0.0, 0.0]));
+                self.weights.push(([*node; 4], [1.0, 0.0, 0.0, 0.0]));
                 self.mesh.vertices.len() as u32 - 1
             });
         }
         self.mesh.triangles.extend(faces.iter().map(|f| f.map(|node| number[&node])));
     }
 
-    /// Where its vertices are when the nodes are at `nodes` [m]. Allocates nothing once `out` is large enough.
+    /// Vertex positions for the node positions `nodes` (m). Reuses the memory of `out`.
     pub fn positions(&self, nodes: &[DVec3], out: &mut Vec<DVec3>) {
         out.clear();
-        out.extend(self.carried.iter().map(|(tet, w)| {
+        out.extend(self.weights.iter().map(|(tet, w)| {
             let [a, b, c, d] = tet.map(|i| nodes[i as usize]);
             w[0] * a + w[1] * b + w[2] * c + w[3] * d
         }));
@@ -190,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn pieces_are_closed_and_come_apart_with_what_was_bared() {
+    fn pieces_separate_with_their_exposed_faces() {
         let body = row(12);
         let (mut surface, _) = body.boundary();
         surface.colors = vec![[200, 120, 90]; surface.vertices.len()];
@@ -204,7 +209,7 @@ mod tests {
             pins: Pins::None,
             facts: OrganFacts::default(),
         };
-        let whole = Whole::new(&organ);
+        let whole = OrganSkin::new(&organ);
         let mut builder = ModelBuilder::new();
         let material = trocar_tissue::Material {
             model: ConstitutiveModel::StableNeoHookean,
@@ -223,33 +228,34 @@ mod tests {
         let bodies = cut.model.bodies();
         let pieces: Vec<Piece<'_>> =
             bodies.iter().map(|b| Piece { rest: b.rest_positions(), tets: b.tets() }).collect();
-        let draped = whole.in_pieces(&pieces).unwrap();
+        let surface = whole.surface_of_pieces(&pieces).unwrap();
         let mut nodes = Vec::new();
         for (k, body) in bodies.iter().enumerate() {
             nodes.extend(body.rest_positions().iter().map(|p| *p + DVec3::X * 0.05 * k as f64));
         }
-        let mut moved = draped.mesh.clone();
-        draped.positions(&nodes, &mut moved.vertices);
-        // What the cut laid bare is a cross-section of 4 x 4 mm on each side, the one facing the other. (Skin and faces overlap beside it, so that volumes say nothing.)
-        let bared = (0..moved.triangles.len())
-            .filter(|t| moved.triangles[*t].iter().all(|v| moved.colors[*v as usize] == BARED))
+        let mut moved = surface.mesh.clone();
+        surface.positions(&nodes, &mut moved.vertices);
+        // The cut exposes a cross-section of 4 x 4 mm on each side, facing each other. Skin and
+        // faces overlap beside it, so volumes cannot be compared.
+        let exposed = (0..moved.triangles.len())
+            .filter(|t| moved.triangles[*t].iter().all(|v| moved.colors[*v as usize] == EXPOSED))
             .map(|t| moved.area_vector(t));
         let (mut there, mut back) = (0.0, 0.0);
-        for area in bared {
+        for area in exposed {
             there += area.x.max(0.0);
             back -= area.x.min(0.0);
         }
         assert!((there - 1.6e-5).abs() < 1e-9 && (back - 1.6e-5).abs() < 1e-9, "{there} {back}");
         assert!(volume > 0.0 && moved.volume() >= volume);
-        assert!(moved.colors.contains(&BARED) && moved.colors.len() == moved.vertices.len());
+        assert!(moved.colors.contains(&EXPOSED) && moved.colors.len() == moved.vertices.len());
         // No triangle spans the gap.
         let longest = (0..moved.triangles.len()).map(|t| {
             let [a, b, c] = moved.corners(t);
             a.distance(b).max(b.distance(c)).max(c.distance(a))
         });
         assert!(longest.fold(0.0, f64::max) < 0.01);
-        // Pieces of something else are refused.
+        // Pieces of another organ are rejected.
         let other = [DVec3::ZERO; 4];
-        assert!(whole.in_pieces(&[Piece { rest: &other, tets: &[[0, 1, 2, 3]] }]).is_none());
+        assert!(whole.surface_of_pieces(&[Piece { rest: &other, tets: &[[0, 1, 2, 3]] }]).is_none());
     }
 }

@@ -1,6 +1,7 @@
-//! Organs cut open by a plane for a look inside: the skin is clipped, and the plane shows a slice of every element that it goes through.
+//! Organs cut open by a plane: the skin is clipped, and the plane shows a slice of every element it
+//! intersects.
 
-use crate::organ::{BARED, Whole};
+use crate::organ::{EXPOSED, OrganSkin};
 use glam::DVec3;
 use trocar_geometry::TriMesh;
 
@@ -10,8 +11,9 @@ const EDGES: [[usize; 2]; 6] = [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]];
 /// Part of a slice that is drawn as its rim.
 const RIM: f64 = 0.10;
 
-/// What remains of `organ` on the side of the plane through `point` away from `normal`, its skin at `skin` and its nodes at `nodes` [m].
-pub(crate) fn section(organ: &Whole, skin: &[DVec3], nodes: &[DVec3], point: DVec3, normal: DVec3) -> TriMesh {
+/// The part of `organ` on the side of the plane opposite to `normal`. `skin` and `nodes` are
+/// current positions (m).
+pub(crate) fn section(organ: &OrganSkin, skin: &[DVec3], nodes: &[DVec3], point: DVec3, normal: DVec3) -> TriMesh {
     let height = |p: DVec3| (p - point).dot(normal);
     let mut mesh = TriMesh { vertices: skin.to_vec(), triangles: Vec::new(), colors: organ.surface.colors.clone() };
     for triangle in &organ.surface.triangles {
@@ -21,7 +23,7 @@ pub(crate) fn section(organ: &Whole, skin: &[DVec3], nodes: &[DVec3], point: DVe
             mesh.triangles.push(*triangle);
         }
         if below == 1 || below == 2 {
-            // The corner that is alone on its side, first.
+            // The corner that is alone on its side comes first.
             let lone = (0..3).find(|k| (h[*k] < 0.0) == (below == 1)).unwrap_or(0);
             let [a, b, c] = [lone, (lone + 1) % 3, (lone + 2) % 3];
             let mut cross = |i: usize, j: usize| {
@@ -50,7 +52,7 @@ pub(crate) fn section(organ: &Whole, skin: &[DVec3], nodes: &[DVec3], point: DVe
     mesh
 }
 
-/// Adds the slice of one element: its middle in `color`, its rim darker.
+/// Adds the slice of one element with a darker rim.
 fn slice(mesh: &mut TriMesh, corners: [DVec3; 4], height: &dyn Fn(DVec3) -> f64, normal: DVec3, color: [u8; 3]) {
     let h = corners.map(height);
     let mut ring: Vec<DVec3> = EDGES
@@ -84,11 +86,11 @@ fn slice(mesh: &mut TriMesh, corners: [DVec3; 4], height: &dyn Fn(DVec3) -> f64,
     }
 }
 
-/// Between the organ's colour and that of flesh, a little different for each element.
+/// A mixture of the organ's colour and the colour of flesh, slightly different for each element.
 fn shade(tint: [f64; 3], element: usize) -> [u8; 3] {
     let stir = (element as u32).wrapping_mul(2_654_435_761) >> 16;
     let light = 0.86 + 0.28 * f64::from(stir & 0xff) / 255.0;
-    [0, 1, 2].map(|k| (light * (0.65 * tint[k] + 0.35 * f64::from(BARED[k]) + 18.0)).clamp(0.0, 255.0) as u8)
+    [0, 1, 2].map(|k| (light * (0.65 * tint[k] + 0.35 * f64::from(EXPOSED[k]) + 18.0)).clamp(0.0, 255.0) as u8)
 }
 
 fn mean(colors: &[[u8; 3]]) -> [f64; 3] {

@@ -1,20 +1,20 @@
-//! Solids for the room, arms and instruments: rounded parts that flow together, turned profiles and frames.
+//! Solids for surroundings, arms and instruments: blended primitives and surfaces of revolution.
 
 use glam::{DVec2, DVec3};
 use trocar_geometry::{SignedDistance, TriMesh, isosurface, sample_everywhere};
 
-/// A part of a [`Solid`].
+/// A primitive of a [`Solid`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Part {
-    /// A cylinder between two points with a rounded edge [m].
+    /// A cylinder between two points with a rounded edge (m).
     Cylinder { from: DVec3, to: DVec3, radius: f64, edge: f64 },
-    /// Two balls and what lies between them [m].
+    /// The convex hull of two balls (m).
     Cone { from: DVec3, to: DVec3, radii: [f64; 2] },
-    /// A box along the axes with rounded edges [m].
+    /// An axis-aligned box with rounded edges (m).
     Block { centre: DVec3, half: DVec3, edge: f64 },
 }
 
-/// Parts that flow together over `blend` [m], each with its sRGB colour.
+/// Primitives blended over the distance `blend` (m), each with its sRGB colour.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Solid {
     pub parts: Vec<(Part, [u8; 3])>,
@@ -22,7 +22,7 @@ pub(crate) struct Solid {
 }
 
 impl Part {
-    /// Signed distance (Quilez, "3D SDFs", capped cylinder, round cone, box).
+    /// Signed distance (Quilez, "3D SDFs": capped cylinder, round cone, box).
     pub fn distance(&self, p: DVec3) -> f64 {
         match *self {
             Self::Cylinder { from, to, radius, edge } => {
@@ -85,7 +85,7 @@ impl SignedDistance for Solid {
 }
 
 impl Solid {
-    /// A solid whose parts flow together over `blend` [m].
+    /// An empty solid whose primitives blend over the distance `blend` (m).
     pub fn new(blend: f64) -> Self {
         Self { parts: Vec::new(), blend }
     }
@@ -95,12 +95,12 @@ impl Solid {
         self
     }
 
-    /// Its surface in cells of `spacing` [m].
+    /// Surface mesh with cells of `spacing` (m).
     pub fn surface(&self, spacing: f64) -> TriMesh {
         self.carved(spacing, |d, _| d)
     }
 
-    /// Its surface after `carve` has changed the distance at each point.
+    /// Surface mesh after `carve` has changed the distance at each point.
     pub fn carved(&self, spacing: f64, carve: impl Fn(f64, DVec3) -> f64 + Sync) -> TriMesh {
         struct Carved<'a, F>(&'a Solid, F);
         impl<F: Fn(f64, DVec3) -> f64 + Sync> SignedDistance for Carved<'_, F> {
@@ -123,11 +123,12 @@ impl Solid {
     }
 }
 
-/// Sides of what is turned.
+/// Number of segments around the axis of a surface of revolution.
 const SIDES: u32 = 40;
 
-/// A profile of (place along x, radius) turned about x, closed where the radius is 0 [m]. Edges between sections are sharp where they bend by more than a third of a right angle.
-pub(crate) fn turned(profile: &[[f64; 2]]) -> TriMesh {
+/// Revolves a profile of (position along x, radius) pairs (m) around x; closed where the radius is
+/// 0. Edges between sections are sharp if they bend by more than about 30 degrees.
+pub(crate) fn revolve(profile: &[[f64; 2]]) -> TriMesh {
     let mut mesh = TriMesh::default();
     let ring = |mesh: &mut TriMesh, [x, r]: [f64; 2]| {
         let first = mesh.vertices.len() as u32;
@@ -157,14 +158,14 @@ pub(crate) fn turned(profile: &[[f64; 2]]) -> TriMesh {
     mesh
 }
 
-/// The mesh turned and moved so that its x axis runs from `from` towards `to`.
-pub(crate) fn along(mesh: &TriMesh, from: DVec3, to: DVec3) -> TriMesh {
+/// Rotates and translates the mesh so that its x axis runs from `from` towards `to`.
+pub(crate) fn align_x(mesh: &TriMesh, from: DVec3, to: DVec3) -> TriMesh {
     let turn = glam::DQuat::from_rotation_arc(DVec3::X, (to - from).normalize_or(DVec3::X));
     TriMesh { vertices: mesh.vertices.iter().map(|p| turn * *p + from).collect(), ..mesh.clone() }
 }
 
-/// Adds a mesh to another, both with colours or both without.
-pub(crate) fn join(into: &mut TriMesh, other: &TriMesh) {
+/// Appends a mesh to another. Either both or neither have colours.
+pub(crate) fn append(into: &mut TriMesh, other: &TriMesh) {
     let first = into.vertices.len() as u32;
     into.vertices.extend(&other.vertices);
     into.colors.extend(&other.colors);
@@ -176,7 +177,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn solids_are_closed_and_as_large_as_they_should_be() {
+    fn solids_are_closed_and_have_the_right_volume() {
         let ball = Part::Cone { from: DVec3::ZERO, to: DVec3::new(0.0, 0.0, 1e-9), radii: [0.03, 0.03] };
         let surface = Solid::new(0.0).with([1; 3], ball).surface(0.002);
         assert!(surface.is_watertight());
@@ -188,8 +189,8 @@ mod tests {
     }
 
     #[test]
-    fn turned_profiles_face_outward() {
-        let mesh = turned(&[[0.0, 0.0], [0.0, 0.01], [0.1, 0.01], [0.1, 0.0]]);
+    fn surfaces_of_revolution_face_outward() {
+        let mesh = revolve(&[[0.0, 0.0], [0.0, 0.01], [0.1, 0.01], [0.1, 0.0]]);
         assert!((mesh.volume() / (std::f64::consts::PI * 1e-4 * 0.1) - 1.0).abs() < 0.02, "{}", mesh.volume());
     }
 }

@@ -1,4 +1,5 @@
-//! Arms drawn from their descriptions, and the abdominal wall round the ports. The tests with the FR3's files are skipped, saying so, where these are not.
+//! Arms drawn from their descriptions, and the abdominal wall around the ports. Tests that need the
+//! FR3's files print that they are skipped if the files are missing.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "what tests share may panic")]
 
@@ -13,7 +14,7 @@ use trocar_scene::{Scene, SpecimenSource};
 use trocar_sensors::CameraRig;
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
-/// A cube of 40 mm, 150 mm before the recording camera.
+/// A cube of 40 mm, 150 mm in front of the recording camera.
 fn specimen() -> Specimen {
     let mut body = TetMesh::default();
     for i in 0..27_u32 {
@@ -72,7 +73,7 @@ fn with_model(model: &str, shapes: Option<&str>) -> Scene {
     scene
 }
 
-/// Share of the outside picture that shows an arm.
+/// Share of the overview picture that shows an arm.
 fn seen(rig: &mut CameraRig, cell: &Cell) -> f64 {
     let label = rig.labels().iter().find(|(_, n)| n == "left arm").unwrap().0;
     let picture = rig.render(cell, "outside", [192, 108], &RenderSettings::preview()).unwrap();
@@ -80,7 +81,7 @@ fn seen(rig: &mut CameraRig, cell: &Cell) -> f64 {
 }
 
 #[test]
-fn a_cell_runs_with_arms_out_of_mjcf_and_shows_their_meshes() {
+fn cell_runs_and_draws_arms_described_in_mjcf() {
     let Some(file) = menagerie() else { return };
     let specimen = specimen();
     let run = |scene: &Scene| {
@@ -102,7 +103,8 @@ fn a_cell_runs_with_arms_out_of_mjcf_and_shows_their_meshes() {
     let (plain, built_in) = (run(&described), run(&scene()));
     for arm in ["left", "right"] {
         let tips = [&plain, &built_in].map(|cell| cell.gripper(arm).unwrap().pose.translation);
-        // Other friction and no rotor inertia of the gears: the same motion, not the same bits.
+        // The described arm has other friction and no rotor inertia: its motion is equal, its bits
+        // are not.
         assert!(tips[0].distance(tips[1]) < 1e-3, "{arm}: {} m apart", tips[0].distance(tips[1]));
     }
     let mut rig = CameraRig::new(&described, &specimen, &plain).unwrap();
@@ -110,7 +112,7 @@ fn a_cell_runs_with_arms_out_of_mjcf_and_shows_their_meshes() {
     assert!(rig.triangles() > simple.triangles() + 100_000, "{} triangles", rig.triangles());
     let shares = [seen(&mut rig, &plain), seen(&mut simple, &built_in)];
     assert!((shares[0] / shares[1] - 1.0).abs() < 0.25, "meshes {}, housings {}", shares[0], shares[1]);
-    // The same meshes on the built-in arm, and no meshes on the described one.
+    // The same meshes on the built-in arm, and no meshes on the described arm.
     let drawn = with_model("franka_fr3", file.to_str());
     let mut on_built_in = CameraRig::new(&drawn, &specimen, &built_in).unwrap();
     assert_eq!(on_built_in.triangles(), rig.triangles());
@@ -120,9 +122,10 @@ fn a_cell_runs_with_arms_out_of_mjcf_and_shows_their_meshes() {
 }
 
 #[test]
-fn arms_share_shapes_only_where_they_are_drawn_alike() {
+fn arms_share_shapes_only_if_drawn_identically() {
     let Some(file) = menagerie() else { return };
-    // The same arm without looks: simple shapes where nobody asks for its own, nothing where the scene does.
+    // The same arm without visuals: simple shapes by default, no shapes if the scene requests those
+    // of the file.
     let folder = tempfile::tempdir().unwrap();
     let bare = folder.path().join("bare.xml");
     let text = std::fs::read_to_string(file).unwrap();
@@ -144,7 +147,7 @@ fn arms_share_shapes_only_where_they_are_drawn_alike() {
 }
 
 #[test]
-fn a_missing_mesh_and_another_arm_are_told_in_a_line() {
+fn missing_mesh_and_wrong_arm_give_one_line_errors() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("arm.xml");
     let arm = |count: usize| {
@@ -175,7 +178,7 @@ fn a_missing_mesh_and_another_arm_are_told_in_a_line() {
 }
 
 #[test]
-fn the_wall_is_where_the_scene_has_it() {
+fn wall_is_at_the_position_of_the_scene() {
     let specimen = specimen();
     let mut scene = scene();
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
@@ -188,7 +191,7 @@ fn the_wall_is_where_the_scene_has_it() {
     let port = DVec3::from(scene.ports[0].centre_m);
     let model = Camera::centred(101, 101, 0.6);
     for (name, eye, skin) in [("above", 0.2, true), ("below", -0.1, false)] {
-        // Beside the shaft: 25 mm from the hole.
+        // Beside the shaft, 25 mm from the hole.
         let target = port + DVec3::new(0.0, 0.025, 0.0);
         rig.add_camera(name, model, Pose::look_at(target + eye * DVec3::Z, target, DVec3::Y));
         let picture = rig.render(&cell, name, [101, 101], &RenderSettings::preview()).unwrap();
@@ -200,7 +203,7 @@ fn the_wall_is_where_the_scene_has_it() {
         // Skin is paler than peritoneum.
         assert_eq!(green > 0.65 * red, skin, "{name}: {:?}", picture.color.pixels[middle]);
     }
-    // The hole is open: the wall begins under the ring, 5 mm from the hole's edge.
+    // The hole is open: the wall starts below the ring, 5 mm from the edge of the hole.
     for (name, eye) in [("in from above", 0.2), ("in from below", -0.1)] {
         rig.add_camera(name, model, Pose::look_at(port + eye * DVec3::Z, port, DVec3::Y));
         let picture = rig.render(&cell, name, [101, 101], &RenderSettings::preview()).unwrap();

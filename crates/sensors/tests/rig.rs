@@ -1,4 +1,5 @@
-//! What the cameras of a small cell see: the same bits on any number of threads, what moves where it is, cuts, sections, noise.
+//! Pictures of a small cell: bit-identical on any number of threads, moving parts at the right
+//! place, cuts, sections, noise.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -11,7 +12,8 @@ use trocar_scene::{Scene, SpecimenSource};
 use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
-/// A bar of cubes along x, six elements each, in the recording camera's frame, on a bed 150 mm before it.
+/// A bar of cubes along x, six elements each, in the frame of the recording camera, on a bed at a
+/// distance of 150 mm.
 fn bar(name: &str, middle: DVec3, cubes: usize, edge: f64) -> Organ {
     let mut body = TetMesh::default();
     let at = |i: usize, j: usize, k: usize| (i * 9 + j * 3 + k) as u32;
@@ -76,7 +78,7 @@ fn label(rig: &CameraRig, name: &str) -> u16 {
 }
 
 #[test]
-fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
+fn every_camera_sees_the_scene_independent_of_threads() {
     let (scene, specimen) = (scene(), specimen());
     let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
     let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
@@ -110,13 +112,14 @@ fn every_camera_sees_what_is_there_with_the_same_bits_on_any_threads() {
         );
     }
     assert!(share(&one[6], label(&rig, "left arm")) > 0.01);
-    // Depth of a camera without noise is the truth: the bed is 150 mm before the recording camera.
+    // Without noise, depth is exact: the bed is 150 mm in front of the recording camera.
     rig.noise = SensorNoise::default();
     let size = rig.size("recording").unwrap();
     let picture = rig.render(&cell, "recording", size, &RenderSettings::preview()).unwrap();
     let bed = picture.depth.depth[100 * size[0] + 20];
     assert!((0.145..0.153).contains(&bed), "{bed}");
-    // After a step of the arms the instruments are elsewhere in the picture, where the cell says.
+    // After the arms moved, the picture shows the instruments at the position that the cell
+    // reports.
     let still = rig.render(&cell, "endoscope", [96, 64], &RenderSettings::preview()).unwrap().clone();
     let action: Vec<_> = cell.observe().iter().map(|a| trocar_cell_coordinates(a, 0.004)).collect();
     for _ in 0..10 {
@@ -139,14 +142,14 @@ fn trocar_cell_coordinates(arm: &trocar_cell::ArmObservation, deeper: f64) -> tr
 }
 
 #[test]
-fn sections_show_half_and_the_whole_again() {
+fn section_shows_half_and_can_be_removed() {
     let (scene, specimen) = (scene(), specimen());
     let cell = Cell::new(&scene, &specimen, 1).unwrap();
     let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
     let camera = ("recording", [212, 120]);
     let whole = rig.render(&cell, camera.0, camera.1, &RenderSettings::preview()).unwrap().clone();
     let triangles = rig.triangles();
-    // Sections leave out what is on the normal's side, and show whole organs again.
+    // A section hides the part on the normal's side. Removing it shows whole organs again.
     let organ = label(&rig, "appendix");
     let middle = specimen.organs[0].body.vertices.iter().sum::<DVec3>() / specimen.organs[0].body.vertices.len() as f64;
     let middle = scene.placement.pose().transform(middle);
@@ -160,22 +163,22 @@ fn sections_show_half_and_the_whole_again() {
 }
 
 #[test]
-fn specimens_are_seen_alone_and_mistakes_are_told() {
+fn specimen_renders_alone_and_errors_name_the_cause() {
     let mut specimen = specimen();
     let mut rig = CameraRig::from_specimen(&specimen).unwrap();
     assert_eq!(rig.cameras(), ["recording", "outside"]);
     let seen = rig.render_still("recording", [212, 120], &RenderSettings::preview()).unwrap().clone();
     assert!(share(&seen, 1) > 0.01 && share(&seen, 2) > 0.01);
-    // The organ's middle is where the recording camera has it.
+    // The centre of the organ is where the recording camera sees it.
     let at = Camera::centred(212, 120, 1.5).project(DVec3::new(0.012, 0.012, 0.141)).unwrap().round();
     assert_eq!(seen.labels[at.y as usize * 212 + at.x as usize], 1);
     assert!(
         matches!(rig.render_still("endoscope", [96, 64], &RenderSettings::preview()), Err(e) if e.to_string() == "there is no camera 'endoscope'; the cameras are recording, outside")
     );
     assert!(
-        matches!(rig.render_still("outside", [4, 64], &RenderSettings::preview()), Err(e) if e.to_string().contains("8 to 8192"))
+        matches!(rig.render_still("outside", [4, 64], &RenderSettings::preview()), Err(e) if e.to_string().contains("[8, 8192]"))
     );
-    // Turned specimens stand upright all the same, and those without a camera are seen from aside.
+    // Tilted specimens are set upright. Those without a camera are seen from the side.
     specimen.up = (DQuat::from_rotation_x(0.6) * specimen.up).normalize();
     (specimen.camera, specimen.background) = (None, None);
     let mut rig = CameraRig::from_specimen(&specimen).unwrap();
