@@ -1,100 +1,88 @@
-//! What a phantom is: its organs and how they lie, the bed, the lamp, the instruments' reach. A phantom is a file with a [`PhantomSpec`].
+//! Specification of a phantom: organs with their positions, bed, lamp, and motion of the
+//! instruments.
 
 use crate::bed::{Bed, BedSpec};
 use crate::body::Body;
-use crate::instruments::Reach;
-use crate::still::Fineness;
-use crate::{Error, Result, phantom_a, phantom_b, phantom_c};
+use crate::instruments::InstrumentMotion;
 use glam::DVec3;
-use trocar_specimen::{End, Material, Pins, nearest};
+use trocar_specimen::{End, Material, Pins};
 
-/// The phantoms there are.
-const SPECS: [&PhantomSpec; 3] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC];
-
-/// Names of the phantoms: `phantom-a` and `phantom-b` are rabbits, `phantom-c` is a porcine liver with its gallbladder.
-pub const NAMES: [&str; 3] = [SPECS[0].name, SPECS[1].name, SPECS[2].name];
-
-/// A phantom.
+/// A phantom. Each phantom is a file with one constant of this type.
 pub(crate) struct PhantomSpec {
     pub name: &'static str,
-    /// What to lay where, for a seed, on a bed that nothing has pressed on yet.
+    /// Places the organs for a seed on a bed without imprints.
     pub organs: fn(u64, &Bed) -> Vec<Organ>,
-    /// The organs' names in the paper's order, which is that of the recording.
-    pub listed: &'static [&'static str],
-    /// Density of the organs [kg/m3].
+    /// Names of the organs in the order of the paper, which is the order of the recording.
+    pub organ_names: &'static [&'static str],
+    /// Density of the organs (kg/m³).
     pub density: f64,
     pub bed: BedSpec,
-    pub reach: Reach,
-    pub fineness: Fineness,
-    /// Depth at which the lamp is as bright as the colours mean [m].
-    pub lit_at: f32,
-    /// How near surroundings must be to darken a crease [m].
-    pub crease: f64,
+    pub reach: InstrumentMotion,
+    pub resolution: Resolution,
+    /// Distance at which the lamp has brightness 1 (m).
+    pub lamp_distance: f32,
+    /// Reach of the ambient occlusion that darkens creases (m).
+    pub occlusion_reach: f64,
 }
 
-/// An organ in its place.
+/// Resolution of the organs' surfaces and of the bed (m).
+#[derive(Clone, Copy)]
+pub(crate) struct Resolution {
+    pub surface: f64,
+    pub bed: f64,
+}
+
+/// A placed organ.
 pub(crate) struct Organ {
     pub name: &'static str,
     pub body: Body,
     pub young_modulus: f64,
     pub pins: PinRule,
-    pub look: Look,
+    pub look: TissueAppearance,
     pub seed: u64,
 }
 
-/// Which nodes are held, before it is known how the organ lies.
+/// Rule for the pinned nodes, independent of the organ's position.
 #[derive(Clone, Copy)]
 pub(crate) enum PinRule {
-    /// The lowest share.
+    /// The lowest share of the nodes.
     Band(f64),
-    /// The left arm grasps: the end on the right is held, and most of the 30% next to it.
+    /// The left arm grasps: the right end is pinned, and most of the 30% next to it.
     RightEnd,
 }
 
-/// What an organ looks like.
+/// Colours of an organ.
 #[derive(Clone, Copy)]
-pub(crate) enum Look {
+pub(crate) enum TissueAppearance {
     /// Two tones in patches, and vessels.
     Bowel { base: DVec3, flush: DVec3, vessels: Vessels },
-    /// Dark, smooth, with lobules.
+    /// Dark and smooth, with lobules.
     Liver,
-    /// Green, with vessels that branch.
+    /// Green, with branching vessels.
     Gallbladder,
 }
 
-/// How vessels run.
+/// Course of the vessels.
 #[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Vessels {
     /// A branching network.
     Network,
-    /// Up from the mesentery around the wall.
+    /// From the mesentery up around the wall.
     Rungs,
 }
 
-impl PhantomSpec {
-    /// The phantom of that name.
-    pub fn named(name: &str) -> Result<&'static Self> {
-        let known = || Error::Unknown {
-            name: name.to_owned(),
-            nearest: nearest(name, NAMES).unwrap_or_default(),
-            known: NAMES.join(", "),
-        };
-        SPECS.into_iter().find(|p| p.name == name).ok_or_else(known)
-    }
-}
-
 impl Organ {
-    /// Its material, the paper's.
+    /// Material of the organ in the paper.
     pub fn material(&self, spec: &PhantomSpec) -> Material {
         Material { young_modulus_pa: self.young_modulus, density_kg_m3: spec.density, ..Material::default() }
     }
 
-    /// Its pins, the paper's.
+    /// Pinned nodes of the organ in the paper.
     pub fn pins(&self) -> Pins {
         match self.pins {
             PinRule::Band(share) => Pins::Band { share },
             PinRule::RightEnd => {
-                // 0.14 + 0.30 * 0.93 = 0.42 of the length; the free part begins before the middle.
+                // 0.14 + 0.30 * 0.93 = 0.42 of the length; the free part starts before the middle.
                 let end = if self.body.base().x > self.body.tip().x { End::Base } else { End::Tip };
                 Pins::End { end, length: 0.14, band_length: 0.30, band_share: 0.93 }
             }

@@ -1,9 +1,9 @@
-//! Single frames: the still picture with the instruments before it, as the sensor gives it.
+//! Single frames: the static view with instruments in front, as the sensor records it.
 
 use crate::instruments::Instrument;
 use crate::sensor::{self, Sensor};
+use crate::static_view::StaticView;
 use crate::stereo;
-use crate::still::Still;
 use glam::DVec2;
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
 use trocar_geometry::TriMesh;
@@ -12,31 +12,31 @@ use trocar_render::srgb;
 
 /// Frames per second.
 pub(crate) const RATE_HZ: f64 = 30.0;
-/// Growth of the instrument masks: real ones are generous too [px].
+/// Margin of the instrument masks (px). Real masks have one too.
 const MASK_GROWTH: usize = 2;
-/// Rays a pixel and direction for the colour of instruments.
+/// Rays per side of a pixel for the colour of instruments.
 const SAMPLES: usize = 2;
 
-/// One recorded frame.
-pub(crate) struct Shot {
+/// A recorded frame.
+pub(crate) struct RecordedFrame {
     pub color: ColorImage,
     pub depth: DepthImage,
-    /// Pixels covered by instruments, grown.
+    /// Pixels covered by instruments, with a margin.
     pub instruments: Mask,
 }
 
-/// How a recording is filmed.
+/// Recording settings that all frames share.
 #[derive(Clone, Copy)]
-pub(crate) struct Take<'a> {
+pub(crate) struct FrameSettings<'a> {
     pub instruments: &'a [Instrument],
     pub camera: &'a Camera,
     pub sensor: Sensor,
     pub seed: u64,
 }
 
-/// Films frame `index`.
-pub(crate) fn shoot(still: &Still, take: &Take<'_>, index: usize) -> Shot {
-    let Take { instruments, camera, sensor, seed } = *take;
+/// Renders and records frame `index`.
+pub(crate) fn record_frame(still: &StaticView, take: &FrameSettings<'_>, index: usize) -> RecordedFrame {
+    let FrameSettings { instruments, camera, sensor, seed } = *take;
     let mut canvas = Canvas {
         color: still.frame.color.clone(),
         depth: still.frame.depth.clone(),
@@ -46,27 +46,27 @@ pub(crate) fn shoot(still: &Still, take: &Take<'_>, index: usize) -> Shot {
     for instrument in instruments {
         let mesh = instrument.mesh(index as f64 / RATE_HZ);
         if let Some(window) = Window::around(&mesh, camera) {
-            window.draw(mesh, camera, still.lit_at, &mut canvas);
+            window.draw(mesh, camera, still.lamp_distance, &mut canvas);
         }
     }
     let Canvas { mut color, mut depth, facing, instruments } = canvas;
     if sensor == Sensor::Stereo {
-        stereo::bend(&mut depth, seed, index);
+        stereo::add_error(&mut depth, seed, index);
     }
-    sensor::expose(&mut color, &mut depth, &facing, seed, index);
-    Shot { color, depth, instruments: sensor::dilate(&instruments, MASK_GROWTH) }
+    sensor::add_noise(&mut color, &mut depth, &facing, seed, index);
+    RecordedFrame { color, depth, instruments: sensor::dilate(&instruments, MASK_GROWTH) }
 }
 
-/// What has been drawn so far.
+/// The frame while instruments are drawn.
 struct Canvas {
     color: ColorImage,
     depth: DepthImage,
-    /// Cosine of view and surface at each pixel.
+    /// Cosine between the surface normal and the ray at each pixel.
     facing: Vec<f32>,
     instruments: Mask,
 }
 
-/// The part of the image that an instrument can cover; nothing else needs rays.
+/// The part of the image that an instrument can cover. Only this part is rendered.
 struct Window {
     u: usize,
     v: usize,
@@ -80,10 +80,11 @@ impl Window {
         let margin = DVec2::splat(0.1 * size.x);
         let (mut low, mut high) = (DVec2::MAX, DVec2::MIN);
         for p in &mesh.vertices {
-            // Too near the lens to say where its triangles reach: then the window is the image.
+            // So close to the lens, triangles can reach anywhere: the window is the whole image.
             let pixel = if p.z < 0.02 { None } else { camera.project(*p) };
             let (a, b) = pixel.map_or((DVec2::ZERO, size), |q| (q, q));
-            // What is far beside the image widens nothing; triangles are small against this distance.
+            // A vertex far outside the image does not extend the window; triangles are small
+            // compared with this distance.
             let beside = a.cmplt(-margin).any() || a.cmpgt(size + margin).any();
             if !beside {
                 (low, high) = (low.min(a), high.max(b));
@@ -100,7 +101,7 @@ impl Window {
         })
     }
 
-    /// The camera that sees only this window, with `finer` times as many pixels a side.
+    /// The camera of this window, with `finer` times as many pixels per side.
     fn camera(&self, whole: &Camera, finer: usize) -> Camera {
         let k = finer as f64;
         Camera {
@@ -114,8 +115,9 @@ impl Window {
         }
     }
 
-    /// Draws the instrument before what is there. Its rim is blended by the share of rays that hit.
-    fn draw(&self, mesh: TriMesh, camera: &Camera, lit_at: f32, canvas: &mut Canvas) {
+    /// Draws the instrument in front of the canvas. Its rim is blended by the share of rays that
+    /// hit.
+    fn draw(&self, mesh: TriMesh, camera: &Camera, lamp_distance: f32, canvas: &mut Canvas) {
         let Canvas { color, depth, facing, instruments } = canvas;
         let shading = Shading { color: [160; 3], gloss: 0.8, wireframe: false };
         let scene = PhongScene::new(vec![Instance { mesh, label: 1, shading }], None, [0; 3]);
@@ -135,7 +137,7 @@ impl Window {
                     if before(z) {
                         hits += 1;
                         let light = srgb::to_linear(fine.color.pixels[at]);
-                        let lamp = sensor::lamp(camera, x as f64, y as f64, z, lit_at);
+                        let lamp = sensor::lamp_brightness(camera, x as f64, y as f64, z, lamp_distance);
                         sum = [0, 1, 2].map(|c| sum[c] + light[c] * lamp);
                     }
                 }
@@ -161,7 +163,7 @@ mod tests {
     use crate::instruments;
 
     #[test]
-    fn nothing_of_an_instrument_is_cut_off_by_its_window() {
+    fn window_covers_the_whole_instrument() {
         let camera = Camera { width: 424, height: 240, fx: 223.4, fy: 223.4, cx: 211.5, cy: 119.5, ..Camera::d405() };
         let masked = |window: &Window, mesh: TriMesh| {
             let mut canvas = Canvas {
