@@ -181,13 +181,8 @@ impl CameraRig {
         size: [usize; 2],
         settings: &RenderSettings,
     ) -> Result<&Picture> {
-<<<<<<< HEAD
-        self.viewer(camera)?;
-        self.update(cell)?;
-=======
         self.index(camera)?;
-        self.follow(cell)?;
->>>>>>> c5fe4b7265df522434e7822745bab89132be40d3
+        self.update(cell)?;
         self.expose(camera, size, settings, (1e3 * cell.time()).round() as u32)
     }
 
