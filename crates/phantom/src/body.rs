@@ -78,7 +78,7 @@ impl SignedDistance for Body {
 
 /// Distance between `body` and the nearest of `others` (m), negative if they overlap. Sampled on
 /// both surfaces.
-pub(crate) fn gap<'a>(body: &Body, others: impl Iterator<OrganPlacement = &'a Body>) -> f64 {
+pub(crate) fn gap<'a>(body: &Body, others: impl Iterator<Item = &'a Body>) -> f64 {
     let least = |of: &Body, to: &Body| of.samples().into_iter().map(|p| to.distance(p)).fold(f64::INFINITY, f64::min);
     others.map(|o| least(body, o).min(least(o, body))).fold(f64::INFINITY, f64::min)
 }

@@ -69,7 +69,7 @@ pub(crate) fn shape(
 }
 
 /// Places `items` in their order, with random variations.
-pub(crate) fn pack(items: impl IntoIterator<OrganPlacement = OrganPlacement>, seed: u64, bed: &Bed) -> Vec<Organ> {
+pub(crate) fn pack(items: impl IntoIterator<Item = OrganPlacement>, seed: u64, bed: &Bed) -> Vec<Organ> {
     let mut organs: Vec<Organ> = Vec::new();
     for (index, mut item) in items.into_iter().enumerate() {
         let seed = noise::key(&[seed, 2, index as u64]);
