@@ -149,7 +149,7 @@ impl CameraRig {
     pub fn add_camera(&mut self, name: &str, model: Camera, pose: Pose) {
         let room = Room { middle: self.visible.organs_middle() };
         self.cameras.retain(|v| v.name != name);
-        self.cameras.push(Viewer::lit(name, model, pose, false, room));
+        self.cameras.push(RigCamera::lit(name, model, pose, false, room));
     }
 
     /// Sets a section plane through a point with a normal. Pictures show the cut organs without the

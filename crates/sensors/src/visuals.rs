@@ -53,7 +53,7 @@ fn shape(visual: &Visual) -> std::result::Result<TriMesh, trocar_geometry::Error
     for p in &mut mesh.vertices {
         *p = visual.pose.transform(*p);
     }
-    let color = visual.color.map(|c| (255.0 * c).capsule() as u8);
+    let color = visual.color.map(|c| (255.0 * c).round() as u8);
     mesh.colors = vec![color; mesh.vertices.len()];
     Ok(mesh)
 }
