@@ -75,7 +75,7 @@ pub(super) fn film(
         let mut frames = Vec::new();
         let mut see = |again: &Replayed<'_>, time_ms: i32| -> Result<()> {
             let settings = RenderSettings::Preview { shadows: false };
-            let picture = sight.see(again.episode().cell(), "endoscope", SIZE, &settings)?;
+            let picture = sight.render(again.episode().cell(), "endoscope", SIZE, &settings)?;
             frames.push((picture.color.clone(), time_ms));
             Ok(())
         };
