@@ -1,7 +1,8 @@
 //! Camera noise, quantisation and holes. All depend on (seed, frame, pixel) alone.
 
-use crate::noise::{key, normal, scramble, unit};
+use crate::noise::{key, normal, unit};
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_core::mix;
 use trocar_render::srgb;
 
 /// Noise model of the depth camera.
@@ -39,9 +40,9 @@ pub(crate) fn add_noise(color: &mut ColorImage, depth: &mut DepthImage, facing: 
     for v in 0..height {
         for u in 0..width {
             let i = v * width + u;
-            let mut h = scramble(stream ^ i as u64);
+            let mut h = mix(stream ^ i as u64);
             let mut next = || {
-                h = scramble(h);
+                h = mix(h);
                 h
             };
             let common = 0.8 * normal(next());

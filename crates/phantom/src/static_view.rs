@@ -3,7 +3,8 @@
 use crate::anatomy::Anatomy;
 use crate::spec::{PhantomSpec, Resolution};
 use crate::{paint, sensor};
-use trocar_camera::{Camera, Mask, Pose};
+use trocar_camera::{Camera, Mask};
+use trocar_core::Pose;
 use trocar_geometry::{TriMesh, isosurface, sample_distance};
 use trocar_render::phong::{Instance, PhongImage, PhongScene, Shading, label_mask};
 

@@ -182,7 +182,7 @@ fn recording_is_complete_and_reproducible() {
     let write = |name: &str| {
         let to = dir.path().join(name);
         let options = RecordOptions { frames: 3, seed: 4, ..RecordOptions::default() };
-        record_with(spec, &options, &small(), coarse(spec), &to, &trocar_progress::Silent).unwrap();
+        record_with(spec, &options, &small(), coarse(spec), &to, &trocar_core::Silent).unwrap();
         to
     };
     let folder = write("a");
@@ -211,7 +211,7 @@ fn recording_is_complete_and_reproducible() {
 fn invalid_requests_are_rejected_and_leave_no_files() {
     use crate::{Error, RecordOptions, record};
     struct Stop;
-    impl trocar_progress::Progress for Stop {
+    impl trocar_core::Progress for Stop {
         fn begin(&self, _: &str, _: u64) {}
         fn advance(&self, _: u64) {}
         fn end(&self) {}
@@ -222,7 +222,7 @@ fn invalid_requests_are_rejected_and_leave_no_files() {
     let dir = tempfile::tempdir().unwrap();
     let to = dir.path().join("out");
     let options = RecordOptions { frames: 2, ..RecordOptions::default() };
-    let silent = &trocar_progress::Silent;
+    let silent = &trocar_core::Silent;
     let unknown = record("fantom-c", &options, &to, silent).unwrap_err().to_string();
     assert_eq!(unknown, "unknown phantom 'fantom-c'; did you mean 'phantom-c'? Known: phantom-a, phantom-b, phantom-c");
     let none = record("phantom-a", &RecordOptions { frames: 0, ..options }, &to, silent).unwrap_err().to_string();
@@ -240,7 +240,7 @@ fn speed() {
     let dir = tempfile::tempdir().unwrap();
     let start = std::time::Instant::now();
     let options = crate::RecordOptions { frames: 90, ..crate::RecordOptions::default() };
-    crate::record("phantom-a", &options, &dir.path().join("a"), &trocar_progress::Silent).unwrap();
+    crate::record("phantom-a", &options, &dir.path().join("a"), &trocar_core::Silent).unwrap();
     for mesh in ["cecum", "appendix"] {
         let mesh = dir.path().join(format!("a/truth/{mesh}.ply"));
         let mesh = trocar_geometry::io::read_surface(&mesh, trocar_geometry::io::Unit::Metre).unwrap();

@@ -10,7 +10,8 @@
 //!
 //! ```
 //! use glam::DVec3;
-//! use trocar_camera::{Camera, Pose};
+//! use trocar_camera::Camera;
+//! use trocar_core::Pose;
 //! use trocar_geometry::TriMesh;
 //! use trocar_render::{Appearance, Film, Light, RayGenerator, RenderSettings, Stage, render};
 //!

@@ -3,7 +3,7 @@
 
 use crate::bvh::Ray;
 use glam::{DVec3, Vec3A};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 
 /// A light source.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,8 @@ use crate::rays::RayGenerator;
 use crate::stage::{BundleCandidates, Stage, rotation_of};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
-use trocar_camera::{ColorImage, DepthImage, Pose};
+use trocar_camera::{ColorImage, DepthImage};
+use trocar_core::Pose;
 
 /// Side of a tile (px). A picture is rendered tile by tile.
 const TILE: usize = 8;

@@ -7,7 +7,8 @@ mod common;
 
 use common::{quad, sphere};
 use glam::DVec3;
-use trocar_camera::{Camera, Pose};
+use trocar_camera::Camera;
+use trocar_core::Pose;
 use trocar_render::{Appearance, Film, Light, RayGenerator, RenderSettings, Stage, render};
 
 /// A Cornell-like box of 10 cm, open towards the camera, with a tissue ball and a steel ball.

@@ -4,7 +4,8 @@
 use crate::solid::{Part, Solid};
 use crate::{Error, Result, visuals};
 use glam::DVec3;
-use trocar_geometry::{Pose, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 use trocar_scene::{Arm, Scene};
 
 /// Cell size of the links' surfaces (m).

@@ -8,7 +8,8 @@
 
 use glam::{DVec2, DVec3};
 use trocar_camera::{Camera, ColorImage};
-use trocar_geometry::{Pose, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 use trocar_render::{Appearance, Film, RayGenerator, RenderSettings, Stage, render, srgb};
 
 /// Maximum number of cells along a side.

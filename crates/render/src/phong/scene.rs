@@ -5,7 +5,8 @@ use super::trace::{Hit, Tracer};
 use crate::srgb;
 use glam::DVec3;
 use rayon::prelude::*;
-use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
+use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 
 /// Shading of an instance.
@@ -34,7 +35,8 @@ pub struct Instance {
 ///
 /// ```
 /// use glam::DVec3;
-/// use trocar_camera::{Camera, Pose};
+/// use trocar_camera::Camera;
+/// use trocar_core::Pose;
 /// use trocar_geometry::TriMesh;
 /// use trocar_render::phong::{Instance, PhongScene, Shading};
 ///

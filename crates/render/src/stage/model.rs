@@ -6,7 +6,7 @@ use crate::material::{Appearance, Material};
 use crate::{Error, Result, srgb};
 use fearless_simd::Level;
 use glam::{DVec3, Mat3A, Quat, Vec3A};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 
 /// Maximum number of triangles of a mesh.

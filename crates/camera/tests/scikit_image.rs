@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::Mask;
-use trocar_similarity::{psnr_db, ssim};
+use trocar_camera::metrics::{psnr_db, ssim};
 
 const WIDTH: usize = 120;
 const HEIGHT: usize = 80;

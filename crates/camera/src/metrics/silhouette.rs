@@ -1,12 +1,12 @@
-//! Silhouettes: intersection over union of masks.
+//! Intersection over union of silhouettes.
 
-use crate::error::{Error, Result, fits};
-use trocar_camera::Mask;
+use super::error::{Error, Result, fits};
+use crate::Mask;
 
-/// Pixels in both masks over pixels in either (Jaccard's index), 0 to 1; `None` where both are empty.
+/// Pixels in both masks over pixels in either (Jaccard index), in [0, 1]. `None` if both are empty.
 ///
 /// # Errors
-/// Masks of differing sizes.
+/// Masks of different sizes.
 pub fn iou(a: &Mask, b: &Mask) -> Result<Option<f64>> {
     fits("the first mask", (a.width, a.height, a.set.len()), (a.width, a.height))?;
     fits("the second mask", (b.width, b.height, b.set.len()), (a.width, a.height))?;
@@ -15,10 +15,10 @@ pub fn iou(a: &Mask, b: &Mask) -> Result<Option<f64>> {
     Ok((either > 0).then(|| both as f64 / either as f64))
 }
 
-/// The pixels in any of the masks.
+/// The union of the masks.
 ///
 /// # Errors
-/// No masks, or masks of differing sizes.
+/// No masks, or masks of different sizes.
 pub fn union<'a>(masks: impl IntoIterator<Item = &'a Mask>) -> Result<Mask> {
     let mut masks = masks.into_iter();
     let mut all = masks.next().ok_or(Error::Empty)?.clone();
@@ -41,7 +41,7 @@ mod tests {
     }
 
     #[test]
-    fn known_overlaps() {
+    fn overlaps_have_their_known_iou() {
         assert_eq!(iou(&rows(0, 6), &rows(0, 6)), Ok(Some(1.0)));
         assert_eq!(iou(&rows(0, 6), &rows(3, 9)), Ok(Some(3.0 / 9.0)));
         assert_eq!(iou(&rows(0, 3), &rows(5, 9)), Ok(Some(0.0)));
@@ -51,7 +51,7 @@ mod tests {
     }
 
     #[test]
-    fn differing_sizes_are_refused() {
+    fn different_sizes_are_rejected() {
         let said = iou(&rows(0, 6), &Mask::new(4, 10)).unwrap_err().to_string();
         assert!(said.contains("4 x 10") && said.contains("5 x 10"), "{said}");
         assert!(iou(&rows(0, 1), &Mask { width: 5, height: 10, set: vec![true; 3] }).is_err());

@@ -1,22 +1,22 @@
-//! Matching of exposure: one gain for each channel.
+//! Exposure matching with one gain per channel.
 
-use crate::error::{Error, Result};
-use trocar_camera::Mask;
+use super::error::{Error, Result};
+use crate::Mask;
 
-/// A picture after its channels' gains.
+/// A picture with exposure gains applied.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Matched {
     /// Gain of each channel.
     pub gains: [f64; 3],
-    /// The picture, not rounded, cut at 255.
+    /// The picture, not rounded, clamped to 255.
     pub picture: Vec<[f64; 3]>,
 }
 
-/// Scales each channel of `picture` so that it comes nearest to `target` by least squares over the mask's pixels:
-/// g = sum(target picture) / sum(picture^2). A channel that is black everywhere stays so, with gain 1.
+/// Scales each channel of `picture` to match `target` by least squares over the mask's pixels: g =
+/// sum(target picture) / sum(picture^2). The gain of an entirely black channel is 1.
 ///
 /// # Errors
-/// An empty mask. (Sizes are the caller's to have checked; what one lacks is not looked at.)
+/// An empty mask. Sizes are not checked; pixels missing in one input are ignored.
 pub fn match_exposure(picture: &[[f64; 3]], target: &[[f64; 3]], mask: &Mask) -> Result<Matched> {
     let (mut own, mut common) = ([0.0; 3], [0.0; 3]);
     let mut any = false;

@@ -1,13 +1,14 @@
-//! Structural similarity: Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli, "Image Quality Assessment: From Error Visibility to
-//! Structural Similarity", IEEE Transactions on Image Processing 13(4), 2004, equation 13.
+//! Structural similarity (SSIM): Z. Wang, A. C. Bovik, H. R. Sheikh, E. P. Simoncelli, "Image
+//! Quality Assessment: From Error Visibility to Structural Similarity", IEEE Transactions on Image
+//! Processing 13(4), 2004, equation 13.
 
-use crate::error::{Error, Result, fits};
+use super::error::{Error, Result, fits};
+use crate::Mask;
 use rayon::prelude::*;
-use trocar_camera::Mask;
 
-/// Half the window's side: 11 x 11 pixels.
+/// Half the side of the window of 11 x 11 pixels.
 const REACH: usize = 5;
-/// Standard deviation of the window's Gaussian [px].
+/// Standard deviation of the window's Gaussian (px).
 const SIGMA: f64 = 1.5;
 /// K1 L and K2 L, squared, with L = 255.
 const C1: f64 = (0.01 * 255.0) * (0.01 * 255.0);
@@ -18,16 +19,18 @@ const C2: f64 = (0.03 * 255.0) * (0.03 * 255.0);
 pub struct Ssim {
     /// Mean over the mask's pixels and the three channels.
     pub mean: f64,
-    /// Mean over the channels at each pixel, row by row; not a number outside of the mask.
+    /// Mean over the channels at each pixel, row by row; NaN outside the mask.
     pub map: Vec<f64>,
 }
 
-/// SSIM of two pictures of `mask`'s size, three channels a pixel in 0 to 255, with the paper's window (a Gaussian of sigma 1.5 px over
-/// 11 x 11), K1 = 0.01, K2 = 0.03 and weighted, uncorrected variances. Only pixels of the mask have weight in a window, so that what lies beside the
-/// mask changes nothing; five pixels or more inside it the map is that of the whole pictures.
+/// SSIM of two pictures of the mask's size, with three channels in [0, 255] per pixel. The window
+/// is a Gaussian of sigma 1.5 px over 11 x 11 pixels, K1 = 0.01 and K2 = 0.03, with weighted,
+/// uncorrected variances, as in the publication. Only pixels of the mask have weight in a window,
+/// so pixels outside the mask have no effect. At five or more pixels inside the mask, the map
+/// equals that of the whole pictures.
 ///
 /// # Errors
-/// Differing sizes, an empty mask.
+/// Different sizes, or an empty mask.
 pub fn ssim(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<Ssim> {
     let size = (mask.width, mask.height);
     fits("the mask", (mask.width, mask.height, mask.set.len()), size)?;
@@ -66,7 +69,8 @@ pub fn ssim(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<Ssim> {
     Ok(Ssim { mean, map })
 }
 
-/// A plane under the window, by rows and then by columns; what lies beyond the border has no weight.
+/// Applies the window to a plane, by rows and then by columns. Pixels beyond the border have no
+/// weight.
 fn blur(plane: &[f64], width: usize) -> Vec<f64> {
     let window: Vec<f64> =
         (0..=2 * REACH).map(|k| (-0.5 * ((k as f64 - REACH as f64) / SIGMA).powi(2)).exp()).collect();
@@ -94,7 +98,7 @@ fn blur(plane: &[f64], width: usize) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed test is a failed test")]
+    #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
     use super::*;
 
@@ -103,7 +107,7 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_is_like_itself_and_even_pictures_have_the_formulas_value() {
+    fn identical_and_uniform_pictures_have_their_known_ssim() {
         let picture: Vec<[f64; 3]> = (0..40 * 30).map(|i| [(i * 37 % 251) as f64, (i % 7) as f64, 9.0]).collect();
         assert!((ssim(&picture, &picture, &whole(40, 30)).unwrap().mean - 1.0).abs() < 1e-12);
         let (a, b) = (vec![[100.0; 3]; 1200], vec![[150.0; 3]; 1200]);
@@ -112,7 +116,7 @@ mod tests {
     }
 
     #[test]
-    fn what_lies_beside_the_mask_changes_nothing() {
+    fn pixels_outside_the_mask_have_no_effect() {
         let mut mask = whole(40, 30);
         (0..1200).for_each(|i| mask.set[i] = i % 40 < 21 && i / 40 > 3);
         let picture = |seed: usize, beside: f64| -> Vec<[f64; 3]> {

@@ -1,31 +1,31 @@
-//! All figures of one picture against another.
+//! All metrics of one picture against another.
 
-use crate::error::{Error, Result, fits};
-use crate::exposure::match_exposure;
-use crate::ssim::ssim;
+use super::error::{Error, Result, fits};
+use super::exposure::match_exposure;
+use super::ssim::ssim;
+use crate::{ColorImage, Mask};
 use serde::Serialize;
-use trocar_camera::{ColorImage, Mask};
 
-/// How like a target a picture is, within a mask.
+/// Similarity of a picture to a target within a mask.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Likeness {
-    /// Structural similarity, 1 for the same.
+pub struct ImageMetrics {
+    /// Structural similarity; 1 for identical pictures.
     pub ssim: f64,
-    /// Peak signal-to-noise ratio [dB]; infinite for the same (`null` in JSON).
+    /// Peak signal-to-noise ratio (dB); infinite for identical pictures (`null` in JSON).
     pub psnr_db: f64,
     /// Structural similarity after [`match_exposure`].
     pub ssim_matched: f64,
-    /// Peak signal-to-noise ratio after [`match_exposure`] [dB].
+    /// Peak signal-to-noise ratio after [`match_exposure`] (dB).
     pub psnr_matched_db: f64,
-    /// The gains of red, green and blue that match it.
+    /// Exposure gains of red, green and blue.
     pub gains: [f64; 3],
 }
 
 /// Compares `picture` with `target` within `mask`.
 ///
 /// # Errors
-/// Differing sizes, an empty mask.
-pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result<Likeness> {
+/// Different sizes, or an empty mask.
+pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result<ImageMetrics> {
     let size = (mask.width, mask.height);
     fits("the target", (target.width, target.height, target.pixels.len()), size)?;
     fits("the picture", (picture.width, picture.height, picture.pixels.len()), size)?;
@@ -33,7 +33,7 @@ pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result
     let [target, picture] =
         [target, picture].map(|image| -> Vec<[f64; 3]> { image.pixels.iter().map(|p| p.map(f64::from)).collect() });
     let matched = match_exposure(&picture, &target, mask)?;
-    Ok(Likeness {
+    Ok(ImageMetrics {
         ssim: ssim(&target, &picture, mask)?.mean,
         psnr_db: psnr_db(&target, &picture, mask)?,
         ssim_matched: ssim(&target, &matched.picture, mask)?.mean,
@@ -42,10 +42,11 @@ pub fn compare(target: &ColorImage, picture: &ColorImage, mask: &Mask) -> Result
     })
 }
 
-/// 10 log10(255^2 / mean squared difference) over the mask's pixels and the three channels [dB]; infinite where there is none.
+/// Peak signal-to-noise ratio 10 log10(255^2 / mean squared difference) over the mask's pixels and
+/// the three channels (dB). Infinite without a difference.
 ///
 /// # Errors
-/// Differing sizes, an empty mask.
+/// Different sizes, or an empty mask.
 pub fn psnr_db(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<f64> {
     let size = (mask.width, mask.height);
     fits("the mask", (mask.width, mask.height, mask.set.len()), size)?;
@@ -60,10 +61,11 @@ pub fn psnr_db(a: &[[f64; 3]], b: &[[f64; 3]], mask: &Mask) -> Result<f64> {
     Ok(10.0 * (255.0 * 255.0 * 3.0 * count as f64 / sum).log10())
 }
 
-/// A picture all of whose pixels have the mean colour of the mask's, rounded: what says nothing but the colour.
+/// A uniform picture with the rounded mean colour of the mask's pixels: a baseline that shows only
+/// the colour.
 ///
 /// # Errors
-/// Differing sizes, an empty mask.
+/// Different sizes, or an empty mask.
 pub fn mean_colour(picture: &ColorImage, mask: &Mask) -> Result<ColorImage> {
     let size = (mask.width, mask.height);
     fits("the mask", (mask.width, mask.height, mask.set.len()), size)?;
@@ -82,7 +84,7 @@ pub fn mean_colour(picture: &ColorImage, mask: &Mask) -> Result<ColorImage> {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed test is a failed test")]
+    #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
     use super::*;
 
@@ -101,10 +103,10 @@ mod tests {
         let (target, mask) = textured();
         let mut picture = target.clone();
         picture.pixels.iter_mut().for_each(|p| *p = [2 * p[0], p[1], p[2] * 3 / 2]);
-        let likeness = compare(&target, &picture, &mask).unwrap();
-        assert!(likeness.psnr_db < 18.0 && likeness.psnr_matched_db > 50.0, "{likeness:?}");
-        assert!(likeness.ssim < 0.95 && likeness.ssim_matched > 0.999, "{likeness:?}");
-        assert!((likeness.gains[0] - 0.5).abs() < 1e-9 && (likeness.gains[1] - 1.0).abs() < 1e-9, "{likeness:?}");
+        let metrics = compare(&target, &picture, &mask).unwrap();
+        assert!(metrics.psnr_db < 18.0 && metrics.psnr_matched_db > 50.0, "{metrics:?}");
+        assert!(metrics.ssim < 0.95 && metrics.ssim_matched > 0.999, "{metrics:?}");
+        assert!((metrics.gains[0] - 0.5).abs() < 1e-9 && (metrics.gains[1] - 1.0).abs() < 1e-9, "{metrics:?}");
         assert_eq!(compare(&target, &target, &mask).unwrap().psnr_db, f64::INFINITY);
     }
 
@@ -113,14 +115,14 @@ mod tests {
         let (target, mask) = textured();
         let mut picture = target.clone();
         picture.pixels.iter_mut().for_each(|p| *p = p.map(|v| v + 5));
-        // Beside the mask nothing counts.
+        // Pixels outside the mask do not count.
         picture.pixels[0] = [255; 3];
-        let likeness = compare(&target, &picture, &mask).unwrap();
-        assert!((likeness.psnr_db - 20.0 * (255.0_f64 / 5.0).log10()).abs() < 1e-9);
+        let metrics = compare(&target, &picture, &mask).unwrap();
+        assert!((metrics.psnr_db - 20.0 * (255.0_f64 / 5.0).log10()).abs() < 1e-9);
     }
 
     #[test]
-    fn the_mean_colour_is_the_masks() {
+    fn mean_colour_is_that_of_the_mask() {
         let (mut picture, mask) = textured();
         for (p, set) in picture.pixels.iter_mut().zip(&mask.set) {
             *p = if *set { [10, 20, 31] } else { [200; 3] };

@@ -1,23 +1,34 @@
-//! How long work tells how far it is, and learns that it should stop.
+//! Progress of long work, and requests to stop it.
 //!
-//! Every stage that can take longer than a second takes a `&dyn Progress`. The command line shows a bar; tests and
-//! libraries pass [`Silent`], and [`StopAfter`] where they try an interruption.
+//! Every stage that can take longer than a second takes a `&dyn Progress`. The command line shows a
+//! bar. Libraries pass [`Silent`]; tests of interruptions pass [`StopAfter`].
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Receives the progress of long work.
+///
+/// ```
+/// use trocar_core::{Progress, StopAfter};
+///
+/// let progress = StopAfter::new(3);
+/// progress.begin("meshing", 10);
+/// let done = (0..10).take_while(|_| { let stop = progress.interrupted(); progress.advance(1); !stop }).count();
+/// progress.end();
+/// assert_eq!(done, 3);
+/// ```
 pub trait Progress: Sync {
-    /// A stage named `stage` begins and will take `total` units of work.
+    /// The stage `stage` begins. It takes `total` units of work.
     fn begin(&self, stage: &str, total: u64);
-    /// `units` of the current stage are done.
+    /// `units` more of the current stage are done.
     fn advance(&self, units: u64);
     /// The current stage is over.
     fn end(&self);
-    /// True when the user asked to stop; the work then returns its crate's `Interrupted` error, leaving nothing behind.
+    /// Whether the user asked to stop. The work then returns its crate's `Interrupted` error and
+    /// leaves nothing behind.
     fn interrupted(&self) -> bool;
 }
 
-/// Says nothing and is never interrupted.
+/// Reports nothing and is never interrupted.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Silent;
 
@@ -30,7 +41,7 @@ impl Progress for Silent {
     }
 }
 
-/// Says nothing, and asks to stop once so many units of work are done, of all stages together.
+/// Reports nothing and asks to stop after a number of units of work, over all stages together.
 #[derive(Debug)]
 pub struct StopAfter {
     units: u64,
@@ -38,7 +49,7 @@ pub struct StopAfter {
 }
 
 impl StopAfter {
-    /// After `units`; with none at once.
+    /// Asks to stop after `units` units of work; at once for 0.
     pub fn new(units: u64) -> Self {
         Self { units, done: AtomicU64::new(0) }
     }

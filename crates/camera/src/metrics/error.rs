@@ -1,35 +1,35 @@
-//! What can be wrong with pictures that are to be compared.
+//! Errors of picture comparisons.
 
-/// Result of this crate.
+/// Result of picture comparisons.
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Pictures that cannot be compared.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 pub enum Error {
-    /// They differ in size, or one has not as many pixels as its size says.
+    /// Different sizes, or a number of pixels that does not match the size.
     #[error(
-        "{what} is {width} x {height} with {pixels} pixels, not {expected_width} x {expected_height}; pictures and masks that are compared have one size"
+        "{what} is {width} x {height} with {pixels} pixels; it must be {expected_width} x {expected_height}, the size of all compared pictures and masks"
     )]
     Size {
-        /// Which of them.
+        /// The picture or mask.
         what: &'static str,
-        /// Its width [px].
+        /// Its width (px).
         width: usize,
-        /// Its height [px].
+        /// Its height (px).
         height: usize,
-        /// Its pixels.
+        /// Its number of pixels.
         pixels: usize,
-        /// The width it should have [px].
+        /// The expected width (px).
         expected_width: usize,
-        /// The height it should have [px].
+        /// The expected height (px).
         expected_height: usize,
     },
-    /// No pixel counts.
-    #[error("the mask is empty; at least one pixel must be compared")]
+    /// The mask is empty.
+    #[error("the mask is empty; at least one pixel must be set")]
     Empty,
 }
 
-/// Checks that something has as many pixels as it should.
+/// Checks the size and number of pixels.
 pub(crate) fn fits(
     what: &'static str,
     (width, height, pixels): (usize, usize, usize),
