@@ -15,7 +15,7 @@ use std::path::PathBuf;
 use std::time::Instant;
 use trocar_camera::{Camera, Endoscope};
 use trocar_cell::Cell;
-use trocar_core::Progress;
+use trocar_core::{Pose, Progress};
 use trocar_render::{Appearance, BodyId, Film, Light, RayGenerator, RenderSettings, ShapeId, Stage, render};
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
