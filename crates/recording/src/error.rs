@@ -26,7 +26,7 @@ pub enum Error {
     },
     /// A bag or MCAP file is unusable.
     #[error(transparent)]
-    Messages(#[from] trocar_messages::Error),
+    Messages(#[from] crate::messages::Error),
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),

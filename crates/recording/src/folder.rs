@@ -1,8 +1,8 @@
 //! Frames from folders of image files.
 
+use crate::error::{Error, Result};
 use crate::frame_list::{FrameFiles, FrameList, list_frames, stem};
 use crate::source::{FrameSource, Images, Packet, Parts};
-use crate::{Error, Result};
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, Mask};
 

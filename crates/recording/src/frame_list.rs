@@ -1,7 +1,7 @@
 //! Which files make a frame: from `frames.csv`, or by pairing the files of the folders.
 
+use crate::error::{Error, Result};
 use crate::pairing::Pairing;
-use crate::{Error, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};

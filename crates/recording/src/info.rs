@@ -1,11 +1,14 @@
 //! `recording.toml`.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
 use std::path::{Component, Path};
 use trocar_camera::Camera;
 use trocar_specimen::{Material, Pins};
+
+/// The file that makes a folder a recording.
+pub(crate) const MARKER: &str = "recording.toml";
 
 /// What is known of a recording. What a bag or MCAP file says itself (cameras, depth scale) may be left out and, where it is
 /// given, overrules the file.

@@ -18,6 +18,7 @@ mod folder;
 mod frame_list;
 mod info;
 mod log;
+pub mod messages;
 mod pairing;
 mod recording;
 mod register;
@@ -32,6 +33,3 @@ pub use recording::{Recording, RgbdFrame};
 pub use register::Registration;
 pub use source::{Packet, Parts};
 pub use writer::RecordingWriter;
-
-/// The file that makes a folder a recording.
-const MARKER: &str = "recording.toml";

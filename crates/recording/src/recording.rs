@@ -1,11 +1,12 @@
 //! A recording opened for reading: frames stream from their source and come out registered, on one camera's pixels.
 
+use crate::error::{Error, Result};
 use crate::folder::Folder;
+use crate::info::{DepthToColor, MARKER, RecordingInfo, SourceInfo};
 use crate::log::{Log, LogCameras};
 use crate::register::Registration;
 use crate::shade::shade;
 use crate::source::{FrameSource, Images, Packet, Parts};
-use crate::{DepthToColor, Error, MARKER, RecordingInfo, Result, SourceInfo};
 use glam::DMat3;
 use std::path::{Path, PathBuf};
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};

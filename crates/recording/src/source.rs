@@ -1,6 +1,6 @@
 //! Where the frames of a recording come from: one trait over folders and log files.
 
-use crate::Result;
+use crate::error::Result;
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use xxhash_rust::xxh3::Xxh3;
 

@@ -1,7 +1,7 @@
 //! Writer of a recording folder.
 
-use super::{MARKER, RecordingInfo};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
+use crate::info::{MARKER, RecordingInfo};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};

@@ -9,7 +9,7 @@ use trocar_recording::Recording;
 /// 400 + 3 x + 5 y + f units), copied into a folder of its own.
 fn fixture(name: &str) -> (tempfile::TempDir, PathBuf) {
     let root = tempfile::tempdir().unwrap();
-    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../messages/tests/fixtures").join(name);
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
     let to = root.path().join(name);
     fs::copy(from, &to).unwrap();
     (root, to)

@@ -4,12 +4,15 @@
 //! names decide between several: depth aligned to colour before other depth, "color" or "rgb" before other images, and
 //! uncompressed before compressed images of the same camera. Infrared images are left out.
 
-use crate::image::Image;
-use crate::{Error, MessageLog, Result, Topic, decode_image, read_one, realsense};
+use super::decode::decode_image;
+use super::error::{Error, Result};
+use super::image::Image;
+use super::realsense;
+use super::topic::{MessageLog, Topic, read_one};
 
 /// Indices of the topics of an RGB-D recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Guess {
+pub struct RgbdTopics {
     /// Colour images.
     pub color: usize,
     /// Depth images.
@@ -33,7 +36,7 @@ pub struct Guess {
 /// # Errors
 /// [`Error::Choice`] when there is no colour or no depth, several that are as good, or none of the given name; it lists the
 /// topics.
-pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> Result<Guess> {
+pub fn find_rgbd_topics(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> Result<RgbdTopics> {
     let topics = log.topics();
     let transforms = (0..topics.len()).filter(|&t| is_transforms(&topics[t])).collect();
     let named = |name: &str| {
@@ -44,7 +47,7 @@ pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> 
     // Its own streams by their names are still its own: units and transforms belong to them.
     let chosen = |named: Option<usize>, found: usize| named.is_none_or(|t| t == found);
     if let Some(found) = realsense::find(topics).filter(|f| chosen(color, f.color) && chosen(depth, f.depth)) {
-        return Ok(Guess {
+        return Ok(RgbdTopics {
             color: found.color,
             depth: found.depth,
             color_info: found.color_info,
@@ -71,7 +74,7 @@ pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> 
     let (color, depth) = (one("colour", false, color)?, one("depth", true, depth)?);
     let color_info = info(topics, color);
     let depth_info = info(topics, depth).or_else(|| color_info.filter(|_| is_aligned(&topics[depth].name)));
-    Ok(Guess {
+    Ok(RgbdTopics {
         color,
         depth,
         color_info,

@@ -7,11 +7,11 @@
 
 mod common;
 
-use common::{ALL, decode_all, fixture, log, read_all};
+use common::messages::{ALL, decode_all, fixture, log, read_all};
 use std::io::Cursor;
 use std::path::Path;
 use trocar_fuzz::{Allowance, PEAK, Peak, assault, cases};
-use trocar_messages::{Topic, guess, open_reader};
+use trocar_recording::messages::{Topic, find_rgbd_topics, open_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -45,7 +45,7 @@ fn damage_never_panics() {
             direct += usize::from(decode_all(&messages[i.parse::<usize>().unwrap()].0, bytes));
         } else if let Ok(log) = open_reader(Path::new("damaged"), Box::new(Cursor::new(bytes.to_vec()))) {
             decoded += read_all(&*log).1;
-            let _ = guess(&*log, None, None);
+            let _ = find_rgbd_topics(&*log, None, None);
             opened += 1;
         }
     });

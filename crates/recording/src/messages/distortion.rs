@@ -5,7 +5,7 @@
 //! Brown Conrady` takes the tangential part after the radial (`rs2_deproject_pixel_to_point`, `rs2_project_point_to_pixel`);
 //! for these, OpenCV's five coefficients are fitted over the image, in which they are linear.
 
-use crate::error::Parsed;
+use super::error::Parsed;
 use glam::DVec2;
 use trocar_camera::{Camera, Distortion};
 

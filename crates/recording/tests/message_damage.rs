@@ -4,10 +4,10 @@
 
 mod common;
 
-use common::*;
+use common::messages::*;
 use std::io::Cursor;
 use std::path::Path;
-use trocar_messages::{MessageLog, open_reader, realsense};
+use trocar_recording::messages::{MessageLog, open_reader, realsense};
 
 fn bytes(name: &str) -> Vec<u8> {
     std::fs::read(fixture(name)).unwrap()

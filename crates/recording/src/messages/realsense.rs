@@ -12,7 +12,8 @@
 //! stream of its group *into* the stream's own frame (`device::get_extrinsics` of librealsense asks for reference to stream;
 //! `rs2_extrinsics` in the same direction).
 
-use crate::{Topic, Transform};
+use super::topic::Topic;
+use super::transform::Transform;
 use trocar_camera::Pose;
 
 /// Indices of the topics of one depth and one colour stream.

@@ -3,9 +3,9 @@
 //! The latter is a PNG behind twelve bytes: a format number and two `f32`. For `16UC1` the PNG has the units; for `32FC1` it
 //! has inverse depth: depth = a / (value - b) with those two numbers (the package's `codec.cpp`).
 
-use crate::error::Parsed;
-use crate::image::{DepthValues, Image, MAX_SIDE, RawDepth};
-use crate::reader::Reader;
+use super::byte_reader::ByteReader;
+use super::error::Parsed;
+use super::image::{DepthValues, Image, MAX_SIDE, RawDepth};
 use ::image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 use std::io::Cursor;
 use trocar_camera::ColorImage;
@@ -35,9 +35,9 @@ pub(crate) fn decode(format: &str, data: &[u8]) -> Parsed<Image> {
     if format.contains("rvl") {
         return Err("depth compressed with RVL is not known here; record with the png format".into());
     }
-    let mut head = Reader::packed(data);
+    let mut head = ByteReader::packed(data);
     let (_format, a, b) = (head.u32()?, head.f32()?, head.f32()?);
-    let DynamicImage::ImageLuma16(image) = unpack(head.take(head.left())?)? else {
+    let DynamicImage::ImageLuma16(image) = unpack(head.take(head.remaining())?)? else {
         return Err("the compressed depth is no 16-bit greyscale PNG".into());
     };
     let (width, height) = (image.width() as usize, image.height() as usize);

@@ -1,11 +1,11 @@
-//! A log file as both formats share it: chunks, and where in them each topic's messages lie.
+//! Builds a [`Log`] while a file is read through.
 
-use crate::chunk::{Chunk, Compression};
-use crate::error::{Error, Parsed, Result};
-use crate::source::Source;
-use crate::{Encoding, Message, MessageLog, Topic};
+use super::byte_source::ByteSource;
+use super::chunk::{Chunk, Compression};
+use super::error::Parsed;
+use super::log::{Connection, Kind, Log, ParseRecord, Record};
+use super::topic::{Encoding, Topic};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
 /// A sentence for each of the first so many problems of a file.
 const MAX_PROBLEMS: usize = 50;
@@ -16,37 +16,6 @@ const MAX_DAMAGES: usize = 200;
 const FREE_GROWTH: u64 = 64 << 20;
 /// ... and up to this many times the file's size: LZ4 cannot shrink more, and no recording does as a whole.
 const MAX_GROWTH: u64 = 256;
-
-/// A record inside a chunk.
-pub(crate) enum Record<'a> {
-    /// A channel of messages.
-    Connection(u32, Connection),
-    /// The name of a message type, by number (MCAP only).
-    Schema(u16, String),
-    /// A message: connection, log time [ns], content.
-    Message(u32, u64, &'a [u8]),
-    /// Anything else.
-    Other,
-}
-
-/// A channel of messages; several may feed one topic.
-#[derive(Clone, Debug)]
-pub(crate) struct Connection {
-    pub topic: String,
-    pub kind: Kind,
-    pub encoding: Encoding,
-}
-
-/// The message type of a connection.
-#[derive(Clone, Debug)]
-pub(crate) enum Kind {
-    Name(String),
-    /// Number of a schema.
-    Schema(u16),
-}
-
-/// Parses the record at the start of some bytes of a chunk and gives its length.
-pub(crate) type ParseRecord = fn(&[u8]) -> Parsed<(Record<'_>, usize)>;
 
 /// Where a message lies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -64,8 +33,8 @@ struct Gathered {
 }
 
 /// What is known of a file while it is read through.
-pub(crate) struct Draft {
-    source: Source,
+pub(crate) struct LogBuilder {
+    source: ByteSource,
     parse: ParseRecord,
     chunks: Vec<Chunk>,
     /// Chunks without a usable index.
@@ -79,8 +48,8 @@ pub(crate) struct Draft {
     grown: u64,
 }
 
-impl Draft {
-    pub fn new(source: Source, parse: ParseRecord) -> Self {
+impl LogBuilder {
+    pub fn new(source: ByteSource, parse: ParseRecord) -> Self {
         Self {
             source,
             parse,
@@ -95,7 +64,7 @@ impl Draft {
         }
     }
 
-    pub fn source(&self) -> &Source {
+    pub fn source(&self) -> &ByteSource {
         &self.source
     }
 
@@ -272,109 +241,4 @@ pub(crate) fn next_after(places: &[u64], at: u64) -> Option<u64> {
 /// One form for a type's name: ROS 2 says `sensor_msgs/msg/Image`, ROS 1 `sensor_msgs/Image`.
 fn normalised(kind: &str) -> String {
     kind.replacen("/msg/", "/", 1)
-}
-
-/// An open log file.
-pub(crate) struct Log {
-    source: Source,
-    parse: ParseRecord,
-    chunks: Vec<Chunk>,
-    topics: Vec<Topic>,
-    times: Vec<Vec<u64>>,
-    /// A topic's messages: chunk, offset in it.
-    places: Vec<Vec<(u32, u32)>>,
-    /// The connections that feed a topic, ascending.
-    connections: Vec<Vec<u32>>,
-    problems: Vec<String>,
-}
-
-impl MessageLog for Log {
-    fn path(&self) -> &Path {
-        self.source.path()
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
-    }
-
-    fn times(&self, topic: usize) -> &[u64] {
-        self.times.get(topic).map_or(&[], Vec::as_slice)
-    }
-
-    fn messages<'a>(&'a self, wanted: &[(usize, usize)]) -> Box<dyn Iterator<Item = Message> + Send + 'a> {
-        // What is not there comes last, as an error.
-        let place = |&(topic, index): &(usize, usize)| -> Option<(u32, u32)> {
-            self.places.get(topic).and_then(|places| places.get(index)).copied()
-        };
-        let mut wanted: Vec<_> = wanted.iter().map(|w| (place(w).unwrap_or((u32::MAX, u32::MAX)), w.0, w.1)).collect();
-        wanted.sort_unstable();
-        Box::new(Messages { log: self, wanted: wanted.into_iter(), loaded: None })
-    }
-
-    fn problems(&self) -> &[String] {
-        &self.problems
-    }
-}
-
-/// Messages in the order of the file, one chunk in memory at a time.
-struct Messages<'a> {
-    log: &'a Log,
-    wanted: std::vec::IntoIter<((u32, u32), usize, usize)>,
-    loaded: Option<(u32, Parsed<Vec<u8>>)>,
-}
-
-impl Messages<'_> {
-    fn read(&mut self, (chunk, offset): (u32, u32), topic: usize) -> Parsed<Vec<u8>> {
-        let place = self.log.chunks.get(chunk as usize).ok_or("there is no such message")?;
-        if self.loaded.as_ref().is_none_or(|(c, _)| *c != chunk) {
-            // The old chunk's memory goes back before the new one's is taken.
-            self.loaded = None;
-            self.loaded = Some((chunk, place.load(&self.log.source)));
-        }
-        let bytes = match &self.loaded {
-            Some((_, Ok(bytes))) => bytes,
-            Some((_, Err(reason))) => return Err(reason.clone()),
-            None => return Err("the chunk is not there".into()),
-        };
-        let misplaced =
-            || format!("the index points to byte {offset} of chunk {chunk}, where there is no such message");
-        let record = bytes.get(offset as usize..).ok_or_else(misplaced)?;
-        match (self.log.parse)(record)?.0 {
-            Record::Message(connection, _, content)
-                if self.log.connections[topic].binary_search(&connection).is_ok() =>
-            {
-                Ok(content.to_vec())
-            }
-            _ => Err(misplaced()),
-        }
-    }
-}
-
-impl Iterator for Messages<'_> {
-    type Item = Message;
-
-    fn next(&mut self) -> Option<Message> {
-        let (place, topic, index) = self.wanted.next()?;
-        let bytes = self.read(place, topic).map_err(|reason| Error::Lost {
-            path: self.log.path().to_owned(),
-            topic: self.log.topics.get(topic).map_or_else(|| topic.to_string(), |t| t.name.clone()),
-            index,
-            reason,
-        });
-        Some(Message { topic, index, bytes })
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        self.wanted.size_hint()
-    }
-}
-
-/// The one message wanted.
-///
-/// # Errors
-/// As for [`Message::bytes`].
-pub fn read_one(log: &dyn MessageLog, topic: usize, index: usize) -> Result<Vec<u8>> {
-    let missing =
-        || Error::Choice { path: log.path().to_owned(), reason: format!("topic {topic} has no message {index}") };
-    log.messages(&[(topic, index)]).next().ok_or_else(missing)?.bytes
 }

@@ -3,9 +3,7 @@
 //! Encodings are those of `sensor_msgs/image_encodings.h`, foxglove's and librealsense's names for the same; depth as in ROS
 //! REP 118. YCbCr is BT.601 with limited range, as OpenCV and librealsense convert it.
 
-use crate::error::{Parsed, Result};
-use crate::ros::{self, fields, of_topic, unknown};
-use crate::{Encoding, Topic, compressed, foxglove};
+use super::error::Parsed;
 use std::borrow::Cow;
 use trocar_camera::{ColorImage, DepthImage};
 
@@ -76,6 +74,8 @@ pub(crate) struct Raw<'a> {
     /// Bytes from row to row.
     pub step: u32,
     pub data: Cow<'a, [u8]>,
+    /// Metres a unit of depth, which newer librealsense writes behind the data.
+    pub depth_unit: Option<f32>,
 }
 
 /// A compressed image before it is unpacked.
@@ -84,62 +84,6 @@ pub(crate) struct Packed<'a> {
     pub frame: String,
     pub format: String,
     pub data: Cow<'a, [u8]>,
-}
-
-/// Decodes an image: `sensor_msgs/Image` or `CompressedImage` (ROS 1, ROS 2), `foxglove.RawImage` or `CompressedImage`
-/// (protobuf, JSON).
-///
-/// # Errors
-/// [`Error::Message`](crate::Error::Message) for another type, an unknown pixel encoding or compression, more than 16384
-/// pixels on a side, or data that do not fit the size.
-pub fn decode_image(topic: &Topic, bytes: &[u8]) -> Result<StampedImage> {
-    let parsed = match (topic.kind.as_str(), &topic.encoding) {
-        ("sensor_msgs/Image", _) => from_ros(topic, bytes),
-        ("sensor_msgs/CompressedImage", _) => packed_from_ros(topic, bytes).and_then(|p| unpacked(&p)),
-        ("foxglove.RawImage", Encoding::Protobuf) => foxglove::raw_image(bytes).and_then(|r| plain(&r)),
-        ("foxglove.RawImage", Encoding::Json) => foxglove::raw_image_json(bytes).and_then(|r| plain(&r)),
-        ("foxglove.CompressedImage", Encoding::Protobuf) => {
-            foxglove::compressed_image(bytes).and_then(|p| unpacked(&p))
-        }
-        ("foxglove.CompressedImage", Encoding::Json) => {
-            foxglove::compressed_image_json(bytes).and_then(|p| unpacked(&p))
-        }
-        _ => Err(unknown(topic)),
-    };
-    of_topic(topic, parsed)
-}
-
-fn from_ros(topic: &Topic, bytes: &[u8]) -> Parsed<StampedImage> {
-    let mut f = fields(topic, bytes)?;
-    let header = ros::header(topic, &mut f)?;
-    let (height, width) = (f.u32()?, f.u32()?);
-    let encoding = f.text()?.to_owned();
-    let (big_endian, step) = (f.u8()? != 0, f.u32()?);
-    let data = Cow::Borrowed(f.counted()?);
-    let mut image =
-        plain(&Raw { stamp: header.stamp, frame: header.frame, width, height, encoding, big_endian, step, data })?;
-    // Newer librealsense: version "1" in place of the frame's name, then the unit behind the data.
-    if topic.encoding == Encoding::Ros1 && image.frame == "1" && matches!(image.image, Image::Depth(_)) && f.left() == 4
-    {
-        image.depth_unit = Some(f.f32()?).filter(|u| u.is_finite() && *u > 0.0);
-    }
-    Ok(image)
-}
-
-fn packed_from_ros<'a>(topic: &Topic, bytes: &'a [u8]) -> Parsed<Packed<'a>> {
-    let mut f = fields(topic, bytes)?;
-    let header = ros::header(topic, &mut f)?;
-    let format = f.text()?.to_owned();
-    Ok(Packed { stamp: header.stamp, frame: header.frame, format, data: Cow::Borrowed(f.counted()?) })
-}
-
-fn unpacked(packed: &Packed<'_>) -> Parsed<StampedImage> {
-    let image = compressed::decode(&packed.format, &packed.data)?;
-    Ok(StampedImage { stamp: packed.stamp, frame: packed.frame.clone(), image, depth_unit: None })
-}
-
-fn plain(raw: &Raw<'_>) -> Parsed<StampedImage> {
-    Ok(StampedImage { stamp: raw.stamp, frame: raw.frame.clone(), image: pixels(raw)?, depth_unit: None })
 }
 
 /// Names of pixel encodings and their bytes a pixel.
@@ -170,7 +114,7 @@ enum Layout {
 }
 
 /// The pixels of an uncompressed image.
-fn pixels(raw: &Raw<'_>) -> Parsed<Image> {
+pub(crate) fn pixels(raw: &Raw<'_>) -> Parsed<Image> {
     let Raw { width, height, step, .. } = *raw;
     let Some((layout, pixel_len)) = layout(&raw.encoding) else {
         return Err(format!(

@@ -1,7 +1,7 @@
 //! A chunk: the unit in which both formats compress and write messages.
 
-use crate::error::Parsed;
-use crate::source::Source;
+use super::byte_source::ByteSource;
+use super::error::Parsed;
 use std::io::Read;
 
 /// A chunk larger than this is refused; recorders write chunks of about a megabyte, or one message.
@@ -38,7 +38,7 @@ pub(crate) struct Chunk {
 
 impl Chunk {
     /// The chunk's content, decompressed and checked.
-    pub fn load(&self, source: &Source) -> Parsed<Vec<u8>> {
+    pub fn load(&self, source: &ByteSource) -> Parsed<Vec<u8>> {
         let size = self.size.unwrap_or(self.len);
         if size.max(self.len) > MAX_CHUNK {
             return Err(format!("a chunk of {size} bytes; at most {MAX_CHUNK} are read"));

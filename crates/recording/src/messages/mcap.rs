@@ -4,12 +4,13 @@
 //! indices of its messages, one a channel; at the end is a summary. As with bags, the file is walked from chunk to chunk, and
 //! the summary is only needed for the channels and to go on behind damage.
 
-use crate::Encoding;
-use crate::chunk::{Chunk, Compression};
-use crate::error::Parsed;
-use crate::log::{Connection, Draft, Kind, Log, Record, next_after};
-use crate::reader::Reader;
-use crate::source::Source;
+use super::byte_reader::ByteReader;
+use super::byte_source::ByteSource;
+use super::chunk::{Chunk, Compression};
+use super::error::Parsed;
+use super::log::{Connection, Kind, Log, Record};
+use super::log_builder::{LogBuilder, next_after};
+use super::topic::Encoding;
 
 /// First bytes of the file, and the last.
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
@@ -34,7 +35,7 @@ const NAMES: u64 = 1 << 16;
 
 /// Parses the record at the start of a chunk's content.
 fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
-    let mut reader = Reader::packed(bytes);
+    let mut reader = ByteReader::packed(bytes);
     let kind = reader.u8()?;
     let len = reader.u64()?;
     let content = reader.take(usize::try_from(len).unwrap_or(usize::MAX))?;
@@ -43,7 +44,7 @@ fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
 
 /// A record's content as far as it matters inside a chunk.
 fn record(kind: u8, content: &[u8]) -> Parsed<Record<'_>> {
-    let mut reader = Reader::packed(content);
+    let mut reader = ByteReader::packed(content);
     Ok(match kind {
         SCHEMA => Record::Schema(reader.u16()?, reader.text()?.to_owned()),
         CHANNEL => {
@@ -61,54 +62,54 @@ fn record(kind: u8, content: &[u8]) -> Parsed<Record<'_>> {
         MESSAGE => {
             let channel = reader.u16()?;
             let (_sequence, log_time, _publish_time) = (reader.u32()?, reader.u64()?, reader.u64()?);
-            Record::Message(channel.into(), log_time, reader.take(reader.left())?)
+            Record::Message(channel.into(), log_time, reader.take(reader.remaining())?)
         }
         _ => Record::Other,
     })
 }
 
 /// Kind, first byte and length of the content of the record at `at`.
-fn walk(source: &Source, at: u64) -> Parsed<(u8, u64, u64)> {
+fn walk(source: &ByteSource, at: u64) -> Parsed<(u8, u64, u64)> {
     let bytes = source.read(at, RECORD_HEADER)?;
-    let mut reader = Reader::packed(&bytes);
+    let mut reader = ByteReader::packed(&bytes);
     Ok((reader.u8()?, at + RECORD_HEADER, reader.u64()?))
 }
 
 /// Opens an MCAP file.
-pub(crate) fn open(source: Source) -> Log {
-    let mut draft = Draft::new(source, parse);
-    let len = draft.source().len();
+pub(crate) fn open(source: ByteSource) -> Log {
+    let mut log = LogBuilder::new(source, parse);
+    let len = log.source().len();
     let mut chunk_ats = Vec::new();
-    match summary_at(draft.source()) {
+    match summary_at(log.source()) {
         Ok(0) => {}
         Ok(at) => {
-            if let Err(reason) = read_summary(&mut draft, at, &mut chunk_ats) {
-                draft.problem(format!("the summary at byte {at} is damaged: {reason}"));
+            if let Err(reason) = read_summary(&mut log, at, &mut chunk_ats) {
+                log.problem(format!("the summary at byte {at} is damaged: {reason}"));
             }
         }
-        Err(reason) => draft.problem(reason),
+        Err(reason) => log.problem(reason),
     }
     chunk_ats.sort_unstable();
     let mut at = MAGIC.len() as u64;
     while at < len {
-        match step(&mut draft, at, &chunk_ats) {
+        match step(&mut log, at, &chunk_ats) {
             Ok(Some(next)) => at = next,
             Ok(None) => break,
-            Err(reason) => match draft.damage(at, len, &reason, &chunk_ats) {
+            Err(reason) => match log.damage(at, len, &reason, &chunk_ats) {
                 Some(resume) => at = resume,
                 None => break,
             },
         }
     }
-    draft.finish()
+    log.finish()
 }
 
 /// Where the summary begins; 0 when there is none.
-fn summary_at(source: &Source) -> Parsed<u64> {
+fn summary_at(source: &ByteSource) -> Parsed<u64> {
     let missing = || "no footer: the recorder did not finish, or the file was cut".to_string();
     let at = source.len().checked_sub(FILE_END).ok_or_else(missing)?;
     let bytes = source.read(at, FILE_END)?;
-    let mut reader = Reader::packed(&bytes);
+    let mut reader = ByteReader::packed(&bytes);
     if !bytes.ends_with(MAGIC) || reader.u8()? != FOOTER || reader.u64()? != 20 {
         return Err(missing());
     }
@@ -120,18 +121,18 @@ fn summary_at(source: &Source) -> Parsed<u64> {
 }
 
 /// The summary: schemas, channels, and where the chunks are.
-fn read_summary(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Parsed<()> {
+fn read_summary(log: &mut LogBuilder, mut at: u64, chunk_ats: &mut Vec<u64>) -> Parsed<()> {
     loop {
-        let (kind, content_at, content_len) = walk(draft.source(), at)?;
+        let (kind, content_at, content_len) = walk(log.source(), at)?;
         match kind {
             FOOTER => return Ok(()),
             SCHEMA | CHANNEL => {
-                let content = draft.source().up_to(content_at, content_len.min(NAMES))?;
-                draft.record(record(kind, &content)?);
+                let content = log.source().up_to(content_at, content_len.min(NAMES))?;
+                log.record(record(kind, &content)?);
             }
             CHUNK_INDEX => {
-                let content = draft.source().read(content_at, content_len)?;
-                let mut reader = Reader::packed(&content);
+                let content = log.source().read(content_at, content_len)?;
+                let mut reader = ByteReader::packed(&content);
                 let (_start, _end) = (reader.u64()?, reader.u64()?);
                 chunk_ats.push(reader.u64()?);
             }
@@ -142,16 +143,16 @@ fn read_summary(draft: &mut Draft, mut at: u64, chunk_ats: &mut Vec<u64>) -> Par
 }
 
 /// Takes in the record at `at` and gives the place of the next; `None` after the last with messages.
-fn step(draft: &mut Draft, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>> {
-    let (kind, content_at, content_len) = walk(draft.source(), at)?;
-    let len = draft.source().len();
+fn step(log: &mut LogBuilder, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>> {
+    let (kind, content_at, content_len) = walk(log.source(), at)?;
+    let len = log.source().len();
     let end = content_at.checked_add(content_len).filter(|&end| end <= len);
     match kind {
         0 => return Err("a record of kind 0".into()),
         DATA_END | FOOTER => return Ok(None),
         CHUNK => {
-            let bytes = draft.source().up_to(content_at, CHUNK_HEADER)?;
-            let mut reader = Reader::packed(&bytes);
+            let bytes = log.source().up_to(content_at, CHUNK_HEADER)?;
+            let mut reader = ByteReader::packed(&bytes);
             let (_start, _end, size, crc) = (reader.u64()?, reader.u64()?, reader.u64()?, reader.u32()?);
             let compression = match reader.text()? {
                 "" => Compression::None,
@@ -165,12 +166,12 @@ fn step(draft: &mut Draft, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>> {
             let Some(end) = whole else {
                 // The chunk was cut, or its length is damaged. What is there can be used if it is not compressed.
                 if compression == Compression::None {
-                    draft.cut_chunk(chunk_at, next_after(chunk_ats, at).unwrap_or(len));
+                    log.cut_chunk(chunk_at, next_after(chunk_ats, at).unwrap_or(len));
                 }
                 return Err(format!("a chunk there says that its {records_len} bytes begin at byte {chunk_at}"));
             };
             let size = (compression != Compression::None).then_some(size);
-            draft.chunk(Chunk { at: chunk_at, len: records_len, size, compression, crc });
+            log.chunk(Chunk { at: chunk_at, len: records_len, size, compression, crc });
             return Ok(Some(end));
         }
         _ => {}
@@ -178,29 +179,29 @@ fn step(draft: &mut Draft, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>> {
     let end = end.ok_or_else(|| format!("a record there says that it is {content_len} bytes long"))?;
     match kind {
         MESSAGE_INDEX => {
-            let content = draft.source().read(content_at, content_len)?;
-            let mut reader = Reader::packed(&content);
+            let content = log.source().read(content_at, content_len)?;
+            let mut reader = ByteReader::packed(&content);
             let channel = reader.u16()?;
-            let mut reader = Reader::packed(reader.counted()?);
-            let mut entries = Vec::with_capacity(reader.left() / 16);
-            while reader.left() > 0 {
+            let mut reader = ByteReader::packed(reader.counted()?);
+            let mut entries = Vec::with_capacity(reader.remaining() / 16);
+            while reader.remaining() > 0 {
                 let time = reader.u64()?;
                 let offset = reader.u64()?;
                 let offset =
                     u32::try_from(offset).map_err(|_| format!("an index points to byte {offset} of a chunk"))?;
                 entries.push((time, offset));
             }
-            draft.index(channel.into(), &entries)?;
+            log.index(channel.into(), &entries)?;
         }
         SCHEMA | CHANNEL => {
-            let content = draft.source().up_to(content_at, content_len.min(NAMES))?;
-            draft.record(record(kind, &content)?);
+            let content = log.source().up_to(content_at, content_len.min(NAMES))?;
+            log.record(record(kind, &content)?);
         }
         MESSAGE => {
-            let head = draft.source().read(content_at, content_len.min(22))?;
+            let head = log.source().read(content_at, content_len.min(22))?;
             if let Record::Message(channel, time, _) = record(kind, &head)? {
-                draft.chunk(Chunk { at, len: end - at, size: None, compression: Compression::None, crc: 0 });
-                draft.index(channel, &[(time, 0)])?;
+                log.chunk(Chunk { at, len: end - at, size: None, compression: Compression::None, crc: 0 });
+                log.index(channel, &[(time, 0)])?;
             }
         }
         _ => {}

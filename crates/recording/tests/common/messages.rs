@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a helper of tests")]
 
 use std::path::{Path, PathBuf};
-use trocar_messages::{
+use trocar_recording::messages::{
     DepthValues, Image, MessageLog, StampedImage, Topic, decode_calibration, decode_float, decode_image,
     decode_transforms, open,
 };

@@ -3,12 +3,11 @@
 //! Protobuf's wire format (<https://protobuf.dev/programming-guides/encoding/>) is a row of numbered fields; the few that
 //! matter are picked out here, without generated code.
 
-use crate::calibration::Intrinsics;
-use crate::error::Parsed;
-use crate::image::{Packed, Raw};
-use crate::reader::Reader;
-use crate::ros::stamp;
-use crate::transform::Transform;
+use super::byte_reader::{ByteReader, stamp};
+use super::calibration::Intrinsics;
+use super::error::Parsed;
+use super::image::{Packed, Raw};
+use super::transform::Transform;
 use base64::Engine;
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -24,8 +23,8 @@ enum Value<'a> {
 /// Calls `visit` with every field of a message: its number, its value. A value of another kind than expected is passed
 /// over, as protobuf asks for unknown fields.
 fn fields<'a>(bytes: &'a [u8], mut visit: impl FnMut(u64, Value<'a>) -> Parsed<()>) -> Parsed<()> {
-    let mut reader = Reader::packed(bytes);
-    while reader.left() > 0 {
+    let mut reader = ByteReader::packed(bytes);
+    while reader.remaining() > 0 {
         let key = varint(&mut reader)?;
         let value = match key & 7 {
             0 => Value::Varint(varint(&mut reader)?),
@@ -42,7 +41,7 @@ fn fields<'a>(bytes: &'a [u8], mut visit: impl FnMut(u64, Value<'a>) -> Parsed<(
     Ok(())
 }
 
-fn varint(reader: &mut Reader<'_>) -> Parsed<u64> {
+fn varint(reader: &mut ByteReader<'_>) -> Parsed<u64> {
     let mut value = 0u64;
     for shift in (0..64).step_by(7) {
         let byte = reader.u8()?;
@@ -83,6 +82,7 @@ pub(crate) fn raw_image(bytes: &[u8]) -> Parsed<Raw<'_>> {
         big_endian: false,
         step: 0,
         data: Cow::Borrowed(&[]),
+        depth_unit: None,
     };
     fields(bytes, |number, value| {
         match (number, value) {
@@ -288,6 +288,7 @@ pub(crate) fn raw_image_json(bytes: &[u8]) -> Parsed<Raw<'static>> {
         big_endian: false,
         step: image.step,
         data: Cow::Owned(data),
+        depth_unit: None,
     })
 }
 

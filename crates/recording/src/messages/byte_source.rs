@@ -1,6 +1,6 @@
 //! The file behind a log: read piece by piece, never mapped and never whole.
 
-use crate::error::{Error, Parsed, Result};
+use super::error::{Error, Parsed, Result};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -11,14 +11,14 @@ pub trait ReadSeek: Read + Seek + Send {}
 impl<T: Read + Seek + Send> ReadSeek for T {}
 
 /// An open file of known length.
-pub(crate) struct Source {
+pub(crate) struct ByteSource {
     path: PathBuf,
     /// The place to read from belongs to the file, so seek and read go together.
     file: Mutex<Box<dyn ReadSeek>>,
     len: u64,
 }
 
-impl Source {
+impl ByteSource {
     pub fn new(path: &Path, mut file: Box<dyn ReadSeek>) -> Result<Self> {
         let len = file
             .seek(SeekFrom::End(0))

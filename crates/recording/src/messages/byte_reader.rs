@@ -3,11 +3,11 @@
 //! Three layouts: packed little-endian (ROS 1 messages, bag and MCAP records), and CDR of either endianness, where a
 //! number of n bytes starts at a multiple of n (OMG CORBA 3.3, part 2, 9.3; the encapsulation header is OMG RTPS 2.5, 10).
 
-use crate::error::Parsed;
+use super::error::Parsed;
 
 /// A place in some bytes.
 #[derive(Clone)]
-pub(crate) struct Reader<'a> {
+pub(crate) struct ByteReader<'a> {
     bytes: &'a [u8],
     at: usize,
     big_endian: bool,
@@ -30,7 +30,7 @@ macro_rules! number {
     };
 }
 
-impl<'a> Reader<'a> {
+impl<'a> ByteReader<'a> {
     /// Packed little-endian: ROS 1 messages and the records of both file formats.
     pub fn packed(bytes: &'a [u8]) -> Self {
         Self { bytes, at: 0, big_endian: false, cdr: false }
@@ -62,14 +62,18 @@ impl<'a> Reader<'a> {
     }
 
     /// Number of bytes that are left.
-    pub fn left(&self) -> usize {
+    pub fn remaining(&self) -> usize {
         self.bytes.len() - self.at
     }
 
     /// The next `count` bytes.
     pub fn take(&mut self, count: usize) -> Parsed<&'a [u8]> {
         let Some(taken) = self.bytes[self.at..].get(..count) else {
-            return Err(format!("cut short: {count} bytes expected at byte {}, {} are left", self.at, self.left()));
+            return Err(format!(
+                "cut short: {count} bytes expected at byte {}, {} are left",
+                self.at,
+                self.remaining()
+            ));
         };
         self.at += count;
         Ok(taken)
@@ -102,13 +106,18 @@ impl<'a> Reader<'a> {
     /// Numbers preceded by their count.
     pub fn counted_f64s(&mut self) -> Parsed<Vec<f64>> {
         let count = self.u32()? as usize;
-        if count > self.left() / 8 {
+        if count > self.remaining() / 8 {
             return Err(format!(
                 "cut short: {count} numbers expected at byte {}, {} bytes are left",
                 self.at,
-                self.left()
+                self.remaining()
             ));
         }
         (0..count).map(|_| self.f64()).collect()
     }
+}
+
+/// Nanoseconds since the epoch.
+pub(crate) fn stamp(seconds: u64, nanoseconds: u64) -> u64 {
+    seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds)
 }
