@@ -7,12 +7,12 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// There is no phantom of that name.
-    #[error("unknown phantom '{name}'; did you mean '{nearest}'? Known: {known}")]
+    #[error("no phantom '{name}'; the phantoms are {known}{hint}", hint = nearest.map(|n| format!("; did you mean '{n}'?")).unwrap_or_default())]
     Unknown {
         /// What was asked for.
         name: String,
-        /// The phantom whose name is most like it.
-        nearest: &'static str,
+        /// The phantom whose name is alike.
+        nearest: Option<&'static str>,
         /// All names.
         known: String,
     },

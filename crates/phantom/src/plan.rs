@@ -76,7 +76,7 @@ impl Plan {
     pub fn named(name: &str) -> Result<&'static Self> {
         let known = || Error::Unknown {
             name: name.to_owned(),
-            nearest: nearest(name, NAMES).unwrap_or_default(),
+            nearest: nearest(name, NAMES),
             known: NAMES.join(", "),
         };
         PLANS.into_iter().find(|p| p.name == name).ok_or_else(known)

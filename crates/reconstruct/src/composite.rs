@@ -1,8 +1,10 @@
 //! The background: per-pixel medians over a window of frames, instruments left out (paper section III, "Instrument
 //! removal").
 
+use crate::error::{Error, Result};
 use crate::masks::instruments;
-use crate::{Error, Result, Settings};
+use crate::motion::moves;
+use crate::settings::Settings;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -31,6 +33,8 @@ pub struct Composite {
     pub coverage: f64,
     /// Median over pixels of the 10th to 90th percentile range of depth [m].
     pub depth_range_median: f64,
+    /// Pixels whose depth changes by more than the sensor's noise.
+    pub moving: Mask,
     /// Hash of the bytes of all used frames.
     pub hash: u64,
     /// Where the time went.
@@ -64,6 +68,18 @@ struct Pixel {
     color: Option<[u8; 3]>,
     /// Median and inter-percentile range, in units of the recording.
     depth: Option<(f64, f64)>,
+    /// Its depth changes by more than the sensor's noise.
+    moving: bool,
+}
+
+/// Room for the samples of one pixel, kept from pixel to pixel.
+#[derive(Default)]
+struct Scratch {
+    /// Red, green, blue, depth; sorted.
+    sorted: [Vec<u16>; 4],
+    /// Depth in the order of time.
+    depths: Vec<u16>,
+    differences: Vec<u16>,
 }
 
 /// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame. Broken frames are left out with a note.
@@ -87,9 +103,9 @@ pub fn composite(
     let needed = settings.min_samples.clamp(1, samples.len());
     let mut pixels = vec![Pixel::default(); width * height];
     pixels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
-        let mut values: [Vec<u16>; 4] = Default::default();
+        let mut scratch = Scratch::default();
         for (column, pixel) in out.iter_mut().enumerate() {
-            *pixel = medians(&samples, row * width + column, needed, &mut values);
+            *pixel = medians(&samples, row * width + column, needed, scale, &mut scratch);
         }
     });
 
@@ -102,6 +118,7 @@ pub fn composite(
     };
     let mut color = ColorImage::new(width, height, [0; 3]);
     let (mut colored, mut depth) = (Mask::new(width, height), DepthImage::new(width, height));
+    let mut moving = Mask::new(width, height);
     let (mut ranges, mut recovered) = (Vec::new(), 0usize);
     for (i, pixel) in pixels.iter().enumerate() {
         if let Some(c) = pixel.color {
@@ -113,6 +130,7 @@ pub fn composite(
             ranges.push(range * scale);
             recovered += usize::from(centre.instruments[i]);
         }
+        moving.set[i] = pixel.moving;
     }
     let all = (width * height) as f64;
     ranges.sort_by(f64::total_cmp);
@@ -126,6 +144,7 @@ pub fn composite(
         recovered_share: recovered as f64 / all,
         coverage: ranges.len() as f64 / all,
         depth_range_median: ranges.get(ranges.len() / 2).copied().unwrap_or(0.0),
+        moving,
         hash: hash.digest(),
         times,
     })
@@ -207,29 +226,40 @@ fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<V
     if settings.stride == 0 {
         return Err(wrong("the window's stride is 0; at least 1".into()));
     }
+    let longest = recording.len().max(Settings::default().window);
+    if settings.window > longest {
+        let reason = format!(
+            "the window is {} frames on each side of its centre; the recording has {} frames in all (--window)",
+            settings.window,
+            recording.len()
+        );
+        return Err(wrong(reason));
+    }
     let first = centre - settings.window.min(centre) / settings.stride * settings.stride;
     let last = centre.saturating_add(settings.window).min(recording.len() - 1);
     Ok((first..=last).step_by(settings.stride).collect())
 }
 
 /// Median over V(u,v): colour over the frames in which the pixel is not masked, depth over those that also measured it.
-fn medians(samples: &[Sample], i: usize, needed: usize, values: &mut [Vec<u16>; 4]) -> Pixel {
-    values.iter_mut().for_each(Vec::clear);
+fn medians(samples: &[Sample], i: usize, needed: usize, scale: f64, scratch: &mut Scratch) -> Pixel {
+    let Scratch { sorted, depths, differences } = scratch;
+    sorted.iter_mut().for_each(Vec::clear);
     for sample in samples.iter().filter(|s| !s.instruments[i]) {
-        for (v, c) in values.iter_mut().zip(sample.color[i]) {
+        for (v, c) in sorted.iter_mut().zip(sample.color[i]) {
             v.push(u16::from(c));
         }
         if sample.depth[i] > 0 {
-            values[3].push(sample.depth[i]);
+            sorted[3].push(sample.depth[i]);
         }
     }
-    values.iter_mut().for_each(|v| v.sort_unstable());
+    depths.clone_from(&sorted[3]);
+    sorted.iter_mut().for_each(|v| v.sort_unstable());
     let enough = |v: &[u16]| v.len() >= needed;
-    let [r, g, b, depth] = values;
-    Pixel {
-        color: enough(r).then(|| [&*r, g, b].map(|v| percentile(v, 0.5).round() as u8)),
-        depth: enough(depth).then(|| (percentile(depth, 0.5), percentile(depth, 0.9) - percentile(depth, 0.1))),
-    }
+    let [r, g, b, depth] = sorted;
+    let color = enough(r).then(|| [&*r, g, b].map(|v| percentile(v, 0.5).round() as u8));
+    let depth = enough(depth).then(|| (percentile(depth, 0.5), percentile(depth, 0.9) - percentile(depth, 0.1)));
+    let moving = depth.is_some_and(|(_, range)| moves(depths, range, scale, differences));
+    Pixel { color, depth, moving }
 }
 
 /// Percentile `p` (0..=1) of sorted values, linear between neighbours.
@@ -259,12 +289,12 @@ mod tests {
             sample(30, 104, false),
             sample(40, 102, false),
         ];
-        let pixel = medians(&samples, 0, 3, &mut Default::default());
+        let pixel = medians(&samples, 0, 3, 1e-3, &mut Scratch::default());
         assert_eq!(pixel.color, Some([25; 3]));
         let (median, range) = pixel.depth.unwrap();
         assert_eq!(median, 102.0);
         assert!((range - 3.2).abs() < 1e-12);
-        assert!(medians(&samples, 0, 4, &mut Default::default()).depth.is_none());
-        assert!(medians(&samples, 0, 4, &mut Default::default()).color.is_some());
+        assert!(medians(&samples, 0, 4, 1e-3, &mut Scratch::default()).depth.is_none());
+        assert!(medians(&samples, 0, 4, 1e-3, &mut Scratch::default()).color.is_some());
     }
 }

@@ -16,6 +16,7 @@ mod fill;
 mod from_surface;
 mod front;
 mod masks;
+mod motion;
 mod organ;
 mod outline;
 mod pipeline;

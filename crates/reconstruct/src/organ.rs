@@ -161,6 +161,7 @@ mod tests {
             recovered_share: 0.0,
             coverage: 1.0,
             depth_range_median: 0.0,
+            moving: Mask::new(w, h),
             hash: 0,
             times: CompositeTimes::default(),
         };

@@ -3,6 +3,7 @@
 use crate::body::fill_with_tets;
 use crate::composite::{Composite, CompositeTimes, composite};
 use crate::masks::OrganSegmenters;
+use crate::motion::WARN_SHARE;
 use crate::organ::{Closed, View, close};
 use crate::{Error, Result, Settings};
 use trocar_camera::{ColorImage, DepthImage, Mask};
@@ -23,6 +24,8 @@ pub struct OrganView {
     pub depth_error: Vec<f32>,
     /// Which pixels were compared.
     pub compared: Mask,
+    /// Share of its pixels with depth that move during the window.
+    pub moving_share: f64,
 }
 
 /// A specimen and what was seen on the way to it.
@@ -50,6 +53,8 @@ pub struct Reconstruction {
     pub times: CompositeTimes,
     /// Per organ, in the specimen's order.
     pub organs: Vec<OrganView>,
+    /// What makes the result doubtful (organs that move during the window), a sentence each.
+    pub warnings: Vec<String>,
     /// Things the user should know (dropped frames, filled holes, clipped organs), a sentence each.
     pub notes: Vec<String>,
 }
@@ -93,7 +98,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         let made = if progress.interrupted() {
             Err(Error::Interrupted)
         } else {
-            close(info, mask, &view, &mut notes).and_then(|closed| with_body(info, closed, settings))
+            close(info, mask, &view, &mut notes).and_then(|closed| with_body(info, closed, &background, settings))
         };
         match made {
             Ok((organ, view)) => {
@@ -134,21 +139,52 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         coverage: background.coverage,
         depth_range_median: background.depth_range_median,
         times: background.times,
+        warnings: motion_warning(&views, settings.window).into_iter().collect(),
         organs: views,
         notes,
     })
 }
 
 /// The organ and what was seen of it, from its closed surface.
-fn with_body(info: &OrganInfo, closed: Closed, settings: &Settings) -> Result<(Organ, OrganView)> {
+fn with_body(
+    info: &OrganInfo,
+    closed: Closed,
+    background: &Composite,
+    settings: &Settings,
+) -> Result<(Organ, OrganView)> {
     let Closed { surface, mask, base, check } = closed;
+    let moving_share = moving_share(&mask, background);
     let (body, mut facts) = fill_with_tets(&info.name, &surface, settings)?;
     facts.depth_error_median_mm = Some(1e3 * check.median_absolute);
     facts.depth_error_signed_mm = Some(1e3 * check.median_signed);
     facts.covered = Some(check.covered);
     let name = info.name.clone();
-    let view = OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared };
+    let view = OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared, moving_share };
     Ok((Organ { name, body, surface, material: info.material, pins: info.pins, base, facts }, view))
+}
+
+/// Share of the pixels of `mask` with depth that move.
+fn moving_share(mask: &Mask, background: &Composite) -> f64 {
+    let measured = |i: &usize| mask.set[*i] && background.depth.depth[*i] > 0.0;
+    let measured: Vec<usize> = (0..mask.set.len()).filter(measured).collect();
+    let moving = measured.iter().filter(|i| background.moving.set[**i]).count();
+    moving as f64 / measured.len().max(1) as f64
+}
+
+/// A sentence for the organs that move, and what to do about it.
+fn motion_warning(views: &[OrganView], window: usize) -> Option<String> {
+    let moving: Vec<String> = views
+        .iter()
+        .filter(|v| v.moving_share > WARN_SHARE)
+        .map(|v| format!("{} ({:.0}% of its pixels)", v.name, 100.0 * v.moving_share))
+        .collect();
+    (!moving.is_empty()).then(|| {
+        format!(
+            "Tissue moves during the window: {}. A composite blurs what moves, and the shapes below are wrong there. \
+             Choose frames in which it is still: --centre FRAME and a --window below {window}.",
+            moving.join(", ")
+        )
+    })
 }
 
 /// Hash of everything the result depends on: what is known of the recording, the used frames, the masks.

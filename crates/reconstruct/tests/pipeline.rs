@@ -4,7 +4,8 @@
 #[path = "../../recording/tests/common/mod.rs"]
 mod common;
 
-use common::{CENTRE, RADIUS, info, write};
+use common::{CENTRE, RADIUS, info, write, write_moving};
+use glam::DVec3;
 use std::path::Path;
 use trocar_geometry::io::Unit;
 use trocar_progress::{Silent, StopAfter};
@@ -27,6 +28,7 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     assert_eq!(made.coverage, 1.0);
     assert_eq!(made.recovered_share, 0.125);
     assert_eq!(made.depth_range_median, 0.0);
+    assert_eq!((made.warnings.len(), made.organs[0].moving_share), (0, 0.0));
     for (z, truth) in made.depth.depth.iter().zip(&depth.depth) {
         assert!((z - truth).abs() <= 0.5001e-3);
     }
@@ -58,6 +60,32 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     assert_eq!(again.specimen.provenance, made.specimen.provenance);
 }
 
+/// An organ that is lifted, swings or breathes during the window gets a warning that names it and
+/// `--window`; a window in which it is still gets none.
+#[test]
+fn an_organ_that_moves_is_warned_of() {
+    let root = tempfile::tempdir().unwrap();
+    let dir = root.path().join("recording");
+    let lifted = |f: usize| CENTRE - DVec3::Z * if f < 40 { 0.0 } else { 0.006 };
+    let swinging = |f: usize| CENTRE + DVec3::X * 0.008 * (0.1 * f as f64).sin();
+    let breathing = |f: usize| CENTRE + DVec3::Z * 0.004 * (0.2 * f as f64).sin();
+    let ways: [(&str, &dyn Fn(usize) -> DVec3); 3] =
+        [("lifted", &lifted), ("swinging", &swinging), ("breathing", &breathing)];
+    for (way, centre) in ways {
+        write_moving(&dir, &info(), 80, centre);
+        let recording = Recording::open(&dir).unwrap();
+        let made = reconstruct(&recording, &Settings::default(), &Silent).unwrap();
+        println!("{way}: {:.2} of the pixels move", made.organs[0].moving_share);
+        let [warning] = &made.warnings[..] else { panic!("{way}: {:?}", made.warnings) };
+        assert!(warning.contains("ball") && warning.contains("--window below 90"), "{warning}");
+    }
+    write_moving(&dir, &info(), 80, lifted);
+    let recording = Recording::open(&dir).unwrap();
+    let still = Settings { centre: Some(20), window: 18, ..Settings::default() };
+    let made = reconstruct(&recording, &still, &Silent).unwrap();
+    assert_eq!((made.warnings.len(), made.organs[0].moving_share), (0, 0.0));
+}
+
 #[test]
 fn stops_when_asked_and_says_what_is_wrong() {
     let root = tempfile::tempdir().unwrap();
@@ -72,6 +100,9 @@ fn stops_when_asked_and_says_what_is_wrong() {
     assert!(failure(Settings { centre: Some(4), ..Settings::default() }).contains("frame 4; the recording has 4"));
     assert!(failure(Settings { stride: 0, ..Settings::default() }).contains("stride is 0"));
     assert!(failure(Settings { finest_cell: 0.0, ..Settings::default() }).contains("finest cell is 0 mm"));
+
+    let failed = failure(Settings { window: 99_999_999_999_999, ..Settings::default() });
+    assert!(failed.contains("the window is 99999999999999 frames") && failed.contains("has 4 frames"), "{failed}");
 
     // An organ where no depth was measured.
     let mut blind = info();

@@ -85,12 +85,15 @@ fn suggestion(message: &str) -> String {
     }
 }
 
-/// The one of `known` most like `given`; the first of equals. `None` without any.
+/// Likeness (Jaro-Winkler, in [0, 1]) below which a name is not suggested.
+const MIN_LIKENESS: f64 = 0.8;
+
+/// The one of `known` most like `given`; the first of equals. `None` where none is alike.
 pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let mut best: Option<(f64, &str)> = None;
     for candidate in known {
         let score = strsim::jaro_winkler(given, candidate);
-        if best.is_none_or(|(s, _)| score > s) {
+        if score >= MIN_LIKENESS && best.is_none_or(|(s, _)| score > s) {
             best = Some((score, candidate));
         }
     }
@@ -141,6 +144,23 @@ mod tests {
         }
         assert_eq!(line_of(text, "absent.a"), None);
         assert_eq!(line_of("= 1", "a"), None);
+    }
+
+    #[test]
+    fn only_names_that_are_alike_are_suggested() {
+        let likeness = [
+            ("apendix", "appendix"),
+            ("lft", "left"),
+            ("colour_topic", "color_topic"),
+            ("depth_scale", "depth_scale_m"),
+            ("phantom-q", "phantom-a"),
+        ];
+        for (given, known) in likeness {
+            assert_eq!(nearest(given, ["tube", known]), Some(known));
+        }
+        for (given, known) in [("appendix", "tube"), ("middle", "right"), ("scissors", "cutter"), ("fps", "rate_hz")] {
+            assert_eq!(nearest(given, [known]), None, "{given}");
+        }
     }
 
     #[test]

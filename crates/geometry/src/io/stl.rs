@@ -42,12 +42,18 @@ fn collect(bytes: &[u8]) -> Parsed<TriMesh> {
     let facets = stl_io::create_stl_reader(&mut cursor).map_err(|e| e.to_string())?;
     let mut mesh = TriMesh::default();
     for (f, facet) in facets.enumerate() {
-        let facet = facet.map_err(|e| format!("facet {f}: {e}"))?;
+        let facet = facet.map_err(|e| format!("facet {f}: {}", plain(&e.to_string())))?;
         let first = u32::try_from(mesh.vertices.len()).map_err(|_| "too many facets".to_string())?;
         mesh.vertices.extend(facet.vertices.map(|v| DVec3::from_array(v.0.map(f64::from))));
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     Ok(mesh)
+}
+
+/// The reader's message about a number in plain words.
+fn plain(message: &str) -> String {
+    let not_finite = message.strip_prefix("expected finite f32, got ").and_then(|rest| rest.split_whitespace().next());
+    not_finite.map_or_else(|| message.to_owned(), |value| format!("a coordinate is {value}; it must be a finite number"))
 }
 
 #[cfg(test)]
