@@ -44,7 +44,8 @@ fn fill(surface: &TriMesh, settings: &Settings) -> trocar_geometry::Result<TetMe
     }
 }
 
-/// The surface with triangles of about `size` [m]: TetGen keeps those it is given, and ours are as fine as the pixels.
+/// The surface with triangles of about `size` [m]: TetGen keeps those it is given, and ours are as
+/// fine as the pixels.
 fn with_edges_of(size: f64, surface: &TriMesh) -> trocar_geometry::Result<TriMesh> {
     let bounds = surface.bounds().ok_or_else(|| trocar_geometry::Error::Mesh("the surface is empty".into()))?;
     let grid = sample_distance(&MeshDistance::new(surface)?, bounds, size);

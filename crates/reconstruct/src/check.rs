@@ -18,7 +18,8 @@ pub struct DepthCheck {
     pub covered: f64,
 }
 
-/// Renders `surface` through `camera` and compares it with `measured` inside `mask`. `None` without a pixel to compare.
+/// Renders `surface` through `camera` and compares it with `measured` inside `mask`. `None` without
+/// a pixel to compare.
 pub fn check(surface: &TriMesh, measured: &DepthImage, mask: &Mask, camera: &Camera) -> Option<DepthCheck> {
     let rendered = render_depth(surface, camera);
     let mut error = vec![0.0; rendered.len()];
@@ -41,8 +42,9 @@ pub fn check(surface: &TriMesh, measured: &DepthImage, mask: &Mask, camera: &Cam
     Some(DepthCheck { error, compared, median_absolute, median_signed: median(signed)?, covered })
 }
 
-/// Depth of the nearest surface at each pixel's centre [m]; infinite where there is none. Triangles are small against the
-/// lens, so they are drawn straight between their projected corners; 1/z is linear on the image.
+/// Depth of the nearest surface at each pixel's centre [m]; infinite where there is none. Triangles
+/// are small against the lens, so they are drawn straight between their projected corners; 1/z is
+/// linear on the image.
 fn render_depth(surface: &TriMesh, camera: &Camera) -> Vec<f64> {
     let (w, h) = (camera.width, camera.height);
     let mut depth = vec![f64::INFINITY; w * h];

@@ -8,15 +8,17 @@
 //!        back    z_front + h
 //! ```
 //!
-//! The mask is triangulated by marching squares over pixel centres, once for the front and once, turned, for the back. Each
-//! rim vertex lies midway between a pixel inside and one outside, so the outline has no half-pixel bias, and belongs to
-//! both sheets, so the surface closes. Along every ray the back is behind the front: the surface cannot cross itself.
+//! The mask is triangulated by marching squares over pixel centres, once for the front and once,
+//! turned, for the back. Each rim vertex lies midway between a pixel inside and one outside, so the
+//! outline has no half-pixel bias, and belongs to both sheets, so the surface closes. Along every
+//! ray the back is behind the front: the surface cannot cross itself.
 
 use std::collections::BTreeMap;
 use trocar_camera::{Camera, Mask};
 use trocar_geometry::TriMesh;
 
-/// A closed outward surface at the resolution of the pixels, camera frame [m]. `h` is the thickness along z behind `front`.
+/// A closed outward surface at the resolution of the pixels, camera frame [m]. `h` is the thickness
+/// along z behind `front`.
 pub fn closed_surface(front: &[f64], h: &[f64], mask: &Mask, camera: &Camera) -> TriMesh {
     let (w, height) = (mask.width as i64, mask.height as i64);
     let pixel = |u: i64, v: i64| -> Option<usize> {
@@ -35,7 +37,8 @@ pub fn closed_surface(front: &[f64], h: &[f64], mask: &Mask, camera: &Camera) ->
     let mut rim: BTreeMap<(i64, i64), u32> = BTreeMap::new();
     for v in -1..height {
         for u in -1..w {
-            // Around the cell, clockwise on the image, so that the polygon faces the camera (towards -z).
+            // Around the cell, clockwise on the image, so that the polygon faces the camera
+            // (towards -z).
             let corners = [(u, v), (u, v + 1), (u + 1, v + 1), (u + 1, v)];
             let inside = corners.map(|(u, v)| pixel(u, v));
             for polygon in polygons(inside.map(|c| c.is_some())) {
@@ -66,8 +69,8 @@ pub fn closed_surface(front: &[f64], h: &[f64], mask: &Mask, camera: &Camera) ->
     mesh
 }
 
-/// The polygons of a marching-squares cell: even numbers 2 k are corner k, odd ones the middle of the edge after it. Two
-/// corners across from each other stay apart.
+/// The polygons of a marching-squares cell: even numbers 2 k are corner k, odd ones the middle of
+/// the edge after it. Two corners across from each other stay apart.
 fn polygons(inside: [bool; 4]) -> Vec<Vec<usize>> {
     let count = inside.iter().filter(|i| **i).count();
     let diagonal = count == 2 && inside[0] == inside[2];
@@ -87,7 +90,8 @@ fn polygons(inside: [bool; 4]) -> Vec<Vec<usize>> {
             polygon.push(2 * k + 1);
         }
     }
-    // Every triangle of this polygon's fan has a corner: none is all rim, which would lie in both sheets.
+    // Every triangle of this polygon's fan has a corner: none is all rim, which would lie in both
+    // sheets.
     vec![polygon]
 }
 
@@ -131,9 +135,9 @@ mod tests {
         (front, mask)
     }
 
-    /// Volume made / true volume of a sphere and of a long cylinder across the view. The paper's R = P99.5(d) is 7% below
-    /// the radius of a disc (0.5% of its area lies within 7% of its centre) and with it a sphere 8% too small; along a
-    /// cylinder it is the radius.
+    /// Volume made / true volume of a sphere and of a long cylinder across the view. The paper's R
+    /// = P99.5(d) is 7% below the radius of a disc (0.5% of its area lies within 7% of its centre)
+    /// and with it a sphere 8% too small; along a cylinder it is the radius.
     #[test]
     fn a_sphere_and_a_cylinder_come_back() {
         let camera = camera();
@@ -163,7 +167,8 @@ mod tests {
         println!("cylinder {ratio:.4}, R {:.4}", made.radius / r);
         assert!(mesh.is_watertight() && (0.94..1.02).contains(&ratio), "cylinder: {ratio}");
     }
-    /// An ellipsoid lying flat: the paper's round back makes it twice too thick, the fitted one does not.
+    /// An ellipsoid lying flat: the paper's round back makes it twice too thick, the fitted one
+    /// does not.
     #[test]
     fn a_flat_organ_comes_back_flat_where_the_back_is_fitted() {
         let camera = camera();

@@ -3,8 +3,9 @@
 use trocar_camera::{Camera, ColorImage, Mask, pixel_neighbours};
 use trocar_geometry::TriMesh;
 
-/// Colours the vertices of `mesh` with the pixels they project to; the unseen back takes the colour seen in front of it.
-/// Only pixels of `mask` that are also `colored` serve: elsewhere the nearest of them does.
+/// Colours the vertices of `mesh` with the pixels they project to; the unseen back takes the colour
+/// seen in front of it. Only pixels of `mask` that are also `colored` serve: elsewhere the nearest
+/// of them does.
 pub fn color_vertices(mesh: &mut TriMesh, image: &ColorImage, colored: &Mask, mask: &Mask, camera: &Camera) {
     let (w, h) = (image.width, image.height);
     // Breadth first from the usable pixels over the whole image.

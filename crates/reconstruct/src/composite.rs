@@ -1,5 +1,5 @@
-//! The background: per-pixel medians over a window of frames, instruments left out (paper section III, "Instrument
-//! removal").
+//! The background: per-pixel medians over a window of frames, instruments left out (paper section
+//! III, "Instrument removal").
 
 use crate::error::{Error, Result};
 use crate::masks::instruments;
@@ -82,7 +82,8 @@ struct Scratch {
     differences: Vec<u16>,
 }
 
-/// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame. Broken frames are left out with a note.
+/// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame. Broken frames
+/// are left out with a note.
 ///
 /// # Errors
 /// A centre outside the recording, too few whole frames, or an interruption.
@@ -185,7 +186,8 @@ fn read_window(
         progress.advance(1);
         (packet.frame, sample)
     };
-    // One thread reads while the others decode; what is read is decoded at once, so no more than a packet a thread waits.
+    // One thread reads while the others decode; what is read is decoded at once, so no more than a
+    // packet a thread waits.
     let mut read: Vec<(usize, Result<Sample>)> = recording.packets(window).par_bridge().map(read).collect();
     progress.end();
     if progress.interrupted() {
@@ -240,7 +242,8 @@ fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<V
     Ok((first..=last).step_by(settings.stride).collect())
 }
 
-/// Median over V(u,v): colour over the frames in which the pixel is not masked, depth over those that also measured it.
+/// Median over V(u,v): colour over the frames in which the pixel is not masked, depth over those
+/// that also measured it.
 fn medians(samples: &[Sample], i: usize, needed: usize, scale: f64, scratch: &mut Scratch) -> Pixel {
     let Scratch { sorted, depths, differences } = scratch;
     sorted.iter_mut().for_each(Vec::clear);

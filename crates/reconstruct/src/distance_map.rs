@@ -1,11 +1,12 @@
 //! Exact Euclidean distance to a silhouette.
 //!
-//! Felzenszwalb and Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
+//! Felzenszwalb and Huttenlocher, "Distance transforms of sampled functions", Theory of Computing
+//! 8, 2012.
 
 use trocar_camera::Mask;
 
-/// Distance from each set pixel's centre to the nearest pixel that is not set, pixels being `spacing` = (x, y) apart; the
-/// world beyond the image is not set. 0 outside of the mask.
+/// Distance from each set pixel's centre to the nearest pixel that is not set, pixels being
+/// `spacing` = (x, y) apart; the world beyond the image is not set. 0 outside of the mask.
 pub fn distance_map(mask: &Mask, spacing: [f64; 2]) -> Vec<f64> {
     // One pixel of the world around the image is enough.
     let (width, height) = (mask.width + 2, mask.height + 2);

@@ -5,9 +5,10 @@ use trocar_camera::Mask;
 /// Iterations stop when no equation is off by more than this [m].
 const TOLERANCE: f64 = 1e-9;
 
-/// Replaces the values of `depth` [m] that are 0 inside `mask` by the harmonic extension of the others: each filled pixel
-/// is the mean of its neighbours in the mask, which is the natural boundary condition at the mask's edge. Solved by
-/// conjugate gradients. Returns how many were filled; `None` when a piece of the mask has no measured pixel.
+/// Replaces the values of `depth` [m] that are 0 inside `mask` by the harmonic extension of the
+/// others: each filled pixel is the mean of its neighbours in the mask, which is the natural
+/// boundary condition at the mask's edge. Solved by conjugate gradients. Returns how many were
+/// filled; `None` when a piece of the mask has no measured pixel.
 pub fn fill(depth: &mut [f64], mask: &Mask) -> Option<usize> {
     let width = mask.width;
     let mut number = vec![usize::MAX; mask.set.len()];
@@ -32,7 +33,8 @@ pub fn fill(depth: &mut [f64], mask: &Mask) -> Option<usize> {
         .collect::<Vec<_>>()
     };
     let around: Vec<Vec<usize>> = unknowns.iter().map(|&i| neighbours(i)).collect();
-    // Starts from the nearest measured values, breadth first; what is never reached has nothing to extend.
+    // Starts from the nearest measured values, breadth first; what is never reached has nothing to
+    // extend.
     let mut ring: Vec<usize> = (0..unknowns.len()).collect();
     while !ring.is_empty() {
         let reached: Vec<(usize, f64)> = ring
@@ -50,7 +52,8 @@ pub fn fill(depth: &mut [f64], mask: &Mask) -> Option<usize> {
         }
         ring.retain(|&k| depth[unknowns[k]] == 0.0);
     }
-    // A x = b with A = the graph Laplacian of the unknowns, b = their measured neighbours; r = b - A x.
+    // A x = b with A = the graph Laplacian of the unknowns, b = their measured neighbours; r = b -
+    // A x.
     let residual = |x: &[f64], out: &mut [f64]| {
         for (k, near) in around.iter().enumerate() {
             out[k] = near.iter().map(|&j| x[j]).sum::<f64>() - near.len() as f64 * x[unknowns[k]];

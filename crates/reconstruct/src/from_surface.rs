@@ -11,8 +11,8 @@ use trocar_progress::Progress;
 use trocar_specimen::{Material, Organ, Pins, Provenance, Specimen};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Makes a one-organ specimen of a ready surface (a real organ model), repaired if need be; z is up. The organ is named
-/// after the file, its base is its lowest end.
+/// Makes a one-organ specimen of a ready surface (a real organ model), repaired if need be; z is
+/// up. The organ is named after the file, its base is its lowest end.
 ///
 /// # Errors
 /// When the file is no surface, its size is no organ's, or it encloses no volume.

@@ -31,11 +31,12 @@ fn only_points(organ: &OrganInfo, masks: &Path) -> bool {
 }
 
 impl OrganSegmenters {
-    /// Opens what the organs of `recording` need, and makes sure that each can be found: a missing mask should not be noticed
-    /// after minutes of work.
+    /// Opens what the organs of `recording` need, and makes sure that each can be found: a missing
+    /// mask should not be noticed after minutes of work.
     ///
     /// # Errors
-    /// An organ without mask, outline or points; a mask of another size, or empty; points without a SAM 2.1.
+    /// An organ without mask, outline or points; a mask of another size, or empty; points without a
+    /// SAM 2.1.
     pub fn open(recording: &Recording, settings: &Settings) -> Result<Self> {
         let folder = recording.dir().join("masks");
         let organs = &recording.info.organs;

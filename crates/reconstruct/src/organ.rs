@@ -113,8 +113,8 @@ fn check_size(name: &str, surface: &TriMesh) -> Result<()> {
     Err(Error::Organ { organ: name.to_owned(), reason })
 }
 
-/// The organ's point at `base_px`, or at the mask's pixel nearest to it; by default the point that the image's centre shows
-/// at the organ's depth `middle` [m].
+/// The organ's point at `base_px`, or at the mask's pixel nearest to it; by default the point that
+/// the image's centre shows at the organ's depth `middle` [m].
 fn base(base_px: Option<[f64; 2]>, mask: &Mask, front: &[f64], camera: &Camera, middle: f64) -> DVec3 {
     let pixel = |i: usize| DVec2::new((i % mask.width) as f64, (i / mask.width) as f64);
     let Some(at) = base_px.map(DVec2::from) else {
@@ -136,7 +136,8 @@ mod tests {
     use trocar_camera::{ColorImage, DepthImage};
     use trocar_specimen::{Material, Pins};
 
-    /// An ellipsoid with half axes `a` [m] whose centre is `c` [m] away, seen by the D405 at 1 mm quantisation.
+    /// An ellipsoid with half axes `a` [m] whose centre is `c` [m] away, seen by the D405 at 1 mm
+    /// quantisation.
     fn closed(c: DVec3, a: DVec3) -> Closed {
         let camera = Camera::d405();
         let (w, h) = (camera.width, camera.height);

@@ -13,8 +13,8 @@ pub struct Tidied {
     pub on_border: usize,
 }
 
-/// Keeps the largest 4-connected piece of `mask` and fills enclosed holes of less than 2% of its area: a pinhole in a mask
-/// would become a tunnel through the organ.
+/// Keeps the largest 4-connected piece of `mask` and fills enclosed holes of less than 2% of its
+/// area: a pinhole in a mask would become a tunnel through the organ.
 pub fn tidy(mask: &mut Mask) -> Tidied {
     let pieces = pieces(mask, true);
     let mut tidied = Tidied::default();

@@ -43,7 +43,8 @@ pub struct Reconstruction {
     pub depth: DepthImage,
     /// Frames the composite used.
     pub frames_used: usize,
-    /// Share of the image that only the composite could fill under the instrument masks of the centre frame.
+    /// Share of the image that only the composite could fill under the instrument masks of the
+    /// centre frame.
     pub recovered_share: f64,
     /// Share of pixels with composite depth.
     pub coverage: f64,
@@ -67,7 +68,8 @@ pub(crate) fn program() -> String {
 /// Reconstructs every organ of a recording.
 ///
 /// # Errors
-/// A setting out of range, a broken recording, an organ that cannot be closed or filled, or an interruption.
+/// A setting out of range, a broken recording, an organ that cannot be closed or filled, or an
+/// interruption.
 pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
     settings.validate()?;
     if recording.info.organs.is_empty() {
@@ -187,7 +189,8 @@ fn motion_warning(views: &[OrganView], window: usize) -> Option<String> {
     })
 }
 
-/// Hash of everything the result depends on: what is known of the recording, the used frames, the masks.
+/// Hash of everything the result depends on: what is known of the recording, the used frames, the
+/// masks.
 fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]) -> Result<u64> {
     let mut hash = Xxh3::new();
     let said = toml::to_string(&recording.info).map_err(|e| Error::Setting(format!("the recording's facts: {e}")))?;

@@ -1,4 +1,5 @@
-//! From a surface as rough as its pixels to a clean one, through a signed distance: no outward bias.
+//! From a surface as rough as its pixels to a clean one, through a signed distance: no outward
+//! bias.
 
 use crate::{Error, Result};
 use trocar_geometry::{MeshDistance, TriMesh, isosurface, sample_distance, taubin};
@@ -8,8 +9,9 @@ const LAMBDA: f64 = 0.5;
 const MU: f64 = -0.53;
 const SMOOTHING_ITERATIONS: usize = 10;
 
-/// Resamples `raw`, which closes but is as rough as its pixels: signed distance on a grid, surface at 0, largest component,
-/// Taubin smoothing. The grid is the paper's 1.5 mm, finer where the organ's `radius` [m] asks for it.
+/// Resamples `raw`, which closes but is as rough as its pixels: signed distance on a grid, surface
+/// at 0, largest component, Taubin smoothing. The grid is the paper's 1.5 mm, finer where the
+/// organ's `radius` [m] asks for it.
 ///
 /// # Errors
 /// When nothing closed comes out.
@@ -17,7 +19,8 @@ pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
     let wrong = |reason: &str| Error::Organ { organ: organ.to_owned(), reason: reason.to_owned() };
     let bounds = raw.bounds().ok_or_else(|| wrong("its surface is empty"))?;
     let extent = (bounds.1 - bounds.0).max_element();
-    // Never more than 200 cells along an axis: past that the grid, not the recording, is what takes the time.
+    // Never more than 200 cells along an axis: past that the grid, not the recording, is what takes
+    // the time.
     let spacing = 1.5e-3_f64.min(radius / 4.0).max(extent / 200.0);
     let grid = sample_distance(&MeshDistance::new(raw)?, bounds, spacing);
     tidy(organ, &isosurface(&grid, 0.0))

@@ -12,11 +12,13 @@ pub struct Settings {
     pub stride: usize,
     /// Frame at the window's centre; the middle of the recording by default.
     pub centre: Option<usize>,
-    /// Fewest samples a pixel needs (paper: 3); a recording of fewer frames needs as many as it has.
+    /// Fewest samples a pixel needs (paper: 3); a recording of fewer frames needs as many as it
+    /// has.
     pub min_samples: usize,
     /// Folder with the networks of SAM 2.1, for organs that are only pointed at.
     pub sam: Option<PathBuf>,
-    /// ONNX Runtime's library, or a folder with a Python `onnxruntime`; `ORT_DYLIB_PATH` by default.
+    /// ONNX Runtime's library, or a folder with a Python `onnxruntime`; `ORT_DYLIB_PATH` by
+    /// default.
     pub onnxruntime: Option<PathBuf>,
     /// How thick an organ is taken to be behind its front.
     pub back: BackRule,
@@ -24,7 +26,8 @@ pub struct Settings {
     pub surface: SurfaceRule,
     /// What fills it with tetrahedra.
     pub mesher: MesherRule,
-    /// Edge of the elements at the surface [m] (and of the triangles that TetGen is given); by default `finest_cell`, or larger so that there are no more than `max_tets`.
+    /// Edge of the elements at the surface [m] (and of the triangles that TetGen is given); by
+    /// default `finest_cell`, or larger so that there are no more than `max_tets`.
     pub element_size: Option<f64>,
     /// Edge of the finest lattice cell where no `element_size` is given [m].
     pub finest_cell: f64,
@@ -38,9 +41,9 @@ pub enum BackRule {
     /// A round profile of the silhouette's width (paper eq. 1). Flat organs come out too thick.
     #[default]
     Rounded,
-    /// As high against its width as the front rises above its rim, and the same below: right for organs that are alike above
-    /// and below their widest outline; of one that is sunk in or covered to half its height, half is missed. 0.2 to 1.5 times as
-    /// high as wide.
+    /// As high against its width as the front rises above its rim, and the same below: right for
+    /// organs that are alike above and below their widest outline; of one that is sunk in or
+    /// covered to half its height, half is missed. 0.2 to 1.5 times as high as wide.
     Fitted,
 }
 

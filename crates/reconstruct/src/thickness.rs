@@ -17,12 +17,14 @@ pub struct Thickness {
 
 /// Models the back of an organ whose front is at `front` [m].
 ///
-/// d is metric at the depth of the organ's middle, z_front + h/2, where a ray passes nearest to the centre of a round
-/// profile: measured at the front, a 25 mm sphere seen from 275 mm would come back 10% too small. h follows from d and d
-/// from h, so both are iterated; each round shrinks the change by about R/z.
+/// d is metric at the depth of the organ's middle, z_front + h/2, where a ray passes nearest to the
+/// centre of a round profile: measured at the front, a 25 mm sphere seen from 275 mm would come
+/// back 10% too small. h follows from d and d from h, so both are iterated; each round shrinks the
+/// change by about R/z.
 pub fn thickness(front: &[f64], mask: &Mask, camera: &Camera, rule: BackRule) -> Thickness {
     const ROUNDS: usize = 6;
-    // Distances per unit of depth. The silhouette runs half a pixel beyond the centres of the outermost pixels.
+    // Distances per unit of depth. The silhouette runs half a pixel beyond the centres of the
+    // outermost pixels.
     let spacing = [1.0 / camera.fx, 1.0 / camera.fy];
     let half_pixel = 0.25 * (spacing[0] + spacing[1]);
     let angular: Vec<f64> = distance_map(mask, spacing).into_iter().map(|d| d - half_pixel).collect();
@@ -45,8 +47,9 @@ pub fn thickness(front: &[f64], mask: &Mask, camera: &Camera, rule: BackRule) ->
     Thickness { h, radius, height_ratio }
 }
 
-/// k of z_front = a + b x + c y - k `profile` by least squares: how far the organ's front rises above a plane through its rim,
-/// against how far a round one would. An organ as high below its rim as above is then as thick as twice that.
+/// k of z_front = a + b x + c y - k `profile` by least squares: how far the organ's front rises
+/// above a plane through its rim, against how far a round one would. An organ as high below its rim
+/// as above is then as thick as twice that.
 fn fitted_ratio(front: &[f64], inside: &[usize], profile: &[f64], width: usize, camera: &Camera) -> f64 {
     /// Beyond these it is not the organ's shape that speaks.
     const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.5;
@@ -73,9 +76,10 @@ fn fitted_ratio(front: &[f64], inside: &[usize], profile: &[f64], width: usize, 
     if ratio.is_finite() { ratio.clamp(*PLAUSIBLE.start(), *PLAUSIBLE.end()) } else { 1.0 }
 }
 
-/// Volume between `front` and the back that is modelled behind it by `rule` [m3]: what a reconstruction of an organ whose front
-/// is known exactly should enclose. Each pixel is a frustum between its front and back depth. `front` is a depth a pixel [m]. For a
-/// camera without distortion.
+/// Volume between `front` and the back that is modelled behind it by `rule` [m3]: what a
+/// reconstruction of an organ whose front is known exactly should enclose. Each pixel is a frustum
+/// between its front and back depth. `front` is a depth a pixel [m]. For a camera without
+/// distortion.
 pub fn modelled_volume(front: &[f64], mask: &Mask, camera: &Camera, rule: BackRule) -> f64 {
     let back = thickness(front, mask, camera, rule);
     let frustum = |i: usize| ((front[i] + back.h[i]).powi(3) - front[i].powi(3)) / (3.0 * camera.fx * camera.fy);

@@ -43,7 +43,8 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     let truth = 4.0 / 3.0 * std::f64::consts::PI * (100.0 * RADIUS).powi(3);
     assert!((0.88..1.02).contains(&(facts.volume_cm3 / truth)), "{} of {truth} cm3", facts.volume_cm3);
     let (low, high) = organ.body.bounds().unwrap();
-    // The modelled back of a sphere is up to a fifth of R short (see the thickness); its front and outline are measured.
+    // The modelled back of a sphere is up to a fifth of R short (see the thickness); its front and
+    // outline are measured.
     assert!((0.5 * (low + high) - CENTRE).length() < 0.15 * RADIUS);
     assert_eq!(made.organs[0].mask, mask);
     let red = organ.surface.colors.iter().filter(|c| **c == [180, 60, 50]).count();

@@ -155,7 +155,8 @@ fn from_folders(dir: &Path) -> Result<FrameList> {
     Ok(FrameList { frames, notes })
 }
 
-/// Pairs files of equal stem; where no two are equal, by the times in their names; where there are none, in order.
+/// Pairs files of equal stem; where no two are equal, by the times in their names; where there are
+/// none, in order.
 fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<FrameFiles> {
     let by_stem: BTreeMap<String, &PathBuf> = depth.iter().map(|d| (stem(d), d)).collect();
     let frame = |c: &PathBuf, d: &PathBuf| FrameFiles { color: Some(c.clone()), depth: d.clone(), instruments: None };
@@ -187,8 +188,8 @@ fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<Fr
     frames
 }
 
-/// Times in the names of all files [s]: the last number of the name, which has a decimal point, as the tools of RealSense
-/// and the TUM benchmark write them.
+/// Times in the names of all files [s]: the last number of the name, which has a decimal point, as
+/// the tools of RealSense and the TUM benchmark write them.
 fn times(files: &[PathBuf]) -> Option<Vec<f64>> {
     let time = |file: &PathBuf| {
         let stem = stem(file);
@@ -198,7 +199,8 @@ fn times(files: &[PathBuf]) -> Option<Vec<f64>> {
     files.iter().map(time).collect()
 }
 
-/// Gives each frame the instrument mask of its stem; where no stem is equal and the counts are, in order.
+/// Gives each frame the instrument mask of its stem; where no stem is equal and the counts are, in
+/// order.
 fn attach_instruments(dir: &Path, frames: &mut [FrameFiles], notes: &mut Vec<String>) -> Result<()> {
     if !dir.is_dir() || frames.is_empty() {
         return Ok(());

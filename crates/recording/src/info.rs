@@ -10,8 +10,8 @@ use trocar_specimen::{Material, Pins};
 /// The file that makes a folder a recording.
 pub(crate) const MARKER: &str = "recording.toml";
 
-/// What is known of a recording. What a bag or MCAP file says itself (cameras, depth scale) may be left out and, where it is
-/// given, overrules the file.
+/// What is known of a recording. What a bag or MCAP file says itself (cameras, depth scale) may be
+/// left out and, where it is given, overrules the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RecordingInfo {
@@ -23,10 +23,11 @@ pub struct RecordingInfo {
     /// Metres per unit of the depth images.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_scale_m: Option<f64>,
-    /// Unit vector against gravity in the camera frame; a camera that looks straight down has [0, 0, -1].
+    /// Unit vector against gravity in the camera frame; a camera that looks straight down has [0,
+    /// 0, -1].
     pub up: [f64; 3],
-    /// Added to a depth pixel (u, v) to reach the colour pixel it belongs to, for depth that is not registered and whose
-    /// camera is not known [px].
+    /// Added to a depth pixel (u, v) to reach the colour pixel it belongs to, for depth that is not
+    /// registered and whose camera is not known [px].
     #[serde(default, skip_serializing_if = "is_zero")]
     pub depth_offset_px: [f64; 2],
     /// Depth beyond this is treated as invalid [m]; no limit by default.
@@ -41,7 +42,8 @@ pub struct RecordingInfo {
     /// Where the frames are; the folders of images by default.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<SourceInfo>,
-    /// The camera of the colour images, on whose pixels everything ends up. For depth that is registered, or alone, its camera.
+    /// The camera of the colour images, on whose pixels everything ends up. For depth that is
+    /// registered, or alone, its camera.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub camera: Option<Camera>,
     /// The camera of the depth images where it is another; depth is then registered to colour.
@@ -156,7 +158,8 @@ pub struct OrganInfo {
     /// Colour-image pixels [u, v] beside the organ, for the segmenter.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub points_outside: Vec<[f64; 2]>,
-    /// Pixel near the organ's base (organ coordinate 0); by default the end nearer the image's centre.
+    /// Pixel near the organ's base (organ coordinate 0); by default the end nearer the image's
+    /// centre.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base_px: Option<[f64; 2]>,
     /// Material; the default material when absent.
@@ -173,7 +176,8 @@ fn default_pins() -> Pins {
 }
 
 impl RecordingInfo {
-    /// What is taken for granted of the log file `path` about which nothing is said: its camera looks straight down.
+    /// What is taken for granted of the log file `path` about which nothing is said: its camera
+    /// looks straight down.
     pub fn of_log(path: &Path) -> Self {
         Self {
             name: path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default(),

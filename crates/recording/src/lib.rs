@@ -1,4 +1,5 @@
-//! RGB-D recordings of a fixed view: read from a folder of images, a RealSense bag or an MCAP file; written as a folder.
+//! RGB-D recordings of a fixed view: read from a folder of images, a RealSense bag or an MCAP file;
+//! written as a folder.
 //!
 //! ```text
 //! recording.toml            what is known of it: cameras, depth scale, organs, where the frames are
@@ -10,8 +11,9 @@
 //! session.bag|mcap          in place of the image folders, named by recording.toml
 //! ```
 //!
-//! A [`Recording`] streams: [`Recording::packets`] hands out undecoded frames in the order they lie on disk, and
-//! [`Recording::decode`] turns one into images on any thread. No more is in memory than the caller keeps.
+//! A [`Recording`] streams: [`Recording::packets`] hands out undecoded frames in the order they lie
+//! on disk, and [`Recording::decode`] turns one into images on any thread. No more is in memory
+//! than the caller keeps.
 
 mod error;
 mod folder;

@@ -17,7 +17,8 @@ use trocar_camera::{Camera, Mask, Pose};
 const MILLIMETRE: f64 = 1e-3;
 /// Depth in floating-point metres is kept in this unit [m]: up to 6.5 m.
 const FLOAT_UNIT: f64 = 1e-4;
-/// Messages of a topic of transforms that are looked at: those between fixed frames come first and again and again.
+/// Messages of a topic of transforms that are looked at: those between fixed frames come first and
+/// again and again.
 const TRANSFORMS: usize = 200;
 
 /// The colour and depth images of a log file, paired by their times.
@@ -47,7 +48,8 @@ pub struct LogCameras {
 }
 
 impl Log {
-    /// Opens the log `source` of the folder `dir`. `depth_scale_m` overrules what the log says of its unit.
+    /// Opens the log `source` of the folder `dir`. `depth_scale_m` overrules what the log says of
+    /// its unit.
     ///
     /// # Errors
     /// Names the file, and the topics when colour and depth are not to be found among them.
@@ -200,7 +202,8 @@ impl FrameSource for Log {
     }
 }
 
-/// What the log says of its cameras; what it does not say, or says wrongly, is left out and asked for later.
+/// What the log says of its cameras; what it does not say, or says wrongly, is left out and asked
+/// for later.
 fn cameras(log: &dyn MessageLog, found: &RgbdTopics) -> LogCameras {
     let topics = log.topics();
     let first = |t: usize| Some((&topics[t], read_one(log, t, 0).ok()?));

@@ -9,7 +9,8 @@ pub struct Pairing {
     pub lone_color: usize,
     /// Depth images without a colour image close enough in time.
     pub lone_depth: usize,
-    /// Frames missing inside the depth stream: gaps of at least one and a half intervals, counted in intervals.
+    /// Frames missing inside the depth stream: gaps of at least one and a half intervals, counted
+    /// in intervals.
     pub gaps: usize,
     /// Median time between the two images of a pair [s].
     pub offset_s: f64,
@@ -18,8 +19,9 @@ pub struct Pairing {
 }
 
 impl Pairing {
-    /// Pairs images taken at the times `color` and `depth` [s]: each with the nearest of the other stream, both ways, no farther
-    /// apart than half a depth interval. Times need not ascend; those that are not finite pair with nothing.
+    /// Pairs images taken at the times `color` and `depth` [s]: each with the nearest of the other
+    /// stream, both ways, no farther apart than half a depth interval. Times need not ascend; those
+    /// that are not finite pair with nothing.
     pub fn by_time(color: &[f64], depth: &[f64]) -> Self {
         let ordered = |times: &[f64]| {
             let mut order: Vec<usize> = (0..times.len()).filter(|i| times[*i].is_finite()).collect();
@@ -61,7 +63,8 @@ impl Pairing {
         }
     }
 
-    /// What the user should know of the pairing, a sentence each; empty when every image has its partner.
+    /// What the user should know of the pairing, a sentence each; empty when every image has its
+    /// partner.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.lone_color + self.lone_depth > 0 {

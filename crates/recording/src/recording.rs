@@ -1,4 +1,5 @@
-//! A recording opened for reading: frames stream from their source and come out registered, on one camera's pixels.
+//! A recording opened for reading: frames stream from their source and come out registered, on one
+//! camera's pixels.
 
 use crate::error::{Error, Result};
 use crate::folder::Folder;
@@ -41,8 +42,9 @@ pub struct RgbdFrame {
 }
 
 impl Recording {
-    /// Opens a recording and checks that its parts fit together (at least one whole frame, sizes). `path` is a folder with a
-    /// `recording.toml`, or a `.bag` or `.mcap` file, about which a `.toml` of the same name beside it may say more.
+    /// Opens a recording and checks that its parts fit together (at least one whole frame, sizes).
+    /// `path` is a folder with a `recording.toml`, or a `.bag` or `.mcap` file, about which a
+    /// `.toml` of the same name beside it may say more.
     ///
     /// # Errors
     /// Names the file, field or frame that is missing or wrong.
@@ -99,7 +101,8 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Decodes the first frame that can be: what is wrong with all of them is wrong with the recording.
+    /// Decodes the first frame that can be: what is wrong with all of them is wrong with the
+    /// recording.
     fn probe(&self) -> Result<()> {
         let mut first_error = None;
         for index in 0..self.len().min(BROKEN_AT_START) {
@@ -185,7 +188,8 @@ impl Recording {
         }
     }
 
-    /// Turns the bytes of frame `index` into images on [`Recording::camera`]'s pixels; may be called from many threads.
+    /// Turns the bytes of frame `index` into images on [`Recording::camera`]'s pixels; may be
+    /// called from many threads.
     ///
     /// # Errors
     /// Names the file that is broken or of the wrong size.
@@ -247,7 +251,8 @@ impl Recording {
     }
 }
 
-/// The camera of the frames, and how depth gets there, from what the user says and else from what the log `said`.
+/// The camera of the frames, and how depth gets there, from what the user says and else from what
+/// the log `said`.
 fn cameras(info: &RecordingInfo, said: &LogCameras) -> std::result::Result<(Camera, Option<Registration>), String> {
     let missing = "the log says nothing of its colour camera; a [camera] with width, height, fx, fy, cx, cy is needed";
     let color = info.camera.or(said.color).ok_or(missing)?;

@@ -20,11 +20,13 @@ pub struct Registration {
 }
 
 impl Registration {
-    /// Depth along the colour camera's axis on the colour camera's pixels [m]; 0 where the depth camera saw nothing.
+    /// Depth along the colour camera's axis on the colour camera's pixels [m]; 0 where the depth
+    /// camera saw nothing.
     ///
-    /// Four neighbouring depth pixels whose depths hang together are a piece of surface and are drawn as two triangles; a depth
-    /// pixel without such neighbours is drawn as the small square it covers. Where several pieces cover a pixel the nearest
-    /// wins, so that what only the depth camera sees behind an edge does not show through.
+    /// Four neighbouring depth pixels whose depths hang together are a piece of surface and are
+    /// drawn as two triangles; a depth pixel without such neighbours is drawn as the small square
+    /// it covers. Where several pieces cover a pixel the nearest wins, so that what only the depth
+    /// camera sees behind an edge does not show through.
     pub fn apply(&self, depth: &DepthImage) -> DepthImage {
         let (width, height) = (self.color.width, self.color.height);
         let mut out = DepthImage::new(width, height);
@@ -85,7 +87,8 @@ mod tests {
         Camera { width, height, fx: f, fy: f, cx, cy, distortion: Distortion::default() }
     }
 
-    /// What `camera`, at `from` in the world and turned by `rotation` (camera to world), sees of a slanted plane.
+    /// What `camera`, at `from` in the world and turned by `rotation` (camera to world), sees of a
+    /// slanted plane.
     fn plane(camera: &Camera, rotation: DMat3, from: DVec3) -> DepthImage {
         let mut image = DepthImage::new(camera.width, camera.height);
         let normal = DVec3::new(0.2, -0.1, 1.0);
@@ -142,7 +145,8 @@ mod tests {
         for i in 0..40 * 30 {
             assert!((unmoved.depth[i] - depth.depth[i]).abs() < 1e-6, "pixel {i}: {}", unmoved.depth[i]);
         }
-        // 20 mm at 0.4 m and 40 px are 2 px, at 0.8 m 1 px: the near block covers what the far plane would show.
+        // 20 mm at 0.4 m and 40 px are 2 px, at 0.8 m 1 px: the near block covers what the far
+        // plane would show.
         let moved = Registration { translation: DVec3::new(0.02, 0.0, 0.0), ..still }.apply(&depth);
         let row = &moved.depth[15 * 40..16 * 40];
         assert!((row[18] - 0.4).abs() < 1e-6 && (row[26] - 0.4).abs() < 1e-6 && (row[27] - 0.8).abs() < 1e-6);

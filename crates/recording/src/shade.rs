@@ -3,7 +3,8 @@
 use glam::DVec3;
 use trocar_camera::{Camera, ColorImage, DepthImage};
 
-/// Grey by how much the surface faces the camera: what stands in for colour in a recording of depth alone.
+/// Grey by how much the surface faces the camera: what stands in for colour in a recording of depth
+/// alone.
 pub fn shade(depth: &DepthImage, camera: &Camera) -> ColorImage {
     let (width, height) = (depth.width, depth.height);
     let mut image = ColorImage::new(width, height, [0; 3]);

@@ -8,7 +8,8 @@ use std::sync::{Mutex, PoisonError};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_specimen::StagedFolder;
 
-/// Writes a recording folder: into a folder beside it first, moved into place by [`RecordingWriter::finish`].
+/// Writes a recording folder: into a folder beside it first, moved into place by
+/// [`RecordingWriter::finish`].
 pub struct RecordingWriter {
     folder: StagedFolder,
     rate_hz: f64,
@@ -18,11 +19,12 @@ pub struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Starts a recording at `dir`, which must not exist or be an earlier recording (one with a `recording.toml`), which is
-    /// replaced at the end. Parents are created.
+    /// Starts a recording at `dir`, which must not exist or be an earlier recording (one with a
+    /// `recording.toml`), which is replaced at the end. Parents are created.
     ///
     /// # Errors
-    /// When `info` would not be accepted by the reader, or `dir` is another kind of folder or cannot be written.
+    /// When `info` would not be accepted by the reader, or `dir` is another kind of folder or
+    /// cannot be written.
     pub fn create(dir: &Path, info: &RecordingInfo) -> Result<Self> {
         let mut info = info.clone();
         let marker = dir.join(MARKER);
@@ -80,7 +82,8 @@ impl RecordingWriter {
         Ok(mask.write_png(&self.folder().join("masks").join(format!("{organ}.png")))?)
     }
 
-    /// Writes the index and moves the folder into place. Dropped unfinished, the writer removes what it wrote.
+    /// Writes the index and moves the folder into place. Dropped unfinished, the writer removes
+    /// what it wrote.
     ///
     /// # Errors
     /// When there is not a single frame, or the folder cannot be moved into place.

@@ -1,7 +1,8 @@
-//! Damaged files of every kind give messages or errors: no panic, no hang, no memory beyond what the file holds.
+//! Damaged files of every kind give messages or errors: no panic, no hang, no memory beyond what
+//! the file holds.
 //!
-//! Half of the cases damage a file; the others damage a message, which goes past checksums and compression straight to the
-//! decoders.
+//! Half of the cases damage a file; the others damage a message, which goes past checksums and
+//! compression straight to the decoders.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 
@@ -16,8 +17,9 @@ use trocar_recording::messages::{Topic, find_rgbd_topics, open_reader};
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// Whatever the size: the buffers of LZ4 (two blocks of 4 MiB and a window), a small image's free growth, Zstandard's window of
-/// 8 MiB and its tables. For each byte: an image of one colour, and compressed chunks.
+/// Whatever the size: the buffers of LZ4 (two blocks of 4 MiB and a window), a small image's free
+/// growth, Zstandard's window of 8 MiB and its tables. For each byte: an image of one colour, and
+/// compressed chunks.
 const ALLOWANCE: Allowance = Allowance { fixed: 24 << 20, per_byte: 600 };
 
 /// The first three messages of every topic of every fixture.

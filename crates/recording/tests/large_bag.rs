@@ -1,7 +1,8 @@
 //! Only what is wanted of a large file is read.
 //!
-//! The measurement needs a bag that `make_fixtures.py --large` wrote: `TROCAR_LARGE_BAG=/tmp/large.bag cargo test --release
-//! -p trocar-recording --test large_bag -- --ignored --nocapture`.
+//! The measurement needs a bag that `make_fixtures.py --large` wrote:
+//! `TROCAR_LARGE_BAG=/tmp/large.bag cargo test --release -p trocar-recording --test large_bag --
+//! --ignored --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 

@@ -4,7 +4,8 @@ use crate::{Error, Picture, Result, Segmenter, Target};
 use std::path::PathBuf;
 use trocar_camera::Mask;
 
-/// Reads `<folder>/<target>.png`, whatever the picture shows; sizes must agree. For organs, which do not move.
+/// Reads `<folder>/<target>.png`, whatever the picture shows; sizes must agree. For organs, which
+/// do not move.
 #[derive(Clone, Debug)]
 pub struct MaskFolder {
     /// The folder, usually a recording's `masks`.

@@ -14,8 +14,8 @@ pub struct Picture<'a> {
     pub name: &'a str,
 }
 
-/// What to find: a name, and what the user pointed at, in pixels of the colour image. A segmenter uses what it can and
-/// says so when that is missing.
+/// What to find: a name, and what the user pointed at, in pixels of the colour image. A segmenter
+/// uses what it can and says so when that is missing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Target {
     /// Name, as in `masks/<name>.png`.
@@ -62,7 +62,8 @@ impl Picture<'_> {
 }
 
 impl Target {
-    /// Refuses coordinates that are not finite, an outline of one or two points, and a box inside out.
+    /// Refuses coordinates that are not finite, an outline of one or two points, and a box inside
+    /// out.
     pub(crate) fn check(&self) -> Result<()> {
         let lists = [("polygon", &self.polygon), ("points", &self.points), ("points_outside", &self.points_outside)];
         for (name, list) in lists {

@@ -1,5 +1,5 @@
-//! Without ONNX Runtime nothing panics, and everything that does not need it works. A program of its own: a process that
-//! has the library open cannot show this.
+//! Without ONNX Runtime nothing panics, and everything that does not need it works. A program of
+//! its own: a process that has the library open cannot show this.
 
 #![allow(clippy::print_stdout, reason = "it says when it is skipped")]
 

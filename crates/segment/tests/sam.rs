@@ -1,5 +1,6 @@
-//! The SAM 2.1 path, run for real: ONNX Runtime on tiny networks with SAM's interface (`fixtures/make_tiny_sam.py`). They
-//! select by colour, so that every answer is known. Skipped, saying so, where the runtime's library is not.
+//! The SAM 2.1 path, run for real: ONNX Runtime on tiny networks with SAM's interface
+//! (`fixtures/make_tiny_sam.py`). They select by colour, so that every answer is known. Skipped,
+//! saying so, where the runtime's library is not.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -41,7 +42,8 @@ fn paint(boxes: &[([usize; 4], [u8; 3])]) -> ColorImage {
     image
 }
 
-/// Intersection over union with a box. The networks' cells are 3.3 x 1.9 pixels, so that a rim is always lost.
+/// Intersection over union with a box. The networks' cells are 3.3 x 1.9 pixels, so that a rim is
+/// always lost.
 fn iou(mask: &Mask, [left, top, right, bottom]: [usize; 4]) -> f64 {
     let inside = |i: usize| (left..right).contains(&(i % WIDTH)) && (top..bottom).contains(&(i / WIDTH));
     let both = (0..mask.set.len()).filter(|i| mask.set[*i] && inside(*i)).count();
@@ -70,7 +72,8 @@ fn points_boxes_and_outlines_select_what_they_point_at() {
         assert!(iou(&mask, left) > 0.9, "{name}: {}", iou(&mask, left));
         assert!(iou(&find(&target(&[[160.0, 60.0]], &[])), right) > 0.9, "{name}");
 
-        // Both clicked: both; the second clicked as outside, or with nothing left to be it: only the first.
+        // Both clicked: both; the second clicked as outside, or with nothing left to be it: only
+        // the first.
         let both = find(&target(&[[50.0, 50.0], [160.0, 60.0]], &[]));
         assert!(both.set[50 * WIDTH + 50] && both.set[60 * WIDTH + 160] && !both.set[60 * WIDTH + 110]);
         let first = find(&target(&[[50.0, 50.0]], &[[160.0, 60.0]]));

@@ -61,7 +61,8 @@ impl Document {
         }
     }
 
-    /// Checks every field and normalises directions. The error names the field, its value and what would be right.
+    /// Checks every field and normalises directions. The error names the field, its value and what
+    /// would be right.
     pub fn validate(&mut self) -> Result<(), String> {
         let up = DVec3::from(self.up).try_normalize();
         self.up = up.ok_or_else(|| format!("up is {:?}; a direction", self.up))?.into();

@@ -49,7 +49,8 @@ pub enum End {
     Tip,
 }
 
-/// Which nodes of an organ are held where they were recorded (mesentery and ligaments are not seen by the camera).
+/// Which nodes of an organ are held where they were recorded (mesentery and ligaments are not seen
+/// by the camera).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "rule", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Pins {
@@ -66,7 +67,8 @@ pub enum Pins {
         end: End,
         /// Organ coordinate distance from that end within which every node is pinned.
         length: f64,
-        /// Organ coordinate length of the part next to the end in which the lowest nodes are pinned too.
+        /// Organ coordinate length of the part next to the end in which the lowest nodes are pinned
+        /// too.
         #[serde(default)]
         band_length: f64,
         /// Share of that part's nodes, lowest first.
@@ -95,7 +97,8 @@ pub struct OrganFacts {
     pub median_edge_mm: f64,
     /// Volume [cm3].
     pub volume_cm3: f64,
-    /// Median absolute depth error of the surface against the depth it was made from [mm]; recordings only.
+    /// Median absolute depth error of the surface against the depth it was made from [mm];
+    /// recordings only.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub depth_error_median_mm: Option<f64>,
     /// Median signed depth error, surface minus measured [mm]; recordings only.
@@ -125,7 +128,8 @@ pub struct Organ {
     pub facts: OrganFacts,
 }
 
-/// Checks the name of an organ: lower-case letters, digits, `-` and `_`, starting with a letter or digit, 1 to 64 of them.
+/// Checks the name of an organ: lower-case letters, digits, `-` and `_`, starting with a letter or
+/// digit, 1 to 64 of them.
 ///
 /// # Errors
 /// Says what is wrong with it.

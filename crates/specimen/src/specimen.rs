@@ -47,7 +47,8 @@ pub struct Specimen {
 const MARKER: &str = "specimen.toml";
 
 impl Specimen {
-    /// Stages the specimen folder `dir`, so that an unwritable place is found before long work; see [`StagedFolder::create`].
+    /// Stages the specimen folder `dir`, so that an unwritable place is found before long work; see
+    /// [`StagedFolder::create`].
     ///
     /// # Errors
     /// When `dir` exists and is no specimen folder, or cannot be written.
@@ -55,11 +56,13 @@ impl Specimen {
         StagedFolder::create(dir, MARKER)
     }
 
-    /// Writes the folder `dir`, which must not exist or be an earlier specimen folder (one with a `specimen.toml`), which is
-    /// then replaced. Written beside it first and moved into place, so that a failure leaves nothing half-written.
+    /// Writes the folder `dir`, which must not exist or be an earlier specimen folder (one with a
+    /// `specimen.toml`), which is then replaced. Written beside it first and moved into place, so
+    /// that a failure leaves nothing half-written.
     ///
     /// # Errors
-    /// When `dir` is another kind of folder, a file cannot be written, or the specimen would not be read again.
+    /// When `dir` is another kind of folder, a file cannot be written, or the specimen would not be
+    /// read again.
     pub fn write(&self, dir: &Path) -> Result<()> {
         let folder = Self::stage(dir)?;
         self.write_into(folder.path())?;
@@ -95,7 +98,8 @@ impl Specimen {
         Ok(read_document(dir)?.organs.into_iter().map(|organ| organ.name).collect())
     }
 
-    /// Reads and checks a specimen folder. Unknown keys are errors that name the nearest right key; meshes are checked.
+    /// Reads and checks a specimen folder. Unknown keys are errors that name the nearest right key;
+    /// meshes are checked.
     ///
     /// # Errors
     /// Names the file and field that is missing or wrong.

@@ -4,8 +4,8 @@ use crate::{Error, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A folder written beside its target under a hidden name and moved into place by [`StagedFolder::commit`]. Dropped
-/// uncommitted, it removes itself and the parents it created.
+/// A folder written beside its target under a hidden name and moved into place by
+/// [`StagedFolder::commit`]. Dropped uncommitted, it removes itself and the parents it created.
 #[derive(Debug)]
 pub struct StagedFolder {
     target: PathBuf,
@@ -16,8 +16,9 @@ pub struct StagedFolder {
 }
 
 impl StagedFolder {
-    /// Stages `target`, which must not exist, be empty, or be an earlier folder of the same kind: one that holds a file
-    /// named `marker`. Nothing of an earlier folder is touched before the commit.
+    /// Stages `target`, which must not exist, be empty, or be an earlier folder of the same kind:
+    /// one that holds a file named `marker`. Nothing of an earlier folder is touched before the
+    /// commit.
     ///
     /// # Errors
     /// When `target` is something else, or its parent cannot be created or written to.
@@ -62,7 +63,8 @@ impl StagedFolder {
         Ok(Self { target, stage, created, committed: false })
     }
 
-    /// Finds out whether `target` could be written, and leaves nothing behind; for a clear error before long work.
+    /// Finds out whether `target` could be written, and leaves nothing behind; for a clear error
+    /// before long work.
     ///
     /// # Errors
     /// Those of [`StagedFolder::create`].
@@ -75,8 +77,9 @@ impl StagedFolder {
         &self.stage
     }
 
-    /// Moves the folder into place. An earlier folder is moved aside first and deleted last, so that it survives a failure; what lies in it that the
-    /// new one has nothing of that name for (a user's notes, runs) is kept.
+    /// Moves the folder into place. An earlier folder is moved aside first and deleted last, so
+    /// that it survives a failure; what lies in it that the new one has nothing of that name for (a
+    /// user's notes, runs) is kept.
     ///
     /// # Errors
     /// When the system refuses to move.

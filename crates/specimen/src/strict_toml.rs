@@ -4,7 +4,8 @@ use crate::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// Reads a TOML file into `T`. Where `T` denies unknown fields, the error for one names the nearest known key.
+/// Reads a TOML file into `T`. Where `T` denies unknown fields, the error for one names the nearest
+/// known key.
 ///
 /// # Errors
 /// Names the file, and for a mistake in it the line and the field.
@@ -33,8 +34,8 @@ fn line_at(text: &str, byte: usize) -> usize {
     1 + text.as_bytes()[..byte.min(text.len())].iter().filter(|b| **b == b'\n').count()
 }
 
-/// The line, from 1, of the field `path`, such as `organ[1].pins.share`; where it is not in the text, of the innermost part that is. `None` where not even the first is, or the text is no
-/// TOML.
+/// The line, from 1, of the field `path`, such as `organ[1].pins.share`; where it is not in the
+/// text, of the innermost part that is. `None` where not even the first is, or the text is no TOML.
 pub fn line_of(text: &str, path: &str) -> Option<usize> {
     let document = toml::de::DeTable::parse(text).ok()?;
     let mut table = Some(document.get_ref());
@@ -47,7 +48,8 @@ pub fn line_of(text: &str, path: &str) -> Option<usize> {
                 None => break,
             },
             (None, Some(table), _) => match table.get_key_value(step) {
-                // A key stands where its value begins or above; a table's key is repeated in every header below it.
+                // A key stands where its value begins or above; a table's key is repeated in every
+                // header below it.
                 Some((key, value)) => {
                     (value, if value.get_ref().is_table() { value.span().start } else { key.span().start })
                 }
@@ -62,7 +64,8 @@ pub fn line_of(text: &str, path: &str) -> Option<usize> {
     line
 }
 
-/// What a parser said on one line, which is short: it may repeat a value, and that may be the whole file.
+/// What a parser said on one line, which is short: it may repeat a value, and that may be the whole
+/// file.
 fn one_line(message: &str) -> String {
     const LONGEST: usize = 1000;
     let line = message.split_whitespace().collect::<Vec<_>>().join(" ");

@@ -1,8 +1,9 @@
 //! ROS 1 bags, format 2.0 (<http://wiki.ros.org/Bags/Format/2.0>).
 //!
-//! A bag is a row of records: a header of named fields, then data. Chunks hold the messages; after each come the indices of
-//! its messages, one a connection; at the end, descriptions of connections and chunks. The file is walked from chunk to
-//! chunk without reading their content, which finds every index; the end is only needed to go on behind damage.
+//! A bag is a row of records: a header of named fields, then data. Chunks hold the messages; after
+//! each come the indices of its messages, one a connection; at the end, descriptions of connections
+//! and chunks. The file is walked from chunk to chunk without reading their content, which finds
+//! every index; the end is only needed to go on behind damage.
 
 use super::byte_reader::ByteReader;
 use super::byte_source::ByteSource;
@@ -105,7 +106,8 @@ fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
     Ok((record, reader.at()))
 }
 
-/// A connection: its topic is in the record's header, its type among fields of the same form in the data.
+/// A connection: its topic is in the record's header, its type among fields of the same form in the
+/// data.
 fn connection<'a>(header: &[u8], data: &[u8]) -> Parsed<Record<'a>> {
     let connection = Connection {
         topic: text(header, "topic")?.to_owned(),
@@ -176,7 +178,8 @@ fn step(log: &mut LogBuilder, at: u64, end: u64, chunk_ats: &[u64]) -> Parsed<u6
     let walked = Walked::read(log.source(), at)?;
     let op = field(&walked.header, "op")?.u8()?;
     if walked.end() > end {
-        // The chunk was cut, or its length is damaged. What is there can be used if it is not compressed.
+        // The chunk was cut, or its length is damaged. What is there can be used if it is not
+        // compressed.
         if op == CHUNK && text(&walked.header, "compression")? == "none" {
             log.cut_chunk(walked.data_at, next_after(chunk_ats, at).unwrap_or(end));
         }
@@ -194,7 +197,8 @@ fn step(log: &mut LogBuilder, at: u64, end: u64, chunk_ats: &[u64]) -> Parsed<u6
             let size = (compression != Compression::None).then_some(size);
             log.chunk(Chunk { at: walked.data_at, len: walked.data_len, size, compression, crc: 0 });
             if walked.data_len == 0 {
-                // The chunk a killed recorder was writing: its length was to be filled in later, its messages follow.
+                // The chunk a killed recorder was writing: its length was to be filled in later,
+                // its messages follow.
                 log.index(0, &[])?;
             }
         }

@@ -1,7 +1,8 @@
 //! Numbers and texts out of bytes, never past their end.
 //!
-//! Three layouts: packed little-endian (ROS 1 messages, bag and MCAP records), and CDR of either endianness, where a
-//! number of n bytes starts at a multiple of n (OMG CORBA 3.3, part 2, 9.3; the encapsulation header is OMG RTPS 2.5, 10).
+//! Three layouts: packed little-endian (ROS 1 messages, bag and MCAP records), and CDR of either
+//! endianness, where a number of n bytes starts at a multiple of n (OMG CORBA 3.3, part 2, 9.3; the
+//! encapsulation header is OMG RTPS 2.5, 10).
 
 use super::error::Parsed;
 

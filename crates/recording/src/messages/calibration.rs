@@ -17,7 +17,8 @@ pub(crate) struct Intrinsics {
     pub k: [f64; 9],
     /// Camera pixels a pixel of the image, horizontally and vertically; 0 means 1.
     pub binning: [u32; 2],
-    /// The part of the camera's image that was taken: left, top, height, width [px]; zeros mean all.
+    /// The part of the camera's image that was taken: left, top, height, width [px]; zeros mean
+    /// all.
     pub region: [u32; 4],
 }
 

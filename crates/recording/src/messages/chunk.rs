@@ -8,9 +8,11 @@ use std::io::Read;
 const MAX_CHUNK: u64 = 1 << 30;
 /// A compressed chunk may grow freely up to this size ...
 const FREE_GROWTH: u64 = 16 << 20;
-/// ... and to this many times its compressed size: blank images shrink a lot, but a chunk of 16 MB is not all blank.
+/// ... and to this many times its compressed size: blank images shrink a lot, but a chunk of 16 MB
+/// is not all blank.
 const MAX_GROWTH: u64 = 1024;
-/// Largest window of a Zstandard chunk, the memory its decoder takes; level 22 asks for 128 MiB, the default for 2.
+/// Largest window of a Zstandard chunk, the memory its decoder takes; level 22 asks for 128 MiB,
+/// the default for 2.
 const MAX_WINDOW: u64 = 128 << 20;
 
 /// How a chunk is compressed.
@@ -66,7 +68,8 @@ impl Chunk {
     }
 }
 
-/// Decompresses exactly `size` bytes; memory is taken as they come, for the size is only what the file says.
+/// Decompresses exactly `size` bytes; memory is taken as they come, for the size is only what the
+/// file says.
 fn grow(decoder: impl Read, size: u64) -> Parsed<Vec<u8>> {
     let mut bytes = Vec::new();
     decoder.take(size + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;

@@ -1,7 +1,9 @@
-//! Compressed images: JPEG and PNG, and the depth images of ROS's `compressed_depth_image_transport`.
+//! Compressed images: JPEG and PNG, and the depth images of ROS's
+//! `compressed_depth_image_transport`.
 //!
-//! The latter is a PNG behind twelve bytes: a format number and two `f32`. For `16UC1` the PNG has the units; for `32FC1` it
-//! has inverse depth: depth = a / (value - b) with those two numbers (the package's `codec.cpp`).
+//! The latter is a PNG behind twelve bytes: a format number and two `f32`. For `16UC1` the PNG has
+//! the units; for `32FC1` it has inverse depth: depth = a / (value - b) with those two numbers (the
+//! package's `codec.cpp`).
 
 use super::byte_reader::ByteReader;
 use super::error::Parsed;
@@ -12,7 +14,8 @@ use trocar_camera::ColorImage;
 
 /// A small image's pixels may take this much memory whatever its file's size ...
 const FREE_GROWTH: u64 = 1 << 20;
-/// ... and larger ones this many times the file's size; PNG shrinks an 8-bit channel 1032 times at best.
+/// ... and larger ones this many times the file's size; PNG shrinks an 8-bit channel 1032 times at
+/// best.
 const MAX_GROWTH: u64 = 4096;
 
 /// Decodes an image by its message's `format` and its content.

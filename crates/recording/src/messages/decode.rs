@@ -8,12 +8,12 @@ use super::transform::Transform;
 use super::{compressed, foxglove, ros};
 use trocar_camera::Camera;
 
-/// Decodes an image: `sensor_msgs/Image` or `CompressedImage` (ROS 1, ROS 2), `foxglove.RawImage` or `CompressedImage`
-/// (protobuf, JSON).
+/// Decodes an image: `sensor_msgs/Image` or `CompressedImage` (ROS 1, ROS 2), `foxglove.RawImage`
+/// or `CompressedImage` (protobuf, JSON).
 ///
 /// # Errors
-/// [`Error::Message`](super::Error::Message) for another type, an unknown pixel encoding or compression, more than 16384
-/// pixels on a side, or data that do not fit the size.
+/// [`Error::Message`](super::Error::Message) for another type, an unknown pixel encoding or
+/// compression, more than 16384 pixels on a side, or data that do not fit the size.
 pub fn decode_image(topic: &Topic, bytes: &[u8]) -> Result<StampedImage> {
     let parsed = match (topic.kind.as_str(), &topic.encoding) {
         ("sensor_msgs/Image", _) => ros::raw_image(topic, bytes).and_then(|r| plain(&r)),
@@ -42,15 +42,17 @@ fn plain(raw: &Raw<'_>) -> Parsed<StampedImage> {
     Ok(StampedImage { stamp: raw.stamp, frame: raw.frame.clone(), image, depth_unit })
 }
 
-/// Decodes a camera calibration: `sensor_msgs/CameraInfo` (ROS 1, ROS 2) or `foxglove.CameraCalibration` (protobuf, JSON).
+/// Decodes a camera calibration: `sensor_msgs/CameraInfo` (ROS 1, ROS 2) or
+/// `foxglove.CameraCalibration` (protobuf, JSON).
 ///
-/// This is the camera of the raw image, with K and D; a rectified image has P and no distortion, which RealSense's aligned
-/// and depth images share with their raw ones. Region and binning are taken into account as ROS's `image_geometry` does.
-/// librealsense's inverse and modified Brown-Conrady models are fitted by OpenCV's (to half a pixel, or an error).
+/// This is the camera of the raw image, with K and D; a rectified image has P and no distortion,
+/// which RealSense's aligned and depth images share with their raw ones. Region and binning are
+/// taken into account as ROS's `image_geometry` does. librealsense's inverse and modified
+/// Brown-Conrady models are fitted by OpenCV's (to half a pixel, or an error).
 ///
 /// # Errors
-/// [`Error::Message`](super::Error::Message) for another type, a camera that was never calibrated (K of zeros), a fisheye,
-/// or numbers that make no sense.
+/// [`Error::Message`](super::Error::Message) for another type, a camera that was never calibrated
+/// (K of zeros), a fisheye, or numbers that make no sense.
 pub fn decode_calibration(topic: &Topic, bytes: &[u8]) -> Result<Camera> {
     let parsed = match (topic.kind.as_str(), &topic.encoding) {
         ("sensor_msgs/CameraInfo", _) => ros::camera_info(topic, bytes),
@@ -61,11 +63,12 @@ pub fn decode_calibration(topic: &Topic, bytes: &[u8]) -> Result<Camera> {
     of_topic(topic, parsed.and_then(|intrinsics| camera(&intrinsics)))
 }
 
-/// Decodes transforms: one of `geometry_msgs/Transform` or `TransformStamped` or `foxglove.FrameTransform`, all of
-/// `tf2_msgs/TFMessage` or `foxglove.FrameTransforms`.
+/// Decodes transforms: one of `geometry_msgs/Transform` or `TransformStamped` or
+/// `foxglove.FrameTransform`, all of `tf2_msgs/TFMessage` or `foxglove.FrameTransforms`.
 ///
 /// # Errors
-/// [`Error::Message`](super::Error::Message) for another type, bytes that end too soon, or a rotation that is none.
+/// [`Error::Message`](super::Error::Message) for another type, bytes that end too soon, or a
+/// rotation that is none.
 pub fn decode_transforms(topic: &Topic, bytes: &[u8]) -> Result<Vec<Transform>> {
     let fields = || ros::fields(topic, bytes);
     let parsed = match (topic.kind.as_str(), &topic.encoding) {

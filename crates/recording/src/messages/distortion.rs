@@ -1,9 +1,10 @@
 //! Lens models as files name them, turned into OpenCV's.
 //!
-//! `plumb_bob` and `rational_polynomial` (ROS, foxglove) and `Brown Conrady` (librealsense) are OpenCV's own. librealsense's
-//! `Inverse Brown Conrady` is the same polynomial the other way round (from the distorted to the ideal point), its `Modified
-//! Brown Conrady` takes the tangential part after the radial (`rs2_deproject_pixel_to_point`, `rs2_project_point_to_pixel`);
-//! for these, OpenCV's five coefficients are fitted over the image, in which they are linear.
+//! `plumb_bob` and `rational_polynomial` (ROS, foxglove) and `Brown Conrady` (librealsense) are
+//! OpenCV's own. librealsense's `Inverse Brown Conrady` is the same polynomial the other way round
+//! (from the distorted to the ideal point), its `Modified Brown Conrady` takes the tangential part
+//! after the radial (`rs2_deproject_pixel_to_point`, `rs2_project_point_to_pixel`); for these,
+//! OpenCV's five coefficients are fitted over the image, in which they are linear.
 
 use super::error::Parsed;
 use glam::DVec2;
@@ -67,8 +68,8 @@ fn polynomial(d: &[f64], p: DVec2, t: DVec2) -> DVec2 {
     scaled(d, p) + tangential(d, t, t.length_squared()) - t
 }
 
-/// The coefficients k1 k2 p1 p2 k3 that best take the ideal to the distorted points which `pair` gives for points all over
-/// the image, by least squares.
+/// The coefficients k1 k2 p1 p2 k3 that best take the ideal to the distorted points which `pair`
+/// gives for points all over the image, by least squares.
 fn fit(camera: &Camera, pair: impl Fn(DVec2) -> (DVec2, DVec2)) -> Parsed<Distortion> {
     let steps = (0..GRID).map(|i| i as f64 / (GRID - 1) as f64);
     let at = |u: f64, v: f64| {

@@ -1,7 +1,7 @@
 //! foxglove's messages, as protobuf and as JSON (<https://docs.foxglove.dev/docs/sdk/schemas>).
 //!
-//! Protobuf's wire format (<https://protobuf.dev/programming-guides/encoding/>) is a row of numbered fields; the few that
-//! matter are picked out here, without generated code.
+//! Protobuf's wire format (<https://protobuf.dev/programming-guides/encoding/>) is a row of
+//! numbered fields; the few that matter are picked out here, without generated code.
 
 use super::byte_reader::{ByteReader, stamp};
 use super::calibration::Intrinsics;
@@ -20,8 +20,8 @@ enum Value<'a> {
     Fixed32(u32),
 }
 
-/// Calls `visit` with every field of a message: its number, its value. A value of another kind than expected is passed
-/// over, as protobuf asks for unknown fields.
+/// Calls `visit` with every field of a message: its number, its value. A value of another kind than
+/// expected is passed over, as protobuf asks for unknown fields.
 fn fields<'a>(bytes: &'a [u8], mut visit: impl FnMut(u64, Value<'a>) -> Parsed<()>) -> Parsed<()> {
     let mut reader = ByteReader::packed(bytes);
     while reader.remaining() > 0 {

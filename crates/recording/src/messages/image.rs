@@ -1,7 +1,9 @@
-//! Images as they come: `sensor_msgs/Image`, `foxglove.RawImage`, and what the compressed ones unpack to.
+//! Images as they come: `sensor_msgs/Image`, `foxglove.RawImage`, and what the compressed ones
+//! unpack to.
 //!
-//! Encodings are those of `sensor_msgs/image_encodings.h`, foxglove's and librealsense's names for the same; depth as in ROS
-//! REP 118. YCbCr is BT.601 with limited range, as OpenCV and librealsense convert it.
+//! Encodings are those of `sensor_msgs/image_encodings.h`, foxglove's and librealsense's names for
+//! the same; depth as in ROS REP 118. YCbCr is BT.601 with limited range, as OpenCV and
+//! librealsense convert it.
 
 use super::error::Parsed;
 use std::borrow::Cow;

@@ -12,9 +12,11 @@ const MAX_PROBLEMS: usize = 50;
 
 /// A file with more damaged places than this is not read to its end: trying each costs time.
 const MAX_DAMAGES: usize = 200;
-/// Opening decompresses chunks without an index up to this many bytes, which are a second's work ...
+/// Opening decompresses chunks without an index up to this many bytes, which are a second's work
+/// ...
 const FREE_GROWTH: u64 = 64 << 20;
-/// ... and up to this many times the file's size: LZ4 cannot shrink more, and no recording does as a whole.
+/// ... and up to this many times the file's size: LZ4 cannot shrink more, and no recording does as
+/// a whole.
 const MAX_GROWTH: u64 = 256;
 
 /// Where a message lies.
@@ -98,8 +100,8 @@ impl LogBuilder {
         Ok(())
     }
 
-    /// The record at `at` is damaged: gives the next chunk that the end of the file knows of before `end`, to go on there.
-    /// It may have been an index, so the last chunk is read through.
+    /// The record at `at` is damaged: gives the next chunk that the end of the file knows of before
+    /// `end`, to go on there. It may have been an index, so the last chunk is read through.
     pub fn damage(&mut self, at: u64, end: u64, reason: &str, chunk_ats: &[u64]) -> Option<u64> {
         self.unindexed.extend(self.chunks.len().checked_sub(1));
         self.damages += 1;
@@ -125,7 +127,8 @@ impl LogBuilder {
         })
     }
 
-    /// Reads through chunk `c`: its descriptions, and its messages too if it has no index. Returns how many those are.
+    /// Reads through chunk `c`: its descriptions, and its messages too if it has no index. Returns
+    /// how many those are.
     fn read_through(&mut self, c: usize) -> usize {
         self.grown = self.grown.saturating_add(self.chunks[c].size.unwrap_or(self.chunks[c].len));
         let may = FREE_GROWTH + MAX_GROWTH.saturating_mul(self.source.len());
@@ -173,7 +176,8 @@ impl LogBuilder {
             let (count, all) = (unindexed.len(), self.chunks.len());
             self.problem(format!("{count} of {all} chunks have no index: {found} messages were found by reading them"));
         }
-        // Descriptions lie in the chunk of a connection's first message when there is none at the end of the file.
+        // Descriptions lie in the chunk of a connection's first message when there is none at the
+        // end of the file.
         let undescribed: Vec<u32> = self.places.keys().copied().filter(|&id| !self.described(id)).collect();
         let mut candidates: Vec<(usize, u32)> = undescribed
             .iter()

@@ -1,8 +1,9 @@
 //! MCAP files (<https://mcap.dev/spec>).
 //!
-//! A row of records: a byte for the kind, a length, content. Chunks hold schemas, channels and messages; after each come the
-//! indices of its messages, one a channel; at the end is a summary. As with bags, the file is walked from chunk to chunk, and
-//! the summary is only needed for the channels and to go on behind damage.
+//! A row of records: a byte for the kind, a length, content. Chunks hold schemas, channels and
+//! messages; after each come the indices of its messages, one a channel; at the end is a summary.
+//! As with bags, the file is walked from chunk to chunk, and the summary is only needed for the
+//! channels and to go on behind damage.
 
 use super::byte_reader::ByteReader;
 use super::byte_source::ByteSource;
@@ -142,7 +143,8 @@ fn read_summary(log: &mut LogBuilder, mut at: u64, chunk_ats: &mut Vec<u64>) -> 
     }
 }
 
-/// Takes in the record at `at` and gives the place of the next; `None` after the last with messages.
+/// Takes in the record at `at` and gives the place of the next; `None` after the last with
+/// messages.
 fn step(log: &mut LogBuilder, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>> {
     let (kind, content_at, content_len) = walk(log.source(), at)?;
     let len = log.source().len();
@@ -164,7 +166,8 @@ fn step(log: &mut LogBuilder, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>>
             let chunk_at = content_at + reader.at() as u64;
             let whole = end.filter(|&end| chunk_at.checked_add(records_len).is_some_and(|e| e <= end));
             let Some(end) = whole else {
-                // The chunk was cut, or its length is damaged. What is there can be used if it is not compressed.
+                // The chunk was cut, or its length is damaged. What is there can be used if it is
+                // not compressed.
                 if compression == Compression::None {
                     log.cut_chunk(chunk_at, next_after(chunk_ats, at).unwrap_or(len));
                 }

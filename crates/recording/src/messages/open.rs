@@ -8,8 +8,8 @@ use std::path::Path;
 
 /// Opens a log file; its content, not its name, says which kind it is.
 ///
-/// A file without an index (the recorder was killed, the copy was cut) is read through and used as far as it is whole; see
-/// [`MessageLog::problems`].
+/// A file without an index (the recorder was killed, the copy was cut) is read through and used as
+/// far as it is whole; see [`MessageLog::problems`].
 ///
 /// # Errors
 /// [`Error::File`] if the file cannot be read or is neither a ROS 1 bag nor MCAP.

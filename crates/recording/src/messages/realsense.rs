@@ -1,4 +1,5 @@
-//! The topics of a bag that RealSense Viewer or librealsense recorded (librealsense, `ros_file_format.h`, version 3).
+//! The topics of a bag that RealSense Viewer or librealsense recorded (librealsense,
+//! `ros_file_format.h`, version 3).
 //!
 //! ```text
 //! /device_0/sensor_0/Depth_0/image/data        sensor_msgs/Image, mono16
@@ -55,7 +56,8 @@ pub fn transform_topic(sensor: usize, stream: &str) -> String {
     format!("/device_0/sensor_{sensor}/{stream}/tf/0")
 }
 
-/// The first depth and the first colour stream of a RealSense recording; `None` when it is none, or has not both.
+/// The first depth and the first colour stream of a RealSense recording; `None` when it is none, or
+/// has not both.
 pub fn find(topics: &[Topic]) -> Option<RealSenseTopics> {
     let stream = |name: &str| {
         topics.iter().enumerate().find_map(|(i, topic)| {
@@ -88,7 +90,8 @@ pub fn find(topics: &[Topic]) -> Option<RealSenseTopics> {
     })
 }
 
-/// The transform that takes points of the depth stream's frame into the colour stream's, from the two streams' own.
+/// The transform that takes points of the depth stream's frame into the colour stream's, from the
+/// two streams' own.
 pub fn color_from_depth(color: &Transform, depth: &Transform) -> Pose {
     let (color, back) = (color.pose(), depth.pose().inverse());
     Pose { rotation: color.rotation * back.rotation, translation: color.transform(back.translation) }

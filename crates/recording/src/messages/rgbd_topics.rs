@@ -1,8 +1,9 @@
 //! Which topics of a log are the colour and the depth camera.
 //!
-//! A RealSense bag says so. Otherwise the first message of every image topic is decoded, which tells colour from depth, and
-//! names decide between several: depth aligned to colour before other depth, "color" or "rgb" before other images, and
-//! uncompressed before compressed images of the same camera. Infrared images are left out.
+//! A RealSense bag says so. Otherwise the first message of every image topic is decoded, which
+//! tells colour from depth, and names decide between several: depth aligned to colour before other
+//! depth, "color" or "rgb" before other images, and uncompressed before compressed images of the
+//! same camera. Infrared images are left out.
 
 use super::decode::decode_image;
 use super::error::{Error, Result};
@@ -34,8 +35,8 @@ pub struct RgbdTopics {
 /// Guesses the topics of an RGB-D recording. Where the user names one, it is that.
 ///
 /// # Errors
-/// [`Error::Choice`] when there is no colour or no depth, several that are as good, or none of the given name; it lists the
-/// topics.
+/// [`Error::Choice`] when there is no colour or no depth, several that are as good, or none of the
+/// given name; it lists the topics.
 pub fn find_rgbd_topics(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> Result<RgbdTopics> {
     let topics = log.topics();
     let transforms = (0..topics.len()).filter(|&t| is_transforms(&topics[t])).collect();
@@ -135,7 +136,8 @@ fn rank(topic: &Topic, depth: bool) -> (u8, u8) {
     (named, u8::from(!topic.kind.ends_with("CompressedImage")))
 }
 
-/// The calibration that shares the most leading parts of its name with an image topic; at least one, and only one.
+/// The calibration that shares the most leading parts of its name with an image topic; at least
+/// one, and only one.
 fn info(topics: &[Topic], image: usize) -> Option<usize> {
     let parts = |t: usize| topics[t].name.split('/').filter(|p| !p.is_empty());
     let shared = |t: usize| parts(t).zip(parts(image)).take_while(|(a, b)| a == b).count();

@@ -1,4 +1,5 @@
-//! What ROS 1 and ROS 2 messages share: the same fields in the same order, written in different ways.
+//! What ROS 1 and ROS 2 messages share: the same fields in the same order, written in different
+//! ways.
 
 use super::byte_reader::{ByteReader, stamp};
 use super::calibration::Intrinsics;

@@ -11,13 +11,13 @@ pub trait MessageLog: Send + Sync {
     /// Topics in the order of their names; those without messages are left out.
     fn topics(&self) -> &[Topic];
 
-    /// Log times [ns since the epoch] of a topic's messages, ascending; index i here is message i below. Empty when there is
-    /// no such topic.
+    /// Log times [ns since the epoch] of a topic's messages, ascending; index i here is message i
+    /// below. Empty when there is no such topic.
     fn times(&self, topic: usize) -> &[u64];
 
-    /// The wanted messages (topic, index), in the order they lie in the file; only their chunks are read, and memory holds
-    /// one at a time. A message that is damaged, or lies in a damaged chunk, is an error and the rest goes on; so is one
-    /// that is not there.
+    /// The wanted messages (topic, index), in the order they lie in the file; only their chunks are
+    /// read, and memory holds one at a time. A message that is damaged, or lies in a damaged chunk,
+    /// is an error and the rest goes on; so is one that is not there.
     fn messages<'a>(&'a self, wanted: &[(usize, usize)]) -> Box<dyn Iterator<Item = Message> + Send + 'a>;
 
     /// What was wrong with the file as a whole, a sentence each; empty for a whole file.

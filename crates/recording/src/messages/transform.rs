@@ -4,7 +4,8 @@ use super::error::Parsed;
 use glam::{DQuat, DVec3};
 use trocar_camera::Pose;
 
-/// A frame's place in another: points of the child frame, rotated and then moved, are points of the parent frame.
+/// A frame's place in another: points of the child frame, rotated and then moved, are points of the
+/// parent frame.
 ///
 /// librealsense uses a bare `geometry_msgs/Transform` otherwise; see [`super::realsense`].
 #[derive(Clone, Debug, Default, PartialEq)]

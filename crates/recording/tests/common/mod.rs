@@ -77,8 +77,8 @@ pub fn scene_at(camera: &Camera, centre: DVec3) -> (ColorImage, DepthImage, Mask
     (color, depth, mask)
 }
 
-/// Writes `frames` frames. The bar covers a third of the frames at each column it passes; depth under
-/// it is a hole.
+/// Writes `frames` frames. The bar covers a third of the frames at each column it passes; depth
+/// under it is a hole.
 pub fn write(dir: &Path, info: &RecordingInfo, frames: usize) {
     write_moving(dir, info, frames, |_| CENTRE);
 }

@@ -1,14 +1,19 @@
 //! Instruments by their looks: steel is grey, tissue is not. No weights, no prompts.
 //!
-//! 1. Grey pixels: little chroma for their brightness; the clearest of them, neutral or bluish, are seeds.
-//! 2. Single pixels of noise go, narrow gaps (reflections of tissue on the shaft) close, and connected parts are formed.
-//! 3. A part stays if two things speak for it: it reaches the image's rim, is long, is darker than its surroundings in good
-//!    part, or stands nearer to the camera than they (where there is depth; farther speaks against it). Inside the picture
-//!    darkness is a must: wet highlights on tissue are grey, long and on ridges too, but never dark.
-//! 4. What stays loses its very thick parts (drapes, trays), has its small holes filled and grows by a margin.
+//! 1. Grey pixels: little chroma for their brightness; the clearest of them, neutral or bluish, are
+//!    seeds.
+//! 2. Single pixels of noise go, narrow gaps (reflections of tissue on the shaft) close, and
+//!    connected parts are formed.
+//! 3. A part stays if two things speak for it: it reaches the image's rim, is long, is darker than
+//!    its surroundings in good part, or stands nearer to the camera than they (where there is
+//!    depth; farther speaks against it). Inside the picture darkness is a must: wet highlights on
+//!    tissue are grey, long and on ridges too, but never dark.
+//! 4. What stays loses its very thick parts (drapes, trays), has its small holes filled and grows
+//!    by a margin.
 //!
-//! What this misses: a bright jaw that shows without its shaft, and blades thinner than about 3 pixels. What it takes too:
-//! anything grey that reaches the rim and is not very thick, such as gloves and sutures.
+//! What this misses: a bright jaw that shows without its shaft, and blades thinner than about 3
+//! pixels. What it takes too: anything grey that reaches the rim and is not very thick, such as
+//! gloves and sutures.
 //!
 //! Lengths are shares of the image's height, so that one set of parameters serves every camera.
 
@@ -19,12 +24,12 @@ use crate::{Error, Picture, Result, Segmenter, Target};
 use parts::{Part, compare, find_parts};
 use trocar_camera::{ColorImage, Mask, pixel_neighbours};
 
-/// What counts as metal. Colours are sRGB, 0 to 255; lengths are shares of the image's height and areas shares of its
-/// pixels. The default is for all recordings.
+/// What counts as metal. Colours are sRGB, 0 to 255; lengths are shares of the image's height and
+/// areas shares of its pixels. The default is for all recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetalParameters {
-    /// A grey pixel's chroma (largest minus smallest channel) is at most `grey_chroma + grey_saturation` x brightness
-    /// (largest channel).
+    /// A grey pixel's chroma (largest minus smallest channel) is at most `grey_chroma +
+    /// grey_saturation` x brightness (largest channel).
     pub grey_chroma: f64,
     /// See `grey_chroma`.
     pub grey_saturation: f64,
@@ -32,8 +37,9 @@ pub struct MetalParameters {
     pub seed_chroma: f64,
     /// See `seed_chroma`.
     pub seed_saturation: f64,
-    /// A seed's red is above the mean of green and blue, and its blue below that of red and green, by at most this and half
-    /// its chroma bound: shadows, pale tissue, fat and bile are warm, steel is not.
+    /// A seed's red is above the mean of green and blue, and its blue below that of red and green,
+    /// by at most this and half its chroma bound: shadows, pale tissue, fat and bile are warm,
+    /// steel is not.
     pub seed_warmth: f64,
     /// Darker pixels (largest channel) are no seeds: in the dark everything is grey.
     pub seed_brightness: u8,
@@ -55,7 +61,8 @@ pub struct MetalParameters {
     pub half_thickness: f64,
     /// Surroundings that are compared reach this far.
     pub surroundings: f64,
-    /// A part stands out if it is nearer than its surroundings by this [m]; the same farther away speaks against it.
+    /// A part stands out if it is nearer than its surroundings by this [m]; the same farther away
+    /// speaks against it.
     pub nearer: f64,
     /// Smaller holes are filled (area).
     pub hole: f64,
@@ -212,7 +219,8 @@ impl MetalParameters {
     }
 }
 
-/// Grey where most of the 3 x 3 pixels around are; the image goes on beyond its rim as it ends there.
+/// Grey where most of the 3 x 3 pixels around are; the image goes on beyond its rim as it ends
+/// there.
 fn without_speckle(looks: &[Look], width: usize, height: usize) -> Vec<bool> {
     let mut rows = vec![0u8; width * height];
     for (row, out) in looks.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {

@@ -18,7 +18,8 @@ pub(super) struct Part {
     pub at_rim: bool,
     /// Largest distance to what is outside [fifths of a pixel].
     pub thickness: u16,
-    /// How much nearer it is to the camera than its surroundings [m], median; `None` without enough depth.
+    /// How much nearer it is to the camera than its surroundings [m], median; `None` without enough
+    /// depth.
     pub nearer: Option<f64>,
 }
 
@@ -67,8 +68,9 @@ pub(super) fn find_parts(set: &[bool], looks: &[Look], width: usize, height: usi
     (labels, parts)
 }
 
-/// Compares parts with what lies up to `reach` pixels around them, on an image of `size` (width, height). Walks outwards
-/// from all parts at once; each pixel reached is compared with the part's pixel it was reached from.
+/// Compares parts with what lies up to `reach` pixels around them, on an image of `size` (width,
+/// height). Walks outwards from all parts at once; each pixel reached is compared with the part's
+/// pixel it was reached from.
 pub(super) fn compare(
     labels: &[Option<u32>],
     parts: &mut [Part],

@@ -1,4 +1,5 @@
-//! Painted pictures with everything that misleads: noise, wet highlights, fat, pale tissue, dark shadows, reflections.
+//! Painted pictures with everything that misleads: noise, wet highlights, fat, pale tissue, dark
+//! shadows, reflections.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -63,7 +64,8 @@ fn paint(bars: &[Bar], dark_room: f64) -> (ColorImage, DepthImage, Mask) {
         }
         for bar in bars {
             if let Some(s) = across(bar, x, y) {
-                // Lit from one side: bright line, grey flank, dark edge; red glow of the tissue on the other flank.
+                // Lit from one side: bright line, grey flank, dark edge; red glow of the tissue on
+                // the other flank.
                 let shine = (-((s + 0.35) / 0.15).powi(2)).exp();
                 let flank = 150.0 * (1.0 - 0.75 * s.abs()) - 30.0 * s;
                 let glow = 22.0 * (-((s - 0.5) / 0.2).powi(2)).exp();
@@ -118,7 +120,8 @@ fn tissue_alone_has_no_metal() {
 
 #[test]
 fn depth_tells_a_loose_jaw_from_a_stain() {
-    // Short and away from the rim: a jaw whose shaft is hidden. The same patch lying in the tissue is none.
+    // Short and away from the rim: a jaw whose shaft is hidden. The same patch lying in the tissue
+    // is none.
     let jaw: [Bar; 1] = [([200.0, 80.0], [228.0, 84.0], 8.0)];
     let (mut color, mut depth, truth) = paint(&jaw, 1.0);
     for (p, t) in color.pixels.iter_mut().zip(&truth.set) {

@@ -22,8 +22,8 @@ const EXPORTS: &str = "ready exports: huggingface.co/vietanhdev/segment-anything
      samexporter.export_sam2) or with onnxruntime's transformers/models/sam2/convert_to_onnx.py; Meta publishes the SAM 2.1 \
      checkpoints and code under Apache-2.0";
 
-/// The files for [`crate::Sam2`], and which of them are there. `folder` is where the networks should lie; the library is
-/// looked for in `ORT_DYLIB_PATH`.
+/// The files for [`crate::Sam2`], and which of them are there. `folder` is where the networks
+/// should lie; the library is looked for in `ORT_DYLIB_PATH`.
 pub fn wanted_files(folder: Option<&Path>) -> Vec<WantedFile> {
     let variable = std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from);
     vec![
@@ -59,8 +59,8 @@ pub(super) fn encoder(folder: &Path) -> Result<PathBuf> {
     )
 }
 
-/// The prompt decoder: all from prompts to masks. ONNX Runtime's exporter calls that the image decoder and names a bare
-/// mask decoder beside it.
+/// The prompt decoder: all from prompts to masks. ONNX Runtime's exporter calls that the image
+/// decoder and names a bare mask decoder beside it.
 pub(super) fn decoder(folder: &Path) -> Result<PathBuf> {
     pick(folder, "mask_decoder.onnx", "decoder", &[], "image_decoder")
 }

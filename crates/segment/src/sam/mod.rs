@@ -1,8 +1,8 @@
 //! SAM 2.1 through ONNX Runtime: an organ from a few clicks.
 //!
-//! Two networks in one folder: an image encoder and a prompt decoder, as public exporters write them (see
-//! [`wanted_files`]). No weights come with Trocar. The runtime is a shared library found when it is first needed; all
-//! else in Trocar works without it.
+//! Two networks in one folder: an image encoder and a prompt decoder, as public exporters write
+//! them (see [`wanted_files`]). No weights come with Trocar. The runtime is a shared library found
+//! when it is first needed; all else in Trocar works without it.
 
 mod files;
 mod network;
@@ -28,8 +28,9 @@ const DEFAULT_SIDE: usize = 1024;
 /// No encoder input is larger than this on a side [px].
 const MAX_SIDE: usize = 4096;
 
-/// SAM 2.1 from two ONNX files. Prompts: points on and off the target and a box; or else the outline, as a box and its
-/// innermost point. The best mask by the network's own predicted IoU is taken.
+/// SAM 2.1 from two ONNX files. Prompts: points on and off the target and a box; or else the
+/// outline, as a box and its innermost point. The best mask by the network's own predicted IoU is
+/// taken.
 #[derive(Debug)]
 pub struct Sam2 {
     folder: PathBuf,
@@ -43,7 +44,8 @@ pub struct Sam2 {
     last: Mutex<Option<(ColorImage, std::sync::Arc<Features>)>>,
 }
 
-/// What a decoder input or encoder output is for. SAM's names are not standard; those of public exporters are known.
+/// What a decoder input or encoder output is for. SAM's names are not standard; those of public
+/// exporters are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Part {
     Embedding,
@@ -64,8 +66,8 @@ struct Features {
     middle: Option<Tensor>,
 }
 
-/// What the decoder is asked: points [px of the picture] with SAM's labels (1 on, 0 off, 2 and 3 a box's corners), and
-/// mask logits to start from.
+/// What the decoder is asked: points [px of the picture] with SAM's labels (1 on, 0 off, 2 and 3 a
+/// box's corners), and mask logits to start from.
 #[derive(Clone, Debug, Default)]
 struct Prompt {
     points: Vec<([f64; 2], f32)>,
@@ -97,13 +99,14 @@ impl Part {
 }
 
 impl Sam2 {
-    /// Opens the two networks in `folder`. ONNX Runtime's library is looked for in `ORT_DYLIB_PATH`, then at `runtime`: the
-    /// library itself, or a folder with a Python `onnxruntime` (a virtual environment, `site-packages`, the package). The
-    /// first library that is opened stays for the whole process.
+    /// Opens the two networks in `folder`. ONNX Runtime's library is looked for in
+    /// `ORT_DYLIB_PATH`, then at `runtime`: the library itself, or a folder with a Python
+    /// `onnxruntime` (a virtual environment, `site-packages`, the package). The first library that
+    /// is opened stays for the whole process.
     ///
     /// # Errors
-    /// Names the file that is missing, is no network, or has other inputs and outputs than SAM 2.1; says how to get the
-    /// library when there is none.
+    /// Names the file that is missing, is no network, or has other inputs and outputs than SAM 2.1;
+    /// says how to get the library when there is none.
     pub fn open(folder: &Path, runtime: Option<&Path>) -> Result<Self> {
         let (encoder, decoder) = (files::encoder(folder)?, files::decoder(folder)?);
         let environment = runtime::load(runtime)?;
@@ -147,7 +150,8 @@ impl Sam2 {
         Ok(sam)
     }
 
-    /// An encoder and a decoder of different sizes of SAM do not fit; better said here than by a failing product inside.
+    /// An encoder and a decoder of different sizes of SAM do not fit; better said here than by a
+    /// failing product inside.
     fn check_pair(&self) -> Result<()> {
         for given in &self.encoder.outputs {
             let Some(part) = Part::of(&given.name) else { continue };

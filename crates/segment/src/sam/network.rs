@@ -58,8 +58,8 @@ impl Network {
         Ok(Self { path: path.to_owned(), inputs, outputs, session: Mutex::new(session) })
     }
 
-    /// Runs it on named inputs, turned into the kinds the file wants; gives the `wanted` outputs of kinds that are numbers
-    /// or flags (1 and -1), in that order.
+    /// Runs it on named inputs, turned into the kinds the file wants; gives the `wanted` outputs of
+    /// kinds that are numbers or flags (1 and -1), in that order.
     pub fn run(&self, feeds: &[(&str, &Tensor)], wanted: &[&str]) -> Result<Vec<(String, Tensor)>> {
         let bad = |e: &dyn std::fmt::Display| Error::file(&self.path, format!("the network does not run ({e})"));
         let mut values: Vec<(String, SessionInputValue<'_>)> = Vec::new();

@@ -9,7 +9,8 @@ use trocar_camera::ColorImage;
 const MEAN: [f32; 3] = [0.485, 0.456, 0.406];
 const DEVIATION: [f32; 3] = [0.229, 0.224, 0.225];
 
-/// The picture as the encoder wants it: squeezed to width x height, normalised, one plane a channel.
+/// The picture as the encoder wants it: squeezed to width x height, normalised, one plane a
+/// channel.
 pub(super) fn encoder_input(color: &ColorImage, width: usize, height: usize) -> Result<Vec<f32>> {
     let bytes = color.pixels.as_flattened().to_vec();
     let image: ImageBuffer<Rgb<u8>, Vec<u8>> = ImageBuffer::from_raw(color.width as u32, color.height as u32, bytes)
@@ -24,8 +25,8 @@ pub(super) fn encoder_input(color: &ColorImage, width: usize, height: usize) -> 
     Ok(planes)
 }
 
-/// Bilinear resampling between pixel centres, sizes as width and height; the image goes on beyond its rim as it ends
-/// there. (`image` clamps `f32` pixels to 0..1, which logits are not.)
+/// Bilinear resampling between pixel centres, sizes as width and height; the image goes on beyond
+/// its rim as it ends there. (`image` clamps `f32` pixels to 0..1, which logits are not.)
 pub(super) fn bilinear(values: &[f32], from: [usize; 2], to: [usize; 2]) -> Vec<f32> {
     if from == to {
         return values.to_vec();

@@ -1,4 +1,5 @@
-//! Finding and opening ONNX Runtime's shared library. Nothing here runs before a network is to be opened.
+//! Finding and opening ONNX Runtime's shared library. Nothing here runs before a network is to be
+//! opened.
 
 use crate::{Error, Result};
 use ort::environment::Environment;
@@ -30,7 +31,8 @@ pub(super) fn load(given: Option<&Path>) -> Result<Environment> {
     Ok(environment)
 }
 
-/// The library's file: what the environment variable names, else what the user named or what lies in that folder.
+/// The library's file: what the environment variable names, else what the user named or what lies
+/// in that folder.
 pub(super) fn find(variable: Option<&Path>, given: Option<&Path>) -> Result<PathBuf> {
     let variable = variable.filter(|p| !p.as_os_str().is_empty());
     let places = [(variable, "ORT_DYLIB_PATH"), (given, "the given runtime")];

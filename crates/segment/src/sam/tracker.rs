@@ -5,13 +5,15 @@ use crate::distance::innermost;
 use crate::{Error, Picture, Result, Target};
 use trocar_camera::{ColorImage, Mask};
 
-/// Follows one target from picture to picture by mask prompts: each picture's decoder is given the mask logits of the
-/// picture before and a click on that mask's innermost pixel. This follows motion that is small against the target's
-/// size, which is what 30 pictures a second show. A decoder without a mask input is given the mask's box instead.
+/// Follows one target from picture to picture by mask prompts: each picture's decoder is given the
+/// mask logits of the picture before and a click on that mask's innermost pixel. This follows
+/// motion that is small against the target's size, which is what 30 pictures a second show. A
+/// decoder without a mask input is given the mask's box instead.
 ///
-/// SAM 2's own video memory (memory encoder and memory attention) is *not* used: the public exports of those two networks
-/// agree neither on inputs nor on what is left to the caller, so code for them could not be checked. The price: a target
-/// that was fully hidden is found again only where it was seen last, and look-alikes that touch it may be taken in.
+/// SAM 2's own video memory (memory encoder and memory attention) is *not* used: the public exports
+/// of those two networks agree neither on inputs nor on what is left to the caller, so code for
+/// them could not be checked. The price: a target that was fully hidden is found again only where
+/// it was seen last, and look-alikes that touch it may be taken in.
 #[derive(Debug)]
 pub struct Tracker<'a> {
     sam: &'a Sam2,
@@ -32,10 +34,12 @@ impl<'a> Tracker<'a> {
         Self { sam, state: None }
     }
 
-    /// Finds the target in the first picture by what the user pointed at; forgets what was followed before.
+    /// Finds the target in the first picture by what the user pointed at; forgets what was followed
+    /// before.
     ///
     /// # Errors
-    /// As [`crate::Segmenter::segment`], and when the mask is empty: there is nothing to follow then.
+    /// As [`crate::Segmenter::segment`], and when the mask is empty: there is nothing to follow
+    /// then.
     pub fn start(&mut self, picture: &Picture<'_>, target: &Target) -> Result<Mask> {
         self.state = None;
         let logits = self.sam.decode(picture.color, &Prompt::new(picture, target)?)?;
@@ -48,8 +52,8 @@ impl<'a> Tracker<'a> {
         Ok(mask)
     }
 
-    /// Finds the target in the next picture. The mask is empty where it cannot be seen; the last one seen is then kept for
-    /// the pictures to come.
+    /// Finds the target in the next picture. The mask is empty where it cannot be seen; the last
+    /// one seen is then kept for the pictures to come.
     ///
     /// # Errors
     /// Before [`Tracker::start`], for a picture of another size, and when the network fails.
