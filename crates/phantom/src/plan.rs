@@ -74,11 +74,7 @@ pub(crate) enum Vessels {
 impl Plan {
     /// The phantom of that name.
     pub fn named(name: &str) -> Result<&'static Self> {
-        let known = || Error::Unknown {
-            name: name.to_owned(),
-            nearest: nearest(name, NAMES),
-            known: NAMES.join(", "),
-        };
+        let known = || Error::Unknown { name: name.to_owned(), nearest: nearest(name, NAMES), known: NAMES.join(", ") };
         PLANS.into_iter().find(|p| p.name == name).ok_or_else(known)
     }
 }

@@ -222,7 +222,10 @@ fn bad_requests_are_refused_and_leave_nothing() {
     let options = RecordOptions { frames: 2, ..RecordOptions::default() };
     let silent = &trocar_progress::Silent;
     let unknown = record("fantom-c", &options, &to, silent).unwrap_err().to_string();
-    assert_eq!(unknown, "no phantom 'fantom-c'; the phantoms are phantom-a, phantom-b, phantom-c; did you mean 'phantom-c'?");
+    assert_eq!(
+        unknown,
+        "no phantom 'fantom-c'; the phantoms are phantom-a, phantom-b, phantom-c; did you mean 'phantom-c'?"
+    );
     let none = record("phantom-a", &RecordOptions { frames: 0, ..options }, &to, silent).unwrap_err().to_string();
     assert!(none.contains("frames is 0"), "{none}");
     let stopped = crate::record::record_with(PLANS[0], &options, &small(), coarse(PLANS[0]), &to, &Stop);

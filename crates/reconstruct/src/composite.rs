@@ -1,4 +1,4 @@
-//! The background: per-pixel medians over a window of frames, instruments left out (paper section
+//! The composite: per-pixel medians over a window of frames without the instruments (paper section
 //! III, "Instrument removal").
 
 use crate::error::{Error, Result};
@@ -13,7 +13,7 @@ use trocar_progress::Progress;
 use trocar_recording::{Packet, Recording, RgbdFrame};
 use xxhash_rust::xxh3::Xxh3;
 
-/// What a window of frames says of the scene behind the instruments.
+/// The scene behind the instruments, from a window of frames.
 pub struct Composite {
     /// The centre frame's colour.
     pub input: ColorImage,
@@ -23,7 +23,7 @@ pub struct Composite {
     pub color: ColorImage,
     /// Pixels with enough samples of colour.
     pub colored: Mask,
-    /// Median depth; 0 with too few samples [m].
+    /// Median depth (m); 0 with too few samples.
     pub depth: DepthImage,
     /// Frames used.
     pub frames_used: usize,
@@ -31,28 +31,28 @@ pub struct Composite {
     pub recovered_share: f64,
     /// Share of the image with depth.
     pub coverage: f64,
-    /// Median over pixels of the 10th to 90th percentile range of depth [m].
+    /// Median over pixels of the 10th to 90th percentile range of depth (m).
     pub depth_range_median: f64,
     /// Pixels whose depth changes by more than the sensor's noise.
     pub moving: Mask,
     /// Hash of the bytes of all used frames.
     pub hash: u64,
-    /// Where the time went.
+    /// Times of its parts.
     pub times: CompositeTimes,
 }
 
-/// Where a composite's time went.
+/// Times of the parts of a composite.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CompositeTimes {
-    /// Wall time of reading and decoding the frames [s].
+    /// Wall time of reading and decoding the frames (s).
     pub frames: f64,
-    /// Time of all threads together spent decoding images [s].
+    /// Time that all threads together decode images (s).
     pub decoding: f64,
-    /// Wall time of the medians [s].
+    /// Wall time of the medians (s).
     pub medians: f64,
 }
 
-/// One frame, as small as it can be held: the whole window is in memory at once.
+/// One frame in compact form, because the whole window is in memory at once.
 struct Sample {
     frame: usize,
     color: Vec<[u8; 3]>,
@@ -66,13 +66,13 @@ struct Sample {
 #[derive(Clone, Copy, Default)]
 struct Pixel {
     color: Option<[u8; 3]>,
-    /// Median and inter-percentile range, in units of the recording.
+    /// Median and 10th to 90th percentile range, in units of the recording.
     depth: Option<(f64, f64)>,
-    /// Its depth changes by more than the sensor's noise.
+    /// Whether its depth changes by more than the sensor's noise.
     moving: bool,
 }
 
-/// Room for the samples of one pixel, kept from pixel to pixel.
+/// Buffers for the samples of one pixel, reused from pixel to pixel.
 #[derive(Default)]
 struct Scratch {
     /// Red, green, blue, depth; sorted.
@@ -82,8 +82,8 @@ struct Scratch {
     differences: Vec<u16>,
 }
 
-/// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame. Broken frames
-/// are left out with a note.
+/// Builds the composite. It takes 6 bytes per pixel and frame of the window. Broken frames are left
+/// out, with a note.
 ///
 /// # Errors
 /// A centre outside the recording, too few whole frames, or an interruption.
@@ -186,8 +186,8 @@ fn read_window(
         progress.advance(1);
         (packet.frame, sample)
     };
-    // One thread reads while the others decode; what is read is decoded at once, so no more than a
-    // packet a thread waits.
+    // One thread reads while the others decode. A packet is decoded at once, so at most one per
+    // thread waits.
     let mut read: Vec<(usize, Result<Sample>)> = recording.packets(window).par_bridge().map(read).collect();
     progress.end();
     if progress.interrupted() {
@@ -213,7 +213,7 @@ fn read_window(
     Ok(samples)
 }
 
-/// A depth [m] in whole units of `scale` [m]; what 16 bits do not hold is invalid, 0.
+/// A depth (m) in whole units of `scale` (m); 0, which is invalid, beyond 16 bits.
 fn units(depth: f32, scale: f64) -> u16 {
     let units = (f64::from(depth) / scale).round();
     if units <= f64::from(u16::MAX) { units as u16 } else { 0 }
@@ -223,10 +223,13 @@ fn units(depth: f32, scale: f64) -> u16 {
 fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<Vec<usize>> {
     let wrong = |reason: String| Error::Input { path: recording.dir().to_owned(), reason };
     if centre >= recording.len() {
-        return Err(wrong(format!("the window's centre is frame {centre}; the recording has {}", recording.len())));
+        return Err(wrong(format!(
+            "the window's centre is frame {centre}; the recording has {} frames (--centre)",
+            recording.len()
+        )));
     }
     if settings.stride == 0 {
-        return Err(wrong("the window's stride is 0; at least 1".into()));
+        return Err(wrong("the window's stride is 0; it must be at least 1".into()));
     }
     let longest = recording.len().max(Settings::default().window);
     if settings.window > longest {
@@ -242,8 +245,8 @@ fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<V
     Ok((first..=last).step_by(settings.stride).collect())
 }
 
-/// Median over V(u,v): colour over the frames in which the pixel is not masked, depth over those
-/// that also measured it.
+/// Medians over V(u,v): colour over the frames in which no instrument covers the pixel, depth over
+/// those of them that measured it.
 fn medians(samples: &[Sample], i: usize, needed: usize, scale: f64, scratch: &mut Scratch) -> Pixel {
     let Scratch { sorted, depths, differences } = scratch;
     sorted.iter_mut().for_each(Vec::clear);
@@ -265,7 +268,7 @@ fn medians(samples: &[Sample], i: usize, needed: usize, scale: f64, scratch: &mu
     Pixel { color, depth, moving }
 }
 
-/// Percentile `p` (0..=1) of sorted values, linear between neighbours.
+/// Percentile `p` in [0, 1] of sorted values, linear between neighbours.
 fn percentile(sorted: &[u16], p: f64) -> f64 {
     let at = p * (sorted.len() - 1) as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);

@@ -22,7 +22,7 @@ const MIN_SAMPLES: usize = 8;
 pub(crate) const WARN_SHARE: f64 = 0.1;
 
 /// Whether a pixel's depth changes by more than the sensor's noise. `depths` are its samples in the
-/// order of time and `range` their 10th to 90th percentile range, both in units of `scale` (m).
+/// order of time and `range` is their 10th to 90th percentile range, both in units of `scale` (m).
 ///
 /// Noise differs from frame to frame, motion over several frames, so the differences of consecutive
 /// samples measure the noise. `scratch` is overwritten.

@@ -1,4 +1,4 @@
-//! The stages in their order.
+//! The stages of the reconstruction in order.
 
 use crate::body::fill_with_tets;
 use crate::composite::{Composite, CompositeTimes, composite};
@@ -13,22 +13,22 @@ use trocar_recording::{OrganInfo, Recording};
 use trocar_specimen::{Organ, Provenance, Specimen};
 use xxhash_rust::xxh3::Xxh3;
 
-/// What the camera saw of one organ, for the report.
+/// One organ in the composite, for the report.
 #[derive(Clone, Debug)]
 pub struct OrganView {
     /// Its name.
     pub name: String,
     /// Its mask in the composite.
     pub mask: Mask,
-    /// Surface depth minus measured depth on the compared pixels [m]; 0 elsewhere.
+    /// Surface depth minus measured depth on the compared pixels (m); 0 elsewhere.
     pub depth_error: Vec<f32>,
-    /// Which pixels were compared.
+    /// The compared pixels.
     pub compared: Mask,
     /// Share of its pixels with depth that move during the window.
     pub moving_share: f64,
 }
 
-/// A specimen and what was seen on the way to it.
+/// A specimen and its intermediate results.
 #[derive(Clone, Debug)]
 pub struct Reconstruction {
     /// The result.
@@ -43,24 +43,24 @@ pub struct Reconstruction {
     pub depth: DepthImage,
     /// Frames the composite used.
     pub frames_used: usize,
-    /// Share of the image that only the composite could fill under the instrument masks of the
-    /// centre frame.
+    /// Share of the image under the instruments of the centre frame that the composite recovered.
     pub recovered_share: f64,
     /// Share of pixels with composite depth.
     pub coverage: f64,
-    /// Median over pixels of the range between the 10th and 90th percentile of depth [m].
+    /// Median over pixels of the range between the 10th and 90th percentile of depth (m).
     pub depth_range_median: f64,
-    /// Where the composite's time went.
+    /// Times of the parts of the composite.
     pub times: CompositeTimes,
     /// Per organ, in the specimen's order.
     pub organs: Vec<OrganView>,
-    /// What makes the result doubtful (organs that move during the window), a sentence each.
+    /// Warnings that the result may be wrong (organs that move during the window), one sentence
+    /// each.
     pub warnings: Vec<String>,
-    /// Things the user should know (dropped frames, filled holes, clipped organs), a sentence each.
+    /// Notes for the user (dropped frames, filled holes, clipped organs), one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Name and version for the provenance.
+/// The program's name and version, for the provenance.
 pub(crate) fn program() -> String {
     format!("trocar {}", env!("CARGO_PKG_VERSION"))
 }
@@ -75,7 +75,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
     if recording.info.organs.is_empty() {
         return Err(Error::Input {
             path: recording.toml().to_owned(),
-            reason: "no [[organ]]; name at least one, with a mask in masks/, a polygon or points (`trocar inspect` writes a template)".into(),
+            reason: "there is no [[organ]]; add at least one, with a mask in masks/, a polygon or points (`trocar inspect --template` writes an example)".into(),
         });
     }
     let segmenters = OrganSegmenters::open(recording, settings)?;
@@ -147,7 +147,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
     })
 }
 
-/// The organ and what was seen of it, from its closed surface.
+/// The organ and its view, from its closed surface.
 fn with_body(
     info: &OrganInfo,
     closed: Closed,
@@ -173,7 +173,7 @@ fn moving_share(mask: &Mask, background: &Composite) -> f64 {
     moving as f64 / measured.len().max(1) as f64
 }
 
-/// A sentence for the organs that move, and what to do about it.
+/// A warning about the organs that move, with the remedy.
 fn motion_warning(views: &[OrganView], window: usize) -> Option<String> {
     let moving: Vec<String> = views
         .iter()
@@ -189,13 +189,13 @@ fn motion_warning(views: &[OrganView], window: usize) -> Option<String> {
     })
 }
 
-/// Hash of everything the result depends on: what is known of the recording, the used frames, the
+/// Hash of everything that the result depends on: the recording's facts, the used frames, the
 /// masks.
 fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]) -> Result<u64> {
     let mut hash = Xxh3::new();
     let said = toml::to_string(&recording.info).map_err(|e| Error::Setting(format!("the recording's facts: {e}")))?;
     hash.update(said.as_bytes());
-    // What a log says of its cameras is not in there.
+    // The cameras that a log describes are not part of the recording's facts.
     let cameras = (recording.camera(), recording.depth_scale(), recording.registration());
     hash.update(format!("{cameras:?}").as_bytes());
     hash.update(&background.hash.to_le_bytes());

@@ -1,4 +1,4 @@
-//! From a recording to organs, against the truth it was made from.
+//! Reconstructs recordings with known truth.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "../../recording/tests/common/mod.rs"]
@@ -21,7 +21,7 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     let recording = Recording::open(&dir).unwrap();
     let made = reconstruct(&recording, &Settings::default(), &Silent).unwrap();
 
-    // The composite: no trace of the bar, which covered an eighth of the image.
+    // The composite has no trace of the bar, which covered an eighth of the image.
     let (color, depth, mask) = common::scene(&recording.camera());
     assert_eq!(made.background, color);
     assert_eq!(made.frames_used, 12, "stride 2");
@@ -43,14 +43,14 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     let truth = 4.0 / 3.0 * std::f64::consts::PI * (100.0 * RADIUS).powi(3);
     assert!((0.88..1.02).contains(&(facts.volume_cm3 / truth)), "{} of {truth} cm3", facts.volume_cm3);
     let (low, high) = organ.body.bounds().unwrap();
-    // The modelled back of a sphere is up to a fifth of R short (see the thickness); its front and
-    // outline are measured.
+    // The modelled back of a sphere is up to a fifth of R short; its front and outline are
+    // measured.
     assert!((0.5 * (low + high) - CENTRE).length() < 0.15 * RADIUS);
     assert_eq!(made.organs[0].mask, mask);
     let red = organ.surface.colors.iter().filter(|c| **c == [180, 60, 50]).count();
     assert_eq!(red, organ.surface.vertices.len());
 
-    // Written and read again, and the same bits a second time.
+    // Written and read again, and a second time with the same bits.
     let out = root.path().join("specimen");
     made.specimen.write(&out).unwrap();
     assert_eq!(Specimen::read(&out).unwrap().organs[0].body, organ.body);
@@ -88,7 +88,7 @@ fn an_organ_that_moves_is_warned_of() {
 }
 
 #[test]
-fn stops_when_asked_and_says_what_is_wrong() {
+fn interruptions_and_wrong_settings_are_named() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("recording");
     write(&dir, &info(), 4);

@@ -147,7 +147,7 @@ fn compressed_images() {
     // Two colour topics, one called so; two depth topics, both called so.
     let message = find_rgbd_topics(&*log, None, None).unwrap_err().to_string();
     assert!(
-        message.contains("several topics with depth") && message.contains("/float/depth/compressedDepth"),
+        message.contains("several topics have depth") && message.contains("/float/depth/compressedDepth"),
         "{message}"
     );
 }

@@ -201,7 +201,7 @@ fn numbers() {
             "up = [0.0, 0.0, 1.0]§",
             "camera[1].view.up has no direction across the view; the direction of the image's top",
         ),
-        Case("share = 0.42", "share = 42§", "organ.cecum.pins.share is 42; 0 to 1"),
+        Case("share = 0.42", "share = 42§", "organ.cecum.pins.share is 42; it must be in [0, 1]"),
         Case(
             "length = 0.14",
             "length = 0.84",

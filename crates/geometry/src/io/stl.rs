@@ -50,10 +50,16 @@ fn collect(bytes: &[u8]) -> Parsed<TriMesh> {
     Ok(mesh)
 }
 
-/// The reader's message about a number in plain words.
+/// The STL reader's message in plain words.
 fn plain(message: &str) -> String {
-    let not_finite = message.strip_prefix("expected finite f32, got ").and_then(|rest| rest.split_whitespace().next());
-    not_finite.map_or_else(|| message.to_owned(), |value| format!("a coordinate is {value}; it must be a finite number"))
+    if let Some(rest) = message.strip_prefix("expected finite f32, got ") {
+        let value = rest.split_whitespace().next().unwrap_or_default();
+        return format!("a coordinate is {value}; it must be a finite number");
+    }
+    if let Some(found) = message.strip_prefix("vertex f32 f32 f32, got ") {
+        return format!("a corner must be `vertex X Y Z`; the line has the words {found}");
+    }
+    message.to_owned()
 }
 
 #[cfg(test)]
@@ -106,6 +112,10 @@ mod tests {
         assert!(parse(format!("solid\n{facet}facet normal 0").as_bytes()).unwrap_err().contains("facet 1"));
         assert!(parse(format!("solid\n{facet}").as_bytes()).is_err());
         let nan = facet.replace("vertex 1", "vertex nan");
-        assert!(parse(format!("solid\n{facet}{nan}endsolid").as_bytes()).unwrap_err().contains("facet 1"));
+        let reason = parse(format!("solid\n{facet}{nan}endsolid").as_bytes()).unwrap_err();
+        assert_eq!(reason, "facet 1: a coordinate is NaN; it must be a finite number");
+        let short = facet.replace("vertex 1 0 0", "vertex 1 0");
+        let reason = parse(format!("solid\n{facet}{short}endsolid").as_bytes()).unwrap_err();
+        assert!(reason.starts_with("facet 1: a corner must be `vertex X Y Z`"), "{reason}");
     }
 }

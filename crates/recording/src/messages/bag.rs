@@ -1,9 +1,10 @@
 //! ROS 1 bags, format 2.0 (<http://wiki.ros.org/Bags/Format/2.0>).
 //!
-//! A bag is a row of records: a header of named fields, then data. Chunks hold the messages; after
-//! each come the indices of its messages, one a connection; at the end, descriptions of connections
-//! and chunks. The file is walked from chunk to chunk without reading their content, which finds
-//! every index; the end is only needed to go on behind damage.
+//! A bag is a sequence of records, each a header of named fields and data. Chunks hold the
+//! messages. The indices of a chunk's messages follow it, one per connection. Descriptions of
+//! connections and chunks are at the end. The file is walked from chunk to chunk without reading
+//! their content, which finds every index. The end of the file is only needed to continue after
+//! damage.
 
 use super::byte_reader::ByteReader;
 use super::byte_source::ByteSource;
@@ -23,14 +24,15 @@ const CHUNK: u8 = 5;
 const CHUNK_INFO: u8 = 6;
 const CONNECTION: u8 = 7;
 
-/// Enough for the header of any record but a hostile one.
+/// Bytes read for a record's header; enough for every header that recorders write.
 const FIRST_READ: u64 = 4096;
-/// Headers are a few short fields.
+/// Longest header of a record (bytes); headers are a few short fields.
 const MAX_HEADER: u64 = 1 << 16;
-/// A connection's description holds the definition of its message, some kilobytes.
+/// Longest description of a connection (bytes); it holds the definition of its message type, some
+/// kilobytes.
 const MAX_DESCRIPTION: u64 = 1 << 20;
 
-/// A record in the file: what its header says, and where its data lies.
+/// A record in the file: its header, and where its data is.
 struct Walked {
     header: Vec<u8>,
     data_at: u64,
@@ -43,7 +45,7 @@ impl Walked {
         let mut bytes = source.up_to(at, FIRST_READ)?;
         let header_len = u64::from(ByteReader::packed(&bytes).u32()?);
         if header_len > MAX_HEADER {
-            return Err(format!("a record's header of {header_len} bytes; at most {MAX_HEADER} are read"));
+            return Err(format!("a record has a header of {header_len} bytes; the limit is {MAX_HEADER}"));
         }
         if header_len + 8 > bytes.len() as u64 {
             bytes = source.read(at, header_len + 8)?;
@@ -62,7 +64,7 @@ impl Walked {
     fn connection(&self, source: &ByteSource) -> Parsed<Record<'static>> {
         if self.data_len > MAX_DESCRIPTION {
             return Err(format!(
-                "a connection described in {} bytes; at most {MAX_DESCRIPTION} are read",
+                "the description of a connection has {} bytes; the limit is {MAX_DESCRIPTION}",
                 self.data_len
             ));
         }
@@ -79,7 +81,7 @@ fn field<'a>(header: &'a [u8], name: &str) -> Parsed<ByteReader<'a>> {
             return Ok(ByteReader::packed(value));
         }
     }
-    Err(format!("a record without the field '{name}'"))
+    Err(format!("a record has no field '{name}'"))
 }
 
 /// A text field of a record's header.
@@ -88,7 +90,7 @@ fn text<'a>(header: &'a [u8], name: &str) -> Parsed<&'a str> {
     std::str::from_utf8(value.take(value.remaining())?).map_err(|_| format!("the field '{name}' is not UTF-8"))
 }
 
-/// Two numbers: seconds, nanoseconds.
+/// Reads a time: seconds, nanoseconds. Returns ns.
 fn time(reader: &mut ByteReader<'_>) -> Parsed<u64> {
     Ok(u64::from(reader.u32()?) * 1_000_000_000 + u64::from(reader.u32()?))
 }
@@ -106,8 +108,8 @@ fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
     Ok((record, reader.at()))
 }
 
-/// A connection: its topic is in the record's header, its type among fields of the same form in the
-/// data.
+/// A connection: the record's header has the topic, the data has the type among fields of the same
+/// form.
 fn connection<'a>(header: &[u8], data: &[u8]) -> Parsed<Record<'a>> {
     let connection = Connection {
         topic: text(header, "topic")?.to_owned(),
@@ -136,7 +138,7 @@ pub(crate) fn open(source: ByteSource) -> Parsed<Log> {
         }
         index_at
     } else {
-        // A finished bag without messages ends where its index would begin.
+        // The index of a complete bag without messages begins at the end of the file.
         if index_at != len || field(&first.header, "chunk_count")?.u32()? > 0 {
             log.problem("no index at the end: the recorder did not finish, or the file was cut".into());
         }
@@ -173,17 +175,17 @@ fn read_end(log: &mut LogBuilder, mut at: u64, chunk_ats: &mut Vec<u64>) -> Pars
     Ok(())
 }
 
-/// Takes in the record at `at` and gives the place of the next.
+/// Adds the record at `at`. Returns the position of the next.
 fn step(log: &mut LogBuilder, at: u64, end: u64, chunk_ats: &[u64]) -> Parsed<u64> {
     let walked = Walked::read(log.source(), at)?;
     let op = field(&walked.header, "op")?.u8()?;
     if walked.end() > end {
-        // The chunk was cut, or its length is damaged. What is there can be used if it is not
-        // compressed.
+        // The chunk was cut, or its length is damaged. An uncompressed one is used as far as it
+        // goes.
         if op == CHUNK && text(&walked.header, "compression")? == "none" {
             log.cut_chunk(walked.data_at, next_after(chunk_ats, at).unwrap_or(end));
         }
-        return Err(format!("a record there says it ends at byte {}", walked.end()));
+        return Err(format!("the record claims to end at byte {}", walked.end()));
     }
     match op {
         CHUNK => {
@@ -192,20 +194,20 @@ fn step(log: &mut LogBuilder, at: u64, end: u64, chunk_ats: &[u64]) -> Parsed<u6
                 "none" => Compression::None,
                 "bz2" => Compression::Bzip2,
                 "lz4" => Compression::Lz4,
-                other => return Err(format!("a chunk is compressed with '{other}'; known are none, bz2 and lz4")),
+                other => return Err(format!("a chunk is compressed with '{other}'; supported are none, bz2 and lz4")),
             };
             let size = (compression != Compression::None).then_some(size);
             log.chunk(Chunk { at: walked.data_at, len: walked.data_len, size, compression, crc: 0 });
             if walked.data_len == 0 {
-                // The chunk a killed recorder was writing: its length was to be filled in later,
-                // its messages follow.
+                // A killed recorder was writing this chunk: its length was never filled in, and its
+                // messages follow.
                 log.index(0, &[])?;
             }
         }
         INDEX => {
             let connection = field(&walked.header, "conn")?.u32()?;
             if !walked.data_len.is_multiple_of(12) {
-                return Err(format!("an index of {} bytes; an entry has 12", walked.data_len));
+                return Err(format!("an index has {} bytes; it must be a multiple of 12", walked.data_len));
             }
             let data = log.source().read(walked.data_at, walked.data_len)?;
             let mut reader = ByteReader::packed(&data);
@@ -227,7 +229,7 @@ fn step(log: &mut LogBuilder, at: u64, end: u64, chunk_ats: &[u64]) -> Parsed<u6
             log.index(connection, &[(time, 0)])?;
         }
         BAG_HEADER | CHUNK_INFO => {}
-        other => return Err(format!("a record of unknown kind {other}")),
+        other => return Err(format!("a record has the unknown kind {other}")),
     }
     Ok(walked.end())
 }

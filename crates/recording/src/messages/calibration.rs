@@ -4,21 +4,20 @@ use super::distortion;
 use super::error::Parsed;
 use trocar_camera::Camera;
 
-/// What both kinds of message say.
+/// The contents of both kinds of message.
 #[derive(Default)]
 pub(crate) struct Intrinsics {
     pub width: u32,
     pub height: u32,
     /// Name of the distortion model.
     pub model: String,
-    /// Its coefficients.
+    /// Distortion coefficients.
     pub d: Vec<f64>,
     /// Camera matrix, row by row.
     pub k: [f64; 9],
-    /// Camera pixels a pixel of the image, horizontally and vertically; 0 means 1.
+    /// Camera pixels per image pixel, horizontally and vertically; 0 means 1.
     pub binning: [u32; 2],
-    /// The part of the camera's image that was taken: left, top, height, width [px]; zeros mean
-    /// all.
+    /// Region of the camera's image: left, top, height, width (px); all zeros mean the whole image.
     pub region: [u32; 4],
 }
 
@@ -29,7 +28,7 @@ pub(crate) fn camera(i: &Intrinsics) -> Parsed<Camera> {
         return Err("K is all zeros: the camera was not calibrated".into());
     }
     if skew != 0.0 {
-        return Err(format!("K has a skew of {skew}; only pixels without skew are known here"));
+        return Err(format!("K has a skew of {skew}; it must be 0"));
     }
     let mut camera = Camera {
         width: i.width as usize,

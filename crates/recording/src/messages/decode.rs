@@ -1,4 +1,4 @@
-//! Decodes messages: picks the parser by the topic's message type and encoding.
+//! Decodes messages. The topic's message type and encoding select the parser.
 
 use super::calibration::camera;
 use super::error::{Error, Parsed, Result};
@@ -45,14 +45,14 @@ fn plain(raw: &Raw<'_>) -> Parsed<StampedImage> {
 /// Decodes a camera calibration: `sensor_msgs/CameraInfo` (ROS 1, ROS 2) or
 /// `foxglove.CameraCalibration` (protobuf, JSON).
 ///
-/// This is the camera of the raw image, with K and D; a rectified image has P and no distortion,
-/// which RealSense's aligned and depth images share with their raw ones. Region and binning are
-/// taken into account as ROS's `image_geometry` does. librealsense's inverse and modified
-/// Brown-Conrady models are fitted by OpenCV's (to half a pixel, or an error).
+/// The result is the camera of the raw image, with K and D. A rectified image has P and no
+/// distortion; RealSense's aligned and depth images share K with their raw ones. Region and binning
+/// are applied as ROS's `image_geometry` does. OpenCV's model is fitted to librealsense's inverse
+/// and modified Brown-Conrady models, to half a pixel or an error.
 ///
 /// # Errors
 /// [`Error::Message`](super::Error::Message) for another type, a camera that was never calibrated
-/// (K of zeros), a fisheye, or numbers that make no sense.
+/// (K of zeros), a fisheye, or numbers out of range.
 pub fn decode_calibration(topic: &Topic, bytes: &[u8]) -> Result<Camera> {
     let parsed = match (topic.kind.as_str(), &topic.encoding) {
         ("sensor_msgs/CameraInfo", _) => ros::camera_info(topic, bytes),
@@ -63,12 +63,12 @@ pub fn decode_calibration(topic: &Topic, bytes: &[u8]) -> Result<Camera> {
     of_topic(topic, parsed.and_then(|intrinsics| camera(&intrinsics)))
 }
 
-/// Decodes transforms: one of `geometry_msgs/Transform` or `TransformStamped` or
-/// `foxglove.FrameTransform`, all of `tf2_msgs/TFMessage` or `foxglove.FrameTransforms`.
+/// Decodes transforms: one from `geometry_msgs/Transform`, `TransformStamped` or
+/// `foxglove.FrameTransform`, all from `tf2_msgs/TFMessage` or `foxglove.FrameTransforms`.
 ///
 /// # Errors
-/// [`Error::Message`](super::Error::Message) for another type, bytes that end too soon, or a
-/// rotation that is none.
+/// [`Error::Message`](super::Error::Message) for another type, truncated bytes, or a quaternion
+/// that is not a rotation.
 pub fn decode_transforms(topic: &Topic, bytes: &[u8]) -> Result<Vec<Transform>> {
     let fields = || ros::fields(topic, bytes);
     let parsed = match (topic.kind.as_str(), &topic.encoding) {
@@ -78,7 +78,7 @@ pub fn decode_transforms(topic: &Topic, bytes: &[u8]) -> Result<Vec<Transform>> 
         }
         ("tf2_msgs/TFMessage" | "tf/tfMessage", _) => fields().and_then(|mut f| {
             let count = f.u32()? as usize;
-            // The smallest is 56 bytes of numbers, so a wild count ends at the end of the bytes.
+            // Each takes at least 56 bytes, so the end of the bytes limits a wrong count.
             (0..count).map(|_| ros::transform_stamped(topic, &mut f)).collect()
         }),
         ("foxglove.FrameTransform", Encoding::Protobuf) => foxglove::frame_transform(bytes).map(|t| vec![t]),
@@ -90,10 +90,10 @@ pub fn decode_transforms(topic: &Topic, bytes: &[u8]) -> Result<Vec<Transform>> 
     of_topic(topic, parsed.and_then(|all| all.into_iter().map(Transform::check).collect()))
 }
 
-/// The number of a `std_msgs/Float32` or `Float64`; RealSense writes a sensor's options so.
+/// Decodes a `std_msgs/Float32` or `Float64`, as which RealSense writes a sensor's options.
 ///
 /// # Errors
-/// [`Error::Message`](super::Error::Message) for another type, or bytes that end too soon.
+/// [`Error::Message`](super::Error::Message) for another type, or truncated bytes.
 pub fn decode_float(topic: &Topic, bytes: &[u8]) -> Result<f32> {
     let parsed = match topic.kind.as_str() {
         "std_msgs/Float32" => ros::fields(topic, bytes).and_then(|mut f| f.f32()),
@@ -103,12 +103,12 @@ pub fn decode_float(topic: &Topic, bytes: &[u8]) -> Result<f32> {
     of_topic(topic, parsed)
 }
 
-/// Why a topic cannot be decoded: nothing known is of this type and encoding.
+/// The reason why a topic cannot be decoded: no parser for its type and encoding.
 fn unknown(topic: &Topic) -> String {
-    format!("messages written as {:?} of this type are not known here", topic.encoding)
+    format!("this type in {:?} encoding is not supported", topic.encoding)
 }
 
-/// The error of a message.
+/// The result with the topic named in its error.
 fn of_topic<T>(topic: &Topic, parsed: Parsed<T>) -> Result<T> {
     parsed.map_err(|reason| Error::Message { topic: topic.name.clone(), kind: topic.kind.clone(), reason })
 }

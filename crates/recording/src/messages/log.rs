@@ -1,4 +1,4 @@
-//! An open log file, as both formats share it: chunks, and where in them each topic's messages lie.
+//! An open log file of either format: its chunks, and where in them each topic's messages are.
 
 use super::byte_source::ByteSource;
 use super::chunk::Chunk;
@@ -10,15 +10,15 @@ use std::path::Path;
 pub(crate) enum Record<'a> {
     /// A channel of messages.
     Connection(u32, Connection),
-    /// The name of a message type, by number (MCAP only).
+    /// The name of a message type, by its number (MCAP only).
     Schema(u16, String),
-    /// A message: connection, log time [ns], content.
+    /// A message: connection, log time (ns), content.
     Message(u32, u64, &'a [u8]),
     /// Anything else.
     Other,
 }
 
-/// A channel of messages; several may feed one topic.
+/// A channel of messages; several may belong to one topic.
 #[derive(Clone, Debug)]
 pub(crate) struct Connection {
     pub topic: String,
@@ -30,11 +30,11 @@ pub(crate) struct Connection {
 #[derive(Clone, Debug)]
 pub(crate) enum Kind {
     Name(String),
-    /// Number of a schema.
+    /// By the number of a schema.
     Schema(u16),
 }
 
-/// Parses the record at the start of some bytes of a chunk and gives its length.
+/// Parses the record at the start of a slice of a chunk, and returns its length too.
 pub(crate) type ParseRecord = fn(&[u8]) -> Parsed<(Record<'_>, usize)>;
 
 /// An open log file.
@@ -44,9 +44,9 @@ pub(crate) struct Log {
     pub chunks: Vec<Chunk>,
     pub topics: Vec<Topic>,
     pub times: Vec<Vec<u64>>,
-    /// A topic's messages: chunk, offset in it.
+    /// A topic's messages: chunk, and offset in it.
     pub places: Vec<Vec<(u32, u32)>>,
-    /// The connections that feed a topic, ascending.
+    /// The connections of a topic, ascending.
     pub connections: Vec<Vec<u32>>,
     pub problems: Vec<String>,
 }
@@ -65,7 +65,7 @@ impl MessageLog for Log {
     }
 
     fn messages<'a>(&'a self, wanted: &[(usize, usize)]) -> Box<dyn Iterator<Item = Message> + Send + 'a> {
-        // What is not there comes last, as an error.
+        // Missing messages come last, as errors.
         let place = |&(topic, index): &(usize, usize)| -> Option<(u32, u32)> {
             self.places.get(topic).and_then(|places| places.get(index)).copied()
         };
@@ -90,7 +90,7 @@ impl Messages<'_> {
     fn read(&mut self, (chunk, offset): (u32, u32), topic: usize) -> Parsed<Vec<u8>> {
         let place = self.log.chunks.get(chunk as usize).ok_or("there is no such message")?;
         if self.loaded.as_ref().is_none_or(|(c, _)| *c != chunk) {
-            // The old chunk's memory goes back before the new one's is taken.
+            // Frees the old chunk before the new one is read.
             self.loaded = None;
             self.loaded = Some((chunk, place.load(&self.log.source)));
         }
@@ -100,7 +100,7 @@ impl Messages<'_> {
             None => return Err("the chunk is not there".into()),
         };
         let misplaced =
-            || format!("the index points to byte {offset} of chunk {chunk}, where there is no such message");
+            || format!("the index points to byte {offset} of chunk {chunk}, where no message of this topic begins");
         let record = bytes.get(offset as usize..).ok_or_else(misplaced)?;
         match (self.log.parse)(record)?.0 {
             Record::Message(connection, _, content)

@@ -7,19 +7,18 @@ use super::log::{Connection, Kind, Log, ParseRecord, Record};
 use super::topic::{Encoding, Topic};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A sentence for each of the first so many problems of a file.
+/// Most problems of a file that are kept, one sentence each.
 const MAX_PROBLEMS: usize = 50;
 
-/// A file with more damaged places than this is not read to its end: trying each costs time.
+/// Most damaged places after which reading continues, because each costs time.
 const MAX_DAMAGES: usize = 200;
-/// Opening decompresses chunks without an index up to this many bytes, which are a second's work
-/// ...
+/// Opening decompresses chunks without an index up to this many bytes, about a second of work ...
 const FREE_GROWTH: u64 = 64 << 20;
-/// ... and up to this many times the file's size: LZ4 cannot shrink more, and no recording does as
-/// a whole.
+/// ... and up to this many times the file's size: LZ4 cannot compress more, and no recording does
+/// as a whole.
 const MAX_GROWTH: u64 = 256;
 
-/// Where a message lies.
+/// The place of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Place {
     time: u64,
@@ -27,14 +26,14 @@ struct Place {
     offset: u32,
 }
 
-/// The messages of a topic, and the connections they came by.
+/// The messages of a topic, and its connections.
 #[derive(Default)]
 struct Gathered {
     places: Vec<Place>,
     connections: Vec<u32>,
 }
 
-/// What is known of a file while it is read through.
+/// The parts of a log that are known so far.
 pub(crate) struct LogBuilder {
     source: ByteSource,
     parse: ParseRecord,
@@ -46,7 +45,7 @@ pub(crate) struct LogBuilder {
     schemas: BTreeMap<u16, String>,
     problems: Vec<String>,
     damages: usize,
-    /// Bytes of the chunks read through.
+    /// Decompressed bytes of the chunks that were read through.
     grown: u64,
 }
 
@@ -76,19 +75,19 @@ impl LogBuilder {
         }
     }
 
-    /// Adds a chunk; it counts as without an index until [`Self::index`].
+    /// Adds a chunk. It has no index until [`Self::index`] is called.
     pub fn chunk(&mut self, chunk: Chunk) {
         self.unindexed.insert(self.chunks.len());
         self.chunks.push(chunk);
     }
 
-    /// Adds an uncompressed chunk whose length is unknown: as much of it as lies before `end`.
+    /// Adds an uncompressed chunk of unknown length, up to `end`.
     pub fn cut_chunk(&mut self, at: u64, end: u64) {
         let len = end.saturating_sub(at);
         self.chunk(Chunk { at, len, size: None, compression: Compression::None, crc: 0 });
     }
 
-    /// Messages of the last chunk: log time, offset in it. The chunk has an index now.
+    /// Adds the index of the last chunk: log time and offset of its messages.
     pub fn index(&mut self, connection: u32, entries: &[(u64, u32)]) -> Parsed<()> {
         let last = self.chunks.len().checked_sub(1).ok_or("an index comes before the first chunk")?;
         let chunk = u32::try_from(last).map_err(|_| "too many chunks")?;
@@ -100,8 +99,9 @@ impl LogBuilder {
         Ok(())
     }
 
-    /// The record at `at` is damaged: gives the next chunk that the end of the file knows of before
-    /// `end`, to go on there. It may have been an index, so the last chunk is read through.
+    /// Records damage at `at`. Returns where to continue: the next chunk before `end` that the end
+    /// of the file lists. The damaged record may have been an index, so the last chunk is read
+    /// through.
     pub fn damage(&mut self, at: u64, end: u64, reason: &str, chunk_ats: &[u64]) -> Option<u64> {
         self.unindexed.extend(self.chunks.len().checked_sub(1));
         self.damages += 1;
@@ -111,7 +111,7 @@ impl LogBuilder {
         next
     }
 
-    /// Takes in a record that is no message; the first description of a connection holds.
+    /// Adds a record that is not a message. The first description of a connection counts.
     pub fn record(&mut self, record: Record<'_>) {
         match record {
             Record::Connection(id, connection) => drop(self.connections.entry(id).or_insert(connection)),
@@ -127,13 +127,13 @@ impl LogBuilder {
         })
     }
 
-    /// Reads through chunk `c`: its descriptions, and its messages too if it has no index. Returns
-    /// how many those are.
+    /// Reads through chunk `c` for descriptions, and for messages if it has no index. Returns the
+    /// number of those messages.
     fn read_through(&mut self, c: usize) -> usize {
         self.grown = self.grown.saturating_add(self.chunks[c].size.unwrap_or(self.chunks[c].len));
         let may = FREE_GROWTH + MAX_GROWTH.saturating_mul(self.source.len());
         if self.grown > may {
-            self.problem(format!("chunk {c} is not read through: the chunks grow to more than {may} bytes"));
+            self.problem(format!("chunk {c} is not read through: the chunks decompress to more than {may} bytes"));
             return 0;
         }
         let bytes = match self.chunks[c].load(&self.source) {
@@ -168,7 +168,7 @@ impl LogBuilder {
         found
     }
 
-    /// Reads through the chunks that need it and sorts everything into topics.
+    /// Reads through the chunks that need it, and sorts the messages by topic.
     pub fn finish(mut self) -> Log {
         let unindexed = self.unindexed.clone();
         let found: usize = unindexed.iter().map(|&c| self.read_through(c)).sum();
@@ -176,8 +176,8 @@ impl LogBuilder {
             let (count, all) = (unindexed.len(), self.chunks.len());
             self.problem(format!("{count} of {all} chunks have no index: {found} messages were found by reading them"));
         }
-        // Descriptions lie in the chunk of a connection's first message when there is none at the
-        // end of the file.
+        // Without descriptions at the end of the file, a connection's description is in the chunk
+        // of its first message.
         let undescribed: Vec<u32> = self.places.keys().copied().filter(|&id| !self.described(id)).collect();
         let mut candidates: Vec<(usize, u32)> = undescribed
             .iter()
@@ -237,12 +237,12 @@ impl LogBuilder {
     }
 }
 
-/// The first of the ascending places that is behind `at`.
+/// The first of the ascending `places` after `at`.
 pub(crate) fn next_after(places: &[u64], at: u64) -> Option<u64> {
     places.get(places.partition_point(|&p| p <= at)).copied()
 }
 
-/// One form for a type's name: ROS 2 says `sensor_msgs/msg/Image`, ROS 1 `sensor_msgs/Image`.
+/// One form of a type's name: ROS 2 writes `sensor_msgs/msg/Image`, ROS 1 `sensor_msgs/Image`.
 fn normalised(kind: &str) -> String {
     kind.replacen("/msg/", "/", 1)
 }

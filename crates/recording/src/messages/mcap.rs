@@ -1,9 +1,9 @@
 //! MCAP files (<https://mcap.dev/spec>).
 //!
-//! A row of records: a byte for the kind, a length, content. Chunks hold schemas, channels and
-//! messages; after each come the indices of its messages, one a channel; at the end is a summary.
-//! As with bags, the file is walked from chunk to chunk, and the summary is only needed for the
-//! channels and to go on behind damage.
+//! A file is a sequence of records: a byte for the kind, a length, content. Chunks hold schemas,
+//! channels and messages. The indices of a chunk's messages follow it, one per channel. A summary
+//! is at the end. As with bags, the file is walked from chunk to chunk; the summary is only needed
+//! for the channels and to continue after damage.
 
 use super::byte_reader::ByteReader;
 use super::byte_source::ByteSource;
@@ -13,7 +13,7 @@ use super::log::{Connection, Kind, Log, Record};
 use super::log_builder::{LogBuilder, next_after};
 use super::topic::Encoding;
 
-/// First bytes of the file, and the last.
+/// First and last bytes of the file.
 pub(crate) const MAGIC: &[u8] = b"\x89MCAP0\r\n";
 
 const FOOTER: u8 = 2;
@@ -25,13 +25,13 @@ const MESSAGE_INDEX: u8 = 7;
 const CHUNK_INDEX: u8 = 8;
 const DATA_END: u8 = 15;
 
-/// Kind and length of a record.
+/// Bytes of a record's kind and length.
 const RECORD_HEADER: u64 = 9;
-/// The footer record and the magic behind it.
+/// Bytes of the footer record and the final magic.
 const FILE_END: u64 = RECORD_HEADER + 20 + MAGIC.len() as u64;
-/// The part of a chunk before its content; the name of the compression is short.
+/// Bytes read for the part of a chunk before its content; the name of the compression is short.
 const CHUNK_HEADER: u64 = 256;
-/// The part of a schema or channel that matters: numbers and names at its beginning.
+/// Bytes read of a schema or channel: numbers and names at its beginning.
 const NAMES: u64 = 1 << 16;
 
 /// Parses the record at the start of a chunk's content.
@@ -43,7 +43,7 @@ fn parse(bytes: &[u8]) -> Parsed<(Record<'_>, usize)> {
     Ok((record(kind, content)?, reader.at()))
 }
 
-/// A record's content as far as it matters inside a chunk.
+/// Parses the parts of a record that matter inside a chunk.
 fn record(kind: u8, content: &[u8]) -> Parsed<Record<'_>> {
     let mut reader = ByteReader::packed(content);
     Ok(match kind {
@@ -69,7 +69,7 @@ fn record(kind: u8, content: &[u8]) -> Parsed<Record<'_>> {
     })
 }
 
-/// Kind, first byte and length of the content of the record at `at`.
+/// The kind, and the start and length of the content, of the record at `at`.
 fn walk(source: &ByteSource, at: u64) -> Parsed<(u8, u64, u64)> {
     let bytes = source.read(at, RECORD_HEADER)?;
     let mut reader = ByteReader::packed(&bytes);
@@ -105,7 +105,7 @@ pub(crate) fn open(source: ByteSource) -> Log {
     log.finish()
 }
 
-/// Where the summary begins; 0 when there is none.
+/// The start of the summary; 0 when there is none.
 fn summary_at(source: &ByteSource) -> Parsed<u64> {
     let missing = || "no footer: the recorder did not finish, or the file was cut".to_string();
     let at = source.len().checked_sub(FILE_END).ok_or_else(missing)?;
@@ -116,12 +116,12 @@ fn summary_at(source: &ByteSource) -> Parsed<u64> {
     }
     let summary = reader.u64()?;
     if summary >= at || (summary > 0 && summary < MAGIC.len() as u64) {
-        return Err(format!("the footer is damaged: it says that the summary begins at byte {summary}"));
+        return Err(format!("the footer is damaged: it places the summary at byte {summary}"));
     }
     Ok(summary)
 }
 
-/// The summary: schemas, channels, and where the chunks are.
+/// Reads the summary: schemas, channels, and the places of the chunks.
 fn read_summary(log: &mut LogBuilder, mut at: u64, chunk_ats: &mut Vec<u64>) -> Parsed<()> {
     loop {
         let (kind, content_at, content_len) = walk(log.source(), at)?;
@@ -139,18 +139,17 @@ fn read_summary(log: &mut LogBuilder, mut at: u64, chunk_ats: &mut Vec<u64>) -> 
             }
             _ => {}
         }
-        at = content_at.checked_add(content_len).ok_or("a record without end")?;
+        at = content_at.checked_add(content_len).ok_or("a record does not end")?;
     }
 }
 
-/// Takes in the record at `at` and gives the place of the next; `None` after the last with
-/// messages.
+/// Adds the record at `at`. Returns the position of the next; `None` after the last with messages.
 fn step(log: &mut LogBuilder, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>> {
     let (kind, content_at, content_len) = walk(log.source(), at)?;
     let len = log.source().len();
     let end = content_at.checked_add(content_len).filter(|&end| end <= len);
     match kind {
-        0 => return Err("a record of kind 0".into()),
+        0 => return Err("the record has kind 0".into()),
         DATA_END | FOOTER => return Ok(None),
         CHUNK => {
             let bytes = log.source().up_to(content_at, CHUNK_HEADER)?;
@@ -160,18 +159,18 @@ fn step(log: &mut LogBuilder, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>>
                 "" => Compression::None,
                 "lz4" => Compression::Lz4,
                 "zstd" => Compression::Zstd,
-                other => return Err(format!("a chunk is compressed with '{other}'; known are none, lz4 and zstd")),
+                other => return Err(format!("a chunk is compressed with '{other}'; supported are none, lz4 and zstd")),
             };
             let records_len = reader.u64()?;
             let chunk_at = content_at + reader.at() as u64;
             let whole = end.filter(|&end| chunk_at.checked_add(records_len).is_some_and(|e| e <= end));
             let Some(end) = whole else {
-                // The chunk was cut, or its length is damaged. What is there can be used if it is
-                // not compressed.
+                // The chunk was cut, or its length is damaged. An uncompressed one is used as far
+                // as it goes.
                 if compression == Compression::None {
                     log.cut_chunk(chunk_at, next_after(chunk_ats, at).unwrap_or(len));
                 }
-                return Err(format!("a chunk there says that its {records_len} bytes begin at byte {chunk_at}"));
+                return Err(format!("the chunk claims {records_len} bytes from byte {chunk_at}"));
             };
             let size = (compression != Compression::None).then_some(size);
             log.chunk(Chunk { at: chunk_at, len: records_len, size, compression, crc });
@@ -179,7 +178,7 @@ fn step(log: &mut LogBuilder, at: u64, chunk_ats: &[u64]) -> Parsed<Option<u64>>
         }
         _ => {}
     }
-    let end = end.ok_or_else(|| format!("a record there says that it is {content_len} bytes long"))?;
+    let end = end.ok_or_else(|| format!("the record claims to be {content_len} bytes long"))?;
     match kind {
         MESSAGE_INDEX => {
             let content = log.source().read(content_at, content_len)?;

@@ -1,28 +1,27 @@
-//! Stamped messages of RGB-D recordings, out of log files.
+//! Reads stamped messages of RGB-D recordings from log files.
 //!
-//! Reads ROS 1 bags (as `rosbag record`, RealSense Viewer and librealsense write them) and MCAP
-//! files (with ROS 1, ROS 2, and foxglove's protobuf or JSON messages), and decodes the few kinds
-//! of message a recording needs: images, camera calibrations, numbers and transforms. It knows
-//! nothing of reconstruction.
+//! Opens ROS 1 bags (as `rosbag record`, RealSense Viewer and librealsense write them) and MCAP
+//! files (with ROS 1, ROS 2, or foxglove's protobuf or JSON messages). Decodes the message types
+//! that a recording needs: images, camera calibrations, numbers and transforms.
 //!
 //! ```text
-//! open -> MessageLog: topics, times -> guess or realsense::find: which topics -> messages -> decode_*
+//! open -> MessageLog (topics, times) -> find_rgbd_topics -> messages -> decode_*
 //! ```
 //!
-//! Files are read piece by piece, one chunk in memory at a time, and may be damaged or hostile:
-//! memory stays below a constant times what the file really holds, and everything wrong is an error
-//! or a sentence in [`MessageLog::problems`].
+//! Files are read in pieces, one chunk in memory at a time, and may be damaged or hostile. Memory
+//! stays below a constant times the size of the file. Every defect is an error or a sentence in
+//! [`MessageLog::problems`].
 //!
 //! Sources of the formats: ROS bag 2.0 (<http://wiki.ros.org/Bags/Format/2.0>), MCAP
 //! (<https://mcap.dev/spec>), the message definitions of `sensor_msgs`, `std_msgs`,
-//! `geometry_msgs`, `tf2_msgs` and foxglove's schemas
-//! (<https://docs.foxglove.dev/docs/sdk/schemas>), depth images as in ROS REP 118, and
-//! librealsense's `ros_file_format.h` for the topics of its bags.
+//! `geometry_msgs`, `tf2_msgs`, foxglove's schemas (<https://docs.foxglove.dev/docs/sdk/schemas>),
+//! depth images as in ROS REP 118, and librealsense's `ros_file_format.h` for the topics of its
+//! bags.
 //!
-//! The records of both files are parsed here: they are few, and one walk and one chunk reader serve
-//! both, so that damage costs the messages it hits and no others. Crate `rosbag` 0.6 maps the whole
-//! file, which needs `unsafe`, and allocates what a chunk's header claims. Decompression, images
-//! and JSON are left to crates; all are pure Rust.
+//! The records of both formats are parsed here: there are few of them, and both formats share one
+//! walk over the file and one chunk reader, so that damage costs only the messages it hits. Crate
+//! `rosbag` 0.6 maps the whole file, which needs `unsafe`, and allocates what a chunk's header
+//! claims. Other crates, all in Rust, do decompression, images and JSON.
 
 mod bag;
 mod byte_reader;

@@ -6,10 +6,10 @@ use super::topic::MessageLog;
 use super::{bag, mcap};
 use std::path::Path;
 
-/// Opens a log file; its content, not its name, says which kind it is.
+/// Opens a log file. Its content, not its name, decides the format.
 ///
-/// A file without an index (the recorder was killed, the copy was cut) is read through and used as
-/// far as it is whole; see [`MessageLog::problems`].
+/// A file without an index (the recorder was killed, the copy was cut) is read through, and what is
+/// undamaged is used; see [`MessageLog::problems`].
 ///
 /// # Errors
 /// [`Error::File`] if the file cannot be read or is neither a ROS 1 bag nor MCAP.
@@ -19,7 +19,7 @@ pub fn open(path: &Path) -> Result<Box<dyn MessageLog>> {
     open_reader(path, Box::new(file))
 }
 
-/// Opens a log that is not (only) a file; `path` names it in errors.
+/// Opens a log from any reader; `path` names it in errors.
 ///
 /// # Errors
 /// As [`open`].

@@ -1,5 +1,4 @@
-//! What ROS 1 and ROS 2 messages share: the same fields in the same order, written in different
-//! ways.
+//! Parses ROS 1 and ROS 2 messages: the same fields in the same order, in different encodings.
 
 use super::byte_reader::{ByteReader, stamp};
 use super::calibration::Intrinsics;
@@ -11,7 +10,7 @@ use std::borrow::Cow;
 
 /// A `std_msgs/Header`.
 pub(crate) struct Header {
-    /// [ns since the epoch].
+    /// Time (ns since the epoch).
     pub stamp: u64,
     pub frame: String,
 }
@@ -25,7 +24,7 @@ pub(crate) fn fields<'a>(topic: &Topic, bytes: &'a [u8]) -> Parsed<ByteReader<'a
     }
 }
 
-/// The message's header. ROS 1 begins it with a sequence number.
+/// Reads the message's header. In ROS 1 it begins with a sequence number.
 pub(crate) fn header(topic: &Topic, fields: &mut ByteReader<'_>) -> Parsed<Header> {
     if topic.encoding == Encoding::Ros1 {
         fields.u32()?;
@@ -42,7 +41,7 @@ pub(crate) fn raw_image<'a>(topic: &Topic, bytes: &'a [u8]) -> Parsed<Raw<'a>> {
     let encoding = f.text()?.to_owned();
     let (big_endian, step) = (f.u8()? != 0, f.u32()?);
     let data = Cow::Borrowed(f.counted()?);
-    // Newer librealsense: version "1" in place of the frame's name, then the unit behind the data.
+    // Newer librealsense writes version "1" as the frame's name, and the unit after the data.
     let has_unit = topic.encoding == Encoding::Ros1 && header.frame == "1" && f.remaining() == 4;
     let depth_unit = if has_unit { Some(f.f32()?).filter(|u| u.is_finite() && *u > 0.0) } else { None };
     Ok(Raw { stamp: header.stamp, frame: header.frame, width, height, encoding, big_endian, step, data, depth_unit })

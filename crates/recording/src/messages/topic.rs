@@ -1,4 +1,4 @@
-//! Topics of a log file, their messages, and how a log is read.
+//! The topics and messages of a log file.
 
 use super::error::{Error, Result};
 use std::path::Path;
@@ -8,36 +8,37 @@ pub trait MessageLog: Send + Sync {
     /// The file.
     fn path(&self) -> &Path;
 
-    /// Topics in the order of their names; those without messages are left out.
+    /// Topics with messages, ordered by name.
     fn topics(&self) -> &[Topic];
 
-    /// Log times [ns since the epoch] of a topic's messages, ascending; index i here is message i
-    /// below. Empty when there is no such topic.
+    /// Log times (ns since the epoch) of a topic's messages, ascending; index i here is message i
+    /// in [`Self::messages`]. Empty when there is no such topic.
     fn times(&self, topic: usize) -> &[u64];
 
-    /// The wanted messages (topic, index), in the order they lie in the file; only their chunks are
-    /// read, and memory holds one at a time. A message that is damaged, or lies in a damaged chunk,
-    /// is an error and the rest goes on; so is one that is not there.
+    /// The `wanted` messages (topic, index) in the order of the file. Only their chunks are read,
+    /// one in memory at a time. A message that is damaged, missing or in a damaged chunk is an
+    /// error; the others follow.
     fn messages<'a>(&'a self, wanted: &[(usize, usize)]) -> Box<dyn Iterator<Item = Message> + Send + 'a>;
 
-    /// What was wrong with the file as a whole, a sentence each; empty for a whole file.
+    /// Problems of the file as a whole, one sentence each; empty for an undamaged file.
     fn problems(&self) -> &[String];
 }
 
 /// A named stream of messages of one type.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Topic {
-    /// Its name: `/camera/color/image_raw`.
+    /// Its name, such as `/camera/color/image_raw`.
     pub name: String,
-    /// Message type, in ROS 1's form for both ROS: `sensor_msgs/Image`, `foxglove.RawImage`.
+    /// Message type in ROS 1's form for both versions of ROS: `sensor_msgs/Image`,
+    /// `foxglove.RawImage`.
     pub kind: String,
-    /// How the messages are written.
+    /// Serialization of the messages.
     pub encoding: Encoding,
     /// Number of messages.
     pub count: usize,
 }
 
-/// How messages are written.
+/// Serialization of messages.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Encoding {
     /// ROS 1 serialization.
@@ -48,7 +49,7 @@ pub enum Encoding {
     Protobuf,
     /// JSON.
     Json,
-    /// Something else, by the file's name for it; cannot be decoded.
+    /// Another serialization, by the file's name for it; such messages cannot be decoded.
     Other(String),
 }
 
@@ -57,13 +58,13 @@ pub enum Encoding {
 pub struct Message {
     /// Index of its topic.
     pub topic: usize,
-    /// Its place among the messages of its topic, by time.
+    /// Index among the messages of its topic, ordered by time.
     pub index: usize,
-    /// Its content, or why it cannot be had.
+    /// Its content, or the reason why it cannot be read.
     pub bytes: Result<Vec<u8>>,
 }
 
-/// The one message wanted.
+/// Reads one message.
 ///
 /// # Errors
 /// As for [`Message::bytes`].
