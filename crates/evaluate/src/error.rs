@@ -115,7 +115,7 @@ pub enum Error {
     Scene(#[from] trocar_scene::Error),
     /// Two pictures cannot be compared.
     #[error(transparent)]
-    Similarity(#[from] trocar_similarity::Error),
+    Similarity(#[from] trocar_camera::metrics::Error),
     /// A specimen cannot be read or written.
     #[error(transparent)]
     Specimen(#[from] trocar_specimen::Error),

@@ -20,7 +20,7 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use trocar_camera::ColorImage;
 use trocar_cell::Cell;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_render::{Picture, Settings};
 use trocar_scene::Scene;
 use trocar_sight::{DepthNoise, OUTSIDE, Sensor, Sight};

@@ -5,7 +5,8 @@ use crate::sensor::{self, Sensor};
 use crate::stereo;
 use crate::still::Still;
 use glam::DVec2;
-use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
+use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_render::{Instance, Scene, Shading, srgb};
 

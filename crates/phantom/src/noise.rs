@@ -1,23 +1,12 @@
 //! Random numbers by position instead of by order, so that no thread can change them; and smooth noise made of them.
 
 use glam::DVec3;
-
-/// Scrambles 64 bits (the finaliser of SplitMix64, Steele, Lea, Flood 2014).
-pub(crate) fn scramble(x: u64) -> u64 {
-    let mut z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
+pub(crate) use trocar_core::unit;
+use trocar_core::{Random, mix};
 
 /// One number for a list of keys.
 pub(crate) fn key(parts: &[u64]) -> u64 {
-    parts.iter().fold(0, |h, p| scramble(h ^ *p))
-}
-
-/// Uniform in 0..1.
-pub(crate) fn unit(h: u64) -> f64 {
-    (h >> 11) as f64 / (1u64 << 53) as f64
+    Random::from_keys(parts).key()
 }
 
 /// Nearly normal with standard deviation 1: the sum of four uniform numbers, never beyond 3.5.
@@ -36,7 +25,7 @@ pub(crate) fn smooth(seed: u64, p: DVec3) -> f64 {
         let [x, y, z] = [cell.x as i64 + dx, cell.y as i64 + dy, cell.z as i64 + dz];
         // Cells are few enough that 21 bits an axis never repeat.
         let packed = (x as u64 & 0x1f_ffff) | (y as u64 & 0x1f_ffff) << 21 | (z as u64 & 0x1f_ffff) << 42;
-        2.0 * unit(scramble(seed ^ scramble(packed))) - 1.0
+        Random::new(seed).symmetric(mix(packed))
     };
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
     let edge = |dy, dz| mix(corner(0, dy, dz), corner(1, dy, dz), w.x);
@@ -60,7 +49,7 @@ mod tests {
     #[test]
     fn normal_numbers_are_normal() {
         let n = 100_000;
-        let values: Vec<f64> = (0..n).map(|i| f64::from(normal(scramble(i)))).collect();
+        let values: Vec<f64> = (0..n).map(|i| f64::from(normal(mix(i)))).collect();
         let mean = values.iter().sum::<f64>() / n as f64;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64;
         assert!(mean.abs() < 0.01 && (variance - 1.0).abs() < 0.02, "mean {mean}, variance {variance}");

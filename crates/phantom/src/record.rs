@@ -9,8 +9,8 @@ use crate::{Error, Result, instruments, noise, sensor};
 use rayon::prelude::*;
 use std::path::Path;
 use trocar_camera::Camera;
+use trocar_core::Progress;
 use trocar_geometry::io::write_ply;
-use trocar_progress::Progress;
 use trocar_recording::{InstrumentRule, OrganInfo, RecordingInfo, RecordingWriter};
 
 /// File names hold six digits.

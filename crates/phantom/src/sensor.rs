@@ -1,7 +1,8 @@
 //! What the camera makes of a picture: noise, quantisation and holes, each from (seed, frame, pixel) alone.
 
-use crate::noise::{key, normal, scramble, unit};
+use crate::noise::{key, normal, unit};
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_core::mix;
 use trocar_render::srgb;
 
 /// What kind of depth camera films.
@@ -37,9 +38,9 @@ pub(crate) fn expose(color: &mut ColorImage, depth: &mut DepthImage, facing: &[f
     for v in 0..height {
         for u in 0..width {
             let i = v * width + u;
-            let mut h = scramble(stream ^ i as u64);
+            let mut h = mix(stream ^ i as u64);
             let mut next = || {
-                h = scramble(h);
+                h = mix(h);
                 h
             };
             let common = 0.8 * normal(next());

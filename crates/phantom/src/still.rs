@@ -3,7 +3,8 @@
 use crate::anatomy::Anatomy;
 use crate::plan::Plan;
 use crate::{paint, sensor};
-use trocar_camera::{Camera, Mask, Pose};
+use trocar_camera::{Camera, Mask};
+use trocar_core::Pose;
 use trocar_geometry::{TriMesh, isosurface, sample_distance};
 use trocar_render::{Frame, Instance, Scene, Shading, label_mask};
 

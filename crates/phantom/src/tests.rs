@@ -180,7 +180,7 @@ fn a_recording_is_whole_and_replays() {
     let write = |name: &str| {
         let to = dir.path().join(name);
         let options = RecordOptions { frames: 3, seed: 4, ..RecordOptions::default() };
-        record_with(plan, &options, &small(), coarse(plan), &to, &trocar_progress::Silent).unwrap();
+        record_with(plan, &options, &small(), coarse(plan), &to, &trocar_core::Silent).unwrap();
         to
     };
     let folder = write("a");
@@ -209,7 +209,7 @@ fn a_recording_is_whole_and_replays() {
 fn bad_requests_are_refused_and_leave_nothing() {
     use crate::{Error, RecordOptions, record};
     struct Stop;
-    impl trocar_progress::Progress for Stop {
+    impl trocar_core::Progress for Stop {
         fn begin(&self, _: &str, _: u64) {}
         fn advance(&self, _: u64) {}
         fn end(&self) {}
@@ -220,7 +220,7 @@ fn bad_requests_are_refused_and_leave_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let to = dir.path().join("out");
     let options = RecordOptions { frames: 2, ..RecordOptions::default() };
-    let silent = &trocar_progress::Silent;
+    let silent = &trocar_core::Silent;
     let unknown = record("fantom-c", &options, &to, silent).unwrap_err().to_string();
     assert_eq!(
         unknown,
@@ -240,7 +240,7 @@ fn speed() {
     let dir = tempfile::tempdir().unwrap();
     let start = std::time::Instant::now();
     let options = crate::RecordOptions { frames: 90, ..crate::RecordOptions::default() };
-    crate::record("phantom-a", &options, &dir.path().join("a"), &trocar_progress::Silent).unwrap();
+    crate::record("phantom-a", &options, &dir.path().join("a"), &trocar_core::Silent).unwrap();
     for mesh in ["cecum", "appendix"] {
         let mesh = dir.path().join(format!("a/truth/{mesh}.ply"));
         let mesh = trocar_geometry::io::read_surface(&mesh, trocar_geometry::io::Unit::Metre).unwrap();

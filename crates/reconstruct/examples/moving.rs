@@ -3,7 +3,7 @@
 fn main() {
     for path in std::env::args().skip(1) {
         let recording = trocar_recording::Recording::open(std::path::Path::new(&path)).unwrap();
-        let made = trocar_reconstruct::reconstruct(&recording, &Default::default(), &trocar_progress::Silent).unwrap();
+        let made = trocar_reconstruct::reconstruct(&recording, &Default::default(), &trocar_core::Silent).unwrap();
         for o in &made.organs {
             println!("{path} {} {:.4}", o.name, o.moving_share);
         }

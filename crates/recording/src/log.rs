@@ -11,7 +11,8 @@ use crate::source::{FrameSource, Images, Packet, Parts};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use trocar_camera::{Camera, Mask, Pose};
+use trocar_camera::{Camera, Mask};
+use trocar_core::Pose;
 
 /// Unit of 16-bit depth where the log has none (ROS REP 118) (m).
 const MILLIMETRE: f64 = 1e-3;

@@ -2,7 +2,7 @@
 
 use crate::tree::Ray;
 use glam::{DVec3, Vec3A};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 
 /// A light.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -8,7 +8,8 @@ use crate::stage::{Ahead, Stage, rotation_of};
 use crate::tree::Stacks;
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
-use trocar_camera::{ColorImage, DepthImage, Pose};
+use trocar_camera::{ColorImage, DepthImage};
+use trocar_core::Pose;
 
 /// Side of the tiles that a picture is rendered in [px].
 const TILE: usize = 8;

@@ -5,7 +5,8 @@ use crate::srgb;
 use crate::trace::{Hit, Tracer};
 use glam::DVec3;
 use rayon::prelude::*;
-use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
+use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 
 /// How an instance is shaded.

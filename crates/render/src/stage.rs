@@ -10,7 +10,7 @@ use crate::tree::{Bounds, Boxes, Ray, Tree};
 use crate::{Error, Result, srgb};
 use fearless_simd::Level;
 use glam::{DVec3, Mat3A, Quat, Vec3A};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 
 /// Triangles beyond which a mesh is refused.

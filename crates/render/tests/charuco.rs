@@ -5,7 +5,8 @@
 use glam::{DQuat, DVec3};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use trocar_camera::{Camera, CameraModel, ColorImage, Distortion, Fisheye, Pose};
+use trocar_camera::{Camera, CameraModel, ColorImage, Distortion, Fisheye};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_render::{Eye, Film, Look, Settings, Stage, render, srgb};
 

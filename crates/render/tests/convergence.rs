@@ -6,7 +6,8 @@ mod common;
 
 use common::{quad, sphere};
 use glam::DVec3;
-use trocar_camera::{Camera, Pose};
+use trocar_camera::Camera;
+use trocar_core::Pose;
 use trocar_render::{Eye, Film, Light, Look, Settings, Stage, render};
 
 /// A Cornell-like box of 10 cm, open to the eye, with a tissue ball and a steel one.

@@ -4,7 +4,8 @@ mod common;
 
 use common::sphere;
 use glam::{DQuat, DVec3};
-use trocar_camera::{Camera, Pose};
+use trocar_camera::Camera;
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_render::{Frame, Instance, Scene, Shading, label_mask};
 

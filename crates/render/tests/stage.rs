@@ -7,7 +7,8 @@ mod common;
 use common::{quad, sphere};
 use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
-use trocar_camera::{Camera, CameraModel, Distortion, Fisheye, Pose};
+use trocar_camera::{Camera, CameraModel, Distortion, Fisheye};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_render::{Error, Eye, Film, Light, Look, Noise, Picture, Settings, Stage, SurfaceKind, render};
 

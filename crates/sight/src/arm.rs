@@ -3,7 +3,8 @@
 use crate::solid::{Part, Solid};
 use crate::{Error, Result, described};
 use glam::DVec3;
-use trocar_geometry::{Pose, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 use trocar_scene::{Arm, Scene};
 
 /// Cell of the links' surfaces [m].

@@ -2,7 +2,8 @@
 
 use crate::{Error, Result};
 use glam::DVec3;
-use trocar_camera::{Camera, Pose};
+use trocar_camera::Camera;
+use trocar_core::Pose;
 use trocar_render::{Eye, Film, Light, Stage};
 use trocar_scene::{CellCamera, Scene};
 

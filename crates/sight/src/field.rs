@@ -5,7 +5,8 @@
 
 use glam::{DVec2, DVec3};
 use trocar_camera::{Camera, ColorImage};
-use trocar_geometry::{Pose, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 use trocar_render::{Eye, Film, Look, Settings, Stage, render, srgb};
 
 /// Most cells along a side.

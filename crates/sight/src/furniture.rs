@@ -3,7 +3,8 @@
 use crate::field::Field;
 use crate::solid::{Part, Solid, along, join, turned};
 use glam::{DVec2, DVec3};
-use trocar_geometry::{Pose, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 use trocar_render::{Look, SurfaceKind};
 use trocar_scene::Port;
 

@@ -4,8 +4,9 @@
 
 use glam::DVec3;
 use std::path::{Path, PathBuf};
-use trocar_camera::{Camera, Pose};
+use trocar_camera::Camera;
 use trocar_cell::{Action, Cell};
+use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_render::Settings;
 use trocar_robot::instrument::Coordinates;

@@ -3,8 +3,9 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use glam::{DQuat, DVec3};
-use trocar_camera::{Camera, ColorImage, Pose};
+use trocar_camera::{Camera, ColorImage};
 use trocar_cell::{Action, Cell};
+use trocar_core::Pose;
 use trocar_geometry::{TetMesh, TriMesh};
 use trocar_render::{Picture, Settings};
 use trocar_scene::{Scene, SpecimenSource};

@@ -4,7 +4,7 @@ use crate::organ::Organ;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_camera::{Camera, ColorImage};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// The origin of a specimen.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_render::Settings;
 use trocar_scene::Scene;
 use trocar_sight::Sight;

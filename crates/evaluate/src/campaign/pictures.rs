@@ -5,7 +5,7 @@ use crate::moving::webp;
 use crate::replayed::Replayed;
 use crate::{Error, Result};
 use std::path::PathBuf;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_render::Settings;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;

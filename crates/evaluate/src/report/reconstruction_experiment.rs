@@ -6,7 +6,7 @@ use super::{colors, figures, overlays, views};
 use crate::Result;
 use crate::experiment::{ReconstructionResult, ReconstructionRow};
 use std::fmt::Write;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_reconstruct::Reconstruction;
 use trocar_render::Scene;
 

@@ -7,7 +7,7 @@ use super::table::{self, fixed, percent};
 use super::{figures, overlays, views};
 use crate::truth::quantile;
 use crate::{Error, Result};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_reconstruct::Reconstruction;
 use trocar_render::Scene;
 

@@ -3,7 +3,8 @@
 use super::colors::{self, VIEW_GROUND};
 use glam::DVec3;
 use std::collections::BTreeMap;
-use trocar_camera::{Camera, ColorImage, Pose};
+use trocar_camera::{Camera, ColorImage};
+use trocar_core::Pose;
 use trocar_geometry::{TetMesh, TriMesh};
 use trocar_render::{Instance, Scene, Shading};
 use trocar_specimen::Specimen;

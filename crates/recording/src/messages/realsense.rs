@@ -15,7 +15,7 @@
 
 use super::topic::Topic;
 use super::transform::Transform;
-use trocar_camera::Pose;
+use trocar_core::Pose;
 
 /// Indices of the topics of one depth and one colour stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

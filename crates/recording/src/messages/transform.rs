@@ -2,7 +2,7 @@
 
 use super::error::Parsed;
 use glam::{DQuat, DVec3};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 
 /// The pose of a child frame in a parent frame: points of the child frame, rotated and then
 /// translated, are points of the parent frame.

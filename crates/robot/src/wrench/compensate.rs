@@ -1,9 +1,10 @@
 //! Readings with the instrument's weight taken off, tared at reset.
 
-use super::{ForceKind, Identification, SensorNoise, Wrench, check_pose, regressor};
+use super::{ForceKind, Identification, SensorNoise, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::SMatrix;
+use trocar_core::Wrench;
 
 /// What is left of a reading: the force on the instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]

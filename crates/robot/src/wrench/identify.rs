@@ -1,9 +1,10 @@
 //! The load model from readings at rest: weighted least squares, with what it does not know.
 
-use super::{LoadModel, SensorNoise, Wrench, check_pose, regressor};
+use super::{LoadModel, SensorNoise, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, DVector, SMatrix, SVD};
+use trocar_core::Wrench;
 
 /// Parameters of a [`LoadModel`]: mass, first moment (3), bias of force (3) and torque (3), in this order.
 pub const PARAMETERS: usize = 10;

@@ -7,7 +7,8 @@ use glam::Vec3;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use std::time::Instant;
-use trocar_camera::{Camera, Pose};
+use trocar_camera::Camera;
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_render::{Look, Stage};
 

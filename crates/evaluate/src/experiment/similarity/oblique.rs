@@ -10,9 +10,8 @@ use crate::truth::DEPTH_UNIT;
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, DepthNoise, Mask};
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Progress};
 use trocar_geometry::io::{Unit, read_surface};
-use trocar_progress::Progress;
 use trocar_recording::{InstrumentRule, OrganInfo, Recording, RecordingInfo, RecordingWriter};
 use trocar_render::{Eye, Film, Light, Look, Noise, Settings, Stage, render};
 
