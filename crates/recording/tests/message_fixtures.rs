@@ -4,10 +4,11 @@
 
 mod common;
 
-use common::*;
+use common::messages::*;
 use trocar_camera::{Camera, Distortion};
-use trocar_messages::{
-    Encoding, MessageLog, decode_calibration, decode_float, decode_image, decode_transforms, guess, read_one, realsense,
+use trocar_recording::messages::{
+    Encoding, MessageLog, decode_calibration, decode_float, decode_image, decode_transforms, find_rgbd_topics,
+    read_one, realsense,
 };
 
 const CAMERA: Camera = Camera {
@@ -42,7 +43,7 @@ fn realsense_bags() {
         let log = log(name);
         assert_eq!(log.problems(), [""; 0], "{name}");
         let found = realsense::find(log.topics()).unwrap();
-        let guessed = guess(&*log, None, None).unwrap();
+        let guessed = find_rgbd_topics(&*log, None, None).unwrap();
         assert_eq!((guessed.color, guessed.depth, guessed.depth_units), (found.color, found.depth, found.depth_units));
         assert_eq!(log.topics()[found.color].name, realsense::image_topic(1, "Color_0"));
         assert_eq!(log.topics()[found.depth_info.unwrap()].name, realsense::info_topic(0, "Depth_0"));
@@ -79,7 +80,7 @@ fn ros_mcap_files() {
     for name in ["ros1.mcap", "ros2_none.mcap", "ros2_zstd.mcap", "ros2_lz4.mcap", "ros2_big_endian_unchunked.mcap"] {
         let log = log(name);
         assert_eq!(log.problems(), [""; 0], "{name}");
-        let guessed = guess(&*log, None, None).unwrap();
+        let guessed = find_rgbd_topics(&*log, None, None).unwrap();
         let named = |t: usize| log.topics()[t].name.as_str();
         assert_eq!(named(guessed.color), "/camera/color/image_raw");
         assert_eq!(named(guessed.depth), "/camera/aligned_depth_to_color/image_raw");
@@ -113,7 +114,7 @@ fn foxglove_mcap_files() {
     for name in ["foxglove_protobuf.mcap", "foxglove_json.mcap"] {
         let log = log(name);
         assert_eq!(log.problems(), [""; 0], "{name}");
-        let guessed = guess(&*log, None, None).unwrap();
+        let guessed = find_rgbd_topics(&*log, None, None).unwrap();
         check_streams(&*log, guessed.color, guessed.depth);
         let t = guessed.color_info.unwrap();
         assert_eq!(decode_calibration(&log.topics()[t], &first(&*log, t)).unwrap(), CAMERA);
@@ -144,9 +145,9 @@ fn compressed_images() {
         }
     }
     // Two colour topics, one called so; two depth topics, both called so.
-    let message = guess(&*log, None, None).unwrap_err().to_string();
+    let message = find_rgbd_topics(&*log, None, None).unwrap_err().to_string();
     assert!(
-        message.contains("several topics with depth") && message.contains("/float/depth/compressedDepth"),
+        message.contains("several topics have depth") && message.contains("/float/depth/compressedDepth"),
         "{message}"
     );
 }
@@ -225,8 +226,8 @@ fn wrong_types_and_files_are_named() {
     for content in [&b""[..], b"#ROSBAG V1.2\n", b"SQLite format 3\0", b"#ROSBAG V2.0\n", b"\x89PNG"] {
         let path = folder.path().join("a.bag");
         std::fs::write(&path, content).unwrap();
-        let Err(error) = trocar_messages::open(&path) else { panic!("{content:?} was opened") };
+        let Err(error) = trocar_recording::messages::open(&path) else { panic!("{content:?} was opened") };
         assert!(error.to_string().contains("a.bag"), "{error}");
     }
-    assert!(trocar_messages::open(&folder.path().join("none.bag")).is_err());
+    assert!(trocar_recording::messages::open(&folder.path().join("none.bag")).is_err());
 }

@@ -1,23 +1,25 @@
-//! Damaged files of every kind give messages or errors: no panic, no hang, no memory beyond what the file holds.
+//! Damaged files of every kind give messages or errors: no panic, no hang, no memory beyond what
+//! the file holds.
 //!
-//! Half of the cases damage a file; the others damage a message, which goes past checksums and compression straight to the
-//! decoders.
+//! Half of the cases damage a file; the others damage a message, which goes past checksums and
+//! compression straight to the decoders.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 
 mod common;
 
-use common::{ALL, decode_all, fixture, log, read_all};
+use common::messages::{ALL, decode_all, fixture, log, read_all};
 use std::io::Cursor;
 use std::path::Path;
 use trocar_fuzz::{Allowance, PEAK, Peak, assault, cases};
-use trocar_messages::{Topic, guess, open_reader};
+use trocar_recording::messages::{Topic, find_rgbd_topics, open_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// Whatever the size: the buffers of LZ4 (two blocks of 4 MiB and a window), a small image's free growth, Zstandard's window of
-/// 8 MiB and its tables. For each byte: an image of one colour, and compressed chunks.
+/// Whatever the size: the buffers of LZ4 (two blocks of 4 MiB and a window), a small image's free
+/// growth, Zstandard's window of 8 MiB and its tables. For each byte: an image of one colour, and
+/// compressed chunks.
 const ALLOWANCE: Allowance = Allowance { fixed: 24 << 20, per_byte: 600 };
 
 /// The first three messages of every topic of every fixture.
@@ -45,7 +47,7 @@ fn damage_never_panics() {
             direct += usize::from(decode_all(&messages[i.parse::<usize>().unwrap()].0, bytes));
         } else if let Ok(log) = open_reader(Path::new("damaged"), Box::new(Cursor::new(bytes.to_vec()))) {
             decoded += read_all(&*log).1;
-            let _ = guess(&*log, None, None);
+            let _ = find_rgbd_topics(&*log, None, None);
             opened += 1;
         }
     });

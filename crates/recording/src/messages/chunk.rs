@@ -1,16 +1,18 @@
-//! A chunk: the unit in which both formats compress and write messages.
+//! A chunk: the unit in which both formats write and compress messages.
 
-use crate::error::Parsed;
-use crate::source::Source;
+use super::byte_source::ByteSource;
+use super::error::Parsed;
 use std::io::Read;
 
-/// A chunk larger than this is refused; recorders write chunks of about a megabyte, or one message.
+/// Largest chunk (bytes); recorders write chunks of about a megabyte, or of one message.
 const MAX_CHUNK: u64 = 1 << 30;
-/// A compressed chunk may grow freely up to this size ...
+/// A compressed chunk may decompress to this size (bytes) whatever its own ...
 const FREE_GROWTH: u64 = 16 << 20;
-/// ... and to this many times its compressed size: blank images shrink a lot, but a chunk of 16 MB is not all blank.
+/// ... and to this many times its compressed size: blank images compress well, but a chunk of 16 MB
+/// is not all blank.
 const MAX_GROWTH: u64 = 1024;
-/// Largest window of a Zstandard chunk, the memory its decoder takes; level 22 asks for 128 MiB, the default for 2.
+/// Largest window of a Zstandard chunk (bytes), which its decoder allocates; level 22 asks for 128
+/// MiB, the default level for 2 MiB.
 const MAX_WINDOW: u64 = 128 << 20;
 
 /// How a chunk is compressed.
@@ -22,29 +24,32 @@ pub(crate) enum Compression {
     Zstd,
 }
 
-/// Where a chunk lies in the file.
+/// The place of a chunk in the file.
 #[derive(Clone, Debug)]
 pub(crate) struct Chunk {
     /// First byte of its content, after the record's header.
     pub at: u64,
     /// Bytes of content in the file.
     pub len: u64,
-    /// Bytes of content when decompressed; `None`: as many as come.
+    /// Bytes of content after decompression; `None` where the file does not say.
     pub size: Option<u64>,
     pub compression: Compression,
-    /// CRC32 of the decompressed content; 0 when the writer gave none.
+    /// CRC32 of the decompressed content; 0 when the file has none.
     pub crc: u32,
 }
 
 impl Chunk {
-    /// The chunk's content, decompressed and checked.
-    pub fn load(&self, source: &Source) -> Parsed<Vec<u8>> {
+    /// Reads, decompresses and checks the chunk's content.
+    pub fn load(&self, source: &ByteSource) -> Parsed<Vec<u8>> {
         let size = self.size.unwrap_or(self.len);
         if size.max(self.len) > MAX_CHUNK {
-            return Err(format!("a chunk of {size} bytes; at most {MAX_CHUNK} are read"));
+            return Err(format!("a chunk has {size} bytes; the limit is {MAX_CHUNK}"));
         }
         if size > FREE_GROWTH && size / MAX_GROWTH > self.len {
-            return Err(format!("a chunk of {} bytes says it grows to {size}; that is no recording", self.len));
+            return Err(format!(
+                "a chunk of {} bytes claims to decompress to {size}; no recording compresses so well",
+                self.len
+            ));
         }
         let bytes = source.read(self.at, self.len)?;
         let bytes = match self.compression {
@@ -60,19 +65,20 @@ impl Chunk {
         }
         .map_err(|e| format!("the {:?} chunk at byte {} is damaged ({e})", self.compression, self.at))?;
         if self.crc != 0 && crc32fast::hash(&bytes) != self.crc {
-            return Err(format!("the chunk at byte {} is damaged (its checksum does not fit)", self.at));
+            return Err(format!("the chunk at byte {} is damaged (wrong checksum)", self.at));
         }
         Ok(bytes)
     }
 }
 
-/// Decompresses exactly `size` bytes; memory is taken as they come, for the size is only what the file says.
+/// Decompresses exactly `size` bytes. Memory grows as they come, because `size` is only what the
+/// file claims.
 fn grow(decoder: impl Read, size: u64) -> Parsed<Vec<u8>> {
     let mut bytes = Vec::new();
     decoder.take(size + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
     if bytes.len() as u64 != size {
         let more = if bytes.len() as u64 > size { " or more" } else { "" };
-        return Err(format!("{} bytes{more} came out instead of {size}", bytes.len()));
+        return Err(format!("it decompresses to {} bytes{more} instead of {size}", bytes.len()));
     }
     Ok(bytes)
 }

@@ -1,27 +1,26 @@
-//! Images as they come: `sensor_msgs/Image`, `foxglove.RawImage`, and what the compressed ones unpack to.
+//! Images: `sensor_msgs/Image`, `foxglove.RawImage`, and the contents of compressed ones.
 //!
-//! Encodings are those of `sensor_msgs/image_encodings.h`, foxglove's and librealsense's names for the same; depth as in ROS
-//! REP 118. YCbCr is BT.601 with limited range, as OpenCV and librealsense convert it.
+//! Encodings are those of `sensor_msgs/image_encodings.h`, and foxglove's and librealsense's names
+//! for the same. Depth is as in ROS REP 118. YCbCr is BT.601 with limited range, as OpenCV and
+//! librealsense convert it.
 
-use crate::error::{Parsed, Result};
-use crate::ros::{self, fields, of_topic, unknown};
-use crate::{Encoding, Topic, compressed, foxglove};
+use super::error::Parsed;
 use std::borrow::Cow;
 use trocar_camera::{ColorImage, DepthImage};
 
-/// Images larger than this on a side are refused.
+/// Largest side of an image (px).
 pub(crate) const MAX_SIDE: u32 = 16_384;
 
 /// An image with the header of its message.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StampedImage {
-    /// When it was taken, by its own clock [ns]; the log time is when it was written.
+    /// Time of exposure by the image's own clock (ns); the log time is when it was written.
     pub stamp: u64,
-    /// The frame its camera is in; RealSense bags write "0" or "1" here.
+    /// The frame of its camera; RealSense bags have "0" or "1" here.
     pub frame: String,
     /// The pixels.
     pub image: Image,
-    /// Metres a unit of depth, which newer librealsense appends to its depth images.
+    /// Unit of depth (m), which newer librealsense appends to its depth images.
     pub depth_unit: Option<f32>,
 }
 
@@ -34,28 +33,28 @@ pub enum Image {
     Depth(RawDepth),
 }
 
-/// A depth image as it was recorded; 0 is invalid.
+/// A depth image as recorded; 0 is invalid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RawDepth {
-    /// Width [px].
+    /// Width (px).
     pub width: usize,
-    /// Height [px].
+    /// Height (px).
     pub height: usize,
-    /// One value a pixel, row by row.
+    /// One value per pixel, row by row.
     pub values: DepthValues,
 }
 
 /// Values of a depth image.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DepthValues {
-    /// Whole units: millimetres by REP 118, whatever the sensor's option says for RealSense.
+    /// Whole units: millimetres by REP 118; the sensor's option for RealSense.
     Units(Vec<u16>),
-    /// Metres; what the message has as NaN, infinite or negative is 0 here.
+    /// Metres; NaN, infinite and negative values of the message are 0 here.
     Metres(Vec<f32>),
 }
 
 impl RawDepth {
-    /// The image in metres, where `unit` [m] is the unit of [`DepthValues::Units`].
+    /// The image in metres; `unit` (m) is the unit of [`DepthValues::Units`].
     pub fn to_metres(&self, unit: f64) -> DepthImage {
         let depth = match &self.values {
             DepthValues::Units(units) => units.iter().map(|&d| (f64::from(d) * unit) as f32).collect(),
@@ -65,7 +64,7 @@ impl RawDepth {
     }
 }
 
-/// An uncompressed image before its pixels are looked at.
+/// An uncompressed image before its pixels are decoded.
 pub(crate) struct Raw<'a> {
     pub stamp: u64,
     pub frame: String,
@@ -73,12 +72,14 @@ pub(crate) struct Raw<'a> {
     pub height: u32,
     pub encoding: String,
     pub big_endian: bool,
-    /// Bytes from row to row.
+    /// Bytes from the start of a row to the start of the next.
     pub step: u32,
     pub data: Cow<'a, [u8]>,
+    /// Unit of depth (m), which newer librealsense writes after the data.
+    pub depth_unit: Option<f32>,
 }
 
-/// A compressed image before it is unpacked.
+/// A compressed image before it is decompressed.
 pub(crate) struct Packed<'a> {
     pub stamp: u64,
     pub frame: String,
@@ -86,63 +87,7 @@ pub(crate) struct Packed<'a> {
     pub data: Cow<'a, [u8]>,
 }
 
-/// Decodes an image: `sensor_msgs/Image` or `CompressedImage` (ROS 1, ROS 2), `foxglove.RawImage` or `CompressedImage`
-/// (protobuf, JSON).
-///
-/// # Errors
-/// [`Error::Message`](crate::Error::Message) for another type, an unknown pixel encoding or compression, more than 16384
-/// pixels on a side, or data that do not fit the size.
-pub fn decode_image(topic: &Topic, bytes: &[u8]) -> Result<StampedImage> {
-    let parsed = match (topic.kind.as_str(), &topic.encoding) {
-        ("sensor_msgs/Image", _) => from_ros(topic, bytes),
-        ("sensor_msgs/CompressedImage", _) => packed_from_ros(topic, bytes).and_then(|p| unpacked(&p)),
-        ("foxglove.RawImage", Encoding::Protobuf) => foxglove::raw_image(bytes).and_then(|r| plain(&r)),
-        ("foxglove.RawImage", Encoding::Json) => foxglove::raw_image_json(bytes).and_then(|r| plain(&r)),
-        ("foxglove.CompressedImage", Encoding::Protobuf) => {
-            foxglove::compressed_image(bytes).and_then(|p| unpacked(&p))
-        }
-        ("foxglove.CompressedImage", Encoding::Json) => {
-            foxglove::compressed_image_json(bytes).and_then(|p| unpacked(&p))
-        }
-        _ => Err(unknown(topic)),
-    };
-    of_topic(topic, parsed)
-}
-
-fn from_ros(topic: &Topic, bytes: &[u8]) -> Parsed<StampedImage> {
-    let mut f = fields(topic, bytes)?;
-    let header = ros::header(topic, &mut f)?;
-    let (height, width) = (f.u32()?, f.u32()?);
-    let encoding = f.text()?.to_owned();
-    let (big_endian, step) = (f.u8()? != 0, f.u32()?);
-    let data = Cow::Borrowed(f.counted()?);
-    let mut image =
-        plain(&Raw { stamp: header.stamp, frame: header.frame, width, height, encoding, big_endian, step, data })?;
-    // Newer librealsense: version "1" in place of the frame's name, then the unit behind the data.
-    if topic.encoding == Encoding::Ros1 && image.frame == "1" && matches!(image.image, Image::Depth(_)) && f.left() == 4
-    {
-        image.depth_unit = Some(f.f32()?).filter(|u| u.is_finite() && *u > 0.0);
-    }
-    Ok(image)
-}
-
-fn packed_from_ros<'a>(topic: &Topic, bytes: &'a [u8]) -> Parsed<Packed<'a>> {
-    let mut f = fields(topic, bytes)?;
-    let header = ros::header(topic, &mut f)?;
-    let format = f.text()?.to_owned();
-    Ok(Packed { stamp: header.stamp, frame: header.frame, format, data: Cow::Borrowed(f.counted()?) })
-}
-
-fn unpacked(packed: &Packed<'_>) -> Parsed<StampedImage> {
-    let image = compressed::decode(&packed.format, &packed.data)?;
-    Ok(StampedImage { stamp: packed.stamp, frame: packed.frame.clone(), image, depth_unit: None })
-}
-
-fn plain(raw: &Raw<'_>) -> Parsed<StampedImage> {
-    Ok(StampedImage { stamp: raw.stamp, frame: raw.frame.clone(), image: pixels(raw)?, depth_unit: None })
-}
-
-/// Names of pixel encodings and their bytes a pixel.
+/// The layout of a pixel encoding, and its bytes per pixel.
 fn layout(encoding: &str) -> Option<(Layout, usize)> {
     Some(match encoding.to_ascii_lowercase().as_str() {
         "rgb8" => (Layout::Rgb, 3),
@@ -170,28 +115,28 @@ enum Layout {
 }
 
 /// The pixels of an uncompressed image.
-fn pixels(raw: &Raw<'_>) -> Parsed<Image> {
+pub(crate) fn pixels(raw: &Raw<'_>) -> Parsed<Image> {
     let Raw { width, height, step, .. } = *raw;
     let Some((layout, pixel_len)) = layout(&raw.encoding) else {
         return Err(format!(
-            "encoding is '{}'; known are rgb8, bgr8, rgba8, bgra8, mono8, 8UC1, 8UC3, 8UC4, yuv422, yuyv, 16UC1, mono16, z16, 32FC1",
+            "encoding is '{}'; supported are rgb8, bgr8, rgba8, bgra8, mono8, 8UC1, 8UC3, 8UC4, yuv422, yuyv, 16UC1, mono16, z16, 32FC1",
             raw.encoding
         ));
     };
     if !(1..=MAX_SIDE).contains(&width) || !(1..=MAX_SIDE).contains(&height) {
-        return Err(format!("an image of {width} x {height} pixels; 1 to {MAX_SIDE} on a side are read"));
+        return Err(format!("the image has {width} x {height} pixels; a side must be in [1, {MAX_SIDE}]"));
     }
     let (width, height) = (width as usize, height as usize);
     let row_len = width * pixel_len;
     if matches!(layout, Layout::Uyvy | Layout::Yuyv) && !width.is_multiple_of(2) {
-        return Err(format!("width is {width}; '{}' has pairs of pixels", raw.encoding));
+        return Err(format!("width is {width}; it must be even for '{}'", raw.encoding));
     }
-    // Some writers leave the step out.
+    // Some writers leave the step at 0.
     let step = if step == 0 { row_len } else { step as usize };
     let needed = step * (height - 1) + row_len;
     if step < row_len || raw.data.len() < needed {
         return Err(format!(
-            "{} bytes in rows of {step} for {width} x {height} pixels of '{}'; expected {needed} in rows of at least {row_len}",
+            "the data have {} bytes in rows of {step}; {width} x {height} pixels of '{}' need {needed} in rows of at least {row_len}",
             raw.data.len(),
             raw.encoding
         ));
@@ -221,7 +166,7 @@ fn pixels(raw: &Raw<'_>) -> Parsed<Image> {
     })
 }
 
-/// Two pixels of a YCbCr 4:2:2 image (ITU-R BT.601, limited range, in 8-bit fixed point).
+/// Two pixels of a YCbCr 4:2:2 image (ITU-R BT.601, limited range, 8-bit fixed point).
 fn pair(first: u8, second: u8, u: u8, v: u8) -> [[u8; 3]; 2] {
     let (d, e) = (i32::from(u) - 128, i32::from(v) - 128);
     let part = |sum: i32| ((sum + 128) >> 8).clamp(0, 255) as u8;

@@ -1,24 +1,24 @@
-//! The file behind a log: read piece by piece, never mapped and never whole.
+//! The file of a log: read in pieces, never mapped and never whole.
 
-use crate::error::{Error, Parsed, Result};
+use super::error::{Error, Parsed, Result};
 use std::io::{Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// What a log can be read from.
+/// A reader that a log can be opened from.
 pub trait ReadSeek: Read + Seek + Send {}
 
 impl<T: Read + Seek + Send> ReadSeek for T {}
 
 /// An open file of known length.
-pub(crate) struct Source {
+pub(crate) struct ByteSource {
     path: PathBuf,
-    /// The place to read from belongs to the file, so seek and read go together.
+    /// Seek and read share the file's position, so both happen under one lock.
     file: Mutex<Box<dyn ReadSeek>>,
     len: u64,
 }
 
-impl Source {
+impl ByteSource {
     pub fn new(path: &Path, mut file: Box<dyn ReadSeek>) -> Result<Self> {
         let len = file
             .seek(SeekFrom::End(0))
@@ -35,7 +35,7 @@ impl Source {
         self.len
     }
 
-    /// Exactly `count` bytes at `at`. Nothing is allocated for bytes the file does not have.
+    /// Exactly `count` bytes at `at`. Allocates nothing for bytes that the file does not have.
     pub fn read(&self, at: u64, count: u64) -> Parsed<Vec<u8>> {
         if at.checked_add(count).is_none_or(|end| end > self.len) {
             return Err(format!("{count} bytes expected at byte {at}, but the file ends at byte {}", self.len));

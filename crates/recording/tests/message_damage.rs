@@ -4,10 +4,10 @@
 
 mod common;
 
-use common::*;
+use common::messages::*;
 use std::io::Cursor;
 use std::path::Path;
-use trocar_messages::{MessageLog, open_reader, realsense};
+use trocar_recording::messages::{MessageLog, open_reader, realsense};
 
 fn bytes(name: &str) -> Vec<u8> {
     std::fs::read(fixture(name)).unwrap()
@@ -97,7 +97,8 @@ fn the_open_chunk_of_a_killed_recorder_is_used() {
     bag.truncate(end);
     bag[field..field + 8].fill(0);
     let chunk = bag.windows(4).rposition(|w| w == b"op=\x05").unwrap();
-    // The header's three fields come in any order; its length is in the four bytes before the first.
+    // The header's three fields come in any order; its length is in the four bytes before the
+    // first.
     let start = (0..chunk).rev().find(|&i| {
         let header = u32::from_le_bytes(bag[i..i + 4].try_into().unwrap()) as usize;
         (20..100).contains(&header) && bag[i + 4..i + 4 + header].windows(5).any(|w| w == b"size=")
@@ -170,7 +171,8 @@ fn a_damaged_chunk_costs_its_messages() {
     }
 }
 
-/// A length that is wrong ends the walk from chunk to chunk; the end of the file says where it goes on.
+/// A length that is wrong ends the walk from chunk to chunk; the end of the file says where it goes
+/// on.
 #[test]
 fn a_damaged_length_costs_a_chunk() {
     for (name, op) in [("realsense.bag", &b"op=\x05"[..]), ("realsense_lz4.bag", b"op=\x05")] {

@@ -1,54 +1,24 @@
-//! A log file as both formats share it: chunks, and where in them each topic's messages lie.
+//! Builds a [`Log`] while a file is read through.
 
-use crate::chunk::{Chunk, Compression};
-use crate::error::{Error, Parsed, Result};
-use crate::source::Source;
-use crate::{Encoding, Message, MessageLog, Topic};
+use super::byte_source::ByteSource;
+use super::chunk::{Chunk, Compression};
+use super::error::Parsed;
+use super::log::{Connection, Kind, Log, ParseRecord, Record};
+use super::topic::{Encoding, Topic};
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
 
-/// A sentence for each of the first so many problems of a file.
+/// Most problems of a file that are kept, one sentence each.
 const MAX_PROBLEMS: usize = 50;
 
-/// A file with more damaged places than this is not read to its end: trying each costs time.
+/// Most damaged places after which reading continues, because each costs time.
 const MAX_DAMAGES: usize = 200;
-/// Opening decompresses chunks without an index up to this many bytes, which are a second's work ...
+/// Opening decompresses chunks without an index up to this many bytes, about a second of work ...
 const FREE_GROWTH: u64 = 64 << 20;
-/// ... and up to this many times the file's size: LZ4 cannot shrink more, and no recording does as a whole.
+/// ... and up to this many times the file's size: LZ4 cannot compress more, and no recording does
+/// as a whole.
 const MAX_GROWTH: u64 = 256;
 
-/// A record inside a chunk.
-pub(crate) enum Record<'a> {
-    /// A channel of messages.
-    Connection(u32, Connection),
-    /// The name of a message type, by number (MCAP only).
-    Schema(u16, String),
-    /// A message: connection, log time [ns], content.
-    Message(u32, u64, &'a [u8]),
-    /// Anything else.
-    Other,
-}
-
-/// A channel of messages; several may feed one topic.
-#[derive(Clone, Debug)]
-pub(crate) struct Connection {
-    pub topic: String,
-    pub kind: Kind,
-    pub encoding: Encoding,
-}
-
-/// The message type of a connection.
-#[derive(Clone, Debug)]
-pub(crate) enum Kind {
-    Name(String),
-    /// Number of a schema.
-    Schema(u16),
-}
-
-/// Parses the record at the start of some bytes of a chunk and gives its length.
-pub(crate) type ParseRecord = fn(&[u8]) -> Parsed<(Record<'_>, usize)>;
-
-/// Where a message lies.
+/// The place of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Place {
     time: u64,
@@ -56,16 +26,16 @@ struct Place {
     offset: u32,
 }
 
-/// The messages of a topic, and the connections they came by.
+/// The messages of a topic, and its connections.
 #[derive(Default)]
 struct Gathered {
     places: Vec<Place>,
     connections: Vec<u32>,
 }
 
-/// What is known of a file while it is read through.
-pub(crate) struct Draft {
-    source: Source,
+/// The parts of a log that are known so far.
+pub(crate) struct LogBuilder {
+    source: ByteSource,
     parse: ParseRecord,
     chunks: Vec<Chunk>,
     /// Chunks without a usable index.
@@ -75,12 +45,12 @@ pub(crate) struct Draft {
     schemas: BTreeMap<u16, String>,
     problems: Vec<String>,
     damages: usize,
-    /// Bytes of the chunks read through.
+    /// Decompressed bytes of the chunks that were read through.
     grown: u64,
 }
 
-impl Draft {
-    pub fn new(source: Source, parse: ParseRecord) -> Self {
+impl LogBuilder {
+    pub fn new(source: ByteSource, parse: ParseRecord) -> Self {
         Self {
             source,
             parse,
@@ -95,7 +65,7 @@ impl Draft {
         }
     }
 
-    pub fn source(&self) -> &Source {
+    pub fn source(&self) -> &ByteSource {
         &self.source
     }
 
@@ -105,19 +75,19 @@ impl Draft {
         }
     }
 
-    /// Adds a chunk; it counts as without an index until [`Self::index`].
+    /// Adds a chunk. It has no index until [`Self::index`] is called.
     pub fn chunk(&mut self, chunk: Chunk) {
         self.unindexed.insert(self.chunks.len());
         self.chunks.push(chunk);
     }
 
-    /// Adds an uncompressed chunk whose length is unknown: as much of it as lies before `end`.
+    /// Adds an uncompressed chunk of unknown length, up to `end`.
     pub fn cut_chunk(&mut self, at: u64, end: u64) {
         let len = end.saturating_sub(at);
         self.chunk(Chunk { at, len, size: None, compression: Compression::None, crc: 0 });
     }
 
-    /// Messages of the last chunk: log time, offset in it. The chunk has an index now.
+    /// Adds the index of the last chunk: log time and offset of its messages.
     pub fn index(&mut self, connection: u32, entries: &[(u64, u32)]) -> Parsed<()> {
         let last = self.chunks.len().checked_sub(1).ok_or("an index comes before the first chunk")?;
         let chunk = u32::try_from(last).map_err(|_| "too many chunks")?;
@@ -129,8 +99,9 @@ impl Draft {
         Ok(())
     }
 
-    /// The record at `at` is damaged: gives the next chunk that the end of the file knows of before `end`, to go on there.
-    /// It may have been an index, so the last chunk is read through.
+    /// Records damage at `at`. Returns where to continue: the next chunk before `end` that the end
+    /// of the file lists. The damaged record may have been an index, so the last chunk is read
+    /// through.
     pub fn damage(&mut self, at: u64, end: u64, reason: &str, chunk_ats: &[u64]) -> Option<u64> {
         self.unindexed.extend(self.chunks.len().checked_sub(1));
         self.damages += 1;
@@ -140,7 +111,7 @@ impl Draft {
         next
     }
 
-    /// Takes in a record that is no message; the first description of a connection holds.
+    /// Adds a record that is not a message. The first description of a connection counts.
     pub fn record(&mut self, record: Record<'_>) {
         match record {
             Record::Connection(id, connection) => drop(self.connections.entry(id).or_insert(connection)),
@@ -156,12 +127,13 @@ impl Draft {
         })
     }
 
-    /// Reads through chunk `c`: its descriptions, and its messages too if it has no index. Returns how many those are.
+    /// Reads through chunk `c` for descriptions, and for messages if it has no index. Returns the
+    /// number of those messages.
     fn read_through(&mut self, c: usize) -> usize {
         self.grown = self.grown.saturating_add(self.chunks[c].size.unwrap_or(self.chunks[c].len));
         let may = FREE_GROWTH + MAX_GROWTH.saturating_mul(self.source.len());
         if self.grown > may {
-            self.problem(format!("chunk {c} is not read through: the chunks grow to more than {may} bytes"));
+            self.problem(format!("chunk {c} is not read through: the chunks decompress to more than {may} bytes"));
             return 0;
         }
         let bytes = match self.chunks[c].load(&self.source) {
@@ -196,7 +168,7 @@ impl Draft {
         found
     }
 
-    /// Reads through the chunks that need it and sorts everything into topics.
+    /// Reads through the chunks that need it, and sorts the messages by topic.
     pub fn finish(mut self) -> Log {
         let unindexed = self.unindexed.clone();
         let found: usize = unindexed.iter().map(|&c| self.read_through(c)).sum();
@@ -204,7 +176,8 @@ impl Draft {
             let (count, all) = (unindexed.len(), self.chunks.len());
             self.problem(format!("{count} of {all} chunks have no index: {found} messages were found by reading them"));
         }
-        // Descriptions lie in the chunk of a connection's first message when there is none at the end of the file.
+        // Without descriptions at the end of the file, a connection's description is in the chunk
+        // of its first message.
         let undescribed: Vec<u32> = self.places.keys().copied().filter(|&id| !self.described(id)).collect();
         let mut candidates: Vec<(usize, u32)> = undescribed
             .iter()
@@ -264,117 +237,12 @@ impl Draft {
     }
 }
 
-/// The first of the ascending places that is behind `at`.
+/// The first of the ascending `places` after `at`.
 pub(crate) fn next_after(places: &[u64], at: u64) -> Option<u64> {
     places.get(places.partition_point(|&p| p <= at)).copied()
 }
 
-/// One form for a type's name: ROS 2 says `sensor_msgs/msg/Image`, ROS 1 `sensor_msgs/Image`.
+/// One form of a type's name: ROS 2 writes `sensor_msgs/msg/Image`, ROS 1 `sensor_msgs/Image`.
 fn normalised(kind: &str) -> String {
     kind.replacen("/msg/", "/", 1)
-}
-
-/// An open log file.
-pub(crate) struct Log {
-    source: Source,
-    parse: ParseRecord,
-    chunks: Vec<Chunk>,
-    topics: Vec<Topic>,
-    times: Vec<Vec<u64>>,
-    /// A topic's messages: chunk, offset in it.
-    places: Vec<Vec<(u32, u32)>>,
-    /// The connections that feed a topic, ascending.
-    connections: Vec<Vec<u32>>,
-    problems: Vec<String>,
-}
-
-impl MessageLog for Log {
-    fn path(&self) -> &Path {
-        self.source.path()
-    }
-
-    fn topics(&self) -> &[Topic] {
-        &self.topics
-    }
-
-    fn times(&self, topic: usize) -> &[u64] {
-        self.times.get(topic).map_or(&[], Vec::as_slice)
-    }
-
-    fn messages<'a>(&'a self, wanted: &[(usize, usize)]) -> Box<dyn Iterator<Item = Message> + Send + 'a> {
-        // What is not there comes last, as an error.
-        let place = |&(topic, index): &(usize, usize)| -> Option<(u32, u32)> {
-            self.places.get(topic).and_then(|places| places.get(index)).copied()
-        };
-        let mut wanted: Vec<_> = wanted.iter().map(|w| (place(w).unwrap_or((u32::MAX, u32::MAX)), w.0, w.1)).collect();
-        wanted.sort_unstable();
-        Box::new(Messages { log: self, wanted: wanted.into_iter(), loaded: None })
-    }
-
-    fn problems(&self) -> &[String] {
-        &self.problems
-    }
-}
-
-/// Messages in the order of the file, one chunk in memory at a time.
-struct Messages<'a> {
-    log: &'a Log,
-    wanted: std::vec::IntoIter<((u32, u32), usize, usize)>,
-    loaded: Option<(u32, Parsed<Vec<u8>>)>,
-}
-
-impl Messages<'_> {
-    fn read(&mut self, (chunk, offset): (u32, u32), topic: usize) -> Parsed<Vec<u8>> {
-        let place = self.log.chunks.get(chunk as usize).ok_or("there is no such message")?;
-        if self.loaded.as_ref().is_none_or(|(c, _)| *c != chunk) {
-            // The old chunk's memory goes back before the new one's is taken.
-            self.loaded = None;
-            self.loaded = Some((chunk, place.load(&self.log.source)));
-        }
-        let bytes = match &self.loaded {
-            Some((_, Ok(bytes))) => bytes,
-            Some((_, Err(reason))) => return Err(reason.clone()),
-            None => return Err("the chunk is not there".into()),
-        };
-        let misplaced =
-            || format!("the index points to byte {offset} of chunk {chunk}, where there is no such message");
-        let record = bytes.get(offset as usize..).ok_or_else(misplaced)?;
-        match (self.log.parse)(record)?.0 {
-            Record::Message(connection, _, content)
-                if self.log.connections[topic].binary_search(&connection).is_ok() =>
-            {
-                Ok(content.to_vec())
-            }
-            _ => Err(misplaced()),
-        }
-    }
-}
-
-impl Iterator for Messages<'_> {
-    type Item = Message;
-
-    fn next(&mut self) -> Option<Message> {
-        let (place, topic, index) = self.wanted.next()?;
-        let bytes = self.read(place, topic).map_err(|reason| Error::Lost {
-            path: self.log.path().to_owned(),
-            topic: self.log.topics.get(topic).map_or_else(|| topic.to_string(), |t| t.name.clone()),
-            index,
-            reason,
-        });
-        Some(Message { topic, index, bytes })
-    }
-
-    fn size_hint(&self) -> (usize, Option<usize>) {
-        self.wanted.size_hint()
-    }
-}
-
-/// The one message wanted.
-///
-/// # Errors
-/// As for [`Message::bytes`].
-pub fn read_one(log: &dyn MessageLog, topic: usize, index: usize) -> Result<Vec<u8>> {
-    let missing =
-        || Error::Choice { path: log.path().to_owned(), reason: format!("topic {topic} has no message {index}") };
-    log.messages(&[(topic, index)]).next().ok_or_else(missing)?.bytes
 }

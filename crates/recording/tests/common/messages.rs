@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, reason = "a helper of tests")]
 
 use std::path::{Path, PathBuf};
-use trocar_messages::{
+use trocar_recording::messages::{
     DepthValues, Image, MessageLog, StampedImage, Topic, decode_calibration, decode_float, decode_image,
     decode_transforms, open,
 };
@@ -104,7 +104,8 @@ pub fn floats(image: &StampedImage) -> &[f32] {
     }
 }
 
-/// Every message of a log, decoded in every way; how many messages could be had, and how many decoded as something.
+/// Every message of a log, decoded in every way; how many messages could be had, and how many
+/// decoded as something.
 pub fn read_all(log: &dyn MessageLog) -> (usize, usize) {
     let wanted: Vec<_> = (0..log.topics().len()).flat_map(|t| (0..log.times(t).len()).map(move |i| (t, i))).collect();
     let (mut had, mut decoded) = (0, 0);

@@ -1,15 +1,16 @@
-//! Lens models as files name them, turned into OpenCV's.
+//! Converts the lens models that files name to OpenCV's.
 //!
-//! `plumb_bob` and `rational_polynomial` (ROS, foxglove) and `Brown Conrady` (librealsense) are OpenCV's own. librealsense's
-//! `Inverse Brown Conrady` is the same polynomial the other way round (from the distorted to the ideal point), its `Modified
-//! Brown Conrady` takes the tangential part after the radial (`rs2_deproject_pixel_to_point`, `rs2_project_point_to_pixel`);
-//! for these, OpenCV's five coefficients are fitted over the image, in which they are linear.
+//! `plumb_bob` and `rational_polynomial` (ROS, foxglove) and `Brown Conrady` (librealsense) are
+//! OpenCV's own. librealsense's `Inverse Brown Conrady` is the same polynomial in the other
+//! direction (from the distorted to the ideal point); its `Modified Brown Conrady` applies the
+//! tangential part after the radial (`rs2_deproject_pixel_to_point`, `rs2_project_point_to_pixel`).
+//! For these two, OpenCV's five coefficients are fitted over the image. The fit is linear in them.
 
-use crate::error::Parsed;
+use super::error::Parsed;
 use glam::DVec2;
 use trocar_camera::{Camera, Distortion};
 
-/// The fit must be this good everywhere in the image [px].
+/// Largest error of the fit anywhere in the image (px).
 const MAX_MISFIT: f64 = 0.5;
 /// Points of the fit along a side of the image.
 const GRID: usize = 25;
@@ -21,7 +22,7 @@ pub(crate) fn convert(name: &str, d: &[f64], camera: &Camera) -> Parsed<Distorti
     }
     let plain: String = name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
     if matches!(plain.as_str(), "equidistant" | "fisheye" | "ftheta" | "kannalabrandt" | "kannalabrandt4") {
-        return Err(format!("distortion model '{name}': a fisheye is no pinhole camera"));
+        return Err(format!("the distortion model is '{name}', a fisheye; only pinhole cameras are supported"));
     }
     if d.iter().all(|&k| k == 0.0) {
         return Ok(Distortion::default());
@@ -30,7 +31,7 @@ pub(crate) fn convert(name: &str, d: &[f64], camera: &Camera) -> Parsed<Distorti
         "plumbbob" | "rationalpolynomial" | "brownconrady" => {
             let more = d.iter().skip(8).any(|&k| k != 0.0);
             if more {
-                return Err(format!("distortion has {} coefficients; the first 8 are known here", d.len()));
+                return Err(format!("the distortion has {} coefficients; at most 8 are supported", d.len()));
             }
             Distortion::try_from(d.iter().copied().take(8).collect::<Vec<_>>())
         }
@@ -40,7 +41,7 @@ pub(crate) fn convert(name: &str, d: &[f64], camera: &Camera) -> Parsed<Distorti
             (p, tangential(d, radial, p.length_squared()))
         }),
         _ => Err(format!(
-            "distortion model '{name}'; known are plumb_bob, rational_polynomial, and librealsense's Brown-Conrady models"
+            "the distortion model is '{name}'; supported are plumb_bob, rational_polynomial, and librealsense's Brown-Conrady models"
         )),
     }
 }
@@ -49,26 +50,26 @@ fn coefficient(d: &[f64], i: usize) -> f64 {
     d.get(i).copied().unwrap_or(0.0)
 }
 
-/// The radial part.
+/// `p` with the radial distortion.
 fn scaled(d: &[f64], p: DVec2) -> DVec2 {
     let r2 = p.length_squared();
     p * (1.0 + r2 * (coefficient(d, 0) + r2 * (coefficient(d, 1) + r2 * coefficient(d, 4))))
 }
 
-/// The tangential part, added to `p`, whose own coordinates it is made of.
+/// `p` with the tangential distortion, computed from `p` itself.
 fn tangential(d: &[f64], p: DVec2, r2: f64) -> DVec2 {
     let (p1, p2) = (coefficient(d, 2), coefficient(d, 3));
     let xy = 2.0 * p.x * p.y;
     p + DVec2::new(p1 * xy + p2 * (r2 + 2.0 * p.x * p.x), p2 * xy + p1 * (r2 + 2.0 * p.y * p.y))
 }
 
-/// Brown's polynomial at `p`; the tangential part is made of `t`.
+/// Brown's polynomial at `p`, with the tangential part computed from `t`.
 fn polynomial(d: &[f64], p: DVec2, t: DVec2) -> DVec2 {
     scaled(d, p) + tangential(d, t, t.length_squared()) - t
 }
 
-/// The coefficients k1 k2 p1 p2 k3 that best take the ideal to the distorted points which `pair` gives for points all over
-/// the image, by least squares.
+/// The coefficients k1 k2 p1 p2 k3 that map ideal to distorted points best (least squares). `pair`
+/// returns both for a point; it is called for a grid of points over the image.
 fn fit(camera: &Camera, pair: impl Fn(DVec2) -> (DVec2, DVec2)) -> Parsed<Distortion> {
     let steps = (0..GRID).map(|i| i as f64 / (GRID - 1) as f64);
     let at = |u: f64, v: f64| {
@@ -93,7 +94,7 @@ fn fit(camera: &Camera, pair: impl Fn(DVec2) -> (DVec2, DVec2)) -> Parsed<Distor
             }
         }
     }
-    let [k1, k2, p1, p2, k3] = solve(normal).ok_or("the distortion cannot be turned into OpenCV's")?;
+    let [k1, k2, p1, p2, k3] = solve(normal).ok_or("the distortion cannot be fitted by OpenCV's model")?;
     let fitted = [k1, k2, p1, p2, k3];
     let misfit = pairs
         .iter()
@@ -103,11 +104,11 @@ fn fit(camera: &Camera, pair: impl Fn(DVec2) -> (DVec2, DVec2)) -> Parsed<Distor
     if misfit <= MAX_MISFIT {
         Ok(Distortion([k1, k2, p1, p2, k3, 0.0, 0.0, 0.0]))
     } else {
-        Err(format!("the distortion is {misfit:.2} px off when turned into OpenCV's; at most {MAX_MISFIT} is allowed"))
+        Err(format!("OpenCV's model fits the distortion to {misfit:.2} px only; it must fit to {MAX_MISFIT} px"))
     }
 }
 
-/// Gaussian elimination with row pivoting; the last column is the right side.
+/// Gaussian elimination with row pivoting; the last column is the right-hand side.
 fn solve(mut m: [[f64; 6]; 5]) -> Option<[f64; 5]> {
     for c in 0..5 {
         let pivot = (c..5).max_by(|&a, &b| m[a][c].abs().total_cmp(&m[b][c].abs()))?;
@@ -136,7 +137,7 @@ mod tests {
         Camera { width: 1280, height: 720, fx: 640.0, fy: 641.0, cx: 645.0, cy: 362.0, distortion }
     }
 
-    /// A D405's colour stream: the inverse polynomial by librealsense's formula, written out again.
+    /// A D405's colour stream: checks against librealsense's formula for the inverse polynomial.
     #[test]
     fn an_inverse_model_is_fitted() {
         let d = [-0.0548, 0.0617, -0.0003, 0.0009, -0.0199];
@@ -175,11 +176,11 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_turned_is_refused() {
+    fn unsupported_models_are_refused() {
         let plain = camera(Distortion::default());
         assert!(convert("equidistant", &[0.0; 4], &plain).unwrap_err().contains("fisheye"));
         assert!(
-            convert("Inverse Brown Conrady", &[-3.0, 9.0, 0.0, 0.0, -40.0], &plain).unwrap_err().contains("px off")
+            convert("Inverse Brown Conrady", &[-3.0, 9.0, 0.0, 0.0, -40.0], &plain).unwrap_err().contains("px only")
         );
         assert!(convert("lens", &[0.1], &plain).unwrap_err().contains("'lens'"));
         assert!(convert("plumb_bob", &[f64::NAN], &plain).is_err());

@@ -1,7 +1,8 @@
 //! Only what is wanted of a large file is read.
 //!
-//! The measurement needs a bag that `make_fixtures.py --large` wrote: `TROCAR_LARGE_BAG=/tmp/large.bag cargo test --release
-//! -p trocar-messages --test large -- --ignored --nocapture`.
+//! The measurement needs a bag that `make_fixtures.py --large` wrote:
+//! `TROCAR_LARGE_BAG=/tmp/large.bag cargo test --release -p trocar-recording --test large_bag --
+//! --ignored --nocapture`.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 
@@ -11,7 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Instant;
-use trocar_messages::{decode_image, open_reader, realsense};
+use trocar_recording::messages::{decode_image, open_reader, realsense};
 
 /// A file that counts what is read of it.
 struct Counted(File, Arc<AtomicU64>);

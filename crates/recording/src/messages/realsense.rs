@@ -1,18 +1,20 @@
-//! The topics of a bag that RealSense Viewer or librealsense recorded (librealsense, `ros_file_format.h`, version 3).
+//! The topics of a bag that RealSense Viewer or librealsense recorded (librealsense,
+//! `ros_file_format.h`, version 3).
 //!
 //! ```text
 //! /device_0/sensor_0/Depth_0/image/data        sensor_msgs/Image, mono16
 //! /device_0/sensor_0/Depth_0/info/camera_info  sensor_msgs/CameraInfo
 //! /device_0/sensor_0/Depth_0/tf/0              geometry_msgs/Transform
-//! /device_0/sensor_0/option/Depth Units/value  std_msgs/Float32 [m]; some versions write Depth_Units
-//! /device_0/sensor_1/Color_0/...               likewise; on a D405 both streams may be of one sensor
+//! /device_0/sensor_0/option/Depth Units/value  std_msgs/Float32 (m), or Depth_Units
+//! /device_0/sensor_1/Color_0/...               same; one sensor on some D405
 //! ```
 //!
-//! Calibration, options and transforms carry the log time 1 ns. A stream's transform takes points *from* the reference
-//! stream of its group *into* the stream's own frame (`device::get_extrinsics` of librealsense asks for reference to stream;
-//! `rs2_extrinsics` in the same direction).
+//! Calibration, options and transforms have the log time 1 ns. A stream's transform maps points
+//! *from* the reference stream of its group *to* the stream's own frame (librealsense's
+//! `device::get_extrinsics` asks for reference to stream; `rs2_extrinsics` has the same direction).
 
-use crate::{Topic, Transform};
+use super::topic::Topic;
+use super::transform::Transform;
 use trocar_core::Pose;
 
 /// Indices of the topics of one depth and one colour stream.
@@ -26,11 +28,11 @@ pub struct RealSenseTopics {
     pub depth_info: Option<usize>,
     /// Calibration of the colour stream.
     pub color_info: Option<usize>,
-    /// Metres a unit of depth.
+    /// Unit of depth (m).
     pub depth_units: Option<usize>,
-    /// From the reference into the depth stream's frame.
+    /// From the reference to the depth stream's frame.
     pub depth_transform: Option<usize>,
-    /// From the reference into the colour stream's frame.
+    /// From the reference to the colour stream's frame.
     pub color_transform: Option<usize>,
 }
 
@@ -54,7 +56,8 @@ pub fn transform_topic(sensor: usize, stream: &str) -> String {
     format!("/device_0/sensor_{sensor}/{stream}/tf/0")
 }
 
-/// The first depth and the first colour stream of a RealSense recording; `None` when it is none, or has not both.
+/// The first depth and the first colour stream of a RealSense recording. `None` for other
+/// recordings, or without both streams.
 pub fn find(topics: &[Topic]) -> Option<RealSenseTopics> {
     let stream = |name: &str| {
         topics.iter().enumerate().find_map(|(i, topic)| {
@@ -87,7 +90,7 @@ pub fn find(topics: &[Topic]) -> Option<RealSenseTopics> {
     })
 }
 
-/// The transform that takes points of the depth stream's frame into the colour stream's, from the two streams' own.
+/// The transform from the depth stream's frame to the colour stream's.
 pub fn color_from_depth(color: &Transform, depth: &Transform) -> Pose {
     let (color, back) = (color.pose(), depth.pose().inverse());
     Pose { rotation: color.rotation * back.rotation, translation: color.transform(back.translation) }

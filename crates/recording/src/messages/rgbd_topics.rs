@@ -1,15 +1,19 @@
-//! Which topics of a log are the colour and the depth camera.
+//! Finds the topics of the colour and the depth camera.
 //!
-//! A RealSense bag says so. Otherwise the first message of every image topic is decoded, which tells colour from depth, and
-//! names decide between several: depth aligned to colour before other depth, "color" or "rgb" before other images, and
-//! uncompressed before compressed images of the same camera. Infrared images are left out.
+//! A RealSense bag names them. In other logs the first message of every image topic is decoded,
+//! which separates colour from depth. Names decide between several topics: depth aligned to colour
+//! before other depth, "color" or "rgb" before other images, and uncompressed before compressed
+//! images of the same camera. Infrared images are ignored.
 
-use crate::image::Image;
-use crate::{Error, MessageLog, Result, Topic, decode_image, read_one, realsense};
+use super::decode::decode_image;
+use super::error::{Error, Result};
+use super::image::Image;
+use super::realsense;
+use super::topic::{MessageLog, Topic, read_one};
 
 /// Indices of the topics of an RGB-D recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Guess {
+pub struct RgbdTopics {
     /// Colour images.
     pub color: usize,
     /// Depth images.
@@ -18,22 +22,22 @@ pub struct Guess {
     pub color_info: Option<usize>,
     /// Calibration of the depth camera; that of colour when depth is aligned to it.
     pub depth_info: Option<usize>,
-    /// Metres a unit of depth (RealSense); without, units are millimetres (REP 118).
+    /// Unit of depth (RealSense); without it, units are millimetres (REP 118).
     pub depth_units: Option<usize>,
-    /// Transform into the colour stream's frame (RealSense).
+    /// Transform from the reference to the colour stream's frame (RealSense).
     pub color_transform: Option<usize>,
-    /// Transform into the depth stream's frame (RealSense).
+    /// Transform from the reference to the depth stream's frame (RealSense).
     pub depth_transform: Option<usize>,
     /// All topics of transforms between named frames.
     pub transforms: Vec<usize>,
 }
 
-/// Guesses the topics of an RGB-D recording. Where the user names one, it is that.
+/// Finds the topics of an RGB-D recording. `color` and `depth` name topics that the user chose.
 ///
 /// # Errors
-/// [`Error::Choice`] when there is no colour or no depth, several that are as good, or none of the given name; it lists the
-/// topics.
-pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> Result<Guess> {
+/// [`Error::Choice`] when there is no colour or no depth, when several topics are equally good, or
+/// when a named topic does not exist. The error lists the topics.
+pub fn find_rgbd_topics(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> Result<RgbdTopics> {
     let topics = log.topics();
     let transforms = (0..topics.len()).filter(|&t| is_transforms(&topics[t])).collect();
     let named = |name: &str| {
@@ -41,10 +45,10 @@ pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> 
         found.ok_or_else(|| choice(log, &format!("no topic '{name}'")))
     };
     let (color, depth) = (color.map(named).transpose()?, depth.map(named).transpose()?);
-    // Its own streams by their names are still its own: units and transforms belong to them.
+    // A user may name the RealSense streams themselves: units and transforms still belong to them.
     let chosen = |named: Option<usize>, found: usize| named.is_none_or(|t| t == found);
     if let Some(found) = realsense::find(topics).filter(|f| chosen(color, f.color) && chosen(depth, f.depth)) {
-        return Ok(Guess {
+        return Ok(RgbdTopics {
             color: found.color,
             depth: found.depth,
             color_info: found.color_info,
@@ -65,13 +69,13 @@ pub fn guess(log: &dyn MessageLog, color: Option<&str>, depth: Option<&str>) -> 
     let one = |what: &str, depth: bool, named: Option<usize>| match (named, &best(depth)[..]) {
         (Some(t), _) => Ok(t),
         (None, [t]) => Ok(*t),
-        (None, []) => Err(choice(log, &format!("no {what} images"))),
-        (None, _) => Err(choice(log, &format!("several topics with {what} images"))),
+        (None, []) => Err(choice(log, &format!("there are no {what} images"))),
+        (None, _) => Err(choice(log, &format!("several topics have {what} images"))),
     };
     let (color, depth) = (one("colour", false, color)?, one("depth", true, depth)?);
     let color_info = info(topics, color);
     let depth_info = info(topics, depth).or_else(|| color_info.filter(|_| is_aligned(&topics[depth].name)));
-    Ok(Guess {
+    Ok(RgbdTopics {
         color,
         depth,
         color_info,
@@ -94,12 +98,12 @@ fn is_transforms(topic: &Topic) -> bool {
     KINDS.contains(&topic.kind.as_str())
 }
 
-/// A topic's name without the image transport.
+/// A topic's name without the suffix of the image transport.
 fn camera(name: &str) -> &str {
     ["/compressed", "/compressedDepth"].iter().find_map(|suffix| name.strip_suffix(suffix)).unwrap_or(name)
 }
 
-/// Whether the images of a topic are depth images; `None` if they are no images, or infrared.
+/// Whether a topic's images are depth images; `None` for other messages and infrared images.
 fn is_depth(log: &dyn MessageLog, t: usize) -> Option<bool> {
     const KINDS: [&str; 4] =
         ["sensor_msgs/Image", "sensor_msgs/CompressedImage", "foxglove.RawImage", "foxglove.CompressedImage"];
@@ -119,7 +123,7 @@ fn is_aligned(name: &str) -> bool {
     name.contains("aligned") || name.contains("registered") || name.contains("depth_to_color")
 }
 
-/// The better the higher.
+/// Rank of a topic; the highest is used.
 fn rank(topic: &Topic, depth: bool) -> (u8, u8) {
     let name = camera(&topic.name).to_ascii_lowercase();
     let named = if depth {
@@ -132,7 +136,8 @@ fn rank(topic: &Topic, depth: bool) -> (u8, u8) {
     (named, u8::from(!topic.kind.ends_with("CompressedImage")))
 }
 
-/// The calibration that shares the most leading parts of its name with an image topic; at least one, and only one.
+/// The only calibration that shares the most leading parts of its name (at least one) with an image
+/// topic.
 fn info(topics: &[Topic], image: usize) -> Option<usize> {
     let parts = |t: usize| topics[t].name.split('/').filter(|p| !p.is_empty());
     let shared = |t: usize| parts(t).zip(parts(image)).take_while(|(a, b)| a == b).count();

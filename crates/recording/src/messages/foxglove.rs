@@ -1,14 +1,13 @@
 //! foxglove's messages, as protobuf and as JSON (<https://docs.foxglove.dev/docs/sdk/schemas>).
 //!
-//! Protobuf's wire format (<https://protobuf.dev/programming-guides/encoding/>) is a row of numbered fields; the few that
-//! matter are picked out here, without generated code.
+//! Protobuf's wire format (<https://protobuf.dev/programming-guides/encoding/>) is a sequence of
+//! numbered fields. The needed fields are read directly, without generated code.
 
-use crate::calibration::Intrinsics;
-use crate::error::Parsed;
-use crate::image::{Packed, Raw};
-use crate::reader::Reader;
-use crate::ros::stamp;
-use crate::transform::Transform;
+use super::byte_reader::{ByteReader, stamp};
+use super::calibration::Intrinsics;
+use super::error::Parsed;
+use super::image::{Packed, Raw};
+use super::transform::Transform;
 use base64::Engine;
 use serde::Deserialize;
 use std::borrow::Cow;
@@ -21,11 +20,11 @@ enum Value<'a> {
     Fixed32(u32),
 }
 
-/// Calls `visit` with every field of a message: its number, its value. A value of another kind than expected is passed
-/// over, as protobuf asks for unknown fields.
+/// Calls `visit` with the number and value of every field of a message. Callers skip a value of an
+/// unexpected kind, as protobuf requires for unknown fields.
 fn fields<'a>(bytes: &'a [u8], mut visit: impl FnMut(u64, Value<'a>) -> Parsed<()>) -> Parsed<()> {
-    let mut reader = Reader::packed(bytes);
-    while reader.left() > 0 {
+    let mut reader = ByteReader::packed(bytes);
+    while reader.remaining() > 0 {
         let key = varint(&mut reader)?;
         let value = match key & 7 {
             0 => Value::Varint(varint(&mut reader)?),
@@ -35,14 +34,17 @@ fn fields<'a>(bytes: &'a [u8], mut visit: impl FnMut(u64, Value<'a>) -> Parsed<(
                 Value::Bytes(reader.take(len)?)
             }
             5 => Value::Fixed32(reader.u32()?),
-            kind => return Err(format!("no protobuf: a field of wire kind {kind} before byte {}", reader.at())),
+            kind => {
+                let at = reader.at();
+                return Err(format!("not protobuf: the field before byte {at} has the wire type {kind}"));
+            }
         };
         visit(key >> 3, value)?;
     }
     Ok(())
 }
 
-fn varint(reader: &mut Reader<'_>) -> Parsed<u64> {
+fn varint(reader: &mut ByteReader<'_>) -> Parsed<u64> {
     let mut value = 0u64;
     for shift in (0..64).step_by(7) {
         let byte = reader.u8()?;
@@ -51,14 +53,14 @@ fn varint(reader: &mut Reader<'_>) -> Parsed<u64> {
             return Ok(value);
         }
     }
-    Err(format!("no protobuf: a number without end before byte {}", reader.at()))
+    Err(format!("not protobuf: the number before byte {} does not end", reader.at()))
 }
 
 fn text(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// `google.protobuf.Timestamp`; before 1970 is 0.
+/// A `google.protobuf.Timestamp` (ns since the epoch); times before 1970 are 0.
 fn timestamp(bytes: &[u8]) -> Parsed<u64> {
     let (mut seconds, mut nanoseconds) = (0u64, 0u64);
     fields(bytes, |number, value| {
@@ -83,6 +85,7 @@ pub(crate) fn raw_image(bytes: &[u8]) -> Parsed<Raw<'_>> {
         big_endian: false,
         step: 0,
         data: Cow::Borrowed(&[]),
+        depth_unit: None,
     };
     fields(bytes, |number, value| {
         match (number, value) {
@@ -135,13 +138,13 @@ pub(crate) fn camera_calibration(bytes: &[u8]) -> Parsed<Intrinsics> {
     Ok(calibration)
 }
 
-/// Repeated doubles, packed or one by one.
+/// Repeated doubles, packed or single.
 fn doubles(value: &Value<'_>, all: &mut Vec<f64>) -> Parsed<()> {
     match value {
         Value::Fixed64(bits) => all.push(f64::from_bits(*bits)),
         Value::Bytes(bytes) => {
             let (numbers, []) = bytes.as_chunks() else {
-                return Err(format!("{} bytes of doubles", bytes.len()));
+                return Err(format!("doubles take {} bytes; it must be a multiple of 8", bytes.len()));
             };
             all.extend(numbers.iter().copied().map(f64::from_le_bytes));
         }
@@ -151,7 +154,7 @@ fn doubles(value: &Value<'_>, all: &mut Vec<f64>) -> Parsed<()> {
 }
 
 fn nine(k: &[f64]) -> Parsed<[f64; 9]> {
-    k.try_into().map_err(|_| format!("K has {} numbers instead of 9", k.len()))
+    k.try_into().map_err(|_| format!("K has {} numbers; it must have 9", k.len()))
 }
 
 /// `foxglove.FrameTransforms`.
@@ -185,7 +188,7 @@ pub(crate) fn frame_transform(bytes: &[u8]) -> Parsed<Transform> {
     Ok(transform)
 }
 
-/// The doubles 1 to N of a vector or quaternion.
+/// Fields 1 to N of a vector or quaternion.
 fn components<const N: usize>(bytes: &[u8]) -> Parsed<[f64; N]> {
     let mut all = [0.0; N];
     fields(bytes, |number, value| {
@@ -213,7 +216,7 @@ impl JsonTime {
     }
 }
 
-/// Both kinds of image.
+/// The fields of both kinds of image.
 #[derive(Default, Deserialize)]
 #[serde(default)]
 struct JsonImage {
@@ -265,7 +268,7 @@ struct JsonTransforms {
 }
 
 fn json<'a, T: Deserialize<'a>>(bytes: &'a [u8]) -> Parsed<T> {
-    serde_json::from_slice(bytes).map_err(|e| format!("unreadable JSON ({e})"))
+    serde_json::from_slice(bytes).map_err(|e| format!("the JSON cannot be read ({e})"))
 }
 
 fn image_json(bytes: &[u8]) -> Parsed<(JsonImage, Vec<u8>)> {
@@ -288,6 +291,7 @@ pub(crate) fn raw_image_json(bytes: &[u8]) -> Parsed<Raw<'static>> {
         big_endian: false,
         step: image.step,
         data: Cow::Owned(data),
+        depth_unit: None,
     })
 }
 
