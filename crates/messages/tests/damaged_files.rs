@@ -10,8 +10,8 @@ mod common;
 use common::{ALL, decode_all, fixture, log, read_all};
 use std::io::Cursor;
 use std::path::Path;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault, cases};
 use trocar_messages::{Topic, guess, open_reader};
+use trocar_testing::{Allowance, PEAK, Peak, assault, cases};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
