@@ -3,6 +3,7 @@
 
 mod axis;
 pub mod colors;
+pub mod document;
 mod error;
 pub mod figures;
 pub mod overlays;

@@ -50,7 +50,7 @@ pub fn figure(content: &str, caption: &str) -> String {
 }
 
 /// How many figures stand beside each other on a wide screen.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Columns {
     /// Two.
     Two,
@@ -68,6 +68,7 @@ pub fn grid(columns: Columns, figures: &[String]) -> String {
 }
 
 /// One figure of merit: plain texts.
+#[derive(Clone, Debug)]
 pub struct Card {
     /// What it is.
     pub name: &'static str,

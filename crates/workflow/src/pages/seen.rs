@@ -191,7 +191,7 @@ fn histogram(r: &Reconstruction) -> Result<String> {
         let points = counts.iter().enumerate().map(|(b, n)| ((b as f64 + 0.5) * BIN - SPAN, share(*n))).collect();
         Line { points, color: colors::organ(i), filled: false }
     };
-    Plot {
+    let plot = Plot {
         title: "distribution of the depth error",
         x: "surface minus measured depth [mm]",
         y: "share of pixels [%]",
@@ -201,6 +201,6 @@ fn histogram(r: &Reconstruction) -> Result<String> {
         limits: vec![],
         log_x: false,
         log_y: false,
-    }
-    .svg()
+    };
+    Ok(plot.svg()?)
 }
