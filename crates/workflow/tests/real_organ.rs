@@ -2,8 +2,8 @@
 
 use std::path::Path;
 use trocar_cell::{GraspDesign, GraspLift};
+use trocar_core::Silent;
 use trocar_geometry::io::Unit;
-use trocar_progress::Silent;
 use trocar_reconstruct::Settings;
 use trocar_workflow::{reconstruct_surface, simulate};
 
