@@ -31,7 +31,7 @@ fn open(path: &Path) {
         || cfg!(windows)
         || std::env::var_os("DISPLAY").is_some()
         || std::env::var_os("WAYLAND_DISPLAY").is_some();
-    if desktop && opener::open(path).is_err() {
+    if desktop && open::that_detached(path).is_err() {
         eprintln!("no browser could be started; open the report by hand");
     }
 }
