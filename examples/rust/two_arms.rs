@@ -1,0 +1,28 @@
+//! The two-arm cell, driven by actions: both instruments move 10 mm deeper while the left one closes.
+
+use trocar::prelude::*;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let scene = Scene::builtin("cell-a")?;
+    let specimen = trocar::workflow::scene_specimen(&scene, "target/phantoms".as_ref(), &Silent)?;
+    let mut cell = Cell::new(&scene, &specimen, 0)?;
+    let start: Vec<_> = cell.observe().iter().map(|arm| arm.coordinates).collect();
+    let periods = 60;
+    for period in 1..=periods {
+        let share = f64::from(period) / f64::from(periods);
+        let mut targets = start.clone();
+        targets.iter_mut().for_each(|target| target.insertion += 0.010 * share);
+        targets[0].jaw *= 1.0 - share;
+        cell.step(&Action::pivots(&targets))?;
+    }
+    for arm in cell.observe() {
+        println!(
+            "{} arm: tip at {:.1} mm, RCM deviation {:.3} mm, force {:.3} N",
+            arm.side.name(),
+            1e3 * arm.tip.translation,
+            1e3 * arm.rcm_deviation,
+            arm.force.wrench.force.length()
+        );
+    }
+    Ok(())
+}
