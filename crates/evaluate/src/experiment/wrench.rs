@@ -197,7 +197,7 @@ impl WrenchExperiment {
                 return Err(Error::Interrupted);
             }
             let found = self.weigh(run as u64, self.tilt)?;
-            distances.push(found.distance_squared(&self::truth())?);
+            distances.push(found.distance_squared(&self::truth()));
             residual += found.chi_squared / found.degrees as f64;
             estimates.push(numbers(&found.model));
             progress.advance(1);
