@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::Mask;
 use trocar_camera::metrics::{psnr_db, ssim};
+use trocar_core::Random;
 
 const WIDTH: usize = 120;
 const HEIGHT: usize = 80;
@@ -25,18 +26,14 @@ fn python() -> Option<PathBuf> {
 
 /// A picture of blobs, and the same picture with noise and another exposure.
 fn pictures(strength: f64) -> [Vec<[f64; 3]>; 2] {
-    let mut bits = 7_u64;
-    let mut noise = move || {
-        bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (bits >> 40) as f64 / (1_u64 << 24) as f64 - 0.5
-    };
+    let mut numbers = Random::new(7).sequence();
     let mut all = [Vec::new(), Vec::new()];
     for i in 0..WIDTH * HEIGHT {
         let (x, y) = ((i % WIDTH) as f64, (i / WIDTH) as f64);
         let clean: [f64; 3] = [0.0, 1.0, 2.0]
             .map(|c| 120.0 + 60.0 * (0.11 * x + c).sin() * (0.17 * y - c).cos() + 20.0 * (0.9 * x * y / 40.0).sin());
         all[0].push(clean.map(|v| v.round().clamp(0.0, 255.0)));
-        all[1].push(clean.map(|v| (0.9 * v + strength * noise()).round().clamp(0.0, 255.0)));
+        all[1].push(clean.map(|v| (0.9 * v + strength * (numbers.uniform() - 0.5)).round().clamp(0.0, 255.0)));
     }
     all
 }

@@ -9,6 +9,7 @@ use common::{Shape, check_conforming};
 use glam::{DQuat, DVec3};
 use std::path::PathBuf;
 use std::time::Instant;
+use trocar_core::Random;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, Mesher, SignedDistance, TetMesh, TetQuality, TriMesh, repair};
 
@@ -26,11 +27,8 @@ fn box_distance(p: DVec3, half: DVec3) -> f64 {
 /// A ball with waves of random direction, length and phase, with the largest slope the mesher
 /// accepts.
 fn blob(seed: u64) -> Named {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
+    let mut numbers = Random::new(seed).sequence();
+    let mut next = || 2.0 * numbers.uniform() - 1.0;
     let waves: Vec<(DVec3, f64)> = (0..6).map(|_| (150.0 * DVec3::new(next(), next(), next()), 3.0 * next())).collect();
     named(&format!("blob {seed}"), DVec3::splat(0.05), move |p| {
         // Six waves of at most 260 rad/m and 0.6 mm have a total slope of at most 0.94. The slope
