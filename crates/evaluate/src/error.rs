@@ -122,6 +122,9 @@ pub enum Error {
     /// A model cannot be built or stepped.
     #[error(transparent)]
     Tissue(#[from] trocar_tissue::Error),
+    /// The oracle or a comparator failed.
+    #[error(transparent)]
+    Reference(#[from] trocar_tissue_reference::Error),
     /// An episode cannot be run, or its files are unusable.
     #[error(transparent)]
     Task(#[from] trocar_task::Error),

@@ -15,7 +15,7 @@ use glam::DVec3;
 use trocar_geometry::Pose;
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Compliance, ConstitutiveModel, Grasp, Load, Material, Model, ModelBuilder,
-    Schedule, Shape, State, Stepper, SupportField, SupportPlane, ToolMotion,
+    Shape, SolverSettings, State, Stepper, SupportField, SupportPlane, ToolMotion,
 };
 
 fn at(translation: DVec3) -> Pose {
@@ -30,14 +30,14 @@ fn bump(frame: usize, frames: usize) -> f64 {
 
 /// Steps `frames` frames; checks that one thread and three agree and that a saved state restores.
 fn hashes(model: &Model, start: &State, frames: usize, tools: &dyn Fn(usize) -> Vec<Pose>, loads: &[Load]) -> [u64; 3] {
-    [Schedule::FAST, Schedule::PAPER, common::adaptive()].map(|schedule| {
+    [SolverSettings::FAST, SolverSettings::PAPER, common::adaptive()].map(|schedule| {
         let run = |threads: usize| {
             let mut stepper = Stepper::new(model, schedule, FRAME, threads).unwrap();
             let mut state = start.clone();
             for k in 0..frames {
                 let motions = tools(k).into_iter().zip(tools(k + 1));
                 let motions: Vec<ToolMotion> = motions.map(|(from, to)| ToolMotion { from, to }).collect();
-                stepper.step_under(model, &mut state, &motions, loads);
+                stepper.step_with_loads(model, &mut state, &motions, loads);
                 if k == frames / 2 {
                     let mut restored = State::new(model);
                     restored.clone_from(&state);

@@ -1,7 +1,7 @@
 //! Solvers by the names under which the command line, reports and JSON know them.
 
 use crate::{Error, Result};
-use trocar_tissue::{Descent, Newton, QuasiNewton, Schedule, SemiImplicit, Start, Xpbd};
+use trocar_tissue::{Descent, QuasiNewton, SolverSettings, Start};
 
 /// The names of the schedules that are measured beside each other.
 pub const SOLVERS: [&str; 2] = ["paper", "fast"];
@@ -13,11 +13,11 @@ const ADAPTIVE: &str = "adaptive";
 ///
 /// # Errors
 /// Another name.
-pub fn solver_named(name: &str) -> Result<Schedule> {
+pub fn solver_named(name: &str) -> Result<SolverSettings> {
     match name {
-        "paper" => Ok(Schedule::PAPER),
-        "fast" => Ok(Schedule::FAST),
-        ADAPTIVE => Ok(Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })),
+        "paper" => Ok(SolverSettings::PAPER),
+        "fast" => Ok(SolverSettings::FAST),
+        ADAPTIVE => Ok(SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })),
         _ => {
             Err(Error::Mismatch(format!("there is no schedule '{name}'; there are {}, {ADAPTIVE}", SOLVERS.join(", "))))
         }
@@ -25,25 +25,19 @@ pub fn solver_named(name: &str) -> Result<Schedule> {
 }
 
 /// One substep of `schedule`, with this many iterations and no early exit.
-pub fn one_substep(schedule: Schedule, iterations: usize) -> Schedule {
+pub fn one_substep(schedule: SolverSettings, iterations: usize) -> SolverSettings {
     match schedule {
-        Schedule::Descent(descent) => Schedule::Descent(Descent { substeps: 1, iterations, ..descent }),
-        Schedule::QuasiNewton(method) => {
-            Schedule::QuasiNewton(QuasiNewton { substeps: 1, iterations, tolerance: 0.0, ..method })
+        SolverSettings::Descent(descent) => SolverSettings::Descent(Descent { substeps: 1, iterations, ..descent }),
+        SolverSettings::QuasiNewton(method) => {
+            SolverSettings::QuasiNewton(QuasiNewton { substeps: 1, iterations, tolerance: 0.0, ..method })
         }
-        Schedule::Xpbd(settings) => Schedule::Xpbd(Xpbd { substeps: 1, iterations, ..settings }),
-        // They have no iterations.
-        Schedule::SemiImplicit(_) => Schedule::SemiImplicit(SemiImplicit { substeps: 1 }),
-        Schedule::Newton(_) => Schedule::Newton(Newton { substeps: 1 }),
     }
 }
 
 /// Iterations of each substep of `schedule`.
-pub fn iterations_of(schedule: Schedule) -> usize {
+pub fn iterations_of(schedule: SolverSettings) -> usize {
     match schedule {
-        Schedule::Descent(descent) => descent.iterations,
-        Schedule::QuasiNewton(method) => method.iterations,
-        Schedule::Xpbd(settings) => settings.iterations,
-        Schedule::SemiImplicit(_) | Schedule::Newton(_) => 1,
+        SolverSettings::Descent(descent) => descent.iterations,
+        SolverSettings::QuasiNewton(method) => method.iterations,
     }
 }
