@@ -10,7 +10,7 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Grasp, Load, Material, Model, ModelBuilder, State, SupportPlane, ToolMotion,
 };

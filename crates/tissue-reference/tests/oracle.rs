@@ -7,7 +7,8 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
-use trocar_geometry::{Pose, TetMesh};
+use trocar_core::Pose;
+use trocar_geometry::TetMesh;
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Descent, Grasp, Material, Model, ModelBuilder, SolverSettings, Start, State,
     Stepper, SupportPlane, ToolMotion,

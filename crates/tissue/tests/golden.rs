@@ -12,7 +12,7 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Compliance, ConstitutiveModel, Grasp, Load, Material, Model, ModelBuilder,
     Shape, SolverSettings, State, Stepper, SupportField, SupportPlane, ToolMotion,

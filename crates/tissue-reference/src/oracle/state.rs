@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{Body, BodyMotion, Grasp, Model, State};
 
 /// A node whose position at the end of a step is prescribed.
