@@ -125,7 +125,7 @@ fn projection_takes_the_negative_part_alone() {
     let twist = DMat3::from_cols(DVec3::new(0.7, 0.3, -0.1), DVec3::new(-0.2, 0.6, 0.2), DVec3::new(0.1, -0.3, 0.8));
     for constitutive in ConstitutiveModel::ALL {
         let model = model(constitutive, 0.0);
-        let psi = model.bodies()[0].material.hyperelastic();
+        let psi = model.bodies()[0].material().hyperelastic();
         let form = |t: &[[f64; 9]; 9], v: &[f64]| -> f64 {
             (0..9).map(|c| (0..9).map(|r| v[c] * t[c][r] * v[r]).sum::<f64>()).sum()
         };
