@@ -9,6 +9,7 @@
 mod compensate;
 mod identify;
 mod poses;
+mod svd;
 
 pub use compensate::{Compensator, ForceReading};
 pub use identify::{Identification, PARAMETERS, StaticReading, identify};
