@@ -61,7 +61,9 @@ class TrocarConfig(EnvConfig):
         }
         self.features_map = {ACTION: ACTION, "agent_pos": OBS_STATE}
         for camera in self.cameras:
-            self.features[f"pixels/{camera}"] = PolicyFeature(type=FeatureType.VISUAL, shape=(self.size, self.size, 3))
+            self.features[f"pixels/{camera}"] = PolicyFeature(
+                type=FeatureType.VISUAL, shape=(self.size, self.size, 3)
+            )
             self.features_map[f"pixels/{camera}"] = f"{OBS_IMAGES}.{camera}"
 
     @property

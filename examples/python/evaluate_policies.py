@@ -27,7 +27,9 @@ def main() -> None:
     parser.add_argument("--episodes", type=int, default=4)
     parser.add_argument("--task", default="grasp-lift", choices=sorted(trocar.TASKS.values()))
     parser.add_argument("--seconds", type=float, default=15.0, help="longest episode")
-    parser.add_argument("-o", "--output", type=Path, help="campaign folder (default: one that is removed)")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="campaign folder (default: one that is removed)"
+    )
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         # The built-in scene with another task: a scene is a file, and this one leaves everything else as it is.
@@ -39,7 +41,9 @@ def main() -> None:
         print(f"{'policy':<12} {'passed':>7} {'95% interval':>13} {'score':>6}")
         for row in result["policies"]:
             low, high = row["interval"]["low"], row["interval"]["high"]
-            print(f"{row['policy']:<12} {row['passed']:>3}/{row['episodes']:<3} {low:>6.0%} -{high:>4.0%} {row['mean_score']:>7.2f}")
+            print(
+                f"{row['policy']:<12} {row['passed']:>3}/{row['episodes']:<3} {low:>6.0%} -{high:>4.0%} {row['mean_score']:>7.2f}"
+            )
 
     name = next(name for name, task in trocar.TASKS.items() if task == options.task)
     env = gym.make(name, episode_s=options.seconds)
@@ -51,7 +55,9 @@ def main() -> None:
             state, _, ended, late, info = env.step(stand_still(state).astype(np.float32))
             over = ended or late
         scores.append((info["is_success"], info["score"]))
-    print(f"{'stand still':<12} {sum(s for s, _ in scores):>3}/{len(scores):<3} {'':>13} {np.mean([x for _, x in scores]):>6.2f}")
+    print(
+        f"{'stand still':<12} {sum(s for s, _ in scores):>3}/{len(scores):<3} {'':>13} {np.mean([x for _, x in scores]):>6.2f}"
+    )
 
 
 if __name__ == "__main__":

@@ -60,7 +60,11 @@ class LiftCells(VecEnv):
         self.distance_column = self.cells.channel_names.index("grasp_distance_mm")
         self.seed_first = seed
         self.render_mode = None
-        super().__init__(cells, gym.spaces.Box(-np.inf, np.inf, (21,), np.float32), gym.spaces.Box(-1.0, 1.0, (5,), np.float32))
+        super().__init__(
+            cells,
+            gym.spaces.Box(-np.inf, np.inf, (21,), np.float32),
+            gym.spaces.Box(-1.0, 1.0, (5,), np.float32),
+        )
 
     def reset(self) -> np.ndarray:
         self.state, infos = self.cells.reset(seed=self.seed_first)
@@ -72,7 +76,10 @@ class LiftCells(VecEnv):
 
     def _stay(self, which: np.ndarray) -> None:
         """The targets of cells that have begun an episode: where the arms are."""
-        self.targets[which, :5], self.targets[which, 5:] = self.state[which, :5], self.state[which, 23:28]
+        self.targets[which, :5], self.targets[which, 5:] = (
+            self.state[which, :5],
+            self.state[which, 23:28],
+        )
 
     def _near(self, channels: np.ndarray) -> np.ndarray:
         """1 with the mouth at the organ, to 0 far away. Before an episode's first step its channels are all 0, which says nothing."""
@@ -128,7 +135,11 @@ class LiftCells(VecEnv):
 
     def _decide(self, row, experts: list[trocar.Policy] | None = None):
         """Does the control steps of one decision. A cell whose episode ends amid it waits at its new start for the others."""
-        rewards, over, self.fresh = np.zeros(self.num_envs), np.zeros(self.num_envs, bool), np.zeros(self.num_envs, bool)
+        rewards, over, self.fresh = (
+            np.zeros(self.num_envs),
+            np.zeros(self.num_envs, bool),
+            np.zeros(self.num_envs, bool),
+        )
         infos: list[dict] = [{} for _ in range(self.num_envs)]
         for step in range(EVERY):
             actions = row(step).copy()
@@ -144,7 +155,11 @@ class LiftCells(VecEnv):
                 seen = self._seen(told["final_obs"][k], actions[k])
                 passed = bool(last["is_success"][k])
                 rewards[k] += self._near(last["channels"][k]) - self.near[k] + 3.0 * passed
-                infos[k] = {"terminal_observation": seen, "TimeLimit.truncated": bool(late[k]), "is_success": passed}
+                infos[k] = {
+                    "terminal_observation": seen,
+                    "TimeLimit.truncated": bool(late[k]),
+                    "is_success": passed,
+                }
                 infos[k]["stage"] = int(last["stage"][k])
                 self.near[k] = near[k]
                 if experts is not None:
@@ -152,7 +167,9 @@ class LiftCells(VecEnv):
             if ends.any():
                 self.fresh |= ends
                 over |= ends
-                self._start = np.concatenate([self.state[:, :5], self.state[:, 23:28]], 1).astype(float)
+                self._start = np.concatenate([self.state[:, :5], self.state[:, 23:28]], 1).astype(
+                    float
+                )
         going = ~self.fresh
         rewards[going] += near[going] - self.near[going]
         # Time is dear.
@@ -203,7 +220,9 @@ def normalized(model: SAC, net: list[int]) -> None:
     inputs = model.observation_space.shape[0] + model.action_space.shape[0]
     for critic in (model.critic, model.critic_target):
         for k in range(critic.n_critics):
-            made = torch.nn.Sequential(*create_mlp(inputs, 1, net, torch.nn.ReLU, post_linear_modules=[torch.nn.LayerNorm]))
+            made = torch.nn.Sequential(
+                *create_mlp(inputs, 1, net, torch.nn.ReLU, post_linear_modules=[torch.nn.LayerNorm])
+            )
             setattr(critic, f"qf{k}", made)
             critic.q_networks[k] = made
     model.critic_target.load_state_dict(model.critic.state_dict())
@@ -212,7 +231,9 @@ def normalized(model: SAC, net: list[int]) -> None:
 
 def demonstrations(envs: LiftCells, episodes: int) -> tuple[ReplayBuffer, list[bool]]:
     """Episodes of the scripted controller as transitions, and which of them passed."""
-    kept = ReplayBuffer(200 * episodes, envs.observation_space, envs.action_space, handle_timeout_termination=True)
+    kept = ReplayBuffer(
+        200 * episodes, envs.observation_space, envs.action_space, handle_timeout_termination=True
+    )
     experts = [trocar.Policy("scripted") for _ in range(envs.num_envs)]
     envs.reset()
     for k, expert in enumerate(experts):
@@ -227,7 +248,14 @@ def demonstrations(envs: LiftCells, episodes: int) -> tuple[ReplayBuffer, list[b
             if over[k] and len(passed) < episodes:
                 passed.append(infos[k]["is_success"])
                 for seen, then, action, reward, end, info in rows[k]:
-                    kept.add(seen[None], then[None], action[None], np.array([reward]), np.array([end]), info)
+                    kept.add(
+                        seen[None],
+                        then[None],
+                        action[None],
+                        np.array([reward]),
+                        np.array([end]),
+                        info,
+                    )
             if over[k]:
                 rows[k] = []
     return kept, passed
@@ -262,7 +290,15 @@ class Log(BaseCallback):
         for info in self.locals["infos"]:
             if "episode" in info:
                 minutes = (time.perf_counter() - self.begun) / 60.0
-                self.rows.append((self.num_timesteps, minutes, info["episode"]["r"], info["stage"], info["is_success"]))
+                self.rows.append(
+                    (
+                        self.num_timesteps,
+                        minutes,
+                        info["episode"]["r"],
+                        info["stage"],
+                        info["is_success"],
+                    )
+                )
                 if len(self.rows) % PART == 0:
                     last = np.array(self.rows[-PART:], float)
                     print(
@@ -299,8 +335,12 @@ def draw(rows: np.ndarray, path: Path, script: float | None) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--decisions", type=int, default=3000, help="five a second of simulated time")
-    parser.add_argument("--demonstrations", type=int, default=10, help="scripted episodes in the replay buffer")
+    parser.add_argument(
+        "--decisions", type=int, default=3000, help="five a second of simulated time"
+    )
+    parser.add_argument(
+        "--demonstrations", type=int, default=10, help="scripted episodes in the replay buffer"
+    )
     parser.add_argument("--cells", type=int, default=4)
     parser.add_argument("--seconds", type=float, default=7.0, help="longest episode")
     parser.add_argument("--test", type=int, default=20, help="new episodes of the test at the end")
@@ -332,7 +372,10 @@ def main() -> None:
         kept, passed = demonstrations(envs, options.demonstrations)
         model.replay_buffer.demonstrations = kept
         script = float(kept.rewards[: kept.size()].sum() / options.demonstrations)
-        print(f"demonstrations: {sum(passed)} of {len(passed)} pass, return {script:.2f}, {kept.size()} decisions", flush=True)
+        print(
+            f"demonstrations: {sum(passed)} of {len(passed)} pass, return {script:.2f}, {kept.size()} decisions",
+            flush=True,
+        )
         kept.device = model.device
     log = Log()
     model.learn(options.decisions, callback=log)
@@ -342,7 +385,13 @@ def main() -> None:
         return
     options.output.parent.mkdir(parents=True, exist_ok=True)
     model.save(options.output.with_suffix(".zip"))
-    np.savetxt(options.output.with_suffix(".csv"), rows, delimiter=",", header="decisions,minutes,return,stage,passed", fmt="%.4g")
+    np.savetxt(
+        options.output.with_suffix(".csv"),
+        rows,
+        delimiter=",",
+        header="decisions,minutes,return,stage,passed",
+        fmt="%.4g",
+    )
     draw(rows, options.output, script)
     if options.test:
         passed = test(model, options.cells, options.seconds, options.test)

@@ -1,6 +1,6 @@
 """Episodes an hour of a campaign with one Ray worker and with more, and whether they give the same table.
 
-    python python/benchmarks/campaign.py --workers 1 2 --episodes 12
+python python/benchmarks/campaign.py --workers 1 2 --episodes 12
 """
 
 import argparse
@@ -12,7 +12,9 @@ from pathlib import Path
 from trocar import campaign
 
 
-def measured(scene: str, policy: str, episodes: int, workers: int, address: str | None, folder: Path) -> dict[str, object]:
+def measured(
+    scene: str, policy: str, episodes: int, workers: int, address: str | None, folder: Path
+) -> dict[str, object]:
     """A campaign from nothing. The rate is that after each worker's first episode: until then Ray starts and workers build their cells."""
     ends: list[float] = []
 
@@ -22,12 +24,25 @@ def measured(scene: str, policy: str, episodes: int, workers: int, address: str 
 
     begun = time.perf_counter()
     result = campaign.run(
-        scene, [policy], folder, episodes=episodes, workers=workers, ray_address=address, progress=tell
+        scene,
+        [policy],
+        folder,
+        episodes=episodes,
+        workers=workers,
+        ray_address=address,
+        progress=tell,
     )
     whole = time.perf_counter() - begun
     rate = 3600.0 * (episodes - workers) / (ends[-1] - ends[workers - 1])
     table = (folder / "table.csv").read_text()
-    return {"workers": workers, "wall_s": whole, "first_s": ends[0] - begun, "episodes_h": rate, "hash": result["hash"], "table": table}
+    return {
+        "workers": workers,
+        "wall_s": whole,
+        "first_s": ends[0] - begun,
+        "episodes_h": rate,
+        "hash": result["hash"],
+        "table": table,
+    }
 
 
 def main() -> None:
@@ -36,7 +51,12 @@ def main() -> None:
     parser.add_argument("--policy", default="scripted")
     parser.add_argument("--episodes", type=int, default=12)
     parser.add_argument("--workers", type=int, nargs="+", default=[1, 2])
-    parser.add_argument("--ray", default="local", metavar="ADDRESS", help="auto, local, host:port, or none for threads (default %(default)s)")
+    parser.add_argument(
+        "--ray",
+        default="local",
+        metavar="ADDRESS",
+        help="auto, local, host:port, or none for threads (default %(default)s)",
+    )
     parser.add_argument("--json", action="store_true")
     options = parser.parse_args()
     if options.episodes <= max(options.workers):
@@ -44,7 +64,15 @@ def main() -> None:
     address = None if options.ray == "none" else options.ray
     with tempfile.TemporaryDirectory() as folder:
         rows = [
-            measured(options.scene, options.policy, options.episodes, n, address, Path(folder) / f"workers-{n}") for n in options.workers
+            measured(
+                options.scene,
+                options.policy,
+                options.episodes,
+                n,
+                address,
+                Path(folder) / f"workers-{n}",
+            )
+            for n in options.workers
         ]
     same = len({(row["hash"], row.pop("table")) for row in rows}) == 1
     if options.json:
@@ -53,7 +81,9 @@ def main() -> None:
     print(f"{'workers':>8} {'episodes/h':>11} {'times':>6} {'wall s':>7} {'first after s':>14}")
     for row in rows:
         times = row["episodes_h"] / rows[0]["episodes_h"]
-        print(f"{row['workers']:>8} {row['episodes_h']:>11.0f} {times:>6.2f} {row['wall_s']:>7.1f} {row['first_s']:>14.1f}")
+        print(
+            f"{row['workers']:>8} {row['episodes_h']:>11.0f} {times:>6.2f} {row['wall_s']:>7.1f} {row['first_s']:>14.1f}"
+        )
     print("tables and states are the same" if same else "TABLES OR STATES DIFFER")
 
 

@@ -22,14 +22,22 @@ def one():
 @pytest.fixture(scope="session")
 def seeing():
     """One cell with state, colours and depth of two cameras."""
-    return gym.make("trocar/GraspLift-v0", obs="state+rgb+depth", image_size=(48, 64), render_mode="rgb_array", **SHORT)
+    return gym.make(
+        "trocar/GraspLift-v0",
+        obs="state+rgb+depth",
+        image_size=(48, 64),
+        render_mode="rgb_array",
+        **SHORT,
+    )
 
 
 @pytest.fixture(scope="session")
 def program():
     """The program `trocar`: `$TROCAR_PROGRAM`, or what cargo has built, or the one on the path."""
     built = Path(__file__).parents[2] / "target/release/trocar"
-    found = os.environ.get("TROCAR_PROGRAM") or (str(built) if built.exists() else shutil.which("trocar"))
+    found = os.environ.get("TROCAR_PROGRAM") or (
+        str(built) if built.exists() else shutil.which("trocar")
+    )
     if not found:
         pytest.skip("the program is not built (cargo build --release)")
     return found
@@ -38,7 +46,9 @@ def program():
 def changed_scene(folder, task, seconds):
     """The built-in scene as a file, with another task and another longest episode."""
     text = (Path(__file__).parents[2] / "crates/scene/scenes/cell-a.toml").read_text()
-    text = text.replace('name = "appendix-resection"', f'name = "{task}"').replace("episode_s = 40.0", f"episode_s = {seconds}")
+    text = text.replace('name = "appendix-resection"', f'name = "{task}"').replace(
+        "episode_s = 40.0", f"episode_s = {seconds}"
+    )
     assert task in text and f"episode_s = {seconds}" in text
     path = folder / f"{task}.toml"
     path.write_text(text)

@@ -40,13 +40,19 @@ def drawn(model, fine, views=12):
     scale = 1800 / (9 * BOARD.square)
     dice = np.random.default_rng(3)
     y, x = np.mgrid[0 : SIZE[1] * fine, 0 : SIZE[0] * fine]
-    pixels = np.stack([(x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5], -1).reshape(-1, 1, 2).astype(np.float64)
+    pixels = (
+        np.stack([(x + 0.5) / fine - 0.5, (y + 0.5) / fine - 0.5], -1)
+        .reshape(-1, 1, 2)
+        .astype(np.float64)
+    )
     rays = undistorted(pixels, LENSES[model], model)
     rays = np.concatenate([rays, np.ones((len(rays), 1))], 1)
     pictures = []
     for _ in range(views):
         turn = cv2.Rodrigues(dice.uniform([-0.5, -0.5, -0.3], [0.5, 0.5, 0.3]))[0]
-        centre = np.array([dice.uniform(-0.02, 0.02), dice.uniform(-0.015, 0.015), dice.uniform(0.09, 0.15)])
+        centre = np.array(
+            [dice.uniform(-0.02, 0.02), dice.uniform(-0.015, 0.015), dice.uniform(0.09, 0.15)]
+        )
         shift = centre - turn @ np.array([4.5, 3, 0]) * BOARD.square
         normal = turn[:, 2]
         hit = rays * ((normal @ shift) / (rays @ normal))[:, None]
@@ -70,7 +76,17 @@ def test_a_drawn_board_gives_the_lens_back(tmp_path):
         names.append(str(tmp_path / f"{k}.png"))
         cv2.imwrite(names[-1], picture)
     for name in ("camera.yaml", "camera.json"):
-        arguments = [*names, "--squares", "9x6", "--square-mm", "10", "--marker-mm", "7", "--dictionary", "DICT_4X4_100"]
+        arguments = [
+            *names,
+            "--squares",
+            "9x6",
+            "--square-mm",
+            "10",
+            "--marker-mm",
+            "7",
+            "--dictionary",
+            "DICT_4X4_100",
+        ]
         assert main([*arguments, "-o", str(tmp_path / name), "--json"]) == 0
         storage = cv2.FileStorage(str(tmp_path / name), cv2.FILE_STORAGE_READ)
         np.testing.assert_allclose(storage.getNode("camera_matrix").mat(), made.matrix, rtol=1e-5)
@@ -97,7 +113,18 @@ def test_what_opencv_cannot_do_is_an_error(tmp_path, capsys, monkeypatch):
     many = [str(tmp_path / f"{k}.png") for k in range(6)]
     for name, picture in zip(many, drawn("pinhole-5", 2)):
         cv2.imwrite(name, picture)
-    common = ["--squares", "9x6", "--dictionary", "DICT_4X4_100", "--square-mm", "10", "--marker-mm", "7", "-o", str(tmp_path / "c.yaml")]
+    common = [
+        "--squares",
+        "9x6",
+        "--dictionary",
+        "DICT_4X4_100",
+        "--square-mm",
+        "10",
+        "--marker-mm",
+        "7",
+        "-o",
+        str(tmp_path / "c.yaml"),
+    ]
     for more, words in [
         (["--squares", "1x1"], "1x1 make no board"),
         (["--squares", "9"], "'9' is not such as 11x8"),
@@ -127,7 +154,15 @@ def test_what_is_wrong_is_said(tmp_path, capsys):
         calibrate(blank, Board((9, 6), 7e-3, 10e-3))
     with pytest.raises(ValueError, match="knows no 'DICT'"):
         calibrate(blank, Board((9, 6), 10e-3, 7e-3, "DICT"))
-    arguments = [str(tmp_path / "none.png"), "--square-mm", "10", "--marker-mm", "7", "-o", str(tmp_path / "c.yaml")]
+    arguments = [
+        str(tmp_path / "none.png"),
+        "--square-mm",
+        "10",
+        "--marker-mm",
+        "7",
+        "-o",
+        str(tmp_path / "c.yaml"),
+    ]
     assert main(arguments) == 1
     assert "none.png is no picture" in capsys.readouterr().err
     assert not (tmp_path / "c.yaml").exists()

@@ -38,7 +38,9 @@ def local(short_scene, tmp_path_factory):
 
 def test_threads_keep_every_episode_and_go_on(short_scene, local):
     folder, result = local
-    assert result["episodes"] == result["planned"] == 4 and [p["episodes"] for p in result["policies"]] == [2, 2]
+    assert result["episodes"] == result["planned"] == 4 and [
+        p["episodes"] for p in result["policies"]
+    ] == [2, 2]
     assert (folder / "local/report.html").exists() and (folder / "local/table.csv").exists()
     # With everything there, nothing is run; with one episode gone, one is, to the same bits.
     gone = folder / "local/episodes/random/000001"
@@ -47,7 +49,12 @@ def test_threads_keep_every_episode_and_go_on(short_scene, local):
     gone.rmdir()
     done = []
     again = campaign.run(
-        str(short_scene), POLICIES, folder / "local", workers=1, progress=lambda *n: done.append(n), **OPTIONS
+        str(short_scene),
+        POLICIES,
+        folder / "local",
+        workers=1,
+        progress=lambda *n: done.append(n),
+        **OPTIONS,
     )
     assert done == [(0, 1), (1, 1)] and again["hash"] == result["hash"]
     with pytest.raises(ValueError, match="another seed"):
@@ -70,13 +77,20 @@ def test_ray_gives_the_same_bits_though_a_worker_is_lost(short_scene, local, mon
 
     monkeypatch.setattr(_ray, "Actor", Mortal)
     done = []
-    options = {"workers": 2, "ray_address": "local", "progress": lambda *n: done.append(n), **OPTIONS}
+    options = {
+        "workers": 2,
+        "ray_address": "local",
+        "progress": lambda *n: done.append(n),
+        **OPTIONS,
+    }
     far = campaign.run(str(short_scene), POLICIES, folder / "far", **options)
     assert mark.exists() and far["hash"] == result["hash"] and done[-1] == (4, 4)
     for kept in sorted((folder / "local/episodes").rglob("episode.trocar")):
         other = folder / "far" / kept.relative_to(folder / "local")
         assert kept.read_bytes() == other.read_bytes()
-        assert kept.with_name("result.json").read_text() == other.with_name("result.json").read_text()
+        assert (
+            kept.with_name("result.json").read_text() == other.with_name("result.json").read_text()
+        )
 
 
 BUSY_CLUSTER = """
@@ -109,7 +123,14 @@ def test_on_ray_no_episode_waits_for_a_worker_that_does_not_start(short_scene, t
 def test_on_ray_a_policy_that_cannot_be_loaded_is_one_line(short_scene, tmp_path):
     pytest.importorskip("ray", reason="Ray is not installed")
     with pytest.raises(RuntimeError, match="no file .*nowhere.py") as told:
-        campaign.run(str(short_scene), ["python:nowhere.py:act"], tmp_path / "out", episodes=1, ray_address="local", workers=1)
+        campaign.run(
+            str(short_scene),
+            ["python:nowhere.py:act"],
+            tmp_path / "out",
+            episodes=1,
+            ray_address="local",
+            workers=1,
+        )
     assert "\n" not in str(told.value)
 
 
@@ -135,12 +156,28 @@ def test_ctrl_c_ends_a_campaign_that_waits_for_a_policy(short_scene, tmp_path, h
     (tmp_path / "mine.py").write_text(WAITED_FOR)
     # With one that acts the first episode is another's, and is kept.
     named = ["random", "w=python:mine.py:wait"] if how == "acts" else ["w=python:mine.py:wait"]
-    words = [word for policy in named for word in ("--policy", policy)] + (["--ray", "local"] if how == "ray" else [])
-    command = [sys.executable, "-m", "trocar.campaign", str(short_scene), *words, "--episodes", "2", "--workers", "1", "-o", "out"]
+    words = [word for policy in named for word in ("--policy", policy)] + (
+        ["--ray", "local"] if how == "ray" else []
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "trocar.campaign",
+        str(short_scene),
+        *words,
+        "--episodes",
+        "2",
+        "--workers",
+        "1",
+        "-o",
+        "out",
+    ]
     environment = {name: value for name, value in os.environ.items() if name != "TROCAR_PYTHON"}
     if how == "loads":
         environment["LOADS_SLOWLY"] = "1"
-    started = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
+    started = subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True
+    )
     try:
         asked = tmp_path / "asked"
         begun = time.monotonic()
@@ -156,14 +193,19 @@ def test_ctrl_c_ends_a_campaign_that_waits_for_a_policy(short_scene, tmp_path, h
     assert started.returncode == 130, said
     assert said.strip().splitlines()[-1].startswith("interrupted;") and "Traceback" not in said
     assert ends(served, 10)
-    kept = [str(p.parent.relative_to(tmp_path / "out/episodes")) for p in (tmp_path / "out/episodes").rglob("result.json")]
+    kept = [
+        str(p.parent.relative_to(tmp_path / "out/episodes"))
+        for p in (tmp_path / "out/episodes").rglob("result.json")
+    ]
     assert kept == (["random/000000"] if how == "acts" else [])
     # There are table and page of what is kept.
     assert len((tmp_path / "out/table.csv").read_text().splitlines()) == 1 + len(kept)
     assert (tmp_path / "out/report.html").exists()
 
 
-def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(short_scene, tmp_path, monkeypatch):
+def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(
+    short_scene, tmp_path, monkeypatch
+):
     pytest.importorskip("msgpack")
     monkeypatch.delenv("TROCAR_PYTHON", raising=False)
     monkeypatch.setenv("PATH", "/nowhere")
@@ -172,15 +214,41 @@ def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(sh
         "def act(obs):\n    s = obs['observation/state']\n    return [*s[:5], *s[23:28]]\n"
     )
     before = dict(os.environ)
-    result = campaign.run(str(short_scene), [f"w=python:{tmp_path}/who.py:act"], tmp_path / "out", episodes=1)
-    assert result["policies"][0]["ends"][4] == 0 and (tmp_path / "who.txt").read_text() == sys.executable
+    result = campaign.run(
+        str(short_scene), [f"w=python:{tmp_path}/who.py:act"], tmp_path / "out", episodes=1
+    )
+    assert (
+        result["policies"][0]["ends"][4] == 0
+        and (tmp_path / "who.txt").read_text() == sys.executable
+    )
     assert dict(os.environ) == before
 
 
-@pytest.mark.parametrize("policy, said", [("python:nowhere.py:act", "nowhere.py"), ("python:nowhere:act", "nowhere"), ("python:os:act", "no act in os")])
-def test_a_policy_that_cannot_be_loaded_stops_the_campaign_before_its_first_episode(short_scene, tmp_path, policy, said, capfd):
+@pytest.mark.parametrize(
+    "policy, said",
+    [
+        ("python:nowhere.py:act", "nowhere.py"),
+        ("python:nowhere:act", "nowhere"),
+        ("python:os:act", "no act in os"),
+    ],
+)
+def test_a_policy_that_cannot_be_loaded_stops_the_campaign_before_its_first_episode(
+    short_scene, tmp_path, policy, said, capfd
+):
     pytest.importorskip("msgpack")
-    code = campaign.main([str(short_scene), "--policy", "random", "--policy", policy, "--workers", "1", "-o", str(tmp_path / "out")])
+    code = campaign.main(
+        [
+            str(short_scene),
+            "--policy",
+            "random",
+            "--policy",
+            policy,
+            "--workers",
+            "1",
+            "-o",
+            str(tmp_path / "out"),
+        ]
+    )
     last = capfd.readouterr().err.strip().splitlines()[-1]
     assert code == 1 and last.startswith(f"error: {policy}: cannot be loaded: ") and said in last
     assert not list((tmp_path / "out/episodes").rglob("result.json"))
@@ -261,7 +329,9 @@ def test_progress_is_one_line_with_the_time_left():
     now[0] += 61.0
     bar(1, 4)
     shown = out.getvalue().split("\r")
-    assert "\n" not in out.getvalue() and "1/4" in shown[-1] and "1:01, about 3:03 left" in shown[-1]
+    assert (
+        "\n" not in out.getvalue() and "1/4" in shown[-1] and "1:01, about 3:03 left" in shown[-1]
+    )
     # What comes next stands in a line of its own.
     bar.say("done")
     assert out.getvalue().endswith("\r\x1b[Kdone\n")
@@ -275,5 +345,10 @@ def test_a_log_gets_a_line_now_and_then():
         bar(done, 100)
         now[0] += EVERY_S / 10
     lines = out.getvalue().splitlines()
-    assert len(lines) == 11 and "\r" not in out.getvalue() and "0/100" in lines[0] and "100/100" in lines[-1]
+    assert (
+        len(lines) == 11
+        and "\r" not in out.getvalue()
+        and "0/100" in lines[0]
+        and "100/100" in lines[-1]
+    )
     assert "left" in lines[1]

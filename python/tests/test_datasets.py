@@ -19,7 +19,11 @@ from trocar.datasets import _layouts, _stats, _video, lerobot
 
 FEATURES = {
     "observation.state": {"dtype": "float32", "shape": (3,), "names": ["x", "y", "z"]},
-    "observation.images.endoscope": {"dtype": "video", "shape": (64, 96, 3), "names": ["height", "width", "channels"]},
+    "observation.images.endoscope": {
+        "dtype": "video",
+        "shape": (64, 96, 3),
+        "names": ["height", "width", "channels"],
+    },
     "action": {"dtype": "float32", "shape": (2,), "names": None},
 }
 LENGTHS = [7, 12, 5]
@@ -54,7 +58,11 @@ def test_numbers_and_pictures_come_back(tmp_path, version):
     root = tmp_path / "set"
     write(root, version)
     info = json.loads((root / "meta/info.json").read_text())
-    assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (3, sum(LENGTHS), 2)
+    assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (
+        3,
+        sum(LENGTHS),
+        2,
+    )
     table = pd.concat(pd.read_parquet(p) for p in sorted((root / "data").rglob("*.parquet")))
     assert table["index"].tolist() == list(range(sum(LENGTHS)))
     assert table["episode_index"].tolist() == [e for e, n in enumerate(LENGTHS) for _ in range(n)]
@@ -74,13 +82,21 @@ def test_a_dataset_is_gone_on_with_and_looks_as_if_written_at_once(tmp_path, ver
     write(tmp_path / "whole", version)
     write(tmp_path / "parts", version, [0])
     write(tmp_path / "parts", version, [1, 2])
-    whole = sorted(p.relative_to(tmp_path / "whole") for p in (tmp_path / "whole").rglob("*") if p.is_file())
-    assert whole == sorted(p.relative_to(tmp_path / "parts") for p in (tmp_path / "parts").rglob("*") if p.is_file())
+    whole = sorted(
+        p.relative_to(tmp_path / "whole") for p in (tmp_path / "whole").rglob("*") if p.is_file()
+    )
+    assert whole == sorted(
+        p.relative_to(tmp_path / "parts") for p in (tmp_path / "parts").rglob("*") if p.is_file()
+    )
     for name in whole:
         if name.suffix == ".parquet":
-            assert pq.read_table(tmp_path / "whole" / name).equals(pq.read_table(tmp_path / "parts" / name)), name
+            assert pq.read_table(tmp_path / "whole" / name).equals(
+                pq.read_table(tmp_path / "parts" / name)
+            ), name
         elif name.suffix != ".mp4":
-            assert (tmp_path / "whole" / name).read_text() == (tmp_path / "parts" / name).read_text(), name
+            assert (tmp_path / "whole" / name).read_text() == (
+                tmp_path / "parts" / name
+            ).read_text(), name
 
 
 class Killed(Exception):
@@ -99,7 +115,9 @@ def same(a, b):
 
 
 @pytest.mark.parametrize(("version", "mb"), [("v3.0", 0), ("v3.0", 16), ("v2.1", 16)])
-def test_killed_between_any_two_files_it_is_gone_on_with_as_if_never(tmp_path, monkeypatch, version, mb):
+def test_killed_between_any_two_files_it_is_gone_on_with_as_if_never(
+    tmp_path, monkeypatch, version, mb
+):
     # With 0 every file is full after an episode, so that the next one begins new files.
     monkeypatch.setattr(_layouts, "DATA_FILE_MB", mb)
     write(tmp_path / "whole", version)
@@ -265,7 +283,10 @@ def test_wrong_frames_are_named_and_not_kept(tmp_path):
 def test_merged_statistics_are_those_of_all_frames():
     dice = np.random.default_rng(1)
     a, b = dice.normal(size=(50, 4)), dice.normal(2.0, 3.0, size=(130, 4))
-    got, want = _stats.merged(_stats.of_numbers(a), _stats.of_numbers(b)), _stats.of_numbers(np.concatenate([a, b]))
+    got, want = (
+        _stats.merged(_stats.of_numbers(a), _stats.of_numbers(b)),
+        _stats.of_numbers(np.concatenate([a, b])),
+    )
     for name in ("min", "max", "mean", "std", "count"):
         np.testing.assert_allclose(got[name], want[name], rtol=1e-12)
 
@@ -275,7 +296,12 @@ def test_lerobot_reads_it(tmp_path):
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     write(tmp_path / "set", "v3.0")
-    dataset = LeRobotDataset("trocar/test", root=tmp_path / "set", video_backend="pyav", delta_timestamps={"action": [0, 1 / 30]})
+    dataset = LeRobotDataset(
+        "trocar/test",
+        root=tmp_path / "set",
+        video_backend="pyav",
+        delta_timestamps={"action": [0, 1 / 30]},
+    )
     assert (dataset.num_episodes, dataset.num_frames, dataset.fps) == (3, sum(LENGTHS), 30)
     first = 0
     for episode, length in enumerate(LENGTHS):
@@ -291,17 +317,24 @@ def test_lerobot_reads_it(tmp_path):
 
 
 #: Types of numbers that a feature may have.
-NUMBERS = [*("bool float16 float32 float64".split()), *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))]
+NUMBERS = [
+    *("bool float16 float32 float64".split()),
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+]
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
 def test_each_type_of_numbers_is_written(tmp_path, version):
-    features = {dtype: {"dtype": dtype, "shape": (n,)} for dtype in NUMBERS for n in [1 + len(dtype) % 2]}
+    features = {
+        dtype: {"dtype": dtype, "shape": (n,)} for dtype in NUMBERS for n in [1 + len(dtype) % 2]
+    }
     writer = LeRobotWriter(tmp_path / "set", fps=30, features=features, version=version)
     for k in range(3):
         writer.add_frame({key: np.full(f["shape"], k % 2, key) for key, f in features.items()})
     writer.save_episode("count")
-    table = pd.concat(pd.read_parquet(p) for p in sorted((tmp_path / "set/data").rglob("*.parquet")))
+    table = pd.concat(
+        pd.read_parquet(p) for p in sorted((tmp_path / "set/data").rglob("*.parquet"))
+    )
     for key in NUMBERS:
         assert [np.ravel(value)[0] for value in table[key]] == [0, 1, 0], key
 
@@ -335,5 +368,7 @@ def test_without_fcntl_datasets_are_written(tmp_path):
         "writer.add_frame({'action': 1.0})",
         "assert writer.save_episode('wait') == 0",
     ]
-    done = subprocess.run([sys.executable, "-c", "\n".join(lines), tmp_path / "set"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(lines), tmp_path / "set"], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr

@@ -99,7 +99,9 @@ def test_two_processes_give_the_same_numbers(one):
         "for _ in range(8): env.step(dice.uniform(low, high))\n"
         "print(env.state_hash)"
     )
-    printed = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ)
+    printed = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ
+    )
     one.reset(seed=3)
     dice = np.random.default_rng(1)
     for _ in range(8):
@@ -151,7 +153,13 @@ def test_order_is_kept_without_wrappers():
     saved = env.save_state()
     env.close()
     env.close()
-    for too_late in (env.reset, lambda: env.step(env.action_space.low), env.render, env.save_state, lambda: env.restore_state(saved)):
+    for too_late in (
+        env.reset,
+        lambda: env.step(env.action_space.low),
+        env.render,
+        env.save_state,
+        lambda: env.restore_state(saved),
+    ):
         with pytest.raises(ClosedEnvironmentError, match="closed"):
             too_late()
     assert env.cells._native is None, "the cell is freed"
@@ -159,7 +167,10 @@ def test_order_is_kept_without_wrappers():
 
 
 def test_seeds_are_told_by_name(one):
-    assert one.reset(seed=np.int64(3))[1]["seed"] == 3 and one.reset(seed=2**63 - 1)[1]["seed"] == 2**63 - 1
+    assert (
+        one.reset(seed=np.int64(3))[1]["seed"] == 3
+        and one.reset(seed=2**63 - 1)[1]["seed"] == 2**63 - 1
+    )
     for seed in (-1, 2**63, 2**64, 1.5):
         with pytest.raises(ValueError, match="seed: is "):
             one.reset(seed=seed)
@@ -168,7 +179,9 @@ def test_seeds_are_told_by_name(one):
 def test_the_state_alone_may_be_in_a_dict():
     env = trocar.TrocarEnv(task="grasp-lift", obs="agent_pos", **SHORT)
     check_env(env, skip_render_check=True, skip_close_check=True)
-    assert set(env.observation_space) == {"agent_pos"} and set(env.reset(seed=1)[0]) == {"agent_pos"}
+    assert set(env.observation_space) == {"agent_pos"} and set(env.reset(seed=1)[0]) == {
+        "agent_pos"
+    }
 
 
 def test_the_rate_is_the_scenes(one, tmp_path):
@@ -205,8 +218,16 @@ def test_a_forked_child_is_refused_and_makes_its_own(one):
         # Nothing of the tests' own is to run in the child, whatever happens.
         try:
             signal.alarm(60)
-            refused = [refuses(use) for use in (lambda: one.reset(seed=1), lambda: one.step(one.action_space.low), one.save_state,
-                                                lambda: one.restore_state(saved), lambda: one.cells.render(0))]
+            refused = [
+                refuses(use)
+                for use in (
+                    lambda: one.reset(seed=1),
+                    lambda: one.step(one.action_space.low),
+                    one.save_state,
+                    lambda: one.restore_state(saved),
+                    lambda: one.cells.render(0),
+                )
+            ]
             own = trocar.TrocarEnv(task="grasp-lift", **SHORT)
             own.reset(seed=1)
             own.step(own.action_space.low)

@@ -25,17 +25,33 @@ class Anything(types.ModuleType):
 @pytest.fixture
 def learning(monkeypatch):
     """The learning example, whether Stable-Baselines3 is there or not."""
-    names = ["common", "common.buffers", "common.callbacks", "common.torch_layers", "common.vec_env"]
-    for name in ["torch", "matplotlib", "matplotlib.pyplot", "stable_baselines3", *(f"stable_baselines3.{n}" for n in names)]:
+    names = [
+        "common",
+        "common.buffers",
+        "common.callbacks",
+        "common.torch_layers",
+        "common.vec_env",
+    ]
+    for name in [
+        "torch",
+        "matplotlib",
+        "matplotlib.pyplot",
+        "stable_baselines3",
+        *(f"stable_baselines3.{n}" for n in names),
+    ]:
         monkeypatch.setitem(sys.modules, name, Anything(name))
-    spec = importlib.util.spec_from_file_location("train_grasp_lift", ROOT / "examples/python/train_grasp_lift.py")
+    spec = importlib.util.spec_from_file_location(
+        "train_grasp_lift", ROOT / "examples/python/train_grasp_lift.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
 @pytest.mark.parametrize("episodes", [4, 9, 10])
-def test_the_test_of_what_was_learned_takes_as_many_episodes_of_every_cell(learning, monkeypatch, episodes):
+def test_the_test_of_what_was_learned_takes_as_many_episodes_of_every_cell(
+    learning, monkeypatch, episodes
+):
     class Cells:
         """Cell 0 always passes, after a step; cells 1 and 2 never do, after ten."""
 
@@ -64,7 +80,11 @@ def test_the_policy_of_the_document_stays_where_it_is(short_scene, tmp_path):
     pytest.importorskip("websockets")
     text = (ROOT / "docs/policies.md").read_text()
     (code,) = [block.partition("```")[0] for block in text.split("```python\n")[1:]]
-    kept = [line for line in code.splitlines() if "openpi_server" not in line and not line.startswith("WebsocketPolicyServer")]
+    kept = [
+        line
+        for line in code.splitlines()
+        if "openpi_server" not in line and not line.startswith("WebsocketPolicyServer")
+    ]
     (tmp_path / "still.py").write_text("\n".join(kept))
     policy = f"still=python:{tmp_path / 'still.py'}:Still"
     result = campaign.run(str(short_scene), [policy], tmp_path / "out", episodes=1)

@@ -57,7 +57,9 @@ class Expert(torch.nn.Module):
             self.experts = [trocar.Policy("scripted") for _ in self.envs]
             for expert, env in zip(self.experts, self.envs):
                 expert.reset(env)
-        return torch.from_numpy(np.stack([expert(env) for expert, env in zip(self.experts, self.envs)]))
+        return torch.from_numpy(
+            np.stack([expert(env) for expert, env in zip(self.experts, self.envs)])
+        )
 
 
 def evaluated(env, policy, seeds):
@@ -76,8 +78,15 @@ def test_the_factory_makes_environments_that_tell_their_task(example):
     envs = make_env(config, n_envs=2)
     env, policy = envs["trocar"][0], Still()
     given = evaluated(env, policy, [1, 2])
-    assert given["action"].shape == (2, 3, 10) and given["done"][:, -1].all() and not given["success"].any()
-    assert policy.shown["task"] == [env.envs[0].task_description] * 2 and "appendix" in policy.shown["task"][0]
+    assert (
+        given["action"].shape == (2, 3, 10)
+        and given["done"][:, -1].all()
+        and not given["success"].any()
+    )
+    assert (
+        policy.shown["task"] == [env.envs[0].task_description] * 2
+        and "appendix" in policy.shown["task"][0]
+    )
     assert policy.shown["observation.images.d405"].shape == (2, 3, 32, 32)
     assert env.envs[0].render().shape == (32, 32, 3) and env.unwrapped.metadata["render_fps"] == 30
     wanted = {name: feature.shape for name, feature in config.features.items()}
@@ -88,8 +97,12 @@ def test_the_factory_makes_environments_that_tell_their_task(example):
 
 def test_success_is_read_from_one_cell_and_from_many(example):
     alone = make_env(example.TrocarConfig(cameras=[], episode_s=20.0), n_envs=1)["trocar"][0]
-    many = trocar.TrocarVectorEnv(2, task="grasp-lift", obs="agent_pos", episode_s=20.0, autoreset_mode="same-step")
+    many = trocar.TrocarVectorEnv(
+        2, task="grasp-lift", obs="agent_pos", episode_s=20.0, autoreset_mode="same-step"
+    )
     for env, seeds in [(alone, [0]), (many, [0, 1])]:
         given = evaluated(env, Expert(env.envs), seeds)
-        assert given["success"].any(dim=1).all(), "the scripted controller passes, and LeRobot sees it"
+        assert given["success"].any(dim=1).all(), (
+            "the scripted controller passes, and LeRobot sees it"
+        )
         env.close()

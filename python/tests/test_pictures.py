@@ -11,15 +11,25 @@ from conftest import SHORT
 def test_gymnasium_finds_nothing_wrong_with_pictures(seeing):
     check_env(seeing.unwrapped, skip_render_check=True, skip_close_check=True)
     space = seeing.observation_space
-    assert set(space) == {"agent_pos", "pixels", "depth"} and set(space["pixels"]) == {"endoscope", "d405"}
-    assert space["pixels"]["d405"].shape == (48, 64, 3) and space["pixels"]["d405"].dtype == np.uint8
-    assert space["depth"]["endoscope"].shape == (48, 64, 1) and space["depth"]["endoscope"].dtype == np.float32
+    assert set(space) == {"agent_pos", "pixels", "depth"} and set(space["pixels"]) == {
+        "endoscope",
+        "d405",
+    }
+    assert (
+        space["pixels"]["d405"].shape == (48, 64, 3) and space["pixels"]["d405"].dtype == np.uint8
+    )
+    assert (
+        space["depth"]["endoscope"].shape == (48, 64, 1)
+        and space["depth"]["endoscope"].dtype == np.float32
+    )
 
 
 def test_gymnasium_finds_nothing_wrong_with_colours_alone():
     env = trocar.TrocarEnv(task="grasp-lift", obs="rgb", image_size=(16, 24), **SHORT)
     check_env(env, skip_render_check=True, skip_close_check=True)
-    assert set(env.observation_space) == {"pixels"} and env.observation_space["pixels"]["d405"].shape == (16, 24, 3)
+    assert set(env.observation_space) == {"pixels"} and env.observation_space["pixels"][
+        "d405"
+    ].shape == (16, 24, 3)
     seen, _ = env.reset(seed=1)
     assert set(seen) == {"pixels"} and env.observation_space.contains(seen)
 
@@ -40,7 +50,9 @@ def test_pictures_show_the_cell(seeing):
     assert np.array_equal(kept, seen["pixels"]["endoscope"]), "what was seen stays as it was"
     assert (after["pixels"]["endoscope"] != kept).any(), "the instruments have moved"
     again, _ = seeing.reset(seed=1)
-    assert np.array_equal(again["pixels"]["endoscope"], kept) and np.array_equal(again["depth"]["d405"], depth)
+    assert np.array_equal(again["pixels"]["endoscope"], kept) and np.array_equal(
+        again["depth"]["d405"], depth
+    )
 
 
 def test_many_cells_see_what_one_sees_and_noise_is_the_seeds(seeing):
@@ -56,12 +68,21 @@ def test_many_cells_see_what_one_sees_and_noise_is_the_seeds(seeing):
         alone, *_ = seeing.step(actions[k])
         assert np.array_equal(now["pixels"]["d405"][k], alone["pixels"]["d405"])
         assert np.array_equal(now["depth"]["d405"][k], alone["depth"]["d405"])
-    noisy = trocar.TrocarEnv(task="grasp-lift", obs="rgb+depth", cameras="d405", image_size=(48, 64), sensor_noise=True, **SHORT)
+    noisy = trocar.TrocarEnv(
+        task="grasp-lift",
+        obs="rgb+depth",
+        cameras="d405",
+        image_size=(48, 64),
+        sensor_noise=True,
+        **SHORT,
+    )
     first, _ = noisy.reset(seed=4)
     again, _ = noisy.reset(seed=4)
     clean, _ = seeing.reset(seed=4)
     other = noisy.cells.native.picture(0, "d405", 48, 64)
-    assert np.array_equal(first["pixels"]["d405"], again["pixels"]["d405"]) and np.array_equal(other, first["pixels"]["d405"])
+    assert np.array_equal(first["pixels"]["d405"], again["pixels"]["d405"]) and np.array_equal(
+        other, first["pixels"]["d405"]
+    )
     assert not np.array_equal(first["pixels"]["d405"], clean["pixels"]["d405"])
     spread = np.abs(first["depth"]["d405"] - clean["depth"]["d405"])[first["depth"]["d405"] > 0]
     assert 0 < np.median(spread) < 5e-3

@@ -8,7 +8,13 @@ pytest.importorskip("pyarrow")
 pytest.importorskip("av")
 h5py = pytest.importorskip("h5py")
 
-from trocar.datasets import LeRobotWriter, Recorder, RobomimicWriter, features_of, robomimic_observations
+from trocar.datasets import (
+    LeRobotWriter,
+    Recorder,
+    RobomimicWriter,
+    features_of,
+    robomimic_observations,
+)
 
 
 class Still(gym.Env):
@@ -34,7 +40,10 @@ def test_a_recorder_wants_the_rate_of_its_environment(tmp_path):
     def writer(fps):
         return LeRobotWriter(tmp_path / f"set-{fps}", fps=fps, features=features_of(env))
 
-    with pytest.raises(ValueError, match="the writer has 30, the environment does 60 steps a second; make the writer with fps=60"):
+    with pytest.raises(
+        ValueError,
+        match="the writer has 30, the environment does 60 steps a second; make the writer with fps=60",
+    ):
         Recorder(env, writer(30))
     # What an environment says of itself counts, not its class.
     env.metadata = Still.metadata | {"render_fps": 30}
@@ -56,7 +65,12 @@ def test_a_recorder_wants_the_rate_of_its_environment(tmp_path):
 
 def test_a_recorder_feeds_a_robomimic_file(tmp_path):
     env = Still()
-    with RobomimicWriter(tmp_path / "set.hdf5", observations=robomimic_observations(env), actions=2, env_name="Still-v0") as writer:
+    with RobomimicWriter(
+        tmp_path / "set.hdf5",
+        observations=robomimic_observations(env),
+        actions=2,
+        env_name="Still-v0",
+    ) as writer:
         recorder = Recorder(env, writer)
         for seed in range(2):
             recorder.reset(seed=seed)
@@ -64,5 +78,7 @@ def test_a_recorder_feeds_a_robomimic_file(tmp_path):
                 recorder.step(np.ones(2))
     with h5py.File(tmp_path / "set.hdf5") as file:
         demo = file["data/demo_1"]
-        assert demo["obs/state"][:].tolist() == [[0], [1]] and demo["next_obs/state"][:].tolist() == [[1], [2]]
+        assert demo["obs/state"][:].tolist() == [[0], [1]] and demo["next_obs/state"][
+            :
+        ].tolist() == [[1], [2]]
         assert demo["rewards"][:].tolist() == [0.5, 0.5] and demo.attrs["success"]

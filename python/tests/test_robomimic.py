@@ -16,7 +16,10 @@ pytest.importorskip("av")
 from trocar.datasets import RobomimicWriter, robomimic_environment
 from trocar.datasets import _spare, robomimic
 
-OBSERVATIONS = {"state": {"dtype": "float32", "shape": (3,)}, "endoscope_image": {"dtype": "image", "shape": (16, 24, 3)}}
+OBSERVATIONS = {
+    "state": {"dtype": "float32", "shape": (3,)},
+    "endoscope_image": {"dtype": "image", "shape": (16, 24, 3)},
+}
 LENGTHS = [7, 12, 5]
 NAME = "trocar/GraspLift-v0"
 
@@ -26,7 +29,12 @@ def picture(episode, frame):
 
 
 def opened(path, **changed):
-    options = {"observations": OBSERVATIONS, "actions": 2, "env_name": NAME, "env_kwargs": {"obs": "state+rgb", "image_size": (16, 24)}}
+    options = {
+        "observations": OBSERVATIONS,
+        "actions": 2,
+        "env_name": NAME,
+        "env_kwargs": {"obs": "state+rgb", "image_size": (16, 24)},
+    }
     return RobomimicWriter(path, **options | changed)
 
 
@@ -51,12 +59,20 @@ def check(path, episodes):
         data = file["data"]
         assert sorted(data) == [f"demo_{k}" for k in range(episodes)]
         assert data.attrs["total"] == sum(LENGTHS[:episodes])
-        assert [name.decode() for name in file["mask/train"][:]] == sorted(data) if episodes else "mask" not in file
+        assert (
+            [name.decode() for name in file["mask/train"][:]] == sorted(data)
+            if episodes
+            else "mask" not in file
+        )
         for k in range(episodes):
             demo = data[f"demo_{k}"]
             assert demo.attrs["num_samples"] == LENGTHS[k] and demo.attrs["success"] == (k == 1)
             assert demo["dones"][:].tolist() == [0] * (LENGTHS[k] - 1) + [1]
-            assert demo["rewards"][:].tolist() == demo["actions"][:, 0].tolist() == list(range(LENGTHS[k]))
+            assert (
+                demo["rewards"][:].tolist()
+                == demo["actions"][:, 0].tolist()
+                == list(range(LENGTHS[k]))
+            )
             assert demo["obs/state"][:, 0].tolist() == list(range(LENGTHS[k]))
             assert demo["next_obs/state"][:, 0].tolist() == [*range(1, LENGTHS[k]), 99]
             seen = [picture(k, n) for n in [*range(LENGTHS[k]), 99]]
@@ -74,7 +90,11 @@ def test_what_robomimic_reads(tmp_path):
         assert os.listdir(path.parent) == ["set.hdf5"]
     with h5py.File(path) as file:
         # robomimic's EnvType.GYM_TYPE is 2; 1 is robosuite.
-        known = {"env_name": NAME, "type": 2, "env_kwargs": {"obs": "state+rgb", "image_size": [16, 24]}}
+        known = {
+            "env_name": NAME,
+            "type": 2,
+            "env_kwargs": {"obs": "state+rgb", "image_size": [16, 24]},
+        }
         assert json.loads(file["data"].attrs["env_args"]) == known
 
 
@@ -164,7 +184,9 @@ def die_at(kill, monkeypatch):
             return getattr(self.file, name)
 
     def through(path, mode):
-        return real(path, "r") if mode == "r" else real(Disk(path, mode), "w" if mode == "w" else "r+")
+        return (
+            real(path, "r") if mode == "r" else real(Disk(path, mode), "w" if mode == "w" else "r+")
+        )
 
     real = h5py.File
     monkeypatch.setattr(h5py, "File", through)
@@ -175,7 +197,9 @@ def die_at(kill, monkeypatch):
 
 def test_an_episode_costs_its_own_writing_whatever_was_before(tmp_path, monkeypatch):
     copied, copy = [], _spare.shutil.copy
-    monkeypatch.setattr(_spare.shutil, "copy", lambda a, b: (copied.append(os.path.getsize(a)), copy(a, b)))
+    monkeypatch.setattr(
+        _spare.shutil, "copy", lambda a, b: (copied.append(os.path.getsize(a)), copy(a, b))
+    )
     path = tmp_path / "set.hdf5"
     with opened(path) as writer:
         for _ in range(12):
@@ -193,12 +217,17 @@ def test_readers_keep_what_they_opened(tmp_path):
     writer = opened(path)
     save(writer, 0)
     read = "import h5py,sys; f = h5py.File(sys.argv[1], 'r'); print(1, flush=True); input(); print(len(f['data']), f['data/demo_0/obs/endoscope_image'][-1].sum())"
-    reader = subprocess.Popen([sys.executable, "-c", read, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    reader = subprocess.Popen(
+        [sys.executable, "-c", read, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     assert reader.stdout.readline() == "1\n"
     with h5py.File(path, "r"):
         save(writer, 1)
         save(writer, 2)
-    assert reader.communicate("\n")[0].split() == ["1", str(picture(0, LENGTHS[0] - 1).sum(dtype=int))]
+    assert reader.communicate("\n")[0].split() == [
+        "1",
+        str(picture(0, LENGTHS[0] - 1).sum(dtype=int)),
+    ]
     check(path, 3)
 
 
@@ -241,7 +270,9 @@ def test_what_cannot_be_written_is_written_again(tmp_path, monkeypatch):
     check(path, 1)
     assert writer.save_episode(last(1), success=True) == 1
     # Without second names (some network and memory-card file systems) it is slower, and right.
-    monkeypatch.setattr(os, "link", lambda a, b: (_ for _ in ()).throw(PermissionError("no links here")))
+    monkeypatch.setattr(
+        os, "link", lambda a, b: (_ for _ in ()).throw(PermissionError("no links here"))
+    )
     assert save(writer, 2) == 2
     check(path, 3)
 
@@ -286,6 +317,9 @@ def test_only_what_fits_is_gone_on_with(tmp_path):
 
 def test_the_environment_is_that_of_its_spec():
     env = gym.make("CartPole-v1", sutton_barto_reward=True)
-    assert robomimic_environment(env) == {"env_name": "CartPole-v1", "env_kwargs": {"sutton_barto_reward": True}}
+    assert robomimic_environment(env) == {
+        "env_name": "CartPole-v1",
+        "env_kwargs": {"sutton_barto_reward": True},
+    }
     with pytest.raises(ValueError, match="no spec"):
         robomimic_environment(gym.Env())

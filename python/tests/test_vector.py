@@ -22,7 +22,9 @@ def two():
 
 
 def test_many_cells_give_what_one_gives(one):
-    envs = gym.make_vec("trocar/GraspLift-v0", num_envs=3, vectorization_mode="vector_entry_point", **SHORT)
+    envs = gym.make_vec(
+        "trocar/GraspLift-v0", num_envs=3, vectorization_mode="vector_entry_point", **SHORT
+    )
     assert envs.metadata["autoreset_mode"] == AutoresetMode.NEXT_STEP
     actions = [actions_of(one, seed, 12) for seed in (10, 11, 12)]
     alone = [rollout(one, seed, actions[k]) for k, seed in enumerate((10, 11, 12))]
@@ -34,7 +36,11 @@ def test_many_cells_give_what_one_gives(one):
     assert late.all() and not ended.any() and infos["end"].tolist() == ["time-out"] * 3
     # The next step begins new episodes and gives no reward.
     seen, rewards, ended, late, _ = envs.step(np.stack([a[0] for a in actions]))
-    assert not late.any() and not rewards.any() and not np.array_equal(seen, np.stack([a[0][0] for a in alone]))
+    assert (
+        not late.any()
+        and not rewards.any()
+        and not np.array_equal(seen, np.stack([a[0][0] for a in alone]))
+    )
     assert list(envs.call("task")) == ["grasp-lift"] * 3 and len(envs.envs) == 3
 
 
@@ -45,7 +51,11 @@ def test_the_other_ways_to_begin_anew(one):
     same.reset(seed=4)
     for _ in range(3):
         seen, _, _, late, infos = same.step(actions)
-    assert late.all() and infos["final_info"]["end"].tolist() == ["time-out"] * 2 and "end" not in infos
+    assert (
+        late.all()
+        and infos["final_info"]["end"].tolist() == ["time-out"] * 2
+        and "end" not in infos
+    )
     assert not np.array_equal(infos["final_obs"][0], seen[0])
     same.step(actions)
     disabled = trocar.TrocarVectorEnv(**options, autoreset_mode="disabled", copy=False)
@@ -60,8 +70,14 @@ def test_the_other_ways_to_begin_anew(one):
 
 
 def test_gymnasiums_own_words_for_beginning_anew():
-    for given, mode in [("SameStep", AutoresetMode.SAME_STEP), ("next-step", AutoresetMode.NEXT_STEP)]:
-        assert trocar.TrocarVectorEnv(1, **BRIEF, autoreset_mode=given).metadata["autoreset_mode"] == mode
+    for given, mode in [
+        ("SameStep", AutoresetMode.SAME_STEP),
+        ("next-step", AutoresetMode.NEXT_STEP),
+    ]:
+        assert (
+            trocar.TrocarVectorEnv(1, **BRIEF, autoreset_mode=given).metadata["autoreset_mode"]
+            == mode
+        )
     with pytest.raises(ValueError, match="autoreset_mode: 'never'"):
         trocar.TrocarVectorEnv(1, **BRIEF, autoreset_mode="never")
     for count in (0, -1, 2.0, 5000):
@@ -92,7 +108,9 @@ def test_a_restored_cell_goes_on_as_it_did_past_its_end(two):
         rows = []
         for _ in range(6):
             seen, rewards, _, late, infos = two.step(actions)
-            rows.append((seen[0].tobytes(), rewards[0], late[0], infos["seed"][0], two.envs[0].state_hash))
+            rows.append(
+                (seen[0].tobytes(), rewards[0], late[0], infos["seed"][0], two.envs[0].state_hash)
+            )
         return rows
 
     two.reset(seed=1)
@@ -102,7 +120,9 @@ def test_a_restored_cell_goes_on_as_it_did_past_its_end(two):
     seen, *_ = two.step(actions)
     first = follow()
     assert len({row[3] for row in first}) == 2, "an episode has ended in between"
-    assert np.array_equal(two.restore_state(0, saved), seen[0]) and not np.array_equal(shown[0], seen[0])
+    assert np.array_equal(two.restore_state(0, saved), seen[0]) and not np.array_equal(
+        shown[0], seen[0]
+    )
     assert follow() == first
     # From one that is over, the next step begins anew.
     two.reset(seed=1)
@@ -118,7 +138,9 @@ def test_a_restored_cell_goes_on_as_it_did_past_its_end(two):
 def test_a_state_moves_between_one_and_many(two, one):
     two.reset(seed=[4, 5])
     two.step(np.stack([two.single_action_space.low] * 2))
-    assert np.array_equal(one.restore_state(two.save_state(1)), two.restore_state(0, two.save_state(1)))
+    assert np.array_equal(
+        one.restore_state(two.save_state(1)), two.restore_state(0, two.save_state(1))
+    )
     assert one.step(one.action_space.low)[4]["seed"] == 5
     with pytest.raises(TypeError, match="state: "):
         two.restore_state(0, (None, True))
@@ -130,9 +152,14 @@ def test_a_state_moves_between_one_and_many(two, one):
 def test_a_cell_of_many_is_asked_like_one(two):
     two.reset(seed=[4, 5])
     pictures = two.call("render")
-    assert [p.shape for p in pictures] == [(32, 48, 3)] * 2 and np.array_equal(pictures[1], two.envs[1].render())
+    assert [p.shape for p in pictures] == [(32, 48, 3)] * 2 and np.array_equal(
+        pictures[1], two.envs[1].render()
+    )
     assert two.get_attr("state_names") == (two.state_names,) * 2
-    assert two.call("_max_episode_steps") == (3, 3) and two.envs[0].task_description == two.task_description
+    assert (
+        two.call("_max_episode_steps") == (3, 3)
+        and two.envs[0].task_description == two.task_description
+    )
     assert two.get_attr("privileged_channels")[0].keys() == set(two.channel_names)
     two.set_attr("label", ["a", "b"])
     two.set_attr("mark", 3)
@@ -162,7 +189,9 @@ def test_order_is_kept_by_many_cells():
         with pytest.raises(ResetNeeded):
             too_early()
     _, info = envs.reset(seed=1, options={"reset_mask": np.array([True, False])})
-    assert not info["is_success"].any() and not envs.cells.terminated.any(), "nor has one ended that has not begun"
+    assert not info["is_success"].any() and not envs.cells.terminated.any(), (
+        "nor has one ended that has not begun"
+    )
     with pytest.raises(ResetNeeded, match=r"\[1\]"):
         envs.step(actions)
     envs.reset(seed=1, options={"reset_mask": np.array([False, True])})
@@ -172,7 +201,9 @@ def test_order_is_kept_by_many_cells():
     for too_late in (lambda: envs.step(actions), envs.reset, envs.render):
         with pytest.raises(ClosedEnvironmentError):
             too_late()
-    assert envs.closed and envs.cells._native is None and envs.get_attr("task") == ("grasp-lift",) * 2
+    assert (
+        envs.closed and envs.cells._native is None and envs.get_attr("task") == ("grasp-lift",) * 2
+    )
 
 
 def test_cells_are_freed_with_their_environment():

@@ -35,7 +35,9 @@ class Bar:
         spent = self._now() - self._begun
         if self._out.isatty():
             # A line that wraps cannot be taken back.
-            self._write(CLEAR + _line(done, total, spent)[: shutil.get_terminal_size().columns - 1], "")
+            self._write(
+                CLEAR + _line(done, total, spent)[: shutil.get_terminal_size().columns - 1], ""
+            )
             self._open = True
         elif done in (0, total) or self._told is None or self._now() - self._told >= EVERY_S:
             self._write(_line(done, total, spent), "\n")

@@ -54,11 +54,15 @@ def run_on_ray(
     try:
         import ray
     except ImportError as why:
-        raise ModuleNotFoundError("ray is not installed; pip install '.[ray]', or leave --ray out") from why
+        raise ModuleNotFoundError(
+            "ray is not installed; pip install '.[ray]', or leave --ray out"
+        ) from why
     begun = not ray.is_initialized()
     try:
         if begun:
-            options: dict[str, Any] = {} if address != "local" else {"num_cpus": workers or os.cpu_count()}
+            options: dict[str, Any] = (
+                {} if address != "local" else {"num_cpus": workers or os.cpu_count()}
+            )
             dashboard = False if address == "local" else None
             ray.init(address=address, log_to_driver=False, include_dashboard=dashboard, **options)
         crew = _Crew(ray, campaign, scene, jobs, workers)
@@ -86,8 +90,16 @@ def run_on_ray(
 class _Crew:
     """Actors. One gets a job once it is ready, so that none waits for an actor that the cluster has no room for."""
 
-    def __init__(self, ray: Any, campaign: Campaign, scene: str, jobs: list[str], workers: int | None):
-        self.ray, self.campaign, self.scene, self.plan, self.jobs = ray, campaign, scene, campaign.plan, jobs
+    def __init__(
+        self, ray: Any, campaign: Campaign, scene: str, jobs: list[str], workers: int | None
+    ):
+        self.ray, self.campaign, self.scene, self.plan, self.jobs = (
+            ray,
+            campaign,
+            scene,
+            campaign.plan,
+            jobs,
+        )
         self.actor = ray.remote(num_cpus=1, max_restarts=0)(Actor)
         room = int(ray.cluster_resources().get("CPU", 1))
         self.count = max(1, min(workers or room, room, len(jobs)))
@@ -114,7 +126,9 @@ class _Crew:
         ready, _ = self.ray.wait(list(self.under_way), num_returns=1, timeout=PATIENCE_S)
         if not ready and self._alone:
             self._alone = False
-            logging.getLogger("trocar").warning("waiting for a CPU of the cluster: no worker has begun yet")
+            logging.getLogger("trocar").warning(
+                "waiting for a CPU of the cluster: no worker has begun yet"
+            )
         return ready
 
     def take(self, reference: Any) -> bool:

@@ -17,7 +17,11 @@ GLANCE_S = 0.5
 
 
 def run_on_threads(
-    campaign: Campaign, scene: str, jobs: list[str], workers: int | None, progress: Callable[[int, int], None]
+    campaign: Campaign,
+    scene: str,
+    jobs: list[str],
+    workers: int | None,
+    progress: Callable[[int, int], None],
 ) -> None:
     """Runs `jobs`. However it ends, what was finished is kept, and no thread is left at work.
 
@@ -59,7 +63,13 @@ class _Crew:
     def _build(self, first: bool) -> Worker:
         # Nothing stops a cell that is being built: no more at once than get on with it.
         with self._turns:
-            worker = Worker(self.scene, phantoms_folder(), self.plan, stop=self._stop, python=sys.executable or None)
+            worker = Worker(
+                self.scene,
+                phantoms_folder(),
+                self.plan,
+                stop=self._stop,
+                python=sys.executable or None,
+            )
         if first:
             # A policy that cannot be loaded is told at the beginning, not when its turn comes.
             worker.start(self.jobs)

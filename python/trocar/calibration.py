@@ -40,17 +40,29 @@ class Board:
 
     def opencv(self) -> cv2.aruco.CharucoBoard:
         """The board as OpenCV knows it."""
-        number = getattr(cv2.aruco, self.dictionary, None) if self.dictionary.startswith("DICT_") else None
+        number = (
+            getattr(cv2.aruco, self.dictionary, None)
+            if self.dictionary.startswith("DICT_")
+            else None
+        )
         if number is None:
-            raise ValueError(f"dictionary: OpenCV knows no '{self.dictionary}'; DICT_4X4_50 and DICT_5X5_100 are such names")
+            raise ValueError(
+                f"dictionary: OpenCV knows no '{self.dictionary}'; DICT_4X4_50 and DICT_5X5_100 are such names"
+            )
         if min(self.squares) < 2:
-            raise ValueError(f"squares: {self.squares[0]}x{self.squares[1]} make no board; at least 2x2 are needed")
+            raise ValueError(
+                f"squares: {self.squares[0]}x{self.squares[1]} make no board; at least 2x2 are needed"
+            )
         if not 0 < self.marker < self.square:
-            raise ValueError(f"markers of {1e3 * self.marker} mm do not fit into squares of {1e3 * self.square} mm")
+            raise ValueError(
+                f"markers of {1e3 * self.marker} mm do not fit into squares of {1e3 * self.square} mm"
+            )
         dictionary = cv2.aruco.getPredefinedDictionary(number)
         held, needed = len(dictionary.bytesList), self.squares[0] * self.squares[1] // 2
         if held < needed:
-            raise ValueError(f"dictionary: {self.dictionary} has {held} markers; {self.squares[0]}x{self.squares[1]} squares need {needed}")
+            raise ValueError(
+                f"dictionary: {self.dictionary} has {held} markers; {self.squares[0]}x{self.squares[1]} squares need {needed}"
+            )
         board = cv2.aruco.CharucoBoard(self.squares, self.square, self.marker, dictionary)
         board.setLegacyPattern(self.legacy)
         return board
@@ -78,7 +90,10 @@ class Calibration:
         (width, height), k = self.size, self.matrix
         return tuple(
             float(np.degrees(np.arctan(centre / focal) + np.arctan((edge - centre) / focal)))
-            for edge, centre, focal in ((width, k[0, 2] + 0.5, k[0, 0]), (height, k[1, 2] + 0.5, k[1, 1]))
+            for edge, centre, focal in (
+                (width, k[0, 2] + 0.5, k[0, 0]),
+                (height, k[1, 2] + 0.5, k[1, 1]),
+            )
         )
 
     def write(self, path: str | Path) -> None:
@@ -97,7 +112,9 @@ class Calibration:
         storage.release()
 
 
-def calibrate(pictures: Iterable[np.ndarray], board: Board, *, model: str = "pinhole-5") -> Calibration:
+def calibrate(
+    pictures: Iterable[np.ndarray], board: Board, *, model: str = "pinhole-5"
+) -> Calibration:
     """Calibrates from pictures (height, width[, 3], 8 bits, all of one size) of `board`.
 
     Pictures with fewer than 8 corners are passed over; with fewer than 5 others this is a `ValueError` that says how many there were.
@@ -113,7 +130,9 @@ def calibrate(pictures: Iterable[np.ndarray], board: Board, *, model: str = "pin
         count += 1
         here = (picture.shape[1], picture.shape[0])
         if size is not None and here != size:
-            raise ValueError(f"picture {index} is {here[0]}x{here[1]}, the first {size[0]}x{size[1]}; all must be of one size")
+            raise ValueError(
+                f"picture {index} is {here[0]}x{here[1]}, the first {size[0]}x{size[1]}; all must be of one size"
+            )
         size = here
         corners, identities, _, _ = detector.detectBoard(picture)
         if identities is None or len(identities) < MIN_CORNERS:
@@ -130,22 +149,35 @@ def calibrate(pictures: Iterable[np.ndarray], board: Board, *, model: str = "pin
     try:
         rms, matrix, distortion, turns, shifts = _estimated(points, places, size, model)
     except cv2.error as why:
-        raise ValueError(f"OpenCV cannot estimate {model} from these {len(used)} pictures: {why.err or why}") from why
-    distortion = np.asarray(distortion).reshape(-1)[: {"pinhole-5": 5, "pinhole-8": 8, "fisheye": 4}[model]]
+        raise ValueError(
+            f"OpenCV cannot estimate {model} from these {len(used)} pictures: {why.err or why}"
+        ) from why
+    distortion = np.asarray(distortion).reshape(-1)[
+        : {"pinhole-5": 5, "pinhole-8": 8, "fisheye": 4}[model]
+    ]
     project = cv2.fisheye.projectPoints if model == "fisheye" else cv2.projectPoints
     views = {}
     for index, of_board, in_picture, turn, shift in zip(used, points, places, turns, shifts):
-        seen = project(of_board.astype(np.float64), turn, shift, matrix, distortion)[0].reshape(-1, 2)
-        views[index] = float(np.sqrt(np.mean(np.sum((seen - in_picture.reshape(-1, 2)) ** 2, axis=1))))
+        seen = project(of_board.astype(np.float64), turn, shift, matrix, distortion)[0].reshape(
+            -1, 2
+        )
+        views[index] = float(
+            np.sqrt(np.mean(np.sum((seen - in_picture.reshape(-1, 2)) ** 2, axis=1)))
+        )
     return Calibration(size, np.asarray(matrix), distortion, model, float(rms), views)
 
 
-def _estimated(points: list[np.ndarray], places: list[np.ndarray], size: tuple[int, int], model: str) -> tuple[Any, ...]:
+def _estimated(
+    points: list[np.ndarray], places: list[np.ndarray], size: tuple[int, int], model: str
+) -> tuple[Any, ...]:
     """RMS error [px], matrix, distortion, turns and shifts of the boards; `cv2.error` where OpenCV finds no camera."""
     if model == "fisheye":
         flags = _fisheye_flag("CALIB_RECOMPUTE_EXTRINSIC") | _fisheye_flag("CALIB_FIX_SKEW")
         # OpenCV 5 takes rows of points only, OpenCV 4 columns too.
-        wide = [[p.astype(np.float64).reshape(1, -1, p.shape[-1]) for p in of] for of in (points, places)]
+        wide = [
+            [p.astype(np.float64).reshape(1, -1, p.shape[-1]) for p in of]
+            for of in (points, places)
+        ]
         return cv2.fisheye.calibrate(*wide, size, None, None, flags=flags)
     flags = cv2.CALIB_RATIONAL_MODEL if model == "pinhole-8" else 0
     return cv2.calibrateCamera(points, places, size, None, None, flags=flags)
@@ -158,19 +190,33 @@ def _fisheye_flag(name: str) -> int:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog="python -m trocar.calibration", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m trocar.calibration", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("pictures", nargs="+", type=Path, help="pictures of the board")
-    parser.add_argument("--squares", default="11x8", help="squares across and down (default %(default)s)")
+    parser.add_argument(
+        "--squares", default="11x8", help="squares across and down (default %(default)s)"
+    )
     parser.add_argument("--square-mm", type=float, required=True, help="edge of a square")
     parser.add_argument("--marker-mm", type=float, required=True, help="edge of a marker")
-    parser.add_argument("--dictionary", default="DICT_4X4_250", help="OpenCV's name (default %(default)s)")
+    parser.add_argument(
+        "--dictionary", default="DICT_4X4_250", help="OpenCV's name (default %(default)s)"
+    )
     parser.add_argument("--legacy", action="store_true", help="the pattern of before OpenCV 4.6")
     parser.add_argument("--model", choices=MODELS, default="pinhole-5")
-    parser.add_argument("-o", "--output", type=Path, required=True, help="calibration file, .yaml or .json")
+    parser.add_argument(
+        "-o", "--output", type=Path, required=True, help="calibration file, .yaml or .json"
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args(arguments)
     try:
-        board = Board(_squares(options.squares), 1e-3 * options.square_mm, 1e-3 * options.marker_mm, options.dictionary, options.legacy)
+        board = Board(
+            _squares(options.squares),
+            1e-3 * options.square_mm,
+            1e-3 * options.marker_mm,
+            options.dictionary,
+            options.legacy,
+        )
         made = calibrate(map(_read, options.pictures), board, model=options.model)
         made.write(options.output)
     # What OpenCV refuses in ways of its own is an error like others, not a traceback.
@@ -179,14 +225,29 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     wide, high = made.field_of_view()
     if options.json:
-        said = {"model": made.model, "rms_px": made.rms, "used": len(made.views), "pictures": len(options.pictures)}
-        said |= {"camera_matrix": made.matrix.tolist(), "distortion": made.distortion.tolist(), "field_of_view_deg": [wide, high]}
+        said = {
+            "model": made.model,
+            "rms_px": made.rms,
+            "used": len(made.views),
+            "pictures": len(options.pictures),
+        }
+        said |= {
+            "camera_matrix": made.matrix.tolist(),
+            "distortion": made.distortion.tolist(),
+            "field_of_view_deg": [wide, high],
+        }
         print(json.dumps(said))
     else:
-        print(f"{made.model}, {len(made.views)} of {len(options.pictures)} pictures, reprojection error {made.rms:.3f} px RMS")
-        print(f"focal lengths {made.matrix[0, 0]:.1f}, {made.matrix[1, 1]:.1f} px; field of view {wide:.1f} x {high:.1f} degrees")
+        print(
+            f"{made.model}, {len(made.views)} of {len(options.pictures)} pictures, reprojection error {made.rms:.3f} px RMS"
+        )
+        print(
+            f"focal lengths {made.matrix[0, 0]:.1f}, {made.matrix[1, 1]:.1f} px; field of view {wide:.1f} x {high:.1f} degrees"
+        )
         worst = max(made.views, key=made.views.__getitem__)
-        print(f"worst picture: {options.pictures[worst]} with {made.views[worst]:.3f} px; written: {options.output}")
+        print(
+            f"worst picture: {options.pictures[worst]} with {made.views[worst]:.3f} px; written: {options.output}"
+        )
     return 0
 
 

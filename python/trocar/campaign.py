@@ -71,17 +71,40 @@ def run(
 
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog="python -m trocar.campaign", description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(
+        prog="python -m trocar.campaign", description=__doc__.splitlines()[0]
+    )
     parser.add_argument("scene", help="scene file, or a built-in scene such as cell-a")
-    parser.add_argument("--policy", action="append", metavar="POLICY", help="as in trocar evaluate; may be given again (default scripted)")
-    parser.add_argument("--episodes", type=int, default=15, help="episodes of each policy (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the first episode (default %(default)s)")
+    parser.add_argument(
+        "--policy",
+        action="append",
+        metavar="POLICY",
+        help="as in trocar evaluate; may be given again (default scripted)",
+    )
+    parser.add_argument(
+        "--episodes", type=int, default=15, help="episodes of each policy (default %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of the first episode (default %(default)s)"
+    )
     parser.add_argument("--workers", type=int, help="episodes at once (default: one a CPU)")
-    parser.add_argument("--retry-failed", action="store_true", help="do episodes again whose policy failed")
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="do episodes again whose policy failed"
+    )
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--ray", metavar="ADDRESS", help="run on a Ray cluster: auto, local, or host:port")
-    where.add_argument("--local", action="store_true", help="run on this machine without Ray (the default)")
-    parser.add_argument("-o", "--output", type=Path, default=Path("trocar-campaign"), help="campaign folder (default %(default)s)")
+    where.add_argument(
+        "--ray", metavar="ADDRESS", help="run on a Ray cluster: auto, local, or host:port"
+    )
+    where.add_argument(
+        "--local", action="store_true", help="run on this machine without Ray (the default)"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("trocar-campaign"),
+        help="campaign folder (default %(default)s)",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args(arguments)
     if options.workers is not None and options.workers < 1:
@@ -113,15 +136,26 @@ def main(arguments: list[str] | None = None) -> int:
         return 1
     except KeyboardInterrupt:
         kept = (options.output / "result.json").exists()
-        bar.say("interrupted; " + ("finished episodes are kept, with their table and report, and the same command goes on" if kept else "no episode was begun"))
+        bar.say(
+            "interrupted; "
+            + (
+                "finished episodes are kept, with their table and report, and the same command goes on"
+                if kept
+                else "no episode was begun"
+            )
+        )
         return 130
     if options.json:
         print(json.dumps(result))
     else:
         for row in result["policies"]:
-            print(f"{row['policy']}: {row['passed']} of {row['episodes']} passed, mean score {row['mean_score']:.2f}")
+            print(
+                f"{row['policy']}: {row['passed']} of {row['episodes']} passed, mean score {row['mean_score']:.2f}"
+            )
             if row["policy_error"]:
-                print(f"{row['policy']} failed in {row['ends'][4]} episodes, first: {row['policy_error']}; --retry-failed does them again")
+                print(
+                    f"{row['policy']} failed in {row['ends'][4]} episodes, first: {row['policy_error']}; --retry-failed does them again"
+                )
         print(f"states {result['hash']}\nreport {result['report']}")
     return 0
 

@@ -48,5 +48,7 @@ class Policy:
         """The cells of an environment, and which of them is its `k`th: `envs.envs[3]` has one, the fourth of `envs`."""
         cells = env.unwrapped.cells
         if cells.action_kind != "pivots":
-            raise ValueError(f"policy: the environment has actions='{cells.action_kind}'; controllers give 'pivots'")
+            raise ValueError(
+                f"policy: the environment has actions='{cells.action_kind}'; controllers give 'pivots'"
+            )
         return cells, env.unwrapped.cell + k

@@ -51,25 +51,42 @@ def unpack(message: bytes) -> Any:
     try:
         # No length in it may be beyond the message's own: unpackb sees to that.
         return msgpack.unpackb(message, raw=False, strict_map_key=False, object_hook=_unpack_array)
-    except (msgpack.exceptions.UnpackException, msgpack.exceptions.ExtraData, UnicodeDecodeError) as why:
+    except (
+        msgpack.exceptions.UnpackException,
+        msgpack.exceptions.ExtraData,
+        UnicodeDecodeError,
+    ) as why:
         raise ValueError(f"the message is no MessagePack: {why or type(why).__name__}") from why
 
 
 def _pack_array(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind not in _KINDS:
-        raise ValueError(f"an array of type {value.dtype} cannot be sent; numbers and truth values can")
+        raise ValueError(
+            f"an array of type {value.dtype} cannot be sent; numbers and truth values can"
+        )
     if isinstance(value, np.ndarray):
-        return {b"__ndarray__": True, b"data": value.tobytes(), b"dtype": value.dtype.str, b"shape": value.shape}
+        return {
+            b"__ndarray__": True,
+            b"data": value.tobytes(),
+            b"dtype": value.dtype.str,
+            b"shape": value.shape,
+        }
     if isinstance(value, np.generic):
         return {b"__npgeneric__": True, b"data": value.item(), b"dtype": value.dtype.str}
-    raise TypeError(f"a {type(value).__name__} cannot be sent; maps, lists, text, numbers and arrays can")
+    raise TypeError(
+        f"a {type(value).__name__} cannot be sent; maps, lists, text, numbers and arrays can"
+    )
 
 
 def _unpack_array(value: dict[Any, Any]) -> Any:
     if b"__ndarray__" in value:
         kind = _dtype(value.get(b"dtype"))
         data, shape = value.get(b"data"), value.get(b"shape")
-        if not isinstance(data, bytes) or not isinstance(shape, list) or not all(isinstance(n, int) and n >= 0 for n in shape):
+        if (
+            not isinstance(data, bytes)
+            or not isinstance(shape, list)
+            or not all(isinstance(n, int) and n >= 0 for n in shape)
+        ):
             raise ValueError("an array of the message lacks its data or shape")
         # A copy: policies may write into what they are given.
         return np.frombuffer(data, kind).reshape(shape).copy()
@@ -86,7 +103,9 @@ def _dtype(name: Any) -> np.dtype:
     except TypeError as why:
         raise ValueError(f"an array of the message has type '{name:.20}', which is none") from why
     if kind.kind not in _KINDS or kind.hasobject:
-        raise ValueError(f"an array of the message has type '{name:.20}'; numbers and truth values are taken")
+        raise ValueError(
+            f"an array of the message has type '{name:.20}'; numbers and truth values are taken"
+        )
     return kind
 
 
@@ -98,7 +117,9 @@ class Served:
             policy = policy()
         infer = getattr(policy, "infer", policy)
         if not callable(infer):
-            raise TypeError(f"a {type(policy).__name__} is no policy: it has no infer(obs) and cannot be called")
+            raise TypeError(
+                f"a {type(policy).__name__} is no policy: it has no infer(obs) and cannot be called"
+            )
         self._infer: Callable[[Any], Any] = infer
         self._reset: Callable[[], Any] | None = getattr(policy, "reset", None)
 
@@ -115,9 +136,14 @@ class Served:
         if not isinstance(reply, dict):
             reply = {"actions": reply}
         if "actions" not in reply:
-            raise ValueError(f"the policy's reply has no 'actions', only {', '.join(map(str, reply)) or 'nothing'}")
+            raise ValueError(
+                f"the policy's reply has no 'actions', only {', '.join(map(str, reply)) or 'nothing'}"
+            )
         actions = np.asarray(reply["actions"], np.float64)
-        return reply | {"actions": actions[None] if actions.ndim == 1 else actions, "server_timing": {"infer_ms": spent}}
+        return reply | {
+            "actions": actions[None] if actions.ndim == 1 else actions,
+            "server_timing": {"infer_ms": spent},
+        }
 
 
 def _is_function(value: Any) -> bool:
@@ -172,7 +198,13 @@ def _file(path: Path) -> ModuleType:
     return module
 
 
-def serve(policy: Served, host: str = "127.0.0.1", port: int = 0, *, told: Callable[[str], None] | None = None) -> None:
+def serve(
+    policy: Served,
+    host: str = "127.0.0.1",
+    port: int = 0,
+    *,
+    told: Callable[[str], None] | None = None,
+) -> None:
     """Serves until it is interrupted. `told` is given the address once it listens. Requests are answered one after the other."""
     from websockets.exceptions import ConnectionClosed
     from websockets.sync.server import serve as listen
@@ -215,7 +247,11 @@ def serve(policy: Served, host: str = "127.0.0.1", port: int = 0, *, told: Calla
     with listen(handle, host, port, max_size=MAX_MESSAGE, compression=None) as server:
         if told is not None:
             place = server.socket.getsockname()
-            told(f"ws://[{place[0]}]:{place[1]}" if ":" in place[0] else f"ws://{place[0]}:{place[1]}")
+            told(
+                f"ws://[{place[0]}]:{place[1]}"
+                if ":" in place[0]
+                else f"ws://{place[0]}:{place[1]}"
+            )
         server.serve_forever()
 
 
@@ -233,11 +269,27 @@ def _end_with_input() -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """The command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog="python -m trocar.serve", description=__doc__.splitlines()[0])
-    parser.add_argument("policy", metavar="FILE.py:NAME|MODULE:NAME", help="a callable, a class, or an object with infer(obs)")
-    parser.add_argument("--host", default="127.0.0.1", help="address to listen at (default %(default)s: this machine alone)")
-    parser.add_argument("--port", type=int, default=8000, help="0 for any that is free (default %(default)s)")
-    parser.add_argument("--until-eof", action="store_true", help="end when standard input does, as the process behind it has ended")
+    parser = argparse.ArgumentParser(
+        prog="python -m trocar.serve", description=__doc__.splitlines()[0]
+    )
+    parser.add_argument(
+        "policy",
+        metavar="FILE.py:NAME|MODULE:NAME",
+        help="a callable, a class, or an object with infer(obs)",
+    )
+    parser.add_argument(
+        "--host",
+        default="127.0.0.1",
+        help="address to listen at (default %(default)s: this machine alone)",
+    )
+    parser.add_argument(
+        "--port", type=int, default=8000, help="0 for any that is free (default %(default)s)"
+    )
+    parser.add_argument(
+        "--until-eof",
+        action="store_true",
+        help="end when standard input does, as the process behind it has ended",
+    )
     options = parser.parse_args(arguments)
     if options.until_eof:
         threading.Thread(target=_end_with_input, daemon=True).start()
@@ -253,7 +305,12 @@ def main(arguments: list[str] | None = None) -> int:
         print(f"{type(why).__name__}: {' '.join(str(why).split())}", file=sys.stderr)
         return 1
     try:
-        serve(policy, options.host, options.port, told=lambda address: print(address, file=out, flush=True))
+        serve(
+            policy,
+            options.host,
+            options.port,
+            told=lambda address: print(address, file=out, flush=True),
+        )
     except KeyboardInterrupt:
         return 0
     except OSError as why:

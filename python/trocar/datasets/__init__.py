@@ -11,4 +11,11 @@ from .lerobot import LeRobotWriter
 from .recorder import Recorder, features_of, robomimic_environment, robomimic_observations
 from .robomimic import RobomimicWriter
 
-__all__ = ["LeRobotWriter", "Recorder", "RobomimicWriter", "features_of", "robomimic_environment", "robomimic_observations"]
+__all__ = [
+    "LeRobotWriter",
+    "Recorder",
+    "RobomimicWriter",
+    "features_of",
+    "robomimic_environment",
+    "robomimic_observations",
+]

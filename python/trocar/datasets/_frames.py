@@ -13,7 +13,20 @@ import numpy as np
 Feature = dict[str, Any]
 
 #: Types of numbers that a feature may have.
-NUMBERS = ("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "float16", "float32", "float64")
+NUMBERS = (
+    "bool",
+    "int8",
+    "int16",
+    "int32",
+    "int64",
+    "uint8",
+    "uint16",
+    "uint32",
+    "uint64",
+    "float16",
+    "float32",
+    "float64",
+)
 
 
 class Frames:
@@ -41,18 +54,31 @@ def check_dtypes(features: dict[str, Feature], pictures: tuple[str, ...]) -> Non
     for key, feature in features.items():
         dtype = feature.get("dtype")
         if dtype not in NUMBERS and dtype not in pictures:
-            raise ValueError(f"features: {key} has dtype '{dtype}', which cannot be written; it must be one of {', '.join((*pictures, *NUMBERS))}")
+            raise ValueError(
+                f"features: {key} has dtype '{dtype}', which cannot be written; it must be one of {', '.join((*pictures, *NUMBERS))}"
+            )
         if dtype in pictures and len(feature["shape"]) != 3:
-            raise ValueError(f"features: {key} has shape {tuple(feature['shape'])}; pictures are (height, width, channels)")
+            raise ValueError(
+                f"features: {key} has shape {tuple(feature['shape'])}; pictures are (height, width, channels)"
+            )
 
 
-def checked_values(what: str, values: dict[str, Any], features: dict[str, Feature]) -> dict[str, np.ndarray]:
+def checked_values(
+    what: str, values: dict[str, Any], features: dict[str, Feature]
+) -> dict[str, np.ndarray]:
     """`values` as arrays of the features' types and shapes, one for each; `what` is what errors call them."""
     missing, unknown = features.keys() - values.keys(), values.keys() - features.keys()
     if missing or unknown:
-        words = [f"{', '.join(sorted(keys))} {how}" for keys, how in ((missing, "missing"), (unknown, "unknown")) if keys]
+        words = [
+            f"{', '.join(sorted(keys))} {how}"
+            for keys, how in ((missing, "missing"), (unknown, "unknown"))
+            if keys
+        ]
         raise ValueError(f"{what}: {'; '.join(words)}; the features are {', '.join(features)}")
-    return {key: _checked_value(f"{what}: {key}", values[key], feature) for key, feature in features.items()}
+    return {
+        key: _checked_value(f"{what}: {key}", values[key], feature)
+        for key, feature in features.items()
+    }
 
 
 def _checked_value(name: str, value: Any, feature: Feature) -> np.ndarray:

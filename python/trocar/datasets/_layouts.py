@@ -37,7 +37,9 @@ class V3:
 
     def video_path(self, key: str, episode: int) -> Path:
         chunk, file = divmod(episode, CHUNK)
-        return self.root / self.PATHS["video_path"].format(video_key=key, chunk_index=chunk, file_index=file)
+        return self.root / self.PATHS["video_path"].format(
+            video_key=key, chunk_index=chunk, file_index=file
+        )
 
     def read_tasks(self) -> list[str]:
         path = self.root / "meta/tasks.parquet"
@@ -56,7 +58,10 @@ class V3:
         for file in self._files(self.EPISODES):
             for row in pq.read_table(file).to_pylist():
                 own = self._stats_of(row)
-                whole = {key: _stats.merged(whole[key], s) if key in whole else s for key, s in own.items()}
+                whole = {
+                    key: _stats.merged(whole[key], s) if key in whole else s
+                    for key, s in own.items()
+                }
         self.write_stats(whole)
         return whole
 
@@ -75,7 +80,10 @@ class V3:
 
     def forget(self, episodes: int, frames: int) -> None:
         """Removes rows of episodes from number `episodes` and of frames from number `frames` on; only the last files have any."""
-        for pattern, key, first in ((self.PATHS["data_path"], "index", frames), (self.EPISODES, "episode_index", episodes)):
+        for pattern, key, first in (
+            (self.PATHS["data_path"], "index", frames),
+            (self.EPISODES, "episode_index", episodes),
+        ):
             for path in reversed(self._files(pattern)):
                 table = pq.ParquetFile(path).read()
                 kept = table.filter(pc.less(table[key], first))
@@ -89,7 +97,9 @@ class V3:
     def _files(self, pattern: str) -> list[Path]:
         """The files of `pattern` that are there, in order."""
         found, place = [], (0, 0)
-        while (path := self.root / pattern.format(chunk_index=place[0], file_index=place[1])).exists():
+        while (
+            path := self.root / pattern.format(chunk_index=place[0], file_index=place[1])
+        ).exists():
             found.append(path)
             place = (place[0] + (place[1] + 1) // CHUNK, (place[1] + 1) % CHUNK)
         return found
@@ -102,7 +112,12 @@ class V3:
         os.replace(path.with_name("tasks.partial"), path)
 
     def write_episode(
-        self, table: pa.Table, row: dict[str, Any], stats: dict[str, _stats.Stats], videos: dict[str, float], first: int
+        self,
+        table: pa.Table,
+        row: dict[str, Any],
+        stats: dict[str, _stats.Stats],
+        videos: dict[str, float],
+        first: int,
     ) -> None:
         data = self._append(self.PATHS["data_path"], table, "index", first)
         row |= {"data/chunk_index": data[0], "data/file_index": data[1]}
@@ -115,7 +130,9 @@ class V3:
             row |= {f"stats/{key}/{name}": value for name, value in of.items()}
         place = self._last(self.EPISODES)
         row |= {"meta/episodes/chunk_index": place[0], "meta/episodes/file_index": place[1]}
-        self._append(self.EPISODES, pa.Table.from_pylist([row]), "episode_index", row["episode_index"])
+        self._append(
+            self.EPISODES, pa.Table.from_pylist([row]), "episode_index", row["episode_index"]
+        )
 
     def _last(self, pattern: str) -> tuple[int, int]:
         """The file that the next rows go into: the last one, or the next if that is full."""
@@ -155,7 +172,9 @@ class V21:
         self.root = root
 
     def _path(self, pattern: str, episode: int, key: str = "") -> Path:
-        return self.root / pattern.format(episode_chunk=episode // CHUNK, episode_index=episode, video_key=key)
+        return self.root / pattern.format(
+            episode_chunk=episode // CHUNK, episode_index=episode, video_key=key
+        )
 
     def video_path(self, key: str, episode: int) -> Path:
         return self._path(self.PATHS["video_path"], episode, key)
@@ -182,15 +201,28 @@ class V21:
         self._path(self.PATHS["data_path"], episodes).unlink(missing_ok=True)
 
     def write_tasks(self, tasks: list[str]) -> None:
-        self._write_lines("tasks", [{"task_index": k, "task": task} for k, task in enumerate(tasks)])
+        self._write_lines(
+            "tasks", [{"task_index": k, "task": task} for k, task in enumerate(tasks)]
+        )
 
     def write_episode(
-        self, table: pa.Table, row: dict[str, Any], stats: dict[str, _stats.Stats], videos: dict[str, float], first: int
+        self,
+        table: pa.Table,
+        row: dict[str, Any],
+        stats: dict[str, _stats.Stats],
+        videos: dict[str, float],
+        first: int,
     ) -> None:
         del videos, first
         _write(self._path(self.PATHS["data_path"], row["episode_index"]), table)
         # Lines of an episode that could not be written whole go.
-        for name, line in (("episodes", row), ("episodes_stats", {"episode_index": row["episode_index"], "stats": _stats.plain(stats)})):
+        for name, line in (
+            ("episodes", row),
+            (
+                "episodes_stats",
+                {"episode_index": row["episode_index"], "stats": _stats.plain(stats)},
+            ),
+        ):
             kept = [old for old in self._lines(name) if old["episode_index"] < row["episode_index"]]
             self._write_lines(name, [*kept, line])
 
@@ -199,4 +231,7 @@ class V21:
         return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
     def _write_lines(self, name: str, lines: list[dict[str, Any]]) -> None:
-        replace(self.root / f"meta/{name}.jsonl", "".join(json.dumps(line) + "\n" for line in lines).encode())
+        replace(
+            self.root / f"meta/{name}.jsonl",
+            "".join(json.dumps(line) + "\n" for line in lines).encode(),
+        )

@@ -30,9 +30,14 @@ def of_pictures(pictures: list[np.ndarray]) -> Stats:
     step = max(1, len(pictures) // SAMPLED_PICTURES)
     chosen = pictures[::step]
     edge = max(1, max(chosen[0].shape[:2]) // SAMPLED_PIXELS)
-    pixels = np.concatenate([p[::edge, ::edge].reshape(-1, 3) for p in chosen]).astype(np.float64) / 255.0
+    pixels = (
+        np.concatenate([p[::edge, ::edge].reshape(-1, 3) for p in chosen]).astype(np.float64)
+        / 255.0
+    )
     stats = _of(pixels, axis=0, count=len(chosen))
-    return {key: value if key == "count" else value.reshape(3, 1, 1) for key, value in stats.items()}
+    return {
+        key: value if key == "count" else value.reshape(3, 1, 1) for key, value in stats.items()
+    }
 
 
 def _of(values: np.ndarray, axis: int, count: int) -> Stats:
@@ -53,7 +58,9 @@ def merged(a: Stats, b: Stats) -> Stats:
     n, m = float(a["count"][0]), float(b["count"][0])
     wa, wb = n / (n + m), m / (n + m)
     mean = wa * a["mean"] + wb * b["mean"]
-    variance = wa * (a["std"] ** 2 + (a["mean"] - mean) ** 2) + wb * (b["std"] ** 2 + (b["mean"] - mean) ** 2)
+    variance = wa * (a["std"] ** 2 + (a["mean"] - mean) ** 2) + wb * (
+        b["std"] ** 2 + (b["mean"] - mean) ** 2
+    )
     stats = {
         "min": np.minimum(a["min"], b["min"]),
         "max": np.maximum(a["max"], b["max"]),
@@ -71,4 +78,6 @@ def plain(stats: dict[str, Stats]) -> dict[str, Any]:
 
 def from_plain(stats: dict[str, Any]) -> dict[str, Stats]:
     """The inverse of `plain`."""
-    return {key: {name: np.asarray(value) for name, value in of.items()} for key, of in stats.items()}
+    return {
+        key: {name: np.asarray(value) for name, value in of.items()} for key, of in stats.items()
+    }

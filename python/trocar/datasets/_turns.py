@@ -35,7 +35,9 @@ def alone(folder: Path, seconds: float = SAVING_SECONDS) -> Iterator[None]:
                 break
             except BlockingIOError as why:
                 if time.monotonic() > until:
-                    raise RuntimeError(f"{folder} is being written by another writer; wait for it, or write into another folder") from why
+                    raise RuntimeError(
+                        f"{folder} is being written by another writer; wait for it, or write into another folder"
+                    ) from why
                 time.sleep(0.05)
         yield
     finally:

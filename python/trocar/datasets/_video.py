@@ -16,10 +16,14 @@ def check_shape(key: str, shape: tuple[int, ...]) -> None:
     if channels != 3:
         raise ValueError(f"features: {key} has {channels} channels; a video needs 3")
     if height % 2 or width % 2:
-        raise ValueError(f"features: {key} is {width}x{height}; a video needs even numbers of pixels")
+        raise ValueError(
+            f"features: {key} is {width}x{height}; a video needs even numbers of pixels"
+        )
 
 
-def write(path: Path, pictures: list[np.ndarray], fps: int, *, codec: str = "libx264", crf: int = 18) -> dict[str, Any]:
+def write(
+    path: Path, pictures: list[np.ndarray], fps: int, *, codec: str = "libx264", crf: int = 18
+) -> dict[str, Any]:
     """Writes 8-bit RGB pictures (height, width, 3) as a video with a key frame every two frames, so that any frame is found quickly.
 
     The file appears whole or not at all. Returns what a LeRobot dataset's `info` says of a video.

@@ -62,13 +62,17 @@ class LeRobotWriter:
         crf: int = 18,
     ):
         if version not in VERSIONS:
-            raise ValueError(f"version: '{version}' is unknown; {' and '.join(VERSIONS)} can be written")
+            raise ValueError(
+                f"version: '{version}' is unknown; {' and '.join(VERSIONS)} can be written"
+            )
         reserved = INDICES.keys() & features.keys()
         if reserved:
             raise ValueError(f"features: {', '.join(sorted(reserved))} are written by themselves")
         slashed = [key for key in features if "/" in key]
         if slashed:
-            raise ValueError(f"features: '{slashed[0]}' has a slash in its name; LeRobot joins words by dots")
+            raise ValueError(
+                f"features: '{slashed[0]}' has a slash in its name; LeRobot joins words by dots"
+            )
         if fps <= 0 or fps != int(fps):
             raise ValueError(f"fps: {fps} is no whole number of frames a second")
         # What only saving would find out is found out before anything is recorded.
@@ -78,7 +82,10 @@ class LeRobotWriter:
                 _video.check_shape(key, feature["shape"])
         self.root, self.fps, self.version = Path(root), int(fps), version
         self.codec, self.crf = codec, crf
-        self.features = {key: dict(f, shape=tuple(f["shape"]), names=f.get("names")) for key, f in features.items()}
+        self.features = {
+            key: dict(f, shape=tuple(f["shape"]), names=f.get("names"))
+            for key, f in features.items()
+        }
         self._frames = Frames(self.features)
         layout = V3 if version == "v3.0" else V21
         self._layout = layout(self.root)
@@ -108,7 +115,9 @@ class LeRobotWriter:
                 self._go_on()
                 self._torn = False
         elif any(path.is_file() and path.suffix != ".partial" for path in self.root.rglob("*")):
-            raise FileExistsError(f"{self.root} is not empty and is no LeRobot dataset (meta/info.json is missing)")
+            raise FileExistsError(
+                f"{self.root} is not empty and is no LeRobot dataset (meta/info.json is missing)"
+            )
 
     def _video_keys(self) -> list[str]:
         return [key for key, f in self.features.items() if f["dtype"] == "video"]
@@ -122,13 +131,17 @@ class LeRobotWriter:
         """Reads what a dataset already holds, and changes nothing."""
         info = json.loads((self.root / "meta/info.json").read_text())
         if info.get("codebase_version") != self.version:
-            raise ValueError(f"{self.root} is a dataset of version {info.get('codebase_version')}, not {self.version}")
+            raise ValueError(
+                f"{self.root} is a dataset of version {info.get('codebase_version')}, not {self.version}"
+            )
 
         def meant(features: dict[str, Feature]) -> dict[str, tuple[str, tuple[int, ...]]]:
             return {key: (f["dtype"], tuple(f["shape"])) for key, f in features.items()}
 
         if meant(info["features"]) != meant(self._info["features"]) or info["fps"] != self.fps:
-            raise ValueError(f"{self.root} has other features or another rate; write into another folder")
+            raise ValueError(
+                f"{self.root} has other features or another rate; write into another folder"
+            )
         self._info = info
 
     def _go_on(self) -> None:
@@ -173,7 +186,9 @@ class LeRobotWriter:
     def _save(self, task: str) -> int:
         known, mark = self.root / "meta/info.json", self.root / UNDER_WAY
         if known.exists() and (
-            self._torn or mark.exists() or json.loads(known.read_text())["total_episodes"] != self.episodes
+            self._torn
+            or mark.exists()
+            or json.loads(known.read_text())["total_episodes"] != self.episodes
         ):
             self._go_on()
         length, episode = len(self._frames), self.episodes
@@ -208,12 +223,18 @@ class LeRobotWriter:
             stats[key] = _stats.of_numbers(values)
         table = pa.table(
             {key: _column(values, self.features[key]) for key, values in arrays.items()}
-            | {key: pa.array(values, pa.type_for_alias(INDICES[key]["dtype"])) for key, values in indices.items()}
+            | {
+                key: pa.array(values, pa.type_for_alias(INDICES[key]["dtype"]))
+                for key, values in indices.items()
+            }
         )
         row = {"episode_index": episode, "tasks": [task], "length": length}
         self._layout.write_episode(table, row, stats, videos, first)
         self._layout.write_tasks(self._tasks)
-        self._stats = {key: _stats.merged(self._stats[key], s) if key in self._stats else s for key, s in stats.items()}
+        self._stats = {
+            key: _stats.merged(self._stats[key], s) if key in self._stats else s
+            for key, s in stats.items()
+        }
         self._layout.write_stats(self._stats)
         # What counts is written last: an episode is in the dataset when `info` says so.
         self._info["total_episodes"] = episode + 1
@@ -237,7 +258,11 @@ def _column(values: np.ndarray, feature: Feature) -> pa.Array:
         return pa.array(values.reshape(-1), kind)
     column: pa.Array = pa.array(values.reshape(-1), kind)
     for size in reversed(feature["shape"]):
-        column = pa.FixedSizeListArray.from_arrays(column, size) if len(feature["shape"]) == 1 else _list(column, size)
+        column = (
+            pa.FixedSizeListArray.from_arrays(column, size)
+            if len(feature["shape"]) == 1
+            else _list(column, size)
+        )
     return column
 
 

@@ -20,7 +20,11 @@ def features_of(env: gym.Env) -> dict[str, Feature]:
         if key.startswith("observation.depth"):
             continue
         if key.startswith("observation.images"):
-            features[key] = {"dtype": "video", "shape": space.shape, "names": ["height", "width", "channels"]}
+            features[key] = {
+                "dtype": "video",
+                "shape": space.shape,
+                "names": ["height", "width", "channels"],
+            }
         else:
             names = getattr(unwrapped, "state_names", None) if key == "observation.state" else None
             features[key] = {"dtype": "float32", "shape": space.shape, "names": names}
@@ -33,7 +37,11 @@ def _leaves(space: gym.Space, name: str = "observation") -> list[tuple[str, gym.
     """The boxes of a space, by LeRobot's names."""
     words = {"agent_pos": "state", "pixels": "images", "environment_state": "environment_state"}
     if isinstance(space, gym.spaces.Dict):
-        return [leaf for key, part in space.items() for leaf in _leaves(part, f"{name}.{words.get(key, key)}")]
+        return [
+            leaf
+            for key, part in space.items()
+            for leaf in _leaves(part, f"{name}.{words.get(key, key)}")
+        ]
     return [(f"{name}.state" if name == "observation" else name, space)]
 
 
@@ -64,11 +72,19 @@ class Recorder(gym.Wrapper):
     >>> env = Recorder(env, writer)
     """
 
-    def __init__(self, env: gym.Env, writer: LeRobotWriter | RobomimicWriter, *, only_successful: bool = False):
+    def __init__(
+        self,
+        env: gym.Env,
+        writer: LeRobotWriter | RobomimicWriter,
+        *,
+        only_successful: bool = False,
+    ):
         super().__init__(env)
         steps, written = env.metadata.get("render_fps"), getattr(writer, "fps", None)
         if steps is not None and written is not None and written != steps:
-            raise ValueError(f"fps: the writer has {written}, the environment does {steps} steps a second; make the writer with fps={steps}")
+            raise ValueError(
+                f"fps: the writer has {written}, the environment does {steps} steps a second; make the writer with fps={steps}"
+            )
         self.writer, self.only_successful = writer, only_successful
         self._observation: Any = None
 
@@ -78,15 +94,28 @@ class Recorder(gym.Wrapper):
         return self._observation, info
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        seen = {key: np.array(value) for key, value in _values(self._observation, self.env.observation_space).items()}
+        seen = {
+            key: np.array(value)
+            for key, value in _values(self._observation, self.env.observation_space).items()
+        }
         result = self.env.step(action)
         self._observation, reward, terminated, truncated, info = result
         action = np.asarray(action, dtype=np.float64)
         if isinstance(self.writer, LeRobotWriter):
             known = self.writer.features.keys()
-            self.writer.add_frame({k: v.astype(np.float32) if v.dtype == np.float64 else v for k, v in seen.items() if k in known} | {"action": action.astype(np.float32)})
+            self.writer.add_frame(
+                {
+                    k: v.astype(np.float32) if v.dtype == np.float64 else v
+                    for k, v in seen.items()
+                    if k in known
+                }
+                | {"action": action.astype(np.float32)}
+            )
         else:
-            self.writer.add_frame({_short(k): v for k, v in seen.items()} | {"actions": action, "rewards": float(reward)})
+            self.writer.add_frame(
+                {_short(k): v for k, v in seen.items()}
+                | {"actions": action, "rewards": float(reward)}
+            )
         if terminated or truncated:
             success = bool(info.get("is_success", False))
             if success or not self.only_successful:
@@ -115,10 +144,16 @@ def robomimic_observations(env: gym.Env) -> dict[str, Feature]:
 def robomimic_environment(env: gym.Env) -> dict[str, Any]:
     """What a `RobomimicWriter` writes down to make an environment anew: `env_name` and `env_kwargs`. It must be of `gym.make`."""
     if env.spec is None:
-        raise ValueError("env: it has no spec; make it by gym.make, or give env_name and env_kwargs yourself")
+        raise ValueError(
+            "env: it has no spec; make it by gym.make, or give env_name and env_kwargs yourself"
+        )
     return {"env_name": env.spec.id, "env_kwargs": dict(env.spec.kwargs)}
 
 
 def _short(key: str) -> str:
     words = key.removeprefix("observation.").split(".")
-    return f"{words[1]}_{'image' if words[0] == 'images' else words[0]}" if len(words) > 1 else words[0]
+    return (
+        f"{words[1]}_{'image' if words[0] == 'images' else words[0]}"
+        if len(words) > 1
+        else words[0]
+    )

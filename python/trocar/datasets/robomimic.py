@@ -57,9 +57,14 @@ class RobomimicWriter:
         check_dtypes(observations, ("video", "image"))
         reserved = {"actions", "rewards"} & observations.keys()
         if reserved:
-            raise ValueError(f"observations: {', '.join(sorted(reserved))} are written by themselves")
+            raise ValueError(
+                f"observations: {', '.join(sorted(reserved))} are written by themselves"
+            )
         self.path = Path(path)
-        self._observations = {key: dict(feature, shape=tuple(feature["shape"])) for key, feature in observations.items()}
+        self._observations = {
+            key: dict(feature, shape=tuple(feature["shape"]))
+            for key, feature in observations.items()
+        }
         self._frames = Frames(
             self._observations
             | {
@@ -102,16 +107,28 @@ class RobomimicWriter:
         """Raises a `ValueError` if the file that is there holds something else."""
         with _open(self._spare.file, "r") as file:
             if "data" not in file or "env_args" not in file["data"].attrs:
-                raise ValueError(f"{self.path} is no robomimic file (it has no group 'data' with 'env_args')")
+                raise ValueError(
+                    f"{self.path} is no robomimic file (it has no group 'data' with 'env_args')"
+                )
             data = file["data"]
             if json.loads(data.attrs["env_args"]) != self._env_args:
-                raise ValueError(f"{self.path} was recorded in another environment, {data.attrs['env_args']}; write into another file")
-            wanted = {key: tuple(feature["shape"]) for key, feature in self._frames.features.items() if key != "rewards"}
+                raise ValueError(
+                    f"{self.path} was recorded in another environment, {data.attrs['env_args']}; write into another file"
+                )
+            wanted = {
+                key: tuple(feature["shape"])
+                for key, feature in self._frames.features.items()
+                if key != "rewards"
+            }
             for name in _demos(data)[-1:]:
                 demo = data[name]
-                held = {key: values.shape[1:] for key, values in demo["obs"].items()} | {"actions": demo["actions"].shape[1:]}
+                held = {key: values.shape[1:] for key, values in demo["obs"].items()} | {
+                    "actions": demo["actions"].shape[1:]
+                }
                 if held != wanted:
-                    raise ValueError(f"{self.path} has other observations or actions, {held}; write into another file")
+                    raise ValueError(
+                        f"{self.path} has other observations or actions, {held}; write into another file"
+                    )
 
     @property
     def episodes(self) -> int:
@@ -176,7 +193,11 @@ class RobomimicWriter:
         for key in self._observations:
             now = columns[key]
             following = np.concatenate([now[1:], last[key][None]])
-            packed = {"compression": "gzip", "compression_opts": 1, "chunks": (1, *now.shape[1:])} if now.ndim > 2 else {}
+            packed = (
+                {"compression": "gzip", "compression_opts": 1, "chunks": (1, *now.shape[1:])}
+                if now.ndim > 2
+                else {}
+            )
             demo.create_dataset(f"obs/{key}", data=now, **packed)
             demo.create_dataset(f"next_obs/{key}", data=following, **packed)
         demo.attrs["num_samples"] = len(self._frames)
@@ -186,7 +207,9 @@ class RobomimicWriter:
 def _env_args(env_name: str, env_kwargs: dict[str, Any]) -> dict[str, Any]:
     """What robomimic makes an environment by, as it comes back out of JSON."""
     try:
-        return json.loads(json.dumps({"env_name": env_name, "type": GYM_TYPE, "env_kwargs": env_kwargs}))
+        return json.loads(
+            json.dumps({"env_name": env_name, "type": GYM_TYPE, "env_kwargs": env_kwargs})
+        )
     except (TypeError, ValueError) as why:
         raise ValueError(f"env_kwargs: {why}; they are kept as JSON") from why
 
@@ -217,6 +240,13 @@ def _enter(file: h5py.File, name: str) -> None:
     if names is None or names.maxshape != (None,) or names.dtype.itemsize < len(name):
         held = [] if names is None else names[:].tolist()
         file.pop(mask, None)
-        names = file.create_dataset(mask, data=np.array(held, dtype="S16"), dtype="S16", shape=(len(held),), maxshape=(None,), chunks=(1024,))
+        names = file.create_dataset(
+            mask,
+            data=np.array(held, dtype="S16"),
+            dtype="S16",
+            shape=(len(held),),
+            maxshape=(None,),
+            chunks=(1024,),
+        )
     names.resize((len(names) + 1,))
     names[-1] = name.encode()

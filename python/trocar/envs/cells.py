@@ -72,7 +72,11 @@ class Cells:
         )
         self.count, self.privileged, self.normalize = count, privileged, normalize
         self.task, self.prompt, self.max_steps = native.task, native.prompt, native.max_steps
-        self.state_names, self.action_names, self.channel_names = native.state_names, native.action_names, native.channel_names
+        self.state_names, self.action_names, self.channel_names = (
+            native.state_names,
+            native.action_names,
+            native.channel_names,
+        )
         #: Steps a second. Scenes have whole ones, which films and datasets want.
         self.fps = round(native.control_hz)
         #: Cells whose first episode has begun.
@@ -86,8 +90,16 @@ class Cells:
         self.written = (self.state, self.figures, self.channels)
         self.low, self.high = native.action_limits
         self.action_kind = actions
-        self.color = {c: np.zeros((count, *s, 3), np.uint8) for c, s in self.sizes.items() if "rgb" in self.kinds}
-        self.depth = {c: np.zeros((count, *s, 1), np.float32) for c, s in self.sizes.items() if "depth" in self.kinds}
+        self.color = {
+            c: np.zeros((count, *s, 3), np.uint8)
+            for c, s in self.sizes.items()
+            if "rgb" in self.kinds
+        }
+        self.depth = {
+            c: np.zeros((count, *s, 1), np.float32)
+            for c, s in self.sizes.items()
+            if "depth" in self.kinds
+        }
         self.ends = native.end_names
         self.stages = native.stage_names
 
@@ -110,9 +122,13 @@ class Cells:
     def action_space(self) -> gym.spaces.Box:
         if self.normalize:
             return gym.spaces.Box(-1.0, 1.0, self.low.shape, np.float32)
-        return gym.spaces.Box(self.low.astype(np.float32), self.high.astype(np.float32), dtype=np.float32)
+        return gym.spaces.Box(
+            self.low.astype(np.float32), self.high.astype(np.float32), dtype=np.float32
+        )
 
-    def _choose_cameras(self, scene: str, wanted: Sequence[str] | None, size: tuple[int, int] | None) -> None:
+    def _choose_cameras(
+        self, scene: str, wanted: Sequence[str] | None, size: tuple[int, int] | None
+    ) -> None:
         """The cameras that are observed, with height and width [px]; told before anything is built."""
         known = {name: (height, width) for name, height, width, _ in scene_cameras(scene)}
         if wanted is None:
@@ -121,11 +137,15 @@ class Cells:
         wanted = [wanted] if isinstance(wanted, str) else list(wanted)
         strange = [name for name in wanted if name not in known]
         if strange or len(set(wanted)) != len(wanted):
-            raise ValueError(f"cameras: {wanted} cannot be seen; any of {', '.join(known)} can, each once")
+            raise ValueError(
+                f"cameras: {wanted} cannot be seen; any of {', '.join(known)} can, each once"
+            )
         sizes = {name: size or known[name] for name in wanted}
         sees = {"rgb", "depth"} & set(self.kinds)
         if sees and not wanted:
-            raise ValueError(f"cameras: {' and '.join(sorted(sees))} need at least one; there are {', '.join(known)}")
+            raise ValueError(
+                f"cameras: {' and '.join(sorted(sees))} need at least one; there are {', '.join(known)}"
+            )
         self.sizes = sizes if sees else {}
         self.render_size = size or known.get("endoscope", (224, 224))
         self.render_camera = "endoscope" if "endoscope" in known else next(iter(known), None)
@@ -134,7 +154,11 @@ class Cells:
         """Writes what the cameras see of the cells that `which` flags."""
         if self.sizes:
             self.native.see(
-                list(self.sizes), list(self.sizes.values()), which, list(self.color.values()), list(self.depth.values())
+                list(self.sizes),
+                list(self.sizes.values()),
+                which,
+                list(self.color.values()),
+                list(self.depth.values()),
             )
 
     def render(self, k: int) -> np.ndarray:
@@ -153,10 +177,15 @@ class Cells:
         if "state" in self.kinds:
             parts["agent_pos"] = state
         if self.color:
-            pixels = {c: gym.spaces.Box(0, 255, a.shape[1:], np.uint8) for c, a in self.color.items()}
+            pixels = {
+                c: gym.spaces.Box(0, 255, a.shape[1:], np.uint8) for c, a in self.color.items()
+            }
             parts["pixels"] = gym.spaces.Dict(pixels)
         if self.depth:
-            depths = {c: gym.spaces.Box(0.0, np.inf, a.shape[1:], np.float32) for c, a in self.depth.items()}
+            depths = {
+                c: gym.spaces.Box(0.0, np.inf, a.shape[1:], np.float32)
+                for c, a in self.depth.items()
+            }
             parts["depth"] = gym.spaces.Dict(depths)
         return gym.spaces.Dict(parts)
 
@@ -189,7 +218,9 @@ class Cells:
         self._need_begun(active)
         actions = np.asarray(actions, np.float64)
         if actions.shape != (self.count, len(self.low)):
-            raise ValueError(f"actions have shape {actions.shape}; {(self.count, len(self.low))} is needed")
+            raise ValueError(
+                f"actions have shape {actions.shape}; {(self.count, len(self.low))} is needed"
+            )
         if self.normalize:
             actions = self.low + 0.5 * (np.clip(actions, -1.0, 1.0) + 1.0) * (self.high - self.low)
         native.step(np.ascontiguousarray(actions), active, self.written)
@@ -246,5 +277,9 @@ class Cells:
         if self.privileged:
             info["channels"] = self.channels[k].copy()
         if end >= 0:
-            info |= {"end": self.ends[int(end)], "why": self.native.why(k), "summary": json.loads(self.native.summary(k))}
+            info |= {
+                "end": self.ends[int(end)],
+                "why": self.native.why(k),
+                "summary": json.loads(self.native.summary(k)),
+            }
         return info

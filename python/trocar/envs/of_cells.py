@@ -70,4 +70,8 @@ class OfOneCell(OfCells):
 
 def row_of(value: Any, k: int) -> Any:
     """What cell `k` sees, as a copy: users keep observations."""
-    return {key: row_of(part, k) for key, part in value.items()} if isinstance(value, dict) else value[k].copy()
+    return (
+        {key: row_of(part, k) for key, part in value.items()}
+        if isinstance(value, dict)
+        else value[k].copy()
+    )

@@ -50,7 +50,9 @@ def kinds_of(obs: str) -> tuple[list[str], bool]:
     names = obs.split("+") if isinstance(obs, str) else [obs]
     kinds = ["state" if name == "agent_pos" else name for name in names]
     if any(name not in KINDS for name in names) or len(set(kinds)) != len(kinds):
-        raise ValueError(f"obs: '{obs}' cannot be observed; join any of {', '.join(KINDS)} by '+', the state once")
+        raise ValueError(
+            f"obs: '{obs}' cannot be observed; join any of {', '.join(KINDS)} by '+', the state once"
+        )
     return kinds, names != ["state"]
 
 
@@ -63,7 +65,9 @@ def size_of(value: Any) -> tuple[int, int] | None:
     except (TypeError, ValueError):
         height = width = 0
     if not (8 <= height <= 8192 and 8 <= width <= 8192):
-        raise ValueError(f"image_size: is {value!r}; height and width are wanted, whole numbers, 8 to 8192 pixels each")
+        raise ValueError(
+            f"image_size: is {value!r}; height and width are wanted, whole numbers, 8 to 8192 pixels each"
+        )
     return height, width
 
 
@@ -71,5 +75,7 @@ def mask_of(value: Any, count: int) -> np.ndarray:
     """Flags of the cells (count,) that are to be reset; all of them where None is given."""
     mask = np.ones(count, bool) if value is None else np.asarray(value)
     if mask.dtype != bool or mask.shape != (count,):
-        raise ValueError(f"reset_mask: has shape {mask.shape} of {mask.dtype}; ({count},) of bool is needed")
+        raise ValueError(
+            f"reset_mask: has shape {mask.shape} of {mask.dtype}; ({count},) of bool is needed"
+        )
     return mask

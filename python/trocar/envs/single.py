@@ -26,12 +26,16 @@ class TrocarEnv(OfOneCell, gym.Env):
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 30}
 
-    def __init__(self, scene: str = "cell-a", *, render_mode: str | None = None, **options: Unpack[Options]):
+    def __init__(
+        self, scene: str = "cell-a", *, render_mode: str | None = None, **options: Unpack[Options]
+    ):
         self._begin(1, scene, render_mode, options)
         self.observation_space = self.cells.observation_space()
         self.action_space = self.cells.action_space()
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, dict[str, Any]]:
         """Begins the episode of `seed` (0 to 2^63 - 1)."""
         seed = None if seed is None else seed_of(seed)
         super().reset(seed=seed)
@@ -41,7 +45,11 @@ class TrocarEnv(OfOneCell, gym.Env):
 
     def step(self, action: np.ndarray) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         self.cells.step(np.asarray(action)[None])
-        reward, ended, late = self.cells.rewards[0], self.cells.terminated[0], self.cells.truncated[0]
+        reward, ended, late = (
+            self.cells.rewards[0],
+            self.cells.terminated[0],
+            self.cells.truncated[0],
+        )
         return self._observation(), float(reward), bool(ended), bool(late), self.cells.info(0)
 
     def render(self) -> np.ndarray | None:

@@ -81,7 +81,10 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
         for k in which:
             if seeds[k] is not None:
                 self._dice[k] = np.random.default_rng(seeds[k])
-        self.cells.reset(which, np.array([self._draw(k) if seeds[k] is None else seeds[k] for k in which], np.uint64))
+        self.cells.reset(
+            which,
+            np.array([self._draw(k) if seeds[k] is None else seeds[k] for k in which], np.uint64),
+        )
         self._over[which] = False
         return self._observation(), self._infos()
 
@@ -96,10 +99,14 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
             raise ValueError(f"seed: has {len(seed)} seeds; {self.num_envs} are needed")
         return [None if one is None else seed_of(one) for one in seed]
 
-    def step(self, actions: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
+    def step(
+        self, actions: np.ndarray
+    ) -> tuple[Any, np.ndarray, np.ndarray, np.ndarray, dict[str, Any]]:
         cells = self.cells
         if self.autoreset_mode == AutoresetMode.DISABLED and self._over.any():
-            raise RuntimeError(f"episodes {np.flatnonzero(self._over).tolist()} have ended; reset them by a reset_mask first")
+            raise RuntimeError(
+                f"episodes {np.flatnonzero(self._over).tolist()} have ended; reset them by a reset_mask first"
+            )
         fresh = np.flatnonzero(self._over)
         cells.step(actions, ~self._over)
         if len(fresh):
@@ -165,7 +172,11 @@ class TrocarVectorEnv(OfCells, gym.vector.VectorEnv):
 def _mode(given: AutoresetMode | str) -> AutoresetMode:
     if isinstance(given, AutoresetMode):
         return given
-    names = {"next-step": AutoresetMode.NEXT_STEP, "same-step": AutoresetMode.SAME_STEP, "disabled": AutoresetMode.DISABLED}
+    names = {
+        "next-step": AutoresetMode.NEXT_STEP,
+        "same-step": AutoresetMode.SAME_STEP,
+        "disabled": AutoresetMode.DISABLED,
+    }
     # Gymnasium's own words too.
     known = names | {mode.value: mode for mode in AutoresetMode}
     if given not in known:
@@ -174,4 +185,8 @@ def _mode(given: AutoresetMode | str) -> AutoresetMode:
 
 
 def _copied(value: Any) -> Any:
-    return {key: _copied(part) for key, part in value.items()} if isinstance(value, dict) else value.copy()
+    return (
+        {key: _copied(part) for key, part in value.items()}
+        if isinstance(value, dict)
+        else value.copy()
+    )
