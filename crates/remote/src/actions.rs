@@ -18,8 +18,8 @@ impl Actions {
     /// A chunk of rows of `dim` numbers.
     ///
     /// # Errors
-    /// [`Error::EmptyChunk`] without numbers, [`Error::WrongDimension`] where `dim` does not divide their count,
-    /// [`Error::NotFinite`].
+    /// [`Error::EmptyChunk`] without numbers, [`Error::WrongDimension`] where `dim` does not divide
+    /// their count, [`Error::NotFinite`].
     pub fn new(dim: usize, values: Vec<f64>) -> Result<Self> {
         let at = String::new;
         if dim == 0 || values.is_empty() {
@@ -71,11 +71,13 @@ impl Default for ActionLimits {
 }
 
 impl ActionLimits {
-    /// The actions of a reply: its field `actions`, or the reply itself where it is an array, as with older RoboArena servers.
+    /// The actions of a reply: its field `actions`, or the reply itself where it is an array, as
+    /// with older RoboArena servers.
     ///
     /// # Errors
-    /// [`Error::WrongField`] where it is missing or no table, [`Error::WrongDtype`], [`Error::WrongDimension`],
-    /// [`Error::EmptyChunk`], [`Error::LongChunk`], [`Error::NotFinite`].
+    /// [`Error::WrongField`] where it is missing or no table, [`Error::WrongDtype`],
+    /// [`Error::WrongDimension`], [`Error::EmptyChunk`], [`Error::LongChunk`],
+    /// [`Error::NotFinite`].
     pub fn take(&self, reply: &Value) -> Result<Actions> {
         let wrong = |reason: String| Err(Error::WrongField { at: String::new(), reason });
         match reply {

@@ -19,7 +19,8 @@ pub enum Dialect {
     RoboArena,
 }
 
-/// Longest waits. Each is for the whole, so that a server that sends a byte now and then does not prolong it.
+/// Longest waits. Each is for the whole, so that a server that sends a byte now and then does not
+/// prolong it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timeouts {
     /// For an attempt to connect, until the metadata are there.
@@ -34,7 +35,8 @@ impl Default for Timeouts {
     }
 }
 
-/// How often it is tried to connect. Only servers that cannot be reached or are busy (502, 503, 504) are tried again.
+/// How often it is tried to connect. Only servers that cannot be reached or are busy (502, 503,
+/// 504) are tried again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Retry {
     /// Attempts in all, at least 1.
@@ -56,7 +58,8 @@ impl Default for Retry {
 pub struct Endpoint {
     /// `ws://host:port/path`; without a scheme it is `ws://`. `wss://` needs the feature `rustls`.
     pub url: String,
-    /// Sent as `Authorization: Api-Key ...`; readable by others on the way unless the address is `wss://`.
+    /// Sent as `Authorization: Api-Key ...`; readable by others on the way unless the address is
+    /// `wss://`.
     pub api_key: Option<String>,
     /// Longest waits.
     pub timeouts: Timeouts,
@@ -81,7 +84,8 @@ impl std::fmt::Debug for Endpoint {
 }
 
 impl Endpoint {
-    /// The server at `url` with the usual limits: 16 MiB a message, 10 s to connect, 60 s for a reply.
+    /// The server at `url` with the usual limits: 16 MiB a message, 10 s to connect, 60 s for a
+    /// reply.
     pub fn new(url: impl Into<String>) -> Self {
         Self {
             url: url.into(),
@@ -115,7 +119,8 @@ impl Endpoint {
         self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Whether it can be connected to as it is written: address, key, waits, and what this build can do. Nothing is sent.
+    /// Whether it can be connected to as it is written: address, key, waits, and what this build
+    /// can do. Nothing is sent.
     ///
     /// # Errors
     /// [`Error::Endpoint`] with what would be right; no password, query or key stands in it.

@@ -6,7 +6,8 @@ pub type Result<T> = std::result::Result<T, Error>;
 /// Longest piece of foreign text in a message [characters].
 const LONGEST: usize = 300;
 
-/// A policy that cannot be reached, or a server that does not keep to the protocol. Every message is one line.
+/// A policy that cannot be reached, or a server that does not keep to the protocol. Every message
+/// is one line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The endpoint cannot be used as it is written.
@@ -209,12 +210,14 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether the connection ended, rather than that a message or an answer was wrong: another connection may do.
+    /// Whether the connection ended, rather than that a message or an answer was wrong: another
+    /// connection may do.
     pub fn is_disconnection(&self) -> bool {
         matches!(self, Self::Closed { .. } | Self::NotConnected { .. })
     }
 
-    /// This error with `place` before its place, where it has one: `within("reply")` makes `actions` `reply/actions`.
+    /// This error with `place` before its place, where it has one: `within("reply")` makes
+    /// `actions` `reply/actions`.
     pub(crate) fn within(mut self, place: &str) -> Self {
         if let Self::Malformed { at, .. }
         | Self::TooDeep { at, .. }

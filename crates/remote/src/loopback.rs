@@ -1,4 +1,5 @@
-//! A policy server on this machine's loopback, for tests and examples: openpi's or RoboArena's, one client at a time.
+//! A policy server on this machine's loopback, for tests and examples: openpi's or RoboArena's, one
+//! client at a time.
 
 use crate::client::stream::{Control, Timed};
 use crate::endpoint::Dialect;
@@ -51,8 +52,8 @@ pub struct Loopback {
 }
 
 impl Loopback {
-    /// Serves `policy` on a free port of 127.0.0.1. An error of the policy goes to the client as the last line of a traceback,
-    /// and its connection is closed.
+    /// Serves `policy` on a free port of 127.0.0.1. An error of the policy goes to the client as
+    /// the last line of a traceback, and its connection is closed.
     ///
     /// # Errors
     /// [`Error::CannotConnect`] where no port is to be had, those of [`pack`] for the metadata.

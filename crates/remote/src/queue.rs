@@ -8,7 +8,8 @@ use crate::error::{Error, Result};
 pub struct Playback {
     /// Actions a second.
     pub rate_hz: f64,
-    /// Actions of a chunk that are played before the next one is asked for; the rest is dropped. A shorter chunk is played whole.
+    /// Actions of a chunk that are played before the next one is asked for; the rest is dropped. A
+    /// shorter chunk is played whole.
     pub replan: usize,
 }
 
@@ -48,7 +49,8 @@ impl ActionQueue {
         self.chunk = None;
     }
 
-    /// The action of simulation time `time` [s]. `infer` is called when the chunk is played out, or when time went back.
+    /// The action of simulation time `time` [s]. `infer` is called when the chunk is played out, or
+    /// when time went back.
     ///
     /// # Errors
     /// Those of `infer`; the queue is then empty.
@@ -61,7 +63,8 @@ impl ActionQueue {
         if !(step >= 0.0 && step < played as f64) {
             self.chunk = None;
             let next = self.start + played as f64 / rate;
-            // Frames need not be whole parts of an action's time: the next chunk begins where the last one ended.
+            // Frames need not be whole parts of an action's time: the next chunk begins where the
+            // last one ended.
             self.start = if played > 0 && tick(next) == 0.0 { next } else { time };
             step = 0.0;
             self.chunk = Some(infer()?);

@@ -1,5 +1,6 @@
-//! What a RoboArena server asks for: the fields of `PolicyServerConfig` in github.com/robo-arena/roboarena, which it sends as its
-//! metadata. Fields that are missing have that class's defaults.
+//! What a RoboArena server asks for: the fields of `PolicyServerConfig` in
+//! github.com/robo-arena/roboarena, which it sends as its metadata. Fields that are missing have
+//! that class's defaults.
 
 use crate::error::{Error, Result};
 use crate::value::{Map, Value};
@@ -71,7 +72,8 @@ impl ServerConfig {
         })
     }
 
-    /// Components of an action in this space, the gripper's included: 8 of joints, 7 of a pose; none where the space is unknown.
+    /// Components of an action in this space, the gripper's included: 8 of joints, 7 of a pose;
+    /// none where the space is unknown.
     pub fn action_dim(&self) -> Option<usize> {
         match self.action_space.as_str() {
             "joint_position" | "joint_velocity" => Some(8),

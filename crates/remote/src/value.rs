@@ -6,7 +6,8 @@ use std::collections::BTreeMap;
 /// A message or a part of one: values by name, in the order of their names.
 pub type Map = BTreeMap<String, Value>;
 
-/// What a policy is shown: pictures, states, the instruction, by the names that the policy wants. Maps may lie in maps.
+/// What a policy is shown: pictures, states, the instruction, by the names that the policy wants.
+/// Maps may lie in maps.
 pub type Observation = Map;
 
 /// A value of a message.

@@ -1,4 +1,5 @@
-//! Damaged messages give a value or a one-line error, and messages that claim to be huge cost nothing.
+//! Damaged messages give a value or a one-line error, and messages that claim to be huge cost
+//! nothing.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;

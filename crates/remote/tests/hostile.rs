@@ -235,7 +235,8 @@ fn a_server_that_reads_nothing_is_not_waited_for() {
 
 #[test]
 fn frames_that_are_wrong() {
-    // Reserved bits; an opcode that is none; a masked frame; a fragmented ping; a continuation of nothing; text that is not UTF-8.
+    // Reserved bits; an opcode that is none; a masked frame; a fragmented ping; a continuation of
+    // nothing; text that is not UTF-8.
     let frames: [&[u8]; 6] = [
         &[0xf2, 1, 0xc0],
         &[0x83, 1, 0xc0],

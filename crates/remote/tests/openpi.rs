@@ -1,4 +1,5 @@
-//! Against openpi's own code from PyPI: its packer, its server, its client. Skipped, saying so, without it.
+//! Against openpi's own code from PyPI: its packer, its server, its client. Skipped, saying so,
+//! without it.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
 mod common;

@@ -1,6 +1,8 @@
-//! Robot arms as dynamic serial chains, laparoscopic instruments, the ports that they work through, and their control.
+//! Robot arms as dynamic serial chains, laparoscopic instruments, the ports that they work through,
+//! and their control.
 //!
-//! Knows nothing of tissue, cameras or files of scenes. SI units and radians; all in double precision.
+//! Knows nothing of tissue, cameras or files of scenes. SI units and radians; all in double
+//! precision.
 
 pub mod chain;
 mod error;

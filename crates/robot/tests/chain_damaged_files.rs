@@ -1,4 +1,5 @@
-//! Damaged descriptions of arms give an arm or an error, never a panic. Alone in its program, as what others allocate would count.
+//! Damaged descriptions of arms give an arm or an error, never a panic. Alone in its program, as
+//! what others allocate would count.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 

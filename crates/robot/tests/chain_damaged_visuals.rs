@@ -1,4 +1,5 @@
-//! Damaged descriptions that show something give looks or an error, never a panic. Alone in its program, as what others allocate would count.
+//! Damaged descriptions that show something give looks or an error, never a panic. Alone in its
+//! program, as what others allocate would count.
 
 #![allow(clippy::unwrap_used, reason = "what tests share may panic")]
 

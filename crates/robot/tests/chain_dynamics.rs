@@ -1,4 +1,5 @@
-//! An arm's kinematics and dynamics against themselves: finite differences, energy, symmetry, the identities between them.
+//! An arm's kinematics and dynamics against themselves: finite differences, energy, symmetry, the
+//! identities between them.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -112,7 +113,8 @@ fn an_undriven_arm_keeps_its_energy() {
         let (kinetic, potential) = arm.energy(&s.q, &s.qd);
         kinetic + potential
     };
-    // Of first order in the step: half the step, half the error, which no wrong term in bias or mass matrix would leave.
+    // Of first order in the step: half the step, half the error, which no wrong term in bias or
+    // mass matrix would leave.
     let drift = |substeps: usize| {
         let (mut state, mut worst, mut most) = (start, 0.0, 0.0);
         for _ in 0..960 {

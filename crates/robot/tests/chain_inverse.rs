@@ -1,4 +1,5 @@
-//! Inverse kinematics: it comes back to reachable poses, says what is missing of others, and is smooth.
+//! Inverse kinematics: it comes back to reachable poses, says what is missing of others, and is
+//! smooth.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -103,8 +104,8 @@ fn the_elbow_does_not_depend_on_the_way() {
     assert!(found.reached && found.q[2] > 0.1, "{:?}", found.q);
 }
 
-/// A straight line outwards through the reach, to where the arm is stretched and beyond: no joint jumps, the flange stays near, and what is missing
-/// is said.
+/// A straight line outwards through the reach, to where the arm is stretched and beyond: no joint
+/// jumps, the flange stays near, and what is missing is said.
 #[test]
 fn it_is_smooth_to_the_end_of_the_reach_and_beyond() {
     let arm = SerialArm::franka_fr3().unwrap();

@@ -1,5 +1,5 @@
-//! Arms against MuJoCo: kinematics, mass matrix, bias and gravity at random states, and driven motion. Skipped, saying so, where MuJoCo or the
-//! FR3's files are not.
+//! Arms against MuJoCo: kinematics, mass matrix, bias and gravity at random states, and driven
+//! motion. Skipped, saying so, where MuJoCo or the FR3's files are not.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -161,8 +161,8 @@ fn the_arm_read_from_mjcf_is_mujocos() {
     assert!(worst.iter().all(|w| *w < 1e-9), "{worst:?}");
 }
 
-/// The built-in table has the manufacturer's inertias, unrounded: exactly against its own figures in MuJoCo, to the Menagerie's rounding
-/// against its file.
+/// The built-in table has the manufacturer's inertias, unrounded: exactly against its own figures
+/// in MuJoCo, to the Menagerie's rounding against its file.
 #[test]
 fn the_built_in_fr3_is_mujocos() {
     let Some(python) = python() else { return };
@@ -204,7 +204,8 @@ fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str
     let mut rng = Random(3);
     let start = Joints::from_fn(n, |i| [0.2, -0.3, 0.1, -1.8, 0.3, 1.6, 0.2][i]);
     let qd = noise(n, 0.3, &mut rng);
-    // The torques of a controller that swings the joints about, recorded; then they are played to both.
+    // The torques of a controller that swings the joints about, recorded; then they are played to
+    // both.
     let phase: Vec<_> = (0..n).map(|_| (between(&mut rng, 0.5, 1.1), between(&mut rng, 0.0, 6.0))).collect();
     let mut table = String::new();
     push(&mut table, &[&start, &qd]);
@@ -244,8 +245,9 @@ fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str
     off
 }
 
-/// Both semi-implicit Euler with implicit damping and the same step. Without friction they are the same to rounding at 480 Hz. MuJoCo's friction is a soft
-/// constraint, which creeps under a load; it is made as hard as its step allows, at 4,800 Hz.
+/// Both semi-implicit Euler with implicit damping and the same step. Without friction they are the
+/// same to rounding at 480 Hz. MuJoCo's friction is a soft constraint, which creeps under a load;
+/// it is made as hard as its step allows, at 4,800 Hz.
 #[test]
 fn a_driven_arm_moves_as_mujocos() {
     let (Some(model), Some(python)) = (menagerie(), python()) else { return };

@@ -1,4 +1,5 @@
-//! The step: friction that holds, limits that are kept, stiff couplings that do not blow up, the same bits each time.
+//! The step: friction that holds, limits that are kept, stiff couplings that do not blow up, the
+//! same bits each time.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -23,7 +24,8 @@ fn rough() -> SerialArm {
 #[test]
 fn friction_holds_what_it_can_without_creeping() {
     let arm = rough();
-    // A controller that believes the arm 2% lighter asks for too little: where the difference is below friction, nothing moves, to the bit.
+    // A controller that believes the arm 2% lighter asks for too little: where the difference is
+    // below friction, nothing moves, to the bit.
     let believed = arm.clone().with_mass_scaled(0.98, 0.95).unwrap();
     let q = arm.posture(&[0.3, -0.1, 0.2, -1.0, 0.1, 1.0, 0.4]).unwrap();
     let torque = believed.gravity_torque(&q);
@@ -64,7 +66,8 @@ fn a_moving_arm_comes_to_rest_and_stays() {
     assert!(at_rest.is_some());
 }
 
-/// One joint: a spinning wheel slows at friction / inertia, a block on a slope, v(t) = v0 - a t to the step.
+/// One joint: a spinning wheel slows at friction / inertia, a block on a slope, v(t) = v0 - a t to
+/// the step.
 #[test]
 fn friction_slows_a_joint_as_coulomb_says() {
     let arm = skewed(1).with_gravity(DVec3::ZERO).unwrap().with_friction(&[0.3], &[0.0]).unwrap();
@@ -129,7 +132,8 @@ fn a_stop_takes_the_speed_and_holds() {
     assert!((report.resisting[0] + 20.0).abs() < 10.0, "{}", report.resisting[0]);
 }
 
-/// A light arm at a stiff rim: a shaft of 0.5 kg that slides, held to a place by a spring far stiffer than the step could take explicitly.
+/// A light arm at a stiff rim: a shaft of 0.5 kg that slides, held to a place by a spring far
+/// stiffer than the step could take explicitly.
 #[test]
 fn a_stiff_coupling_is_stable_and_right() {
     // The last joint of the arm slides a link of 0.5 kg.
@@ -282,7 +286,8 @@ fn what_cannot_be_stepped_is_refused_and_leaves_the_state() {
     }
 }
 
-/// Prints what a step costs; the bound is that of two arms at 480 Hz under 3% of a core, with room for a busy machine.
+/// Prints what a step costs; the bound is that of two arms at 480 Hz under 3% of a core, with room
+/// for a busy machine.
 #[test]
 fn a_step_is_cheap() {
     let arm = loaded();
@@ -321,7 +326,8 @@ fn a_step_is_cheap() {
     assert!(share < 0.03, "{share}");
 }
 
-/// Couplings of any stiffness in any number, at random: solved, within what their laws allow, and never won from (no drive, no gravity).
+/// Couplings of any stiffness in any number, at random: solved, within what their laws allow, and
+/// never won from (no drive, no gravity).
 #[test]
 fn random_couplings_are_solved_and_give_no_energy() {
     let arm = loaded().with_gravity(DVec3::ZERO).unwrap();

@@ -1,4 +1,5 @@
-//! What descriptions show of an arm: every shape on the link that carries it, at its pose, in its colour; what is wrong is told.
+//! What descriptions show of an arm: every shape on the link that carries it, at its pose, in its
+//! colour; what is wrong is told.
 
 #![allow(clippy::unwrap_used, reason = "what tests share may panic")]
 

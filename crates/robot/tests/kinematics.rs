@@ -133,7 +133,8 @@ fn out_of_reach_the_nearest_point_is_taken_and_moves_smoothly() {
             let q = l * DVec3::new(tilt.sin() * to.cos(), tilt.sin() * to.sin(), tilt.cos());
             assert!(s.rejected_translation.length() <= (q - p).length() + 1e-12, "{p} {q}");
         }
-        // 10 um on, the answer has moved no farther, but for the turn about the axis where the wanted point is nearer to it.
+        // 10 um on, the answer has moved no farther, but for the turn about the axis where the
+        // wanted point is nearer to it.
         let next = solve(p + DVec3::new(1e-5, -0.5e-5, 0.5e-5));
         let across = p.truncate().length();
         let widest = 0.35 * 0.55;

@@ -1,4 +1,5 @@
-//! Controlled arms in their ports: what they do with commands, at rest, under load, and what they say.
+//! Controlled arms in their ports: what they do with commands, at rest, under load, and what they
+//! say.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -347,7 +348,8 @@ fn the_mount_reads_weight_load_and_inertia() {
     let back = flange.rotation.inverse();
     let touch = Wrench { force: back * push, torque: back * (tip - flange.translation).cross(push) };
     assert!(near(m.measured_cf(), model.reading(flange.rotation, m.arm().gravity()) + touch) < 1e-3);
-    // In motion: an arm without payload that feels the reading at its flange takes the same torques.
+    // In motion: an arm without payload that feels the reading at its flange takes the same
+    // torques.
     let bare = m.arm().clone().with_payload(trocar_robot::chain::MassProperties::NONE).unwrap();
     let (mut before, mut worst, mut inertial) = (m.measured_js(), 0.0_f64, 0.0_f64);
     circle(&mut m, |m, report| {

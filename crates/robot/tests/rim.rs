@@ -48,7 +48,8 @@ fn no_sampled_point_of_the_rim_is_nearer_and_every_contact_is_on_it() {
             let here: Vec<_> = found.iter().filter(|p| (p.point.z - z).abs() < 1e-12).collect();
             let least = here.iter().map(|p| p.gap).fold(f64::INFINITY, f64::min);
             let sampled = gaps.iter().copied().fold(f64::INFINITY, f64::min);
-            // Between samples the rim comes nearer by at most an eighth of the square of their distance times the curvature.
+            // Between samples the rim comes nearer by at most an eighth of the square of their
+            // distance times the curvature.
             assert!(least <= sampled + 1e-15 && least > sampled - 5e-9, "{least} {sampled}");
             minima += (0..SAMPLES)
                 .filter(|k| gaps[*k] < gaps[(k + 1) % SAMPLES] && gaps[*k] <= gaps[(k + SAMPLES - 1) % SAMPLES])
@@ -103,7 +104,8 @@ fn the_room_is_the_papers_clearance() {
 
 #[test]
 fn an_ellipse_of_sampled_points_agrees() {
-    // The other way round: the shaft's elliptic section in the sheet's plane lies within the hole just when nothing is touched.
+    // The other way round: the shaft's elliptic section in the sheet's plane lies within the hole
+    // just when nothing is touched.
     let (port, mut random) = (port(), Random(12));
     let mut inside = 0;
     for _ in 0..2000 {
@@ -175,8 +177,8 @@ fn undamped_contact_gains_no_energy() {
     }
 }
 
-/// A shaft of 0.48 kg that leans on the rim with 2 N, comes to rest for a second and is then pulled along itself by `pull(t)`; its place along itself since
-/// then, at every millisecond of `seconds`.
+/// A shaft of 0.48 kg that leans on the rim with 2 N, comes to rest for a second and is then pulled
+/// along itself by `pull(t)`; its place along itself since then, at every millisecond of `seconds`.
 fn pulled(port: &Port, seconds: usize, pull: impl Fn(f64) -> f64) -> Vec<f64> {
     let (mass, h) = (0.48, 1e-4);
     let (mut s, mut motion, mut state) =

@@ -41,8 +41,9 @@ enum Link {
 
 /// A client of a policy server.
 ///
-/// A request is sent once: a policy may keep a history, so after an error of the connection only [`Client::reconnect`] or
-/// [`Client::reset`] bring it back. Replies that are whole but wrong (malformed, not finite, ...) leave the connection as it is.
+/// A request is sent once: a policy may keep a history, so after an error of the connection only
+/// [`Client::reconnect`] or [`Client::reset`] bring it back. Replies that are whole but wrong
+/// (malformed, not finite, ...) leave the connection as it is.
 pub struct Client {
     endpoint: Endpoint,
     url: String,
@@ -62,9 +63,10 @@ impl Client {
     /// Connects, and waits for the server's metadata.
     ///
     /// # Errors
-    /// [`Error::Endpoint`], [`Error::CannotConnect`], [`Error::KeyRefused`], [`Error::Handshake`], [`Error::Tls`],
-    /// [`Error::TimedOut`], [`Error::Closed`], [`Error::Server`], [`Error::TooLarge`], [`Error::Protocol`],
-    /// [`Error::Interrupted`], and those of [`unpack`] for the metadata.
+    /// [`Error::Endpoint`], [`Error::CannotConnect`], [`Error::KeyRefused`], [`Error::Handshake`],
+    /// [`Error::Tls`], [`Error::TimedOut`], [`Error::Closed`], [`Error::Server`],
+    /// [`Error::TooLarge`], [`Error::Protocol`], [`Error::Interrupted`], and those of [`unpack`]
+    /// for the metadata.
     pub fn connect(endpoint: &Endpoint) -> Result<Self> {
         let (socket, metadata) = dial(endpoint)?;
         let dialect = dialect_of(endpoint, &metadata);
@@ -103,10 +105,11 @@ impl Client {
     /// Sends an observation and waits for the chunk of actions.
     ///
     /// # Errors
-    /// Those of [`pack`] for the observation; [`Error::TimedOut`], [`Error::Closed`], [`Error::Server`], [`Error::TooLarge`],
-    /// [`Error::Protocol`] and [`Error::Interrupted`], which end the connection; those of [`unpack`] and
-    /// [`Error::WrongField`], [`Error::WrongDimension`], [`Error::EmptyChunk`], [`Error::LongChunk`], [`Error::NotFinite`] for the
-    /// reply; [`Error::NotConnected`] after an earlier one.
+    /// Those of [`pack`] for the observation; [`Error::TimedOut`], [`Error::Closed`],
+    /// [`Error::Server`], [`Error::TooLarge`], [`Error::Protocol`] and [`Error::Interrupted`],
+    /// which end the connection; those of [`unpack`] and [`Error::WrongField`],
+    /// [`Error::WrongDimension`], [`Error::EmptyChunk`], [`Error::LongChunk`], [`Error::NotFinite`]
+    /// for the reply; [`Error::NotConnected`] after an earlier one.
     pub fn infer(&mut self, observation: &Observation) -> Result<Reply> {
         let start = Instant::now();
         let request = self.request(observation, "infer")?;
@@ -129,8 +132,9 @@ impl Client {
         Ok(Reply { actions, server_ms, round_trip_ms: start.elapsed().as_secs_f64() * 1e3, fields })
     }
 
-    /// Begins an episode: connects anew where the connection was lost, and tells a RoboArena server, with `info` (such as its
-    /// `session_id`), to forget the last one. openpi's protocol has no such message.
+    /// Begins an episode: connects anew where the connection was lost, and tells a RoboArena
+    /// server, with `info` (such as its `session_id`), to forget the last one. openpi's protocol
+    /// has no such message.
     ///
     /// # Errors
     /// As [`Client::connect`] and [`Client::infer`].

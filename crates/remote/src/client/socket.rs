@@ -1,4 +1,5 @@
-//! A WebSocket to a server: connecting, sending, receiving, each until a deadline, and what their failures are called.
+//! A WebSocket to a server: connecting, sending, receiving, each until a deadline, and what their
+//! failures are called.
 
 use super::stream::{Control, GLANCE, Halt, Timed};
 use crate::endpoint::Endpoint;
@@ -115,7 +116,8 @@ impl Socket {
         }
     }
 
-    /// Answers pings and learns of a close, without waiting. Between requests nothing else may come.
+    /// Answers pings and learns of a close, without waiting. Between requests nothing else may
+    /// come.
     pub fn tend(&mut self) -> Result<()> {
         let wait = Wait::new("a request", Duration::from_millis(1));
         let end = Instant::now() + FLOOD;
@@ -148,7 +150,8 @@ impl Socket {
     }
 }
 
-/// A TCP connection. Names are resolved and addresses tried on a thread of its own, because neither can be interrupted.
+/// A TCP connection. Names are resolved and addresses tried on a thread of its own, because neither
+/// can be interrupted.
 fn reach(endpoint: &Endpoint, uri: &Uri, url: &str, wait: Wait) -> Result<TcpStream> {
     let cannot = |reason: String| Error::CannotConnect { url: url.to_owned(), reason };
     let host = uri.host().unwrap_or("").trim_start_matches('[').trim_end_matches(']').to_owned();
@@ -239,7 +242,8 @@ fn failure(e: tungstenite::Error, url: &str, limit: usize, wait: Wait) -> Error 
     }
 }
 
-/// What a close frame says. 1008 and those around 4401 are how gateways refuse a key after the handshake.
+/// What a close frame says. 1008 and those around 4401 are how gateways refuse a key after the
+/// handshake.
 fn closed(url: &str, what: &'static str, frame: Option<&CloseFrame>) -> Error {
     let Some(frame) = frame else {
         return Error::Closed { url: url.into(), what, reason: "without a reason".into() };

@@ -1,4 +1,5 @@
-//! A TCP stream whose reads and writes end by a deadline or an interruption, whatever the other side does.
+//! A TCP stream whose reads and writes end by a deadline or an interruption, whatever the other
+//! side does.
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -39,7 +40,8 @@ impl Control {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Patience::Until(deadline);
     }
 
-    /// Operations from here on give [`io::ErrorKind::WouldBlock`] where they would wait, and end by `deadline` where there is always something.
+    /// Operations from here on give [`io::ErrorKind::WouldBlock`] where they would wait, and end by
+    /// `deadline` where there is always something.
     pub fn at_once(&self, deadline: Instant) {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Patience::AtOnce(deadline);
     }

@@ -9,7 +9,8 @@ use rmp::Marker;
 /// The value of a whole message.
 ///
 /// # Errors
-/// [`Error::Malformed`], [`Error::TooDeep`], [`Error::TooMany`], [`Error::WrongDtype`], [`Error::WrongShape`].
+/// [`Error::Malformed`], [`Error::TooDeep`], [`Error::TooMany`], [`Error::WrongDtype`],
+/// [`Error::WrongShape`].
 pub fn unpack(bytes: &[u8]) -> Result<Value> {
     let mut reader = Reader { bytes, at: 0, left: VALUES };
     let value = reader.value(0)?;
@@ -110,7 +111,8 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// Refuses a list or map of `n` items that take at least `each` bytes, before anything is made for it.
+    /// Refuses a list or map of `n` items that take at least `each` bytes, before anything is made
+    /// for it.
     fn room(&self, n: usize, each: usize, depth: usize) -> Result<()> {
         if depth >= DEPTH {
             return Err(Error::TooDeep { at: String::new(), limit: DEPTH });

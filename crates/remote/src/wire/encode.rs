@@ -6,11 +6,12 @@ use crate::error::{Error, Result};
 use crate::value::{Map, Value};
 use rmp::encode as msgpack;
 
-/// The message of a map, byte for byte what Python's packer makes of a dictionary in the order of its keys.
+/// The message of a map, byte for byte what Python's packer makes of a dictionary in the order of
+/// its keys.
 ///
 /// # Errors
-/// [`Error::TooDeep`] and [`Error::TooMany`] for what a server of this crate would not read either; [`Error::WrongField`] for text,
-/// bytes or lists of 4 GiB and more.
+/// [`Error::TooDeep`] and [`Error::TooMany`] for what a server of this crate would not read either;
+/// [`Error::WrongField`] for text, bytes or lists of 4 GiB and more.
 pub fn pack(map: &Map) -> Result<Vec<u8>> {
     let mut writer = Writer { bytes: Vec::new(), left: super::VALUES - 1 };
     writer.map(map, 1)?;

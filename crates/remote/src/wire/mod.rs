@@ -1,5 +1,6 @@
-//! MessagePack with NumPy arrays in it, as `openpi_client.msgpack_numpy` writes it: an array is a map with the keys `__ndarray__`,
-//! `data`, `dtype`, `shape`, a NumPy number one with `__npgeneric__`, `data`, `dtype`. These keys are byte strings, others are text.
+//! MessagePack with NumPy arrays in it, as `openpi_client.msgpack_numpy` writes it: an array is a
+//! map with the keys `__ndarray__`, `data`, `dtype`, `shape`, a NumPy number one with
+//! `__npgeneric__`, `data`, `dtype`. These keys are byte strings, others are text.
 
 mod decode;
 mod encode;

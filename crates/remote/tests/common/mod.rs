@@ -26,7 +26,8 @@ impl Drop for Hostile {
     }
 }
 
-/// Does `act` with the first connection. Reads of the server end after five seconds, so that no test hangs.
+/// Does `act` with the first connection. Reads of the server end after five seconds, so that no
+/// test hangs.
 pub fn raw(act: impl FnOnce(TcpStream) + Send + 'static) -> Hostile {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("ws://{}", listener.local_addr().unwrap());

@@ -51,7 +51,8 @@ pub struct Joint {
     pub kind: JointKind,
     /// Pose of its link in the parent's axes at position zero.
     pub placement: Pose,
-    /// Axis in its link's axes, through the link's origin. Any length but zero; kept as a unit vector.
+    /// Axis in its link's axes, through the link's origin. Any length but zero; kept as a unit
+    /// vector.
     pub axis: DVec3,
     /// Its limits.
     pub limits: JointLimits,
@@ -74,7 +75,8 @@ pub struct Segment {
     pub mass: MassProperties,
 }
 
-/// A chain of links, each moved by one joint, with a payload at its flange: a robot arm. Immutable; `with_*` make another one.
+/// A chain of links, each moved by one joint, with a payload at its flange: a robot arm. Immutable;
+/// `with_*` make another one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SerialArm {
     name: String,
@@ -89,12 +91,14 @@ pub struct SerialArm {
 }
 
 impl SerialArm {
-    /// An arm from its base outwards. `flange` is the pose of the flange in the last link's axes. The base is at the world's origin, gravity
-    /// 9.81 m/s2 along -z, the home posture zero or, where limits forbid that, the middle of the range.
+    /// An arm from its base outwards. `flange` is the pose of the flange in the last link's axes.
+    /// The base is at the world's origin, gravity 9.81 m/s2 along -z, the home posture zero or,
+    /// where limits forbid that, the middle of the range.
     ///
     /// # Errors
-    /// No joint or more than [`MAX_JOINTS`]; an axis of no length; limits the wrong way round; a number that is negative or not finite where
-    /// it must not be; a body that cannot exist; links and armature so light that nothing resists a joint.
+    /// No joint or more than [`MAX_JOINTS`]; an axis of no length; limits the wrong way round; a
+    /// number that is negative or not finite where it must not be; a body that cannot exist; links
+    /// and armature so light that nothing resists a joint.
     pub fn new(name: impl Into<String>, segments: Vec<Segment>, flange: Pose) -> Result<Self> {
         let name = name.into();
         let n = segments.len();
@@ -152,7 +156,8 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// The same arm with this fixed to its flange, in the flange's axes, in place of what was there.
+    /// The same arm with this fixed to its flange, in the flange's axes, in place of what was
+    /// there.
     ///
     /// # Errors
     /// A body that cannot exist.
@@ -163,7 +168,8 @@ impl SerialArm {
         self.checked()
     }
 
-    /// The same arm with another home posture: where it starts, and where [`SerialArm::inverse`] likes to have the elbow.
+    /// The same arm with another home posture: where it starts, and where [`SerialArm::inverse`]
+    /// likes to have the elbow.
     ///
     /// # Errors
     /// Not a number a joint, or one beyond its limits.
@@ -172,11 +178,12 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// The same arm with every link's mass and inertia times `links` and the payload's times `payload`: what a controller that is mistaken
-    /// believes. Rotors stay as they are.
+    /// The same arm with every link's mass and inertia times `links` and the payload's times
+    /// `payload`: what a controller that is mistaken believes. Rotors stay as they are.
     ///
     /// # Errors
-    /// A factor that is not positive (the payload's may be zero) or so small that nothing resists a joint.
+    /// A factor that is not positive (the payload's may be zero) or so small that nothing resists a
+    /// joint.
     pub fn with_mass_scaled(mut self, links: f64, payload: f64) -> Result<Self> {
         if !(links > 0.0 && links.is_finite() && payload >= 0.0 && payload.is_finite()) {
             return Err(Error::invalid("mass factor", "must be positive and finite"));
@@ -189,7 +196,8 @@ impl SerialArm {
         self.checked()
     }
 
-    /// The same arm with this Coulomb friction [N m or N] and viscous damping [N m s/rad or N s/m] in its joints.
+    /// The same arm with this Coulomb friction [N m or N] and viscous damping [N m s/rad or N s/m]
+    /// in its joints.
     ///
     /// # Errors
     /// Not a number a joint, or one that is negative or not finite.

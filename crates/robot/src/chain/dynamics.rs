@@ -1,8 +1,9 @@
 //! What it takes to move an arm: mass matrix, bias forces, inverse and forward dynamics.
 //!
-//! The recursions run in world axes about each link's centre of mass, which for a chain costs little more than link axes and needs no
-//! transforms: Newton-Euler outwards and inwards (Lynch and Park 2017, section 8.3; Featherstone 2008, section 5.3) and composite rigid
-//! bodies (Featherstone 2008, section 6.2). A rotor adds its armature to its joint alone.
+//! The recursions run in world axes about each link's centre of mass, which for a chain costs
+//! little more than link axes and needs no transforms: Newton-Euler outwards and inwards (Lynch and
+//! Park 2017, section 8.3; Featherstone 2008, section 5.3) and composite rigid bodies (Featherstone
+//! 2008, section 6.2). A rotor adds its armature to its joint alone.
 
 use super::arm::SerialArm;
 use super::frames::Frames;
@@ -58,7 +59,8 @@ impl SerialArm {
         self.composite(&frames, &self.place(&frames))
     }
 
-    /// Coriolis, centrifugal and gravity torques at rates `qd`: what holds the joints at zero acceleration.
+    /// Coriolis, centrifugal and gravity torques at rates `qd`: what holds the joints at zero
+    /// acceleration.
     pub fn bias(&self, q: &Joints, qd: &Joints) -> Joints {
         self.inverse_dynamics(q, qd, &self.zeros())
     }
@@ -68,14 +70,15 @@ impl SerialArm {
         self.inverse_dynamics(q, &self.zeros(), &self.zeros())
     }
 
-    /// The torques that give the accelerations `qdd`. Damping and friction of the joints are not in it.
+    /// The torques that give the accelerations `qdd`. Damping and friction of the joints are not in
+    /// it.
     pub fn inverse_dynamics(&self, q: &Joints, qd: &Joints, qdd: &Joints) -> Joints {
         let frames = self.frames(q);
         self.newton_euler(&frames, &self.place(&frames), qd, qdd, self.gravity())
     }
 
-    /// The accelerations under joint torques and loads on links. Damping, friction and limits of the joints are not in it: see
-    /// [`SerialArm::step`].
+    /// The accelerations under joint torques and loads on links. Damping, friction and limits of
+    /// the joints are not in it: see [`SerialArm::step`].
     ///
     /// # Errors
     /// A mass matrix that is not positive definite, which a number that is not finite makes.
@@ -113,7 +116,8 @@ impl SerialArm {
         placed
     }
 
-    /// The torques for rates `qd` and accelerations `qdd`. Gravity is an acceleration of the base against it.
+    /// The torques for rates `qd` and accelerations `qdd`. Gravity is an acceleration of the base
+    /// against it.
     fn newton_euler(&self, frames: &Frames, bodies: &Bodies, qd: &Joints, qdd: &Joints, gravity: DVec3) -> Joints {
         let n = self.dof();
         let mut forces = [DVec3::ZERO; MAX_JOINTS];
@@ -168,7 +172,8 @@ impl SerialArm {
                 center += d * (added / sum);
             }
             mass = sum;
-            // Momentum of the composite at unit speed of joint j, angular about the composite's centre.
+            // Momentum of the composite at unit speed of joint j, angular about the composite's
+            // centre.
             let z = frames.axis(j);
             let (p, l) = if frames.turns(j) {
                 (mass * z.cross(center - frames.link(j).translation), inertia * z)

@@ -173,13 +173,16 @@ const HOME: [f64; 7] = [0.0, 0.0, 0.0, -FRAC_PI_2, 0.0, FRAC_PI_2, -FRAC_PI_4];
 impl SerialArm {
     /// A Franka Research 3 without hand, its base at the world's origin.
     ///
-    /// Kinematics, masses, inertias and limits of position, speed and torque are those of the manufacturer's `franka_description`
-    /// (commit 566ba44, `robots/fr3`); the acceleration limit is that of the manufacturer's control interface. Rotor inertia, damping and Coulomb
-    /// friction, which the manufacturer does not publish as identified values, and the home posture are those of the MuJoCo Menagerie's
-    /// `franka_fr3`. (`franka_description` has 0.2 N m and 0.003 N m s/rad for every joint: see [`SerialArm::with_friction`].)
+    /// Kinematics, masses, inertias and limits of position, speed and torque are those of the
+    /// manufacturer's `franka_description` (commit 566ba44, `robots/fr3`); the acceleration limit
+    /// is that of the manufacturer's control interface. Rotor inertia, damping and Coulomb
+    /// friction, which the manufacturer does not publish as identified values, and the home posture
+    /// are those of the MuJoCo Menagerie's `franka_fr3`. (`franka_description` has 0.2 N m and
+    /// 0.003 N m s/rad for every joint: see [`SerialArm::with_friction`].)
     ///
-    /// The limits are the manufacturer's because they are what the real arm's controller enforces; some versions of the Menagerie's file have wider
-    /// ones. The speed limits are those of the description: the real arm's also depend on position.
+    /// The limits are the manufacturer's because they are what the real arm's controller enforces;
+    /// some versions of the Menagerie's file have wider ones. The speed limits are those of the
+    /// description: the real arm's also depend on position.
     ///
     /// # Errors
     /// None: the table is checked like any other.

@@ -17,7 +17,8 @@ pub struct Frames {
 }
 
 impl SerialArm {
-    /// Forward kinematics: where everything is at posture `q` [rad or m], limits or not (Lynch and Park 2017, section 4.1).
+    /// Forward kinematics: where everything is at posture `q` [rad or m], limits or not (Lynch and
+    /// Park 2017, section 4.1).
     pub fn frames(&self, q: &Joints) -> Frames {
         let n = self.dof();
         let mut frames = Frames {
@@ -77,8 +78,8 @@ impl Frames {
         self.turns[i]
     }
 
-    /// The geometric Jacobian of the point of link `i` that is at `point` in the world [m] (Lynch and Park 2017, section 5.1). Beyond the
-    /// last link, of the last.
+    /// The geometric Jacobian of the point of link `i` that is at `point` in the world [m] (Lynch
+    /// and Park 2017, section 5.1). Beyond the last link, of the last.
     pub fn jacobian(&self, i: usize, point: DVec3) -> Jacobian {
         let mut j = Jacobian { n: self.n, linear: [DVec3::ZERO; MAX_JOINTS], angular: [DVec3::ZERO; MAX_JOINTS] };
         for k in 0..self.n.min(i.saturating_add(1)) {
@@ -117,7 +118,8 @@ impl Jacobian {
         &self.angular[..self.n]
     }
 
-    /// Velocity of the point [m/s] and angular velocity of its link [rad/s] at the joint rates `qd`.
+    /// Velocity of the point [m/s] and angular velocity of its link [rad/s] at the joint rates
+    /// `qd`.
     pub fn velocity(&self, qd: &Joints) -> (DVec3, DVec3) {
         let mut v = (DVec3::ZERO, DVec3::ZERO);
         for k in 0..self.n {
@@ -127,12 +129,14 @@ impl Jacobian {
         v
     }
 
-    /// The joint torques that hold a force [N] at the point and a torque [N m] on the link: J^T (force, torque).
+    /// The joint torques that hold a force [N] at the point and a torque [N m] on the link: J^T
+    /// (force, torque).
     pub fn torque(&self, force: DVec3, torque: DVec3) -> Joints {
         Joints::from_fn(self.n, |k| self.linear[k].dot(force) + self.angular[k].dot(torque))
     }
 
-    /// The row of the point's motion along `direction`: its product with the joint rates is the speed that way.
+    /// The row of the point's motion along `direction`: its product with the joint rates is the
+    /// speed that way.
     pub fn row(&self, direction: DVec3) -> Joints {
         self.torque(direction, DVec3::ZERO)
     }

@@ -1,7 +1,8 @@
 //! Inverse kinematics: the posture that brings the flange to a pose.
 //!
-//! Levenberg-Marquardt with the damping of Sugihara (2011), which is smooth whether or not the pose can be reached, in the joints' box by an active
-//! set; the motion that leaves the flange where it is (a seventh joint's) goes towards a preferred posture and away from limits.
+//! Levenberg-Marquardt with the damping of Sugihara (2011), which is smooth whether or not the pose
+//! can be reached, in the joints' box by an active set; the motion that leaves the flange where it
+//! is (a seventh joint's) goes towards a preferred posture and away from limits.
 
 use super::arm::SerialArm;
 use super::frames::Frames;
@@ -11,7 +12,8 @@ use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use trocar_geometry::Pose;
 
-/// Rotations are weighed against translations as if at this distance [m]: about an instrument's length.
+/// Rotations are weighed against translations as if at this distance [m]: about an instrument's
+/// length.
 pub(crate) const LEVER: f64 = 0.3;
 /// Damping that is always there [m2]: singular values below its root are not trusted.
 const FLOOR: f64 = 1e-6;
@@ -33,10 +35,11 @@ pub struct InverseOptions {
     pub posture_tolerance: f64,
     /// Most iterations of one search.
     pub iterations: usize,
-    /// Other starts that are tried where the first does not reach the target: the preferred posture, then postures all over the range. Zero for
-    /// a smooth motion.
+    /// Other starts that are tried where the first does not reach the target: the preferred
+    /// posture, then postures all over the range. Zero for a smooth motion.
     pub restarts: usize,
-    /// No joint ends further from its start than its highest speed takes it in this time [s]. Infinite: no bound.
+    /// No joint ends further from its start than its highest speed takes it in this time [s].
+    /// Infinite: no bound.
     pub within: f64,
 }
 
@@ -79,8 +82,9 @@ impl Reached {
 }
 
 impl SerialArm {
-    /// Looks for the posture whose flange is at `target` in the world, from the posture `start` on. Never fails to answer: where the pose cannot
-    /// be reached, the nearest posture that was found comes with what is missing.
+    /// Looks for the posture whose flange is at `target` in the world, from the posture `start` on.
+    /// Never fails to answer: where the pose cannot be reached, the nearest posture that was found
+    /// comes with what is missing.
     ///
     /// # Errors
     /// A target or start that is not finite, or not a number a joint.
@@ -176,7 +180,8 @@ impl Search<'_> {
         let near = |m: &(DVec3, DVec3)| m.0.length() <= close && m.1.length() <= straight;
         let square = |m: &(DVec3, DVec3)| m.0.length_squared() + (LEVER * m.1).length_squared();
         let mut wishes = elbow;
-        // How much shorter than usual the steps are to be, after one that led away; and for how many none came much nearer.
+        // How much shorter than usual the steps are to be, after one that led away; and for how
+        // many none came much nearer.
         let (mut caution, mut stride, mut stalled) = (1.0, STRIDE, 0);
         let mut iterations = 0;
         while iterations < self.options.iterations {
@@ -281,7 +286,8 @@ impl Search<'_> {
         if !wishes {
             return (step, 0.0);
         }
-        // Then what leaves it in place, as far as the room that is left allows: a wish must never push the flange away.
+        // Then what leaves it in place, as far as the room that is left allows: a wish must never
+        // push the flange away.
         let mut elbow = Joints::zeros(n);
         let room = |i: usize, way: f64| {
             let end = if way > 0.0 { ranges[i][1] } else { ranges[i][0] };
@@ -310,7 +316,8 @@ impl Search<'_> {
         (step, elbow.max_abs())
     }
 
-    /// Where joint `i` would go if it were free: half way to the preferred posture, and off a limit that is near.
+    /// Where joint `i` would go if it were free: half way to the preferred posture, and off a limit
+    /// that is near.
     fn wish(&self, i: usize, q: f64) -> f64 {
         let [low, high] = self.arm.segments()[i].joint.limits.position;
         let margin = self.options.margin.max(0.0).min(0.25 * (high - low));
@@ -319,8 +326,9 @@ impl Search<'_> {
     }
 }
 
-/// J^T (J J^T + damping)^-1 e over the joints that are not held, made better `rounds - 1` times with what is still missing (iterated
-/// Tikhonov), so that damping costs accuracy only where the arm is singular.
+/// J^T (J J^T + damping)^-1 e over the joints that are not held, made better `rounds - 1` times
+/// with what is still missing (iterated Tikhonov), so that damping costs accuracy only where the
+/// arm is singular.
 pub(crate) fn solve(
     rows: &[Joints; TASK],
     held: JointSet,

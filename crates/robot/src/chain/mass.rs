@@ -20,7 +20,8 @@ impl MassProperties {
     /// Nothing.
     pub const NONE: Self = Self { mass: 0.0, center: DVec3::ZERO, inertia: DMat3::ZERO };
 
-    /// A tube of `mass` [kg] along z around `center`; with `inner` 0 it is solid. Radii and length in metres.
+    /// A tube of `mass` [kg] along z around `center`; with `inner` 0 it is solid. Radii and length
+    /// in metres.
     pub fn tube(mass: f64, outer: f64, inner: f64, length: f64, center: DVec3) -> Self {
         let square = outer * outer + inner * inner;
         let across = mass * (3.0 * square + length * length) / 12.0;
@@ -52,8 +53,9 @@ impl MassProperties {
     /// Is it a body that can exist? A mass of zero is.
     ///
     /// # Errors
-    /// A number that is not finite, a negative mass, an inertia that is not symmetric, or whose principal moments are negative or one of them
-    /// more than the sum of the others. `what` names the body in the message.
+    /// A number that is not finite, a negative mass, an inertia that is not symmetric, or whose
+    /// principal moments are negative or one of them more than the sum of the others. `what` names
+    /// the body in the message.
     pub fn validate(&self, what: &str) -> Result<()> {
         let fail = |reason: String| Err(Error::invalid(what, reason));
         if !(self.mass.is_finite() && self.center.is_finite() && self.inertia.is_finite()) {
@@ -68,8 +70,8 @@ impl MassProperties {
         if skew.max((m.z_axis.y - m.y_axis.z).abs()) > 1e-9 * size {
             return fail("the inertia must be symmetric".into());
         }
-        // trace/2 - I is the second moment of mass, which is positive semidefinite exactly when the moments obey the triangle inequality;
-        // published tables are rounded, hence the tolerance.
+        // trace/2 - I is the second moment of mass, which is positive semidefinite exactly when the
+        // moments obey the triangle inequality; published tables are rounded, hence the tolerance.
         let half = 0.5 * (m.x_axis.x + m.y_axis.y + m.z_axis.z);
         if !semidefinite(DMat3::from_diagonal(DVec3::splat(half)) - m, 1e-3 * size) {
             return fail(
@@ -89,7 +91,8 @@ pub(crate) fn point_inertia(m: f64, d: DVec3) -> DMat3 {
     DMat3::from_diagonal(DVec3::splat(s)) - DMat3::from_cols(d * (m * d.x), d * (m * d.y), d * (m * d.z))
 }
 
-/// Whether no eigenvalue of the symmetric `m` is below `-slack`: all principal minors of the shifted matrix.
+/// Whether no eigenvalue of the symmetric `m` is below `-slack`: all principal minors of the
+/// shifted matrix.
 fn semidefinite(m: DMat3, slack: f64) -> bool {
     let a = m + DMat3::from_diagonal(DVec3::splat(slack));
     let (x, y, z) = (a.x_axis, a.y_axis, a.z_axis);

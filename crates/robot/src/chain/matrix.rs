@@ -53,7 +53,8 @@ impl JointMatrix {
         Joints::from_fn(self.n, |i| (0..self.n).map(|j| self.rows[i][j] * v.at(j)).sum())
     }
 
-    /// The Cholesky factor L, L L^T = self; `None` where the matrix is not positive definite (or not finite).
+    /// The Cholesky factor L, L L^T = self; `None` where the matrix is not positive definite (or
+    /// not finite).
     pub fn factor(&self) -> Option<JointFactor> {
         let n = self.n;
         let mut l = JointFactor { n, rows: [[0.0; MAX_JOINTS]; MAX_JOINTS], inverse: [0.0; MAX_JOINTS] };

@@ -1,11 +1,13 @@
 //! Serial arms: their description, kinematics and dynamics.
 //!
-//! A [`SerialArm`] is immutable: joints, links and what is fixed to the flange. [`Frames`] says where its links are at a posture,
-//! [`SerialArm::dynamics`] what it takes to move them, [`SerialArm::step`] moves an [`ArmState`] on in time and [`SerialArm::inverse`]
-//! finds the posture of a flange pose. Nothing of it allocates.
+//! A [`SerialArm`] is immutable: joints, links and what is fixed to the flange. [`Frames`] says
+//! where its links are at a posture, [`SerialArm::dynamics`] what it takes to move them,
+//! [`SerialArm::step`] moves an [`ArmState`] on in time and [`SerialArm::inverse`] finds the
+//! posture of a flange pose. Nothing of it allocates.
 //!
-//! Everything is computed in world axes by the recursions of Featherstone, *Rigid Body Dynamics Algorithms* (2008) and of Lynch and
-//! Park, *Modern Robotics* (2017), which are cited where they are used.
+//! Everything is computed in world axes by the recursions of Featherstone, *Rigid Body Dynamics
+//! Algorithms* (2008) and of Lynch and Park, *Modern Robotics* (2017), which are cited where they
+//! are used.
 
 mod arm;
 mod describe;

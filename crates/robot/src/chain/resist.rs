@@ -1,16 +1,19 @@
-//! The velocities after a step, under what resists them: Coulomb friction, stops and stiff contacts, all implicit.
+//! The velocities after a step, under what resists them: Coulomb friction, stops and stiff
+//! contacts, all implicit.
 //!
 //! They are the minimum of a convex function of the joint velocities v,
 //!
 //! F(v) = v^T H v / 2 - b^T v + sum_i f_i |v_i| + sum_r phi_r(J_r v),  low_i <= v_i <= high_i,
 //!
-//! Gauss's principle of least constraint for one step of implicit Euler (Moreau's time stepping; Todorov 2014 writes it so). H is the mass matrix
-//! with the implicit damping, f_i the friction's impulse, phi_r the potential of a spring that may only push or may slip. In velocities,
-//! rather than in impulses, a joint that sticks has a velocity of exactly zero, so that it does not creep, and one that reaches a stop has
-//! exactly the velocity that brings it there.
+//! Gauss's principle of least constraint for one step of implicit Euler (Moreau's time stepping;
+//! Todorov 2014 writes it so). H is the mass matrix with the implicit damping, f_i the friction's
+//! impulse, phi_r the potential of a spring that may only push or may slip. In velocities, rather
+//! than in impulses, a joint that sticks has a velocity of exactly zero, so that it does not creep,
+//! and one that reaches a stop has exactly the velocity that brings it there.
 //!
-//! A round is a sweep of exact proximal steps, joint by joint, which finds what sticks, and then a Newton step of the joints that move.
-//! Both go down, and F is convex, so the rounds converge; two or three are usual.
+//! A round is a sweep of exact proximal steps, joint by joint, which finds what sticks, and then a
+//! Newton step of the joints that move. Both go down, and F is convex, so the rounds converge; two
+//! or three are usual.
 
 use super::joints::{JointSet, Joints, MAX_JOINTS};
 use super::matrix::JointMatrix;
@@ -22,7 +25,8 @@ const TOLERANCE: f64 = 1e-12;
 /// Changes of impulse below this share of those that are summed are rounding.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// A resistance along one direction in joint space: an impulse `-(offset + slope u)` at the speed u = row . v, within bounds.
+/// A resistance along one direction in joint space: an impulse `-(offset + slope u)` at the speed u
+/// = row . v, within bounds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
     pub row: Joints,
@@ -139,7 +143,8 @@ impl Problem<'_> {
         }
     }
 
-    /// A Newton step of the joints that neither stick nor are stopped, as far as none of them sticks or is stopped on the way.
+    /// A Newton step of the joints that neither stick nor are stopped, as far as none of them
+    /// sticks or is stopped on the way.
     fn newton(&self, v: &mut Joints) {
         let n = v.len();
         let mut free = JointSet::default();
@@ -197,8 +202,8 @@ impl Problem<'_> {
             (0..m).map(|a| (g[list[a]] + slide(list[a], old[list[a]])) * d[a]).sum::<f64>()
         };
         let end = go(reach);
-        // Where rows begin or cease to yield on the way, the function is not the parabola that the step was made for: the minimum along it
-        // is searched by halving, the slope being monotone.
+        // Where rows begin or cease to yield on the way, the function is not the parabola that the
+        // step was made for: the minimum along it is searched by halving, the slope being monotone.
         if self.rows.iter().any(|r| r.yields(&old) != r.yields(&end)) && slope(&end) > 0.0 {
             let (mut low, mut high) = (0.0, reach);
             for _ in 0..30 {

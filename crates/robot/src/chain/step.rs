@@ -1,6 +1,7 @@
 //! An arm's state, and its motion through one physics step.
 //!
-//! Semi-implicit Euler: rigid-body forces at the step's beginning; damping, friction, stops and couplings at its end (`resist.rs`).
+//! Semi-implicit Euler: rigid-body forces at the step's beginning; damping, friction, stops and
+//! couplings at its end (`resist.rs`).
 
 use super::arm::SerialArm;
 use super::joints::{JointSet, Joints};
@@ -36,8 +37,8 @@ pub enum CouplingLaw {
     Bilateral,
     /// Only pushes along the row: a touch. A displacement above zero is a gap.
     Push,
-    /// Coulomb friction: at most `coefficient` times the magnitude of the force of the coupling number `of`, which must be a
-    /// [`CouplingLaw::Bilateral`] or [`CouplingLaw::Push`] one.
+    /// Coulomb friction: at most `coefficient` times the magnitude of the force of the coupling
+    /// number `of`, which must be a [`CouplingLaw::Bilateral`] or [`CouplingLaw::Push`] one.
     Friction {
         /// The coupling that presses, by its place in the list.
         of: usize,
@@ -46,19 +47,24 @@ pub enum CouplingLaw {
     },
 }
 
-/// A stiff spring with a damper between the arm and the world along one direction: what a port's rim, a table or a hand does to it. It is
-/// implicit, so that no stiffness is too high for the step.
+/// A stiff spring with a damper between the arm and the world along one direction: what a port's
+/// rim, a table or a hand does to it. It is implicit, so that no stiffness is too high for the
+/// step.
 ///
-/// With u = row . qd the force along the row is -(stiffness x displacement + damping u), within what the law allows.
+/// With u = row . qd the force along the row is -(stiffness x displacement + damping u), within
+/// what the law allows.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
-    /// Speed along the direction a unit of joint rate: a row of a Jacobian, from [`super::Jacobian::row`].
+    /// Speed along the direction a unit of joint rate: a row of a Jacobian, from
+    /// [`super::Jacobian::row`].
     pub row: Joints,
-    /// How far the spring is stretched along the row [m or rad]. Given for the step's beginning; after it, for its end.
+    /// How far the spring is stretched along the row [m or rad]. Given for the step's beginning;
+    /// after it, for its end.
     pub displacement: f64,
     /// Stiffness [N/m or N m/rad].
     pub stiffness: f64,
-    /// Damping [N s/m or N m s/rad]. A push may begin a little before the gap closes where this is not small beside stiffness times step.
+    /// Damping [N s/m or N m s/rad]. A push may begin a little before the gap closes where this is
+    /// not small beside stiffness times step.
     pub damping: f64,
     /// Which forces are possible.
     pub law: CouplingLaw,
@@ -97,21 +103,25 @@ pub struct StepReport {
     pub at_velocity_limit: JointSet,
     /// Joints that friction held still at the end of the step.
     pub stuck: JointSet,
-    /// Whether the velocities solved their equations to rounding in every sub-step. Where they did not, which takes touches of very
-    /// different stiffness, they are finite and within limits, and the step may be repeated with more sub-steps.
+    /// Whether the velocities solved their equations to rounding in every sub-step. Where they did
+    /// not, which takes touches of very different stiffness, they are finite and within limits, and
+    /// the step may be repeated with more sub-steps.
     pub converged: bool,
 }
 
 impl SerialArm {
-    /// Moves the state on by `dt` [s] in `substeps` equal parts. Allocates nothing; the same numbers give the same bits.
+    /// Moves the state on by `dt` [s] in `substeps` equal parts. Allocates nothing; the same
+    /// numbers give the same bits.
     ///
-    /// Positions never leave their limits (a state that is outside is let in, not pulled in), speeds never exceed theirs. Rows of couplings hold
-    /// for the whole step, displacements advance in it. Friction is Coulomb's, the same at rest and in motion: a joint whose load is below it
+    /// Positions never leave their limits (a state that is outside is let in, not pulled in),
+    /// speeds never exceed theirs. Rows of couplings hold for the whole step, displacements advance
+    /// in it. Friction is Coulomb's, the same at rest and in motion: a joint whose load is below it
     /// stands still to the bit.
     ///
     /// # Errors
-    /// A length of step that is not positive, no substep, more than [`MAX_COUPLINGS`] or an impossible coupling, or a number that is not finite, be it
-    /// given or a result. State and couplings are then as before.
+    /// A length of step that is not positive, no substep, more than [`MAX_COUPLINGS`] or an
+    /// impossible coupling, or a number that is not finite, be it given or a result. State and
+    /// couplings are then as before.
     pub fn step(
         &self,
         state: &mut ArmState,

@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 /// Where an instrument is in its port: what an arm is told, and what it reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Coordinates {
-    /// The two pivots [rad]: the first turns about the port's x, the second about the y that the first has turned.
+    /// The two pivots [rad]: the first turns about the port's x, the second about the y that the
+    /// first has turned.
     pub pivots: [f64; 2],
     /// Distance from the port's centre to the jaw's pivot [m], along the shaft.
     pub insertion: f64,
@@ -54,7 +55,8 @@ impl Coordinates {
     }
 }
 
-/// How far an instrument may go in a port. The pivots are limited together, by the tilt, as the round hole limits them.
+/// How far an instrument may go in a port. The pivots are limited together, by the tilt, as the
+/// round hole limits them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
     /// Greatest tilt [rad].
@@ -65,7 +67,8 @@ pub struct Limits {
     pub roll: [f64; 2],
 }
 
-/// By how much something lies outside its limits: 0 within, positive above the upper, negative below the lower.
+/// By how much something lies outside its limits: 0 within, positive above the upper, negative
+/// below the lower.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Excess {
     /// Of the tilt [rad].
@@ -95,7 +98,8 @@ impl Limits {
     /// Says whether the limits can be used.
     ///
     /// # Errors
-    /// A tilt of 0 or of 80 degrees and more (the second pivot is singular at 90), an empty range, an insertion that is not positive, a number that is not finite.
+    /// A tilt of 0 or of 80 degrees and more (the second pivot is singular at 90), an empty range,
+    /// an insertion that is not positive, a number that is not finite.
     pub fn check(&self) -> Result<()> {
         within("limits, tilt", self.tilt, 1e-3, 80_f64.to_radians(), "rad")?;
         within("limits, insertion[0]", self.insertion[0], 1e-3, 2.0, "m")?;
@@ -105,8 +109,9 @@ impl Limits {
         Ok(())
     }
 
-    /// The nearest coordinates within the limits, and what was cut off. Where the tilt is too great it is taken back towards the normal in its own
-    /// direction, so that coordinates that move continuously stay so. Numbers that are not finite are not made better.
+    /// The nearest coordinates within the limits, and what was cut off. Where the tilt is too great
+    /// it is taken back towards the normal in its own direction, so that coordinates that move
+    /// continuously stay so. Numbers that are not finite are not made better.
     pub fn clamp(&self, wanted: &Coordinates) -> (Coordinates, Excess) {
         let mut excess = Excess::default();
         let mut clamped = *wanted;
@@ -130,7 +135,8 @@ pub(crate) fn cut(value: f64, [low, high]: [f64; 2]) -> (f64, f64) {
     if value.is_nan() { (value, value) } else { (kept, value - kept) }
 }
 
-/// The pivots that turn the port's z to a direction (its part in the port's plane, its part along z > 0).
+/// The pivots that turn the port's z to a direction (its part in the port's plane, its part along z
+/// > 0).
 pub(crate) fn pivots(across: DVec2, along: f64) -> [f64; 2] {
     [(-across.y).atan2(along), across.x.atan2(across.y.hypot(along))]
 }

@@ -6,8 +6,10 @@
 //!     +---> z         +---> z (along the shaft)                           +---> x (along the closed blades)
 //! ```
 //!
-//! Three frames: the *flange* (the arm's tool mount), the *shaft frame* with its origin at the shaft's base and z along the shaft, and the *tip
-//! frame*, which is the gripper's of `trocar-cell`: origin at the jaw's pivot, x along the shaft, y across the closing plane, z along the hinge.
+//! Three frames: the *flange* (the arm's tool mount), the *shaft frame* with its origin at the
+//! shaft's base and z along the shaft, and the *tip frame*, which is the gripper's of
+//! `trocar-cell`: origin at the jaw's pivot, x along the shaft, y across the closing plane, z along
+//! the hinge.
 
 pub(crate) mod coordinates;
 
@@ -58,12 +60,14 @@ pub struct Jaw {
 }
 
 impl Jaw {
-    /// The angle between the blades [rad] at an opening 0 to 1; openings outside are clamped, NaN is closed.
+    /// The angle between the blades [rad] at an opening 0 to 1; openings outside are clamped, NaN
+    /// is closed.
     pub fn angle(&self, opening: f64) -> f64 {
         self.max_angle * share(opening)
     }
 
-    /// The opening 0 to 1 after `seconds` on the way from `opening` to `target`, no faster than the jaw.
+    /// The opening 0 to 1 after `seconds` on the way from `opening` to `target`, no faster than the
+    /// jaw.
     pub fn toward(&self, opening: f64, target: f64, seconds: f64) -> f64 {
         let most = (self.speed * seconds / self.max_angle).max(0.0);
         share(opening + (share(target) - opening).max(-most).min(most))
@@ -92,7 +96,8 @@ impl Instrument {
         Self::motorised("grasper", &head, FRAC_PI_3 / 0.3)
     }
 
-    /// The motorised cutter of the right arm: as the grasper, with the motor farther to the side and a faster jaw.
+    /// The motorised cutter of the right arm: as the grasper, with the motor farther to the side
+    /// and a faster jaw.
     pub fn cutter() -> Self {
         let head = Head { radius: 0.026, length: 0.09, aside: 0.009 };
         Self::motorised("cutter", &head, FRAC_PI_3 / 0.2)
@@ -150,7 +155,8 @@ impl Instrument {
     /// Says whether the description can be used.
     ///
     /// # Errors
-    /// A length, angle or mass that is no instrument's, a number that is not finite, an inertia that no body has.
+    /// A length, angle or mass that is no instrument's, a number that is not finite, an inertia
+    /// that no body has.
     pub fn check(&self) -> Result<()> {
         let what = |field: &str| format!("instrument '{}', {field}", self.name);
         within(&what("shaft_radius"), self.shaft_radius, 5e-4, 0.02, "m")?;

@@ -7,15 +7,18 @@ use crate::instrument::Instrument;
 use crate::port::{Port, Shaft};
 use serde::{Deserialize, Serialize};
 
-/// Most torque that integral action or observer may add, as a share of the joint's limit: what is more is no error of a model.
+/// Most torque that integral action or observer may add, as a share of the joint's limit: what is
+/// more is no error of a model.
 const CORRECTION_SHARE: f64 = 0.3;
-/// Integral action and observer leave a joint alone that stands still this near to its reference [rad or m; rad/s or m/s]: with friction they would wind up
-/// and move it to and fro for ever. A touch over 0.05 mm at the tip.
+/// Integral action and observer leave a joint alone that stands still this near to its reference
+/// [rad or m; rad/s or m/s]: with friction they would wind up and move it to and fro for ever. A
+/// touch over 0.05 mm at the tip.
 const QUIET: [f64; 2] = [8e-5, 1e-4];
 /// They take it up again from here, or when its reference moves.
 const AWAKE: [f64; 2] = [1.6e-4, 1e-3];
 
-/// Damping of the task's error in joints [m2]: near postures in which the arm loses a direction the joints' own error is better.
+/// Damping of the task's error in joints [m2]: near postures in which the arm loses a direction the
+/// joints' own error is better.
 const TRUSTED: f64 = 1e-4;
 
 /// What a controller remembers between steps.
@@ -23,7 +26,8 @@ const TRUSTED: f64 = 1e-4;
 pub(super) struct Memory {
     /// The last torques [N m or N].
     pub torque: Joints,
-    /// Integral of the error [rad s or m s], or what the observer found: torques that the model does not know [N m or N].
+    /// Integral of the error [rad s or m s], or what the observer found: torques that the model
+    /// does not know [N m or N].
     pub correction: Joints,
     /// Joints that stand still where they should.
     pub asleep: JointSet,
@@ -59,7 +63,8 @@ pub(super) struct Plan<'a> {
 }
 
 impl Plan<'_> {
-    /// The torques for a step of `dt` [s]: within the arm's limits and their rate. `from` and `to` are the references at its beginning and end.
+    /// The torques for a step of `dt` [s]: within the arm's limits and their rate. `from` and `to`
+    /// are the references at its beginning and end.
     pub fn torque(
         &self,
         memory: &mut Memory,
@@ -132,9 +137,11 @@ impl Plan<'_> {
         }
     }
 
-    /// The acceleration that brings an error back: w^2 e + 2 z w e' where it is small. A torque that may change by no more than r a second gives a joint of inertia m no more
-    /// jerk than j = r/m, and a loop that asks for more swings up. So the speed of the way back, and its acceleration, grow with the root alone from where
-    /// to bring them to zero again at the loop's pace would take half that jerk.
+    /// The acceleration that brings an error back: w^2 e + 2 z w e' where it is small. A torque
+    /// that may change by no more than r a second gives a joint of inertia m no more jerk than j =
+    /// r/m, and a loop that asks for more swings up. So the speed of the way back, and its
+    /// acceleration, grow with the root alone from where to bring them to zero again at the loop's
+    /// pace would take half that jerk.
     fn correction(&self, error: f64, slower: f64, inertia: f64) -> f64 {
         let g = &self.settings.gains;
         let w = g.bandwidth;
@@ -151,7 +158,8 @@ impl Plan<'_> {
         self.believed.segments()[i].joint.limits.effort
     }
 
-    /// The joints' error as the tip, the port and the roll see it, the port's share weighed; the elbow's as it is.
+    /// The joints' error as the tip, the port and the roll see it, the port's share weighed; the
+    /// elbow's as it is.
     fn task_error(&self, behind: &Joints, dynamics: &Dynamics, from: &Reference) -> Joints {
         let n = behind.len();
         let (is, shall) = (dynamics.frames.flange(), self.believed.frames(&from.q).flange());
@@ -176,7 +184,8 @@ impl Plan<'_> {
         let away = there - here;
         let task = [d.x, d.y, d.z, away.dot(one), away.dot(two), LEVER * r.dot(shaft.direction)];
         let weighed = [0.0, 0.0, 0.0, (weight - 1.0) * task[3], (weight - 1.0) * task[4], 0.0];
-        // The joints' error already holds the task's to first order; what is added is the rest of it and the port's weight.
+        // The joints' error already holds the task's to first order; what is added is the rest of
+        // it and the port's weight.
         let extra: [f64; TASK] = std::array::from_fn(|a| task[a] - rows[a].dot(behind) + weighed[a]);
         let add = solve(&rows, JointSet::default(), extra, TRUSTED, 1);
         Joints::from_fn(n, |i| behind[i] + add[i])

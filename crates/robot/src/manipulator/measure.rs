@@ -37,7 +37,8 @@ impl Manipulator {
         self.instrument.tip(&self.flange())
     }
 
-    /// Pose of the tip that the controller is given now: the reference, which is behind the command by its filter.
+    /// Pose of the tip that the controller is given now: the reference, which is behind the command
+    /// by its filter.
     pub fn setpoint_cp(&self) -> Pose {
         self.instrument.tip(&self.arm.frames(&self.state.reference.q).flange())
     }
@@ -50,8 +51,9 @@ impl Manipulator {
         Twist { linear, angular }
     }
 
-    /// What a six-axis sensor at the mount reads, mean over the last step: what the instrument does to the mount, with its weight, its inertia, the load on its
-    /// tip and the rim's forces; in the flange's frame, torque about its origin, as [`LoadModel`](crate::wrench::LoadModel) has it.
+    /// What a six-axis sensor at the mount reads, mean over the last step: what the instrument does
+    /// to the mount, with its weight, its inertia, the load on its tip and the rim's forces; in the
+    /// flange's frame, torque about its origin, as [`LoadModel`](crate::wrench::LoadModel) has it.
     pub fn measured_cf(&self) -> Wrench {
         let turn = self.flange().rotation.inverse();
         let [force, torque] = self.state.mount;
@@ -68,8 +70,9 @@ impl Manipulator {
         Shaft::of(&self.instrument, &self.flange())
     }
 
-    /// The instrument's coordinates as measured, and their rates: pivots [rad/s], insertion [m/s], roll [rad/s], jaw [1/s]. Where the shaft does not point into the body
-    /// any more, which takes joint commands, they are those of the reference at rest.
+    /// The instrument's coordinates as measured, and their rates: pivots [rad/s], insertion [m/s],
+    /// roll [rad/s], jaw [1/s]. Where the shaft does not point into the body any more, which takes
+    /// joint commands, they are those of the reference at rest.
     pub fn coordinates(&self) -> (Coordinates, [f64; 5]) {
         let frames = self.arm.frames(&self.state.arm.q);
         let flange = frames.flange();
@@ -136,8 +139,9 @@ impl Manipulator {
         }
     }
 
-    /// What the instrument does to the mount: its weight and what touches it (`outer`: force, and torque about the flange's origin at the
-    /// step's beginning) less what its momentum took (Newton and Euler). In the cell's axes.
+    /// What the instrument does to the mount: its weight and what touches it (`outer`: force, and
+    /// torque about the flange's origin at the step's beginning) less what its momentum took
+    /// (Newton and Euler). In the cell's axes.
     pub(super) fn mount_reading(
         &self,
         before: &ArmState,

@@ -5,10 +5,13 @@
 //!                         setpoint_*                            believes 2% and 5% less          measured_*
 //! ```
 //!
-//! Nothing is moved but by joint torques within the arm's limits. Words are those of CRTK (Su et al. 2020): `servo` commands, `setpoint` is what the controller is
-//! given, `measured` what is; `_cp` a pose, `_cv` a twist, `_cf` a force in the cell's axes, `_js` the joints, `_jp` their positions.
+//! Nothing is moved but by joint torques within the arm's limits. Words are those of CRTK (Su et
+//! al. 2020): `servo` commands, `setpoint` is what the controller is given, `measured` what is;
+//! `_cp` a pose, `_cv` a twist, `_cf` a force in the cell's axes, `_js` the joints, `_jp` their
+//! positions.
 //!
-//! A step allocates nothing, and its [`ManipulatorState`] is plain data: a copy restored goes on to the bit.
+//! A step allocates nothing, and its [`ManipulatorState`] is plain data: a copy restored goes on to
+//! the bit.
 
 mod control;
 mod measure;
@@ -78,9 +81,11 @@ pub struct Commanded {
     pub excess: Excess,
     /// How much of the way to what the limits leave the arm can go, 0 to 1: 1 where it reaches it.
     pub reach: f64,
-    /// What is left of a commanded orientation: axis times angle [rad], in the cell. Zero for coordinates.
+    /// What is left of a commanded orientation: axis times angle [rad], in the cell. Zero for
+    /// coordinates.
     pub rejected_rotation: DVec3,
-    /// What is left of a commanded position [m], in the cell, where a limit or the arm's reach binds. Zero for coordinates.
+    /// What is left of a commanded position [m], in the cell, where a limit or the arm's reach
+    /// binds. Zero for coordinates.
     pub rejected_translation: DVec3,
 }
 
@@ -91,7 +96,8 @@ pub struct StepReport {
     pub arm: chain::StepReport,
     /// Force with which the shaft presses the rim [N], the sum of its places, mean over the step.
     pub rim_force: f64,
-    /// Distance from the port's centre to the shaft's axis, in the port's plane [m], at the step's end.
+    /// Distance from the port's centre to the shaft's axis, in the port's plane [m], at the step's
+    /// end.
     pub rcm_deviation: f64,
     /// Share of the step that the reference went on: under 1 where the arm could not follow.
     pub pace: f64,
@@ -105,8 +111,8 @@ impl StepReport {
 }
 
 impl Manipulator {
-    /// `arm` in its place in the cell, with `instrument` at its flange in place of any payload, through `port`, at rest at `start`. The elbow is where the arm's
-    /// home posture draws it.
+    /// `arm` in its place in the cell, with `instrument` at its flange in place of any payload,
+    /// through `port`, at rest at `start`. The elbow is where the arm's home posture draws it.
     ///
     /// # Errors
     /// A part that cannot be used; a start outside the limits or one that the arm does not reach.
@@ -176,7 +182,8 @@ impl Manipulator {
         Ok(Commanded { coordinates, excess, reach, rejected_rotation: DVec3::ZERO, rejected_translation: DVec3::ZERO })
     }
 
-    /// Commands a pose of the tip in the cell, and the jaw's opening. Position first; what four degrees of freedom cannot do of the orientation is told.
+    /// Commands a pose of the tip in the cell, and the jaw's opening. Position first; what four
+    /// degrees of freedom cannot do of the orientation is told.
     ///
     /// # Errors
     /// A number that is not finite, a rotation that is not of unit length: nothing is changed.
@@ -202,7 +209,8 @@ impl Manipulator {
         })
     }
 
-    /// Commands the joints [rad or m]. Nothing keeps the shaft in the port's centre then, except its rim.
+    /// Commands the joints [rad or m]. Nothing keeps the shaft in the port's centre then, except
+    /// its rim.
     ///
     /// # Errors
     /// Not a number a joint, one that is not finite or beyond its limits: nothing is changed.
@@ -224,11 +232,13 @@ impl Manipulator {
         Ok(())
     }
 
-    /// One physics step of `dt` [s], 1/480 s for instance. `load` is what is done to the instrument's tip: a force [N] at the jaw's pivot and a torque [N m]
-    /// about it, along the cell's axes.
+    /// One physics step of `dt` [s], 1/480 s for instance. `load` is what is done to the
+    /// instrument's tip: a force [N] at the jaw's pivot and a torque [N m] about it, along the
+    /// cell's axes.
     ///
     /// # Errors
-    /// A step that is not between 0 and 20 ms, a load that is not finite, or one so great that a result is not: nothing is changed.
+    /// A step that is not between 0 and 20 ms, a load that is not finite, or one so great that a
+    /// result is not: nothing is changed.
     pub fn step(&mut self, load: Wrench, dt: f64) -> Result<StepReport> {
         if !(dt > 0.0 && dt <= LONGEST) {
             return Err(Error::invalid("step", format!("{dt} s is not between 0 and {LONGEST} s")));

@@ -1,13 +1,17 @@
 //! From commands thirty times a second to a smooth motion of the joints.
 //!
-//! Commands pass through two filters. A *limiter*, once a command: the next control point goes towards the command no faster and with no more acceleration than is
-//! allowed, and is the command itself where that is slow enough. Then a uniform quadratic B-spline through the control points: the reference's speed is continuous, its acceleration bounded,
-//! and a command that moves steadily is followed steadily. The spline is 1.5 command periods (50 ms) behind a signal whose samples are the
-//! commands, one (33 ms) behind the mean of the held commands.
+//! Commands pass through two filters. A *limiter*, once a command: the next control point goes
+//! towards the command no faster and with no more acceleration than is allowed, and is the command
+//! itself where that is slow enough. Then a uniform quadratic B-spline through the control points:
+//! the reference's speed is continuous, its acceleration bounded, and a command that moves steadily
+//! is followed steadily. The spline is 1.5 command periods (50 ms) behind a signal whose samples
+//! are the commands, one (33 ms) behind the mean of the held commands.
 //!
-//! The spline runs in the instrument's coordinates, so that the shaft's axis goes through the port's centre at every instant and not only at the
-//! commands. The joints follow by one or two Newton steps a physics step; the elbow drifts to the arm's home posture and off its limits. Where the arm cannot follow (a joint
-//! at a limit or too fast) the spline's time runs slower, or stands still.
+//! The spline runs in the instrument's coordinates, so that the shaft's axis goes through the
+//! port's centre at every instant and not only at the commands. The joints follow by one or two
+//! Newton steps a physics step; the elbow drifts to the arm's home posture and off its limits.
+//! Where the arm cannot follow (a joint at a limit or too fast) the spline's time runs slower, or
+//! stands still.
 
 use crate::chain::{Joints, LEVER, SerialArm, TASK, solve, turn};
 use crate::instrument::{Coordinates, Instrument, Limits, coordinates};
@@ -16,19 +20,22 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_geometry::Pose;
 
-/// Highest speed and acceleration of the control points: the two pivots [rad/s, rad/s2], insertion [m/s, m/s2], roll [rad/s, rad/s2]. Commands that stay below both
-/// pass unchanged.
+/// Highest speed and acceleration of the control points: the two pivots [rad/s, rad/s2], insertion
+/// [m/s, m/s2], roll [rad/s, rad/s2]. Commands that stay below both pass unchanged.
 const COORDINATE_LIMITS: [[f64; 2]; 4] = [[0.6, 3.0], [0.6, 3.0], [0.15, 1.0], [2.0, 10.0]];
 /// Share of a joint's highest speed that the reference may use.
 const SPEED_SHARE: f64 = 0.5;
 /// With what acceleration joints come to rest at their limits [rad/s2 or m/s2].
 const BRAKING: f64 = 8.0;
-/// How long the spline takes to come back to its pace [s], and the pace below which it stands still.
+/// How long the spline takes to come back to its pace [s], and the pace below which it stands
+/// still.
 const RECOVERY: f64 = 0.3;
 const STANDSTILL: f64 = 0.04;
-/// Below this pace the joints' highest speeds fall with it: where the arm is nearly stretched it comes to rest instead of running into its end.
+/// Below this pace the joints' highest speeds fall with it: where the arm is nearly stretched it
+/// comes to rest instead of running into its end.
 const EASE: f64 = 0.7;
-/// No joint of the reference gains speed faster [rad/s2 or m/s2]; far above what motions away from singular postures take.
+/// No joint of the reference gains speed faster [rad/s2 or m/s2]; far above what motions away from
+/// singular postures take.
 const QUICKEST: f64 = 25.0;
 /// Acceleration of joint commands where the arm has no limit of its own [rad/s2 or m/s2].
 const JOINT_ACCELERATION: f64 = 10.0;
@@ -40,12 +47,14 @@ const CLOSE: f64 = 1e-9;
 const FAR: f64 = 2e-6;
 /// How fast the elbow goes where it likes to be [1/s].
 const ELBOW: f64 = 4.0;
-/// It moves only while the instrument does, with all of that from this speed on (a coordinate a second, insertions five times as much): a joint that creeps while
-/// the instrument rests would stick and slip.
+/// It moves only while the instrument does, with all of that from this speed on (a coordinate a
+/// second, insertions five times as much): a joint that creeps while the instrument rests would
+/// stick and slip.
 const MOVING: f64 = 0.02;
 /// Joints are pushed off their limits from this far away [rad or m].
 const MARGIN: f64 = 0.1;
-/// The reference's joints keep this far from their limits [rad or m], which leaves room for the error of the arm behind it.
+/// The reference's joints keep this far from their limits [rad or m], which leaves room for the
+/// error of the arm behind it.
 const KEEP: f64 = 5e-3;
 
 /// What is commanded: coordinates in the port, or joints.
@@ -186,7 +195,8 @@ impl Reference {
     /// Moves the spline on.
     fn run(&mut self, ways: &Ways<'_>, time: f64) {
         let period = ways.period;
-        // A control point is made when the first step after its instant begins, so that a command that was given in between is in it.
+        // A control point is made when the first step after its instant begins, so that a command
+        // that was given in between is in it.
         while self.phase >= period * (1.0 - ROUNDING) {
             self.renew(ways);
         }
@@ -264,7 +274,8 @@ impl Reference {
     }
 }
 
-/// The joints' step towards a pose of the flange, with the elbow's drift over `drifts` [s] if there is one, and how far the flange is from the pose [m].
+/// The joints' step towards a pose of the flange, with the elbow's drift over `drifts` [s] if there
+/// is one, and how far the flange is from the pose [m].
 fn newton(arm: &SerialArm, q: &Joints, target: &Pose, drifts: Option<f64>) -> (Joints, f64) {
     let n = q.len();
     let frames = arm.frames(q);

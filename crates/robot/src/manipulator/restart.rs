@@ -1,4 +1,5 @@
-//! Another start for an arm that is there already: what an episode's reset needs, without building the arm's models anew.
+//! Another start for an arm that is there already: what an episode's reset needs, without building
+//! the arm's models anew.
 
 use super::control::Memory;
 use super::reference::Reference;
@@ -10,8 +11,9 @@ use crate::{Error, Result};
 use glam::DVec3;
 
 impl Manipulator {
-    /// Puts the arm at rest at `start`, as [`Manipulator::new`] does; only the controller's joint inertias stay those of the start it was made with, so that states of all its starts go on to the bit
-    /// in all manipulators that were made alike.
+    /// Puts the arm at rest at `start`, as [`Manipulator::new`] does; only the controller's joint
+    /// inertias stay those of the start it was made with, so that states of all its starts go on to
+    /// the bit in all manipulators that were made alike.
     ///
     /// # Errors
     /// A start outside the limits, or one that the arm does not reach: nothing is changed.

@@ -6,24 +6,29 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A control law. All of them command joint torques, and all feed forward what their model says that the reference takes.
+/// A control law. All of them command joint torques, and all feed forward what their model says
+/// that the reference takes.
 ///
-/// With e the error of the joints behind the reference, M and b the believed mass matrix and bias (Coriolis, centrifugal, gravity):
+/// With e the error of the joints behind the reference, M and b the believed mass matrix and bias
+/// (Coriolis, centrifugal, gravity):
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
-    /// Constant stiffness and damping a joint: M qdd_ref + b + K e + D e'. K and D are those of the bandwidth for the joint's own inertia
-    /// in the start posture.
+    /// Constant stiffness and damping a joint: M qdd_ref + b + K e + D e'. K and D are those of the
+    /// bandwidth for the joint's own inertia in the start posture.
     JointImpedance,
     /// Computed torque: M (qdd_ref + w^2 e + 2 z w e') + b (Siciliano et al. 2009, section 8.5.2).
     ComputedTorque,
     /// Computed torque with the integral of the error: M (... + w^2 w_i int e) + b.
     Integral,
-    /// Computed torque less what a disturbance observer finds: what torque the last steps took beyond the model's, low-passed at w_o. For a constant M it is the
-    /// momentum observer of De Luca and Mattone (2003).
+    /// Computed torque less what a disturbance observer finds: what torque the last steps took
+    /// beyond the model's, low-passed at w_o. For a constant M it is the momentum observer of De
+    /// Luca and Mattone (2003).
     Observer,
-    /// As [`Law::Observer`], with errors where they matter: the tip's place, the shaft's distance from the port's centre (weighed by
-    /// `port`) and the roll, the elbow in what these leave free. It halves the RCM deviation and bears no knocks: from 60 rad/s on it does not come back from 25 N.
+    /// As [`Law::Observer`], with errors where they matter: the tip's place, the shaft's distance
+    /// from the port's centre (weighed by `port`) and the roll, the elbow in what these leave free.
+    /// It halves the RCM deviation and bears no knocks: from 60 rad/s on it does not come back from
+    /// 25 N.
     RcmImpedance,
 }
 
@@ -80,8 +85,8 @@ pub struct ModelError {
     pub links: f64,
     /// Share by which the instrument is believed lighter than it is.
     pub instrument: f64,
-    /// Coulomb friction in each joint of the arm, of which the controller knows nothing [N m or N]. It takes the place of the arm's own. None: the arm's own
-    /// stays, and is as unknown.
+    /// Coulomb friction in each joint of the arm, of which the controller knows nothing [N m or N].
+    /// It takes the place of the arm's own. None: the arm's own stays, and is as unknown.
     pub friction: Option<f64>,
 }
 
@@ -109,7 +114,8 @@ pub struct Settings {
     pub command_rate: f64,
     /// Fastest change of a joint's torque [N m/s], or of a force [N/s].
     pub torque_rate: f64,
-    /// Limits of the instrument's coordinates. None: the port's for this instrument, touching allowed, pivot and shaft's base 20 mm inside and outside.
+    /// Limits of the instrument's coordinates. None: the port's for this instrument, touching
+    /// allowed, pivot and shaft's base 20 mm inside and outside.
     pub limits: Option<Limits>,
     /// Parts into which the arm's dynamics divide a physics step.
     pub substeps: usize,
@@ -135,10 +141,12 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// The settings of a controller by its name in a scene file, `default` or a [`Law::name`], with some gains set otherwise.
+    /// The settings of a controller by its name in a scene file, `default` or a [`Law::name`], with
+    /// some gains set otherwise.
     ///
     /// # Errors
-    /// A name or gain that the controller does not have, with the nearest that exists; a gain out of range.
+    /// A name or gain that the controller does not have, with the nearest that exists; a gain out
+    /// of range.
     pub fn named(name: &str, gains: &BTreeMap<String, f64>) -> Result<Self> {
         let mut settings = Self::default();
         if name != "default" {

@@ -9,7 +9,8 @@ use glam::DVec3;
 const NEAR: f64 = 2e-3;
 
 impl Manipulator {
-    /// Where the shaft touches the rim, or may within the step, as couplings: a push and friction along the shaft at each place.
+    /// Where the shaft touches the rim, or may within the step, as couplings: a push and friction
+    /// along the shaft at each place.
     pub(super) fn touches(&self, frames: &Frames, state: &ArmState) -> Touches {
         let flange = frames.flange();
         let shaft = Shaft::of(&self.instrument, &flange);

@@ -1,14 +1,17 @@
-//! Forces between shaft and rim: a spring and a dashpot across the shaft, Coulomb friction along it.
+//! Forces between shaft and rim: a spring and a dashpot across the shaft, Coulomb friction along
+//! it.
 //!
-//! Friction is a spring to a mark on the shaft: it pulls back to where the mark was at the rim until Coulomb's limit, then the mark follows. A load below the limit
-//! does not creep. The marks are the caller's [`RimState`], plain data, so that a step can be tried again.
+//! Friction is a spring to a mark on the shaft: it pulls back to where the mark was at the rim
+//! until Coulomb's limit, then the mark follows. A load below the limit does not creep. The marks
+//! are the caller's [`RimState`], plain data, so that a step can be tried again.
 
 use super::{Edge, Port, RimPoint, Shaft, Twist};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A contact that has moved less than this along the rim [rad] since its mark was set keeps the mark to the bit.
+/// A contact that has moved less than this along the rim [rad] since its mark was set keeps the
+/// mark to the bit.
 const STAYS: f64 = 0.02;
 
 /// A mark on the shaft.
@@ -28,8 +31,8 @@ pub struct RimState {
     marks: [Option<Mark>; 4],
 }
 
-/// One scalar force on the shaft, for a solver to linearise: a point of the shaft that moves by dx along `direction` at speed v changes it by
-/// -(stiffness dx + damping v).
+/// One scalar force on the shaft, for a solver to linearise: a point of the shaft that moves by dx
+/// along `direction` at speed v changes it by -(stiffness dx + damping v).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactRow {
     /// Where it acts [m], in the cell.
@@ -53,7 +56,8 @@ pub struct RimContact {
     pub normal: ContactRow,
     /// Friction, along the shaft's direction.
     pub friction: ContactRow,
-    /// How far the shaft has moved along its direction from where friction holds it [m]; 0 where it is not touched.
+    /// How far the shaft has moved along its direction from where friction holds it [m]; 0 where it
+    /// is not touched.
     pub stretch: f64,
     /// Whether friction is at its limit.
     pub sliding: bool,
@@ -92,7 +96,8 @@ impl Contacts {
 }
 
 impl Port {
-    /// The contacts of a shaft that moves by `motion` (at its base), and their forces on it. Changes nothing: [`Port::advance`] moves the marks once a step is done.
+    /// The contacts of a shaft that moves by `motion` (at its base), and their forces on it.
+    /// Changes nothing: [`Port::advance`] moves the marks once a step is done.
     pub fn contacts(&self, shaft: &Shaft, motion: &Twist, state: &RimState) -> Contacts {
         let all = self.nearest(shaft).map(|near| near.map(|at| self.contact(at, shaft, motion, state)));
         Contacts { all }
@@ -127,8 +132,8 @@ impl Port {
         mark.along - (self.rim(edge, mark.angle) - shaft.base).dot(shaft.direction)
     }
 
-    /// Ends a step with the shaft where it is now: marks where friction slides follow, contacts that moved along the rim take theirs along, those that the shaft
-    /// has left are forgotten.
+    /// Ends a step with the shaft where it is now: marks where friction slides follow, contacts
+    /// that moved along the rim take theirs along, those that the shaft has left are forgotten.
     pub fn advance(&self, shaft: &Shaft, state: &mut RimState) {
         let before = *state;
         state.marks = self.nearest(shaft).map(|near| {
@@ -149,7 +154,8 @@ impl Port {
 }
 
 impl RimState {
-    /// The mark of the contact that was nearest to this one on the same edge, if it is not on the hole's other side.
+    /// The mark of the contact that was nearest to this one on the same edge, if it is not on the
+    /// hole's other side.
     fn mark_for(&self, at: &RimPoint) -> Option<&Mark> {
         let same = self.marks.iter().flatten().filter(|m| m.inner == (at.edge == Edge::Inner));
         same.min_by(|a, b| turned(at.angle, a.angle).total_cmp(&turned(at.angle, b.angle)))

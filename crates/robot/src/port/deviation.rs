@@ -43,7 +43,8 @@ impl Deviation {
         (sum / self.values.len().max(1) as f64).sqrt()
     }
 
-    /// The deviation [m] that a `share` 0 to 1 of all stay at or below, linear between neighbours as numpy has it (0.5 the median, 0.95 the p95); 0 without any.
+    /// The deviation [m] that a `share` 0 to 1 of all stay at or below, linear between neighbours
+    /// as numpy has it (0.5 the median, 0.95 the p95); 0 without any.
     pub fn percentile(&self, share: f64) -> f64 {
         let mut sorted = self.values.clone();
         sorted.sort_by(f64::total_cmp);

@@ -1,4 +1,5 @@
-//! Coordinates to poses and back, for a shaft whose axis goes through the port's centre; and the measuring of one whose axis does not.
+//! Coordinates to poses and back, for a shaft whose axis goes through the port's centre; and the
+//! measuring of one whose axis does not.
 
 use super::{Port, Shaft, Twist};
 use crate::instrument::{Coordinates, Excess, Instrument, Limits, compose, coordinates, shaft_to_tip};
@@ -7,17 +8,20 @@ use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::TAU;
 use trocar_geometry::Pose;
 
-/// Least cosine of the tilt at which a shaft is taken to go through the port and not to lie in its plane.
+/// Least cosine of the tilt at which a shaft is taken to go through the port and not to lie in its
+/// plane.
 pub(super) const LEAST_COS: f64 = 0.05;
 
 /// Where an instrument is, whether its axis goes through the centre or not.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// Its coordinates: the insertion is counted from where the axis crosses the port's plane, the jaw is the caller's.
+    /// Its coordinates: the insertion is counted from where the axis crosses the port's plane, the
+    /// jaw is the caller's.
     pub coordinates: Coordinates,
     /// Angle between shaft and normal [rad].
     pub tilt: f64,
-    /// From the port's centre to where the axis crosses the port's plane [m], along the port's x and y; its length is the RCM deviation (SPEC).
+    /// From the port's centre to where the axis crosses the port's plane [m], along the port's x
+    /// and y; its length is the RCM deviation (SPEC).
     pub offset: DVec2,
     /// The jaw's pivot in the cell.
     pub tip: Pose,
@@ -39,7 +43,8 @@ pub struct Solution {
     pub tip: Pose,
     /// The flange there, in the cell.
     pub flange: Pose,
-    /// What is left of the wanted orientation: the axis times the angle [rad] of the turn, in the cell, that would take the reached orientation to the wanted one.
+    /// What is left of the wanted orientation: the axis times the angle [rad] of the turn, in the
+    /// cell, that would take the reached orientation to the wanted one.
     pub rejected_rotation: DVec3,
     /// What is left of the wanted position [m], in the cell; zero unless a limit binds.
     pub rejected_translation: DVec3,
@@ -60,7 +65,8 @@ impl Port {
         instrument.flange(&self.tip(coordinates))
     }
 
-    /// How the tip moves, in the cell, for one unit a second of each of the two pivots, the insertion and the roll.
+    /// How the tip moves, in the cell, for one unit a second of each of the two pivots, the
+    /// insertion and the roll.
     pub fn tip_jacobian(&self, coordinates: &Coordinates) -> [Twist; 4] {
         let along = self.pose.rotation * Coordinates::direction(coordinates.pivots);
         let arm = coordinates.insertion * along;
@@ -74,10 +80,12 @@ impl Port {
         ]
     }
 
-    /// Measures an instrument whose flange is at `flange` in the cell. The roll is within +-pi; `jaw` is taken over.
+    /// Measures an instrument whose flange is at `flange` in the cell. The roll is within +-pi;
+    /// `jaw` is taken over.
     ///
     /// # Errors
-    /// A pose that is not finite, a shaft that points out of the body or lies in the port's plane (a tilt over 87 degrees).
+    /// A pose that is not finite, a shaft that points out of the body or lies in the port's plane
+    /// (a tilt over 87 degrees).
     pub fn measure(&self, instrument: &Instrument, flange: &Pose, jaw: f64) -> Result<Measured> {
         let shaft = Shaft::of(instrument, flange);
         let inverse = self.pose.inverse();
@@ -101,8 +109,9 @@ impl Port {
         Ok(Measured { coordinates, tilt, offset: DVec2::new(crossing.x, crossing.y), tip })
     }
 
-    /// How fast the two pivots [rad/s], the insertion [m/s] and the roll [rad/s] that [`Port::measure`] gives change, for a flange at `flange` that moves by `motion` (at
-    /// its origin, in the cell).
+    /// How fast the two pivots [rad/s], the insertion [m/s] and the roll [rad/s] that
+    /// [`Port::measure`] gives change, for a flange at `flange` that moves by `motion` (at its
+    /// origin, in the cell).
     ///
     /// # Errors
     /// As [`Port::measure`]; a motion that is not finite.
@@ -125,12 +134,15 @@ impl Port {
         Ok([first, second, insertion, angular.dot(u) - first * u.x])
     }
 
-    /// The nearest that an instrument within `limits` comes to `wanted`, a pose of its tip in the cell. Position goes first: two pivots and the insertion
-    /// meet it, the roll comes as near to the orientation as it can, and what is left is told. The roll is the one nearest to `near.roll`, so the long way
-    /// round is never taken; `near.pivots` say where to tilt where the position leaves it open, and `near.jaw` is taken over.
+    /// The nearest that an instrument within `limits` comes to `wanted`, a pose of its tip in the
+    /// cell. Position goes first: two pivots and the insertion meet it, the roll comes as near to
+    /// the orientation as it can, and what is left is told. The roll is the one nearest to
+    /// `near.roll`, so the long way round is never taken; `near.pivots` say where to tilt where the
+    /// position leaves it open, and `near.jaw` is taken over.
     ///
-    /// Where a limit binds, the nearest reachable point is taken. It moves continuously with the wanted one, except on the axis outside the body, from which all
-    /// tilts are as near, and where the wanted roll is half a turn from `near`.
+    /// Where a limit binds, the nearest reachable point is taken. It moves continuously with the
+    /// wanted one, except on the axis outside the body, from which all tilts are as near, and where
+    /// the wanted roll is half a turn from `near`.
     ///
     /// # Errors
     /// A pose that is not finite, limits that cannot be used.
@@ -157,7 +169,8 @@ impl Port {
         let (kept, beyond) = coordinates::cut(tilt, [0.0, limits.tilt]);
         excess.tilt = beyond;
         let (sin, cos) = kept.sin_cos();
-        // Within the cone the wanted point lies on the ray; outside, its foot on the cone's side is the nearest.
+        // Within the cone the wanted point lies on the ray; outside, its foot on the cone's side is
+        // the nearest.
         let length = across.length() * sin + point.z * cos;
         let (insertion, beyond) = coordinates::cut(length, limits.insertion);
         excess.insertion = beyond;
@@ -184,8 +197,9 @@ impl Port {
         })
     }
 
-    /// The roll that brings the tip nearest to an orientation at these pivots: the twist about the shaft of what is left. Where a swing of half a turn is left too,
-    /// every roll is as near, and 0 is given.
+    /// The roll that brings the tip nearest to an orientation at these pivots: the twist about the
+    /// shaft of what is left. Where a swing of half a turn is left too, every roll is as near, and
+    /// 0 is given.
     fn nearest_roll(&self, pivots: [f64; 2], orientation: DQuat) -> f64 {
         let shaft = (self.pose.rotation * turn(pivots)).inverse() * orientation * shaft_to_tip().inverse();
         if shaft.w.hypot(shaft.z) < 1e-12 {

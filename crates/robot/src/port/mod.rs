@@ -9,12 +9,14 @@
 //!                 \ \                            v z = normal, into the body
 //! ```
 //!
-//! The *port frame* has its origin at the hole's centre in the middle of the sheet and z along the normal, into the body: an upright shaft points along
-//! +z. The two pivots of [`Coordinates`](crate::instrument::Coordinates) turn z first about x, then about the y that the first has turned. That is singular
-//! only at a second pivot of 90 degrees, where a shaft would lie in the sheet; the hole allows 33.6.
+//! The *port frame* has its origin at the hole's centre in the middle of the sheet and z along the
+//! normal, into the body: an upright shaft points along +z. The two pivots of
+//! [`Coordinates`](crate::instrument::Coordinates) turn z first about x, then about the y that the
+//! first has turned. That is singular only at a second pivot of 90 degrees, where a shaft would lie
+//! in the sheet; the hole allows 33.6.
 //!
-//! The port is no welded pivot: a shaft is thinner than the hole, leans on its rim, and how far its axis is from the centre is measured
-//! ([`Measured::deviation`]).
+//! The port is no welded pivot: a shaft is thinner than the hole, leans on its rim, and how far its
+//! axis is from the centre is measured ([`Measured::deviation`]).
 
 mod contact;
 mod deviation;
@@ -57,8 +59,9 @@ pub struct Port {
 }
 
 impl Port {
-    /// The paper's 6 mm hole at `centre` [m] with `normal` into the body and x as near to `x` as the normal lets it. The rim is a single edge
-    /// of 20 N/mm with friction 0.2: no paper states these, so set them where they are known.
+    /// The paper's 6 mm hole at `centre` [m] with `normal` into the body and x as near to `x` as
+    /// the normal lets it. The rim is a single edge of 20 N/mm with friction 0.2: no paper states
+    /// these, so set them where they are known.
     ///
     /// # Errors
     /// A centre that is not finite, a normal without direction, an `x` along the normal.
@@ -91,7 +94,8 @@ impl Port {
     /// Says whether the description can be used.
     ///
     /// # Errors
-    /// A size, stiffness or friction that no port has, a pose that is not finite or not of unit rotation.
+    /// A size, stiffness or friction that no port has, a pose that is not finite or not of unit
+    /// rotation.
     pub fn check(&self) -> Result<()> {
         within("port, hole_diameter", self.hole_diameter, 1e-3, 0.1, "m")?;
         within("port, thickness", self.thickness, 0.0, 0.05, "m")?;
@@ -116,9 +120,10 @@ impl Port {
         self.pose.rotation * DVec3::Z
     }
 
-    /// How far the axis of a shaft of `radius` [m] at `tilt` [rad] may lie beside the centre in the direction in which it tilts:
-    /// (D - d/cos(tilt) - t tan(tilt))/2 [m]; in a sheet without thickness the paper's formula (SPEC K3). Negative where the shaft
-    /// does not fit, minus infinity from 90 degrees on.
+    /// How far the axis of a shaft of `radius` [m] at `tilt` [rad] may lie beside the centre in the
+    /// direction in which it tilts: (D - d/cos(tilt) - t tan(tilt))/2 [m]; in a sheet without
+    /// thickness the paper's formula (SPEC K3). Negative where the shaft does not fit, minus
+    /// infinity from 90 degrees on.
     pub fn clearance(&self, radius: f64, tilt: f64) -> f64 {
         let cos = tilt.cos();
         if cos.is_nan() || cos <= 1e-9 {
@@ -127,10 +132,12 @@ impl Port {
         0.5 * (self.hole_diameter - 2.0 * radius / cos - self.thickness * tilt.abs().tan())
     }
 
-    /// How far the axis may lie beside the centre across the direction of the tilt [m], in a sheet without thickness.
+    /// How far the axis may lie beside the centre across the direction of the tilt [m], in a sheet
+    /// without thickness.
     ///
-    /// That is (D - d)/2 up to the tilt acos(sqrt(d/D)), 24.1 degrees for 5 in 6 mm. Beyond it the shaft's elliptic section is blunter at the end of its
-    /// short axis than the hole is, touches at two points beside that end, and sin(tilt) sqrt((D/2)^2 - (d/2)^2/cos(tilt)^2) is left.
+    /// That is (D - d)/2 up to the tilt acos(sqrt(d/D)), 24.1 degrees for 5 in 6 mm. Beyond it the
+    /// shaft's elliptic section is blunter at the end of its short axis than the hole is, touches
+    /// at two points beside that end, and sin(tilt) sqrt((D/2)^2 - (d/2)^2/cos(tilt)^2) is left.
     pub fn clearance_across(&self, radius: f64, tilt: f64) -> f64 {
         let (big, k) = (0.5 * self.hole_diameter, tilt.cos() * tilt.cos());
         if big * k >= radius {
@@ -140,7 +147,8 @@ impl Port {
         if square >= 0.0 { square.sqrt() } else { f64::NEG_INFINITY }
     }
 
-    /// The tilt [rad] at which a shaft of `radius` [m] has `clearance` [m] left; none where an upright one has less.
+    /// The tilt [rad] at which a shaft of `radius` [m] has `clearance` [m] left; none where an
+    /// upright one has less.
     pub fn tilt_with_clearance(&self, radius: f64, clearance: f64) -> Option<f64> {
         // D' cos(tilt) - t sin(tilt) = d is one cosine.
         let wide = self.hole_diameter - 2.0 * clearance;
@@ -149,8 +157,9 @@ impl Port {
         (wide >= 2.0 * radius && cos.is_finite()).then(|| tilt.max(0.0))
     }
 
-    /// Limits for an instrument: the tilt that leaves `clearance` [m], insertions of which the jaw's pivot is `margin` [m] inside and the shaft's base
-    /// as far outside, and the roll that a wrist of +-2.7 rad has.
+    /// Limits for an instrument: the tilt that leaves `clearance` [m], insertions of which the
+    /// jaw's pivot is `margin` [m] inside and the shaft's base as far outside, and the roll that a
+    /// wrist of +-2.7 rad has.
     ///
     /// # Errors
     /// An instrument that does not go through the hole with that clearance, or that is too short.

@@ -1,21 +1,25 @@
 //! Where a shaft is nearest to the rim of its hole: exact, by the root of one monotone function.
 //!
-//! A cylinder of radius r and unit direction u goes through the circle |q| = R in the plane z = 0 and its axis crosses that plane at c. It fits as long as every
-//! point q of the circle is at least r away from the axis. With x in the direction of the tilt and k = cos(tilt)^2 the squared distance of
-//! q = R (cos a, sin a) is
+//! A cylinder of radius r and unit direction u goes through the circle |q| = R in the plane z = 0
+//! and its axis crosses that plane at c. It fits as long as every point q of the circle is at least
+//! r away from the axis. With x in the direction of the tilt and k = cos(tilt)^2 the squared
+//! distance of q = R (cos a, sin a) is
 //!
 //! ```text
 //! f(a) = k (R cos a - cx)^2 + (R sin a - cy)^2      f'(a)/2R = (1-k) R sin a cos a + k cx sin a - cy cos a
 //! ```
 //!
-//! By symmetry cx, cy >= 0. In the first quadrant f'(a) = 0 reads (1-k) R = cy/sin a - k cx/cos a, whose right side falls from infinity to minus
-//! infinity: one root, the nearest point. Of the other quadrants only the second can hold another minimum (the shaft may lean on both sides):
-//! (1-k) R = cy/sin b + k cx/cos b with b = pi - a has a convex right side whose least value, at tan(b)^3 = cy/(k cx), is
-//! ((k cx)^(2/3) + cy^(2/3))^(3/2); the root below that b is the minimum. Inside the sheet the distance is a concave function along z, so both edges of
-//! a thick sheet are all that can touch.
+//! By symmetry cx, cy >= 0. In the first quadrant f'(a) = 0 reads (1-k) R = cy/sin a - k cx/cos a,
+//! whose right side falls from infinity to minus infinity: one root, the nearest point. Of the
+//! other quadrants only the second can hold another minimum (the shaft may lean on both sides):
+//! (1-k) R = cy/sin b + k cx/cos b with b = pi - a has a convex right side whose least value, at
+//! tan(b)^3 = cy/(k cx), is ((k cx)^(2/3) + cy^(2/3))^(3/2); the root below that b is the minimum.
+//! Inside the sheet the distance is a concave function along z, so both edges of a thick sheet are
+//! all that can touch.
 //!
-//! The two minima of an edge merge when the axis is far enough to one side. Up to tilts of acos(sqrt(r/R)) (24.1 degrees for 5 in 6 mm) neither
-//! touches by then; beyond, both may press, each deeper than r - R cos(tilt)^2, and there the force changes by a step.
+//! The two minima of an edge merge when the axis is far enough to one side. Up to tilts of
+//! acos(sqrt(r/R)) (24.1 degrees for 5 in 6 mm) neither touches by then; beyond, both may press,
+//! each deeper than r - R cos(tilt)^2, and there the force changes by a step.
 
 use super::kinematics::LEAST_COS;
 use super::{Port, Shaft};
@@ -43,15 +47,17 @@ pub struct RimPoint {
     pub angle: f64,
     /// The place [m], in the cell.
     pub point: DVec3,
-    /// Unit vector from the rim to the shaft, across the shaft: the direction of the force on the shaft. In the cell.
+    /// Unit vector from the rim to the shaft, across the shaft: the direction of the force on the
+    /// shaft. In the cell.
     pub normal: DVec3,
     /// Distance between shaft and rim [m]; negative where the shaft presses.
     pub gap: f64,
 }
 
 impl Port {
-    /// The places at which a shaft is nearest to the rim: one or two an edge, none where the shaft does not go through the port's plane (a tilt over 87 degrees) or ends
-    /// before it. Exact: a positive gap everywhere means that the shaft touches nothing.
+    /// The places at which a shaft is nearest to the rim: one or two an edge, none where the shaft
+    /// does not go through the port's plane (a tilt over 87 degrees) or ends before it. Exact: a
+    /// positive gap everywhere means that the shaft touches nothing.
     pub fn nearest(&self, shaft: &Shaft) -> [Option<RimPoint>; 4] {
         let mut found = [None; 4];
         let inverse = self.pose.inverse();
@@ -69,7 +75,8 @@ impl Port {
             for (k, angle) in angles.into_iter().enumerate().filter_map(|(k, a)| a.map(|a| (k, a))) {
                 let out = DVec2::from_angle(angle);
                 let place = (0.5 * self.hole_diameter * out).extend(z);
-                // Across the shaft, with the part in the sheet's plane towards the centre: f' = 0 says that this is where the axis lies.
+                // Across the shaft, with the part in the sheet's plane towards the centre: f' = 0
+                // says that this is where the axis lies.
                 let normal = DVec3::new(-out.x, -out.y, (out.x * u.x + out.y * u.y) / u.z).normalize();
                 let along = (place - base).dot(u);
                 if (0.0..=shaft.length).contains(&along) {
@@ -96,8 +103,8 @@ impl Port {
     }
 }
 
-/// Angles of the circle's points nearest to the axis that crosses its plane at `c` with `u` its direction's part in the plane: the nearest, and the other minimum if
-/// there is one.
+/// Angles of the circle's points nearest to the axis that crosses its plane at `c` with `u` its
+/// direction's part in the plane: the nearest, and the other minimum if there is one.
 fn minima(c: DVec2, u: DVec2, radius: f64) -> [Option<f64>; 2] {
     let tilted = u.try_normalize().unwrap_or(DVec2::X);
     // (1 - k) R directly from the sine, which small tilts keep.
@@ -118,7 +125,8 @@ fn minima(c: DVec2, u: DVec2, radius: f64) -> [Option<f64>; 2] {
     [Some(back(near)), other]
 }
 
-/// The root of a function of (sin, cos) that is negative below it and positive above, between `low` and `high`.
+/// The root of a function of (sin, cos) that is negative below it and positive above, between `low`
+/// and `high`.
 fn halve(mut low: f64, mut high: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);

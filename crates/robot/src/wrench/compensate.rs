@@ -10,7 +10,8 @@ use nalgebra::SMatrix;
 pub struct ForceReading {
     /// What kind of force it is.
     pub kind: ForceKind,
-    /// Force [N] on the instrument and torque [N m] about the flange's origin, along the cell's axes.
+    /// Force [N] on the instrument and torque [N m] about the flange's origin, along the cell's
+    /// axes.
     pub wrench: Wrench,
     /// Covariance of the force [N2], along the cell's axes.
     pub force_covariance: DMat3,
@@ -28,8 +29,9 @@ impl ForceReading {
 
 /// Takes an identified load off readings.
 ///
-/// A tare at orientation R0 leaves of a reading y at R: (y - y0) - (A(R) - A(R0)) p with A the load model's derivative: the bias is gone, the identified parameters p
-/// matter only as far as the instrument was turned since, and so does their covariance.
+/// A tare at orientation R0 leaves of a reading y at R: (y - y0) - (A(R) - A(R0)) p with A the load
+/// model's derivative: the bias is gone, the identified parameters p matter only as far as the
+/// instrument was turned since, and so does their covariance.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compensator {
     load: Identification,
@@ -61,7 +63,8 @@ impl Compensator {
         &self.load
     }
 
-    /// Takes the mean of `readings` at `orientation` (the flange's frame to the cell's) for touching nothing.
+    /// Takes the mean of `readings` at `orientation` (the flange's frame to the cell's) for
+    /// touching nothing.
     ///
     /// # Errors
     /// No reading, or one that is not finite; the tare stays as it was.
@@ -80,7 +83,8 @@ impl Compensator {
         Ok(())
     }
 
-    /// The force on the instrument in one reading with the flange at `orientation`; `kind` says what is held or touched now.
+    /// The force on the instrument in one reading with the flange at `orientation`; `kind` says
+    /// what is held or touched now.
     ///
     /// # Errors
     /// A reading or orientation that is not finite.

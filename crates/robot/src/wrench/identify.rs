@@ -5,13 +5,16 @@ use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, DVector, SMatrix, SVD};
 
-/// Parameters of a [`LoadModel`]: mass, first moment (3), bias of force (3) and torque (3), in this order.
+/// Parameters of a [`LoadModel`]: mass, first moment (3), bias of force (3) and torque (3), in this
+/// order.
 pub const PARAMETERS: usize = 10;
 
-/// Fewest poses: with two, a turn about the line between their gravities leaves the centre of mass open.
+/// Fewest poses: with two, a turn about the line between their gravities leaves the centre of mass
+/// open.
 const FEWEST: usize = 3;
 
-/// Condition number from which the orientations are too alike to tell weight from bias: all within about two degrees of one another.
+/// Condition number from which the orientations are too alike to tell weight from bias: all within
+/// about two degrees of one another.
 const WORST_CONDITION: f64 = 100.0;
 
 /// A reading at rest, touching nothing.
@@ -28,9 +31,11 @@ pub struct StaticReading {
 pub struct Identification {
     /// The estimate.
     pub model: LoadModel,
-    /// Condition number of the equations, each weighted by its noise and each parameter scaled to the same effect.
+    /// Condition number of the equations, each weighted by its noise and each parameter scaled to
+    /// the same effect.
     pub condition: f64,
-    /// Sum of the squared residuals over their variances. For a true model about `degrees`; far more says that the noise is greater than was said or that something was touched.
+    /// Sum of the squared residuals over their variances. For a true model about `degrees`; far
+    /// more says that the noise is greater than was said or that something was touched.
     pub chi_squared: f64,
     /// Equations less parameters.
     pub degrees: usize,
@@ -48,7 +53,8 @@ impl Identification {
         LoadModel::from_array(std::array::from_fn(|i| self.covariance[(i, i)].max(0.0).sqrt()))
     }
 
-    /// Square of the distance from the estimate to `truth` in standard deviations: chi-squared with ten degrees of freedom where noise is all that is wrong.
+    /// Square of the distance from the estimate to `truth` in standard deviations: chi-squared with
+    /// ten degrees of freedom where noise is all that is wrong.
     ///
     /// # Errors
     /// A covariance that cannot be inverted.
@@ -67,10 +73,12 @@ impl Identification {
     }
 }
 
-/// Identifies the load from readings at rest under `gravity` [m/s2] (in the cell) of a sensor with `noise`.
+/// Identifies the load from readings at rest under `gravity` [m/s2] (in the cell) of a sensor with
+/// `noise`.
 ///
 /// # Errors
-/// Fewer than three poses, orientations too alike to tell weight from bias, a number that is not finite; the pose is said.
+/// Fewer than three poses, orientations too alike to tell weight from bias, a number that is not
+/// finite; the pose is said.
 pub fn identify(poses: &[StaticReading], noise: &SensorNoise, gravity: DVec3) -> Result<Identification> {
     noise.check()?;
     if poses.len() < FEWEST {

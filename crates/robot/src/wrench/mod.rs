@@ -1,8 +1,10 @@
 //! Forces at the tool mount: what an instrument weighs is identified and taken off.
 //!
-//! A six-axis sensor at the mount carries an instrument of 4.7 N; tissue pulls with tens of millinewtons. So the weight must be known to a percent and its
-//! share at every orientation taken off. [`LoadModel`] is what the sensor reads when nothing is touched, [`identify`] finds it from readings
-//! at rest, [`Compensator`] takes it off, tared at reset, and says how uncertain what is left is.
+//! A six-axis sensor at the mount carries an instrument of 4.7 N; tissue pulls with tens of
+//! millinewtons. So the weight must be known to a percent and its share at every orientation taken
+//! off. [`LoadModel`] is what the sensor reads when nothing is touched, [`identify`] finds it from
+//! readings at rest, [`Compensator`] takes it off, tared at reset, and says how uncertain what is
+//! left is.
 //!
 //! All of it is static: where an arm accelerates, the instrument's inertia is in the reading too.
 
@@ -26,7 +28,8 @@ use serde::{Deserialize, Serialize};
 pub enum ForceKind {
     /// Tissue or the port presses on the instrument.
     Contact,
-    /// A latched grasp holds nodes where the jaws are: the force that this takes, not the tissue's reaction to a touch.
+    /// A latched grasp holds nodes where the jaws are: the force that this takes, not the tissue's
+    /// reaction to a touch.
     Constraint,
 }
 
@@ -70,10 +73,11 @@ impl std::ops::Sub for Wrench {
     }
 }
 
-/// What a sensor at the mount reads when the instrument touches nothing: linear in these ten numbers.
+/// What a sensor at the mount reads when the instrument touches nothing: linear in these ten
+/// numbers.
 ///
-/// The reading is what the instrument does to the mount, in the sensor's frame (the flange's), torque about its origin:
-/// force = m g + b_f, torque = (m c) x g + b_t, with g the gravity there.
+/// The reading is what the instrument does to the mount, in the sensor's frame (the flange's),
+/// torque about its origin: force = m g + b_f, torque = (m c) x g + b_t, with g the gravity there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadModel {
     /// Mass m [kg].
@@ -101,7 +105,8 @@ impl LoadModel {
         self.first_moment / self.mass
     }
 
-    /// The reading with the flange at `orientation` (its frame to the cell's) under `gravity` [m/s2] in the cell.
+    /// The reading with the flange at `orientation` (its frame to the cell's) under `gravity`
+    /// [m/s2] in the cell.
     pub fn reading(&self, orientation: DQuat, gravity: DVec3) -> Wrench {
         let g = orientation.inverse() * gravity;
         Wrench { force: self.mass * g, torque: self.first_moment.cross(g) } + self.bias

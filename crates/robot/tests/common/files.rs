@@ -38,7 +38,8 @@ pub const MJCF: &str = r#"<mujoco model="two">
   <keyframe><key name="home" qpos="0.2 0.1"/></keyframe>
 </mujoco>"#;
 
-/// The arm of both files with looks: a foot, a mesh on the first link, a red box that is fixed to it, a rod on the second.
+/// The arm of both files with looks: a foot, a mesh on the first link, a red box that is fixed to
+/// it, a rod on the second.
 pub fn shown_urdf() -> String {
     let mesh = r#"<link name="a"><visual><origin xyz="0 0 0.1"/><geometry><mesh filename="meshes/a.stl" scale="2 2 2"/></geometry></visual>"#;
     let red =

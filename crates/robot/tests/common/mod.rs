@@ -73,7 +73,8 @@ pub fn free_fr3() -> SerialArm {
     arm.with_friction(&nothing, &nothing).unwrap().with_limits(&[JointLimits::NONE; 7]).unwrap()
 }
 
-/// An arm of the paper's cell: the left with the grasper at 13.3 degrees, the right with the cutter at 18.3, in a sheet without thickness.
+/// An arm of the paper's cell: the left with the grasper at 13.3 degrees, the right with the cutter
+/// at 18.3, in a sheet without thickness.
 pub fn cell(side: usize, settings: Settings) -> Manipulator {
     let x = [-1.0, 1.0][side.min(1)];
     let base = Pose {

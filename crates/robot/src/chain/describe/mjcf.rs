@@ -1,4 +1,5 @@
-//! Arms from MJCF, MuJoCo's format: the bodies from the world to a tip, with what the compiler and the default classes say of them.
+//! Arms from MJCF, MuJoCo's format: the bodies from the world to a tip, with what the compiler and
+//! the default classes say of them.
 //!
 //! What would change the dynamics and is not understood is an error, never left out in silence.
 
@@ -17,16 +18,19 @@ use std::path::Path;
 use trocar_geometry::Pose;
 
 impl SerialArm {
-    /// Reads the arm that ends in `tip`, a body or a site, from an MJCF file: joints, limits (`range`, `actuatorfrcrange`), armature, damping,
-    /// friction, masses, gravity, and the keyframe `home` where it fits.
+    /// Reads the arm that ends in `tip`, a body or a site, from an MJCF file: joints, limits
+    /// (`range`, `actuatorfrcrange`), armature, damping, friction, masses, gravity, and the
+    /// keyframe `home` where it fits.
     ///
-    /// The base is the world. Bodies that are welded to a link are part of it. What hangs on the tip's body is left out: a payload takes its place.
-    /// A link's axes are its body's, moved to the joint's anchor. MJCF knows no limits of speed.
+    /// The base is the world. Bodies that are welded to a link are part of it. What hangs on the
+    /// tip's body is left out: a payload takes its place. A link's axes are its body's, moved to
+    /// the joint's anchor. MJCF knows no limits of speed.
     ///
     /// # Errors
-    /// A file that cannot be read or is no MJCF; no such tip; a body of the chain with more than one joint, with one that is neither hinge nor
-    /// slide, or without `<inertial>`; another branch that moves; springs, reference angles, gravity compensation, included files and
-    /// generated bodies, which are not understood; and what [`SerialArm::new`] refuses.
+    /// A file that cannot be read or is no MJCF; no such tip; a body of the chain with more than
+    /// one joint, with one that is neither hinge nor slide, or without `<inertial>`; another branch
+    /// that moves; springs, reference angles, gravity compensation, included files and generated
+    /// bodies, which are not understood; and what [`SerialArm::new`] refuses.
     pub fn from_mjcf(path: &Path, tip: &str) -> Result<Self> {
         let (source, text) = Source::read(path)?;
         let document = source.parse(&text, "mujoco")?;
@@ -240,7 +244,8 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(Pose { rotation: self.rotation(node)?, translation })
     }
 
-    /// Numbers that place an element: of a geom also those of its default classes; bodies and inertias have none.
+    /// Numbers that place an element: of a geom also those of its default classes; bodies and
+    /// inertias have none.
     fn placing<const N: usize>(&self, node: Node<'a, 'i>, name: &str) -> Result<Option<[f64; N]>> {
         if node.has_tag_name("geom") { self.numbers(node, name) } else { self.source.numbers(node, name) }
     }
@@ -288,7 +293,8 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(DQuat::IDENTITY)
     }
 
-    /// The attribute of a joint or another element that has defaults, its own or of its default class or of one around that.
+    /// The attribute of a joint or another element that has defaults, its own or of its default
+    /// class or of one around that.
     fn attribute(&self, joint: Node<'a, 'i>, name: &str) -> Result<Option<&'a str>> {
         if let Some(own) = joint.attribute(name) {
             return Ok(Some(own));

@@ -16,15 +16,17 @@ use std::path::Path;
 use trocar_geometry::Pose;
 
 impl SerialArm {
-    /// Reads the arm from the link `base` to the link `tip` from a URDF file. Without `base` it begins at the root, without `tip` it ends at the
-    /// only link that has no child.
+    /// Reads the arm from the link `base` to the link `tip` from a URDF file. Without `base` it
+    /// begins at the root, without `tip` it ends at the only link that has no child.
     ///
-    /// Links that are fixed to a moving one are part of it; what hangs on the tip is left out: a payload takes its place. URDF knows no rotor inertia,
-    /// so that the armature is zero; gravity is 9.81 m/s2 along -z.
+    /// Links that are fixed to a moving one are part of it; what hangs on the tip is left out: a
+    /// payload takes its place. URDF knows no rotor inertia, so that the armature is zero; gravity
+    /// is 9.81 m/s2 along -z.
     ///
     /// # Errors
-    /// A file that cannot be read, is no URDF or is an unexpanded xacro; no such base or tip, several ends, a loop; a joint that is neither
-    /// revolute, continuous, prismatic nor fixed, or mimics another; a link that is moved by a joint and has no `<inertial>`; another branch that
+    /// A file that cannot be read, is no URDF or is an unexpanded xacro; no such base or tip,
+    /// several ends, a loop; a joint that is neither revolute, continuous, prismatic nor fixed, or
+    /// mimics another; a link that is moved by a joint and has no `<inertial>`; another branch that
     /// moves; and what [`SerialArm::new`] refuses.
     pub fn from_urdf(path: &Path, base: Option<&str>, tip: Option<&str>) -> Result<Self> {
         let (source, text) = Source::read(path)?;

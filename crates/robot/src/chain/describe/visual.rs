@@ -1,4 +1,5 @@
-//! What the links of a description look like: meshes and simple shapes, each with its pose and colour. Only for pictures; no force knows of it.
+//! What the links of a description look like: meshes and simple shapes, each with its pose and
+//! colour. Only for pictures; no force knows of it.
 
 use glam::DVec3;
 use std::path::PathBuf;

@@ -6,7 +6,8 @@ use roxmltree::{Document, Node, ParsingOptions};
 use std::io::Read;
 use std::path::Path;
 
-/// The largest file [bytes]. Descriptions of arms have some tens of kilobytes; their meshes are files of their own.
+/// The largest file [bytes]. Descriptions of arms have some tens of kilobytes; their meshes are
+/// files of their own.
 const LARGEST: u64 = 16 << 20;
 /// The most nodes, which bounds memory.
 const NODES: u32 = 300_000;
@@ -124,7 +125,8 @@ pub(super) fn children<'a, 'i>(node: Node<'a, 'i>, kind: &str) -> impl Iterator<
     node.children().filter(move |c| c.has_tag_name(kind))
 }
 
-/// An upper bound of the depth of elements: opening marks less closing ones. What is in comments may count too.
+/// An upper bound of the depth of elements: opening marks less closing ones. What is in comments
+/// may count too.
 fn nesting(text: &str) -> usize {
     let bytes = text.as_bytes();
     let (mut depth, mut deepest) = (0usize, 0);

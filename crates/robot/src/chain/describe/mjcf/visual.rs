@@ -1,4 +1,5 @@
-//! What an MJCF file's bodies look like: the geoms of groups 0 to 2, which MuJoCo's viewer shows, of each body from the world to the tip and of what is welded to them.
+//! What an MJCF file's bodies look like: the geoms of groups 0 to 2, which MuJoCo's viewer shows,
+//! of each body from the world to the tip and of what is welded to them.
 
 use super::super::visual::{PLAIN, Visual, VisualShape, opaque};
 use super::super::xml::{Source, children, place, shown};
@@ -13,11 +14,14 @@ use trocar_geometry::Pose;
 /// Groups of geoms up to this one are seen.
 const SEEN: f64 = 2.0;
 
-/// What the arm that ends in `tip` looks like, as [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf) reads it: of the base first, then of each link that a joint moves. Without `tip` it ends at
-/// the last body of the file that a joint moves.
+/// What the arm that ends in `tip` looks like, as
+/// [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf) reads it: of the base first, then
+/// of each link that a joint moves. Without `tip` it ends at the last body of the file that a joint
+/// moves.
 ///
 /// # Errors
-/// As [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf); a mesh that no asset is, a geom whose size is missing.
+/// As [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf); a mesh that no asset is, a geom
+/// whose size is missing.
 pub fn mjcf_visuals(path: &Path, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> {
     let (source, text) = Source::read(path)?;
     let document = source.parse(&text, "mujoco")?;
@@ -43,7 +47,8 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
                 links.push(Vec::new());
             }
             let Some(of) = links.last_mut() else { continue };
-            // Bodies that are still to be looked at, with their poses. What hangs on the tip's body is left out.
+            // Bodies that are still to be looked at, with their poses. What hangs on the tip's body
+            // is left out.
             let mut open = vec![(body, here)];
             while let Some((node, pose)) = open.pop() {
                 for geom in children(node, "geom") {

@@ -1,4 +1,5 @@
-//! What a URDF file's links look like: `<visual>` of each link from the base to the tip, and of what is fixed to them.
+//! What a URDF file's links look like: `<visual>` of each link from the base to the tip, and of
+//! what is fixed to them.
 
 use super::super::visual::{PLAIN, Visual, VisualShape, opaque};
 use super::super::xml::{Source, children, place, shown};
@@ -10,11 +11,14 @@ use roxmltree::Node;
 use std::path::{Component, Path, PathBuf};
 use trocar_geometry::Pose;
 
-/// What the arm between `base` and `tip` of a URDF file looks like, as [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf) reads it: of the base first, then of each link that a joint moves.
-/// `package://NAME/...` is looked for where a folder NAME lies beside the file or above it.
+/// What the arm between `base` and `tip` of a URDF file looks like, as
+/// [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf) reads it: of the base first, then
+/// of each link that a joint moves. `package://NAME/...` is looked for where a folder NAME lies
+/// beside the file or above it.
 ///
 /// # Errors
-/// As [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf); a shape that is not understood, a package that is nowhere, a path that leaves its package.
+/// As [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf); a shape that is not understood,
+/// a package that is nowhere, a path that leaves its package.
 pub fn urdf_visuals(path: &Path, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> {
     let (source, text) = Source::read(path)?;
     let document = source.parse(&text, "robot")?;
@@ -88,7 +92,8 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(())
     }
 
-    /// The colour of a visual, its own or that of the material that it names; `None` if it cannot be seen.
+    /// The colour of a visual, its own or that of the material that it names; `None` if it cannot
+    /// be seen.
     fn color(&self, visual: Node<'a, 'i>) -> Result<Option<[f64; 3]>> {
         let Some(own) = children(visual, "material").next() else { return Ok(Some(PLAIN)) };
         let of = |material: Node<'a, 'i>| children(material, "color").next();
