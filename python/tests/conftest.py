@@ -1,12 +1,13 @@
 """What several files of tests share: cells that are built once, since building one takes about a second of work."""
 
-from pathlib import Path
 import os
 import shutil
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
+
 import trocar  # noqa: F401  (registers the environments)
 
 #: Short episodes: a test of the contract needs no more.

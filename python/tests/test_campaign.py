@@ -10,8 +10,9 @@ import threading
 import time
 
 import pytest
+
 from trocar import _ray, _threads, campaign
-from trocar._progress import EVERY_S, Bar
+from trocar._progress import LOG_INTERVAL_S, Bar
 
 OPTIONS = {"episodes": 2, "seed": 5}
 POLICIES = ["scripted", "random"]
@@ -333,7 +334,7 @@ def test_progress_is_one_line_with_the_time_left():
         "\n" not in out.getvalue() and "1/4" in shown[-1] and "1:01, about 3:03 left" in shown[-1]
     )
     # What comes next stands in a line of its own.
-    bar.say("done")
+    bar.print("done")
     assert out.getvalue().endswith("\r\x1b[Kdone\n")
     assert all(len(re.sub(r"\x1b\[K", "", part)) < 80 for part in shown)
 
@@ -343,7 +344,7 @@ def test_a_log_gets_a_line_now_and_then():
     bar = Bar(out, lambda: now[0])
     for done in range(101):
         bar(done, 100)
-        now[0] += EVERY_S / 10
+        now[0] += LOG_INTERVAL_S / 10
     lines = out.getvalue().splitlines()
     assert (
         len(lines) == 11

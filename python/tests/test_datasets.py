@@ -14,8 +14,8 @@ pytest.importorskip("h5py")
 
 import pandas as pd
 import pyarrow.parquet as pq
-from trocar.datasets import LeRobotWriter
-from trocar.datasets import _layouts, _stats, _video, lerobot
+
+from trocar.datasets import LeRobotWriter, _layouts, _stats, _video, lerobot
 
 FEATURES = {
     "observation.state": {"dtype": "float32", "shape": (3,), "names": ["x", "y", "z"]},
@@ -206,13 +206,13 @@ def test_two_writers_of_a_folder_take_turns(tmp_path, monkeypatch):
 
     def watched(self, task):
         monkeypatch.setattr(lerobot.LeRobotWriter, "_save", save)
-        (tmp_path / "set/meta/under-way.partial").write_text("")
+        (tmp_path / "set/meta/unfinished.partial").write_text("")
         other = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version="v3.0")
         other.add_frame(next(frames(0)))
-        assert (tmp_path / "set/meta/under-way.partial").exists()
-        with pytest.raises(RuntimeError, match="another writer"), other._alone(0.0):
+        assert (tmp_path / "set/meta/unfinished.partial").exists()
+        with pytest.raises(RuntimeError, match="another writer"), other._locked(0.0):
             pass
-        (tmp_path / "set/meta/under-way.partial").unlink()
+        (tmp_path / "set/meta/unfinished.partial").unlink()
         inside.append(other.episodes)
         return save(self, task)
 
@@ -228,7 +228,7 @@ def test_what_another_writer_left_when_it_died_is_not_built_upon(tmp_path, monke
     dying = write(tmp_path / "set", version, [0])
     # Opened before the other's death, once while it holds the folder and once while it does not.
     before = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version=version)
-    with dying._alone():
+    with dying._locked():
         amid = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version=version)
     for frame in frames(2):
         dying.add_frame(frame)
@@ -251,7 +251,7 @@ def test_what_another_writer_left_when_it_died_is_not_built_upon(tmp_path, monke
 def test_a_writer_opened_while_another_saves_keeps_what_is_there(tmp_path):
     write(tmp_path / "whole", "v3.0")
     one = write(tmp_path / "set", "v3.0", [0, 1])
-    with one._alone():
+    with one._locked():
         other = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version="v3.0")
     for frame in frames(2):
         other.add_frame(frame)
@@ -318,7 +318,7 @@ def test_lerobot_reads_it(tmp_path):
 
 #: Types of numbers that a feature may have.
 NUMBERS = [
-    *("bool float16 float32 float64".split()),
+    *(["bool", "float16", "float32", "float64"]),
     *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
 ]
 

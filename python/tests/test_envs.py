@@ -11,11 +11,11 @@ import typing
 import gymnasium as gym
 import numpy as np
 import pytest
-import trocar
+from conftest import SHORT, actions_of, changed_scene, rollout
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from conftest import SHORT, actions_of, changed_scene, rollout
+import trocar
 
 NAMES = list(trocar.TASKS)
 

@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import trocar
 
 pytest.importorskip("lerobot.scripts.lerobot_eval")
 
-import torch  # noqa: E402
-from lerobot.envs.factory import make_env  # noqa: E402
-from lerobot.envs.utils import close_envs  # noqa: E402
-from lerobot.scripts.lerobot_eval import rollout  # noqa: E402
+import torch
+from lerobot.envs.factory import make_env
+from lerobot.envs.utils import close_envs
+from lerobot.scripts.lerobot_eval import rollout
 
 EXAMPLE = Path(__file__).parents[2] / "examples/python/evaluate_lerobot.py"
 

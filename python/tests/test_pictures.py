@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-import trocar
+from conftest import SHORT
 from gymnasium.utils.env_checker import check_env
 
-from conftest import SHORT
+import trocar
 
 
 def test_gymnasium_finds_nothing_wrong_with_pictures(seeing):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import trocar
 
 msgpack = pytest.importorskip("msgpack")
@@ -103,7 +104,7 @@ def test_a_server_answers_resets_and_tells_errors():
     address, ready, policy = [], threading.Event(), Policy()
     tell = lambda url: (address.append(url), ready.set())
     threading.Thread(
-        target=serve.serve, args=(serve.Served(policy),), kwargs={"told": tell}, daemon=True
+        target=serve.serve, args=(serve.Served(policy),), kwargs={"on_listening": tell}, daemon=True
     ).start()
     assert ready.wait(10) and address[0].startswith("ws://127.0.0.1:")
     with connect(address[0]) as client:

@@ -13,8 +13,7 @@ h5py = pytest.importorskip("h5py")
 pytest.importorskip("pyarrow")
 pytest.importorskip("av")
 
-from trocar.datasets import RobomimicWriter, robomimic_environment
-from trocar.datasets import _spare, robomimic
+from trocar.datasets import RobomimicWriter, _spare, robomimic_environment
 
 OBSERVATIONS = {
     "state": {"dtype": "float32", "shape": (3,)},

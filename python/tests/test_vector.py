@@ -5,11 +5,11 @@ import weakref
 import gymnasium as gym
 import numpy as np
 import pytest
-import trocar
+from conftest import SHORT, actions_of, rollout
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.vector import AutoresetMode
 
-from conftest import SHORT, actions_of, rollout
+import trocar
 
 #: Three steps an episode.
 BRIEF = {"task": "grasp-lift", "episode_s": 0.1}
