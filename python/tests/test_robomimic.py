@@ -284,7 +284,7 @@ def test_two_writers_of_a_file_take_turns(tmp_path):
     assert save(one, 2) == 2 and one.episodes == other.episodes == 3
     check(path, 3)
     # While one saves, the end of another takes nothing away.
-    with one._spare.alone():
+    with one._spare.locked():
         one._spare.copy()
         other.close()
         assert one._spare.path.exists()
