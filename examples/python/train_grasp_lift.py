@@ -16,7 +16,7 @@ batch is drawn from them (Ball et al. 2023, RLPD). The policy itself starts from
 import argparse
 import time
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import gymnasium as gym
 import matplotlib
@@ -55,7 +55,7 @@ class LiftCells(VecEnv):
     """
 
     def __init__(self, cells: int, seconds: float, seed: int):
-        self.cells: Any = gym.make_vec(
+        envs = gym.make_vec(
             "trocar/GraspLift-v0",
             num_envs=cells,
             vectorization_mode="vector_entry_point",
@@ -63,6 +63,8 @@ class LiftCells(VecEnv):
             episode_s=seconds,
             privileged=True,
         )
+        # Its own attributes are not in Gymnasium's types.
+        self.cells = cast(Any, envs)
         space = self.cells.single_action_space
         assert isinstance(space, gym.spaces.Box)
         self.low, self.high = space.low.astype(float), space.high.astype(float)

@@ -1,4 +1,4 @@
-"""Campaigns give the same bits here, on threads, and on Ray's workers; they are stopped and gone on with."""
+"""Campaigns give the same bits on threads and on Ray, and resume after a stop."""
 
 import io
 import os
@@ -17,7 +17,7 @@ from trocar._progress import LOG_INTERVAL_S, Bar
 OPTIONS = {"episodes": 2, "seed": 5}
 POLICIES = ["scripted", "random"]
 
-#: Policies that are waited for: when they act, and when they are loaded.
+#: A policy that blocks when it acts, or with $LOADS_SLOWLY when it is loaded.
 WAITED_FOR = """
 import os, pathlib, sys, time
 
@@ -37,13 +37,13 @@ def local(short_scene, tmp_path_factory):
     return folder, campaign.run(str(short_scene), POLICIES, folder / "local", workers=2, **OPTIONS)
 
 
-def test_threads_keep_every_episode_and_go_on(short_scene, local):
+def test_threads_keep_every_episode_and_resume(short_scene, local):
     folder, result = local
     assert result["episodes"] == result["planned"] == 4 and [
         p["episodes"] for p in result["policies"]
     ] == [2, 2]
     assert (folder / "local/report.html").exists() and (folder / "local/table.csv").exists()
-    # With everything there, nothing is run; with one episode gone, one is, to the same bits.
+    # One episode is missing: one is run, with the same bits.
     gone = folder / "local/episodes/random/000001"
     for file in gone.iterdir():
         file.unlink()
@@ -62,7 +62,7 @@ def test_threads_keep_every_episode_and_go_on(short_scene, local):
         campaign.run(str(short_scene), POLICIES, folder / "local", episodes=2, seed=6)
 
 
-def test_ray_gives_the_same_bits_though_a_worker_is_lost(short_scene, local, monkeypatch):
+def test_ray_gives_the_same_bits_with_a_lost_worker(short_scene, local, monkeypatch):
     pytest.importorskip("ray", reason="Ray is not installed")
     folder, result = local
     mark = folder / "lost"
@@ -106,15 +106,13 @@ class Other:
     def here(self):
         pass
 
-other = Other.remote()
-ray.get(other.here.remote())
-result = campaign.run(sys.argv[1], ["random"], sys.argv[2], episodes=3, workers=2, ray_address="local")
-print("episodes", result["episodes"])
+other = Other.remote() ray.get(other.here.remote()) result = campaign.run(sys.argv[1], ["random"],
+sys.argv[2], episodes=3, workers=2, ray_address="local") print("episodes", result["episodes"])
 """
 
 
 def test_on_ray_no_episode_waits_for_a_worker_that_does_not_start(short_scene, tmp_path):
-    """Of the cluster's two CPUs one is another's for as long as it runs."""
+    """Another actor occupies one of the cluster's two CPUs."""
     pytest.importorskip("ray", reason="Ray is not installed")
     command = [sys.executable, "-c", BUSY_CLUSTER, str(short_scene), str(tmp_path / "out")]
     done = subprocess.run(command, capture_output=True, text=True, timeout=180)
@@ -123,7 +121,7 @@ def test_on_ray_no_episode_waits_for_a_worker_that_does_not_start(short_scene, t
 
 def test_on_ray_a_policy_that_cannot_be_loaded_is_one_line(short_scene, tmp_path):
     pytest.importorskip("ray", reason="Ray is not installed")
-    with pytest.raises(RuntimeError, match="no file .*nowhere.py") as told:
+    with pytest.raises(RuntimeError, match=r"no file .*nowhere\.py") as told:
         campaign.run(
             str(short_scene),
             ["python:nowhere.py:act"],
@@ -136,7 +134,7 @@ def test_on_ray_a_policy_that_cannot_be_loaded_is_one_line(short_scene, tmp_path
 
 
 def ends(process, seconds):
-    """Whether the process of that number is gone within the time; one that nobody has waited for is."""
+    """Whether a process ends within the time. A zombie has ended."""
     until = time.monotonic() + seconds
     while time.monotonic() < until:
         try:
@@ -155,7 +153,7 @@ def test_ctrl_c_ends_a_campaign_that_waits_for_a_policy(short_scene, tmp_path, h
     if how == "ray":
         pytest.importorskip("ray", reason="Ray is not installed")
     (tmp_path / "mine.py").write_text(WAITED_FOR)
-    # With one that acts the first episode is another's, and is kept.
+    # If it blocks when it acts, the first episode is of `random` and is kept.
     named = ["random", "w=python:mine.py:wait"] if how == "acts" else ["w=python:mine.py:wait"]
     words = [word for policy in named for word in ("--policy", policy)] + (
         ["--ray", "local"] if how == "ray" else []
@@ -199,7 +197,10 @@ def test_ctrl_c_ends_a_campaign_that_waits_for_a_policy(short_scene, tmp_path, h
         for p in (tmp_path / "out/episodes").rglob("result.json")
     ]
     assert kept == (["random/000000"] if how == "acts" else [])
-    # There are table and page of what is kept.
+    if how == "loads":
+        assert not (tmp_path / "out").exists(), "nothing was started"
+        return
+    # Table and page show the kept episodes.
     assert len((tmp_path / "out/table.csv").read_text().splitlines()) == 1 + len(kept)
     assert (tmp_path / "out/report.html").exists()
 
@@ -211,7 +212,8 @@ def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(
     monkeypatch.delenv("TROCAR_PYTHON", raising=False)
     monkeypatch.setenv("PATH", "/nowhere")
     (tmp_path / "who.py").write_text(
-        "import pathlib, sys\npathlib.Path(__file__).with_suffix('.txt').write_text(sys.executable)\n"
+        "import pathlib, sys\n"
+        "pathlib.Path(__file__).with_suffix('.txt').write_text(sys.executable)\n"
         "def act(obs):\n    s = obs['observation/state']\n    return [*s[:5], *s[23:28]]\n"
     )
     before = dict(os.environ)
@@ -233,30 +235,33 @@ def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(
         ("python:os:act", "no act in os"),
     ],
 )
-def test_a_policy_that_cannot_be_loaded_stops_the_campaign_before_its_first_episode(
-    short_scene, tmp_path, policy, said, capfd
+def test_a_policy_that_cannot_be_loaded_stops_the_campaign_before_anything_is_built(
+    short_scene, tmp_path, monkeypatch, policy, said, capfd
 ):
     pytest.importorskip("msgpack")
-    code = campaign.main(
-        [
-            str(short_scene),
-            "--policy",
-            "random",
-            "--policy",
-            policy,
-            "--workers",
-            "1",
-            "-o",
-            str(tmp_path / "out"),
-        ]
-    )
-    last = capfd.readouterr().err.strip().splitlines()[-1]
-    assert code == 1 and last.startswith(f"error: {policy}: cannot be loaded: ") and said in last
-    assert not list((tmp_path / "out/episodes").rglob("result.json"))
+    monkeypatch.setenv("TROCAR_PHANTOMS", str(tmp_path / "phantoms"))
+    words = ["--policy", "random", "--policy", policy, "--workers", "1"]
+    code = campaign.main([str(short_scene), *words, "-o", str(tmp_path / "out")])
+    (line,) = capfd.readouterr().err.strip().splitlines()
+    assert code == 1 and line.startswith(f"error: {policy}: cannot be loaded: ") and said in line
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_campaign_that_fails_before_its_first_episode_leaves_no_folder(
+    short_scene, tmp_path, monkeypatch
+):
+    class Broken(Idle):
+        def __init__(self, *_, **__):
+            raise ValueError("no cell")
+
+    monkeypatch.setattr(_threads, "Worker", Broken)
+    with pytest.raises(ValueError, match="no cell"):
+        campaign.run(str(short_scene), ["random"], tmp_path / "out", episodes=1)
+    assert not (tmp_path / "out").exists()
 
 
 class Kept:
-    """Stands for a campaign: remembers what it is to keep."""
+    """A campaign that remembers its episodes."""
 
     plan = "{}"
 
@@ -268,7 +273,7 @@ class Kept:
 
 
 class Idle:
-    """Stands for a worker that has nothing to do."""
+    """A worker that does nothing."""
 
     def __init__(self, *_, **__):
         pass
@@ -280,7 +285,7 @@ class Idle:
         return [job]
 
 
-def test_workers_are_built_side_by_side(monkeypatch):
+def test_workers_are_built_in_parallel(monkeypatch):
     both = threading.Barrier(2, timeout=20.0)
 
     class Worker(Idle):
@@ -294,8 +299,8 @@ def test_workers_are_built_side_by_side(monkeypatch):
     assert kept.files == {"a": ["a"], "b": ["b"], "c": ["c"]} and told == [(k, 3) for k in range(4)]
 
 
-def test_an_episode_that_is_over_when_it_stops_is_kept(monkeypatch):
-    """Ctrl-C comes when one episode has been kept, and another is over that nobody has taken yet."""
+def test_an_episode_that_has_finished_when_it_stops_is_kept(monkeypatch):
+    """Ctrl-C comes when one episode is kept and another has finished."""
     over = threading.Event()
 
     class Worker(Idle):
@@ -323,7 +328,7 @@ class Terminal(io.StringIO):
         return True
 
 
-def test_progress_is_one_line_with_the_time_left():
+def test_progress_is_one_line_with_the_remaining_time():
     out, now = Terminal(), [100.0]
     bar = Bar(out, lambda: now[0])
     bar(0, 4)
@@ -333,13 +338,13 @@ def test_progress_is_one_line_with_the_time_left():
     assert (
         "\n" not in out.getvalue() and "1/4" in shown[-1] and "1:01, about 3:03 left" in shown[-1]
     )
-    # What comes next stands in a line of its own.
+    # Later output gets its own line.
     bar.print("done")
     assert out.getvalue().endswith("\r\x1b[Kdone\n")
     assert all(len(re.sub(r"\x1b\[K", "", part)) < 80 for part in shown)
 
 
-def test_a_log_gets_a_line_now_and_then():
+def test_a_log_gets_a_line_per_interval():
     out, now = io.StringIO(), [0.0]
     bar = Bar(out, lambda: now[0])
     for done in range(101):

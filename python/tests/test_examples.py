@@ -1,4 +1,4 @@
-"""What examples and documents say, without the packages that they need beside this one."""
+"""Code of examples and guides, without the other packages that they need."""
 
 import importlib.util
 import json
@@ -25,7 +25,7 @@ class Anything(types.ModuleType):
 
 @pytest.fixture
 def learning(monkeypatch):
-    """The learning example, whether Stable-Baselines3 is there or not."""
+    """The learning example, with or without Stable-Baselines3."""
     names = [
         "common",
         "common.buffers",
@@ -50,7 +50,7 @@ def learning(monkeypatch):
 
 
 @pytest.mark.parametrize("episodes", [4, 9, 10])
-def test_the_test_of_what_was_learned_takes_as_many_episodes_of_every_cell(
+def test_the_test_of_the_learned_policy_takes_equally_many_episodes_of_each_cell(
     learning, monkeypatch, episodes
 ):
     class Cells:
@@ -75,8 +75,8 @@ def test_the_test_of_what_was_learned_takes_as_many_episodes_of_every_cell(
     assert len(passed) == episodes and sum(passed) == -(-episodes // 3)
 
 
-def test_the_policy_of_the_document_stays_where_it_is(short_scene, tmp_path):
-    """It is served as it is written there; only the server of another package is left out."""
+def test_the_policy_of_the_guide_runs(short_scene, tmp_path):
+    """It is served as it is written there, without the server of another package."""
     pytest.importorskip("msgpack")
     pytest.importorskip("websockets")
     text = (ROOT / "docs/policies.md").read_text()

@@ -1,4 +1,4 @@
-"""LeRobot's factory and evaluation drive the environments, and read task and success rightly."""
+"""LeRobot's factory and evaluation run the environments and read task and success."""
 
 import importlib.util
 import sys
@@ -25,14 +25,14 @@ def example():
     """The example as a module."""
     spec = importlib.util.spec_from_file_location("evaluate_lerobot", EXAMPLE)
     module = importlib.util.module_from_spec(spec)
-    # Dataclasses look their module up.
+    # Dataclasses look up their module.
     sys.modules[spec.name] = module
     spec.loader.exec_module(module)
     return module
 
 
 class Still(torch.nn.Module):
-    """Stays where the arms are, and keeps what it was shown."""
+    """A policy that stands still and keeps its observations."""
 
     def reset(self):
         self.shown = None
@@ -44,7 +44,10 @@ class Still(torch.nn.Module):
 
 
 class Expert(torch.nn.Module):
-    """The scripted controller in each cell; LeRobot resets policies before environments, so it begins when it is asked first."""
+    """The scripted controller in each cell.
+
+    LeRobot resets policies before environments, so it starts at its first action.
+    """
 
     def __init__(self, envs):
         super().__init__()
@@ -64,7 +67,7 @@ class Expert(torch.nn.Module):
 
 
 def evaluated(env, policy, seeds):
-    """What LeRobot's rollout gives; it warns of nothing."""
+    """The result of LeRobot's rollout, without warnings."""
 
     def same(value):
         return value
@@ -74,7 +77,7 @@ def evaluated(env, policy, seeds):
         return rollout(env, policy, same, same, same, same, seeds=seeds)
 
 
-def test_the_factory_makes_environments_that_tell_their_task(example):
+def test_the_factory_makes_environments_with_their_task(example):
     config = example.TrocarConfig(episode_s=0.1, size=32, cameras=["d405"])
     envs = make_env(config, n_envs=2)
     env, policy = envs["trocar"][0], Still()

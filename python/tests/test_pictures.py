@@ -8,7 +8,7 @@ from gymnasium.utils.env_checker import check_env
 import trocar
 
 
-def test_gymnasium_finds_nothing_wrong_with_pictures(seeing):
+def test_pictures_pass_gymnasiums_checker(seeing):
     check_env(seeing.unwrapped, skip_render_check=True, skip_close_check=True)
     space = seeing.observation_space
     assert set(space) == {"agent_pos", "pixels", "depth"} and set(space["pixels"]) == {
@@ -24,7 +24,7 @@ def test_gymnasium_finds_nothing_wrong_with_pictures(seeing):
     )
 
 
-def test_gymnasium_finds_nothing_wrong_with_colours_alone():
+def test_colours_alone_pass_gymnasiums_checker():
     env = trocar.TrocarEnv(task="grasp-lift", obs="rgb", image_size=(16, 24), **SHORT)
     check_env(env, skip_render_check=True, skip_close_check=True)
     assert set(env.observation_space) == {"pixels"} and env.observation_space["pixels"][
@@ -38,7 +38,7 @@ def test_pictures_show_the_cell(seeing):
     seen, _ = seeing.reset(seed=1)
     for camera in ("endoscope", "d405"):
         assert seen["pixels"][camera].std() > 10, f"{camera} sees something"
-    # The depth camera hangs 0.29 m above the ports, the specimen lies below them.
+    # The depth camera is 0.29 m above the ports, the specimen below them.
     depth = seen["depth"]["d405"]
     assert 0.2 < np.median(depth[depth > 0]) < 0.6
     shown = seeing.render()
@@ -55,7 +55,7 @@ def test_pictures_show_the_cell(seeing):
     )
 
 
-def test_many_cells_see_what_one_sees_and_noise_is_the_seeds(seeing):
+def test_many_cells_render_the_pictures_of_one_and_noise_follows_the_seed(seeing):
     options = {"obs": "rgb+depth", "image_size": (48, 64), "cameras": ["d405"], "copy": False}
     envs = trocar.TrocarVectorEnv(2, task="grasp-lift", **SHORT, **options)
     assert set(envs.single_observation_space) == {"pixels", "depth"}
@@ -91,7 +91,7 @@ def test_many_cells_see_what_one_sees_and_noise_is_the_seeds(seeing):
 def test_wrong_cameras_are_named():
     for options, words in [
         ({"cameras": ["keyhole"]}, "keyhole.*endoscope"),
-        ({"cameras": []}, "at least one"),
+        ({"cameras": []}, "rgb needs one"),
         ({"image_size": (4, 64)}, "image_size"),
         ({"render_mode": "human"}, "rgb_array"),
     ]:

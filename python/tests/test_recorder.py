@@ -1,4 +1,4 @@
-"""A recorder writes what its environment shows, at its environment's rate."""
+"""A recorder writes its environment's observations, at its rate."""
 
 import gymnasium as gym
 import numpy as np
@@ -18,7 +18,7 @@ from trocar.datasets import (
 
 
 class Still(gym.Env):
-    """An environment of two steps an episode that shows how many were done."""
+    """An environment with two steps an episode that observes the number of steps."""
 
     metadata = {"render_modes": [], "render_fps": 60}
     observation_space = gym.spaces.Box(0, 9, (1,), np.float32)
@@ -34,7 +34,7 @@ class Still(gym.Env):
         return np.full(1, self.count, np.float32), 0.5, self.count == 2, False, {"is_success": True}
 
 
-def test_a_recorder_wants_the_rate_of_its_environment(tmp_path):
+def test_a_recorder_needs_the_rate_of_its_environment(tmp_path):
     env = Still()
 
     def writer(fps):
@@ -42,10 +42,10 @@ def test_a_recorder_wants_the_rate_of_its_environment(tmp_path):
 
     with pytest.raises(
         ValueError,
-        match="the writer has 30, the environment does 60 steps a second; make the writer with fps=60",
+        match=r"the writer has 30, the environment runs 60 steps a second; .*with fps=60",
     ):
         Recorder(env, writer(30))
-    # What an environment says of itself counts, not its class.
+    # The environment's metadata count, not its class's.
     env.metadata = Still.metadata | {"render_fps": 30}
     env = Recorder(gym.wrappers.TimeLimit(env, 9), writer(30))
     env.reset(seed=0)

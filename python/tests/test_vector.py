@@ -1,4 +1,4 @@
-"""Many cells give the numbers of one, begin anew in three ways, and are asked like single ones."""
+"""Many cells give the numbers of one, reset in three ways, and have the attributes of one."""
 
 import weakref
 
@@ -17,11 +17,11 @@ BRIEF = {"task": "grasp-lift", "episode_s": 0.1}
 
 @pytest.fixture(scope="module")
 def two():
-    """Two cells of the shortest episodes, which begin anew at the next step."""
+    """Two cells with very short episodes, which reset at the next step."""
     return trocar.TrocarVectorEnv(2, **BRIEF, render_mode="rgb_array", image_size=(32, 48))
 
 
-def test_many_cells_give_what_one_gives(one):
+def test_many_cells_give_the_numbers_of_one(one):
     envs = gym.make_vec(
         "trocar/GraspLift-v0", num_envs=3, vectorization_mode="vector_entry_point", **SHORT
     )
@@ -34,7 +34,7 @@ def test_many_cells_give_what_one_gives(one):
         seen, rewards, ended, late, infos = envs.step(np.stack([a[step] for a in actions]))
         assert np.array_equal(rewards, [a[1][step] for a in alone])
     assert late.all() and not ended.any() and infos["end"].tolist() == ["time-out"] * 3
-    # The next step begins new episodes and gives no reward.
+    # The next step starts new episodes and gives no reward.
     seen, rewards, ended, late, _ = envs.step(np.stack([a[0] for a in actions]))
     assert (
         not late.any()
@@ -44,7 +44,7 @@ def test_many_cells_give_what_one_gives(one):
     assert list(envs.call("task")) == ["grasp-lift"] * 3 and len(envs.envs) == 3
 
 
-def test_the_other_ways_to_begin_anew(one):
+def test_the_other_autoreset_modes(one):
     options = {"num_envs": 2, "task": "grasp-lift", "episode_s": 0.1}
     actions = np.stack([actions_of(one, 3, 1)[0]] * 2)
     same = trocar.TrocarVectorEnv(**options, autoreset_mode="same-step")
@@ -69,7 +69,7 @@ def test_the_other_ways_to_begin_anew(one):
     assert again is first and np.array_equal(again, start), "the arrays are the cells' own"
 
 
-def test_gymnasiums_own_words_for_beginning_anew():
+def test_gymnasiums_names_of_autoreset_modes():
     for given, mode in [
         ("SameStep", AutoresetMode.SAME_STEP),
         ("next-step", AutoresetMode.NEXT_STEP),
@@ -101,7 +101,7 @@ def test_wrong_masks_and_seeds_reset_nothing(two):
     assert infos["seed"].tolist() == [2**63 - 1, 2]
 
 
-def test_a_restored_cell_goes_on_as_it_did_past_its_end(two):
+def test_a_restored_cell_continues_past_its_end_as_before(two):
     actions = np.stack([two.single_action_space.low] * 2)
 
     def follow():
@@ -124,7 +124,7 @@ def test_a_restored_cell_goes_on_as_it_did_past_its_end(two):
         shown[0], seen[0]
     )
     assert follow() == first
-    # From one that is over, the next step begins anew.
+    # After an ended episode, the next step starts a new one.
     two.reset(seed=1)
     for _ in range(3):
         two.step(actions)
@@ -149,7 +149,7 @@ def test_a_state_moves_between_one_and_many(two, one):
             two.save_state(k)
 
 
-def test_a_cell_of_many_is_asked_like_one(two):
+def test_a_cell_of_many_has_the_attributes_of_one(two):
     two.reset(seed=[4, 5])
     pictures = two.call("render")
     assert [p.shape for p in pictures] == [(32, 48, 3)] * 2 and np.array_equal(
@@ -164,7 +164,7 @@ def test_a_cell_of_many_is_asked_like_one(two):
     two.set_attr("label", ["a", "b"])
     two.set_attr("mark", 3)
     assert two.get_attr("label") == ("a", "b") and two.get_attr("mark") == (3, 3)
-    with pytest.raises(ValueError, match="2 are needed"):
+    with pytest.raises(ValueError, match="it must be 2"):
         two.set_attr("label", ["a"])
     view = two.envs[1]
     assert view.unwrapped is view and view.observation_space == two.single_observation_space
@@ -177,12 +177,12 @@ def test_a_cell_of_many_is_asked_like_one(two):
     assert two.envs[0].state_hash == view.state_hash
 
 
-def test_a_cell_of_many_knows_what_made_it():
+def test_a_cell_of_many_has_its_spec():
     envs = gym.make_vec("trocar/GraspLift-v0", num_envs=1, episode_s=0.1)
     assert envs.envs[0].spec.id == "trocar/GraspLift-v0"
 
 
-def test_order_is_kept_by_many_cells():
+def test_calls_in_the_wrong_order_raise_for_many_cells():
     envs = trocar.TrocarVectorEnv(2, **BRIEF, render_mode="rgb_array")
     actions = np.stack([envs.single_action_space.low] * 2)
     for too_early in (lambda: envs.step(actions), envs.render, lambda: envs.save_state(0)):
@@ -210,6 +210,6 @@ def test_cells_are_freed_with_their_environment():
     envs = trocar.TrocarVectorEnv(1, **BRIEF)
     cells, view = weakref.ref(envs.cells), envs.envs[0]
     del envs
-    assert cells() is None, "what shows one of them does not keep them"
+    assert cells() is None, "a view of a cell does not keep the cells"
     with pytest.raises(ClosedEnvironmentError):
         view.task
