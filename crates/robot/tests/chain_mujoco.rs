@@ -196,7 +196,7 @@ fn the_built_in_fr3_is_mujocos() {
     assert!(arm.home().iter().zip(theirs.home().iter()).all(|(a, b)| (a - b).abs() < 2e-4), "theirs is rounded");
 }
 
-/// Largest distance of joints over 2 s of the same torques [rad].
+/// Largest distance of joints over 2 s of the same torques (rad).
 fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str) -> f64 {
     let n = arm.dof();
     let steps = (2.0 / step).round() as usize;

@@ -7,7 +7,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_geometry::Pose;
 
-/// Standard gravity in a world with z up [m/s2], as most simulators have it.
+/// Standard gravity in a world with z up (m/s2), as most simulators have it.
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
 /// What a joint lets its link do.
@@ -22,13 +22,13 @@ pub enum JointKind {
 /// How far, how fast and how hard a joint may go. Infinite where nothing is known.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointLimits {
-    /// Lowest and highest position [rad or m].
+    /// Lowest and highest position (rad or m).
     pub position: [f64; 2],
-    /// Highest speed [rad/s or m/s].
+    /// Highest speed (rad/s or m/s).
     pub velocity: f64,
-    /// Highest torque or force of the drive [N m or N].
+    /// Highest torque or force of the drive (N m or N).
     pub effort: f64,
-    /// Highest acceleration that may be planned [rad/s2 or m/s2]. Nothing enforces it.
+    /// Highest acceleration that may be planned (rad/s2 or m/s2). Nothing enforces it.
     pub acceleration: f64,
 }
 
@@ -56,11 +56,11 @@ pub struct Joint {
     pub axis: DVec3,
     /// Its limits.
     pub limits: JointLimits,
-    /// Inertia of the rotor as felt at the joint [kg m2, or kg].
+    /// Inertia of the rotor as felt at the joint (kg m2, or kg).
     pub armature: f64,
-    /// Viscous damping [N m s/rad, or N s/m].
+    /// Viscous damping (N m s/rad, or N s/m).
     pub damping: f64,
-    /// Coulomb friction, at rest and in motion [N m, or N].
+    /// Coulomb friction, at rest and in motion (N m, or N).
     pub friction: f64,
 }
 
@@ -144,7 +144,7 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// The same arm under this gravity, in world axes [m/s2].
+    /// The same arm under this gravity, in world axes (m/s2).
     ///
     /// # Errors
     /// A vector that is not finite.
@@ -196,7 +196,7 @@ impl SerialArm {
         self.checked()
     }
 
-    /// The same arm with this Coulomb friction [N m or N] and viscous damping [N m s/rad or N s/m]
+    /// The same arm with this Coulomb friction (N m or N) and viscous damping (N m s/rad or N s/m)
     /// in its joints.
     ///
     /// # Errors
@@ -252,7 +252,7 @@ impl SerialArm {
         self.flange
     }
 
-    /// Gravity in world axes [m/s2].
+    /// Gravity in world axes (m/s2).
     pub fn gravity(&self) -> DVec3 {
         self.gravity
     }

@@ -18,11 +18,11 @@ use glam::{DMat3, DVec3};
 pub struct LinkLoad {
     /// The link, 0 the first that moves; beyond the last, the last.
     pub link: usize,
-    /// Where the force acts, in the world [m].
+    /// Where the force acts, in the world (m).
     pub point: DVec3,
-    /// Force [N].
+    /// Force (N).
     pub force: DVec3,
-    /// Torque [N m].
+    /// Torque (N m).
     pub torque: DVec3,
 }
 
@@ -31,9 +31,9 @@ pub struct LinkLoad {
 pub struct Dynamics {
     /// Where the links are.
     pub frames: Frames,
-    /// Mass matrix M(q), the rotors' armature in it [kg m2, kg m or kg].
+    /// Mass matrix M(q), the rotors' armature in it (kg m2, kg m or kg).
     pub mass_matrix: JointMatrix,
-    /// Coriolis, centrifugal and gravity torques [N m or N].
+    /// Coriolis, centrifugal and gravity torques (N m or N).
     pub bias: Joints,
 }
 
@@ -96,7 +96,7 @@ impl SerialArm {
         if qdd.is_finite() { Ok(qdd) } else { Err(Error::NotFinite { what: "an acceleration" }) }
     }
 
-    /// Kinetic and potential energy [J]; the latter is zero for masses at the world's origin.
+    /// Kinetic and potential energy (J); the latter is zero for masses at the world's origin.
     pub fn energy(&self, q: &Joints, qd: &Joints) -> (f64, f64) {
         let frames = self.frames(q);
         let bodies = self.place(&frames);

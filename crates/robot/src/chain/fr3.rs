@@ -9,17 +9,17 @@ use trocar_geometry::Pose;
 
 /// A joint's figures and its link's.
 struct Row {
-    /// Position in the parent's axes [m], and turn about x [quarter turns].
+    /// Position in the parent's axes (m), and turn about x (quarter turns).
     position: [f64; 3],
     quarters: f64,
-    /// Position limits [rad], speed [rad/s], torque [N m].
+    /// Position limits (rad), speed (rad/s), torque (N m).
     range: [f64; 2],
     velocity: f64,
     effort: f64,
-    /// Rotor inertia [kg m2] and Coulomb friction [N m].
+    /// Rotor inertia (kg m2) and Coulomb friction (N m).
     armature: f64,
     friction: f64,
-    /// Mass [kg], centre [m], inertia xx, xy, xz, yy, yz, zz about it [kg m2].
+    /// Mass (kg), centre (m), inertia xx, xy, xz, yy, yz, zz about it (kg m2).
     mass: f64,
     center: [f64; 3],
     inertia: [f64; 6],
@@ -161,11 +161,11 @@ const ROWS: [Row; 7] = [
     },
 ];
 
-/// Viscous damping of every joint [N m s/rad].
+/// Viscous damping of every joint (N m s/rad).
 const DAMPING: f64 = 0.21;
-/// Highest acceleration of every joint [rad/s2].
+/// Highest acceleration of every joint (rad/s2).
 const ACCELERATION: f64 = 10.0;
-/// From the last joint to the flange, along its axis [m].
+/// From the last joint to the flange, along its axis (m).
 const FLANGE: f64 = 0.107;
 /// The posture in which the arm is delivered: elbow up, hand down.
 const HOME: [f64; 7] = [0.0, 0.0, 0.0, -FRAC_PI_2, 0.0, FRAC_PI_2, -FRAC_PI_4];

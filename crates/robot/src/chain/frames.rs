@@ -17,7 +17,7 @@ pub struct Frames {
 }
 
 impl SerialArm {
-    /// Forward kinematics: where everything is at posture `q` [rad or m], limits or not (Lynch and
+    /// Forward kinematics: where everything is at posture `q` (rad or m), limits or not (Lynch and
     /// Park 2017, section 4.1).
     pub fn frames(&self, q: &Joints) -> Frames {
         let n = self.dof();
@@ -78,7 +78,7 @@ impl Frames {
         self.turns[i]
     }
 
-    /// The geometric Jacobian of the point of link `i` that is at `point` in the world [m] (Lynch
+    /// The geometric Jacobian of the point of link `i` that is at `point` in the world (m) (Lynch
     /// and Park 2017, section 5.1). Beyond the last link, of the last.
     pub fn jacobian(&self, i: usize, point: DVec3) -> Jacobian {
         let mut j = Jacobian { n: self.n, linear: [DVec3::ZERO; MAX_JOINTS], angular: [DVec3::ZERO; MAX_JOINTS] };
@@ -108,17 +108,17 @@ pub struct Jacobian {
 }
 
 impl Jacobian {
-    /// Velocity of the point a unit of joint speed, one a joint [m/rad or 1].
+    /// Velocity of the point a unit of joint speed, one a joint (m/rad or 1).
     pub fn linear(&self) -> &[DVec3] {
         &self.linear[..self.n]
     }
 
-    /// Angular velocity of the link a unit of joint speed, one a joint [1 or 0].
+    /// Angular velocity of the link a unit of joint speed, one a joint (1 or 0).
     pub fn angular(&self) -> &[DVec3] {
         &self.angular[..self.n]
     }
 
-    /// Velocity of the point [m/s] and angular velocity of its link [rad/s] at the joint rates
+    /// Velocity of the point (m/s) and angular velocity of its link (rad/s) at the joint rates
     /// `qd`.
     pub fn velocity(&self, qd: &Joints) -> (DVec3, DVec3) {
         let mut v = (DVec3::ZERO, DVec3::ZERO);
@@ -129,7 +129,7 @@ impl Jacobian {
         v
     }
 
-    /// The joint torques that hold a force [N] at the point and a torque [N m] on the link: J^T
+    /// The joint torques that hold a force (N) at the point and a torque (N m) on the link: J^T
     /// (force, torque).
     pub fn torque(&self, force: DVec3, torque: DVec3) -> Joints {
         Joints::from_fn(self.n, |k| self.linear[k].dot(force) + self.angular[k].dot(torque))

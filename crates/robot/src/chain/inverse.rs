@@ -12,14 +12,14 @@ use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use trocar_geometry::Pose;
 
-/// Rotations are weighed against translations as if at this distance [m]: about an instrument's
+/// Rotations are weighed against translations as if at this distance (m): about an instrument's
 /// length.
 pub(crate) const LEVER: f64 = 0.3;
-/// Damping that is always there [m2]: singular values below its root are not trusted.
+/// Damping that is always there (m2): singular values below its root are not trusted.
 const FLOOR: f64 = 1e-6;
 /// The least share of the damping, after steps that went well.
 const CAUTION: f64 = 1e-2;
-/// No joint moves further in one iteration [rad or m].
+/// No joint moves further in one iteration (rad or m).
 const STRIDE: f64 = 0.6;
 
 /// How [`SerialArm::inverse`] searches.
@@ -27,18 +27,18 @@ const STRIDE: f64 = 0.6;
 pub struct InverseOptions {
     /// Where the joints would like to be: it chooses the elbow. `None`: the arm's home.
     pub preferred: Option<Joints>,
-    /// Joints are pushed off their limits from this far away [rad or m].
+    /// Joints are pushed off their limits from this far away (rad or m).
     pub margin: f64,
-    /// Good enough: distance [m] and angle [rad] of the flange from its target.
+    /// Good enough: distance (m) and angle (rad) of the flange from its target.
     pub tolerance: [f64; 2],
-    /// The elbow is left alone when it would move less than this in an iteration [rad or m].
+    /// The elbow is left alone when it would move less than this in an iteration (rad or m).
     pub posture_tolerance: f64,
     /// Most iterations of one search.
     pub iterations: usize,
     /// Other starts that are tried where the first does not reach the target: the preferred
     /// posture, then postures all over the range. Zero for a smooth motion.
     pub restarts: usize,
-    /// No joint ends further from its start than its highest speed takes it in this time [s].
+    /// No joint ends further from its start than its highest speed takes it in this time (s).
     /// Infinite: no bound.
     pub within: f64,
 }
@@ -62,9 +62,9 @@ impl Default for InverseOptions {
 pub struct Reached {
     /// The posture, within its limits.
     pub q: Joints,
-    /// From the flange reached to its target, in world axes [m].
+    /// From the flange reached to its target, in world axes (m).
     pub translation: DVec3,
-    /// The turn from the flange reached to its target, as axis times angle in world axes [rad].
+    /// The turn from the flange reached to its target, as axis times angle in world axes (rad).
     pub rotation: DVec3,
     /// Whether both are within tolerance.
     pub reached: bool,
@@ -75,7 +75,7 @@ pub struct Reached {
 }
 
 impl Reached {
-    /// Distance from the target [m], the angle at a lever of 0.3 m included.
+    /// Distance from the target (m), the angle at a lever of 0.3 m included.
     fn cost(&self) -> f64 {
         (self.translation.length_squared() + (LEVER * self.rotation).length_squared()).sqrt()
     }
@@ -162,7 +162,7 @@ impl Search<'_> {
         })
     }
 
-    /// What is missing to the target: translation [m] and turn [rad].
+    /// What is missing to the target: translation (m) and turn (rad).
     fn missing(&self, frames: &Frames) -> (DVec3, DVec3) {
         let flange = frames.flange();
         (self.target.translation - flange.translation, turn(self.target.rotation * flange.rotation.inverse()))
@@ -363,7 +363,7 @@ pub(crate) fn solve(
     step
 }
 
-/// A rotation as axis times angle, the short way [rad].
+/// A rotation as axis times angle, the short way (rad).
 pub(crate) fn turn(q: DQuat) -> DVec3 {
     let (v, w) = (DVec3::new(q.x, q.y, q.z), q.w);
     let (v, w) = if w < 0.0 { (-v, -w) } else { (v, w) };

@@ -7,8 +7,8 @@ use std::ops::{Deref, DerefMut};
 /// The most joints that an arm may have.
 pub const MAX_JOINTS: usize = 16;
 
-/// A number for each joint of an arm: angles [rad] or displacements [m], their rates, torques [N m]
-/// or forces [N]. Reads as a slice.
+/// A number for each joint of an arm: angles (rad) or displacements (m), their rates, torques (N m)
+/// or forces (N). Reads as a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Joints {

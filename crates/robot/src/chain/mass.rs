@@ -8,11 +8,11 @@ use trocar_geometry::Pose;
 /// How a rigid body resists motion, in axes that are fixed to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MassProperties {
-    /// Mass [kg].
+    /// Mass (kg).
     pub mass: f64,
-    /// Centre of mass [m].
+    /// Centre of mass (m).
     pub center: DVec3,
-    /// Inertia about the centre of mass [kg m2].
+    /// Inertia about the centre of mass (kg m2).
     pub inertia: DMat3,
 }
 
@@ -20,7 +20,7 @@ impl MassProperties {
     /// Nothing.
     pub const NONE: Self = Self { mass: 0.0, center: DVec3::ZERO, inertia: DMat3::ZERO };
 
-    /// A tube of `mass` [kg] along z around `center`; with `inner` 0 it is solid. Radii and length
+    /// A tube of `mass` (kg) along z around `center`; with `inner` 0 it is solid. Radii and length
     /// in metres.
     pub fn tube(mass: f64, outer: f64, inner: f64, length: f64, center: DVec3) -> Self {
         let square = outer * outer + inner * inner;
@@ -85,7 +85,7 @@ impl MassProperties {
     }
 }
 
-/// Inertia of a point of mass `m` [kg] at `d` [m] about the origin.
+/// Inertia of a point of mass `m` (kg) at `d` (m) about the origin.
 pub(crate) fn point_inertia(m: f64, d: DVec3) -> DMat3 {
     let s = m * d.length_squared();
     DMat3::from_diagonal(DVec3::splat(s)) - DMat3::from_cols(d * (m * d.x), d * (m * d.y), d * (m * d.z))

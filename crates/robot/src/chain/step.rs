@@ -17,9 +17,9 @@ const FRICTION_ROUNDS: usize = 36;
 /// Where an arm's joints are and how fast they move. Plain data: a copy is an exact snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArmState {
-    /// Positions [rad or m].
+    /// Positions (rad or m).
     pub q: Joints,
-    /// Rates [rad/s or m/s].
+    /// Rates (rad/s or m/s).
     pub qd: Joints,
 }
 
@@ -58,17 +58,17 @@ pub struct Coupling {
     /// Speed along the direction a unit of joint rate: a row of a Jacobian, from
     /// [`super::Jacobian::row`].
     pub row: Joints,
-    /// How far the spring is stretched along the row [m or rad]. Given for the step's beginning;
+    /// How far the spring is stretched along the row (m or rad). Given for the step's beginning;
     /// after it, for its end.
     pub displacement: f64,
-    /// Stiffness [N/m or N m/rad].
+    /// Stiffness (N/m or N m/rad).
     pub stiffness: f64,
-    /// Damping [N s/m or N m s/rad]. A push may begin a little before the gap closes where this is
+    /// Damping (N s/m or N m s/rad). A push may begin a little before the gap closes where this is
     /// not small beside stiffness times step.
     pub damping: f64,
     /// Which forces are possible.
     pub law: CouplingLaw,
-    /// Filled in by the step: the mean force along the row over the step [N or N m].
+    /// Filled in by the step: the mean force along the row over the step (N or N m).
     pub force: f64,
 }
 
@@ -82,7 +82,7 @@ impl Coupling {
 /// What drives an arm through a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
-    /// Torques of the joints' drives [N m or N], kept within their limits by the step.
+    /// Torques of the joints' drives (N m or N), kept within their limits by the step.
     pub torque: Joints,
     /// Other torques at the joints, from forces on the links (J^T f): not limited.
     pub external: Joints,
@@ -91,9 +91,9 @@ pub struct Drive {
 /// What happened in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
-    /// The torques of the drives that acted, after limiting [N m or N].
+    /// The torques of the drives that acted, after limiting (N m or N).
     pub torque: Joints,
-    /// Mean torque of friction and stops over the step [N m or N].
+    /// Mean torque of friction and stops over the step (N m or N).
     pub resisting: Joints,
     /// Joints whose drive was asked for more than its limit.
     pub torque_limited: JointSet,
@@ -110,7 +110,7 @@ pub struct StepReport {
 }
 
 impl SerialArm {
-    /// Moves the state on by `dt` [s] in `substeps` equal parts. Allocates nothing; the same
+    /// Moves the state on by `dt` (s) in `substeps` equal parts. Allocates nothing; the same
     /// numbers give the same bits.
     ///
     /// Positions never leave their limits (a state that is outside is let in, not pulled in),

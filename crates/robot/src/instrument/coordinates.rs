@@ -8,12 +8,12 @@ use serde::{Deserialize, Serialize};
 /// Where an instrument is in its port: what an arm is told, and what it reports.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Coordinates {
-    /// The two pivots [rad]: the first turns about the port's x, the second about the y that the
+    /// The two pivots (rad): the first turns about the port's x, the second about the y that the
     /// first has turned.
     pub pivots: [f64; 2],
-    /// Distance from the port's centre to the jaw's pivot [m], along the shaft.
+    /// Distance from the port's centre to the jaw's pivot (m), along the shaft.
     pub insertion: f64,
-    /// Turn of the instrument about its shaft [rad].
+    /// Turn of the instrument about its shaft (rad).
     pub roll: f64,
     /// Jaw opening, 0 closed to 1 wide open.
     pub jaw: f64,
@@ -48,7 +48,7 @@ impl Coordinates {
         glam::DVec3::new(sb, -sa * cb, ca * cb)
     }
 
-    /// Angle between the shaft and the port's normal [rad].
+    /// Angle between the shaft and the port's normal (rad).
     pub fn tilt(&self) -> f64 {
         let u = Self::direction(self.pivots);
         DVec2::new(u.x, u.y).length().atan2(u.z)
@@ -59,11 +59,11 @@ impl Coordinates {
 /// round hole limits them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
-    /// Greatest tilt [rad].
+    /// Greatest tilt (rad).
     pub tilt: f64,
-    /// Least and greatest insertion [m].
+    /// Least and greatest insertion (m).
     pub insertion: [f64; 2],
-    /// Least and greatest roll [rad].
+    /// Least and greatest roll (rad).
     pub roll: [f64; 2],
 }
 
@@ -71,11 +71,11 @@ pub struct Limits {
 /// below the lower.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Excess {
-    /// Of the tilt [rad].
+    /// Of the tilt (rad).
     pub tilt: f64,
-    /// Of the insertion [m].
+    /// Of the insertion (m).
     pub insertion: f64,
-    /// Of the roll [rad].
+    /// Of the roll (rad).
     pub roll: f64,
     /// Of the jaw's opening.
     pub jaw: f64,

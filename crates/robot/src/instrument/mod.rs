@@ -23,10 +23,10 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 use trocar_geometry::Pose;
 
-/// Standard gravity as all of Trocar uses it [m/s2].
+/// Standard gravity as all of Trocar uses it (m/s2).
 pub const GRAVITY: f64 = 9.81;
 
-/// What the paper's instruments weigh [N] (SPEC C8).
+/// What the paper's instruments weigh (N) (SPEC C8).
 pub const WEIGHT: f64 = 4.7;
 
 /// An instrument on a tool mount.
@@ -34,13 +34,13 @@ pub const WEIGHT: f64 = 4.7;
 pub struct Instrument {
     /// Its name.
     pub name: String,
-    /// Radius of the shaft [m].
+    /// Radius of the shaft (m).
     pub shaft_radius: f64,
-    /// Length of the shaft [m], from its base to its end.
+    /// Length of the shaft (m), from its base to its end.
     pub shaft_length: f64,
     /// Pose of the shaft frame in the flange's.
     pub mount: Pose,
-    /// Distance from the shaft's end to the jaw's pivot [m], along the shaft.
+    /// Distance from the shaft's end to the jaw's pivot (m), along the shaft.
     pub pivot_offset: f64,
     /// The jaw.
     pub jaw: Jaw,
@@ -51,16 +51,16 @@ pub struct Instrument {
 /// A jaw of two blades.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Jaw {
-    /// Full angle between the blades wide open [rad].
+    /// Full angle between the blades wide open (rad).
     pub max_angle: f64,
-    /// Length of the blades beyond the pivot [m].
+    /// Length of the blades beyond the pivot (m).
     pub blade_length: f64,
-    /// Greatest speed of the angle between the blades [rad/s].
+    /// Greatest speed of the angle between the blades (rad/s).
     pub speed: f64,
 }
 
 impl Jaw {
-    /// The angle between the blades [rad] at an opening 0 to 1; openings outside are clamped, NaN
+    /// The angle between the blades (rad) at an opening 0 to 1; openings outside are clamped, NaN
     /// is closed.
     pub fn angle(&self, opening: f64) -> f64 {
         self.max_angle * share(opening)
@@ -121,7 +121,7 @@ impl Instrument {
         }
     }
 
-    /// Distance from the shaft's base to the jaw's pivot [m].
+    /// Distance from the shaft's base to the jaw's pivot (m).
     pub fn reach(&self) -> f64 {
         self.shaft_length + self.pivot_offset
     }
@@ -147,7 +147,7 @@ impl Instrument {
         self.mass.placed(&self.mount)
     }
 
-    /// Weight [N].
+    /// Weight (N).
     pub fn weight(&self) -> f64 {
         self.mass.mass * GRAVITY
     }
@@ -188,7 +188,7 @@ pub(crate) fn share(value: f64) -> f64 {
 struct Head {
     radius: f64,
     length: f64,
-    /// How far its mass lies beside the shaft's axis [m].
+    /// How far its mass lies beside the shaft's axis (m).
     aside: f64,
 }
 

@@ -11,23 +11,23 @@ use serde::{Deserialize, Serialize};
 /// more is no error of a model.
 const CORRECTION_SHARE: f64 = 0.3;
 /// Integral action and observer leave a joint alone that stands still this near to its reference
-/// [rad or m; rad/s or m/s]: with friction they would wind up and move it to and fro for ever. A
+/// (rad or m; rad/s or m/s): with friction they would wind up and move it to and fro for ever. A
 /// touch over 0.05 mm at the tip.
 const QUIET: [f64; 2] = [8e-5, 1e-4];
 /// They take it up again from here, or when its reference moves.
 const AWAKE: [f64; 2] = [1.6e-4, 1e-3];
 
-/// Damping of the task's error in joints [m2]: near postures in which the arm loses a direction the
+/// Damping of the task's error in joints (m2): near postures in which the arm loses a direction the
 /// joints' own error is better.
 const TRUSTED: f64 = 1e-4;
 
 /// What a controller remembers between steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
-    /// The last torques [N m or N].
+    /// The last torques (N m or N).
     pub torque: Joints,
-    /// Integral of the error [rad s or m s], or what the observer found: torques that the model
-    /// does not know [N m or N].
+    /// Integral of the error (rad s or m s), or what the observer found: torques that the model
+    /// does not know (N m or N).
     pub correction: Joints,
     /// Joints that stand still where they should.
     pub asleep: JointSet,
@@ -56,14 +56,14 @@ impl Memory {
 pub(super) struct Plan<'a> {
     pub settings: &'a Settings,
     pub believed: &'a SerialArm,
-    /// The joints' own inertias in the start posture [kg m2 or kg].
+    /// The joints' own inertias in the start posture (kg m2 or kg).
     pub inertia: &'a Joints,
     pub instrument: &'a Instrument,
     pub port: &'a Port,
 }
 
 impl Plan<'_> {
-    /// The torques for a step of `dt` [s]: within the arm's limits and their rate. `from` and `to`
+    /// The torques for a step of `dt` (s): within the arm's limits and their rate. `from` and `to`
     /// are the references at its beginning and end.
     pub fn torque(
         &self,
@@ -118,7 +118,7 @@ impl Plan<'_> {
         torque
     }
 
-    /// Learns from a step of `dt` [s] what torque it took beyond what the model says.
+    /// Learns from a step of `dt` (s) what torque it took beyond what the model says.
     pub fn learn(&self, memory: &mut Memory, dynamics: &Dynamics, before: &ArmState, after: &ArmState, dt: f64) {
         if !self.settings.law.observes() {
             return;

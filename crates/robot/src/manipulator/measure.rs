@@ -11,11 +11,11 @@ use trocar_geometry::Pose;
 /// What is read at the joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointReadings {
-    /// Positions [rad or m].
+    /// Positions (rad or m).
     pub position: Joints,
-    /// Rates [rad/s or m/s].
+    /// Rates (rad/s or m/s).
     pub velocity: Joints,
-    /// Torques of the drives [N m or N].
+    /// Torques of the drives (N m or N).
     pub effort: Joints,
 }
 
@@ -70,8 +70,8 @@ impl Manipulator {
         Shaft::of(&self.instrument, &self.flange())
     }
 
-    /// The instrument's coordinates as measured, and their rates: pivots [rad/s], insertion [m/s],
-    /// roll [rad/s], jaw [1/s]. Where the shaft does not point into the body any more, which takes
+    /// The instrument's coordinates as measured, and their rates: pivots (rad/s), insertion (m/s),
+    /// roll (rad/s), jaw (1/s). Where the shaft does not point into the body any more, which takes
     /// joint commands, they are those of the reference at rest.
     pub fn coordinates(&self) -> (Coordinates, [f64; 5]) {
         let frames = self.arm.frames(&self.state.arm.q);
@@ -112,12 +112,12 @@ impl Manipulator {
         if r.in_joints() { self.setpoint_coordinates() } else { reference::unpack(&r.target, jaw) }
     }
 
-    /// Distance from the port's centre to the shaft's axis, in the port's plane [m].
+    /// Distance from the port's centre to the shaft's axis, in the port's plane (m).
     pub fn rcm_deviation(&self) -> f64 {
         self.deviation(&self.arm.frames(&self.state.arm.q))
     }
 
-    /// Angle between shaft and port normal [rad].
+    /// Angle between shaft and port normal (rad).
     pub fn tilt(&self) -> f64 {
         self.shaft().direction.angle_between(self.port.normal())
     }

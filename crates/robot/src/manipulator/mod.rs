@@ -34,9 +34,9 @@ use reference::{Reference, Ways};
 use serde::{Deserialize, Serialize};
 use trocar_geometry::Pose;
 
-/// The longest physics step [s].
+/// The longest physics step (s).
 const LONGEST: f64 = 0.02;
-/// The flange is at a commanded pose when it is this near [m, rad].
+/// The flange is at a commanded pose when it is this near (m, rad).
 const REACHED: [f64; 2] = [1e-6, 1e-5];
 /// How often the way to a command that the arm cannot reach is halved.
 const HALVINGS: usize = 6;
@@ -66,7 +66,7 @@ pub struct ManipulatorState {
     reference: Reference,
     memory: Memory,
     rim: RimState,
-    /// Opening, its rate [1/s] and where it goes.
+    /// Opening, its rate (1/s) and where it goes.
     jaw: [f64; 3],
     /// What a sensor at the mount read over the last step, in the cell's axes.
     mount: [DVec3; 2],
@@ -81,10 +81,10 @@ pub struct Commanded {
     pub excess: Excess,
     /// How much of the way to what the limits leave the arm can go, 0 to 1: 1 where it reaches it.
     pub reach: f64,
-    /// What is left of a commanded orientation: axis times angle [rad], in the cell. Zero for
+    /// What is left of a commanded orientation: axis times angle (rad), in the cell. Zero for
     /// coordinates.
     pub rejected_rotation: DVec3,
-    /// What is left of a commanded position [m], in the cell, where a limit or the arm's reach
+    /// What is left of a commanded position (m), in the cell, where a limit or the arm's reach
     /// binds. Zero for coordinates.
     pub rejected_translation: DVec3,
 }
@@ -94,9 +94,9 @@ pub struct Commanded {
 pub struct StepReport {
     /// The arm's own report: torques, joints at limits.
     pub arm: chain::StepReport,
-    /// Force with which the shaft presses the rim [N], the sum of its places, mean over the step.
+    /// Force with which the shaft presses the rim (N), the sum of its places, mean over the step.
     pub rim_force: f64,
-    /// Distance from the port's centre to the shaft's axis, in the port's plane [m], at the step's
+    /// Distance from the port's centre to the shaft's axis, in the port's plane (m), at the step's
     /// end.
     pub rcm_deviation: f64,
     /// Share of the step that the reference went on: under 1 where the arm could not follow.
@@ -209,7 +209,7 @@ impl Manipulator {
         })
     }
 
-    /// Commands the joints [rad or m]. Nothing keeps the shaft in the port's centre then, except
+    /// Commands the joints (rad or m). Nothing keeps the shaft in the port's centre then, except
     /// its rim.
     ///
     /// # Errors
@@ -232,8 +232,8 @@ impl Manipulator {
         Ok(())
     }
 
-    /// One physics step of `dt` [s], 1/480 s for instance. `load` is what is done to the
-    /// instrument's tip: a force [N] at the jaw's pivot and a torque [N m] about it, along the
+    /// One physics step of `dt` (s), 1/480 s for instance. `load` is what is done to the
+    /// instrument's tip: a force (N) at the jaw's pivot and a torque (N m) about it, along the
     /// cell's axes.
     ///
     /// # Errors

@@ -20,40 +20,40 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_geometry::Pose;
 
-/// Highest speed and acceleration of the control points: the two pivots [rad/s, rad/s2], insertion
-/// [m/s, m/s2], roll [rad/s, rad/s2]. Commands that stay below both pass unchanged.
+/// Highest speed and acceleration of the control points: the two pivots (rad/s, rad/s2), insertion
+/// (m/s, m/s2), roll (rad/s, rad/s2). Commands that stay below both pass unchanged.
 const COORDINATE_LIMITS: [[f64; 2]; 4] = [[0.6, 3.0], [0.6, 3.0], [0.15, 1.0], [2.0, 10.0]];
 /// Share of a joint's highest speed that the reference may use.
 const SPEED_SHARE: f64 = 0.5;
-/// With what acceleration joints come to rest at their limits [rad/s2 or m/s2].
+/// With what acceleration joints come to rest at their limits (rad/s2 or m/s2).
 const BRAKING: f64 = 8.0;
-/// How long the spline takes to come back to its pace [s], and the pace below which it stands
+/// How long the spline takes to come back to its pace (s), and the pace below which it stands
 /// still.
 const RECOVERY: f64 = 0.3;
 const STANDSTILL: f64 = 0.04;
 /// Below this pace the joints' highest speeds fall with it: where the arm is nearly stretched it
 /// comes to rest instead of running into its end.
 const EASE: f64 = 0.7;
-/// No joint of the reference gains speed faster [rad/s2 or m/s2]; far above what motions away from
+/// No joint of the reference gains speed faster (rad/s2 or m/s2); far above what motions away from
 /// singular postures take.
 const QUICKEST: f64 = 25.0;
-/// Acceleration of joint commands where the arm has no limit of its own [rad/s2 or m/s2].
+/// Acceleration of joint commands where the arm has no limit of its own (rad/s2 or m/s2).
 const JOINT_ACCELERATION: f64 = 10.0;
 /// Share of a period by which a sum of steps may be off.
 const ROUNDING: f64 = 1e-9;
-/// The flange is where it should be [m, with angles at a lever].
+/// The flange is where it should be (m, with angles at a lever).
 const CLOSE: f64 = 1e-9;
-/// Beyond that the arm does not reach the pose [m].
+/// Beyond that the arm does not reach the pose (m).
 const FAR: f64 = 2e-6;
-/// How fast the elbow goes where it likes to be [1/s].
+/// How fast the elbow goes where it likes to be (1/s).
 const ELBOW: f64 = 4.0;
 /// It moves only while the instrument does, with all of that from this speed on (a coordinate a
 /// second, insertions five times as much): a joint that creeps while the instrument rests would
 /// stick and slip.
 const MOVING: f64 = 0.02;
-/// Joints are pushed off their limits from this far away [rad or m].
+/// Joints are pushed off their limits from this far away (rad or m).
 const MARGIN: f64 = 0.1;
-/// The reference's joints keep this far from their limits [rad or m], which leaves room for the
+/// The reference's joints keep this far from their limits (rad or m), which leaves room for the
 /// error of the arm behind it.
 const KEEP: f64 = 5e-3;
 
@@ -73,14 +73,14 @@ pub(super) struct Reference {
     /// The command at the last control point.
     previous: Joints,
     points: [Joints; 3],
-    /// Time since the last control point was made [s].
+    /// Time since the last control point was made (s).
     phase: f64,
     /// The spline now.
     pub value: Joints,
-    /// The posture now, and its rate over the last step [rad/s or m/s].
+    /// The posture now, and its rate over the last step (rad/s or m/s).
     pub q: Joints,
     pub qd: Joints,
-    /// Acceleration over the last step [rad/s2 or m/s2].
+    /// Acceleration over the last step (rad/s2 or m/s2).
     pub qdd: Joints,
     /// Share of the last step that the spline's time took: 1 where the arm could follow.
     pub pace: f64,
@@ -141,7 +141,7 @@ impl Reference {
         self.target = *target;
     }
 
-    /// Goes on by `dt` [s].
+    /// Goes on by `dt` (s).
     pub fn advance(&mut self, ways: &Ways<'_>, dt: f64) {
         let (before, rate) = (*self, self.qd);
         let mut pace = (before.pace + dt / RECOVERY).min(1.0);
@@ -274,8 +274,8 @@ impl Reference {
     }
 }
 
-/// The joints' step towards a pose of the flange, with the elbow's drift over `drifts` [s] if there
-/// is one, and how far the flange is from the pose [m].
+/// The joints' step towards a pose of the flange, with the elbow's drift over `drifts` (s) if there
+/// is one, and how far the flange is from the pose (m).
 fn newton(arm: &SerialArm, q: &Joints, target: &Pose, drifts: Option<f64>) -> (Joints, f64) {
     let n = q.len();
     let frames = arm.frames(q);

@@ -66,13 +66,13 @@ impl Law {
 /// Gains of a control law. Those that a law does not have do nothing.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
-    /// Bandwidth w of the error [rad/s]: the stiffness is w^2 times the inertia.
+    /// Bandwidth w of the error (rad/s): the stiffness is w^2 times the inertia.
     pub bandwidth: f64,
     /// Damping ratio z.
     pub damping: f64,
-    /// Bandwidth w_i of the integral action [rad/s].
+    /// Bandwidth w_i of the integral action (rad/s).
     pub integral: f64,
-    /// Bandwidth w_o of the disturbance observer [rad/s].
+    /// Bandwidth w_o of the disturbance observer (rad/s).
     pub observer: f64,
     /// How many times as stiff the shaft is held in the port as the tip in its place.
     pub port: f64,
@@ -85,7 +85,7 @@ pub struct ModelError {
     pub links: f64,
     /// Share by which the instrument is believed lighter than it is.
     pub instrument: f64,
-    /// Coulomb friction in each joint of the arm, of which the controller knows nothing [N m or N].
+    /// Coulomb friction in each joint of the arm, of which the controller knows nothing (N m or N).
     /// It takes the place of the arm's own. None: the arm's own stays, and is as unknown.
     pub friction: Option<f64>,
 }
@@ -112,7 +112,7 @@ pub struct Settings {
     pub error: ModelError,
     /// Commands a second. The reference passes between them on a spline.
     pub command_rate: f64,
-    /// Fastest change of a joint's torque [N m/s], or of a force [N/s].
+    /// Fastest change of a joint's torque (N m/s), or of a force (N/s).
     pub torque_rate: f64,
     /// Limits of the instrument's coordinates. None: the port's for this instrument, touching
     /// allowed, pivot and shaft's base 20 mm inside and outside.
@@ -121,7 +121,7 @@ pub struct Settings {
     pub substeps: usize,
 }
 
-/// Highest rate of torque of an FR3 [N m/s] (Franka's control interface).
+/// Highest rate of torque of an FR3 (N m/s) (Franka's control interface).
 const FR3_TORQUE_RATE: f64 = 1000.0;
 
 impl Default for Settings {

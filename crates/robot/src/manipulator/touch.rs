@@ -5,7 +5,7 @@ use crate::chain::{ArmState, Coupling, CouplingLaw, Frames, MAX_COUPLINGS};
 use crate::port::{Shaft, Twist};
 use glam::DVec3;
 
-/// The shaft touches the rim within a step only where it is nearer than this [m].
+/// The shaft touches the rim within a step only where it is nearer than this (m).
 const NEAR: f64 = 2e-3;
 
 impl Manipulator {

@@ -10,7 +10,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A contact that has moved less than this along the rim [rad] since its mark was set keeps the
+/// A contact that has moved less than this along the rim (rad) since its mark was set keeps the
 /// mark to the bit.
 const STAYS: f64 = 0.02;
 
@@ -19,9 +19,9 @@ const STAYS: f64 = 0.02;
 struct Mark {
     /// Whether it is at the inner edge.
     inner: bool,
-    /// The rim's place that it belongs to: the angle about the normal [rad].
+    /// The rim's place that it belongs to: the angle about the normal (rad).
     angle: f64,
-    /// Distance of the mark from the shaft's base [m].
+    /// Distance of the mark from the shaft's base (m).
     along: f64,
 }
 
@@ -35,15 +35,15 @@ pub struct RimState {
 /// along `direction` at speed v changes it by -(stiffness dx + damping v).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactRow {
-    /// Where it acts [m], in the cell.
+    /// Where it acts (m), in the cell.
     pub point: DVec3,
     /// Unit vector along which it acts on the shaft, in the cell.
     pub direction: DVec3,
-    /// Force along `direction` now [N].
+    /// Force along `direction` now (N).
     pub force: f64,
-    /// How it falls with motion [N/m]; 0 where it does not.
+    /// How it falls with motion (N/m); 0 where it does not.
     pub stiffness: f64,
-    /// How it falls with speed [N s/m]; 0 where it does not.
+    /// How it falls with speed (N s/m); 0 where it does not.
     pub damping: f64,
 }
 
@@ -56,7 +56,7 @@ pub struct RimContact {
     pub normal: ContactRow,
     /// Friction, along the shaft's direction.
     pub friction: ContactRow,
-    /// How far the shaft has moved along its direction from where friction holds it [m]; 0 where it
+    /// How far the shaft has moved along its direction from where friction holds it (m); 0 where it
     /// is not touched.
     pub stretch: f64,
     /// Whether friction is at its limit.
@@ -80,12 +80,12 @@ impl Contacts {
         self.iter().filter(|c| c.at.gap < 0.0)
     }
 
-    /// The least gap [m]; none where the shaft is not in the port.
+    /// The least gap (m); none where the shaft is not in the port.
     pub fn gap(&self) -> Option<f64> {
         self.iter().map(|c| c.at.gap).reduce(f64::min)
     }
 
-    /// Force [N] and torque about `point` [N m] that the rim exerts on the shaft, in the cell.
+    /// Force (N) and torque about `point` (N m) that the rim exerts on the shaft, in the cell.
     pub fn on_shaft(&self, point: DVec3) -> (DVec3, DVec3) {
         let rows = self.touching().flat_map(|c| [&c.normal, &c.friction]);
         rows.fold((DVec3::ZERO, DVec3::ZERO), |(force, torque), row| {
@@ -126,7 +126,7 @@ impl Port {
         RimContact { at, normal, friction, stretch, sliding }
     }
 
-    /// How far the shaft has moved along its direction since the mark was set [m].
+    /// How far the shaft has moved along its direction since the mark was set (m).
     fn stretch(&self, shaft: &Shaft, mark: &Mark) -> f64 {
         let edge = if mark.inner { Edge::Inner } else { Edge::Outer };
         mark.along - (self.rim(edge, mark.angle) - shaft.base).dot(shaft.direction)
@@ -163,7 +163,7 @@ impl RimState {
     }
 }
 
-/// Angle between two angles [rad], 0 to pi.
+/// Angle between two angles (rad), 0 to pi.
 fn turned(a: f64, b: f64) -> f64 {
     ((a - b + PI).rem_euclid(TAU) - PI).abs()
 }

@@ -2,10 +2,10 @@
 
 use crate::{Error, Result};
 
-/// RCM deviation that an episode is judged by [m].
+/// RCM deviation that an episode is judged by (m).
 pub const RCM_THRESHOLD: f64 = 3e-3;
 
-/// RCM deviation at which the hardware aborts [m].
+/// RCM deviation at which the hardware aborts (m).
 pub const RCM_ABORT: f64 = 5e-3;
 
 /// Deviations gathered step by step.
@@ -15,7 +15,7 @@ pub struct Deviation {
 }
 
 impl Deviation {
-    /// Takes one deviation [m].
+    /// Takes one deviation (m).
     ///
     /// # Errors
     /// One that is negative or not finite.
@@ -32,18 +32,18 @@ impl Deviation {
         self.values.len()
     }
 
-    /// The greatest [m], 0 without any.
+    /// The greatest (m), 0 without any.
     pub fn peak(&self) -> f64 {
         self.values.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Root of the mean square [m], 0 without any.
+    /// Root of the mean square (m), 0 without any.
     pub fn rms(&self) -> f64 {
         let sum: f64 = self.values.iter().map(|v| v * v).sum();
         (sum / self.values.len().max(1) as f64).sqrt()
     }
 
-    /// The deviation [m] that a `share` 0 to 1 of all stay at or below, linear between neighbours
+    /// The deviation (m) that a `share` 0 to 1 of all stay at or below, linear between neighbours
     /// as numpy has it (0.5 the median, 0.95 the p95); 0 without any.
     pub fn percentile(&self, share: f64) -> f64 {
         let mut sorted = self.values.clone();

@@ -18,9 +18,9 @@ pub struct Measured {
     /// Its coordinates: the insertion is counted from where the axis crosses the port's plane, the
     /// jaw is the caller's.
     pub coordinates: Coordinates,
-    /// Angle between shaft and normal [rad].
+    /// Angle between shaft and normal (rad).
     pub tilt: f64,
-    /// From the port's centre to where the axis crosses the port's plane [m], along the port's x
+    /// From the port's centre to where the axis crosses the port's plane (m), along the port's x
     /// and y; its length is the RCM deviation (SPEC).
     pub offset: DVec2,
     /// The jaw's pivot in the cell.
@@ -28,7 +28,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// RCM deviation [m]: distance from the port's centre to the shaft's axis, in the port's plane.
+    /// RCM deviation (m): distance from the port's centre to the shaft's axis, in the port's plane.
     pub fn deviation(&self) -> f64 {
         self.offset.length()
     }
@@ -43,10 +43,10 @@ pub struct Solution {
     pub tip: Pose,
     /// The flange there, in the cell.
     pub flange: Pose,
-    /// What is left of the wanted orientation: the axis times the angle [rad] of the turn, in the
+    /// What is left of the wanted orientation: the axis times the angle (rad) of the turn, in the
     /// cell, that would take the reached orientation to the wanted one.
     pub rejected_rotation: DVec3,
-    /// What is left of the wanted position [m], in the cell; zero unless a limit binds.
+    /// What is left of the wanted position (m), in the cell; zero unless a limit binds.
     pub rejected_translation: DVec3,
     /// By how much the wanted pose lies outside which limit.
     pub excess: Excess,
@@ -109,7 +109,7 @@ impl Port {
         Ok(Measured { coordinates, tilt, offset: DVec2::new(crossing.x, crossing.y), tip })
     }
 
-    /// How fast the two pivots [rad/s], the insertion [m/s] and the roll [rad/s] that
+    /// How fast the two pivots (rad/s), the insertion (m/s) and the roll (rad/s) that
     /// [`Port::measure`] gives change, for a flange at `flange` that moves by `motion` (at its
     /// origin, in the cell).
     ///

@@ -42,24 +42,24 @@ use trocar_geometry::Pose;
 pub struct Port {
     /// Pose of the port frame in the cell: the hole's centre, z into the body.
     pub pose: Pose,
-    /// Diameter D of the hole [m].
+    /// Diameter D of the hole (m).
     pub hole_diameter: f64,
-    /// Thickness t of the sheet [m]. At 0 the rim is one edge and the clearance is the paper's.
+    /// Thickness t of the sheet (m). At 0 the rim is one edge and the clearance is the paper's.
     pub thickness: f64,
-    /// Stiffness of the rim against the shaft [N/m].
+    /// Stiffness of the rim against the shaft (N/m).
     pub stiffness: f64,
-    /// Damping of the rim across the shaft [N s/m].
+    /// Damping of the rim across the shaft (N s/m).
     pub damping: f64,
     /// Coulomb's coefficient of friction between rim and shaft.
     pub friction: f64,
-    /// Stiffness of the rim along the shaft while friction holds [N/m].
+    /// Stiffness of the rim along the shaft while friction holds (N/m).
     pub friction_stiffness: f64,
-    /// Damping along the shaft while friction holds [N s/m].
+    /// Damping along the shaft while friction holds (N s/m).
     pub friction_damping: f64,
 }
 
 impl Port {
-    /// The paper's 6 mm hole at `centre` [m] with `normal` into the body and x as near to `x` as
+    /// The paper's 6 mm hole at `centre` (m) with `normal` into the body and x as near to `x` as
     /// the normal lets it. The rim is a single edge of 20 N/mm with friction 0.2: no paper states
     /// these, so set them where they are known.
     ///
@@ -110,7 +110,7 @@ impl Port {
         Ok(())
     }
 
-    /// Centre of the hole [m], in the cell.
+    /// Centre of the hole (m), in the cell.
     pub fn centre(&self) -> DVec3 {
         self.pose.translation
     }
@@ -120,8 +120,8 @@ impl Port {
         self.pose.rotation * DVec3::Z
     }
 
-    /// How far the axis of a shaft of `radius` [m] at `tilt` [rad] may lie beside the centre in the
-    /// direction in which it tilts: (D - d/cos(tilt) - t tan(tilt))/2 [m]; in a sheet without
+    /// How far the axis of a shaft of `radius` (m) at `tilt` (rad) may lie beside the centre in the
+    /// direction in which it tilts: (D - d/cos(tilt) - t tan(tilt))/2 (m); in a sheet without
     /// thickness the paper's formula (SPEC K3). Negative where the shaft does not fit, minus
     /// infinity from 90 degrees on.
     pub fn clearance(&self, radius: f64, tilt: f64) -> f64 {
@@ -132,7 +132,7 @@ impl Port {
         0.5 * (self.hole_diameter - 2.0 * radius / cos - self.thickness * tilt.abs().tan())
     }
 
-    /// How far the axis may lie beside the centre across the direction of the tilt [m], in a sheet
+    /// How far the axis may lie beside the centre across the direction of the tilt (m), in a sheet
     /// without thickness.
     ///
     /// That is (D - d)/2 up to the tilt acos(sqrt(d/D)), 24.1 degrees for 5 in 6 mm. Beyond it the
@@ -147,7 +147,7 @@ impl Port {
         if square >= 0.0 { square.sqrt() } else { f64::NEG_INFINITY }
     }
 
-    /// The tilt [rad] at which a shaft of `radius` [m] has `clearance` [m] left; none where an
+    /// The tilt (rad) at which a shaft of `radius` (m) has `clearance` (m) left; none where an
     /// upright one has less.
     pub fn tilt_with_clearance(&self, radius: f64, clearance: f64) -> Option<f64> {
         // D' cos(tilt) - t sin(tilt) = d is one cosine.
@@ -157,8 +157,8 @@ impl Port {
         (wide >= 2.0 * radius && cos.is_finite()).then(|| tilt.max(0.0))
     }
 
-    /// Limits for an instrument: the tilt that leaves `clearance` [m], insertions of which the
-    /// jaw's pivot is `margin` [m] inside and the shaft's base as far outside, and the roll that a
+    /// Limits for an instrument: the tilt that leaves `clearance` (m), insertions of which the
+    /// jaw's pivot is `margin` (m) inside and the shaft's base as far outside, and the roll that a
     /// wrist of +-2.7 rad has.
     ///
     /// # Errors

@@ -43,14 +43,14 @@ pub enum Edge {
 pub struct RimPoint {
     /// On which edge.
     pub edge: Edge,
-    /// Its angle about the port's normal [rad], from the port's x, within +-pi.
+    /// Its angle about the port's normal (rad), from the port's x, within +-pi.
     pub angle: f64,
-    /// The place [m], in the cell.
+    /// The place (m), in the cell.
     pub point: DVec3,
     /// Unit vector from the rim to the shaft, across the shaft: the direction of the force on the
     /// shaft. In the cell.
     pub normal: DVec3,
-    /// Distance between shaft and rim [m]; negative where the shaft presses.
+    /// Distance between shaft and rim (m); negative where the shaft presses.
     pub gap: f64,
 }
 
@@ -93,7 +93,7 @@ impl Port {
         found
     }
 
-    /// Position of an edge's place at `angle` [rad] about the normal, in the cell [m].
+    /// Position of an edge's place at `angle` (rad) about the normal, in the cell (m).
     pub(super) fn rim(&self, edge: Edge, angle: f64) -> DVec3 {
         let z = match edge {
             Edge::Outer => -0.5 * self.thickness,

@@ -10,17 +10,17 @@ use nalgebra::SMatrix;
 pub struct ForceReading {
     /// What kind of force it is.
     pub kind: ForceKind,
-    /// Force [N] on the instrument and torque [N m] about the flange's origin, along the cell's
+    /// Force (N) on the instrument and torque (N m) about the flange's origin, along the cell's
     /// axes.
     pub wrench: Wrench,
-    /// Covariance of the force [N2], along the cell's axes.
+    /// Covariance of the force (N2), along the cell's axes.
     pub force_covariance: DMat3,
-    /// Covariance of the torque [N2 m2], along the cell's axes.
+    /// Covariance of the torque (N2 m2), along the cell's axes.
     pub torque_covariance: DMat3,
 }
 
 impl ForceReading {
-    /// Standard deviation of the force along each axis of the cell [N].
+    /// Standard deviation of the force along each axis of the cell (N).
     pub fn force_deviation(&self) -> DVec3 {
         let c = self.force_covariance;
         DVec3::new(c.x_axis.x, c.y_axis.y, c.z_axis.z).max(DVec3::ZERO).map(f64::sqrt)
@@ -51,7 +51,7 @@ impl Compensator {
     /// Without a tare: the identified bias is taken off.
     ///
     /// # Errors
-    /// Noise or a gravity [m/s2] that cannot be used.
+    /// Noise or a gravity (m/s2) that cannot be used.
     pub fn new(load: Identification, noise: SensorNoise, gravity: DVec3) -> Result<Self> {
         noise.check()?;
         check_pose("compensator", DQuat::IDENTITY, gravity)?;

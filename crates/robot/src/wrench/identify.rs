@@ -73,7 +73,7 @@ impl Identification {
     }
 }
 
-/// Identifies the load from readings at rest under `gravity` [m/s2] (in the cell) of a sensor with
+/// Identifies the load from readings at rest under `gravity` (m/s2) (in the cell) of a sensor with
 /// `noise`.
 ///
 /// # Errors

@@ -36,14 +36,14 @@ pub enum ForceKind {
 /// A force and a torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Wrench {
-    /// Force [N].
+    /// Force (N).
     pub force: DVec3,
-    /// Torque about the frame's origin [N m].
+    /// Torque about the frame's origin (N m).
     pub torque: DVec3,
 }
 
 impl Wrench {
-    /// Of a force [N] at a point [m].
+    /// Of a force (N) at a point (m).
     pub fn at(force: DVec3, point: DVec3) -> Self {
         Self { force, torque: point.cross(force) }
     }
@@ -80,9 +80,9 @@ impl std::ops::Sub for Wrench {
 /// torque about its origin: force = m g + b_f, torque = (m c) x g + b_t, with g the gravity there.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadModel {
-    /// Mass m [kg].
+    /// Mass m (kg).
     pub mass: f64,
-    /// Mass times its centre, m c [kg m], in the flange's frame.
+    /// Mass times its centre, m c (kg m), in the flange's frame.
     pub first_moment: DVec3,
     /// What the sensor reads unloaded.
     pub bias: Wrench,
@@ -95,18 +95,18 @@ impl LoadModel {
         Self { mass: mass.mass, first_moment: mass.mass * mass.center, bias }
     }
 
-    /// Weight [N] under `gravity` [m/s2].
+    /// Weight (N) under `gravity` (m/s2).
     pub fn weight(&self, gravity: DVec3) -> f64 {
         self.mass * gravity.length()
     }
 
-    /// Centre of mass [m], in the flange's frame.
+    /// Centre of mass (m), in the flange's frame.
     pub fn centre(&self) -> DVec3 {
         self.first_moment / self.mass
     }
 
     /// The reading with the flange at `orientation` (its frame to the cell's) under `gravity`
-    /// [m/s2] in the cell.
+    /// (m/s2) in the cell.
     pub fn reading(&self, orientation: DQuat, gravity: DVec3) -> Wrench {
         let g = orientation.inverse() * gravity;
         Wrench { force: self.mass * g, torque: self.first_moment.cross(g) } + self.bias
@@ -126,9 +126,9 @@ impl LoadModel {
 /// Standard deviations of a sensor's noise, the same on all axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorNoise {
-    /// Of each force [N].
+    /// Of each force (N).
     pub force: f64,
-    /// Of each torque [N m].
+    /// Of each torque (N m).
     pub torque: f64,
 }
 

@@ -8,12 +8,12 @@ use std::f64::consts::PI;
 /// Static poses of the paper's identification (SPEC C8).
 pub const STATIC_POSES: usize = 54;
 
-/// How far the instrument is tilted from hanging down [rad]: 60 degrees, which an arm above a
+/// How far the instrument is tilted from hanging down (rad): 60 degrees, which an arm above a
 /// phantom reaches to all sides.
 pub const STATIC_TILT: f64 = PI / 3.0;
 
 /// `count` orientations of the flange (its frame to the cell's, z up) in which the shaft hangs down
-/// or is tilted by up to `tilt` [rad], evenly by area, to all sides (a Fibonacci spiral). A turn
+/// or is tilted by up to `tilt` (rad), evenly by area, to all sides (a Fibonacci spiral). A turn
 /// about the vertical changes nothing that the sensor reads, so there is none.
 ///
 /// # Errors

@@ -33,7 +33,7 @@ pub fn noise(n: usize, size: f64, rng: &mut Random) -> Joints {
     Joints::from_fn(n, |_| between(rng, -size, size))
 }
 
-/// A rod of this mass [kg] and half length [m] along its x.
+/// A rod of this mass (kg) and half length (m) along its x.
 pub fn rod(mass: f64, half: f64) -> MassProperties {
     let across = mass * half * half / 3.0;
     MassProperties {

@@ -28,23 +28,23 @@ pub enum VisualShape {
         /// Factors along x, y and z.
         scale: DVec3,
     },
-    /// A box with these halves of its sides [m].
+    /// A box with these halves of its sides (m).
     Block(DVec3),
     /// A cylinder about z.
     Cylinder {
-        /// Radius [m].
+        /// Radius (m).
         radius: f64,
-        /// Half its length [m].
+        /// Half its length (m).
         half: f64,
     },
     /// A cylinder about z with round ends.
     Capsule {
-        /// Radius [m].
+        /// Radius (m).
         radius: f64,
-        /// Half its length without the ends [m].
+        /// Half its length without the ends (m).
         half: f64,
     },
-    /// A ball with this radius [m].
+    /// A ball with this radius (m).
     Ball(f64),
 }
 

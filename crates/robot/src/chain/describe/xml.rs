@@ -6,7 +6,7 @@ use roxmltree::{Document, Node, ParsingOptions};
 use std::io::Read;
 use std::path::Path;
 
-/// The largest file [bytes]. Descriptions of arms have some tens of kilobytes; their meshes are
+/// The largest file (bytes). Descriptions of arms have some tens of kilobytes; their meshes are
 /// files of their own.
 const LARGEST: u64 = 16 << 20;
 /// The most nodes, which bounds memory.
