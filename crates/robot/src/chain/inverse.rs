@@ -6,7 +6,7 @@
 
 use super::arm::SerialArm;
 use super::frames::Frames;
-use super::joints::{JointSet, Joints};
+use super::joints::{JointSet, Joints, MAX_JOINTS};
 use super::matrix::JointMatrix;
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
@@ -171,8 +171,7 @@ impl Search<'_> {
     /// One descent; `elbow`: whether the preferred posture counts.
     fn run(&self, from: &Joints, elbow: bool) -> Reached {
         let n = self.arm.dof();
-        let ranges: [[f64; 2]; super::MAX_JOINTS] =
-            std::array::from_fn(|i| if i < n { self.range(i) } else { [0.0; 2] });
+        let ranges: [[f64; 2]; MAX_JOINTS] = std::array::from_fn(|i| if i < n { self.range(i) } else { [0.0; 2] });
         let mut q = Joints::from_fn(n, |i| from[i].clamp(ranges[i][0], ranges[i][1]));
         let mut frames = self.arm.frames(&q);
         let mut missing = self.missing(&frames);

@@ -1,6 +1,7 @@
 //! What a manipulator's sensors and its controller say, in CRTK's words.
 
-use super::{Manipulator, reference};
+use super::controlled_arm::Manipulator;
+use super::reference;
 use crate::chain::{ArmState, Frames, Joints};
 use crate::instrument::{Coordinates, compose};
 use crate::port::{Measured, Shaft, Twist};

@@ -2,8 +2,8 @@
 //! the arm's models anew.
 
 use super::control::Memory;
+use super::controlled_arm::{Manipulator, ManipulatorState, STARTS};
 use super::reference::Reference;
-use super::{Manipulator, ManipulatorState, STARTS};
 use crate::chain::{ArmState, InverseOptions};
 use crate::instrument::Coordinates;
 use crate::port::RimState;

@@ -1,6 +1,6 @@
 //! The shaft at the port's rim, as couplings for the arm's step.
 
-use super::Manipulator;
+use super::controlled_arm::Manipulator;
 use crate::chain::{ArmState, Coupling, CouplingLaw, Frames, MAX_COUPLINGS};
 use crate::port::{Shaft, Twist};
 use glam::DVec3;

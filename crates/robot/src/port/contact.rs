@@ -5,7 +5,9 @@
 //! until Coulomb's limit, then the mark follows. A load below the limit does not creep. The marks
 //! are the caller's [`RimState`], plain data, so that a step can be tried again.
 
-use super::{Edge, Port, RimPoint, Shaft, Twist};
+use super::port_model::Port;
+use super::rim::{Edge, RimPoint};
+use super::shaft::{Shaft, Twist};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};

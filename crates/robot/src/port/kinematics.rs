@@ -1,7 +1,8 @@
 //! Coordinates to poses and back, for a shaft whose axis goes through the port's centre; and the
 //! measuring of one whose axis does not.
 
-use super::{Port, Shaft, Twist};
+use super::port_model::Port;
+use super::shaft::{Shaft, Twist};
 use crate::instrument::{Coordinates, Excess, Instrument, Limits, compose, coordinates, shaft_to_tip};
 use crate::{Error, Result};
 use glam::{DQuat, DVec2, DVec3};

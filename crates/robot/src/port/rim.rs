@@ -22,7 +22,8 @@
 //! each deeper than r - R cos(tilt)^2, and there the force changes by a step.
 
 use super::kinematics::LEAST_COS;
-use super::{Port, Shaft};
+use super::port_model::Port;
+use super::shaft::Shaft;
 use glam::{DVec2, DVec3};
 use std::f64::consts::{FRAC_PI_2, PI};
 

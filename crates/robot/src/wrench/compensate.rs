@@ -1,6 +1,7 @@
 //! Readings with the instrument's weight taken off, tared at reset.
 
-use super::{ForceKind, Identification, SensorNoise, Wrench, check_pose, regressor};
+use super::identify::Identification;
+use super::load::{ForceKind, SensorNoise, Wrench, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use nalgebra::SMatrix;

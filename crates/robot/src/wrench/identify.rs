@@ -1,13 +1,9 @@
 //! The load model from readings at rest: weighted least squares, with what it does not know.
 
-use super::{LoadModel, SensorNoise, Wrench, check_pose, regressor};
+use super::load::{LoadModel, PARAMETERS, SensorNoise, Wrench, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use nalgebra::{DMatrix, DVector, SMatrix, SVD};
-
-/// Parameters of a [`LoadModel`]: mass, first moment (3), bias of force (3) and torque (3), in this
-/// order.
-pub const PARAMETERS: usize = 10;
 
 /// Fewest poses: with two, a turn about the line between their gravities leaves the centre of mass
 /// open.

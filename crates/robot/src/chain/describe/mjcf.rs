@@ -3,10 +3,6 @@
 //!
 //! What would change the dynamics and is not understood is an error, never left out in silence.
 
-mod visual;
-
-pub use visual::mjcf_visuals;
-
 use super::xml::{Source, children, place, shown};
 use crate::Result;
 use crate::chain::arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
@@ -46,14 +42,14 @@ impl SerialArm {
 }
 
 /// What `<compiler>` says.
-struct Compiler {
+pub(super) struct Compiler {
     degrees: bool,
     autolimits: bool,
     sequence: [u8; 3],
 }
 
 impl Compiler {
-    fn read(source: &Source<'_>, root: Node<'_, '_>) -> Result<Self> {
+    pub(super) fn read(source: &Source<'_>, root: Node<'_, '_>) -> Result<Self> {
         let mut compiler = Self { degrees: true, autolimits: true, sequence: *b"xyz" };
         for node in children(root, "compiler") {
             let odd = |name: &str, value: &str| {
@@ -86,10 +82,10 @@ impl Compiler {
     }
 }
 
-struct Reader<'p, 'a, 'i> {
-    source: Source<'p>,
-    root: Node<'a, 'i>,
-    compiler: Compiler,
+pub(super) struct Reader<'p, 'a, 'i> {
+    pub(super) source: Source<'p>,
+    pub(super) root: Node<'a, 'i>,
+    pub(super) compiler: Compiler,
 }
 
 impl<'a, 'i> Reader<'_, 'a, 'i> {
@@ -152,12 +148,12 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(arm)
     }
 
-    fn at(&self, node: Node<'_, '_>, complaint: &str) -> crate::Error {
+    pub(super) fn at(&self, node: Node<'_, '_>, complaint: &str) -> crate::Error {
         self.source.fail(format!("{} {complaint}", place(node)))
     }
 
     /// The bodies from the world to the tip, and the site if the tip is one.
-    fn chain(&self, tip: &str) -> Result<(Vec<Node<'a, 'i>>, Option<Node<'a, 'i>>)> {
+    pub(super) fn chain(&self, tip: &str) -> Result<(Vec<Node<'a, 'i>>, Option<Node<'a, 'i>>)> {
         let find = |kind: &str| {
             let all = children(self.root, "worldbody").flat_map(|w| w.descendants());
             all.into_iter().find(|n| n.has_tag_name(kind) && n.attribute("name") == Some(tip))
@@ -239,7 +235,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(Some(MassProperties { mass, center, inertia }))
     }
 
-    fn pose(&self, node: Node<'a, 'i>) -> Result<Pose> {
+    pub(super) fn pose(&self, node: Node<'a, 'i>) -> Result<Pose> {
         let translation = self.placing::<3>(node, "pos")?.map_or(DVec3::ZERO, DVec3::from_array);
         Ok(Pose { rotation: self.rotation(node)?, translation })
     }
@@ -295,7 +291,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
 
     /// The attribute of a joint or another element that has defaults, its own or of its default
     /// class or of one around that.
-    fn attribute(&self, joint: Node<'a, 'i>, name: &str) -> Result<Option<&'a str>> {
+    pub(super) fn attribute(&self, joint: Node<'a, 'i>, name: &str) -> Result<Option<&'a str>> {
         if let Some(own) = joint.attribute(name) {
             return Ok(Some(own));
         }
@@ -324,12 +320,12 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(top.into_iter().rev().find_map(in_class))
     }
 
-    fn numbers<const N: usize>(&self, joint: Node<'a, 'i>, name: &str) -> Result<Option<[f64; N]>> {
+    pub(super) fn numbers<const N: usize>(&self, joint: Node<'a, 'i>, name: &str) -> Result<Option<[f64; N]>> {
         let text = self.attribute(joint, name)?;
         text.map(|t| self.source.parse_numbers(t, &place(joint), name)).transpose()
     }
 
-    fn number(&self, joint: Node<'a, 'i>, name: &str) -> Result<f64> {
+    pub(super) fn number(&self, joint: Node<'a, 'i>, name: &str) -> Result<f64> {
         Ok(self.numbers::<1>(joint, name)?.map_or(0.0, |[v]| v))
     }
 
@@ -346,7 +342,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
     }
 
     /// The joint of a body at `here`, and its anchor in the body's axes.
-    fn joint(&self, node: Node<'a, 'i>, here: &Pose, number: usize) -> Result<(Joint, DVec3)> {
+    pub(super) fn joint(&self, node: Node<'a, 'i>, here: &Pose, number: usize) -> Result<(Joint, DVec3)> {
         let kind = match self.attribute(node, "type")?.unwrap_or("hinge") {
             "hinge" if node.has_tag_name("joint") => JointKind::Revolute,
             "slide" => JointKind::Prismatic,

@@ -5,10 +5,12 @@
 //! not read torque limits; neither can tell these from what the file says.)
 
 mod mjcf;
+mod mjcf_visual;
 mod urdf;
+mod urdf_visual;
 mod visual;
 mod xml;
 
-pub use mjcf::mjcf_visuals;
-pub use urdf::urdf_visuals;
+pub use mjcf_visual::mjcf_visuals;
+pub use urdf_visual::urdf_visuals;
 pub use visual::{Visual, VisualShape};

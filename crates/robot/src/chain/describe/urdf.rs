@@ -1,9 +1,5 @@
 //! Arms from URDF, ROS's format: the links from a base to a tip.
 
-mod visual;
-
-pub use visual::urdf_visuals;
-
 use super::xml::{Source, children, place, shown};
 use crate::chain::arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
 use crate::chain::frames::compose;
@@ -41,17 +37,17 @@ impl SerialArm {
     }
 }
 
-struct Reader<'p, 'a, 'i> {
-    source: Source<'p>,
-    root: Node<'a, 'i>,
-    links: BTreeMap<&'a str, Node<'a, 'i>>,
+pub(super) struct Reader<'p, 'a, 'i> {
+    pub(super) source: Source<'p>,
+    pub(super) root: Node<'a, 'i>,
+    pub(super) links: BTreeMap<&'a str, Node<'a, 'i>>,
     /// Joints by the link that they move, and by the one that they are on.
-    by_child: BTreeMap<&'a str, Node<'a, 'i>>,
-    by_parent: BTreeMap<&'a str, Vec<Node<'a, 'i>>>,
+    pub(super) by_child: BTreeMap<&'a str, Node<'a, 'i>>,
+    pub(super) by_parent: BTreeMap<&'a str, Vec<Node<'a, 'i>>>,
 }
 
 impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
-    fn new(source: Source<'p>, root: Node<'a, 'i>) -> Result<Self> {
+    pub(super) fn new(source: Source<'p>, root: Node<'a, 'i>) -> Result<Self> {
         let mut reader =
             Self { source, root, links: BTreeMap::new(), by_child: BTreeMap::new(), by_parent: BTreeMap::new() };
         for link in children(root, "link") {
@@ -70,12 +66,12 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
         Ok(reader)
     }
 
-    fn at(&self, node: Node<'_, '_>, complaint: &str) -> Error {
+    pub(super) fn at(&self, node: Node<'_, '_>, complaint: &str) -> Error {
         self.source.fail(format!("{} {complaint}", place(node)))
     }
 
     /// The link at one end of a joint.
-    fn end(&self, joint: Node<'a, 'i>, kind: &str) -> Result<&'a str> {
+    pub(super) fn end(&self, joint: Node<'a, 'i>, kind: &str) -> Result<&'a str> {
         let node = children(joint, kind).next().ok_or_else(|| self.at(joint, &format!("has no <{kind}>")))?;
         let name = self.source.required(node, "link")?;
         if !self.links.contains_key(name) {
@@ -91,7 +87,7 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
     }
 
     /// The joints from `base` to `tip`.
-    fn joints(&self, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Node<'a, 'i>>> {
+    pub(super) fn joints(&self, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Node<'a, 'i>>> {
         let tip = match tip {
             Some(tip) => self.link(tip)?,
             None => {
@@ -179,7 +175,7 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
         Ok(())
     }
 
-    fn origin(&self, node: Node<'a, 'i>) -> Result<Pose> {
+    pub(super) fn origin(&self, node: Node<'a, 'i>) -> Result<Pose> {
         let Some(origin) = children(node, "origin").next() else { return Ok(Pose::IDENTITY) };
         let translation = self.source.vector(origin, "xyz")?.unwrap_or(DVec3::ZERO);
         let [roll, pitch, yaw] = self.source.numbers::<3>(origin, "rpy")?.unwrap_or([0.0; 3]);
@@ -217,7 +213,7 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
     }
 
     /// The joint whose link is at `here` when it is at zero; `None` for a fixed one.
-    fn joint(&self, node: Node<'a, 'i>, here: &Pose) -> Result<Option<Joint>> {
+    pub(super) fn joint(&self, node: Node<'a, 'i>, here: &Pose) -> Result<Option<Joint>> {
         let (kind, bounded) = match self.source.required(node, "type")? {
             "fixed" => return Ok(None),
             "revolute" => (JointKind::Revolute, true),

@@ -1,9 +1,9 @@
 //! What a URDF file's links look like: `<visual>` of each link from the base to the tip, and of
 //! what is fixed to them.
 
-use super::super::visual::{PLAIN, Visual, VisualShape, opaque};
-use super::super::xml::{Source, children, place, shown};
-use super::Reader;
+use super::urdf::Reader;
+use super::visual::{PLAIN, Visual, VisualShape, opaque};
+use super::xml::{Source, children, place, shown};
 use crate::Result;
 use crate::chain::frames::compose;
 use glam::DVec3;

@@ -1,9 +1,9 @@
 //! What an MJCF file's bodies look like: the geoms of groups 0 to 2, which MuJoCo's viewer shows,
 //! of each body from the world to the tip and of what is welded to them.
 
-use super::super::visual::{PLAIN, Visual, VisualShape, opaque};
-use super::super::xml::{Source, children, place, shown};
-use super::{Compiler, Reader};
+use super::mjcf::{Compiler, Reader};
+use super::visual::{PLAIN, Visual, VisualShape, opaque};
+use super::xml::{Source, children, place, shown};
 use crate::Result;
 use crate::chain::frames::compose;
 use glam::{DQuat, DVec3};
