@@ -276,7 +276,7 @@ def test_wrong_frames_are_named_and_not_kept(tmp_path):
         writer.save_episode("lift")
     (tmp_path / "foreign").mkdir()
     (tmp_path / "foreign/letter.txt").write_text("dear")
-    with pytest.raises(FileExistsError, match="no LeRobot dataset"):
+    with pytest.raises(FileExistsError, match="not a LeRobot dataset"):
         LeRobotWriter(tmp_path / "foreign", fps=30, features=FEATURES)
 
 
@@ -355,7 +355,7 @@ def test_features_that_cannot_be_written_are_refused_at_once(tmp_path):
         with pytest.raises(ValueError, match=words):
             LeRobotWriter(tmp_path / "set", fps=30, features={"view": feature})
     for fps in (0, 29.97):
-        with pytest.raises(ValueError, match="no whole number of frames"):
+        with pytest.raises(ValueError, match="must be a positive integer"):
             LeRobotWriter(tmp_path / "set", fps=fps, features=FEATURES)
     assert LeRobotWriter(tmp_path / "set", fps=30.0, features=FEATURES).fps == 30
     assert not (tmp_path / "set").exists()

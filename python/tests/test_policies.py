@@ -252,7 +252,9 @@ def test_the_program_evaluates_a_python_policy_and_survives_one_that_raises(
     assert (raises["episodes"], raises["ends"][4]) == (2, 2), raises
     for episode in range(2):
         kept = json.loads((tmp_path / f"out/episodes/raises/{episode:06}/result.json").read_text())
-        assert "RuntimeError: no idea what to do" in kept["end"]["why"], kept["end"]
+        # No address, whose port is random.
+        why = kept["end"]["why"]
+        assert why.startswith("python:mine:raises: RuntimeError: no idea what to do"), why
     assert reads["ends"][4] == 2
     kept = json.loads((tmp_path / "out/episodes/reads/000000/result.json").read_text())
     asked = trocar.TrocarEnv(scene=str(short_scene)).task_description
@@ -340,7 +342,7 @@ def test_a_missing_extra_is_one_line_with_the_remedy(tmp_path):
 
 @pytest.mark.parametrize("port", ["99999", "-1", "http"])
 def test_a_bad_port_is_refused(port):
-    done = served("os:getcwd", f"--port={port}")
+    done = served("os:fspath", f"--port={port}")
     assert done.returncode == 2 and "Traceback" not in done.stderr
     line = done.stderr.strip().splitlines()[-1]
     assert line.endswith(f"argument --port: '{port}' must be an integer in [0, 65535]")
@@ -351,7 +353,7 @@ def test_an_address_that_cannot_be_used_is_one_line():
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        done = served("os:getcwd", "--port", str(port))
+        done = served("os:fspath", "--port", str(port))
     (line,) = done.stderr.strip().splitlines()
     assert done.returncode == 1 and f"cannot listen at 127.0.0.1:{port}" in line
 
@@ -387,11 +389,26 @@ def test_the_program_stops_at_a_policy_that_cannot_be_loaded(
     program, short_scene, tmp_path, policy, said
 ):
     command = command_of(program, short_scene, tmp_path, ["random", policy])
-    command["args"] += ["--jobs", "1"]
+    command["args"][-1] = str(tmp_path / "phantoms")
     done = subprocess.run(**command, capture_output=True, text=True, timeout=120)
-    assert done.returncode == 2 and not list((tmp_path / "out/episodes").rglob("result.json"))
     (line,) = done.stderr.strip().splitlines()
+    assert done.returncode == 2
     assert line.startswith(f"error: {policy}: cannot be loaded: ") and said in line
+    # Neither a campaign nor a phantom was started.
+    assert os.listdir(tmp_path) == ["mine.py"]
+
+
+def test_the_program_names_a_missing_extra(program, short_scene, tmp_path):
+    command = command_of(program, short_scene, tmp_path, ["python:mine.py:Still"])
+    command["args"][-1] = str(tmp_path / "phantoms")
+    (tmp_path / "hidden").mkdir()
+    command["env"] = without("msgpack", tmp_path / "hidden")
+    command["env"]["TROCAR_PYTHON"] = sys.executable
+    done = subprocess.run(**command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 2 and sorted(os.listdir(tmp_path)) == ["hidden", "mine.py"]
+    assert done.stderr.strip() == (
+        f"error: python:mine.py:Still: cannot be loaded: trocar.serve {EXTRA}"
+    )
 
 
 def test_the_program_serves_a_file(program, short_scene, tmp_path):

@@ -59,7 +59,7 @@ def test_a_recorder_needs_the_rate_of_its_environment(tmp_path):
         metadata = {"render_modes": [], "render_fps": 15}
 
     Recorder(EverySecond(env.unwrapped), writer(15))
-    with pytest.raises(ValueError, match="the environment does 15"):
+    with pytest.raises(ValueError, match="the environment runs 15"):
         Recorder(EverySecond(env.unwrapped), writer(30))
 
 
