@@ -79,7 +79,7 @@ def test_the_policy_of_the_guide_runs(short_scene, tmp_path):
     """It is served as it is written there, without the server of another package."""
     pytest.importorskip("msgpack")
     pytest.importorskip("websockets")
-    text = (ROOT / "docs/policies.md").read_text()
+    text = (ROOT / "docs/guides/policies.md").read_text()
     (code,) = [block.partition("```")[0] for block in text.split("```python\n")[1:]]
     kept = [
         line

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 
 /// The interpreter of `python:` policies, unless `$TROCAR_PYTHON` or the caller names another.
 const PYTHON: &str = "python3";
@@ -187,7 +187,7 @@ impl Served {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trocar_progress::StopAfter;
+    use trocar_core::StopAfter;
 
     #[test]
     fn an_interpreter_that_does_not_start_is_one_line() {

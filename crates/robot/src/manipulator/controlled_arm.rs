@@ -6,11 +6,10 @@ use super::settings::Settings;
 use crate::chain::{self, ArmState, CouplingLaw, Drive, InverseOptions, JointSet, Joints, SerialArm};
 use crate::instrument::{Coordinates, Excess, Instrument, Limits, share};
 use crate::port::{Port, RimState, Shaft};
-use crate::wrench::Wrench;
 use crate::{Error, Result};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Wrench};
 
 /// The longest physics step (s).
 const LONGEST: f64 = 0.02;

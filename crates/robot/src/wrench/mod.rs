@@ -12,8 +12,9 @@ mod compensate;
 mod identify;
 mod load;
 mod poses;
+mod svd;
 
 pub use compensate::{Compensator, ForceReading};
 pub use identify::{Identification, StaticReading, identify};
-pub use load::{ForceKind, LoadModel, PARAMETERS, SensorNoise, Wrench};
+pub use load::{ForceKind, LoadModel, PARAMETERS, SensorNoise};
 pub use poses::{STATIC_POSES, STATIC_TILT, static_orientations};
