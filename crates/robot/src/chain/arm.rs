@@ -180,8 +180,8 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// This arm with the masses and inertias of its links scaled by `links` and those of the payload
-    /// by `payload`: the wrong model of a controller. Rotors are not scaled.
+    /// This arm with the masses and inertias of its links scaled by `links` and those of the
+    /// payload by `payload`: the wrong model of a controller. Rotors are not scaled.
     ///
     /// # Errors
     /// A factor that is not positive (the payload's may be zero), or so small that the mass matrix

@@ -77,8 +77,8 @@ impl SerialArm {
         self.newton_euler(&frames, &self.place(&frames), qd, qdd, self.gravity())
     }
 
-    /// The accelerations under joint torques and loads on links, without damping, friction and limits
-    /// of the joints (see [`SerialArm::step`]).
+    /// The accelerations under joint torques and loads on links, without damping, friction and
+    /// limits of the joints (see [`SerialArm::step`]).
     ///
     /// # Errors
     /// A mass matrix that is not positive definite, because of a number that is not finite.

@@ -175,14 +175,14 @@ impl SerialArm {
     ///
     /// Kinematics, masses, inertias and limits of position, speed and torque come from the
     /// manufacturer's `franka_description` (commit 566ba44, `robots/fr3`); the acceleration limit
-    /// comes from the manufacturer's control interface. Rotor inertia, damping and Coulomb friction,
-    /// for which the manufacturer publishes no identified values, and the home posture come from the
-    /// MuJoCo Menagerie's `franka_fr3`. (`franka_description` has 0.2 N m and
-    /// 0.003 N m s/rad for every joint: see [`SerialArm::with_friction`].)
+    /// comes from the manufacturer's control interface. Rotor inertia, damping and Coulomb
+    /// friction, for which the manufacturer publishes no identified values, and the home posture
+    /// come from the MuJoCo Menagerie's `franka_fr3`. (`franka_description` has 0.2 N m and 0.003 N
+    /// m s/rad for every joint: see [`SerialArm::with_friction`].)
     ///
-    /// The limits are the manufacturer's, which the real arm's controller enforces; some versions of
-    /// the Menagerie's file have wider ones. The speed limits are those of the description; those of
-    /// the real arm also depend on position.
+    /// The limits are the manufacturer's, which the real arm's controller enforces; some versions
+    /// of the Menagerie's file have wider ones. The speed limits are those of the description;
+    /// those of the real arm also depend on position.
     ///
     /// # Errors
     /// None; the table passes the checks of [`SerialArm::new`].

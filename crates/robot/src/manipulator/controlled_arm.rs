@@ -1,82 +1,82 @@
 //! The controlled arm: commands, and the physics step.
 
-use super::control::{Memory, Plan};
-use super::reference::{Reference, Ways, between};
+use super::control::{Controller, Memory};
+use super::reference::{Reference, ReferenceContext, between};
 use super::settings::Settings;
 use crate::chain::{self, ArmState, CouplingLaw, Drive, InverseOptions, JointSet, Joints, SerialArm};
-use crate::instrument::{Coordinates, Excess, Instrument, Limits, share};
+use crate::instrument::{Coordinates, Excess, Instrument, Limits, clamp_unit};
 use crate::port::{Port, RimState, Shaft};
 use crate::{Error, Result};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_core::{Pose, Wrench};
 
-/// The longest physics step (s).
-const LONGEST: f64 = 0.02;
-/// The flange is at a commanded pose when it is this near (m, rad).
-const REACHED: [f64; 2] = [1e-6, 1e-5];
-/// How often the way to a command that the arm cannot reach is halved.
-const HALVINGS: usize = 6;
-/// Postures from which the start is searched.
-pub(super) const STARTS: usize = 24;
+/// Maximum physics step (s).
+const MAX_STEP: f64 = 0.02;
+/// Tolerances of a commanded pose of the flange (m, rad).
+const POSE_TOLERANCE: [f64; 2] = [1e-6, 1e-5];
+/// Bisections of the path to a command that the arm cannot reach.
+const REACH_BISECTIONS: usize = 6;
+/// Number of postures from which the start posture is searched.
+pub(super) const START_SEARCHES: usize = 24;
 
 /// A controlled arm with its instrument in its port.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manipulator {
-    /// What is: the instrument is its payload.
+    /// The actual arm, with the instrument as its payload.
     pub(super) arm: SerialArm,
-    /// What the controller believes to be.
+    /// The controller's model of the arm.
     pub(super) believed: SerialArm,
     pub(super) instrument: Instrument,
     pub(super) port: Port,
     pub(super) settings: Settings,
     pub(super) limits: Limits,
-    /// The joints' own inertias in the start posture.
+    /// The joints' diagonal inertias in the start posture (kg m2 or kg).
     pub(super) inertia: Joints,
     pub(super) state: ManipulatorState,
 }
 
-/// All that changes as a [`Manipulator`] moves. Plain data: a copy is an exact snapshot.
+/// The state of a [`Manipulator`]. Plain data: a copy is an exact snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ManipulatorState {
     pub(super) arm: ArmState,
     pub(super) reference: Reference,
     pub(super) memory: Memory,
     pub(super) rim: RimState,
-    /// Opening, its rate (1/s) and where it goes.
+    /// Opening of the jaw, its rate (1/s) and its target.
     pub(super) jaw: [f64; 3],
-    /// What a sensor at the mount read over the last step, in the cell's axes.
+    /// Mean force (N) and torque (N m) at the mount over the last step, in the cell's axes.
     pub(super) mount: [DVec3; 2],
 }
 
-/// What a command came to.
+/// Result of a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Commanded {
-    /// Where the instrument is sent: within its limits and the arm's reach.
+    /// The accepted coordinates, within the limits and the arm's reach.
     pub coordinates: Coordinates,
-    /// By how much the command lay outside which limit.
+    /// By how much the command exceeds each limit.
     pub excess: Excess,
-    /// How much of the way to what the limits leave the arm can go, 0 to 1: 1 where it reaches it.
+    /// Share of the path to the limited command that the arm can reach, in [0, 1].
     pub reach: f64,
-    /// What is left of a commanded orientation: axis times angle (rad), in the cell. Zero for
-    /// coordinates.
+    /// The rejected part of a commanded orientation: axis times angle (rad), in the cell. Zero for
+    /// commands of coordinates.
     pub rejected_rotation: DVec3,
-    /// What is left of a commanded position (m), in the cell, where a limit or the arm's reach
-    /// binds. Zero for coordinates.
+    /// The rejected part of a commanded position (m), in the cell, because of a limit or the arm's
+    /// reach. Zero for commands of coordinates.
     pub rejected_translation: DVec3,
 }
 
-/// What happened in a step.
+/// Result of a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
-    /// The arm's own report: torques, joints at limits.
-    pub arm: chain::StepReport,
-    /// Force with which the shaft presses the rim (N), the sum of its places, mean over the step.
+    /// Report of the arm: torques, joints at limits.
+    pub arm: chain::ArmStepReport,
+    /// Normal force of the shaft on the rim (N), summed over contacts, mean over the step.
     pub rim_force: f64,
-    /// Distance from the port's centre to the shaft's axis, in the port's plane (m), at the step's
-    /// end.
+    /// Distance from the port's centre to the shaft's axis, in the port's plane (m), at the end of
+    /// the step.
     pub rcm_deviation: f64,
-    /// Share of the step that the reference went on: under 1 where the arm could not follow.
+    /// Speed of the reference's time, below 1 if the arm cannot follow.
     pub pace: f64,
 }
 
@@ -88,11 +88,11 @@ impl StepReport {
 }
 
 impl Manipulator {
-    /// `arm` in its place in the cell, with `instrument` at its flange in place of any payload,
-    /// through `port`, at rest at `start`. The elbow is where the arm's home posture draws it.
+    /// `arm` at its base in the cell, with `instrument` as its payload, through `port`, at rest at
+    /// `start`. The arm's home posture chooses the elbow.
     ///
     /// # Errors
-    /// A part that cannot be used; a start outside the limits or one that the arm does not reach.
+    /// An invalid part; a start outside the limits or out of reach.
     pub fn new(
         arm: SerialArm,
         instrument: Instrument,
@@ -120,11 +120,11 @@ impl Manipulator {
             return Err(Error::invalid("start", format!("its {name} is outside the limits by {by:.4} (SI units)")));
         }
         let target = port.flange(&instrument, &kept);
-        let options = InverseOptions { restarts: STARTS, tolerance: [1e-9, 1e-9], ..InverseOptions::default() };
+        let options = InverseOptions { restarts: START_SEARCHES, tolerance: [1e-9, 1e-9], ..InverseOptions::default() };
         let found = arm.inverse(&target, &arm.home(), &options)?;
         if !found.reached {
             let reason = format!(
-                "the flange of arm '{}' would be {:.1} mm from its place; bring the base nearer",
+                "the flange of arm '{}' would be {:.1} mm from its pose; move the base nearer",
                 arm.name(),
                 1e3 * found.translation.length()
             );
@@ -141,16 +141,16 @@ impl Manipulator {
             mount: [DVec3::ZERO; 2],
         };
         let mut made = Self { arm, believed, instrument, port, settings, limits, inertia, state };
-        // What the sensor reads at rest, before the first step.
+        // The reading at rest, before the first step.
         let at = made.state.arm;
         made.state.mount = made.mount_reading(&at, &at, &made.arm.frames(&at.q), [DVec3::ZERO; 2], 1.0);
         Ok(made)
     }
 
-    /// Commands the instrument's coordinates, absolute. What limits cut off is told.
+    /// Commands absolute coordinates of the instrument. The result has the parts beyond limits.
     ///
     /// # Errors
-    /// A number that is not finite: nothing is changed.
+    /// A number that is not finite. The state is then unchanged.
     pub fn servo_cp(&mut self, target: &Coordinates) -> Result<Commanded> {
         let target = Coordinates::from_action(target.to_action())?;
         let (kept, excess) = self.limits.clamp(&target);
@@ -159,11 +159,12 @@ impl Manipulator {
         Ok(Commanded { coordinates, excess, reach, rejected_rotation: DVec3::ZERO, rejected_translation: DVec3::ZERO })
     }
 
-    /// Commands a pose of the tip in the cell, and the jaw's opening. Position first; what four
-    /// degrees of freedom cannot do of the orientation is told.
+    /// Commands a pose of the tip in the cell, and the jaw's opening. Position has priority; the
+    /// result has the part of the orientation that four degrees of freedom cannot reach.
     ///
     /// # Errors
-    /// A number that is not finite, a rotation that is not of unit length: nothing is changed.
+    /// A number that is not finite, a rotation that is not of unit length. The state is then
+    /// unchanged.
     pub fn servo_tip(&mut self, target: &Pose, jaw: f64) -> Result<Commanded> {
         if !jaw.is_finite() {
             return Err(Error::NotFinite { what: "the jaw's opening" });
@@ -180,55 +181,54 @@ impl Manipulator {
             rejected_rotation: if reach == 1.0 {
                 solution.rejected_rotation
             } else {
-                chain::turn(target.rotation * tip.rotation.inverse())
+                chain::rotation_vector(target.rotation * tip.rotation.inverse())
             },
             rejected_translation: target.translation - tip.translation,
         })
     }
 
-    /// Commands the joints (rad or m). Nothing keeps the shaft in the port's centre then, except
-    /// its rim.
+    /// Commands the joints (rad or m). Then only the rim keeps the shaft in the port.
     ///
     /// # Errors
-    /// Not a number a joint, one that is not finite or beyond its limits: nothing is changed.
+    /// Another number of joints, or a position that is not finite or outside the limits. The state
+    /// is then unchanged.
     pub fn servo_jp(&mut self, target: &[f64]) -> Result<()> {
         let target = self.arm.posture(target)?;
         self.state.reference.command_joints(&target, self.period());
         Ok(())
     }
 
-    /// Commands the jaw's opening alone, 0 to 1; what is outside is cut.
+    /// Commands only the jaw's opening, clamped to [0, 1].
     ///
     /// # Errors
-    /// A number that is not finite: nothing is changed.
+    /// A number that is not finite. The state is then unchanged.
     pub fn servo_jaw(&mut self, opening: f64) -> Result<()> {
         if !opening.is_finite() {
             return Err(Error::NotFinite { what: "the jaw's opening" });
         }
-        self.state.jaw[2] = share(opening);
+        self.state.jaw[2] = clamp_unit(opening);
         Ok(())
     }
 
-    /// One physics step of `dt` (s), 1/480 s for instance. `load` is what is done to the
-    /// instrument's tip: a force (N) at the jaw's pivot and a torque (N m) about it, along the
-    /// cell's axes.
+    /// One physics step of `dt` (s), for example 1/480 s. `load` acts on the instrument's tip: a
+    /// force (N) at the jaw's pivot and a torque (N m) about it, in the cell's axes.
     ///
     /// # Errors
-    /// A step that is not between 0 and 20 ms, a load that is not finite, or one so great that a
-    /// result is not: nothing is changed.
+    /// A step outside (0, 20] ms, a load that is not finite, or one so large that the result is not
+    /// finite. The state is then unchanged.
     pub fn step(&mut self, load: Wrench, dt: f64) -> Result<StepReport> {
-        if !(dt > 0.0 && dt <= LONGEST) {
-            return Err(Error::invalid("step", format!("{dt} s is not between 0 and {LONGEST} s")));
+        if !(dt > 0.0 && dt <= MAX_STEP) {
+            return Err(Error::invalid("step", format!("is {dt} s; it must be in (0, {MAX_STEP}] s")));
         }
         if !load.is_finite() {
             return Err(Error::NotFinite { what: "the load on the tip" });
         }
         let mut next = self.state;
         let (before, from) = (self.state.arm, self.state.reference);
-        next.reference.advance(&self.ways(), dt);
+        next.reference.advance(&self.reference_context(), dt);
         let dynamics = self.believed.dynamics(&before.q, &before.qd);
-        let plan = self.plan();
-        let torque = plan.torque(&mut next.memory, &before, &dynamics, &from, &next.reference, dt);
+        let controller = self.controller();
+        let torque = controller.torque(&mut next.memory, &before, &dynamics, &from, &next.reference, dt);
         let flange = dynamics.frames.flange();
         let tip = self.instrument.tip(&flange).translation;
         let external = dynamics.frames.jacobian(self.arm.dof(), tip).torque(load.force, load.torque);
@@ -241,10 +241,10 @@ impl Manipulator {
             dt,
             self.settings.substeps,
         )?;
-        plan.learn(&mut next.memory, &dynamics, &before, &next.arm, dt);
+        controller.observe(&mut next.memory, &dynamics, &before, &next.arm, dt);
         let frames = self.arm.frames(&next.arm.q);
         self.port.advance(&Shaft::of(&self.instrument, &frames.flange()), &mut next.rim);
-        // Force and torque about the flange's origin of what touches the instrument.
+        // External force and torque on the instrument, about the flange's origin.
         let mut outer = [load.force, load.torque + (tip - flange.translation).cross(load.force)];
         let mut rim_force = 0.0;
         for (c, (point, direction)) in touches.couplings[..count].iter().zip(touches.places) {
@@ -266,30 +266,30 @@ impl Manipulator {
         Ok(StepReport { arm: report, rim_force, rcm_deviation: self.deviation(&frames), pace })
     }
 
-    /// All that changes, to be kept.
+    /// A snapshot of the state.
     pub fn state(&self) -> ManipulatorState {
         self.state
     }
 
-    /// Goes back to a state of this manipulator, or of one made alike.
+    /// Restores a state of this manipulator, or of an identical one.
     ///
     /// # Errors
     /// A state of an arm with another number of joints.
     pub fn restore(&mut self, state: &ManipulatorState) -> Result<()> {
         let n = self.arm.dof();
         if state.arm.q.len() != n || state.arm.qd.len() != n || state.reference.q.len() != n {
-            return Err(Error::invalid("state", format!("must be that of an arm with {n} joints")));
+            return Err(Error::invalid("state", format!("must have {n} joints, like the arm")));
         }
         self.state = *state;
         Ok(())
     }
 
-    /// The arm as it is: with the instrument and the friction.
+    /// The actual arm, with instrument and friction.
     pub fn arm(&self) -> &SerialArm {
         &self.arm
     }
 
-    /// The arm that the controller believes in.
+    /// The controller's model of the arm.
     pub fn believed(&self) -> &SerialArm {
         &self.believed
     }
@@ -304,7 +304,7 @@ impl Manipulator {
         &self.port
     }
 
-    /// How it is driven.
+    /// The settings of the controller.
     pub fn settings(&self) -> &Settings {
         &self.settings
     }
@@ -318,8 +318,8 @@ impl Manipulator {
         1.0 / self.settings.command_rate
     }
 
-    fn ways(&self) -> Ways<'_> {
-        Ways {
+    fn reference_context(&self) -> ReferenceContext<'_> {
+        ReferenceContext {
             arm: &self.arm,
             instrument: &self.instrument,
             port: &self.port,
@@ -328,8 +328,8 @@ impl Manipulator {
         }
     }
 
-    fn plan(&self) -> Plan<'_> {
-        Plan {
+    fn controller(&self) -> Controller<'_> {
+        Controller {
             settings: &self.settings,
             believed: &self.believed,
             inertia: &self.inertia,
@@ -344,11 +344,12 @@ impl Manipulator {
         self.state.jaw[2] = to.jaw;
     }
 
-    /// As much of the way from the reference to `to` as the arm can go.
+    /// The part of the path from the reference to `to` that the arm can reach, and its share.
     fn reachable(&self, to: &Coordinates) -> Result<(Coordinates, f64)> {
         let reaches = |c: &Coordinates| -> Result<bool> {
             let target = self.port.flange(&self.instrument, c);
-            let options = InverseOptions { tolerance: REACHED, posture_tolerance: 1e-2, ..InverseOptions::default() };
+            let options =
+                InverseOptions { tolerance: POSE_TOLERANCE, posture_tolerance: 1e-2, ..InverseOptions::default() };
             let found = self.arm.inverse(&target, &self.state.reference.q, &options)?;
             Ok(found.reached && found.at_limit.is_empty())
         };
@@ -357,7 +358,7 @@ impl Manipulator {
         }
         let from = self.setpoint_coordinates();
         let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..HALVINGS {
+        for _ in 0..REACH_BISECTIONS {
             let middle = 0.5 * (low + high);
             if reaches(&between(&from, to, middle))? { low = middle } else { high = middle }
         }

@@ -1,17 +1,17 @@
-//! An arm that works with an instrument through a port, under control: commands in, motion out.
+//! An arm with an instrument in a port, under control: commands in, motion out.
 //!
 //! ```text
 //!  commands, 30 Hz ──> reference (limiter, spline, joints) ──> controller ──> torques ──> arm, payload, rim, load on the tip
 //!                         setpoint_*                            believes 2% and 5% less          measured_*
 //! ```
 //!
-//! Nothing is moved but by joint torques within the arm's limits. Words are those of CRTK (Su et
-//! al. 2020): `servo` commands, `setpoint` is what the controller is given, `measured` what is;
-//! `_cp` a pose, `_cv` a twist, `_cf` a force in the cell's axes, `_js` the joints, `_jp` their
-//! positions.
+//! Only joint torques within the arm's limits move the arm. Names are those of CRTK (Su et al.
+//! 2020): `servo` commands, `setpoint` is the input of the controller, `measured` the actual
+//! motion; `_cp` is a pose, `_cv` a twist, `_cf` a force in the cell's axes, `_js` the joints,
+//! `_jp` their positions.
 //!
-//! A step allocates nothing, and its [`ManipulatorState`] is plain data: a copy restored goes on to
-//! the bit.
+//! A step allocates nothing. [`ManipulatorState`] is plain data: a restored copy continues bit for
+//! bit.
 
 mod control;
 mod controlled_arm;

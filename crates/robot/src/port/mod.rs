@@ -1,22 +1,22 @@
-//! The port: a hole in a sheet that an instrument's shaft leans on and pivots in.
+//! The port: a round hole in a sheet, on whose rim an instrument's shaft leans and pivots.
 //!
 //! ```text
 //!            \  shaft                        outside
 //!             \ \
 //!   ___________\ \   _______________________ sheet (thickness t, z from -t/2 to t/2)
-//!   ____________\_\_|_______________________     o---> x    y away from the reader
+//!   ____________\_\_|_______________________     o---> x    y into the page
 //!        rim     \ \  rim                        |
 //!                 \ \                            v z = normal, into the body
 //! ```
 //!
 //! The *port frame* has its origin at the hole's centre in the middle of the sheet and z along the
 //! normal, into the body: an upright shaft points along +z. The two pivots of
-//! [`Coordinates`](crate::instrument::Coordinates) turn z first about x, then about the y that the
-//! first has turned. That is singular only at a second pivot of 90 degrees, where a shaft would lie
-//! in the sheet; the hole allows 33.6.
+//! [`Coordinates`](crate::instrument::Coordinates) rotate z first about x, then about the rotated
+//! y. This is singular only at a second pivot of 90 degrees, where a shaft would lie in the sheet;
+//! the hole allows 33.6 degrees.
 //!
-//! The port is no welded pivot: a shaft is thinner than the hole, leans on its rim, and how far its
-//! axis is from the centre is measured ([`Measured::deviation`]).
+//! The port is not a fixed pivot: a shaft is thinner than the hole and leans on its rim. The
+//! distance of its axis from the centre is measured ([`Measured::deviation`]).
 
 mod contact;
 mod deviation;

@@ -20,21 +20,21 @@ pub struct Port {
     pub stiffness: f64,
     /// Damping of the rim across the shaft (N s/m).
     pub damping: f64,
-    /// Coulomb's coefficient of friction between rim and shaft.
+    /// Coefficient of Coulomb friction between rim and shaft.
     pub friction: f64,
-    /// Stiffness of the rim along the shaft while friction holds (N/m).
+    /// Stiffness of the rim along the shaft while it sticks (N/m).
     pub friction_stiffness: f64,
-    /// Damping along the shaft while friction holds (N s/m).
+    /// Damping along the shaft while it sticks (N s/m).
     pub friction_damping: f64,
 }
 
 impl Port {
-    /// The paper's 6 mm hole at `centre` (m) with `normal` into the body and x as near to `x` as
-    /// the normal lets it. The rim is a single edge of 20 N/mm with friction 0.2: no paper states
-    /// these, so set them where they are known.
+    /// The paper's 6 mm hole at `centre` (m), with `normal` into the body and x the projection of
+    /// `x` across the normal. The rim is a single edge of 20 N/mm with friction 0.2; these two are
+    /// our choice, because the paper does not state them.
     ///
     /// # Errors
-    /// A centre that is not finite, a normal without direction, an `x` along the normal.
+    /// A centre that is not finite, a zero normal, an `x` along the normal.
     pub fn new(centre: DVec3, normal: DVec3, x: DVec3) -> Result<Self> {
         if !centre.is_finite() {
             return Err(Error::invalid("port, centre", format!("{centre} must be finite")));
@@ -61,11 +61,11 @@ impl Port {
         })
     }
 
-    /// Says whether the description can be used.
+    /// Checks the port.
     ///
     /// # Errors
-    /// A size, stiffness or friction that no port has, a pose that is not finite or not of unit
-    /// rotation.
+    /// A size, stiffness or friction out of range, a pose that is not finite or whose rotation is
+    /// not a unit quaternion.
     pub fn check(&self) -> Result<()> {
         within("port, hole_diameter", self.hole_diameter, 1e-3, 0.1, "m")?;
         within("port, thickness", self.thickness, 0.0, 0.05, "m")?;
@@ -75,7 +75,7 @@ impl Port {
         within("port, friction_stiffness", self.friction_stiffness, 1.0, 1e8, "N/m")?;
         within("port, friction_damping", self.friction_damping, 0.0, 1e6, "N s/m")?;
         if !self.pose.translation.is_finite() || !self.pose.rotation.is_normalized() {
-            return Err(Error::invalid("port, pose", "must be finite, its rotation a quaternion of length 1"));
+            return Err(Error::invalid("port, pose", "must be finite, with a unit quaternion as its rotation"));
         }
         Ok(())
     }
@@ -90,10 +90,10 @@ impl Port {
         self.pose.rotation * DVec3::Z
     }
 
-    /// How far the axis of a shaft of `radius` (m) at `tilt` (rad) may lie beside the centre in the
-    /// direction in which it tilts: (D - d/cos(tilt) - t tan(tilt))/2 (m); in a sheet without
-    /// thickness the paper's formula (SPEC K3). Negative where the shaft does not fit, minus
-    /// infinity from 90 degrees on.
+    /// Maximum distance (m) of the axis of a shaft of `radius` (m) at `tilt` (rad) from the centre,
+    /// in the direction of the tilt: (D - d/cos(tilt) - t tan(tilt))/2, the paper's clearance for a
+    /// sheet without thickness. Negative if the shaft does not fit, minus infinity from 90 degrees
+    /// on.
     pub fn clearance(&self, radius: f64, tilt: f64) -> f64 {
         let cos = tilt.cos();
         if cos.is_nan() || cos <= 1e-9 {
@@ -102,12 +102,13 @@ impl Port {
         0.5 * (self.hole_diameter - 2.0 * radius / cos - self.thickness * tilt.abs().tan())
     }
 
-    /// How far the axis may lie beside the centre across the direction of the tilt (m), in a sheet
-    /// without thickness.
+    /// Maximum distance (m) of the axis from the centre across the direction of the tilt, in a
+    /// sheet without thickness.
     ///
-    /// That is (D - d)/2 up to the tilt acos(sqrt(d/D)), 24.1 degrees for 5 in 6 mm. Beyond it the
-    /// shaft's elliptic section is blunter at the end of its short axis than the hole is, touches
-    /// at two points beside that end, and sin(tilt) sqrt((D/2)^2 - (d/2)^2/cos(tilt)^2) is left.
+    /// It is (D - d)/2 up to the tilt acos(sqrt(d/D)), 24.1 degrees for 5 mm in 6 mm. Beyond it the
+    /// curvature of the shaft's elliptic section at the end of its short axis is smaller than that
+    /// of the hole. The section touches at two points beside this end, and the distance is
+    /// sin(tilt) sqrt((D/2)^2 - (d/2)^2/cos(tilt)^2).
     pub fn clearance_across(&self, radius: f64, tilt: f64) -> f64 {
         let (big, k) = (0.5 * self.hole_diameter, tilt.cos() * tilt.cos());
         if big * k >= radius {
@@ -117,22 +118,22 @@ impl Port {
         if square >= 0.0 { square.sqrt() } else { f64::NEG_INFINITY }
     }
 
-    /// The tilt (rad) at which a shaft of `radius` (m) has `clearance` (m) left; none where an
-    /// upright one has less.
+    /// The tilt (rad) at which a shaft of `radius` (m) has the clearance `clearance` (m); `None` if
+    /// an upright shaft has less.
     pub fn tilt_with_clearance(&self, radius: f64, clearance: f64) -> Option<f64> {
-        // D' cos(tilt) - t sin(tilt) = d is one cosine.
+        // D' cos(tilt) - t sin(tilt) = d as a single cosine.
         let wide = self.hole_diameter - 2.0 * clearance;
         let cos = 2.0 * radius / wide.hypot(self.thickness);
         let tilt = cos.min(1.0).acos() - self.thickness.atan2(wide);
         (wide >= 2.0 * radius && cos.is_finite()).then(|| tilt.max(0.0))
     }
 
-    /// Limits for an instrument: the tilt that leaves `clearance` (m), insertions of which the
-    /// jaw's pivot is `margin` (m) inside and the shaft's base as far outside, and the roll that a
-    /// wrist of +-2.7 rad has.
+    /// Limits for an instrument: the tilt with the clearance `clearance` (m), insertions with the
+    /// jaw's pivot at least `margin` (m) inside and the shaft's base as far outside, and a roll
+    /// within +-2.7 rad.
     ///
     /// # Errors
-    /// An instrument that does not go through the hole with that clearance, or that is too short.
+    /// An instrument that does not fit into the hole with this clearance, or is too short.
     pub fn limits(&self, instrument: &crate::instrument::Instrument, clearance: f64, margin: f64) -> Result<Limits> {
         self.check()?;
         instrument.check()?;
@@ -140,7 +141,7 @@ impl Port {
             let shaft = 2e3 * instrument.shaft_radius;
             let hole = 1e3 * self.hole_diameter;
             let reason =
-                format!("{hole} mm leave a shaft of {shaft} mm no tilt at a clearance of {} mm", 1e3 * clearance);
+                format!("{hole} mm allow no tilt of a shaft of {shaft} mm at a clearance of {} mm", 1e3 * clearance);
             return Err(Error::invalid("port, hole_diameter", reason));
         };
         let limits = Limits { tilt, insertion: [margin, instrument.reach() - margin], roll: [-2.7, 2.7] };
@@ -158,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn clearances_are_the_papers() {
+    fn clearances_equal_the_papers() {
         let mm = |degrees: f64| 1e3 * port().clearance(2.5e-3, degrees.to_radians());
         assert!((mm(0.0) - 0.5).abs() < 1e-12);
         assert!((mm(13.3) - 0.43).abs() < 0.005, "{}", mm(13.3));
@@ -170,7 +171,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tilt_for_a_clearance_has_it() {
+    fn the_tilt_for_a_clearance_has_this_clearance() {
         for thickness in [0.0, 1e-3, 3e-3] {
             let port = Port { thickness, ..port() };
             for clearance in [0.0, 1e-4, 4e-4] {

@@ -7,38 +7,38 @@ use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use trocar_core::Wrench;
 
-/// Parameters of a [`LoadModel`]: mass, first moment (3), bias of force (3) and torque (3), in this
-/// order.
+/// Number of parameters of a [`LoadModel`], in this order: mass, first moment (3), bias of force
+/// (3) and torque (3).
 pub const PARAMETERS: usize = 10;
 
-/// What a force is, so that nobody mistakes one for the other (SPEC C8).
+/// The kind of a measured force.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum ForceKind {
     /// Tissue or the port presses on the instrument.
     Contact,
-    /// A latched grasp holds nodes where the jaws are: the force that this takes, not the tissue's
-    /// reaction to a touch.
+    /// A latched grasp holds nodes at the jaws: the force of this constraint, not a contact force
+    /// of tissue.
     Constraint,
 }
 
-/// What a sensor at the mount reads when the instrument touches nothing: linear in these ten
-/// numbers.
+/// The reading of a sensor at the mount without contact: linear in ten parameters.
 ///
-/// The reading is what the instrument does to the mount, in the sensor's frame (the flange's),
-/// torque about its origin: force = m g + b_f, torque = (m c) x g + b_t, with g the gravity there.
+/// The reading is the wrench of the instrument on the mount, in the sensor's frame (the flange's),
+/// torque about its origin: force = m g + b_f, torque = (m c) x g + b_t, with gravity g in this
+/// frame.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LoadModel {
     /// Mass m (kg).
     pub mass: f64,
-    /// Mass times its centre, m c (kg m), in the flange's frame.
+    /// Mass times centre of mass, m c (kg m), in the flange's frame.
     pub first_moment: DVec3,
-    /// What the sensor reads unloaded.
+    /// The reading of the unloaded sensor.
     pub bias: Wrench,
 }
 
 impl LoadModel {
-    /// That of an instrument on a sensor with `bias`.
+    /// The model of an instrument on a sensor with `bias`.
     pub fn of(instrument: &Instrument, bias: Wrench) -> Self {
         let mass = instrument.mass_in_flange();
         Self { mass: mass.mass, first_moment: mass.mass * mass.center, bias }
@@ -54,8 +54,8 @@ impl LoadModel {
         self.first_moment / self.mass
     }
 
-    /// The reading with the flange at `orientation` (its frame to the cell's) under `gravity`
-    /// (m/s2) in the cell.
+    /// The reading with the flange at `orientation` (from its frame to the cell's) under `gravity`
+    /// in the cell (m/s2).
     pub fn reading(&self, orientation: DQuat, gravity: DVec3) -> Wrench {
         let g = orientation.inverse() * gravity;
         Wrench { force: self.mass * g, torque: self.first_moment.cross(g) } + self.bias
@@ -72,17 +72,17 @@ impl LoadModel {
     }
 }
 
-/// Standard deviations of a sensor's noise, the same on all axes.
+/// Standard deviations of a sensor's noise, equal on all axes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SensorNoise {
-    /// Of each force (N).
+    /// Of each force component (N).
     pub force: f64,
-    /// Of each torque (N m).
+    /// Of each torque component (N m).
     pub torque: f64,
 }
 
 impl SensorNoise {
-    /// Says whether the noise can be used.
+    /// Checks the noise.
     ///
     /// # Errors
     /// A deviation that is not positive and finite.
@@ -97,21 +97,21 @@ impl SensorNoise {
     }
 }
 
-/// `orientation` and `gravity`, if they can be used.
+/// Checks `orientation` and `gravity` (m/s2).
 pub(super) fn check_pose(what: &str, orientation: DQuat, gravity: DVec3) -> Result<()> {
     if !orientation.is_normalized() {
-        return Err(Error::invalid(format!("{what}, orientation"), "must be a quaternion of length 1"));
+        return Err(Error::invalid(format!("{what}, orientation"), "must be a unit quaternion"));
     }
     if !gravity.is_finite() || gravity.length() < 0.1 {
         return Err(Error::invalid(
             "gravity",
-            format!("{gravity} m/s2 is no gravity to weigh with; the earth's is 9.81"),
+            format!("is {gravity} m/s2; it must be finite and at least 0.1 m/s2 (the earth's is 9.81)"),
         ));
     }
     Ok(())
 }
 
-/// The derivative of a reading by the ten parameters, row by row.
+/// The derivative of a reading with respect to the ten parameters, by rows.
 pub(super) fn regressor(orientation: DQuat, gravity: DVec3) -> [[f64; PARAMETERS]; 6] {
     let g = orientation.inverse() * gravity;
     let mut rows = [[0.0; PARAMETERS]; 6];

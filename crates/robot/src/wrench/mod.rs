@@ -1,12 +1,11 @@
-//! Forces at the tool mount: what an instrument weighs is identified and taken off.
+//! Forces at the tool mount: identification and compensation of an instrument's weight.
 //!
 //! A six-axis sensor at the mount carries an instrument of 4.7 N; tissue pulls with tens of
-//! millinewtons. So the weight must be known to a percent and its share at every orientation taken
-//! off. [`LoadModel`] is what the sensor reads when nothing is touched, [`identify`] finds it from
-//! readings at rest, [`Compensator`] takes it off, tared at reset, and says how uncertain what is
-//! left is.
+//! millinewtons. So the weight must be known to a percent and subtracted in every orientation.
+//! [`LoadModel`] is the reading without contact, [`identify`] estimates it from readings at rest,
+//! and [`Compensator`] subtracts it, tared at reset, with the uncertainty of the rest.
 //!
-//! All of it is static: where an arm accelerates, the instrument's inertia is in the reading too.
+//! The model is static: if the arm accelerates, readings contain the instrument's inertia.
 
 mod compensate;
 mod identify;
