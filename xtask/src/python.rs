@@ -49,7 +49,7 @@ impl Build {
     fn arguments(self) -> &'static [&'static str] {
         match self {
             Self::Workspace => &["--workspace", "--tests"],
-            Self::Module => &["-p", "trocar", "-p", "trocar-python"],
+            Self::Module => &["-p", "trocar-cli", "-p", "trocar-python"],
         }
     }
 }
