@@ -7,11 +7,14 @@
 //! guide to policies describes the format and the errors.
 //!
 //! ```
-//! use trocar_remote::{ActionQueue, Actions, Array, Client, Endpoint, Loopback, Observation, Playback};
+//! use trocar_remote::{
+//!     ActionQueue, Actions, Array, Client, Endpoint, Loopback, Observation, Playback,
+//! };
 //!
 //! // A server on this machine, for tests and examples. It answers with chunks of two actions.
 //! let server = Loopback::start(&Default::default(), |_| {
-//!     let chunk = Array::from_f64(&[2, 3], &[0.0, 0.1, 0.2, 1.0, 1.1, 1.2]).map_err(|e| e.to_string())?;
+//!     let chunk = Array::from_f64(&[2, 3], &[0.0, 0.1, 0.2, 1.0, 1.1, 1.2]);
+//!     let chunk = chunk.map_err(|e| e.to_string())?;
 //!     Ok(Observation::from([("actions".to_owned(), chunk.into())]))
 //! })?;
 //! let mut client = Client::connect(&Endpoint::new(server.url()))?;
@@ -20,7 +23,8 @@
 //! for frame in 0..4 {
 //!     let action = queue.at(frame as f64 / 30.0, || -> Result<Actions, _> {
 //!         let mut observation = Observation::new();
-//!         observation.insert("observation/image".into(), Array::from_u8(&[1, 2, 3], vec![0; 6])?.into());
+//!         let image = Array::from_u8(&[1, 2, 3], vec![0; 6])?;
+//!         observation.insert("observation/image".into(), image.into());
 //!         observation.insert("prompt".into(), "lift the appendix".into());
 //!         Ok(client.infer(&observation)?.actions)
 //!     })?;

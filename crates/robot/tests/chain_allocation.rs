@@ -48,7 +48,7 @@ fn steps_and_searches_do_not_allocate() {
         arm.inverse(&flange, &arm.home(), &options).unwrap();
     }
     let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
-    let mut controlled = common::cell(0, trocar_robot::manipulator::Settings::default());
+    let mut controlled = common::cell(0, trocar_robot::manipulator::ControllerSettings::default());
     let start = controlled.commanded();
     let made = ALLOCATIONS.load(Ordering::Relaxed);
     for k in 0..480 {

@@ -8,7 +8,7 @@ use glam::DVec3;
 use trocar_core::{Pose, Wrench};
 use trocar_robot::chain::Joints;
 use trocar_robot::instrument::Coordinates;
-use trocar_robot::manipulator::{Law, Manipulator, ModelError, Settings, StepReport};
+use trocar_robot::manipulator::{ControllerSettings, Law, Manipulator, ModelError, StepReport};
 use trocar_robot::wrench::LoadModel;
 
 const DT: f64 = 1.0 / 480.0;
@@ -40,7 +40,7 @@ fn circle(m: &mut Manipulator, mut each: impl FnMut(&Manipulator, &StepReport)) 
 #[test]
 fn the_default_reaches_the_papers_figures() {
     for side in 0..2 {
-        let mut m = cell(side, Settings::default());
+        let mut m = cell(side, ControllerSettings::default());
         // The gravity error acts at once: let it settle.
         rest(&mut m, Wrench::default(), 1.0, |_, _| {});
         let (mut squares, mut deviations) = (0.0, Vec::new());
@@ -63,7 +63,7 @@ fn the_default_reaches_the_papers_figures() {
 fn droop_without_integral_action_equals_the_analytic_value() {
     for law in [Law::JointImpedance, Law::ComputedTorque] {
         let error = ModelError { friction: Some(0.0), ..ModelError::default() };
-        let mut settings = Settings { law, error, ..Settings::default() };
+        let mut settings = ControllerSettings { law, error, ..ControllerSettings::default() };
         settings.gains.bandwidth = 60.0;
         let mut m = cell(0, settings);
         let began = m.measured_js().position;
@@ -89,7 +89,7 @@ fn droop_without_integral_action_equals_the_analytic_value() {
 fn friction_causes_no_limit_cycle() {
     for side in 0..2 {
         for law in [Law::ComputedTorque, Law::Integral, Law::Observer, Law::RcmImpedance] {
-            let mut m = cell(side, Settings { law, ..Settings::default() });
+            let mut m = cell(side, ControllerSettings { law, ..ControllerSettings::default() });
             circle(&mut m, |_, _| {});
             rest(&mut m, Wrench::default(), 5.0, |_, _| {});
             let at = m.measured_cp().translation;
@@ -106,7 +106,7 @@ fn friction_causes_no_limit_cycle() {
 
 #[test]
 fn torques_keep_their_limits_and_their_rate() {
-    let mut m = cell(1, Settings::default());
+    let mut m = cell(1, ControllerSettings::default());
     let mut last = m.measured_js().effort;
     let mut random = Random(3);
     for k in 0..4800 {
@@ -152,7 +152,7 @@ fn digest(m: &Manipulator) -> Vec<u64> {
 fn ten_thousand_random_commands_keep_limits() {
     let (mut worst, mut short) = (0.0_f64, 0);
     for side in 0..2 {
-        let (mut m, mut random) = (cell(side, Settings::default()), Random(5 + side as u64));
+        let (mut m, mut random) = (cell(side, ControllerSettings::default()), Random(5 + side as u64));
         for command in 0..5000 {
             let said = m.servo_cp(&somewhere(&m, &mut random)).unwrap();
             short += usize::from(said.reach < 1.0);
@@ -191,7 +191,7 @@ fn the_same_commands_give_the_same_bits_also_from_a_restored_state() {
         }
         digest(m)
     };
-    let (mut one, mut two) = (cell(0, Settings::default()), cell(0, Settings::default()));
+    let (mut one, mut two) = (cell(0, ControllerSettings::default()), cell(0, ControllerSettings::default()));
     assert_eq!(run(&mut one, 1), run(&mut two, 1));
     let state = one.state();
     let later = run(&mut one, 2);
@@ -203,7 +203,7 @@ fn the_same_commands_give_the_same_bits_also_from_a_restored_state() {
 
 #[test]
 fn illegal_commands_are_refused_and_change_nothing() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let before = m.clone();
     for k in 0..5 {
         for bad in [f64::NAN, f64::INFINITY] {
@@ -229,17 +229,20 @@ fn illegal_commands_are_refused_and_change_nothing() {
     assert!(m.step(Wrench { force: DVec3::splat(f64::MAX), torque: DVec3::ZERO }, DT).is_err());
     assert!(m == before);
     let wide = Coordinates { pivots: [0.0, 0.6], ..start(0) };
-    let new = |start| Manipulator::new(m.arm().clone(), m.instrument().clone(), *m.port(), Settings::default(), start);
+    let new = |start| {
+        Manipulator::new(m.arm().clone(), m.instrument().clone(), *m.port(), ControllerSettings::default(), start)
+    };
     assert!(new(wide).unwrap_err().to_string().contains("tilt"));
     let far = m.arm().clone().with_base(Pose::IDENTITY).unwrap();
     let far = far.with_base(Pose { translation: DVec3::new(-2.0, 0.0, 0.0), ..Pose::IDENTITY }).unwrap();
-    let said = Manipulator::new(far, m.instrument().clone(), *m.port(), Settings::default(), start(0)).unwrap_err();
+    let said =
+        Manipulator::new(far, m.instrument().clone(), *m.port(), ControllerSettings::default(), start(0)).unwrap_err();
     assert!(said.to_string().contains("mm from its pose"), "{said}");
 }
 
 #[test]
 fn parts_beyond_limits_or_reach_are_cut_and_reported() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let said = m.servo_cp(&Coordinates { insertion: 0.9, jaw: 2.0, ..start(0) }).unwrap();
     assert!(said.excess.insertion > 0.5 && said.excess.jaw == 1.0 && said.coordinates.jaw == 1.0);
     assert_eq!(said.coordinates, m.commanded());
@@ -257,7 +260,7 @@ fn parts_beyond_limits_or_reach_are_cut_and_reported() {
 
 #[test]
 fn a_steady_command_is_followed_with_its_lag() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let at = |t: f64| Coordinates { insertion: 0.1 + 0.03 * t, ..start(0) };
     for k in 0..480 {
         if k % 16 == 0 {
@@ -277,7 +280,7 @@ fn a_steady_command_is_followed_with_its_lag() {
 
 #[test]
 fn after_joint_commands_the_shaft_returns_to_the_centre() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let began = m.measured_js().position;
     let target: Vec<f64> = began.iter().enumerate().map(|(i, q)| q + if i == 6 { 0.3 } else { 0.0 }).collect();
     m.servo_jp(&target).unwrap();
@@ -294,11 +297,11 @@ fn after_joint_commands_the_shaft_returns_to_the_centre() {
 #[test]
 fn a_thick_sheet_is_in_contact_and_other_steps_give_the_same_motion() {
     // A sheet of 2 mm leaves 0.04 mm at 18.3 degrees: the shaft slides on its rim everywhere.
-    let thin = cell(1, Settings::default());
+    let thin = cell(1, ControllerSettings::default());
     let port = trocar_robot::port::Port { thickness: 2e-3, ..*thin.port() };
     let new = || {
         let arm = thin.arm().clone();
-        Manipulator::new(arm, thin.instrument().clone(), port, Settings::default(), start(1)).unwrap()
+        Manipulator::new(arm, thin.instrument().clone(), port, ControllerSettings::default(), start(1)).unwrap()
     };
     let run = |rate: usize| {
         let mut m = new();
@@ -321,7 +324,7 @@ fn a_thick_sheet_is_in_contact_and_other_steps_give_the_same_motion() {
 
 #[test]
 fn a_jump_of_the_command_is_smoothed() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     m.servo_cp(&Coordinates { insertion: 0.2, pivots: [0.2, 0.0], ..start(0) }).unwrap();
     let mut last = m.setpoint_js().velocity;
     let mut most = 0.0_f64;
@@ -337,7 +340,7 @@ fn a_jump_of_the_command_is_smoothed() {
 
 #[test]
 fn the_mount_reads_weight_load_and_inertia() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let model = LoadModel::of(m.instrument(), Wrench::default());
     let near = |a: Wrench, b: Wrench| (a.force - b.force).length() + 3.0 * (a.torque - b.torque).length();
     assert!(near(m.measured_cf(), model.reading(m.flange().rotation, m.arm().gravity())) < 1e-12);
@@ -374,7 +377,7 @@ fn the_mount_reads_weight_load_and_inertia() {
 
 #[test]
 fn a_step_is_cheap() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let began = std::time::Instant::now();
     circle(&mut m, |_, _| {});
     let micros = began.elapsed().as_secs_f64() * 1e6 / 1920.0;

@@ -119,12 +119,12 @@ fn too_similar_orientations_are_refused() {
     let good: Vec<_> = static_orientations(54, STATIC_TILT).unwrap().into_iter().map(read).collect();
     refused(&[], "too few");
     refused(&good[..2], "too few");
-    refused(&[good[0]; 54], "too alike");
+    refused(&[good[0]; 54], "too similar");
     // Rotations about the vertical do not change the effect of gravity.
     let yaw: Vec<_> = (0..54).map(|k| read(DQuat::from_rotation_z(0.1 * f64::from(k)))).collect();
-    refused(&yaw, "too alike");
+    refused(&yaw, "too similar");
     let narrow = static_orientations(54, 1_f64.to_radians()).unwrap().into_iter().map(read).collect::<Vec<_>>();
-    refused(&narrow, "too alike");
+    refused(&narrow, "too similar");
     let mut bad = good.clone();
     bad[7].reading.torque.y = f64::NAN;
     refused(&bad, "pose 7, reading");

@@ -1,9 +1,9 @@
 //! Laparoscopic instruments: shaft, jaw and mass.
 //!
 //! ```text
-//!   flange        shaft base                                     shaft end   jaw pivot
-//!     |  motor head   |================= shaft =======================|---o<  blades
-//!     +---> z         +---> z (along the shaft)                           +---> x (along the closed blades)
+//!   flange       shaft base                        shaft end   jaw pivot
+//!     | motor head |============= shaft ===============|---o<  blades
+//!     +---> z      +---> z (along the shaft)               +---> x (along the closed blades)
 //! ```
 //!
 //! There are three frames: the *flange* (the arm's tool mount); the *shaft frame*, with its origin
@@ -212,7 +212,7 @@ mod tests {
             assert!((i.jaw.angle(1.0).to_degrees() - 60.0).abs() < 1e-12);
             assert!(i.mass.center.z < 0.0, "the motor outweighs the shaft");
         }
-        assert!(Instrument::named("stapler").unwrap_err().to_string().contains("grasper and cutter"));
+        assert!(Instrument::named("stapler").unwrap_err().to_string().contains("grasper or cutter"));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The control laws: torques from reference and measured joints.
 
 use super::reference::Reference;
-use super::settings::{Law, Settings};
+use super::settings::{ControllerSettings, Law};
 use crate::chain::{
     ArmState, Dynamics, JointSet, Joints, ROTATION_LEVER, SerialArm, TASK_ROWS, rotation_vector, solve_task,
 };
@@ -55,7 +55,7 @@ impl Memory {
 
 /// The constants of a controller.
 pub(super) struct Controller<'a> {
-    pub settings: &'a Settings,
+    pub settings: &'a ControllerSettings,
     pub believed: &'a SerialArm,
     /// The joints' diagonal inertias in the start posture (kg m2 or kg).
     pub inertia: &'a Joints,

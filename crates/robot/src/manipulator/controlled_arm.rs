@@ -2,7 +2,7 @@
 
 use super::control::{Controller, Memory};
 use super::reference::{Reference, ReferenceContext, between};
-use super::settings::Settings;
+use super::settings::ControllerSettings;
 use crate::chain::{self, ArmState, CouplingLaw, Drive, InverseOptions, JointSet, Joints, SerialArm};
 use crate::instrument::{Coordinates, Excess, Instrument, Limits, clamp_unit};
 use crate::port::{Port, RimState, Shaft};
@@ -29,7 +29,7 @@ pub struct Manipulator {
     pub(super) believed: SerialArm,
     pub(super) instrument: Instrument,
     pub(super) port: Port,
-    pub(super) settings: Settings,
+    pub(super) settings: ControllerSettings,
     pub(super) limits: Limits,
     /// The joints' diagonal inertias in the start posture (kg m2 or kg).
     pub(super) inertia: Joints,
@@ -97,7 +97,7 @@ impl Manipulator {
         arm: SerialArm,
         instrument: Instrument,
         port: Port,
-        settings: Settings,
+        settings: ControllerSettings,
         start: Coordinates,
     ) -> Result<Self> {
         settings.check()?;
@@ -305,7 +305,7 @@ impl Manipulator {
     }
 
     /// The settings of the controller.
-    pub fn settings(&self) -> &Settings {
+    pub fn settings(&self) -> &ControllerSettings {
         &self.settings
     }
 

@@ -1,8 +1,11 @@
 //! An arm with an instrument in a port, under control: commands in, motion out.
 //!
 //! ```text
-//!  commands, 30 Hz ──> reference (limiter, spline, joints) ──> controller ──> torques ──> arm, payload, rim, load on the tip
-//!                         setpoint_*                            believes 2% and 5% less          measured_*
+//! commands, 30 Hz
+//!   -> reference (limiter, spline, joints)              setpoint_*
+//!   -> controller (links 2% and instrument 5% too light)
+//!   -> torques
+//!   -> arm with payload, rim, load on the tip           measured_*
 //! ```
 //!
 //! Only joint torques within the arm's limits move the arm. Names are those of CRTK (Su et al.
@@ -23,4 +26,4 @@ mod touch;
 
 pub use controlled_arm::{Commanded, Manipulator, ManipulatorState, StepReport};
 pub use measure::JointReadings;
-pub use settings::{Gains, Law, ModelError, Settings};
+pub use settings::{ControllerSettings, Gains, Law, ModelError};

@@ -102,7 +102,7 @@ impl ModelError {
 
 /// Settings of a manipulator's controller.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
+pub struct ControllerSettings {
     /// The control law.
     pub law: Law,
     /// The gains.
@@ -123,7 +123,7 @@ pub struct Settings {
 /// Maximum torque rate of an FR3 (N m/s), from Franka's control interface.
 const FR3_TORQUE_RATE: f64 = 1000.0;
 
-impl Default for Settings {
+impl Default for ControllerSettings {
     /// The controller chosen by `trocar experiment controller-grid`.
     fn default() -> Self {
         let gains = Gains { bandwidth: 80.0, damping: 1.0, integral: 15.0, observer: 45.0, port: 2.0 };
@@ -139,7 +139,7 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
+impl ControllerSettings {
     /// The settings of a controller by its name in a scene file, `default` or a [`Law::name`], with
     /// other values of `gains`.
     ///
@@ -208,13 +208,13 @@ fn unknown<'a>(what: &str, given: &str, names: impl Iterator<Item = &'a str> + C
 mod tests {
     use super::*;
 
-    fn named(name: &str, gains: &[(&str, f64)]) -> Result<Settings> {
-        Settings::named(name, &gains.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect())
+    fn named(name: &str, gains: &[(&str, f64)]) -> Result<ControllerSettings> {
+        ControllerSettings::named(name, &gains.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect())
     }
 
     #[test]
     fn controllers_and_gains_are_found_by_name() {
-        assert_eq!(named("default", &[]).unwrap(), Settings::default());
+        assert_eq!(named("default", &[]).unwrap(), ControllerSettings::default());
         for law in Law::ALL {
             let gains: Vec<_> = law.gains().iter().map(|g| (*g, 3.0)).collect();
             let s = named(law.name(), &gains).unwrap();

@@ -6,7 +6,8 @@
 //! (cos a, sin a) is
 //!
 //! ```text
-//! f(a) = k (R cos a - cx)^2 + (R sin a - cy)^2      f'(a)/2R = (1-k) R sin a cos a + k cx sin a - cy cos a
+//! f(a) = k (R cos a - cx)^2 + (R sin a - cy)^2
+//! f'(a)/2R = (1-k) R sin a cos a + k cx sin a - cy cos a
 //! ```
 //!
 //! By symmetry cx, cy >= 0. In the first quadrant f'(a) = 0 is (1-k) R = cy/sin a - k cx/cos a,

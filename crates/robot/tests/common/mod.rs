@@ -12,7 +12,7 @@ use glam::{DMat3, DVec3};
 use trocar_core::Pose;
 use trocar_robot::chain::{Joint, JointKind, JointLimits, Joints, MassProperties, Segment, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument};
-use trocar_robot::manipulator::{Manipulator, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Manipulator};
 use trocar_robot::port::Port;
 
 /// A number in a range.
@@ -75,7 +75,7 @@ pub fn free_fr3() -> SerialArm {
 
 /// An arm of the paper's cell: the left one with the grasper at 13.3 degrees, the right one with
 /// the cutter at 18.3 degrees, in a sheet without thickness.
-pub fn cell(side: usize, settings: Settings) -> Manipulator {
+pub fn cell(side: usize, settings: ControllerSettings) -> Manipulator {
     let x = [-1.0, 1.0][side.min(1)];
     let base = Pose {
         rotation: glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
