@@ -6,6 +6,7 @@ mod blend;
 mod body;
 mod error;
 mod film;
+mod folder;
 mod instruments;
 mod noise;
 mod pack;
@@ -24,6 +25,7 @@ mod tube;
 mod tests;
 
 pub use error::{Error, Result};
+pub use folder::phantoms_folder;
 pub use plan::NAMES;
 pub use record::{RecordOptions, describe, record};
 pub use sensor::Sensor;
