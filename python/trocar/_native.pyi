@@ -1,6 +1,7 @@
 """Types of the native module; what it does is documented in `crates/python/src`."""
 
 from os import PathLike
+from pathlib import Path
 from typing import Sequence
 
 import numpy as np
@@ -13,6 +14,9 @@ Arrays = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]
 
 def scenes() -> list[str]:
     """Names of the built-in scenes."""
+
+def phantoms_folder() -> Path:
+    """The folder of made phantoms: `$TROCAR_PHANTOMS`, or `trocar/phantoms` in the user's cache."""
 
 def policies() -> list[str]:
     """Names of the controllers."""

@@ -4,25 +4,16 @@ from __future__ import annotations
 
 import copy
 import json
-import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Sequence
 
 import gymnasium as gym
 import numpy as np
 
 from .._native import Cells as Native
-from .._native import State
+from .._native import State, phantoms_folder
 from .._native import cameras as scene_cameras
 from .options import Options, kinds_of, size_of, whole
-
-
-def phantoms_folder() -> Path:
-    """Where phantoms are kept once they are made: `$TROCAR_PHANTOMS`, or `trocar/phantoms` in the user's cache."""
-    if given := os.environ.get("TROCAR_PHANTOMS"):
-        return Path(given)
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "trocar" / "phantoms"
 
 
 @dataclass(frozen=True)
