@@ -42,6 +42,5 @@ mod tests;
 pub use catalog::NAMES;
 pub use error::{Error, Result};
 pub use folder::phantoms_folder;
-pub use plan::NAMES;
 pub use record::{RecordOptions, describe, record};
 pub use sensor::Sensor;
