@@ -1,4 +1,4 @@
-//! A specimen comes back as written, and a spoiled one is one clear error.
+//! A specimen is read as written, and a damaged one is one clear error.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod common;
@@ -13,7 +13,7 @@ fn failure(dir: &Path) -> String {
 }
 
 #[test]
-fn comes_back_as_written() {
+fn is_read_as_written() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("specimen");
     drop(Specimen::stage(&dir).unwrap());
