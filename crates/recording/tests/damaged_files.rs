@@ -6,8 +6,8 @@ mod common;
 
 use common::{info, write};
 use std::fs;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_recording::Recording;
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

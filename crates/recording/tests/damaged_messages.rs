@@ -11,8 +11,8 @@ mod common;
 use common::messages::{ALL, decode_all, fixture, log, read_all};
 use std::io::Cursor;
 use std::path::Path;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault, cases};
 use trocar_recording::messages::{Topic, find_rgbd_topics, open_reader};
+use trocar_testing::{Allowance, PEAK, Peak, assault, cases};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

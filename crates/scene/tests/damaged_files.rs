@@ -1,8 +1,8 @@
 //! Damaged scenes give a scene or a one-line error: never a panic, a hang, or more memory than their size calls for.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_scene::{BUILTINS, Scene};
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

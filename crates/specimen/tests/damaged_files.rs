@@ -5,8 +5,8 @@
 mod common;
 
 use std::fs;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_specimen::Specimen;
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
