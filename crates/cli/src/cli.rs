@@ -327,8 +327,9 @@ pub struct CellBench {
     /// A specimen folder instead of the scene's specimen.
     #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Worker threads; all by default.
     #[arg(long, default_value_t = 0)]
@@ -341,8 +342,9 @@ pub struct EpisodeBench {
     /// Scene file or built-in scene.
     #[arg(default_value = "cell-a")]
     pub scene: String,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Worker threads for tissue; all by default.
     #[arg(long, default_value_t = 0)]
@@ -401,8 +403,9 @@ pub struct RenderBench {
     /// Scene file or built-in scene whose cameras are measured; none for none.
     #[arg(long, default_value = "cell-a")]
     pub scene: String,
-    /// Folder for the scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where the scene's phantom is made once and kept
+    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }
 
@@ -501,8 +504,9 @@ pub struct Simulate {
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Run folder to write.
     #[arg(short, long)]

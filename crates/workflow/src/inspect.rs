@@ -24,8 +24,10 @@ pub struct Inspection {
     pub coverage: f64,
     /// Nearest and farthest depth of the middle frame, without the outermost hundredths [m].
     pub depth_range_m: [f64; 2],
-    /// Organs named in the `.toml`.
+    /// Organs of the `.toml` with a mask, an outline or points.
     pub organs: Vec<String>,
+    /// What the organs of the `.toml` lack, one sentence each.
+    pub missing: Vec<String>,
     /// The topics of a log.
     pub topics: Vec<String>,
     /// What was dropped or replaced.
@@ -63,6 +65,11 @@ pub fn inspect(recording: &Path, template: bool) -> Result<Inspection> {
             }
         }
     }
+    let (found, without): (Vec<&OrganInfo>, Vec<&OrganInfo>) = opened
+        .info
+        .organs
+        .iter()
+        .partition(|o| !o.polygon.is_empty() || !o.points.is_empty() || opened.organ_mask_file(&o.name).is_file());
     Ok(Inspection {
         recording: recording.display().to_string(),
         frames: opened.len(),
@@ -71,11 +78,22 @@ pub fn inspect(recording: &Path, template: bool) -> Result<Inspection> {
         depth_scale_m: opened.depth_scale(),
         coverage: valid.len() as f64 / depths.len().max(1) as f64,
         depth_range_m: [at(0.01), at(0.99)],
-        organs: opened.info.organs.iter().map(|o| o.name.clone()).collect(),
+        organs: found.iter().map(|o| o.name.clone()).collect(),
+        missing: without.iter().map(|o| missing_mask(&opened, o)).collect(),
         topics: opened.describe(),
         notes: opened.notes().to_vec(),
         written: written.iter().map(|p: &PathBuf| p.display().to_string()).collect(),
     })
+}
+
+/// Says that an organ cannot be found.
+fn missing_mask(recording: &Recording, organ: &OrganInfo) -> String {
+    let file = recording.organ_mask_file(&organ.name);
+    format!(
+        "organ '{}' has no mask: {} does not exist, and there are neither a polygon nor points",
+        organ.name,
+        file.display()
+    )
 }
 
 fn write_template(recording: &Recording, written: &mut Vec<PathBuf>) -> Result<()> {

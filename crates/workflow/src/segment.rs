@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_camera::{ColorImage, Mask};
 use trocar_core::Progress;
-use trocar_recording::{Recording, RgbdFrame};
+use trocar_recording::{InstrumentRule, Recording, RgbdFrame};
 use trocar_report::overlays::overlay;
 use trocar_segment::{MetalDetector, Picture, Sam2, Segmenter, Target, Tracker, WantedFile, wanted_files};
 use trocar_specimen::StagedFolder;
@@ -82,7 +82,13 @@ impl Segment {
         let staged = StagedFolder::create(output, MARKER)?;
         let folder = staged.path();
         let organs: Vec<_> = recording.info.organs.iter().filter(|o| !o.points.is_empty()).collect();
-        let follow = !recording.info.followed.is_empty();
+        // `instruments = "none"` goes before instruments that are marked.
+        let without = recording.info.instruments == InstrumentRule::None;
+        let follow = !recording.info.followed.is_empty() && !without;
+        if without && organs.is_empty() {
+            let reason = "there is nothing to segment: instruments = \"none\", and no organ has points";
+            return Err(Error::Mismatch(format!("{}: {reason}", recording.toml().display())));
+        }
         let sam = match (&self.sam, organs.is_empty() && !follow) {
             (Some(weights), false) => Some(Sam2::open(weights, self.onnxruntime.as_deref())?),
             (None, false) => {
@@ -92,7 +98,9 @@ impl Segment {
             }
             (_, true) => None,
         };
-        make(&folder.join("instruments"))?;
+        if !without {
+            make(&folder.join("instruments"))?;
+        }
         let middle = recording.frame(recording.len() / 2)?;
         let mut found = Vec::new();
         let mut shown = middle.color.clone();
@@ -111,8 +119,9 @@ impl Segment {
             found.push((organ.name.clone(), mask.count()));
         }
         shown.write_png(&folder.join("organs-seen.png"))?;
-        progress.begin("frames", recording.len() as u64);
+        progress.begin("frames", if without { 0 } else { recording.len() as u64 });
         let covered = match (&sam, follow) {
+            _ if without => Ok(Vec::new()),
             (Some(sam), true) => followed(&recording, sam, folder, progress),
             _ => by_metal(&recording, folder, progress),
         }?;
@@ -121,10 +130,11 @@ impl Segment {
             masks: output.display().to_string(),
             organs: found,
             instruments: match (&sam, follow) {
+                _ if without => "none, as the recording says".to_owned(),
                 (Some(sam), true) => format!("followed by {}", sam.describe()),
                 _ => MetalDetector::default().describe(),
             },
-            frames: recording.len(),
+            frames: if without { 0 } else { recording.len() },
             covered: covered.iter().sum::<f64>() / covered.len().max(1) as f64,
             seconds: clock.elapsed().as_secs_f64(),
         };

@@ -28,9 +28,11 @@ pub struct Reconstructed {
     pub specimen: String,
     /// Its organs.
     pub organs: Vec<OrganRow>,
-    /// How the composite went; `None` for a ready surface.
+    /// Figures of the composite; `None` for a surface file.
     pub composite: Option<CompositeFigures>,
-    /// What the user should know.
+    /// Warnings that the result may be wrong, one sentence each.
+    pub warnings: Vec<String>,
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
     /// Wall time [s].
     pub seconds: f64,
@@ -46,6 +48,8 @@ pub struct OrganRow {
     /// Its measurements.
     #[serde(flatten)]
     pub facts: OrganFacts,
+    /// Share of its pixels that move during the window; `None` for a surface file.
+    pub moving_share: Option<f64>,
 }
 
 /// The composite in figures (SPEC R2).
@@ -118,7 +122,12 @@ pub fn reconstruct_recording(
     finish(staged, &reconstruction.specimen, &html, progress)?;
     let composite = CompositeFigures::of(&reconstruction, recording)?;
     let r = &reconstruction;
-    Ok((figures(&r.specimen, Some(composite), r.notes.clone(), output, clock), reconstruction))
+    let mut figures = figures(&r.specimen, Some(composite), r.notes.clone(), output, clock);
+    figures.warnings.clone_from(&r.warnings);
+    for (row, view) in figures.organs.iter_mut().zip(&r.organs) {
+        row.moving_share = Some(view.moving_share);
+    }
+    Ok((figures, reconstruction))
 }
 
 /// Makes the specimen folder `output` of a ready surface, report included.
@@ -232,8 +241,13 @@ fn figures(
 ) -> Reconstructed {
     Reconstructed {
         specimen: output.display().to_string(),
-        organs: specimen.organs.iter().map(|o| OrganRow { organ: o.name.clone(), facts: o.facts }).collect(),
+        organs: specimen
+            .organs
+            .iter()
+            .map(|o| OrganRow { organ: o.name.clone(), facts: o.facts, moving_share: None })
+            .collect(),
         composite,
+        warnings: Vec::new(),
         notes,
         seconds: clock.elapsed().as_secs_f64(),
         report: output.join(REPORT).display().to_string(),

@@ -27,8 +27,13 @@ fn text(i: &Inspection) -> String {
         1e3 * i.depth_range_m[0],
         1e3 * i.depth_range_m[1]
     ));
-    let organs = if i.organs.is_empty() { "none named yet".to_owned() } else { i.organs.join(", ") };
+    let organs = match (i.organs.is_empty(), i.missing.is_empty()) {
+        (false, _) => i.organs.join(", "),
+        (true, true) => "none described yet".to_owned(),
+        (true, false) => "none with a mask, a polygon or points".to_owned(),
+    };
     lines.push(format!("organs        {organs}"));
+    lines.extend(i.missing.iter().map(|m| format!("missing       {m}")));
     lines.extend(i.topics.iter().map(|t| format!("topic         {t}")));
     lines.extend(i.notes.iter().map(|n| format!("note: {n}")));
     lines.extend(i.written.iter().map(|w| format!("wrote {w}")));

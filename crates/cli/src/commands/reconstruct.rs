@@ -86,6 +86,9 @@ pub fn text(r: &Reconstructed) -> String {
             );
         }
     }
+    for warning in &r.warnings {
+        out += &format!("\nwarning: {warning}");
+    }
     for note in &r.notes {
         out += &format!("\nnote: {note}");
     }

@@ -45,6 +45,7 @@ pub(super) fn overview(r: &Reconstruction) -> String {
     let inverted: usize = facts().map(|f| f.inverted).sum();
     let tight = facts().filter(|f| f.watertight).count();
     let organs = facts().count();
+    let doubtful = !r.warnings.is_empty();
     let errors: Vec<f64> = facts().filter_map(|f| f.depth_error_median_mm).collect();
     let worst = errors.iter().copied().fold(f64::NAN, f64::max);
     let cards = [
@@ -57,10 +58,16 @@ pub(super) fn overview(r: &Reconstruction) -> String {
         ),
         Card::new("Frames used", table::count(r.frames_used), "in the composite"),
         Card::new("Depth error", format!("{} mm", fixed(worst, 2)), "median of the organ that fits worst"),
-        Card::new("Watertight", format!("{tight} of {organs}"), "organs").met(tight == organs),
-        Card::new("Inverted elements", table::count(inverted), "over all organs").met(inverted == 0),
+        judged(Card::new("Watertight", format!("{tight} of {organs}"), "organs"), tight == organs, doubtful),
+        judged(Card::new("Inverted elements", table::count(inverted), "over all organs"), inverted == 0, doubtful),
     ];
-    page::section("From the recording", "", &page::cards(&cards))
+    let warnings: String = r.warnings.iter().map(|w| page::warning(w)).collect();
+    page::section("From the recording", "", &(warnings + &page::cards(&cards)))
+}
+
+/// The card with its target. A target that is met is not shown as good beside a warning.
+fn judged(card: Card, met: bool, doubtful: bool) -> Card {
+    if met && doubtful { card } else { card.met(met) }
 }
 
 /// Input, composite, masks and the surfaces seen by the recording camera.
