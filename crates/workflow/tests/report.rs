@@ -1,4 +1,5 @@
-//! Reports of made-up organs: what must hold for any page. The pages are left in the target's tmp folder to look at.
+//! Reports of made-up organs: what must hold for any page. The pages are left in the target's tmp
+//! folder to look at.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // the helpers are test code too
 
 use base64::{Engine, engine::general_purpose::STANDARD};

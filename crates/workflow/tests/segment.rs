@@ -1,4 +1,4 @@
-//! `trocar segment`'s work from recording to masks, and from these to a specimen.
+//! `trocar segment`: from a recording to masks, and from these to a specimen.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 #[path = "../../recording/tests/common/mod.rs"]
@@ -12,7 +12,8 @@ use trocar_reconstruct::{Settings, reconstruct};
 use trocar_recording::{InstrumentInfo, InstrumentRule, Recording, RecordingInfo};
 use trocar_workflow::{Segment, inspect, wanted_weights};
 
-/// Networks of SAM's interface that select by colour; `None`, saying so, without ONNX Runtime.
+/// Networks with SAM's interface that select by colour; `None`, with a message, without ONNX
+/// Runtime.
 fn sam() -> Option<Segment> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let tools = root.join("../../target/tools");
@@ -38,11 +39,11 @@ fn iou(a: &Mask, b: &Mask) -> f64 {
 }
 
 #[test]
-fn an_organ_that_is_pointed_at_is_found_and_reconstructed() {
+fn an_organ_with_points_is_found_and_reconstructed() {
     let Some(segment) = sam() else { return };
     let mut info = info();
     info.organs[0].points = vec![[82.0, 58.0]];
-    // Before frame 2 the bar comes from the image's other side, where nothing can follow it.
+    // Before frame 2 the bar comes from the image's other side, where it cannot be followed.
     info.followed =
         vec![InstrumentInfo { name: "bar".into(), frame: 2, points: vec![[152.0, 30.0]], points_outside: vec![] }];
     let (root, dir) = recording(&info);
@@ -65,7 +66,7 @@ fn an_organ_that_is_pointed_at_is_found_and_reconstructed() {
 }
 
 #[test]
-fn without_sam_metal_is_looked_for_and_points_are_refused() {
+fn without_sam_metal_is_detected_and_points_are_refused() {
     let (root, dir) = recording(&info());
     let masks = root.path().join("masks");
     let made = Segment::default().run(&dir, &masks, &Silent).unwrap();

@@ -21,7 +21,7 @@ fn text(i: &Inspection) -> String {
         lines.push(format!("depth camera  {}; registered to colour", camera(depth)));
     }
     lines.push(format!(
-        "depth         {} mm a unit; the middle frame has it on {:.0}% of its pixels, {:.0} to {:.0} mm",
+        "depth         unit {} mm; the middle frame has depth on {:.0}% of its pixels, from {:.0} to {:.0} mm",
         1e3 * i.depth_scale_m,
         100.0 * i.coverage,
         1e3 * i.depth_range_m[0],

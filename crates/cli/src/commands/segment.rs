@@ -5,7 +5,7 @@ use trocar_core::Progress;
 use trocar_workflow::{Result, Segment, Segmented, Wanted, wanted_weights};
 
 pub fn run(arguments: &cli::Segment, json: bool, progress: &dyn Progress) -> Result<()> {
-    // clap asks for both unless the files are asked for.
+    // clap requires both unless --weights is given.
     let (Some(recording), Some(masks), false) = (&arguments.recording, &arguments.output, arguments.weights) else {
         output::print(json, &wanted_weights(arguments.sam.folder.as_deref()), |files| list(files));
         return Ok(());
