@@ -69,7 +69,8 @@ fn a_bag_is_inspected_and_gets_its_template() {
             .replace("# ", "")
             .replace("#\n", "\n")
             .replacen("Facts of", "# Facts of", 1)
-            .replacen("unless", "# unless", 1),
+            .replacen("depth scale come", "# depth scale come", 1)
+            .replacen("by its outline", "# by its outline", 1),
     )
     .unwrap();
     let organs = &trocar(dir.path(), &["inspect", "session.mcap"])["organs"];

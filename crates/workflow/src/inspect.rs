@@ -117,8 +117,9 @@ fn write_template(recording: &Recording, written: &mut Vec<PathBuf>) -> Result<(
     let example = with_organ.split_once("[[organ]]").map_or(String::new(), |(_, rest)| format!("[[organ]]{rest}"));
     let example: String =
         example.lines().map(|l| if l.is_empty() { "#\n".into() } else { format!("# {l}\n") }).collect();
-    let comment = "# What is known of this recording; docs/guides/recordings.md explains every key. Cameras and depth scale come from the log\n\
-                   # unless they are given here. Describe each organ below by its outline in pixels of the colour image, or by a mask.\n";
+    let comment = "# Facts of this recording; docs/guides/recordings.md explains every key. Cameras and\n\
+                   # depth scale come from the log unless they are given here. Describe each organ below\n\
+                   # by its outline in pixels of the colour image, or by a mask.\n";
     let path = recording.toml().to_owned();
     std::fs::write(&path, format!("{comment}{text}\n{example}"))
         .map_err(|source| Error::Io { path: path.clone(), source })?;

@@ -18,7 +18,7 @@ pub struct Episode {
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
     /// Folder of made phantoms, where a scene's phantom is made once and kept
-    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Episode folder to write: episode.trocar, channels.parquet, result.json.
@@ -41,7 +41,7 @@ pub struct Replay {
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
     /// Folder of made phantoms, where a scene's phantom is made once and kept
-    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }

@@ -24,7 +24,7 @@ pub struct Evaluate {
     #[arg(long)]
     pub retry_failed: bool,
     /// Folder of made phantoms, where a scene's phantom is made once and kept
-    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Campaign folder: begun there, or gone on with where it was left.
@@ -48,7 +48,7 @@ pub struct RolloutsExperiment {
     #[arg(long, default_value_t = 0)]
     pub jobs: usize,
     /// Folder of made phantoms, where a scene's phantom is made once and kept
-    /// [default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache]
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Campaign folder: begun there, or gone on with where it was left.
