@@ -164,7 +164,6 @@ fn reconstruction() -> Reconstruction {
             .collect(),
         compared: mask(i as u16 + 1),
         moving_share: 0.0,
-        moving_share: 0.0,
     };
     let organs = specimen.organs.iter().enumerate().map(|(i, o)| view(i, &o.name)).collect();
     let mut input = frame.color.clone();
@@ -185,7 +184,6 @@ fn reconstruction() -> Reconstruction {
         recovered_share: 0.034,
         coverage: 0.903,
         depth_range_median: 0.0019,
-        warnings: Vec::new(),
         warnings: Vec::new(),
         times: CompositeTimes::default(),
         organs,
