@@ -8,7 +8,7 @@ mod common;
 use common::{FRAME, GRAVITY, appendix, nodes, tissue};
 use glam::DVec3;
 use std::time::{Duration, Instant};
-use trocar_tissue::{Cut, Schedule, State, Stepper, sever};
+use trocar_tissue::{Cut, SolverSettings, State, Stepper, sever};
 
 /// Repetitions; the fastest counts.
 const TIMES: usize = 30;
@@ -24,8 +24,8 @@ fn main() {
         let mesh = appendix(cell);
         let model = common::model(&mesh, tissue(12e3), nodes(&mesh, |p| p.x < 6e-3), GRAVITY);
         let state = State::new(&model);
-        let mut fast = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
-        let mut sweeps = Stepper::new(&model, Schedule::PAPER, FRAME, 1).unwrap();
+        let mut fast = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
+        let mut sweeps = Stepper::new(&model, SolverSettings::PAPER, FRAME, 1).unwrap();
         let cut = Cut::through(0, DVec3::X * 0.04, DVec3::X);
         let mut moving = state.clone();
         let mut times = [const { Vec::new() }; 4];
@@ -39,9 +39,9 @@ fn main() {
             assert_eq!(severed.pieces.len(), 2);
             for (k, stepper) in [&mut fast, &mut sweeps].into_iter().enumerate() {
                 let start = Instant::now();
-                stepper.follow(&severed.model).unwrap();
+                stepper.set_model(&severed.model).unwrap();
                 times[1 + k].push(start.elapsed());
-                stepper.follow(&model).unwrap();
+                stepper.set_model(&model).unwrap();
             }
         }
         let [sever, fast, sweeps, frame] = times.map(|times| least(&times));

@@ -194,6 +194,48 @@ impl Body {
         f64::from(self.vertices[self.internal[node] as usize].mass)
     }
 
+    /// Rest shape (m).
+    pub fn rest(&self) -> &TetMesh {
+        &self.rest
+    }
+
+    /// Rest volumes of the elements (m3).
+    pub fn volumes(&self) -> &[f64] {
+        &self.volumes
+    }
+
+    /// World position of the body's own origin (m). A state keeps positions relative to it.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// Stiffness of a support or a tool against a node (N/m).
+    pub fn contact_stiffness(&self, node: usize) -> f64 {
+        f64::from(self.vertices[self.internal[node] as usize].contact_stiffness)
+    }
+
+    /// Edges with a dashpot and its coefficient (N s/m), each once, smaller node first, in
+    /// ascending order.
+    pub fn dashpots(&self) -> Vec<([u32; 2], f64)> {
+        let nodes = self.nodes_of_vertices();
+        let mut dashpots = Vec::new();
+        for (node, vertex) in self.internal.iter().enumerate() {
+            for edge in self.edges_of(*vertex as usize) {
+                let to = nodes[edge.to as usize];
+                if to > node && edge.damping > 0.0 {
+                    dashpots.push(([node as u32, to as u32], f64::from(edge.damping)));
+                }
+            }
+        }
+        dashpots
+    }
+
+    /// Number under which the solvers know each node: nodes of one colour of the sweeps are
+    /// adjacent, pinned nodes come last.
+    pub fn solver_numbers(&self) -> &[u32] {
+        &self.internal
+    }
+
     /// The node of every vertex.
     pub(crate) fn nodes_of_vertices(&self) -> Vec<usize> {
         let mut nodes = vec![0; self.len()];

@@ -2,6 +2,7 @@
 
 mod check;
 
+use crate::assembly::{SEEN_FROM, shape_gradients};
 use crate::body::{BodyData, Corner, Edge, Vertex};
 use crate::contact::surface::Surface;
 use crate::descent::coloring::color;
@@ -336,9 +337,6 @@ fn count_parts(neighbours: &[Vec<u32>]) -> usize {
     parts
 }
 
-/// Other corners of an element seen from corner k, so that (b-a)x(c-a).(x-a) is positive.
-const SEEN_FROM: [[usize; 3]; 4] = [[1, 3, 2], [0, 2, 3], [0, 3, 1], [0, 1, 2]];
-
 /// The faces opposite a node in its elements, turned as its corners are.
 fn faces(mesh: &TetMesh, incident: &[(usize, usize)]) -> Vec<[u32; 3]> {
     incident.iter().map(|(t, k)| SEEN_FROM[*k].map(|c| mesh.tets[*t][c])).collect()
@@ -390,14 +388,4 @@ fn add_edges(body: &mut BodyData, i: usize, neighbours: &[u32], incident: &[(usi
         });
     }
     diagonal as f32
-}
-
-/// Gradients of the four shape functions of element `t` at rest [1/m].
-pub(crate) fn shape_gradients(mesh: &TetMesh, t: usize) -> [DVec3; 4] {
-    let x = mesh.corners(t);
-    let six_v = 6.0 * mesh.tet_volume(t);
-    [0, 1, 2, 3].map(|k: usize| {
-        let [a, b, c] = SEEN_FROM[k].map(|c| x[c]);
-        (b - a).cross(c - a) / six_v
-    })
 }

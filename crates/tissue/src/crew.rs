@@ -10,7 +10,7 @@ use glam::DVec3;
 /// What the stepper knows of the solvers' kind: nothing.
 pub(crate) trait Crew: Send + Sync {
     /// Goes over to another model; what both have in common keeps its solver. `alone`: the calling thread is to do all the work.
-    fn follow(&mut self, model: &Model, alone: bool);
+    fn set_model(&mut self, model: &Model, alone: bool);
 
     /// Whether the model is the one that was followed, and the state one of it.
     fn fits(&self, model: &Model, state: &State) -> bool;
@@ -75,7 +75,7 @@ impl<S: Solver> Workers<S> {
 }
 
 impl<S: Solver> Crew for Workers<S> {
-    fn follow(&mut self, model: &Model, alone: bool) {
+    fn set_model(&mut self, model: &Model, alone: bool) {
         let mut old = std::mem::take(&mut self.list);
         for (index, (state, body)) in State::new(model).bodies.into_iter().zip(&model.bodies).enumerate() {
             let worker = match old.iter().position(|worker| worker.body.is(body)) {

@@ -114,23 +114,8 @@ impl Frame<'_> {
 
     /// Calls `place(vertex, position)` for every vertex that a tool carries rigidly, where it is to be when `share` of the frame is over, in the body's frame [m]. Vertices held
     /// by a tool of which no motion is given stay where they are and are left out.
-    pub fn for_held(&self, body: &Body, share: f64, place: impl FnMut(usize, Vec3A)) {
-        self.for_nodes(self.rigid_grasps(), body, share, place);
-    }
-
-    /// The same for all grasps, for solvers that know no compliant ones.
-    pub fn for_all_held(&self, body: &Body, share: f64, place: impl FnMut(usize, Vec3A)) {
-        self.for_nodes(self.grasps(), body, share, place);
-    }
-
-    fn for_nodes<'g>(
-        &self,
-        grasps: impl Iterator<Item = &'g Grasp>,
-        body: &Body,
-        share: f64,
-        mut place: impl FnMut(usize, Vec3A),
-    ) {
-        for grasp in grasps {
+    pub fn for_held(&self, body: &Body, share: f64, mut place: impl FnMut(usize, Vec3A)) {
+        for grasp in self.rigid_grasps() {
             if let Some(motion) = self.tools.get(grasp.tool) {
                 for (node, x) in grasp.prescribed(&motion.at(share)) {
                     place(body.internal[node as usize] as usize, (x - body.origin).as_vec3a());

@@ -1,6 +1,5 @@
-//! The instruction set that a schedule's kernels run in.
+//! The instruction set that the kernels run in.
 
-use crate::Schedule;
 use fearless_simd::Level;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -66,15 +65,5 @@ impl Isa {
     #[cfg(not(target_arch = "x86_64"))]
     fn found(self) -> Option<Level> {
         None
-    }
-}
-
-impl Schedule {
-    /// Name of the instruction set of this schedule's kernels on this machine; the comparators in double precision have what the program was compiled for.
-    pub fn isa(&self) -> &'static str {
-        match self {
-            Self::QuasiNewton(_) | Self::Descent(_) => Isa::detect().name(),
-            Self::SemiImplicit(_) | Self::Xpbd(_) | Self::Newton(_) => Isa::Portable.name(),
-        }
     }
 }

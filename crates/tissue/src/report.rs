@@ -4,8 +4,8 @@ use crate::Body;
 use crate::state::BodyState;
 use glam::Vec3A;
 
-/// A node at this speed [m/s] has diverged (the paper's particle velocity limit).
-pub(crate) const SPEED_LIMIT: f64 = 20.0;
+/// Speed at which a node has diverged (m/s): the paper's particle velocity limit.
+pub const SPEED_LIMIT: f64 = 20.0;
 
 /// An edge of more than this many rest lengths has diverged.
 const STRETCH_LIMIT: f32 = 10.0;

@@ -1,6 +1,7 @@
 //! What changes while stepping: plain data.
 
 use crate::contact::{Anchor, Source, Stretch};
+use crate::external::BodyMotion;
 use crate::{Body, Grasp, Model};
 use glam::{DVec3, Vec3A};
 use xxhash_rust::xxh3::Xxh3;
@@ -79,6 +80,31 @@ impl State {
             let nodes = model.bodies.get(grasp.body).map_or(0, |body| body.len());
             grasp.nodes.len() == grasp.captured.len() && grasp.nodes.iter().all(|i| (*i as usize) < nodes)
         })
+    }
+
+    /// The motion of a body, in double precision and node order.
+    pub fn motion(&self, model: &Model, body: usize) -> BodyMotion {
+        let mut motion = BodyMotion::default();
+        motion.load(&model.bodies[body], &self.bodies[body]);
+        motion
+    }
+
+    /// Sets the motion of a body, rounded to single precision; what contact with tools and other
+    /// bodies remembers stays.
+    pub fn set_motion(&mut self, model: &Model, body: usize, motion: &BodyMotion) {
+        motion.store(&model.bodies[body], &mut self.bodies[body]);
+    }
+
+    /// Tells the adaptive start of the sweeps which acceleration each node of a body had in the
+    /// last substep (m/s2).
+    pub fn set_accelerations(&mut self, model: &Model, body: usize, accelerations: &[DVec3]) {
+        let strength = model.gravity.length_squared();
+        if strength > 0.0 {
+            for (i, acceleration) in model.bodies[body].internal.iter().zip(accelerations) {
+                let share = acceleration.dot(model.gravity) / strength;
+                self.bodies[body].falling[*i as usize] = share.clamp(0.0, 1.0) as f32;
+            }
+        }
     }
 
     /// World position of a node [m].

@@ -1,19 +1,19 @@
 //! One frame of simulation: every body by its solver, and what it did to the tools.
 
-use crate::comparator::ComparatorIntegrator;
 use crate::crew::{Crew, Workers};
 use crate::descent::TouchingDescent;
+use crate::external::{ExternalSolver, Integrator};
 use crate::integrator::Frame;
-use crate::oracle::NewtonIntegrator;
 use crate::quasi_newton::QuasiNewtonSolver;
 use crate::report::Divergence;
-use crate::{Error, Event, Load, Model, Result, Schedule, State, StepReport, ToolForce, ToolMotion};
+use crate::{Body, Error, Event, Load, Model, Result, SolverSettings, State, StepReport, ToolForce, ToolMotion};
 use glam::DVec3;
 
 /// Advances states of one model; owns all scratch memory, so stepping allocates nothing, but for lists of what bodies touch that get longer than they ever were.
 pub struct Stepper {
     dt: f64,
-    schedule: Schedule,
+    /// Whether a single body is worth several threads.
+    threaded_bodies: bool,
     threads: usize,
     /// None: the calling thread does the work.
     pool: Option<rayon::ThreadPool>,
@@ -23,19 +23,39 @@ pub struct Stepper {
 }
 
 impl Stepper {
-    /// Prepares to step frames of `dt` [s] by `schedule` with `threads` worker threads (0: as many as the machine has). The result does not depend on
-    /// the number of threads.
+    /// Prepares to step frames of `dt` (s) with `threads` worker threads (0: one for each core).
+    /// The results do not depend on the number of threads.
     ///
     /// # Errors
-    /// A schedule or `dt` that cannot be, or threads that the system does not give.
-    pub fn new(model: &Model, schedule: Schedule, dt: f64, threads: usize) -> Result<Self> {
+    /// Settings or a `dt` out of range, or threads that the system does not give.
+    pub fn new(model: &Model, settings: SolverSettings, dt: f64, threads: usize) -> Result<Self> {
+        settings.check()?;
+        let threaded_bodies = matches!(settings, SolverSettings::Descent(_));
+        Self::with_crew(model, crew(settings, dt), threaded_bodies, dt, threads)
+    }
+
+    /// Prepares to step with an integrator from outside this crate: `make` makes the one of each
+    /// body. Bodies then pass through each other and through tools.
+    ///
+    /// # Errors
+    /// A `dt` out of range, or threads that the system does not give.
+    pub fn with_integrator(
+        model: &Model,
+        make: impl Fn(&Body) -> Box<dyn Integrator> + Send + Sync + 'static,
+        dt: f64,
+        threads: usize,
+    ) -> Result<Self> {
+        let crew = Workers::new(move |body, _| ExternalSolver::new(make(body)));
+        Self::with_crew(model, Box::new(crew), false, dt, threads)
+    }
+
+    fn with_crew(model: &Model, crew: Box<dyn Crew>, threaded_bodies: bool, dt: f64, threads: usize) -> Result<Self> {
         if !(dt > 0.0 && dt <= 10.0) {
-            return Err(Error::Model(format!("a frame of {dt} s; above 0 and at most 10 s make sense")));
+            return Err(Error::Model(format!("a frame of {dt} s; must be in (0, 10]")));
         }
-        schedule.check()?;
-        let crew = crew(schedule, dt);
-        let mut stepper = Self { dt, schedule, threads, pool: None, crew, forces: Vec::new(), events: Vec::new() };
-        stepper.follow(model)?;
+        let (forces, events) = (Vec::new(), Vec::new());
+        let mut stepper = Self { dt, threaded_bodies, threads, pool: None, crew, forces, events };
+        stepper.set_model(model)?;
         Ok(stepper)
     }
 
@@ -44,9 +64,9 @@ impl Stepper {
     ///
     /// # Errors
     /// Threads that the system does not give; the stepper still steps the old model then.
-    pub fn follow(&mut self, model: &Model) -> Result<()> {
-        // Handing a small model over to a pool of one would cost more than some frames do, and bodies are all that the quasi-Newton solver shares out among threads.
-        let one = matches!(self.schedule, Schedule::QuasiNewton(_)) && model.bodies.len() == 1;
+    pub fn set_model(&mut self, model: &Model) -> Result<()> {
+        // Handing a small model over to a pool would cost more than some frames do.
+        let one = !self.threaded_bodies && model.bodies.len() == 1;
         let alone = self.threads == 1 || one;
         if alone {
             self.pool = None;
@@ -55,7 +75,7 @@ impl Stepper {
             self.pool =
                 Some(pool.map_err(|e| Error::Model(format!("{} threads cannot be started: {e}", self.threads)))?);
         }
-        self.crew.follow(model, alone);
+        self.crew.set_model(model, alone);
         Ok(())
     }
 
@@ -83,11 +103,17 @@ impl Stepper {
 
     /// Advances `state` by one frame. `tools` are the motions of the tools that carry the state's grasps; what is held by a tool without a motion stays where it is.
     pub fn step(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion]) -> StepReport {
-        self.step_under(model, state, tools, &[])
+        self.step_with_loads(model, state, tools, &[])
     }
 
     /// The same under `loads` on nodes.
-    pub fn step_under(&mut self, model: &Model, state: &mut State, tools: &[ToolMotion], loads: &[Load]) -> StepReport {
+    pub fn step_with_loads(
+        &mut self,
+        model: &Model,
+        state: &mut State,
+        tools: &[ToolMotion],
+        loads: &[Load],
+    ) -> StepReport {
         self.events.clear();
         self.forces.clear();
         let refused = |why| StepReport { divergence: Some(why), ..StepReport::default() };
@@ -134,19 +160,14 @@ impl Stepper {
     }
 }
 
-/// The schedule's solvers.
-fn crew(schedule: Schedule, dt: f64) -> Box<dyn Crew> {
-    match schedule {
-        Schedule::QuasiNewton(method) => {
+/// The solvers of these settings.
+fn crew(settings: SolverSettings, dt: f64) -> Box<dyn Crew> {
+    match settings {
+        SolverSettings::QuasiNewton(method) => {
             Box::new(Workers::new(move |body, alone| QuasiNewtonSolver::new(method, body, dt, alone)))
         }
-        Schedule::Descent(descent) => {
+        SolverSettings::Descent(descent) => {
             Box::new(Workers::new(move |body, alone| TouchingDescent::new(descent, body, alone)))
         }
-        Schedule::SemiImplicit(settings) => {
-            Box::new(Workers::new(move |body, _| ComparatorIntegrator::semi_implicit(settings, body)))
-        }
-        Schedule::Xpbd(settings) => Box::new(Workers::new(move |body, _| ComparatorIntegrator::xpbd(settings, body))),
-        Schedule::Newton(settings) => Box::new(Workers::new(move |body, _| NewtonIntegrator::new(settings, body))),
     }
 }

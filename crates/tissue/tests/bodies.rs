@@ -9,8 +9,8 @@ use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_tissue::{
-    Body, BodyContact, BodyDescription, Divergence, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper,
-    ToolMotion,
+    Body, BodyContact, BodyDescription, Divergence, Grasp, Material, Model, ModelBuilder, SolverSettings, State,
+    Stepper, ToolMotion,
 };
 
 /// A ball of `cells` cubes across, of radius `radius` [m], round `centre`.
@@ -195,7 +195,7 @@ fn coulomb_holds_between_bodies() {
         let parts = [Part { mesh: ground, material, pinned }, Part { mesh: above, material, pinned: vec![] }];
         let model = scene(&parts, contact, GRAVITY);
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         let mut run = |frames: usize| {
             let (mut fallbacks, mut iterations) = (0, 0);
             for _ in 0..frames {
@@ -240,7 +240,7 @@ fn two_blocks_press_as_one() {
     ];
     let model = scene(&parts, contact, DVec3::ZERO);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     let pressed = 1e-3;
     for k in 1..=30 {
         for i in &pinned_high {
@@ -296,7 +296,7 @@ fn folded_tissue_touches_itself() {
     };
     let pinned = nodes(&mesh, |p| p.z < 2.1 * edge || p.x < 1.1 * edge);
     let [top, bottom] = [2.0, 6.0].map(|z| nodes(&mesh, |p| p.x > 3.0 * edge && (p.z / edge - z).abs() < 1e-6));
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let gap = |folds: bool| {
             let contact = BodyContact { folds, ..BodyContact::default() };
             let material = Material { viscosity: 10.0, ..tissue(800.0) };
@@ -329,7 +329,7 @@ fn a_rigid_body_is_an_obstacle() {
     let parts = [Part { mesh: low, material, pinned: all }, Part { mesh: high, material, pinned: vec![] }];
     let contact = BodyContact::default();
     let model = scene(&parts, contact, GRAVITY);
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
         for _ in 0..60 {
@@ -354,7 +354,7 @@ fn a_blow_goes_through_a_row() {
     let mut state = State::new(&model);
     (0..model.bodies()[0].len()).for_each(|i| state.set_velocity(&model, 0, i, DVec3::X * 0.4));
     let before = momentum(&model, &state);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 2).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 2).unwrap();
     for _ in 0..20 {
         let report = stepper.step(&model, &mut state, &[]);
         assert_eq!((report.inverted, report.divergence, report.fallbacks), (0, None, 0));
@@ -377,7 +377,7 @@ fn long_frames_find_what_falls() {
     let parts = [Part { mesh: low, material, pinned }, Part { mesh: high, material, pinned: vec![] }];
     let model = scene(&parts, BodyContact::default(), GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, 1.0 / 30.0, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, 1.0 / 30.0, 1).unwrap();
     for _ in 0..30 {
         let report = stepper.step(&model, &mut state, &[]);
         assert_eq!((report.inverted, report.divergence), (0, None));
@@ -397,7 +397,7 @@ fn tools_feel_what_presses_what_they_hold() {
     let model = scene(&parts, BodyContact::default(), GRAVITY);
     let weight: f64 =
         model.bodies().iter().map(|body| (0..body.len()).map(|i| body.mass(i)).sum::<f64>()).sum::<f64>() * 9.81;
-    for schedule in [Schedule::FAST, many_sweeps()] {
+    for schedule in [SolverSettings::FAST, many_sweeps()] {
         let mut state = State::new(&model);
         state.grasps = vec![Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY)];
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
@@ -427,7 +427,7 @@ fn another_contact_is_another_model() {
         builder.build().unwrap()
     };
     let model = build(0.6, false);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     for (other, refused) in [(build(0.6, false), false), (build(0.1, false), true), (build(0.6, true), true)] {
         let mut state = State::new(&other);
         assert_eq!(stepper.step(&other, &mut state, &[]).divergence == Some(Divergence::OtherModel), refused);
@@ -451,7 +451,7 @@ fn only_pairs_that_collide_touch() {
         let model = builder.build().unwrap();
         let mut state = State::new(&model);
         (0..model.bodies()[1].len()).for_each(|i| state.set_velocity(&model, 1, i, DVec3::Z * -0.3));
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         (0..12).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
         let moved = centroid(&model, &state, 0).length();
         assert_eq!(moved < 1e-9, filtered || !contact, "the other went {moved} m");
@@ -483,7 +483,7 @@ fn bits_repeat() {
     let material = Material { viscosity: 20.0, ..tissue(8e3) };
     let parts = meshes.map(|mesh| Part { pinned: pins(&mesh), mesh, material });
     let model = scene(&parts, BodyContact::default(), GRAVITY);
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let run = |threads: usize| {
             let mut state = State::new(&model);
             let mut stepper = Stepper::new(&model, schedule, FRAME, threads).unwrap();
@@ -529,7 +529,7 @@ fn bodies_that_wake_remember_nothing() {
         }
         hashes
     };
-    let stepper = || Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let stepper = || Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     go(&mut stepper(), &mut settled, &|_| 0.0, 60);
     // Pushed into the second, which is pushed into the third; they rest in between.
     let push = |k: usize| if k < 10 { 0.0 } else { 4e-3 * ((k - 10) as f64 / 20.0).min(1.0) };

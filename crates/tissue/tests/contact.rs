@@ -9,8 +9,8 @@ use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_tissue::{
-    BodyDescription, Collider, Material, Model, ModelBuilder, Schedule, Shape, State, Stepper, Support, SupportPlane,
-    ToolMotion,
+    BodyDescription, Collider, Material, Model, ModelBuilder, Shape, SolverSettings, State, Stepper, Support,
+    SupportPlane, ToolMotion,
 };
 
 fn at(translation: DVec3) -> Pose {
@@ -65,7 +65,7 @@ fn a_sphere_is_pushed_back_as_hertz_says() {
     let radius: f64 = 0.03;
     let sphere = collider(Shape::Sphere { centre: DVec3::ZERO, radius }, 0.0, 0.0);
     let model = scene(&mesh, material, pinned, vec![], vec![sphere], DVec3::ZERO);
-    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
+    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
     for depth in [0.3e-3, 0.6e-3] {
         for _ in 0..60 {
             let report = stepper.step(&model, &mut state, &[still(at(DVec3::Z * (radius - depth)))]);
@@ -97,7 +97,7 @@ fn a_block_on_an_incline_sticks_and_slides_at_the_right_angle() {
             let angle = (share * friction).atan();
             let gravity = 9.81 * DVec3::new(angle.sin(), 0.0, -angle.cos());
             let model = scene(&mesh, material, vec![], supports.clone(), colliders.clone(), gravity);
-            let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+            let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
             let mut state = State::new(&model);
             let mut walk = |frames: usize| {
                 for _ in 0..frames {
@@ -129,7 +129,7 @@ fn nothing_is_passed_through_at_half_a_metre_a_second() {
     let material = Material { viscosity: 60.0, ..tissue(12e3) };
     let radius = 2e-3;
     let ends = [DVec3::new(0.0, -0.02, 0.012), DVec3::new(0.0, 0.03, 0.012)];
-    for (schedule, speed) in [(Schedule::FAST, 0.5), (Schedule::FAST, 0.1), (Schedule::PAPER, 0.5)] {
+    for (schedule, speed) in [(SolverSettings::FAST, 0.5), (SolverSettings::FAST, 0.1), (SolverSettings::PAPER, 0.5)] {
         let bar = collider(Shape::Capsule { ends, radius }, 1.5e-3, 0.3);
         let model = scene(&mesh, material, nodes(&mesh, |p| p.z == 0.0), vec![], vec![bar], DVec3::ZERO);
         let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, schedule, FRAME, 1).unwrap());
@@ -161,7 +161,7 @@ fn nothing_is_passed_through_at_half_a_metre_a_second() {
         }
         let off =
             state.positions(&model, 0).iter().zip(&mesh.vertices).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-        assert!(off < 1e-3 || schedule == Schedule::PAPER, "{schedule:?}: still {off} m off");
+        assert!(off < 1e-3 || schedule == SolverSettings::PAPER, "{schedule:?}: still {off} m off");
     }
 }
 
@@ -171,7 +171,7 @@ fn a_capsule_pressed_into_pinned_tissue_is_held_back() {
     let mesh = block([12, 8, 4], 2e-3);
     let material = Material { viscosity: 60.0, ..tissue(12e3) };
     let ends = [DVec3::new(0.008, 0.008, 0.0), DVec3::new(0.016, 0.008, 0.0)];
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let tool = collider(Shape::Capsule { ends, radius: 2.5e-3 }, 1.5e-3, 0.6);
         let pinned = nodes(&mesh, |p| p.z < 3e-3);
         let model = scene(&mesh, material, pinned, vec![], vec![tool], GRAVITY);
@@ -209,7 +209,8 @@ fn contact_holds_at_any_stiffness() {
             .unwrap();
         builder.collider(collider(Shape::Sphere { centre: DVec3::ZERO, radius: 4e-3 }, 1.5e-3, 0.6)).unwrap();
         let model = builder.build().unwrap();
-        let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
+        let (mut state, mut stepper) =
+            (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
         let height = |frame: usize| 0.0115 + 1.2e-3 * (frame as f64 * 0.7).cos() - 1.0e-3;
         let (mut iterations, mut fallbacks, mut fastest) = (0, 0, 0.0f64);
         for frame in 0..180 {
@@ -253,7 +254,7 @@ fn contact_repeats_to_the_bit() {
         let rotation = DQuat::from_rotation_x(0.05 * (0.1 * f).sin());
         Pose { rotation, translation: DVec3::new(4e-4 * f - 0.005, 0.0, 7e-3 + 2e-3 * (0.2 * f).cos()) }
     };
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut hashes = Vec::new();
         for (threads, pause) in [(1, 0), (2, 0), (3, 0), (1, 37)] {
             let (mut state, mut stepper) =

@@ -8,8 +8,8 @@ use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper, SupportField,
-    SupportPlane, ToolMotion,
+    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
+    SupportField, SupportPlane, ToolMotion,
 };
 
 const FRAMES: usize = 600;
@@ -56,7 +56,7 @@ fn start(model: &Model, held: &[u32]) -> State {
     state
 }
 
-fn same_bits(schedule: Schedule, name: &str) -> u64 {
+fn same_bits(schedule: SolverSettings, name: &str) -> u64 {
     let (model, held) = scene();
     let whole = |threads: usize| {
         let mut state = start(&model, &held);
@@ -85,12 +85,12 @@ fn same_bits(schedule: Schedule, name: &str) -> u64 {
 
 #[test]
 fn six_hundred_frames_of_sweeps_have_the_same_bits() {
-    for (name, schedule) in [("paper", Schedule::PAPER), ("adaptive sweeps", common::adaptive())] {
+    for (name, schedule) in [("paper", SolverSettings::PAPER), ("adaptive sweeps", common::adaptive())] {
         println!("{name}: {:#018x}", same_bits(schedule, name));
     }
 }
 
 #[test]
 fn six_hundred_frames_of_the_fast_schedule_have_the_same_bits() {
-    println!("fast: {:#018x}", same_bits(Schedule::FAST, "fast"));
+    println!("fast: {:#018x}", same_bits(SolverSettings::FAST, "fast"));
 }

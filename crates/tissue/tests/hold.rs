@@ -8,7 +8,9 @@ use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
-use trocar_tissue::{Compliance, Divergence, Event, Grasp, Material, Model, Schedule, State, Stepper, ToolMotion};
+use trocar_tissue::{
+    Compliance, Divergence, Event, Grasp, Material, Model, SolverSettings, State, Stepper, ToolMotion,
+};
 
 fn at(translation: DVec3) -> Pose {
     Pose { translation, ..Pose::IDENTITY }
@@ -42,7 +44,7 @@ fn the_grasp_slips_at_twice_mu_times_the_jaw_force() {
     let model = model(&mesh, viscous(12e3), vec![], GRAVITY);
     let held = nodes(&mesh, |p| p.x < 7e-3);
     // The paper's ten sweeps do not carry a weight: they are no judge of friction.
-    for schedule in [Schedule::FAST] {
+    for schedule in [SolverSettings::FAST] {
         for share in [0.96, 1.04] {
             let compliance = jaws(share * weight(&model) / (2.0 * 0.6));
             let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, schedule, FRAME, 1).unwrap());
@@ -78,7 +80,7 @@ fn what_hangs_on_a_tool_without_motion_stays() {
     let mesh = strip();
     let model = model(&mesh, viscous(12e3), vec![], GRAVITY);
     let held = nodes(&mesh, |p| p.x < 7e-3);
-    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
+    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(jaws(1.0)));
     for _ in 0..60 {
         stepper.step(&model, &mut state, &[]);
@@ -100,7 +102,7 @@ fn the_tool_feels_the_weight() {
     let held = nodes(&mesh, |p| p.x < 7e-3);
     for rigid in [false, true] {
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         let grasp = Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY);
         state.grasps.push(if rigid { grasp } else { grasp.compliant(jaws(1.0)) });
         for _ in 0..240 {
@@ -124,7 +126,7 @@ fn a_tear_is_told_once() {
     let model = model(&mesh, viscous(12e3), nodes(&mesh, |p| p.x > 23e-3), GRAVITY);
     let held = nodes(&mesh, |p| p.x < 5e-3);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     let compliance = Compliance { tear_force: 0.3, ..jaws(10.0) };
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(compliance));
     let mut torn = Vec::new();
@@ -149,7 +151,7 @@ fn what_is_held_does_not_drift() {
         let model = model(&mesh, viscous(young_modulus), nodes(&mesh, |p| p.x > 23e-3), GRAVITY);
         let held = nodes(&mesh, |p| p.x < 5e-3);
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(jaws(0.2)));
         let place = |f: i32| at(DVec3::Z * 8e-3 * (f64::from(f) / 60.0).min(1.0));
         for frame in 0..180 {
@@ -171,7 +173,7 @@ fn nodes_are_free_again_after_every_grasp() {
     let mesh = strip();
     let model = model(&mesh, viscous(12e3), nodes(&mesh, |p| p.x > 23e-3), DVec3::ZERO);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     for cycle in 0..200 {
         let first = f64::from(cycle % 8) * 2e-3;
         let held = nodes(&mesh, |p| p.x >= first && p.x < first + 5e-3);
@@ -206,14 +208,14 @@ fn holding_repeats_to_the_bit() {
     let mut hashes = Vec::new();
     for pause in [None, None, Some(40)] {
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(jaws(0.02)));
         for frame in 0..80 {
             if pause == Some(frame) {
                 let saved = state.clone();
                 stepper.step(&model, &mut state, &[]);
                 state = saved;
-                stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+                stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
             }
             stepper.step(&model, &mut state, &[ToolMotion { from: place(frame), to: place(frame + 1) }]);
         }

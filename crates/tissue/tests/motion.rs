@@ -5,7 +5,8 @@ mod common;
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Descent, Material, ModelBuilder, Schedule, Start, State, Stepper, SupportPlane,
+    BodyDescription, ConstitutiveModel, Descent, Material, ModelBuilder, SolverSettings, Start, State, Stepper,
+    SupportPlane,
 };
 
 /// SPEC T2: free fall matches g t^2/2 and g t to four digits, with damping, in all materials; the paper's schedule follows
@@ -16,7 +17,7 @@ fn free_fall() {
     for constitutive in ConstitutiveModel::ALL {
         let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
         let model = model(&mesh, material, vec![], GRAVITY);
-        for (schedule, h) in [(Schedule::default(), 0.0), (Schedule::PAPER, FRAME / 8.0)] {
+        for (schedule, h) in [(SolverSettings::default(), 0.0), (SolverSettings::PAPER, FRAME / 8.0)] {
             let mut state = State::new(&model);
             let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
             for _ in 0..60 {
@@ -42,7 +43,7 @@ fn a_column_sags_under_its_weight() {
     let material = Material { poisson_ratio: 0.0, viscosity: 4.0, ..tissue(12e3) };
     let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 0).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 0).unwrap();
     let mut report = Default::default();
     for _ in 0..180 {
         report = stepper.step(&model, &mut state, &[]);
@@ -78,7 +79,7 @@ fn dashpots_do_not_brake_rotation() {
                 .sum()
         };
         let before = momentum(&state);
-        let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 1).unwrap();
         for _ in 0..30 {
             stepper.step(&model, &mut state, &[]);
         }
@@ -108,7 +109,7 @@ fn the_plane_supports_and_holds() {
     let mut state = State::new(&model);
     // Ten sweeps do not carry the friction of the foot through the block, which then slides several times too far; the law itself is
     // tested with enough of them.
-    let schedule = Schedule::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive });
+    let schedule = SolverSettings::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive });
     let mut stepper = Stepper::new(&model, schedule, FRAME, 0).unwrap();
     let all: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
     let mut report = Default::default();

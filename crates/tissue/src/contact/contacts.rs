@@ -168,7 +168,7 @@ impl Contacts {
         mut found: impl FnMut(Source, f32, Vec3A, Vec3A, Vec3A, f32),
     ) {
         for (s, support) in self.supports.iter().enumerate() {
-            let (height, gradient) = support.touch(x);
+            let (height, gradient) = support.contact(x);
             if height <= self.reach {
                 let steepness = gradient.length();
                 let (normal, height) = (gradient / steepness, height / steepness);

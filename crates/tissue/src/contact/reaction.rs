@@ -1,7 +1,7 @@
 //! What nodes that a tool carries rigidly pull at it with.
 
 use super::force::ToolForce;
-use crate::builder::shape_gradients;
+use crate::assembly::shape_gradients;
 use crate::integrator::Frame;
 use crate::state::BodyState;
 use crate::{Body, Grasp, Hyperelastic};

@@ -106,7 +106,7 @@ impl Cut {
 /// A grasp goes with the nodes it holds: one that holds nodes of several pieces becomes a grasp for each, one behind the other, jaw and tear force shared by the number of nodes.
 /// Of a held node's copies those stay held that share an element with a held node off the cut; if there are none, those of a piece that has any; and if there are none at all, every copy.
 ///
-/// A cut that meets nothing opens no face and leaves model and state as they were. The model and the state of before stay good: [`crate::Stepper::follow`] goes over to either. On one
+/// A cut that meets nothing opens no face and leaves model and state as they were. The model and the state of before stay good: [`crate::Stepper::set_model`] goes over to either. On one
 /// thread of a Zen 5 core that others used at the same time, a tube of 7,752 elements is severed in 15 ms, and the fast schedule goes over in 23 ms (layout, ordering and factor of both pieces),
 /// which are two frames of 60 Hz together; 3,958 elements take 8 and 14 ms, 31,498 take 53 and 179 ms. Sweeps go over at once. (`cargo bench -p trocar-tissue --bench cutting`)
 ///

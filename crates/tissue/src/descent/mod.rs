@@ -13,7 +13,7 @@ pub(crate) mod sweep;
 use crate::contact::{Contacts, Pairs};
 use crate::descent::sweep::{Substep, is_squeezed};
 use crate::integrator::{Frame, Solver, Worker};
-use crate::schedule::{Descent, Start};
+use crate::settings::{Descent, Start};
 use crate::state::BodyState;
 use crate::{Body, Isa, StepReport};
 use glam::Vec3A;

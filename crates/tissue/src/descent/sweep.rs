@@ -252,7 +252,7 @@ mod tests {
                 sum += 0.5 * 0.5 * f64::from(edge.damping) / (h * before) * change * change;
             }
             for support in &body.supports {
-                let height = support.touch(x[i] + body.origin).height.min(0.0);
+                let height = support.contact(x[i] + body.origin).height.min(0.0);
                 sum += 0.5 * f64::from(vertex.contact_stiffness) * height * height;
             }
         }

@@ -3,9 +3,7 @@
 use super::dissection::{Graph, dissect};
 use super::tiles::Tiles;
 use crate::Body;
-use crate::builder::shape_gradients;
-use crate::oracle::element::{blocks, tangent};
-use crate::stiffness::Stiffness;
+use crate::assembly::{Stiffness, blocks, shape_gradients, tangent};
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;
 use faer::linalg::triangular_inverse::invert_lower_triangular;

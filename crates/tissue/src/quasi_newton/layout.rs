@@ -1,7 +1,7 @@
 //! A body laid out for the quasi-Newton solver: free nodes in the order of elimination, elements sixteen at a time.
 
 use crate::Body;
-use crate::builder::shape_gradients;
+use crate::assembly::shape_gradients;
 use crate::lanes::{LANES, Row};
 use glam::DVec3;
 

@@ -12,7 +12,7 @@ use crate::contact::Contacts;
 use crate::descent::DescentIntegrator;
 use crate::integrator::Frame;
 use crate::lanes::{Row, dot_rows};
-use crate::schedule::{Descent, QuasiNewton, Start};
+use crate::settings::{Descent, QuasiNewton, Start};
 use crate::state::BodyState;
 use crate::{Body, Isa};
 use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x4};

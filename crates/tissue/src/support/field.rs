@@ -3,7 +3,7 @@
 //! The surface is a biquadratic B-spline over a square grid: its normal is continuous, so that a node that slides over it meets no edges, and it lies nowhere above its
 //! coefficients, so that it can be kept under every node of a body by lowering them.
 
-use super::Touch;
+use super::SupportContact;
 use crate::{Error, Result};
 use glam::{DMat3, DVec3};
 use trocar_geometry::TetMesh;
@@ -146,7 +146,7 @@ impl SupportField {
     /// Lowers the coefficients around each node that lies below the surface by as much. What is lowered for one node lowers the surface for the others.
     fn lower(&mut self, mesh: &TetMesh) {
         for p in &mesh.vertices {
-            let depth = -self.touch(*p).height;
+            let depth = -self.contact(*p).height;
             if depth > 0.0 {
                 let [u, v, _] = self.place(*p);
                 let ([column, _], [row, _]) = (self.knot(u, 0), self.knot(v, 1));
@@ -169,7 +169,7 @@ impl SupportField {
         [middle - 1.0, place - middle]
     }
 
-    pub(super) fn touch(&self, p: DVec3) -> Touch {
+    pub(super) fn contact(&self, p: DVec3) -> SupportContact {
         let [u, v, w] = self.place(p);
         let ([column, s], [row, t]) = (self.knot(u, 0), self.knot(v, 1));
         let (across, down) = (weights(s), weights(t));
@@ -188,7 +188,7 @@ impl SupportField {
         let (one, two) = (1.0 / self.cell, 1.0 / (self.cell * self.cell));
         let outer = |p: DVec3, q: DVec3| DMat3::from_cols(p * q.x, p * q.y, p * q.z);
         let curvature = outer(a, a) * sums[2][0] + outer(b, b) * sums[0][2] + (outer(a, b) + outer(b, a)) * sums[1][1];
-        Touch {
+        SupportContact {
             height: w - sums[0][0],
             gradient: up - one * (sums[1][0] * a + sums[0][1] * b),
             curvature: curvature * -two,
@@ -238,11 +238,11 @@ mod tests {
             let [a, b, up] = field.axes;
             let p =
                 field.origin + 2e-3 * (13.0 * at(0.617) - 1.0) * a + 2e-3 * (12.0 * at(0.137) - 1.0) * b + 1e-4 * up;
-            let touch = field.touch(p);
+            let touch = field.contact(p);
             steepest = steepest.max((touch.gradient - up).length());
             let d = 1e-7;
             for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
-                let (more, less) = (field.touch(p + d * axis), field.touch(p - d * axis));
+                let (more, less) = (field.contact(p + d * axis), field.contact(p - d * axis));
                 let slope = (more.height - less.height) / (2.0 * d);
                 assert!((slope - touch.gradient.dot(axis)).abs() < 1e-4, "{k}: {slope}, {}", touch.gradient);
                 let bend = (more.gradient - less.gradient) / (2.0 * d);

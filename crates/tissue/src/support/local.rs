@@ -50,10 +50,10 @@ impl LocalSupport {
 
     /// Height of a point above the support [m], and its gradient.
     #[inline]
-    pub fn touch(&self, x: Vec3A) -> (f32, Vec3A) {
+    pub fn contact(&self, x: Vec3A) -> (f32, Vec3A) {
         match self {
             Self::Plane(plane) => ((x - plane.point).dot(plane.normal), plane.normal),
-            Self::Field(field) => field.touch(x),
+            Self::Field(field) => field.contact(x),
         }
     }
 }
@@ -82,7 +82,7 @@ impl LocalField {
     }
 
     #[inline]
-    fn touch(&self, x: Vec3A) -> (f32, Vec3A) {
+    fn contact(&self, x: Vec3A) -> (f32, Vec3A) {
         let off = x - self.origin;
         let [a, b, up] = self.axes;
         let (column, across, slope_across) = knot(off.dot(a), self.last[0]);
@@ -143,8 +143,8 @@ mod tests {
         for k in 0..500 {
             let at = |f: f64| (f64::from(k) * f).fract();
             let x = 0.02 * DVec3::new(at(0.617), at(0.137), at(0.711)) - DVec3::splat(5e-3);
-            let exact = field.touch(x);
-            let (height, gradient) = local.touch((x - body.origin).as_vec3a());
+            let exact = field.contact(x);
+            let (height, gradient) = local.contact((x - body.origin).as_vec3a());
             highest = highest.max((exact.gradient - DVec3::Z).length());
             assert!((f64::from(height) - exact.height).abs() < 1e-8, "{x}: {height} m, {} m", exact.height);
             assert!((gradient.as_dvec3() - exact.gradient).length() < 1e-4, "{x}");

@@ -3,7 +3,9 @@
 
 use glam::DVec3;
 use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
-use trocar_tissue::{BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, Schedule, Start};
+use trocar_tissue::{
+    BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, SolverSettings, Start,
+};
 
 pub const FRAME: f64 = 1.0 / 60.0;
 pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
@@ -22,7 +24,7 @@ pub fn tissue(young_modulus: f64) -> Material {
 /// A schedule to be judged.
 pub struct Judged {
     pub name: &'static str,
-    pub schedule: Schedule,
+    pub schedule: SolverSettings,
     /// Whether it minimises: held to the laws that the minimum keeps. Sweeps that stop early are not at the minimum.
     pub converges: bool,
 }
@@ -30,21 +32,21 @@ pub struct Judged {
 /// Every schedule that solvers are judged by.
 pub fn schedules() -> Vec<Judged> {
     vec![
-        Judged { name: "paper", schedule: Schedule::PAPER, converges: false },
+        Judged { name: "paper", schedule: SolverSettings::PAPER, converges: false },
         Judged { name: "adaptive sweeps", schedule: adaptive(), converges: false },
-        Judged { name: "fast", schedule: Schedule::FAST, converges: true },
+        Judged { name: "fast", schedule: SolverSettings::FAST, converges: true },
         Judged { name: "many sweeps", schedule: many_sweeps(), converges: true },
     ]
 }
 
 /// The paper's sweeps from an adaptive start.
-pub fn adaptive() -> Schedule {
-    Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
+pub fn adaptive() -> SolverSettings {
+    SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
 }
 
 /// So many sweeps that little is left to minimise on a small mesh.
-pub fn many_sweeps() -> Schedule {
-    Schedule::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive })
+pub fn many_sweeps() -> SolverSettings {
+    SolverSettings::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive })
 }
 
 /// A number in 0..1 for each counter, the same on every machine.
