@@ -2,6 +2,11 @@
 
 from collections.abc import Sequence
 from os import PathLike
+<<<<<<< HEAD
+=======
+from pathlib import Path
+from typing import Sequence
+>>>>>>> main
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +18,9 @@ Arrays = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]
 
 def scenes() -> list[str]:
     """Names of the built-in scenes."""
+
+def phantoms_folder() -> Path:
+    """The folder of made phantoms: `$TROCAR_PHANTOMS`, or `trocar/phantoms` in the user's cache."""
 
 def policies() -> list[str]:
     """Names of the built-in controllers."""

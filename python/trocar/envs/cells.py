@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import copy
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import gymnasium as gym
 import numpy as np
 
 from .._native import Cells as NativeCells
-from .._native import State
+from .._native import State, phantoms_folder
 from .._native import cameras as scene_cameras
 from .options import Options, checked_int, checked_size, kinds_of
 
@@ -26,13 +24,6 @@ MAX_CELLS, MAX_THREADS = 4096, 1024
 RECORDING_CAMERA = "recording"
 #: Columns of `Cells.figures`.
 REWARD, SCORE, STAGE, END, TIME = range(5)
-
-
-def phantoms_folder() -> Path:
-    """The folder of phantoms: `$TROCAR_PHANTOMS`, or `trocar/phantoms` in the user's cache."""
-    if given := os.environ.get("TROCAR_PHANTOMS"):
-        return Path(given)
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "trocar" / "phantoms"
 
 
 @dataclass(frozen=True)
