@@ -2,11 +2,7 @@
 
 from collections.abc import Sequence
 from os import PathLike
-<<<<<<< HEAD
-=======
 from pathlib import Path
-from typing import Sequence
->>>>>>> main
 
 import numpy as np
 from numpy.typing import NDArray
