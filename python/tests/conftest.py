@@ -45,12 +45,15 @@ def program():
 
 
 def changed_scene(folder, task, seconds):
-    """The built-in scene as a file, with another task and another maximum duration (s)."""
+    """The built-in scene as a file, with another task, another duration (s) and small pictures."""
     text = (Path(__file__).parents[2] / "crates/scene/scenes/cell-a.toml").read_text()
-    text = text.replace('name = "appendix-resection"', f'name = "{task}"').replace(
-        "episode_s = 40.0", f"episode_s = {seconds}"
-    )
-    assert task in text and f"episode_s = {seconds}" in text
+    for old, new in [
+        ('name = "appendix-resection"', f'name = "{task}"'),
+        ("episode_s = 40.0", f"episode_s = {seconds}"),
+        ("policy_size_px = [224, 224]", "policy_size_px = [48, 48]"),
+    ]:
+        assert old in text
+        text = text.replace(old, new)
     path = folder / f"{task}.toml"
     path.write_text(text)
     return path
