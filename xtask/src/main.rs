@@ -17,11 +17,18 @@ const TEST: &[Check] = &[
     ("formatting", &["fmt", "--all", "--check"], &[]),
     ("lints", &["clippy", "--workspace", "--all-targets", "--release", "--locked", "--", "-D", "warnings"], &[]),
     ("tests", &["test", "--workspace", "--release", "--locked"], &[]),
-    ("docs", &["doc", "--workspace", "--no-deps", "--release", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")]),
 ];
 
-const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests and docs, warnings as errors; then xtask python
+/// The programs in `examples/rust`, which are built with the tests and run after them.
+const EXAMPLES: [&str; 5] = ["gravity", "grasp_lift", "two_arms", "reconstruct", "score_policy"];
+
+/// The API documentation; warnings are errors.
+const API_DOCS: Check =
+    ("docs", &["doc", "--workspace", "--no-deps", "--release", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")]);
+
+const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, examples and docs, warnings as errors; then xtask python
        cargo xtask python        ruff, mypy and the tests of the Python package (skipped without Python or network)
+       cargo xtask docs          the API documentation, and the book in target/book where mdbook is installed
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
@@ -35,6 +42,13 @@ fn main() -> ExitCode {
             test()
         }
         ["python"] => check_python(python::Build::Module),
+        ["docs"] => {
+            if docs() {
+                ExitCode::SUCCESS
+            } else {
+                ExitCode::FAILURE
+            }
+        }
         ["tools"] => {
             tools::fetch();
             ExitCode::SUCCESS
@@ -61,15 +75,47 @@ fn usage() -> ExitCode {
 }
 
 fn test() -> ExitCode {
-    for (name, arguments, variables) in TEST {
-        eprintln!("\n== {name}: cargo {}", arguments.join(" "));
-        if !cargo(arguments, variables) {
-            eprintln!("\n{name} failed");
-            return ExitCode::FAILURE;
+    if TEST.iter().all(check) && EXAMPLES.iter().all(|name| example(name)) && docs() {
+        eprintln!("\nformatting, lints, tests, examples and docs are in order");
+        return check_python(python::Build::Workspace);
+    }
+    ExitCode::FAILURE
+}
+
+fn check((name, arguments, variables): &Check) -> bool {
+    eprintln!("\n== {name}: cargo {}", arguments.join(" "));
+    let passed = cargo(arguments, variables);
+    if !passed {
+        eprintln!("\n{name} failed");
+    }
+    passed
+}
+
+/// Runs one example as it was built with the tests: as part of the workspace, so that nothing is
+/// compiled a second time with other features.
+fn example(name: &&str) -> bool {
+    let program = std::path::Path::new("target/release/examples").join(name);
+    eprintln!("\n== example: {}", program.display());
+    let passed = Command::new(&program).status().is_ok_and(|status| status.success());
+    if !passed {
+        eprintln!("\nexample {name} failed");
+    }
+    passed
+}
+
+/// The API documentation, and the book where mdbook is installed.
+fn docs() -> bool {
+    if !check(&API_DOCS) {
+        return false;
+    }
+    eprintln!("\n== book: mdbook build");
+    match Command::new("mdbook").arg("build").status() {
+        Ok(status) => status.success(),
+        Err(_) => {
+            eprintln!("   skipped: mdbook is not installed (cargo install mdbook)");
+            true
         }
     }
-    eprintln!("\nformatting, lints, tests and docs are in order");
-    check_python(python::Build::Workspace)
 }
 
 fn check_python(build: python::Build) -> ExitCode {
