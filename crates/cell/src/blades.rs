@@ -1,8 +1,9 @@
 //! The gripper as tissue feels it: colliders of its blades and shaft.
 //!
-//! Three tools stand for one gripper: its own frame, which carries the shaft and whatever is held, and a frame for each blade ([`Gripper::blade`]).
-//! A blade is three thin capsules along it. With their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5 mm wide, 3.2 mm thick, and an
-//! inner face that is flat to 0.07 mm. A cutter's blade is a single capsule.
+//! Three tools stand for one gripper: its own frame, which carries the shaft and whatever is held,
+//! and a frame for each blade ([`Gripper::blade`]). A blade is three thin capsules along it. With
+//! their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5 mm wide, 3.2 mm
+//! thick, and an inner face that is flat to 0.07 mm. A cutter's blade is a single capsule.
 
 use crate::Gripper;
 use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MAX_ANGLE, MOUTH_BEGIN, SHAFT_LENGTH, SHAFT_RADIUS};
@@ -114,8 +115,9 @@ impl Blades {
     }
 }
 
-/// How hard tissue pushes the blades of `gripper` apart [N]: the mean over the two of the force outwards across the blade, which is what one rod that drives both feels of
-/// either. `forces` are those of the step's tools, of which `tools` are the gripper's; 0 where there are none.
+/// How hard tissue pushes the blades of `gripper` apart [N]: the mean over the two of the force
+/// outwards across the blade, which is what one rod that drives both feels of either. `forces` are
+/// those of the step's tools, of which `tools` are the gripper's; 0 where there are none.
 pub fn opening_force(gripper: &Gripper, tools: Tools, forces: &[ToolForce]) -> f64 {
     let of = |(tool, side): (usize, f64)| {
         let outwards = gripper.blade(side).rotation * (side * DVec3::Y);

@@ -1,11 +1,14 @@
-//! Takes the swing out of organs that still move when the settling phase is over: a large soft organ swings for many seconds.
+//! Takes the swing out of organs that still move when the settling phase is over: a large soft
+//! organ swings for many seconds.
 //!
-//! Kinetic damping (Cundall 1976): everything is stopped whenever the kinetic energy has passed a peak, until nothing moves fast for a while by itself.
+//! Kinetic damping (Cundall 1976): everything is stopped whenever the kinetic energy has passed a
+//! peak, until nothing moves fast for a while by itself.
 
 use crate::World;
 use crate::measure::SETTLED_SPEED;
 
-/// Organs that have not come to rest after the settling phase are calmed for at most this many frames ...
+/// Organs that have not come to rest after the settling phase are calmed for at most this many
+/// frames ...
 const CALM_FRAMES: usize = 300;
 /// ... until they have been slow, undisturbed, for this many.
 const CALM_FOR: usize = 12;

@@ -14,8 +14,9 @@ pub(crate) struct Clasp {
 }
 
 impl Clasp {
-    /// What is held of the `tissue` of organ `organ` in the `mouth`: the attached cluster (SPEC C3), or for friction the tissue between the blades. None where no cluster is near.
-    /// `reach` is how far jaws hold from the middle of what they pinch [m].
+    /// What is held of the `tissue` of organ `organ` in the `mouth`: the attached cluster (SPEC
+    /// C3), or for friction the tissue between the blades. None where no cluster is near. `reach`
+    /// is how far jaws hold from the middle of what they pinch [m].
     pub fn on(
         world: &World,
         organ: usize,

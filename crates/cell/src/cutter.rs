@@ -1,7 +1,8 @@
 //! Scissors: what blades that close through tissue part.
 //!
-//! A cutter has the gripper's blades. Its cut is in the plane in which they swing, over their length and as wide as they were open. A tube across the blades is cut through where the mouth holds all of
-//! it, and in part otherwise. Its edges have no width: they push no tissue.
+//! A cutter has the gripper's blades. Its cut is in the plane in which they swing, over their
+//! length and as wide as they were open. A tube across the blades is cut through where the mouth
+//! holds all of it, and in part otherwise. Its edges have no width: they push no tissue.
 
 use crate::gripper::{BLADE_TIP, MOUTH_BEGIN};
 use crate::{Gripper, Result, World};
@@ -17,7 +18,8 @@ pub const CUT_CLOSED: f64 = 0.15;
 /// Watches the blades of a cutter: a cut is made by blades that were open and close.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scissors {
-    /// Blades wider than the first angle are ready to cut, and do when they close to less than the second [rad].
+    /// Blades wider than the first angle are ready to cut, and do when they close to less than the
+    /// second [rad].
     angles: [f64; 2],
     /// Widest angle [rad] since the last cut, if that is wide enough for the next.
     opened: Option<f64>,
@@ -30,7 +32,8 @@ impl Default for Scissors {
 }
 
 impl Scissors {
-    /// Scissors that cut once they have been open wider than `opened` [rad] and close to less than `closed` [rad].
+    /// Scissors that cut once they have been open wider than `opened` [rad] and close to less than
+    /// `closed` [rad].
     pub fn new(opened: f64, closed: f64) -> Self {
         Self { angles: [opened, closed], opened: None }
     }
@@ -50,8 +53,10 @@ impl Scissors {
         self.opened = None;
     }
 
-    /// The cutter is at `gripper` now. When its blades have closed, after they were open, the gripper there with the blades as wide as they were: what lies between those is
-    /// cut ([`Gripper::cut`]). None otherwise; blades that close again without having opened cut nothing.
+    /// The cutter is at `gripper` now. When its blades have closed, after they were open, the
+    /// gripper there with the blades as wide as they were: what lies between those is cut
+    /// ([`Gripper::cut`]). None otherwise; blades that close again without having opened cut
+    /// nothing.
     pub fn follow(&mut self, gripper: &Gripper) -> Option<Gripper> {
         let angle = gripper.jaw_angle;
         if angle < self.angles[1] {
@@ -85,7 +90,8 @@ impl Gripper {
 }
 
 impl World {
-    /// Cuts a body; it keeps its index, and what it lost comes behind all others. The pieces, or none where nothing was cut. Nothing of it can be undone but by a clone of model and state.
+    /// Cuts a body; it keeps its index, and what it lost comes behind all others. The pieces, or
+    /// none where nothing was cut. Nothing of it can be undone but by a clone of model and state.
     ///
     /// # Errors
     /// A cut that cannot be, or pieces that cannot be stepped.

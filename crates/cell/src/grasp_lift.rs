@@ -1,7 +1,8 @@
 //! The grasp-lift task: settle, approach, close, lift 15 mm in 1 s, hold 1 s, lower, open.
 //!
-//! The gripper moves freely. Its blades and shaft touch the tissue; its jaws close with a force, and hold what is between them by one of the designs of
-//! [`GraspDesign`]. With a cut asked for, a second instrument parts the organ after the hold, and what came loose is lifted on.
+//! The gripper moves freely. Its blades and shaft touch the tissue; its jaws close with a force,
+//! and hold what is between them by one of the designs of [`GraspDesign`]. With a cut asked for, a
+//! second instrument parts the organ after the hold, and what came loose is lifted on.
 
 use crate::jaw::JAW_FORCE;
 use crate::{CutOrgan, Error, GraspDesign, Gripper, Phase, Result, Sample, Session, Summary};
@@ -34,13 +35,16 @@ pub struct GraspLift {
     pub jaw_force: f64,
     /// How far beside the tissue's middle the gripper comes [m], across the organ.
     pub approach_offset: f64,
-    /// The jaws first drag the tissue sideways by this much [m], by a live-pose grasp, let go of it there and close again.
+    /// The jaws first drag the tissue sideways by this much [m], by a live-pose grasp, let go of it
+    /// there and close again.
     pub regrasp: Option<f64>,
     /// After the hold, lower what was lifted and let go of it.
     pub lower: bool,
-    /// After the hold, cut the organ between the grasp and what holds it, and lift on instead of lowering.
+    /// After the hold, cut the organ between the grasp and what holds it, and lift on instead of
+    /// lowering.
     pub sever: Option<SeverAt>,
-    /// Blades and shaft touch the tissue, and organs each other. Without, jaws stop where they would touch it.
+    /// Blades and shaft touch the tissue, and organs each other. Without, jaws stop where they
+    /// would touch it.
     pub contact: bool,
     /// How a frame is stepped.
     pub schedule: Schedule,
@@ -86,7 +90,8 @@ pub struct Snapshot {
     pub time_s: f64,
     /// Phase of the task.
     pub phase: Phase,
-    /// Node positions of each organ [m]; those of an organ that has been cut are [`CutOrgan::parents`]' copies.
+    /// Node positions of each organ [m]; those of an organ that has been cut are
+    /// [`CutOrgan::parents`]' copies.
     pub nodes: Vec<Vec<DVec3>>,
     /// The gripper.
     pub gripper: Gripper,
@@ -113,7 +118,8 @@ impl GraspLift {
     /// Runs the task on `specimen`.
     ///
     /// # Errors
-    /// Names the organ that is not there, the option out of range, or the place where nothing can be grasped.
+    /// Names the organ that is not there, the option out of range, or the place where nothing can
+    /// be grasped.
     pub fn run(&self, specimen: &Specimen, progress: &dyn Progress) -> Result<GraspLiftRun> {
         let mut session = Session::new(self, specimen)?;
         progress.begin("simulate", session.frames() as u64);

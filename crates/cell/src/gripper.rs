@@ -1,8 +1,8 @@
 //! A free-moving two-jaw gripper.
 //!
-//! Frame: origin at the jaw pivot, x along the closed blades towards their tips, y across the closing plane (the blades
-//! open towards +y and -y), z completes. The mouth (SPEC C3) is a wedge 2 to 21 mm beyond the pivot, 5 mm wide along z, with
-//! half-gap r sin(theta/2).
+//! Frame: origin at the jaw pivot, x along the closed blades towards their tips, y across the
+//! closing plane (the blades open towards +y and -y), z completes. The mouth (SPEC C3) is a wedge 2
+//! to 21 mm beyond the pivot, 5 mm wide along z, with half-gap r sin(theta/2).
 
 use glam::{DMat3, DQuat, DVec3};
 use trocar_geometry::{Pose, TriMesh};
@@ -35,7 +35,8 @@ pub struct Gripper {
 }
 
 impl Gripper {
-    /// A gripper that comes from `up`, closes across `along` (the tube's direction) and holds `point` in mid-mouth.
+    /// A gripper that comes from `up`, closes across `along` (the tube's direction) and holds
+    /// `point` in mid-mouth.
     pub fn over(point: DVec3, up: DVec3, along: DVec3, jaw_angle: f64) -> Self {
         let x = -up;
         let z = (along - along.dot(up) * up).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
@@ -43,13 +44,15 @@ impl Gripper {
         Self { pose: Pose { rotation, translation: point + GRIP_DISTANCE * up }, jaw_angle }
     }
 
-    /// Frame of the blade that opens towards +y (`side` 1) or -y (`side` -1): at the pivot, x along the blade. Its inner face is the plane y = 0.
+    /// Frame of the blade that opens towards +y (`side` 1) or -y (`side` -1): at the pivot, x along
+    /// the blade. Its inner face is the plane y = 0.
     pub fn blade(&self, side: f64) -> Pose {
         let swing = DQuat::from_rotation_z(0.5 * side * self.jaw_angle);
         Pose { rotation: self.pose.rotation * swing, translation: self.pose.translation }
     }
 
-    /// How the gripper and its two blades move in a frame at whose end they are as in `next`: the motions of tools 0, 1 (the blade towards +y) and 2.
+    /// How the gripper and its two blades move in a frame at whose end they are as in `next`: the
+    /// motions of tools 0, 1 (the blade towards +y) and 2.
     pub fn motions_to(&self, next: &Self) -> [ToolMotion; 3] {
         let blade = |side| ToolMotion { from: self.blade(side), to: next.blade(side) };
         [ToolMotion { from: self.pose, to: next.pose }, blade(1.0), blade(-1.0)]
@@ -60,7 +63,8 @@ impl Gripper {
         r * (0.5 * self.jaw_angle).sin()
     }
 
-    /// The angle at which the blades touch tissue that reaches `half_width` [m] to either side in mid-mouth.
+    /// The angle at which the blades touch tissue that reaches `half_width` [m] to either side in
+    /// mid-mouth.
     pub fn angle_for(half_width: f64) -> f64 {
         (2.0 * (half_width / GRIP_DISTANCE).clamp(0.0, 1.0).asin()).min(MAX_ANGLE)
     }
@@ -80,7 +84,8 @@ impl Gripper {
         let mut mesh = TriMesh::default();
         for side in [1.0, -1.0] {
             let swing = DQuat::from_rotation_z(side * 0.5 * self.jaw_angle);
-            // The blade's inner face lies on the line from the pivot to the gap's edge; it narrows towards the tip.
+            // The blade's inner face lies on the line from the pivot to the gap's edge; it narrows
+            // towards the tip.
             let section = |x: f64, thickness: f64, width: f64| {
                 [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 1.0)]
                     .map(|(t, w)| swing * DVec3::new(x, side * t * thickness, 0.5 * w * width + side * aside))
@@ -109,7 +114,8 @@ impl Gripper {
     }
 }
 
-/// Adds the closed body spanned by rings of `N` points, given counter-clockwise seen from the last ring (`mirrored`: clockwise).
+/// Adds the closed body spanned by rings of `N` points, given counter-clockwise seen from the last
+/// ring (`mirrored`: clockwise).
 fn loft<const N: usize>(mesh: &mut TriMesh, rings: &[[DVec3; N]], mirrored: bool) {
     let start = mesh.vertices.len() as u32;
     let n = N as u32;

@@ -31,7 +31,8 @@ impl Hold {
         Self { organ, nodes, centroid, centroid_in_jaw, jaw: pose.translation }
     }
 
-    /// The organ has been cut into `pieces` of bodies in `world`: goes on with the piece that has the most of the nodes. `pose` is the gripper's now, `was` their centroid before the cut [m].
+    /// The organ has been cut into `pieces` of bodies in `world`: goes on with the piece that has
+    /// the most of the nodes. `pose` is the gripper's now, `was` their centroid before the cut [m].
     pub fn follow(&mut self, world: &World, pieces: &[Piece], pose: &Pose, was: DVec3) {
         let mut held = self.nodes.clone();
         held.sort_unstable();

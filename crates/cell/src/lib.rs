@@ -1,6 +1,8 @@
-//! Specimen and tools in one stepped world, the two-arm cell around it, and the scripted tasks in both.
+//! Specimen and tools in one stepped world, the two-arm cell around it, and the scripted tasks in
+//! both.
 //!
-//! A [`World`] is a specimen in its own recording frame, in which a [`Session`] moves a free gripper. A [`Cell`] is the whole of a scene file in the cell frame: it takes actions and reports
+//! A [`World`] is a specimen in its own recording frame, in which a [`Session`] moves a free
+//! gripper. A [`Cell`] is the whole of a scene file in the cell frame: it takes actions and reports
 //! observations, and tissue feels and loads two dynamic arms in their ports.
 
 pub mod blades;

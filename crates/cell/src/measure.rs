@@ -1,4 +1,5 @@
-//! What a grasp-lift is measured by. Words as in the specification: lift, follow ratio, slip, snap, held, settled.
+//! What a grasp-lift is measured by. Words as in the specification: lift, follow ratio, slip, snap,
+//! held, settled.
 
 use crate::blades::FRICTION;
 use crate::{GraspDesign, Severance};
@@ -9,7 +10,8 @@ use serde::Serialize;
 pub struct Sample {
     /// Time at the end of the frame [s].
     pub time_s: f64,
-    /// Phase: settle, approach, close, lift, hold, lower, open; with a cut reach, snip, carry, keep instead of the last two.
+    /// Phase: settle, approach, close, lift, hold, lower, open; with a cut reach, snip, carry, keep
+    /// instead of the last two.
     pub phase: &'static str,
     /// Rise of the jaw since activation [mm].
     pub jaw_lift_mm: f64,
@@ -62,7 +64,8 @@ pub struct Summary {
     pub follow_ratio: f64,
     /// Slip at the end of the hold [mm].
     pub slip_mm: f64,
-    /// Substeps in which held nodes could not follow the jaws without inverting or overstretching an element: the grasp yields.
+    /// Substeps in which held nodes could not follow the jaws without inverting or overstretching
+    /// an element: the grasp yields.
     pub yielded_substeps: usize,
     /// Largest distance between where the constraint first prescribes a node and where it was [mm].
     pub snap_mm: f64,
@@ -118,8 +121,9 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// For a grasp that pressed and yet did not hold: a sentence on the jaw force that would bear the organ's weight. None for one that held, and for designs that tie nodes, which
-    /// no force of the jaws makes hold.
+    /// For a grasp that pressed and yet did not hold: a sentence on the jaw force that would bear
+    /// the organ's weight. None for one that held, and for designs that tie nodes, which no force
+    /// of the jaws makes hold.
     pub fn force_advice(&self) -> Option<String> {
         let presses = [GraspDesign::Friction, GraspDesign::Compliant].iter().any(|d| d.name() == self.design);
         if self.held || self.diverged || !self.attached || self.torn || !presses || self.lift_mm <= 0.0 {

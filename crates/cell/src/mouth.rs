@@ -1,7 +1,8 @@
 //! What is between the blades (SPEC C3; paper section IV-C).
 //!
-//! The mouth is a wedge from 2 to 21 mm beyond the pivot, 5 mm wide, whose half-gap at distance r from the pivot is r sin(theta / 2). Tissue is grasped only if it lies in
-//! the wedge on both sides of the closing plane and the blades are farther apart than their contact skin.
+//! The mouth is a wedge from 2 to 21 mm beyond the pivot, 5 mm wide, whose half-gap at distance r
+//! from the pivot is r sin(theta / 2). Tissue is grasped only if it lies in the wedge on both sides
+//! of the closing plane and the blades are farther apart than their contact skin.
 
 use crate::clusters::FEWEST_HELD;
 use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MOUTH_BEGIN};
@@ -9,13 +10,16 @@ use crate::{Cluster, Gripper, World, clusters};
 use glam::DVec3;
 use trocar_geometry::Pose;
 
-/// Blades whose inner faces are no farther apart than this [m], where tissue is, hold nothing but each other's skin (the contact offset of SPEC C1).
+/// Blades whose inner faces are no farther apart than this [m], where tissue is, hold nothing but
+/// each other's skin (the contact offset of SPEC C1).
 pub const CONTACT_SKIN: f64 = 0.0015;
 
-/// A cluster farther than this [m] from the middle of the tissue between the blades is not what they hold.
+/// A cluster farther than this [m] from the middle of the tissue between the blades is not what
+/// they hold.
 const ATTACH_WITHIN: f64 = 0.012;
 
-/// Share of the way from an element's middle to its corners at which it is looked at, besides its middle.
+/// Share of the way from an element's middle to its corners at which it is looked at, besides its
+/// middle.
 const TOWARDS_CORNER: f64 = 0.5;
 
 /// The wedge between the blades at one instant.
@@ -61,10 +65,12 @@ impl Mouth {
         along && q.z.abs() <= 0.5 * BLADE_WIDTH && q.y.abs() <= self.gripper.half_gap(r) + beyond
     }
 
-    /// The part of a body of elements `tets` with nodes at `positions` [m, world] that is grasped when the jaws close on it now; `None` when that is none.
+    /// The part of a body of elements `tets` with nodes at `positions` [m, world] that is grasped
+    /// when the jaws close on it now; `None` when that is none.
     ///
-    /// Elements are looked at in five points, their middle and half way from there to each corner, each for a fifth of the volume: nodes alone are too far apart, and those
-    /// that touch a blade may lie on either side of its face.
+    /// Elements are looked at in five points, their middle and half way from there to each corner,
+    /// each for a fifth of the volume: nodes alone are too far apart, and those that touch a blade
+    /// may lie on either side of its face.
     pub fn tissue(&self, tets: &[[u32; 4]], positions: &[DVec3]) -> Option<Mouthful> {
         let (mut sides, mut sum, mut volume) = ([0.0; 2], DVec3::ZERO, 0.0);
         for tet in tets {
@@ -72,7 +78,8 @@ impl Mouth {
             let [a, b, c, d] = corners;
             let share = (b - a).cross(c - a).dot(d - a).abs() / 30.0;
             let middle = 0.25 * (a + b + c + d);
-            // Most elements are far away; no point that is looked at is farther from the middle than half of the way to a corner.
+            // Most elements are far away; no point that is looked at is farther from the middle
+            // than half of the way to a corner.
             let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
             if middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach {
                 continue;
@@ -128,8 +135,9 @@ impl Mouth {
     }
 }
 
-/// The cluster of organ `organ` that is attached when jaws close on tissue around `centroid` [m]: the nearest, within 12 mm. Of thick organs, clusters are what jaws can reach
-/// (`reach` [m], see [`Cluster::within_reach`]).
+/// The cluster of organ `organ` that is attached when jaws close on tissue around `centroid` [m]:
+/// the nearest, within 12 mm. Of thick organs, clusters are what jaws can reach (`reach` [m], see
+/// [`Cluster::within_reach`]).
 pub fn attached(world: &World, organ: usize, centroid: DVec3, reach: f64) -> Option<Cluster> {
     let mut all: Vec<Cluster> = clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
     if all.iter().any(|c| c.nodes.len() >= FEWEST_HELD) {
@@ -167,7 +175,8 @@ mod tests {
         let open = gripper(MAX_ANGLE);
         let mm = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 1e-3;
         assert!(grasped(&open, mm(11.5, 0.0, 0.0)));
-        // Before its beginning and beyond its end. The cube is 1 mm large to each side and is looked at to half way.
+        // Before its beginning and beyond its end. The cube is 1 mm large to each side and is
+        // looked at to half way.
         assert!(grasped(&open, mm(21.0, 0.0, 0.0)) && !grasped(&open, mm(22.05, 0.0, 0.0)));
         assert!(grasped(&open, mm(2.5, 0.0, 0.0)) && !grasped(&open, mm(0.9, 0.0, 0.0)));
         assert!(!grasped(&open, mm(-11.5, 0.0, 0.0)), "behind the pivot");

@@ -53,7 +53,8 @@ impl Phase {
         }
     }
 
-    /// The phases of a task that drags and grasps again or does not, and cuts what it lifted, lowers it, or ends with the hold.
+    /// The phases of a task that drags and grasps again or does not, and cuts what it lifted,
+    /// lowers it, or ends with the hold.
     pub(crate) fn sequence(regrasp: bool, lower: bool, sever: bool) -> Vec<Self> {
         let mut all = vec![Self::Settle, Self::Approach, Self::Close];
         if regrasp {

@@ -9,7 +9,9 @@ const DEEP: f64 = 0.09;
 /// An action is kept for up to so many periods.
 const LONGEST: f64 = 20.0;
 
-/// A policy that asks for anything an action may ask for: targets over all that the arms are let reach, or steps of the tip of any size, each kept for 1 to 20 periods. The same seed does the same.
+/// A policy that asks for anything an action may ask for: targets over all that the arms are let
+/// reach, or steps of the tip of any size, each kept for 1 to 20 periods. The same seed does the
+/// same.
 #[derive(Clone, Debug)]
 pub struct RandomActions {
     arms: Vec<String>,
@@ -22,7 +24,8 @@ pub struct RandomActions {
 }
 
 impl RandomActions {
-    /// Every fourth seed (3, 7, ...) moves the tips, the others ask for coordinates in the ports. `arms` are the names of the cell's arms, in their order.
+    /// Every fourth seed (3, 7, ...) moves the tips, the others ask for coordinates in the ports.
+    /// `arms` are the names of the cell's arms, in their order.
     pub fn new(seed: u64, arms: &[&str]) -> Self {
         let space = if seed % 4 == 3 { ActionSpace::Tip } else { ActionSpace::Pivots };
         Self { arms: arms.iter().map(|arm| (*arm).to_owned()).collect(), dice: seed, space, action: None, left: 0 }

@@ -1,4 +1,5 @@
-//! The second instrument of a grasp-lift: it comes to the lifted organ between the grasp and what holds the organ, and parts it there.
+//! The second instrument of a grasp-lift: it comes to the lifted organ between the grasp and what
+//! holds the organ, and parts it there.
 
 use crate::hold::Hold;
 use crate::jaw::Jaw;
@@ -17,13 +18,16 @@ pub(crate) const CARRY: f64 = 0.010;
 /// How far behind its place the cutter sets out, and where it withdraws to [m].
 const BACK: f64 = 0.060;
 
-/// Least room between the tissue in the jaws and the cut [m]: half of the grasper's blades stands out beside that tissue's middle, and a cutter's edge beside them.
+/// Least room between the tissue in the jaws and the cut [m]: half of the grasper's blades stands
+/// out beside that tissue's middle, and a cutter's edge beside them.
 const LEAST_ROOM: f64 = 0.003;
 
-/// With pins on both sides of the grasp there is no end to cut off; the cut is then this far from the grasp [m].
+/// With pins on both sides of the grasp there is no end to cut off; the cut is then this far from
+/// the grasp [m].
 const BESIDE: f64 = 0.008;
 
-/// The organ's middle and direction at the cut are those of its nodes this far to either side [m], or this many median edges.
+/// The organ's middle and direction at the cut are those of its nodes this far to either side [m],
+/// or this many median edges.
 const SECTION: f64 = 0.004;
 const SECTION_EDGES: f64 = 1.5;
 
@@ -36,7 +40,8 @@ pub(crate) struct Resection {
     jaw: Jaw,
     scissors: Scissors,
     cut: Option<CutOrgan>,
-    /// When the blades had closed: height of the jaws and of each piece's centroid along `up` [m], and where the held tissue was in the jaws.
+    /// When the blades had closed: height of the jaws and of each piece's centroid along `up` [m],
+    /// and where the held tissue was in the jaws.
     jaw_height: f64,
     heights: Vec<f64>,
     held_height: f64,
@@ -46,7 +51,8 @@ pub(crate) struct Resection {
 }
 
 impl Resection {
-    /// Decides where the organ whose tissue is in `hold` is cut, `reach` [m] being how far jaws from above reach into it.
+    /// Decides where the organ whose tissue is in `hold` is cut, `reach` [m] being how far jaws
+    /// from above reach into it.
     ///
     /// # Errors
     /// When there is no room between the tissue in the jaws and what holds the organ.
@@ -64,7 +70,8 @@ impl Resection {
             let nodes: Vec<u32> = (0..body.len() as u32).filter(near).collect();
             let mean = nodes.iter().map(|i| axis.s[*i as usize]).sum::<f64>() / nodes.len() as f64;
             let section = Cluster { s, nodes, clear: true };
-            // A coarse organ may have no node there; its axis has a point everywhere, though at rest.
+            // A coarse organ may have no node there; its axis has a point everywhere, though at
+            // rest.
             if section.nodes.is_empty() {
                 return (axis.point_at(s), s);
             }
@@ -132,7 +139,8 @@ impl Resection {
         Gripper { pose, jaw_angle: self.jaw.turn_to(self.gripper.jaw_angle, to) }
     }
 
-    /// Moves the cutter to where it is when `share` of the phase is over; its blades cut when they close. `hold` goes on with the piece it holds.
+    /// Moves the cutter to where it is when `share` of the phase is over; its blades cut when they
+    /// close. `hold` goes on with the piece it holds.
     ///
     /// # Errors
     /// Pieces that cannot be stepped.
@@ -277,7 +285,8 @@ impl Resection {
     }
 }
 
-/// The organ coordinate half way between the tissue `held` of organ `organ` and the part of it that is pinned.
+/// The organ coordinate half way between the tissue `held` of organ `organ` and the part of it that
+/// is pinned.
 fn between(world: &World, organ: usize, held: &[u32]) -> Result<f64> {
     let (body, axis) = (&world.model.bodies()[organ], &world.axes[organ]);
     let of = |i: usize| axis.s[i];
@@ -294,7 +303,8 @@ fn between(world: &World, organ: usize, held: &[u32]) -> Result<f64> {
     })
 }
 
-/// The same for organ coordinates of held and pinned nodes and the organ's length [m]; the room there is [m] where that is too little.
+/// The same for organ coordinates of held and pinned nodes and the organ's length [m]; the room
+/// there is [m] where that is too little.
 fn place(held: &[f64], pins: &[f64], length: f64) -> std::result::Result<f64, f64> {
     let middle = mean(held);
     let towards_base = pins.iter().filter(|s| **s < middle).count();

@@ -41,7 +41,8 @@ pub struct Moment {
     gripper: Gripper,
 }
 
-/// A [`GraspLift`] in progress: [`advance`](Self::advance) until it is over, then [`finish`](Self::finish).
+/// A [`GraspLift`] in progress: [`advance`](Self::advance) until it is over, then
+/// [`finish`](Self::finish).
 pub struct Session<'a> {
     task: &'a GraspLift,
     organ: usize,
@@ -166,8 +167,10 @@ impl<'a> Session<'a> {
         Moment { state: self.world.state.clone(), gripper: self.gripper }
     }
 
-    /// Does the frame that `other` has done from the moment `before`: from the same places and velocities, with the same gripper, under what contact did to nodes at its end. So a run without
-    /// contact moves, frame by frame, as one that has it. As [`advance`](Self::advance) else.
+    /// Does the frame that `other` has done from the moment `before`: from the same places and
+    /// velocities, with the same gripper, under what contact did to nodes at its end. So a run
+    /// without contact moves, frame by frame, as one that has it. As [`advance`](Self::advance)
+    /// else.
     ///
     /// # Errors
     /// As [`advance`](Self::advance).
@@ -269,7 +272,8 @@ impl<'a> Session<'a> {
         self.next_phase();
     }
 
-    /// One frame: move the gripper, step the world, measure. `share` of the phase is over at the frame's end.
+    /// One frame: move the gripper, step the world, measure. `share` of the phase is over at the
+    /// frame's end.
     fn step(&mut self, phase: Phase, share: f64) -> Result<()> {
         let given = self.given.take();
         let next = given.as_ref().map_or_else(|| self.gripper_at(phase, share), |(_, gripper)| *gripper);
@@ -466,7 +470,8 @@ impl<'a> Session<'a> {
     }
 }
 
-/// Where the nodes of organ `organ` of the specimen are now [m], those of a cut organ numbered through its pieces.
+/// Where the nodes of organ `organ` of the specimen are now [m], those of a cut organ numbered
+/// through its pieces.
 fn positions(world: &World, organ: usize, cut: Option<&CutOrgan>) -> Vec<DVec3> {
     match cut {
         Some(cut) if cut.organ == organ => cut.positions(world),

@@ -12,13 +12,15 @@ const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 /// A cut in figures.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Severance {
-    /// `severed`, `cut in part`, `no tissue`, or `not closed` where the run ended before the blades had.
+    /// `severed`, `cut in part`, `no tissue`, or `not closed` where the run ended before the blades
+    /// had.
     pub outcome: &'static str,
     /// The same in a sentence.
     pub said: String,
     /// Organ coordinate at which the cutter was put.
     pub aimed_at: f64,
-    /// Organ coordinate of the cut: the mean over the nodes that fell apart; 0 where nothing was cut.
+    /// Organ coordinate of the cut: the mean over the nodes that fell apart; 0 where nothing was
+    /// cut.
     pub at: f64,
     /// The least and greatest of these: elements' faces are no plane.
     pub at_least: f64,
@@ -38,7 +40,8 @@ pub struct Severance {
     pub area_mm2: f64,
     /// Nodes that came new, as copies of those on the cut.
     pub copies: usize,
-    /// The pieces: the one that stays the organ, then those that came loose. Empty where nothing was cut.
+    /// The pieces: the one that stays the organ, then those that came loose. Empty where nothing
+    /// was cut.
     pub pieces: Vec<SeveredPiece>,
     /// Volume of the organ just before the cut [mm3].
     pub volume_before_mm3: f64,
@@ -56,7 +59,8 @@ pub struct Severance {
     pub jaw_rise_mm: f64,
     /// Rise of the tissue in the jaws since then [mm].
     pub held_rise_mm: f64,
-    /// The jaws still hold it: it has followed at least 0.80 of their rise, and slipped less than 3 mm since. False where nothing was cut through.
+    /// The jaws still hold it: it has followed at least 0.80 of their rise, and slipped less than 3
+    /// mm since. False where nothing was cut through.
     pub held: bool,
     /// Wall time of the cut: faces, new model, solver prepared [ms].
     pub cut_ms: f64,
@@ -87,7 +91,8 @@ pub struct SeveredPiece {
     pub rise_mm: f64,
 }
 
-/// An organ that was cut, for those who draw it. Its nodes are numbered through its pieces, one after the other; its elements keep the specimen's order.
+/// An organ that was cut, for those who draw it. Its nodes are numbered through its pieces, one
+/// after the other; its elements keep the specimen's order.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CutOrgan {
     /// The organ's place in the specimen.
@@ -132,7 +137,8 @@ impl CutOrgan {
         self.bodies.iter().flat_map(|body| world.state.positions(&world.model, *body)).collect()
     }
 
-    /// Whether nodes `a` and `b` of the whole organ are in different pieces; false where they have copies in several.
+    /// Whether nodes `a` and `b` of the whole organ are in different pieces; false where they have
+    /// copies in several.
     pub(crate) fn parts(&self, a: u32, b: u32) -> bool {
         let pieces = |node: u32| -> Vec<u32> {
             let copies = (0..self.parents.len()).filter(|i| self.parents[*i] == node);

@@ -4,12 +4,14 @@ use crate::clusters::FEWEST_HELD;
 use crate::{Cluster, Error, Gripper, Result, World, clusters, gripper};
 use glam::DVec3;
 
-/// Jaws hold nodes within this distance of the middle of what they pinch [m] (half a cluster and the blades' reach) ...
+/// Jaws hold nodes within this distance of the middle of what they pinch [m] (half a cluster and
+/// the blades' reach) ...
 const REACH: f64 = 0.009;
 /// ... or within this many median edges on a coarse mesh.
 const REACH_EDGES: f64 = 1.5;
 
-/// A cluster clear of pins is preferred to one that is not, even if it is this much farther along the organ.
+/// A cluster clear of pins is preferred to one that is not, even if it is this much farther along
+/// the organ.
 const WORTH_GOING: f64 = 0.1;
 
 /// A cluster and the gripper over it, decided once the organs have settled.
@@ -30,7 +32,9 @@ pub(crate) fn reach_into(world: &World, organ: usize) -> f64 {
 }
 
 impl Target {
-    /// The gripper comes `offset` [m] beside it, towards its +y. Chooses the cluster of organ `organ` nearest to organ coordinate `at`, clear of pins if one is near, of which jaws from above reach enough nodes.
+    /// The gripper comes `offset` [m] beside it, towards its +y. Chooses the cluster of organ
+    /// `organ` nearest to organ coordinate `at`, clear of pins if one is near, of which jaws from
+    /// above reach enough nodes.
     ///
     /// # Errors
     /// When the organ has no free node.
@@ -40,7 +44,8 @@ impl Target {
         let mut within: Vec<Cluster> =
             clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
         let distance = |c: &Cluster| (c.s - at).abs();
-        // A stable sort: of equally near ones the first. One clear of pins is worth going a little farther for.
+        // A stable sort: of equally near ones the first. One clear of pins is worth going a little
+        // farther for.
         let rank = |c: &Cluster| distance(c) + if c.clear { 0.0 } else { WORTH_GOING };
         within.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
         let enough = within.iter().position(|c| c.nodes.len() >= FEWEST_HELD).unwrap_or(0);

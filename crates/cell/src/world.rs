@@ -18,8 +18,10 @@ pub(crate) const GRAVITY: f64 = 9.80665;
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
 
-/// Shear viscosity of tissue over its Young's modulus [s]. Sheared tissue creeps with three times as long a time constant, 18 ms. The paper damps its elements
-/// without saying how much; this lets the organs of all phantoms come to rest within a second and stays far below the second that a lift takes.
+/// Shear viscosity of tissue over its Young's modulus [s]. Sheared tissue creeps with three times
+/// as long a time constant, 18 ms. The paper damps its elements without saying how much; this lets
+/// the organs of all phantoms come to rest within a second and stays far below the second that a
+/// lift takes.
 pub const VISCOSITY_TIME: f64 = 0.006;
 
 /// Cell of the supports over the organ's median edge: as fine as the nodes that lie on it.
@@ -150,7 +152,8 @@ impl World {
         Ok(Self { model, state, axes, up, stepper, cuts: 0 })
     }
 
-    /// What tissue did to each tool in the last frame, in the order of the motions that were given; shorter where nothing is felt.
+    /// What tissue did to each tool in the last frame, in the order of the motions that were given;
+    /// shorter where nothing is felt.
     pub fn forces(&self) -> &[ToolForce] {
         self.stepper.forces()
     }
@@ -185,7 +188,8 @@ impl World {
         Ok(())
     }
 
-    /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and colliders.
+    /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and
+    /// colliders.
     pub fn step(&mut self, tools: &[ToolMotion]) -> trocar_tissue::StepReport {
         self.step_under(tools, &[])
     }

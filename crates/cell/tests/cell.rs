@@ -189,7 +189,8 @@ fn pressing_on_stiff_tissue_neither_swings_nor_drifts_and_the_shaft_comes_back()
 
 #[test]
 fn a_load_aside_leans_the_shaft_in_its_port() {
-    // A tube pinned at its lower half and as stiff as cartilage, pushed aside with the closed blades.
+    // A tube pinned at its lower half and as stiff as cartilage, pushed aside with the closed
+    // blades.
     let mut specimen = two_tubes(Pins::Band { share: 0.42 }, 3e-3);
     specimen.organs[0].material.young_modulus_pa = 1e6;
     let mut cell = cell(&specimen);

@@ -1,4 +1,5 @@
-//! What is taken to be in the mouth: the 15 placements of a synthetic tube (SPEC C3), and those where nothing is.
+//! What is taken to be in the mouth: the 15 placements of a synthetic tube (SPEC C3), and those
+//! where nothing is.
 
 mod common;
 
@@ -9,7 +10,8 @@ use trocar_tissue::Schedule;
 
 const REACH: f64 = 0.009;
 
-/// Jaws over the tube at `x` [m] along it, `aside` of its axis and `above` of where they hold it in mid-mouth.
+/// Jaws over the tube at `x` [m] along it, `aside` of its axis and `above` of where they hold it in
+/// mid-mouth.
 fn jaws(x: f64, aside: f64, above: f64, angle: f64) -> Gripper {
     let up = -DVec3::Z;
     let mut gripper = Gripper::over(x * DVec3::X, up, DVec3::X, angle);

@@ -1,4 +1,5 @@
-//! What the cameras see of the cells: colour and depth written into the caller's arrays, all cells at once.
+//! What the cameras see of the cells: colour and depth written into the caller's arrays, all cells
+//! at once.
 
 use crate::cells::Cells;
 use crate::error::wrong;
@@ -39,7 +40,8 @@ impl Eyes {
         Self { sights: (0..count).map(|_| None).collect(), specimen, noise }
     }
 
-    /// The specimen of cell `k` may be elsewhere now: where a scene varies that, the field under it is made anew.
+    /// The specimen of cell `k` may be elsewhere now: where a scene varies that, the field under it
+    /// is made anew.
     pub fn moved(&mut self, k: usize, scene: &Scene) {
         let v = &scene.task.variation;
         if v.specimen_shift_mm != 0.0 || v.specimen_turn_deg != 0.0 {
@@ -72,7 +74,8 @@ fn awake<'a>(
     Ok(sight)
 }
 
-/// A camera as Python is told of it: name, height and width [px] of what policies see, whether it measures depth.
+/// A camera as Python is told of it: name, height and width [px] of what policies see, whether it
+/// measures depth.
 pub type Described = (String, usize, usize, bool);
 
 /// The cameras of a scene, before anything is built of it.

@@ -1,4 +1,5 @@
-//! The organs of a scene: where they come from, what is said otherwise than in the specimen, and how their tissue is stepped.
+//! The organs of a scene: where they come from, what is said otherwise than in the specimen, and
+//! how their tissue is stepped.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -14,7 +15,8 @@ pub struct SpecimenSource {
     /// Specimen folder, relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
-    /// Built-in phantom: phantom-a, phantom-b (rabbits) or phantom-c (a pig's liver and gallbladder).
+    /// Built-in phantom: phantom-a, phantom-b (rabbits) or phantom-c (a pig's liver and
+    /// gallbladder).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phantom: Option<String>,
     /// Seed of the phantom's anatomy.
@@ -41,7 +43,8 @@ impl SpecimenSource {
         Self { path: None, phantom: Some(name.to_owned()), seed }
     }
 
-    /// What it names; the folder where both are given, `None` where neither is. A checked scene has exactly one.
+    /// What it names; the folder where both are given, `None` where neither is. A checked scene has
+    /// exactly one.
     pub fn source(&self) -> Option<Source<'_>> {
         match (&self.path, &self.phantom) {
             (Some(path), _) => Some(Source::Folder(path)),
@@ -128,7 +131,8 @@ pub enum PinRule {
         end: PinEnd,
         /// Organ coordinate distance from that end within which every node is held, 0 to 1.
         length: f64,
-        /// Organ coordinate length of the part next to the end in which the lowest nodes are held too.
+        /// Organ coordinate length of the part next to the end in which the lowest nodes are held
+        /// too.
         #[serde(default)]
         band_length: f64,
         /// Share of that part's nodes, lowest first.

@@ -23,7 +23,8 @@ pub struct CellCamera {
     /// Width and height of the image that policies get [px].
     #[serde(default = "policy_size")]
     pub policy_size_px: [u32; 2],
-    /// For an oblique endoscope: the angle from its shaft to the view [degrees]; the shaft points from the view towards the image's top. 0 for any other camera.
+    /// For an oblique endoscope: the angle from its shaft to the view [degrees]; the shaft points
+    /// from the view towards the image's top. 0 for any other camera.
     #[serde(default)]
     pub oblique_deg: f64,
     /// It measures depth, too.
@@ -104,7 +105,8 @@ pub enum Lens {
 }
 
 impl CellCamera {
-    /// Its model; `recording` is the specimen's camera. `None` where that is asked for and there is none, or the numbers make no camera, which a checked scene does not have.
+    /// Its model; `recording` is the specimen's camera. `None` where that is asked for and there is
+    /// none, or the numbers make no camera, which a checked scene does not have.
     pub fn model(&self, recording: Option<&Camera>) -> Option<Camera> {
         let [width, height] = self.size_px.map(|n| n as usize);
         let camera = match &self.lens {
@@ -127,14 +129,16 @@ impl CellCamera {
         camera.validate().is_ok().then_some(camera)
     }
 
-    /// Pose of the endoscope's shaft in the cell frame: the view turned back towards the image's top by the oblique angle, z along the shaft.
+    /// Pose of the endoscope's shaft in the cell frame: the view turned back towards the image's
+    /// top by the oblique angle, z along the shaft.
     pub fn shaft(&self, placement: &Frame) -> Pose {
         let view = self.view.pose(placement);
         let turn = DQuat::from_rotation_x(self.oblique_deg.to_radians());
         Pose { rotation: view.rotation * turn, translation: view.translation }
     }
 
-    /// The paper's three (section IV-D): endoscope, D405 above the port midpoint, and the recording camera.
+    /// The paper's three (section IV-D): endoscope, D405 above the port midpoint, and the recording
+    /// camera.
     pub(crate) fn paper() -> Vec<Self> {
         let camera = |name: &str, view: View, lens: Lens| Self {
             name: name.to_owned(),

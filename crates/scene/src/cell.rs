@@ -71,15 +71,19 @@ pub struct Arm {
     /// franka_fr3, or a URDF (.urdf) or MJCF (.xml, .mjcf) file relative to the scene file.
     #[serde(default = "franka_fr3")]
     pub model: String,
-    /// The link or body in a model file on which the instrument is mounted; the last one if left out.
+    /// The link or body in a model file on which the instrument is mounted; the last one if left
+    /// out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flange: Option<String>,
-    /// What it looks like in pictures: simple, or a URDF or MJCF file relative to the scene file whose visual meshes are drawn; if left out, those of a model file, and simple shapes for franka_fr3.
+    /// What it looks like in pictures: simple, or a URDF or MJCF file relative to the scene file
+    /// whose visual meshes are drawn; if left out, those of a model file, and simple shapes for
+    /// franka_fr3.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shapes: Option<String>,
     /// Pose of the base in the cell frame.
     pub base: Frame,
-    /// Joint angles towards which the elbow is drawn [degrees], as many as the arm has joints; the model's own if left out.
+    /// Joint angles towards which the elbow is drawn [degrees], as many as the arm has joints; the
+    /// model's own if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub posture_deg: Vec<f64>,
     /// What drives it.
@@ -110,7 +114,8 @@ pub enum ArmModel<'a> {
 }
 
 impl Arm {
-    /// Its model; `None` where `model` is neither a name nor a file of a known kind, which a checked scene does not have.
+    /// Its model; `None` where `model` is neither a name nor a file of a known kind, which a
+    /// checked scene does not have.
     pub fn source(&self) -> Option<ArmModel<'_>> {
         let ends = |end: &str| self.model.to_ascii_lowercase().ends_with(end);
         match self.model.as_str() {
@@ -121,7 +126,8 @@ impl Arm {
         }
     }
 
-    /// The description, relative to the scene file, whose meshes pictures show; `None` for simple shapes.
+    /// The description, relative to the scene file, whose meshes pictures show; `None` for simple
+    /// shapes.
     pub fn drawn(&self) -> Option<&str> {
         match (self.shapes.as_deref(), self.source()) {
             (Some(SIMPLE), _) => None,
@@ -155,7 +161,8 @@ impl Arm {
 pub struct Controller {
     /// Its name; `default` is the one that the arm's model comes with.
     pub name: String,
-    /// Gains by name, 0 or more; those left out are the controller's own. Units are the controller's.
+    /// Gains by name, 0 or more; those left out are the controller's own. Units are the
+    /// controller's.
     pub gains: BTreeMap<String, f64>,
 }
 
@@ -179,10 +186,12 @@ pub struct Port {
     /// Diameter of the hole [mm].
     #[serde(default = "hole")]
     pub hole_diameter_mm: f64,
-    /// Thickness of the wall [mm]; of a wall of 0 the hole is one edge, as in the paper's formula of the clearance (SPEC K3). One of 2 mm leaves a shaft of 5 mm in 6 mm 19 degrees of tilt.
+    /// Thickness of the wall [mm]; of a wall of 0 the hole is one edge, as in the paper's formula
+    /// of the clearance (SPEC K3). One of 2 mm leaves a shaft of 5 mm in 6 mm 19 degrees of tilt.
     #[serde(default = "sheet")]
     pub sheet_thickness_mm: f64,
-    /// Diameter of the piece of abdominal wall that pictures show round the hole [mm]; of 0 they show a ring on a holder alone. Nothing but pictures knows of it.
+    /// Diameter of the piece of abdominal wall that pictures show round the hole [mm]; of 0 they
+    /// show a ring on a holder alone. Nothing but pictures knows of it.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub sheet_diameter_mm: f64,
 }
@@ -218,7 +227,8 @@ impl Port {
         }
     }
 
-    /// Its frame in the cell: origin at the centre, z along the normal, x the cell's x as far as it lies in the wall (the cell's y where it does not).
+    /// Its frame in the cell: origin at the centre, z along the normal, x the cell's x as far as it
+    /// lies in the wall (the cell's y where it does not).
     pub fn frame(&self) -> Pose {
         let z = DVec3::from(self.normal).normalize_or(DVec3::Z);
         let in_wall = |v: DVec3| v - v.dot(z) * z;
@@ -228,7 +238,8 @@ impl Port {
         Pose { rotation, translation: self.centre_m.into() }
     }
 
-    /// Largest tilt of a shaft of `diameter_mm` [rad]: acos(d/D), where it fills the hole (SPEC K3); `None` for a shaft that does not fit.
+    /// Largest tilt of a shaft of `diameter_mm` [rad]: acos(d/D), where it fills the hole (SPEC
+    /// K3); `None` for a shaft that does not fit.
     pub fn tilt_limit(&self, diameter_mm: f64) -> Option<f64> {
         let share = diameter_mm / self.hole_diameter_mm;
         (share > 0.0 && share < 1.0).then(|| share.acos())
@@ -265,13 +276,15 @@ pub struct Instrument {
     /// Mass with its motor [kg]; the paper's weighs 4.7 N.
     #[serde(default = "instrument_mass")]
     pub mass_kg: f64,
-    /// Centre of mass from the mount, along the instrument's axes; z runs along the shaft towards the tip [mm].
+    /// Centre of mass from the mount, along the instrument's axes; z runs along the shaft towards
+    /// the tip [mm].
     #[serde(default = "centre_of_mass")]
     pub centre_of_mass_mm: [f64; 3],
     /// Full angle between the open blades [degrees].
     #[serde(default = "jaw_max_angle")]
     pub jaw_max_angle_deg: f64,
-    /// Force with which the jaws close [N]; 0.5 if left out, for a cutter too. The paper's cutter has 20.
+    /// Force with which the jaws close [N]; 0.5 if left out, for a cutter too. The paper's cutter
+    /// has 20.
     #[serde(default = "jaw_force")]
     pub jaw_force_n: f64,
     /// Pose of the mount in the flange's frame.
@@ -307,7 +320,9 @@ fn jaw_force() -> f64 {
     0.5
 }
 
-/// Force of the paper's cutter [N]. Tissue between blades stiffens without end as they close, so a grasper's half a newton stops short of closed in thick or stiff tissue; laparoscopic scissors close with tens.
+/// Force of the paper's cutter [N]. Tissue between blades stiffens without end as they close, so a
+/// grasper's half a newton stops short of closed in thick or stiff tissue; laparoscopic scissors
+/// close with tens.
 const CUTTER_FORCE_N: f64 = 20.0;
 
 impl Instrument {

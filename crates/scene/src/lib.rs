@@ -1,10 +1,14 @@
 //! Scene files: the whole cell in one TOML file, checked before anything is built from it.
 //!
-//! A [`Scene`] says which specimen lies where, how its tissue is stepped, which arms hold which instruments through which ports, what the cameras see, and what the task asks for.
-//! [`Scene::read`] takes a file or the name of a built-in scene, refuses unknown keys and values that cannot be meant, and says in one line where and why.
+//! A [`Scene`] says which specimen lies where, how its tissue is stepped, which arms hold which
+//! instruments through which ports, what the cameras see, and what the task asks for.
+//! [`Scene::read`] takes a file or the name of a built-in scene, refuses unknown keys and values
+//! that cannot be meant, and says in one line where and why.
 //!
-//! One rule for units: a key ends in its unit. Where things are in the cell is in metres (`_m`); how large things are and how far they may go is in millimetres (`_mm`);
-//! angles are in degrees (`_deg`), pressures in pascals (`_pa`), forces in newtons (`_n`). Shares, organ coordinates and jaw openings run from 0 to 1 and have no unit.
+//! One rule for units: a key ends in its unit. Where things are in the cell is in metres (`_m`);
+//! how large things are and how far they may go is in millimetres (`_mm`); angles are in degrees
+//! (`_deg`), pressures in pascals (`_pa`), forces in newtons (`_n`). Shares, organ coordinates and
+//! jaw openings run from 0 to 1 and have no unit.
 
 mod anatomy;
 mod builtin;

@@ -10,8 +10,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use xxhash_rust::xxh3::Xxh3;
 
-/// A Trocar scene: the whole two-arm cell. The cell frame is right-handed with z up; its origin is midway between the arms' bases on their mounting plane, x runs from the left base to the
-/// right, y towards the phantom.
+/// A Trocar scene: the whole two-arm cell. The cell frame is right-handed with z up; its origin is
+/// midway between the arms' bases on their mounting plane, x runs from the left base to the right,
+/// y towards the phantom.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -83,8 +84,9 @@ impl Rates {
     }
 }
 
-/// The recording camera looks straight down, its image's top away from the arms, such that the middle of phantom A's appendix lies below the ports' midpoint. The phantom's bed, 150 mm
-/// below the camera, is at z = 0.02.
+/// The recording camera looks straight down, its image's top away from the arms, such that the
+/// middle of phantom A's appendix lies below the ports' midpoint. The phantom's bed, 150 mm below
+/// the camera, is at z = 0.02.
 fn placement() -> Frame {
     Frame { position_m: [-0.012, 0.48, 0.17], rotation_wxyz: [0.0, 1.0, 0.0, 0.0] }
 }
@@ -103,7 +105,8 @@ fn instruments() -> Vec<Instrument> {
 }
 
 impl Scene {
-    /// The paper's cell around a specimen, with every default; paths start from the working directory.
+    /// The paper's cell around a specimen, with every default; paths start from the working
+    /// directory.
     pub fn new(name: &str, specimen: SpecimenSource) -> Self {
         Self {
             name: name.to_owned(),
@@ -124,7 +127,8 @@ impl Scene {
         }
     }
 
-    /// A path of the scene as the system understands it: relative ones start from the scene file's folder.
+    /// A path of the scene as the system understands it: relative ones start from the scene file's
+    /// folder.
     pub fn resolve(&self, path: &str) -> PathBuf {
         self.folder.join(path)
     }
@@ -139,7 +143,8 @@ impl Scene {
         self.instruments.iter().find(|i| i.name == name)
     }
 
-    /// The arms, the left one first, each with its port and instrument. A checked scene has them all.
+    /// The arms, the left one first, each with its port and instrument. A checked scene has them
+    /// all.
     pub fn stations(&self) -> Vec<(&Arm, &Port, &Instrument)> {
         let mut all = Vec::new();
         for arm in &self.arms {
@@ -161,7 +166,8 @@ impl Scene {
         self.arm_with(InstrumentKind::Grasper)
     }
 
-    /// The scene as TOML with every value, in a fixed order: the same scene always gives the same text.
+    /// The scene as TOML with every value, in a fixed order: the same scene always gives the same
+    /// text.
     ///
     /// # Errors
     /// When a value has no place in TOML; none that a file could hold.
@@ -169,8 +175,10 @@ impl Scene {
         toml::to_string(self).map_err(|e| Error::Write(e.to_string()))
     }
 
-    /// What replays know the scene by: xxh3 of its canonical form and of `contents`, the hashes of what it names by path or as a phantom (the specimen, then the arms' model files in
-    /// order). The description and the specimen folder's path do not count, so that a scene may be explained better and a folder may move.
+    /// What replays know the scene by: xxh3 of its canonical form and of `contents`, the hashes of
+    /// what it names by path or as a phantom (the specimen, then the arms' model files in order).
+    /// The description and the specimen folder's path do not count, so that a scene may be
+    /// explained better and a folder may move.
     ///
     /// # Errors
     /// As [`to_toml`](Self::to_toml).

@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 pub struct Start {
     /// Angle between shaft and port normal [degrees]; 0, or 1 and more.
     pub tilt_deg: f64,
-    /// Where the tip leans [degrees]: the direction in the wall, from the port's x axis (the cell's x) counter-clockwise as seen from outside.
+    /// Where the tip leans [degrees]: the direction in the wall, from the port's x axis (the cell's
+    /// x) counter-clockwise as seen from outside.
     pub azimuth_deg: f64,
     /// Distance along the shaft from the port's centre to the tip of the closed blades [mm].
     pub insertion_mm: f64,

@@ -117,7 +117,8 @@ impl Default for Gates {
     }
 }
 
-/// How episodes differ by their seed: each figure is the most that a value goes to either side, all values equally likely. All 0 for the same start every time.
+/// How episodes differ by their seed: each figure is the most that a value goes to either side, all
+/// values equally likely. All 0 for the same start every time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Variation {

@@ -1,4 +1,5 @@
-//! The schema accepts the scenes, refuses what the reader refuses by form, and says units, defaults and all keys; so does the users' page.
+//! The schema accepts the scenes, refuses what the reader refuses by form, and says units, defaults
+//! and all keys; so does the users' page.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use serde_json::Value;

@@ -45,7 +45,8 @@ impl Bounds {
         Ok(made)
     }
 
-    /// The action of these numbers. What lies outside is brought back to the edge, as a robot's own limits do; the box of two pivots has corners that no shaft reaches, and those are brought
+    /// The action of these numbers. What lies outside is brought back to the edge, as a robot's own
+    /// limits do; the box of two pivots has corners that no shaft reaches, and those are brought
     /// back too.
     ///
     /// # Errors

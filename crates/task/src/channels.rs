@@ -1,4 +1,5 @@
-//! Channels: one flat row of figures a control period. All gates, sweeps and summaries are functions of these rows alone.
+//! Channels: one flat row of figures a control period. All gates, sweeps and summaries are
+//! functions of these rows alone.
 
 use serde::Serialize;
 
@@ -107,9 +108,11 @@ row! {
 }
 
 row! {
-    /// The task in a period. What concerns tissue in jaws is zero while the grasper holds none of the task's organ. Flags are 0 or 1.
+    /// The task in a period. What concerns tissue in jaws is zero while the grasper holds none of
+    /// the task's organ. Flags are 0 or 1.
     TaskChannels {
-        /// Distance from the middle of the grasper's mouth to the organ's axis where the grasp gate wants it [mm].
+        /// Distance from the middle of the grasper's mouth to the organ's axis where the grasp gate
+        /// wants it [mm].
         grasp_distance_mm,
         /// The grasper holds the task's organ.
         grasped,
@@ -123,7 +126,8 @@ row! {
         follow,
         /// Slip [mm].
         slip_mm,
-        /// Distance from the cutter's tip to the nearest tissue between grasp (the gate's upper end while nothing is held) and base [mm].
+        /// Distance from the cutter's tip to the nearest tissue between grasp (the gate's upper end
+        /// while nothing is held) and base [mm].
         position_mm,
         /// Jaw opening of the cutter.
         cut_jaw,
@@ -133,7 +137,8 @@ row! {
         cut_share,
         /// Cuts in the period.
         cuts,
-        /// Largest distance of any arm's blade tip from its first target [mm]; port-reach only, as the next two.
+        /// Largest distance of any arm's blade tip from its first target [mm]; port-reach only, as
+        /// the next two.
         reach_1_mm,
         /// From its second.
         reach_2_mm,
@@ -175,7 +180,8 @@ impl Channels {
     /// Numbers a row.
     pub const COUNT: usize = 1 + 2 * ArmChannels::NAMES.len() + TaskChannels::NAMES.len();
 
-    /// Whether the episode is lost here: tissue or an arm diverged, or an arm's RCM deviation went beyond `abort_mm`.
+    /// Whether the episode is lost here: tissue or an arm diverged, or an arm's RCM deviation went
+    /// beyond `abort_mm`.
     pub fn is_lost(&self, abort_mm: Option<f64>) -> bool {
         let out = |mm: f64| abort_mm.is_some_and(|most| mm > most);
         self.task.diverged > 0.0 || out(self.left.rcm_peak_mm) || out(self.right.rcm_peak_mm)

@@ -1,4 +1,5 @@
-//! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is scored and what happened.
+//! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is
+//! scored and what happened.
 
 use crate::measure::Subject;
 use crate::random::Random;
@@ -11,7 +12,8 @@ use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
 
-/// How long organs settle under gravity before any episode begins [s]: all phantoms are at rest within it (SPEC, settled).
+/// How long organs settle under gravity before any episode begins [s]: all phantoms are at rest
+/// within it (SPEC, settled).
 pub const SETTLE_S: f64 = 1.0;
 
 /// How an episode ended.
@@ -119,8 +121,9 @@ pub struct Episode {
 }
 
 impl Episode {
-    /// The episodes of `scene` around `specimen`, stepped by `threads` threads (0: as many as the machine has; results do not depend on them). Builds the models and lets the organs settle once;
-    /// the episode stands at the start of seed 0.
+    /// The episodes of `scene` around `specimen`, stepped by `threads` threads (0: as many as the
+    /// machine has; results do not depend on them). Builds the models and lets the organs settle
+    /// once; the episode stands at the start of seed 0.
     ///
     /// # Errors
     /// A scene without the task's organ or instruments, or one that cannot be built.
@@ -171,7 +174,8 @@ impl Episode {
         Ok(())
     }
 
-    /// Begins the episode of `seed`: the arms' starts, and where the scene says so the specimen's place, are those of the seed. The same seed gives the same bits, whatever was before. Takes
+    /// Begins the episode of `seed`: the arms' starts, and where the scene says so the specimen's
+    /// place, are those of the seed. The same seed gives the same bits, whatever was before. Takes
     /// milliseconds; a specimen that moves is built and settled anew, which takes seconds.
     ///
     /// # Errors
@@ -203,7 +207,8 @@ impl Episode {
     /// Does one control period.
     ///
     /// # Errors
-    /// An action that cannot be done: nothing has changed, and the caller may try another or [`fail`](Self::fail). An episode that has ended.
+    /// An action that cannot be done: nothing has changed, and the caller may try another or
+    /// [`fail`](Self::fail). An episode that has ended.
     pub fn step(&mut self, action: &Action) -> Result<Step> {
         if let Some(end) = &self.now.end {
             return Err(Error::Ended(end.to_string()));
@@ -211,7 +216,8 @@ impl Episode {
         let report = match self.cell.step(action) {
             Ok(report) => report,
             Err(refused @ trocar_cell::Error::Action { .. }) => return Err(refused.into()),
-            // An arm whose numbers are lost: the last row that was right again, but for the time, that it diverged, and that nothing happened.
+            // An arm whose numbers are lost: the last row that was right again, but for the time,
+            // that it diverged, and that nothing happened.
             Err(lost) => {
                 self.now.end = Some(End::Diverged { why: lost.to_string() });
                 let mut channels = self.now.rows.last().copied().unwrap_or_default();
@@ -368,7 +374,8 @@ impl Episode {
         Ok(())
     }
 
-    /// Hash over every bit that the future depends on, but for the seed's random numbers: cell and stages.
+    /// Hash over every bit that the future depends on, but for the seed's random numbers: cell and
+    /// stages.
     pub fn state_hash(&self) -> u64 {
         let mut hash = Xxh3::new();
         hash.update(&self.cell.hash().to_le_bytes());
@@ -379,7 +386,8 @@ impl Episode {
     }
 }
 
-/// What a state is known by to belong to an episode: the scene and the specimen. How long an episode may be does not matter.
+/// What a state is known by to belong to an episode: the scene and the specimen. How long an
+/// episode may be does not matter.
 fn key(scene: &Scene, specimen: u64) -> Result<u64> {
     let mut scene = scene.clone();
     scene.task.episode_s = 0.0;

@@ -1,7 +1,8 @@
 //! Tasks in the two-arm cell: stages, channels, episodes, their files, and policies.
 //!
-//! An [`Episode`] steps a scene's cell from a seeded start to its [`End`]. Each step gives a row of [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds the
-//! actions and a hash a step, so that anyone can run it again and compare.
+//! An [`Episode`] steps a scene's cell from a seeded start to its [`End`]. Each step gives a row of
+//! [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds
+//! the actions and a hash a step, so that anyone can run it again and compare.
 
 mod bounds;
 mod channels;

@@ -143,7 +143,8 @@ fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f6
     (0..count).filter(|i| of(*i)).map(square).fold(f64::INFINITY, f64::min).sqrt()
 }
 
-/// Whether any of `bodies` is between the blades of arm `k`, and the share of the wedge that they fill.
+/// Whether any of `bodies` is between the blades of arm `k`, and the share of the wedge that they
+/// fill.
 fn mouth(cell: &Cell, k: usize, bodies: &[usize]) -> (bool, f64) {
     let all: Vec<f64> = bodies.iter().filter_map(|body| Some(cell.between_blades(k, *body)?.1)).collect();
     (!all.is_empty(), all.iter().sum::<f64>().min(1.0))

@@ -44,7 +44,8 @@ pub struct Observation {
 /// Numbers of [`Observation::to_vec`].
 pub const STATE_SIZE: usize = 47;
 
-/// Names of the numbers of [`Observation::to_vec`], in order. The time is not among them: a policy that counts seconds learns the script, not the task.
+/// Names of the numbers of [`Observation::to_vec`], in order. The time is not among them: a policy
+/// that counts seconds learns the script, not the task.
 pub const STATE_NAMES: [&str; STATE_SIZE] = [
     "left_pivot_1_rad",
     "left_pivot_2_rad",

@@ -1,6 +1,8 @@
 //! Episode files: what was done, so that anyone can do it again and compare every step.
 //!
-//! One line of JSON (scene text and hash, specimen hash, seed, program), then for every step the action's numbers and the state's hash after it as little-endian binary, then xxh3 of all before it.
+//! One line of JSON (scene text and hash, specimen hash, seed, program), then for every step the
+//! action's numbers and the state's hash after it as little-endian binary, then xxh3 of all before
+//! it.
 
 use crate::storage::write_whole;
 use crate::{End, Episode, Error, Result, specimen_hash};
@@ -82,7 +84,8 @@ pub struct Verdict {
     pub replayed_by: String,
 }
 
-/// What replays know a scene by: [`Scene::hash`] over the specimen's hash and the arms' model files.
+/// What replays know a scene by: [`Scene::hash`] over the specimen's hash and the arms' model
+/// files.
 ///
 /// # Errors
 /// A model file that cannot be read.
@@ -225,7 +228,8 @@ impl EpisodeFile {
         Ok(scene)
     }
 
-    /// Whether specimen, scene or an arm's model are others than the recorded ones, in a sentence; `None` where they are the same.
+    /// Whether specimen, scene or an arm's model are others than the recorded ones, in a sentence;
+    /// `None` where they are the same.
     ///
     /// # Errors
     /// A model file that cannot be read.
@@ -241,7 +245,8 @@ impl EpisodeFile {
             .then(|| format!("the scene or an arm's model is another one: {found}, not {}", header.scene_hash)))
     }
 
-    /// Does the episode again with `specimen` and compares every step. What differs is a verdict, not an error. `watch` is asked before each step and returns false to stop.
+    /// Does the episode again with `specimen` and compares every step. What differs is a verdict,
+    /// not an error. `watch` is asked before each step and returns false to stop.
     ///
     /// # Errors
     /// An episode that cannot be built; [`trocar_cell::Error::Interrupted`] when `watch` stops it.

@@ -1,6 +1,8 @@
-//! The stages of each task, as pure functions of the channels: nothing but rows and gates decides (SPEC, stage gates).
+//! The stages of each task, as pure functions of the channels: nothing but rows and gates decides
+//! (SPEC, stage gates).
 //!
-//! Stages pass in their order and stay passed. All of the resection's stages after the lift need tissue in the grasper: without it there is no "tissue between grasp and base".
+//! Stages pass in their order and stay passed. All of the resection's stages after the lift need
+//! tissue in the grasper: without it there is no "tissue between grasp and base".
 
 use crate::{Channels, Error, Result};
 use serde::{Deserialize, Serialize};
@@ -210,8 +212,9 @@ impl Tracker {
         }
     }
 
-    /// Blades that were open beyond the gate with tissue between them have closed, and it was between them in every row until they did. Blades that are nearly closed have a
-    /// mouth too thin to hold anything, so the last row does not count.
+    /// Blades that were open beyond the gate with tissue between them have closed, and it was
+    /// between them in every row until they did. Blades that are nearly closed have a mouth too
+    /// thin to hold anything, so the last row does not count.
     fn cut(&mut self, c: &Channels) -> bool {
         let (gates, t) = (&self.gates, &c.task);
         if t.grasped <= 0.0 {

@@ -67,7 +67,8 @@ pub(crate) fn starts(scene: &Scene, cell: &Cell, seed: u64) -> Vec<Coordinates> 
 
 /// Greatest tilt of port-reach's targets [rad].
 const TARGET_TILT: f64 = 0.35;
-/// They are this much above the deepest insertion with which the blades stay above the floor [m], over this length.
+/// They are this much above the deepest insertion with which the blades stay above the floor [m],
+/// over this length.
 const TARGET_ABOVE: f64 = 0.015;
 const TARGET_RANGE: f64 = 0.03;
 

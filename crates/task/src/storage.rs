@@ -1,4 +1,5 @@
-//! Channels as Parquet: one flat column of doubles a channel, read back checked. Any data-frame library reads them.
+//! Channels as Parquet: one flat column of doubles a channel, read back checked. Any data-frame
+//! library reads them.
 
 use crate::{Channels, Error, Result};
 use parquet::basic::{Repetition, Type as Physical};
@@ -37,7 +38,8 @@ pub struct ChannelsInfo {
     pub gates: Gates,
     /// RCM deviation that episodes are scored against [mm].
     pub rcm_threshold_mm: f64,
-    /// RCM deviation beyond which an episode is lost [mm]; None in files that were written before it was.
+    /// RCM deviation beyond which an episode is lost [mm]; None in files that were written before
+    /// it was.
     #[serde(default)]
     pub rcm_abort_mm: Option<f64>,
     /// The arms that the scene has, left first.
@@ -125,7 +127,8 @@ fn hash(rows: &[Channels]) -> u64 {
 /// Reads what [`write_channels`] wrote.
 ///
 /// # Errors
-/// Names the file and what is wrong: not Parquet, not ours, a column that is missing, values that are not those that were written.
+/// Names the file and what is wrong: not Parquet, not ours, a column that is missing, values that
+/// are not those that were written.
 pub fn read_channels(path: &Path) -> Result<(ChannelsInfo, Vec<Channels>)> {
     let io = |source| Error::Io { path: path.to_owned(), source };
     let invalid = |reason: String| Error::Invalid { path: path.to_owned(), reason };

@@ -26,7 +26,8 @@ pub struct ArmSummary {
     pub rcm_max_mm: f64,
     /// The largest of the whole episode [mm].
     pub rcm_peak_mm: f64,
-    /// Root mean square distance between commanded and measured tip at the same time, without load [mm].
+    /// Root mean square distance between commanded and measured tip at the same time, without load
+    /// [mm].
     pub tracking_rms_mm: f64,
     /// The delay of the measured tip behind the commanded one that makes that distance least [ms].
     pub lag_ms: f64,
@@ -96,7 +97,8 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Of the rows of an episode that ended as `end` says; `threshold_mm` is the RCM deviation that it is scored against.
+    /// Of the rows of an episode that ended as `end` says; `threshold_mm` is the RCM deviation that
+    /// it is scored against.
     pub fn of(rows: &[Channels], progress: &Progress, end: Option<&End>, arms: &[&str], threshold_mm: f64) -> Self {
         let tasks = || rows.iter().map(|c| &c.task);
         // What has blown up is told as a very large number: files have no infinity.
@@ -181,7 +183,8 @@ pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[k] + (at - k as f64) * (sorted[next] - sorted[k])
 }
 
-/// Root mean square distance [m] of the measured tips from those commanded `lag` [s] before, over the rows `of`.
+/// Root mean square distance [m] of the measured tips from those commanded `lag` [s] before, over
+/// the rows `of`.
 fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool) -> f64 {
     let tip = |a: &ArmChannels| glam::DVec3::new(a.tip_x_m, a.tip_y_m, a.tip_z_m);
     let commanded = |a: &ArmChannels| glam::DVec3::new(a.commanded_x_m, a.commanded_y_m, a.commanded_z_m);

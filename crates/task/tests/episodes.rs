@@ -1,4 +1,5 @@
-//! Episodes around a small tube: the scripted baseline passes, resets and replays are exact, files are checked.
+//! Episodes around a small tube: the scripted baseline passes, resets and replays are exact, files
+//! are checked.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
@@ -229,7 +230,8 @@ fn a_strong_cutter_closes_through_tissue_and_harms_nothing_else() {
         let s = &recording.summary;
         println!("sever {sever}: {} N at the blades, {s:?}", worst(|c| c.right.jaw_force_n));
         assert!(s.passed && !s.diverged && s.inverted_peak == 0, "{s:?}");
-        // Blades that close through tissue shear it: nothing is pressed from one period after they begin to.
+        // Blades that close through tissue shear it: nothing is pressed from one period after they
+        // begin to.
         let open = recording.channels.iter().position(|c| c.task.cut_jaw > 0.99).unwrap();
         let closing = recording.channels[open..].iter().filter(|c| c.task.cut_jaw < 0.8);
         let pressing: Vec<f64> = closing.map(|c| c.right.jaw_force_n).collect();
@@ -240,7 +242,8 @@ fn a_strong_cutter_closes_through_tissue_and_harms_nothing_else() {
 
 #[test]
 fn an_offset_is_the_same_in_every_phase() {
-    // The other arm stays where it is while the first approaches, enters and closes: what is told to it must not wander off by the offset again with each of these phases.
+    // The other arm stays where it is while the first approaches, enters and closes: what is told
+    // to it must not wander off by the offset again with each of these phases.
     let mut episode = Episode::new(&resection(), &specimen(), 1).unwrap();
     episode.reset(5).unwrap();
     let start = episode.cell().observe()[1].commanded;

@@ -9,7 +9,8 @@ pub const NUMBERS: usize = 5;
 /// Fastest that a tip is commanded to move [m/s]: twice as fast as the task moves it.
 pub const TIP_SPEED: f64 = 0.1;
 
-/// Fastest that a shaft is commanded to swing in its port [rad/s]: what the arms' reference follows without falling behind.
+/// Fastest that a shaft is commanded to swing in its port [rad/s]: what the arms' reference follows
+/// without falling behind.
 pub const SWING_SPEED: f64 = 0.9;
 
 /// Fastest that an instrument is commanded to roll [rad/s].
@@ -20,7 +21,8 @@ pub const ROLL_SPEED: f64 = 2.0;
 pub enum ActionSpace {
     /// Per arm: two pivots [rad], insertion [m], roll [rad], jaw opening 0 to 1; absolute targets.
     Pivots,
-    /// Per arm: motion of the tip along the cell's x, y and z [m], change of the roll [rad], both from what was commanded last; jaw opening 0 to 1.
+    /// Per arm: motion of the tip along the cell's x, y and z [m], change of the roll [rad], both
+    /// from what was commanded last; jaw opening 0 to 1.
     Tip,
 }
 
@@ -50,7 +52,8 @@ impl ActionSpace {
     }
 }
 
-/// The five numbers of an arm, checked for what can be said of them without knowing where the arm is.
+/// The five numbers of an arm, checked for what can be said of them without knowing where the arm
+/// is.
 pub(super) struct Checker<'a> {
     pub space: ActionSpace,
     /// Name of the arm, and place of its first number.
@@ -111,8 +114,10 @@ impl Checker<'_> {
     }
 }
 
-/// The coordinates on the way from `from` to `to` that can be commanded next, and whether that is not all of the way: within a period of `period` [s] the tip goes no faster than
-/// [`TIP_SPEED`], the shaft swings no faster than [`SWING_SPEED`] and rolls no faster than [`ROLL_SPEED`]. The jaw has a drive of its own.
+/// The coordinates on the way from `from` to `to` that can be commanded next, and whether that is
+/// not all of the way: within a period of `period` [s] the tip goes no faster than [`TIP_SPEED`],
+/// the shaft swings no faster than [`SWING_SPEED`] and rolls no faster than [`ROLL_SPEED`]. The jaw
+/// has a drive of its own.
 pub(super) fn paced(from: &Coordinates, to: &Coordinates, period: f64) -> (Coordinates, bool) {
     let swing = [0, 1].map(|k| to.pivots[k] - from.pivots[k]);
     let (push, turn) = (to.insertion - from.insertion, to.roll - from.roll);

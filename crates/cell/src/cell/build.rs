@@ -20,7 +20,8 @@ const MARGIN: f64 = 0.02;
 /// The blades' tips stay this far above the lowest tissue [m].
 const ABOVE_FLOOR: f64 = 0.001;
 
-/// Radius and length of what an instrument's mass is spread over [m]: about its motor's housing. Only the moments of inertia depend on it, and they are small beside the arm's.
+/// Radius and length of what an instrument's mass is spread over [m]: about its motor's housing.
+/// Only the moments of inertia depend on it, and they are small beside the arm's.
 const HOUSING: [f64; 2] = [0.028, 0.09];
 
 /// Time that a grasper's and a cutter's jaws take from open to closed [s].
@@ -185,8 +186,9 @@ pub(super) fn start(
     Coordinates { pivots, insertion: 1e-3 * start.insertion_mm - blades.length, roll, jaw: start.jaw }
 }
 
-/// The rolls [rad] to which an arm gets from its start without a joint at a limit, wherever the shaft leans by up to [`LEAN`]: the wrist's range less what the shaft's turn takes of it. Where the arm does not get
-/// even at the start's roll is left out: commands there are held back.
+/// The rolls [rad] to which an arm gets from its start without a joint at a limit, wherever the
+/// shaft leans by up to [`LEAN`]: the wrist's range less what the shaft's turn takes of it. Where
+/// the arm does not get even at the start's roll is left out: commands there are held back.
 fn roll_of(
     arm: &SerialArm,
     port: &Port,
@@ -198,7 +200,8 @@ fn roll_of(
     let first = InverseOptions { restarts: STARTS, ..options };
     let posture = arm.inverse(&port.flange(instrument, start), &arm.home(), &first)?;
     let mut range = limits.roll;
-    // Steps towards `to`, each from the posture of the one before: the last posture, and the share of the way that was gone.
+    // Steps towards `to`, each from the posture of the one before: the last posture, and the share
+    // of the way that was gone.
     let walk = |from: &Coordinates, q: &Joints, to: &Coordinates| -> Result<(Joints, f64)> {
         let (mut q, mut share) = (*q, 0.0);
         for step in 1..=WALK {
@@ -235,7 +238,8 @@ fn roll_of(
             }
         }
     }
-    // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now and then.
+    // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now
+    // and then.
     let ends = [0, 1]
         .map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - MARGIN_OF_ROLL.copysign(range[k]) });
     Ok([ends[0].min(start.roll), ends[1].max(start.roll)])

@@ -1,4 +1,5 @@
-//! Reads and commands of one arm, in the words of the Collaborative Robotics Toolkit (CRTK). Commands are taken at once and carried out by [`Cell::advance`] or the next [`Cell::step`].
+//! Reads and commands of one arm, in the words of the Collaborative Robotics Toolkit (CRTK).
+//! Commands are taken at once and carried out by [`Cell::advance`] or the next [`Cell::step`].
 
 use super::Cell;
 use super::report::TaggedForce;
@@ -51,7 +52,8 @@ impl Cell {
         Ok(self.arm(arm)?.manipulator.measured_cp())
     }
 
-    /// What a sensor at the tool mount reads, in the mount's frame, weight and inertia of the instrument included; tagged with what the tissue's part of it is.
+    /// What a sensor at the tool mount reads, in the mount's frame, weight and inertia of the
+    /// instrument included; tagged with what the tissue's part of it is.
     ///
     /// # Errors
     /// An arm that is not there.
@@ -101,7 +103,8 @@ impl Cell {
         Ok(chain.segments().iter().map(|s| s.joint.limits.position).collect())
     }
 
-    /// The nearest coordinates to a pose of the tip in the cell, and what of the pose they do not meet.
+    /// The nearest coordinates to a pose of the tip in the cell, and what of the pose they do not
+    /// meet.
     ///
     /// # Errors
     /// An arm that is not there, a pose that is none.
@@ -109,7 +112,8 @@ impl Cell {
         self.arm(arm)?.solve(tip, near)
     }
 
-    /// Moves the tip to a pose in the cell as near as the port lets it; the jaw stays as it was told. The solution has the rotation that was rejected.
+    /// Moves the tip to a pose in the cell as near as the port lets it; the jaw stays as it was
+    /// told. The solution has the rotation that was rejected.
     ///
     /// # Errors
     /// An arm that is not there, a pose that is none.
@@ -124,7 +128,8 @@ impl Cell {
     /// Moves the joints, whatever the port says to it; the jaw stays as it was told.
     ///
     /// # Errors
-    /// An arm that is not there, not a number a joint, one that is not finite. Nothing has changed then.
+    /// An arm that is not there, not a number a joint, one that is not finite. Nothing has changed
+    /// then.
     pub fn servo_jp(&mut self, arm: &str, joints: &[f64]) -> Result<()> {
         let station = self.arm_mut(arm)?;
         station.manipulator.servo_jp(joints)?;
@@ -132,7 +137,8 @@ impl Cell {
         Ok(())
     }
 
-    /// Moves the jaw towards an opening, 0 closed to 1. Closing, it stops where tissue pushes back with its force.
+    /// Moves the jaw towards an opening, 0 closed to 1. Closing, it stops where tissue pushes back
+    /// with its force.
     ///
     /// # Errors
     /// An arm that is not there, an opening that is none.

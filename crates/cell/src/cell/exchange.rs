@@ -1,10 +1,15 @@
 //! What tissue does to an instrument between two of its frames.
 //!
-//! Tissue is stepped 60 times a second, arms 480 times. Tissue sees the tip go from where it was measured at a frame's beginning to where it is at the end; the arm feels, over the
-//! next frame, what tissue did at that frame's end. Taken as it is, such a force is a spring that is late by a frame, and a late spring of stiffness k does work: it makes an arm
-//! swing unless the arm damps with more than about k T / 2, T being the frame (Colgate and Schenkel 1997). So the force is carried on with the tip: it changes by the stiffness seen so far, a
-//! secant as the jaw's drive has it ([`crate::Jaw`]), times the way the tip has gone since, at every step of the arm. Where the secant is right, the arm feels the spring as it is; where it is
-//! too large, the difference resists every motion and vanishes at the next frame: it damps. Where the tip rests, nothing is added.
+//! Tissue is stepped 60 times a second, arms 480 times. Tissue sees the tip go from where it was
+//! measured at a frame's beginning to where it is at the end; the arm feels, over the next frame,
+//! what tissue did at that frame's end. Taken as it is, such a force is a spring that is late by a
+//! frame, and a late spring of stiffness k does work: it makes an arm swing unless the arm damps
+//! with more than about k T / 2, T being the frame (Colgate and Schenkel 1997). So the force is
+//! carried on with the tip: it changes by the stiffness seen so far, a secant as the jaw's drive
+//! has it ([`crate::Jaw`]), times the way the tip has gone since, at every step of the arm. Where
+//! the secant is right, the arm feels the spring as it is; where it is too large, the difference
+//! resists every motion and vanishes at the next frame: it damps. Where the tip rests, nothing is
+//! added.
 
 use glam::DVec3;
 use trocar_robot::wrench::Wrench;
@@ -85,8 +90,9 @@ impl Exchange {
 mod tests {
     use super::*;
 
-    /// A tip of `mass` [kg] with `damping` [N s/m], held at x = 0 by a spring of 3000 N/m and let go 1 mm inside a wall of `stiffness` [N/m] that answers 60 times a second: the
-    /// greatest distance from the balance in the last of three seconds [m].
+    /// A tip of `mass` [kg] with `damping` [N s/m], held at x = 0 by a spring of 3000 N/m and let
+    /// go 1 mm inside a wall of `stiffness` [N/m] that answers 60 times a second: the greatest
+    /// distance from the balance in the last of three seconds [m].
     fn swing(mass: f64, damping: f64, stiffness: f64, carried_on: bool) -> f64 {
         let (mut x, mut v, dt) = (0.001, 0.0, 1.0 / 480.0);
         let mut exchange = Exchange::new(DVec3::ZERO);

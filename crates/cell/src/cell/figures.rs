@@ -1,4 +1,5 @@
-//! What tasks measure of a cell beside its observations: what jaws carry and what is between blades.
+//! What tasks measure of a cell beside its observations: what jaws carry and what is between
+//! blades.
 
 use super::Cell;
 use crate::gripper::{BLADE_WIDTH, MOUTH_BEGIN};
@@ -36,7 +37,8 @@ impl Cell {
         Some(Carried { organ, s, jaw_lift: moved.jaw_lift, tissue_lift: moved.tissue_lift, slip: moved.slip })
     }
 
-    /// Tissue of body `organ` between the blades of the arm at place `k` (SPEC C3), and its share of the wedge between them; None where there is none.
+    /// Tissue of body `organ` between the blades of the arm at place `k` (SPEC C3), and its share
+    /// of the wedge between them; None where there is none.
     pub fn between_blades(&self, k: usize, organ: usize) -> Option<(Mouthful, f64)> {
         let station = self.stations.get(k)?;
         let tissue = station.mouth().tissue_of(&self.world, organ)?;
@@ -55,7 +57,8 @@ impl Cell {
         Ok(station.manipulator.measured_cp().transform(station.fixed.blades.length * DVec3::X))
     }
 
-    /// Whether an arm's instrument has hooked or crushed tissue and passes through it until it has come back.
+    /// Whether an arm's instrument has hooked or crushed tissue and passes through it until it has
+    /// come back.
     ///
     /// # Errors
     /// An arm that is not there.

@@ -1,8 +1,13 @@
-//! The force guard: a command does not push an instrument harder into tissue than the scene lets it.
+//! The force guard: a command does not push an instrument harder into tissue than the scene lets
+//! it.
 //!
-//! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N for a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a stop is not
-//! enough, because what is pressed stays pressed. So the part of a command's way that goes against the force gets shorter as the force nears the limit, and beyond the limit the instrument draws back.
-//! What a step may cost is known from the stiffness seen so far, as in [`crate::Jaw`]: a fixed gain would swing on stiff tissue or creep on soft. The rest of the way is the command's.
+//! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N
+//! for a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a
+//! stop is not enough, because what is pressed stays pressed. So the part of a command's way that
+//! goes against the force gets shorter as the force nears the limit, and beyond the limit the
+//! instrument draws back. What a step may cost is known from the stiffness seen so far, as in
+//! [`crate::Jaw`]: a fixed gain would swing on stiff tissue or creep on soft. The rest of the way
+//! is the command's.
 
 use glam::DVec3;
 
@@ -50,7 +55,8 @@ impl Guard {
         self.last = [force, at];
     }
 
-    /// What is left of a way [m] that is commanded for the next period where `limit` [N] must not be passed; the same where it need not be changed.
+    /// What is left of a way [m] that is commanded for the next period where `limit` [N] must not
+    /// be passed; the same where it need not be changed.
     pub fn allow(&self, way: DVec3, limit: f64) -> DVec3 {
         let [force, _] = self.last;
         let size = force.length();
@@ -87,7 +93,8 @@ impl Guard {
 mod tests {
     use super::*;
 
-    /// Goes `speed` [m a period] into a wall of `stiffness` [N/m], the tip a share behind the command: forces of 300 periods [N].
+    /// Goes `speed` [m a period] into a wall of `stiffness` [N/m], the tip a share behind the
+    /// command: forces of 300 periods [N].
     fn press(stiffness: f64, speed: f64, limit: f64) -> Vec<f64> {
         let (mut guard, mut command, mut tip) = (Guard::default(), 0.01, 0.01_f64);
         let mut forces = Vec::new();

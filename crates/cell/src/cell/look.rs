@@ -5,7 +5,8 @@ use crate::Result;
 use trocar_geometry::Pose;
 
 impl Cell {
-    /// Poses in the cell of an arm's base, of each of its links from the first that moves, and of its flange, as they are now.
+    /// Poses in the cell of an arm's base, of each of its links from the first that moves, and of
+    /// its flange, as they are now.
     ///
     /// # Errors
     /// An arm that is not there.

@@ -1,8 +1,11 @@
 //! The two-arm cell of a scene: tissue, ports, instruments and dynamic arms, stepped by actions.
 //!
-//! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of physics steps of the arms (1/480 s). In a frame the arms go first, under the load that tissue had on
-//! them at the last frame's end, carried on with the tip (`exchange.rs`); then tissue is stepped with tools that go from where the tips were measured at the frame's beginning to where they are now.
-//! Instruments do not push each other: their clearance is measured, and an event tells where they would have touched.
+//! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of
+//! physics steps of the arms (1/480 s). In a frame the arms go first, under the load that tissue
+//! had on them at the last frame's end, carried on with the tip (`exchange.rs`); then tissue is
+//! stepped with tools that go from where the tips were measured at the frame's beginning to where
+//! they are now. Instruments do not push each other: their clearance is measured, and an event
+//! tells where they would have touched.
 
 mod action;
 mod build;
@@ -72,7 +75,8 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The cell of `scene` around `specimen`, whose tissue is stepped by `threads` threads (0: as many as the machine has). The arms stand in their start poses, the organs as they were
+    /// The cell of `scene` around `specimen`, whose tissue is stepped by `threads` threads (0: as
+    /// many as the machine has). The arms stand in their start poses, the organs as they were
     /// recorded. Results do not depend on the threads.
     ///
     /// # Errors
@@ -81,7 +85,8 @@ impl Cell {
         Self::with_contact(scene, specimen, threads, true)
     }
 
-    /// The same with organs that pass through each other where `organ_contact` is false: for measuring what their contact costs.
+    /// The same with organs that pass through each other where `organ_contact` is false: for
+    /// measuring what their contact costs.
     ///
     /// # Errors
     /// As [`Cell::new`].
@@ -114,7 +119,8 @@ impl Cell {
     /// Does one control period.
     ///
     /// # Errors
-    /// An action that cannot be done is refused with the number's place and name, and nothing has changed. An arm whose numbers are lost ends the run: restore a state.
+    /// An action that cannot be done is refused with the number's place and name, and nothing has
+    /// changed. An arm whose numbers are lost ends the run: restore a state.
     pub fn step(&mut self, action: &Action) -> Result<CellReport> {
         let needed = NUMBERS * self.stations.len();
         if action.numbers.len() != needed {
@@ -179,7 +185,8 @@ impl Cell {
         Ok(CellReport { time: self.time(), arms, clearance, tissue, events })
     }
 
-    /// The gap between the two instruments now [m]: negative where they are inside each other, for they do not push each other.
+    /// The gap between the two instruments now [m]: negative where they are inside each other, for
+    /// they do not push each other.
     pub fn clearance(&self) -> f64 {
         match &self.stations[..] {
             [one, other] => clearance::clearance(&one.rods(), &other.rods()),
@@ -187,8 +194,9 @@ impl Cell {
         }
     }
 
-    /// Unhooks instruments from what they pierced, hooked or crushed beyond what tissue bears, lets tissue feel them again when all is well, and puts right what does not come back by itself. `least`
-    /// is the smallest share of its rest volume that an element has.
+    /// Unhooks instruments from what they pierced, hooked or crushed beyond what tissue bears, lets
+    /// tissue feel them again when all is well, and puts right what does not come back by itself.
+    /// `least` is the smallest share of its rest volume that an element has.
     fn look_after(&mut self, least: f64, events: &mut Vec<CellEvent>) {
         if least > SQUEEZED && !self.stations.iter().any(Station::meets_tissue) && self.waits.iter().all(|w| *w == 0) {
             return;
@@ -289,7 +297,8 @@ impl Cell {
         &self.world
     }
 
-    /// Length of the most stretched edge of any organ now over that at rest: privileged, too. Takes a pass over all edges.
+    /// Length of the most stretched edge of any organ now over that at rest: privileged, too. Takes
+    /// a pass over all edges.
     pub fn max_stretch(&mut self) -> f64 {
         self.edges.strains(&self.world, 1.0).iter().fold(1.0, |most, s| s.stretch.max(most))
     }
@@ -299,7 +308,8 @@ impl Cell {
         self.timing
     }
 
-    /// How far an arm's jaws and what they hold have gone since they closed on it; None while they hold nothing.
+    /// How far an arm's jaws and what they hold have gone since they closed on it; None while they
+    /// hold nothing.
     pub(crate) fn moved(&self, k: usize) -> Option<Moved> {
         self.stations[k].moved(&self.world)
     }

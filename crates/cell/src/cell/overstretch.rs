@@ -1,11 +1,16 @@
 //! Tissue that an instrument has hooked or crushed beyond what tissue bears.
 //!
-//! Real tissue tears at a stretch of about two; ours has no such end. So where an edge of an organ is longer than [`MOST`] times its rest length, or an element has less than [`CRUSHED`] of its rest
-//! volume, the nearest instrument lets go of what it holds and is not felt until all tissue is below [`REST`] and above [`ROUND`] again. One that holds by a latch keeps its hold at first and only presses no more;
-//! it lets go beyond [`FAR_TOO_MUCH`]. Each of these is told as an event, and no figure of merit counts on it.
+//! Real tissue tears at a stretch of about two; ours has no such end. So where an edge of an organ
+//! is longer than [`MOST`] times its rest length, or an element has less than [`CRUSHED`] of its
+//! rest volume, the nearest instrument lets go of what it holds and is not felt until all tissue is
+//! below [`REST`] and above [`ROUND`] again. One that holds by a latch keeps its hold at first and
+//! only presses no more; it lets go beyond [`FAR_TOO_MUCH`]. Each of these is told as an event, and
+//! no figure of merit counts on it.
 //!
-//! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold lock each other, whatever the energy. An organ that is beyond these limits and that no instrument is at, or
-//! that stays beyond [`REST`] or [`ROUND`] for [`PATIENCE`], is put right outside of time ([`trocar_tissue::State::relax`]), and that is told, too.
+//! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold
+//! lock each other, whatever the energy. An organ that is beyond these limits and that no
+//! instrument is at, or that stays beyond [`REST`] or [`ROUND`] for [`PATIENCE`], is put right
+//! outside of time ([`trocar_tissue::State::relax`]), and that is told, too.
 
 use crate::World;
 use glam::DVec3;
@@ -19,19 +24,23 @@ pub(super) const FAR_TOO_MUCH: f64 = 6.5;
 /// Stretch of all edges at which it is felt again.
 pub(super) const REST: f64 = 3.0;
 
-/// Share of its rest volume below which an element is crushed: less than the strongest grasps of the lifts leave. Below a thousandth solvers make no way any more.
+/// Share of its rest volume below which an element is crushed: less than the strongest grasps of
+/// the lifts leave. Below a thousandth solvers make no way any more.
 pub(super) const CRUSHED: f64 = 0.01;
 
 /// Share of which every element has to have more for an instrument to be felt again.
 pub(super) const ROUND: f64 = 0.05;
 
-/// Tissue that no instrument meets is looked at where an element has less than this share of its rest volume.
+/// Tissue that no instrument meets is looked at where an element has less than this share of its
+/// rest volume.
 pub(super) const SQUEEZED: f64 = 0.2;
 
-/// Frames that an organ may stay beyond [`REST`] and [`ROUND`] after the last instrument has let go of it: what is elastic has come back by then.
+/// Frames that an organ may stay beyond [`REST`] and [`ROUND`] after the last instrument has let go
+/// of it: what is elastic has come back by then.
 pub(super) const PATIENCE: u32 = 15;
 
-/// An instrument farther than this from where tissue is strained most has nothing to do with it [m].
+/// An instrument farther than this from where tissue is strained most has nothing to do with it
+/// [m].
 pub(super) const NEAR: f64 = 0.03;
 
 /// How far an organ is from its rest shape at worst.
@@ -51,7 +60,9 @@ impl Strain {
         self.is_beyond(false)
     }
 
-    /// Beyond what an instrument stays for. `latched`: its latch alone holds the organ, and its blades press on nothing. How hard that may pull is for the tearing force to say; the stretch only ends what solvers bear.
+    /// Beyond what an instrument stays for. `latched`: its latch alone holds the organ, and its
+    /// blades press on nothing. How hard that may pull is for the tearing force to say; the stretch
+    /// only ends what solvers bear.
     pub fn is_beyond(&self, latched: bool) -> bool {
         self.stretch > if latched { FAR_TOO_MUCH } else { MOST } || self.volume < CRUSHED
     }
@@ -104,7 +115,8 @@ impl Edges {
         Self { bodies: bodies.collect(), cuts: world.cuts, positions: Vec::new() }
     }
 
-    /// The strain of every body; `least` is the smallest share of its rest volume that any element has.
+    /// The strain of every body; `least` is the smallest share of its rest volume that any element
+    /// has.
     pub fn strains(&mut self, world: &World, least: f64) -> Vec<Strain> {
         if self.cuts != world.cuts {
             *self = Self::of(world);

@@ -84,7 +84,8 @@ fn move_organ(organ: &mut Organ, pose: &Pose) {
     }
 }
 
-/// The end of `organ` that is farther from the port of the arm that grasps; found only where the rule asks for it.
+/// The end of `organ` that is farther from the port of the arm that grasps; found only where the
+/// rule asks for it.
 fn far_end(scene: &Scene, organ: &Organ, rule: Option<&PinRule>) -> Result<End> {
     let port = scene.grasping_arm().and_then(|arm| scene.port(&arm.port));
     let (Some(PinRule::End { end: PinEnd::Far, .. }), Some(port)) = (rule, port) else { return Ok(End::Tip) };

@@ -40,13 +40,17 @@ pub struct ArmObservation {
     pub tilt: f64,
     /// What was commanded for the end of the period.
     pub commanded: Coordinates,
-    /// What is left of the wanted orientation: axis times angle [rad] in the cell of the turn from the commanded to the wanted one.
+    /// What is left of the wanted orientation: axis times angle [rad] in the cell of the turn from
+    /// the commanded to the wanted one.
     pub rejected_rotation: DVec3,
-    /// The command stops short of what was asked: it was too far for one period, below the cell's floor, or against a force near the limit.
+    /// The command stops short of what was asked: it was too far for one period, below the cell's
+    /// floor, or against a force near the limit.
     pub held_back: bool,
-    /// It was the force: the scene's `safety.force_limit_n` shortened the last command, or turned it back.
+    /// It was the force: the scene's `safety.force_limit_n` shortened the last command, or turned
+    /// it back.
     pub guarded: bool,
-    /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is latched its constraint force, otherwise contact.
+    /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is
+    /// latched its constraint force, otherwise contact.
     pub force: TaggedForce,
     /// Contact force on shaft and blades [N], whether a grasp is latched or not.
     pub contact: DVec3,
@@ -145,7 +149,8 @@ pub enum CellEvent {
         /// Pieces that the organ now is in: 1 where the scene parts nothing.
         pieces: usize,
     },
-    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until it is out and the tissue has come back.
+    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears: it let go of
+    /// it, and passes through until it is out and the tissue has come back.
     Unhooked {
         /// The arm.
         arm: Side,
@@ -156,7 +161,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// Tissue was hooked or crushed beyond what it bears by jaws that hold it: they keep their hold, but their blades are not felt until they let go.
+    /// Tissue was hooked or crushed beyond what it bears by jaws that hold it: they keep their
+    /// hold, but their blades are not felt until they let go.
     Bared {
         /// The arm.
         arm: Side,
@@ -167,7 +173,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// An organ was folded so that it would not come back by itself: it was put right, without regard to time and forces.
+    /// An organ was folded so that it would not come back by itself: it was put right, without
+    /// regard to time and forces.
     Relaxed {
         /// Name of the organ.
         organ: String,
@@ -183,7 +190,8 @@ pub enum CellEvent {
         /// The force [N].
         force_n: f64,
     },
-    /// The instruments came into each other, which real ones would not: they do not push each other here.
+    /// The instruments came into each other, which real ones would not: they do not push each other
+    /// here.
     InstrumentsTouch {
         /// How deep [mm].
         depth_mm: f64,
@@ -258,7 +266,8 @@ pub struct CellReport {
     pub time: f64,
     /// The arms, the left one first.
     pub arms: Vec<ArmObservation>,
-    /// Gap between the two instruments at its end [m]: negative where they are inside each other, for they do not push each other.
+    /// Gap between the two instruments at its end [m]: negative where they are inside each other,
+    /// for they do not push each other.
     pub clearance: f64,
     /// The tissue.
     pub tissue: TissueObservation,

@@ -1,4 +1,5 @@
-//! Another start for a cell that is there already: arms elsewhere, tissue as it was saved, time at zero.
+//! Another start for a cell that is there already: arms elsewhere, tissue as it was saved, time at
+//! zero.
 
 use super::station::Moving;
 use super::{Cell, CellState, build};
@@ -7,17 +8,20 @@ use trocar_robot::instrument::Coordinates;
 use trocar_scene::{Port, Start};
 
 impl Cell {
-    /// Coordinates of the arm at place `k` that stands as `start` says in the scene's `port`, as near as its limits let it.
+    /// Coordinates of the arm at place `k` that stands as `start` says in the scene's `port`, as
+    /// near as its limits let it.
     pub fn start_coordinates(&self, k: usize, start: &Start, port: &Port) -> Coordinates {
         let fixed = &self.stations[k].fixed;
         fixed.limits.clamp(&build::start(start, port, &fixed.port, &fixed.blades)).0
     }
 
-    /// Takes the tissue and the grasp designs of `state`, lets go of all, puts the arms at rest at `starts`, one an arm, and begins at time zero. The same state and starts give the same bits
+    /// Takes the tissue and the grasp designs of `state`, lets go of all, puts the arms at rest at
+    /// `starts`, one an arm, and begins at time zero. The same state and starts give the same bits
     /// whatever the cell did before.
     ///
     /// # Errors
-    /// A state of another cell, or a start that an arm does not reach: the cell is then to be restored or restarted.
+    /// A state of another cell, or a start that an arm does not reach: the cell is then to be
+    /// restored or restarted.
     pub fn restart(&mut self, state: &CellState, starts: &[Coordinates]) -> Result<()> {
         if starts.len() != self.stations.len() {
             let (given, here) = (starts.len(), self.stations.len());

@@ -8,7 +8,8 @@ use crate::world::WorldState;
 use trocar_robot::manipulator::ManipulatorState;
 use xxhash_rust::xxh3::Xxh3;
 
-/// Everything of a [`Cell`] that changes: tissue with its cuts and grasps, arms, controllers, jaws, loads, time. Plain data.
+/// Everything of a [`Cell`] that changes: tissue with its cuts and grasps, arms, controllers, jaws,
+/// loads, time. Plain data.
 #[derive(Clone, Debug)]
 pub struct CellState {
     world: WorldState,
@@ -27,7 +28,8 @@ impl CellState {
         self.waits.iter().for_each(|w| hash.update(&w.to_le_bytes()));
         hash.update(&[u8::from(self.touch)]);
         for (arm, manipulator) in &self.arms {
-            // Printed numbers are as exact as their bits: the shortest text that reads back as the same.
+            // Printed numbers are as exact as their bits: the shortest text that reads back as the
+            // same.
             hash.update(format!("{:?}", manipulator).as_bytes());
             for number in arm.numbers() {
                 hash.update(&number.to_bits().to_le_bytes());
@@ -50,7 +52,8 @@ impl Cell {
         }
     }
 
-    /// Puts back a state that this cell, or another of the same scene and specimen, gave. What comes after is the same to the bit.
+    /// Puts back a state that this cell, or another of the same scene and specimen, gave. What
+    /// comes after is the same to the bit.
     ///
     /// # Errors
     /// A state of a cell with other arms or organs.

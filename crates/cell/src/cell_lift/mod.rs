@@ -1,6 +1,8 @@
-//! A scripted grasp-lift in the cell: an arm comes through its port, closes its jaws on an organ, lifts it 15 mm in a second and holds it for one.
+//! A scripted grasp-lift in the cell: an arm comes through its port, closes its jaws on an organ,
+//! lifts it 15 mm in a second and holds it for one.
 //!
-//! The script is a [`Policy`]: all it does goes through actions, thirty a second, and so through ports, controllers and arms. What it grasps is chosen as in [`crate::GraspLift`].
+//! The script is a [`Policy`]: all it does goes through actions, thirty a second, and so through
+//! ports, controllers and arms. What it grasps is chosen as in [`crate::GraspLift`].
 
 mod record;
 
@@ -26,7 +28,8 @@ const APPROACH_SPEED: f64 = 0.03;
 /// Longest wait for the jaws to take hold [s].
 const LONGEST_CLOSE: f64 = 1.5;
 
-/// Most that the jaws may miss the place by [m]: on flat organs the blades' tips reach the cell's floor first.
+/// Most that the jaws may miss the place by [m]: on flat organs the blades' tips reach the cell's
+/// floor first.
 const MISSED: f64 = 8e-3;
 
 /// The task.
@@ -42,7 +45,8 @@ pub struct CellLift {
     pub lift: f64,
     /// How the jaws hold; `None`: as they are set.
     pub design: Option<GraspDesign>,
-    /// The jaws first drag the tissue sideways by this much [m], by a live-pose grasp, let go of it there and close again.
+    /// The jaws first drag the tissue sideways by this much [m], by a live-pose grasp, let go of it
+    /// there and close again.
     pub regrasp: Option<f64>,
 }
 
@@ -160,7 +164,8 @@ impl CellLiftPolicy {
         Ok(())
     }
 
-    /// The tip's pose with the tissue in mid-mouth, the shaft through its port, the jaws across the organ; and its coordinates.
+    /// The tip's pose with the tissue in mid-mouth, the shaft through its port, the jaws across the
+    /// organ; and its coordinates.
     fn choose(&self, cell: &Cell) -> Result<(Pose, Coordinates)> {
         let (world, arm) = (cell.world(), &self.task.arm);
         let target = Target::choose(world, self.organ, self.task.at, 0.0)?;
@@ -174,7 +179,8 @@ impl CellLiftPolicy {
             let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
             Pose { rotation, translation: at - GRIP_DISTANCE * x }
         };
-        // The blades are alike: of the two ways round, the one that the wrist reaches with less of a turn.
+        // The blades are alike: of the two ways round, the one that the wrist reaches with less of
+        // a turn.
         let near = Coordinates { jaw: 1.0, ..self.from };
         let turn = |s: &Solution| (s.coordinates.roll - near.roll).abs() + 10.0 * s.excess.roll.abs();
         let (a, b) = (cell.solve(arm, &pose(hinge), &near)?, cell.solve(arm, &pose(-hinge), &near)?);
@@ -249,12 +255,14 @@ impl CellLift {
     /// Runs the task in `cell`.
     ///
     /// # Errors
-    /// Names the arm or organ that is not there, the option out of range, the place that cannot be grasped; an interruption.
+    /// Names the arm or organ that is not there, the option out of range, the place that cannot be
+    /// grasped; an interruption.
     pub fn run(&self, cell: &mut Cell, progress: &dyn Progress) -> Result<CellLiftRun> {
         self.run_watched(cell, progress, &mut |_, _| {})
     }
 
-    /// The same, with `watch` shown the cell and the phase's name before the first period and after each.
+    /// The same, with `watch` shown the cell and the phase's name before the first period and after
+    /// each.
     ///
     /// # Errors
     /// As [`CellLift::run`].

@@ -76,7 +76,8 @@ pub struct CellLiftSummary {
     pub rcm_free_median_mm: f64,
     /// Largest RCM deviation of the whole run [mm].
     pub rcm_run_max_mm: f64,
-    /// RCM deviation in the period before the last grasp, and the largest in the 0.3 s after it [mm].
+    /// RCM deviation in the period before the last grasp, and the largest in the 0.3 s after it
+    /// [mm].
     pub rcm_before_grasp_mm: f64,
     /// See there [mm].
     pub rcm_after_grasp_mm: f64,

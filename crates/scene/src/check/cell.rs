@@ -6,7 +6,8 @@ use crate::cell::SIMPLE;
 use crate::{Arm, ArmModel, Frame, Instrument, Port, Scene, Start};
 use glam::DVec3;
 
-/// Height of the FR3's shoulder above its base, and how far its flange gets from there [m] (Franka's data sheet: reach 855 mm).
+/// Height of the FR3's shoulder above its base, and how far its flange gets from there [m]
+/// (Franka's data sheet: reach 855 mm).
 const FR3_SHOULDER: f64 = 0.333;
 const FR3_REACH: f64 = 0.855;
 
@@ -179,7 +180,8 @@ fn posture(field: &str, one: &Arm) -> Checked {
     Ok(())
 }
 
-/// The instrument goes through the port, leans no farther than the hole lets it, and the arm gets there.
+/// The instrument goes through the port, leans no farther than the hole lets it, and the arm gets
+/// there.
 fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f64) -> Checked {
     let (shaft, hole) = (instrument.shaft_diameter_mm, port.hole_diameter_mm);
     let Some(limit) = port.tilt_limit(shaft) else {
@@ -197,7 +199,8 @@ fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f
     if one.source() != Some(ArmModel::FrankaFr3) {
         return Ok(());
     }
-    // The flange is at the instrument's other end; a mount of its own moves it by no more than its length.
+    // The flange is at the instrument's other end; a mount of its own moves it by no more than its
+    // length.
     let flange = one.start.tip(port) - instrument.length() * one.start.direction(port);
     let shoulder = one.base.pose().transform(FR3_SHOULDER * DVec3::Z);
     let far = flange.distance(shoulder) - DVec3::from(instrument.mount.position_m).length();

@@ -51,7 +51,8 @@ fn along(cell: &Cell, body: usize, s: f64) -> DVec3 {
     at(s + CHORD) - at(s - CHORD)
 }
 
-/// The aim of `arm` at the cluster of `body` nearest to `s` that may be grasped, `depth` [m] from the pivot in its mouth.
+/// The aim of `arm` at the cluster of `body` nearest to `s` that may be grasped, `depth` [m] from
+/// the pivot in its mouth.
 pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, s: f64, range: [f64; 2], depth: f64) -> Result<Aim> {
     let world = cell.world();
     let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, REACH)).collect();
@@ -67,7 +68,8 @@ pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, s: f64, range: [f64; 2]
     at(cell, arm, body, cluster.s, cluster.centroid(world, body), depth)
 }
 
-/// The aim of `arm` at a point of `body` near `s`: shaft through the port, jaws across the organ, the point `depth` [m] from the pivot.
+/// The aim of `arm` at a point of `body` near `s`: shaft through the port, jaws across the organ,
+/// the point `depth` [m] from the pivot.
 pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, depth: f64) -> Result<Aim> {
     let along = along(cell, body, s);
     let x = (point - cell.port(arm)?.centre()).normalize_or(-DVec3::Z);
@@ -76,7 +78,8 @@ pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, dept
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
         Pose { rotation, translation: point - depth * x }
     };
-    // The blades are alike: of the two ways round, the one that the wrist reaches with less of a turn.
+    // The blades are alike: of the two ways round, the one that the wrist reaches with less of a
+    // turn.
     let near = Coordinates { jaw: 1.0, ..cell.setpoint(arm)? };
     let turn = |s: &Solution| (s.coordinates.roll - near.roll).abs() + 10.0 * s.excess.roll.abs();
     let (a, b) = (cell.solve(arm, &pose(hinge), &near)?, cell.solve(arm, &pose(-hinge), &near)?);

@@ -1,4 +1,5 @@
-//! Policies: what moves an episode. Six controllers come with the program: a scripted one that passes, and five that are worse in one way each.
+//! Policies: what moves an episode. Six controllers come with the program: a scripted one that
+//! passes, and five that are worse in one way each.
 
 mod aim;
 mod perturbed;
@@ -26,7 +27,8 @@ pub trait Policy {
     /// An episode that it cannot do.
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()>;
 
-    /// The next 1 to [`CHUNK`] actions, one a control period. What is to be scored looks at [`Episode::observe`] alone; scripts may look at the tissue too.
+    /// The next 1 to [`CHUNK`] actions, one a control period. What is to be scored looks at
+    /// [`Episode::observe`] alone; scripts may look at the tissue too.
     ///
     /// # Errors
     /// Ends the episode as [`crate::End::PolicyError`].

@@ -7,11 +7,13 @@ use std::collections::VecDeque;
 use trocar_cell::{Action, ActionSpace};
 use trocar_robot::instrument::Coordinates;
 
-/// Standard deviation of the noise on pivots [rad]: about 3 mm at the tip. On roll ten times as much.
+/// Standard deviation of the noise on pivots [rad]: about 3 mm at the tip. On roll ten times as
+/// much.
 pub const NOISE_RAD: f64 = 0.03;
 /// And on the insertion [m].
 pub const NOISE_M: f64 = 0.003;
-/// The noise is drawn so often a second [Hz] and goes straight in between: a hand's tremor and drift, not a buzz that arms filter out.
+/// The noise is drawn so often a second [Hz] and goes straight in between: a hand's tremor and
+/// drift, not a buzz that arms filter out.
 const NOISE_HZ: f64 = 2.0;
 /// How late actions come [s].
 pub const DELAY_S: f64 = 0.5;
@@ -21,7 +23,8 @@ pub const OFFSET_MM: f64 = 5.0;
 /// Distance from port to organ that turns millimetres into pivots [m].
 const ARM: f64 = 0.12;
 
-/// Changes each arm's coordinates and keeps them within the limits; other action spaces are left as they are.
+/// Changes each arm's coordinates and keeps them within the limits; other action spaces are left as
+/// they are.
 fn changed(episode: &Episode, action: Action, mut change: impl FnMut(usize, &mut Coordinates)) -> Result<Action> {
     if action.space != ActionSpace::Pivots {
         return Ok(action);

@@ -10,7 +10,8 @@ use trocar_robot::instrument::Coordinates;
 /// Time from one random place to the next [s].
 const HOP_S: f64 = 2.0;
 
-/// Goes from one random place within the arms' limits to the next, jaws included; half of the time deep, where the tissue is.
+/// Goes from one random place within the arms' limits to the next, jaws included; half of the time
+/// deep, where the tissue is.
 #[derive(Clone, Debug)]
 pub struct RandomWalk {
     random: Random,

@@ -1,6 +1,8 @@
-//! The scripted finite-state baseline (SPEC E3): grasp at the organ's middle, lift, bring the cutter to the tissue between grasp and base, open, engage, close.
+//! The scripted finite-state baseline (SPEC E3): grasp at the organ's middle, lift, bring the
+//! cutter to the tissue between grasp and base, open, engage, close.
 //!
-//! It looks at where the tissue is, which no policy that is scored may; all it does goes through actions, and so through ports, controllers and arms.
+//! It looks at where the tissue is, which no policy that is scored may; all it does goes through
+//! actions, and so through ports, controllers and arms.
 
 use super::aim::{self, Aim, between, eased};
 use super::{CHUNK, Policy};
@@ -20,10 +22,12 @@ const SLOW: f64 = 0.025;
 
 /// Tissue is taken this far from the pivot: in mid-mouth by the grasper [m] ...
 const GRASP_DEPTH: f64 = 0.0115;
-/// ... and farther out by the cutter, where the gap of nearly closed blades is still wider than their skin (SPEC C3).
+/// ... and farther out by the cutter, where the gap of nearly closed blades is still wider than
+/// their skin (SPEC C3).
 const CUT_DEPTH: f64 = 0.0140;
 
-/// Way along the organ from the middle of the grasp to the cut [m]: half of a grasper's blade and half of a cutter's, and as much between them as either jaw's aim may be off.
+/// Way along the organ from the middle of the grasp to the cut [m]: half of a grasper's blade and
+/// half of a cutter's, and as much between them as either jaw's aim may be off.
 const BESIDE: f64 = 0.0060;
 
 /// Lift of the jaws [m] above what the gate asks for.
@@ -33,7 +37,8 @@ const ABOVE_GATE: f64 = 0.0025;
 const LIFT_S: f64 = 1.5;
 const CLOSE_S: f64 = 1.5;
 
-/// Speed of the greedy one over that of the careful one, and the time that it gives jaws to close [s]: what they take on nothing and a little more.
+/// Speed of the greedy one over that of the careful one, and the time that it gives jaws to close
+/// [s]: what they take on nothing and a little more.
 const HASTE: f64 = 3.0;
 const SNATCH_S: f64 = 0.4;
 
@@ -48,7 +53,8 @@ const TRIES: usize = 3;
 pub enum Style {
     /// Comes along the shaft, waits for what it has begun, tries again.
     Careful,
-    /// Straight to everything at three times the speed, open loop: no way round, no looking whether jaws have taken hold or the lift has lasted, no second try.
+    /// Straight to everything at three times the speed, open loop: no way round, no looking whether
+    /// jaws have taken hold or the lift has lasted, no second try.
     Greedy,
 }
 
@@ -80,7 +86,8 @@ pub struct Scripted {
     /// Where each arm goes from and to in this phase.
     from: Vec<Coordinates>,
     to: Vec<Coordinates>,
-    /// What it asked of each arm last. Not what the cell was told: who changes its actions on the way must not shift where its next phase begins, or a constant offset grows with every phase.
+    /// What it asked of each arm last. Not what the cell was told: who changes its actions on the
+    /// way must not shift where its next phase begins, or a constant offset grows with every phase.
     last: Vec<Coordinates>,
     /// The grasp, as it was aimed at.
     grasp: Option<Aim>,
@@ -99,7 +106,8 @@ impl Scripted {
         Self { style, name, phase: Phase::Rest, done: 0, count: 0, from, to, last, grasp: None, lift: 0.0, tries: 0 }
     }
 
-    /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on, an appendix whose base is held is pinned, and pinned tissue feels no blade.
+    /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on,
+    /// an appendix whose base is held is pinned, and pinned tissue feels no blade.
     fn cut_at(&self, episode: &Episode, body: usize) -> f64 {
         let grasp = self.grasp.as_ref().map_or(0.5, |g| g.s);
         let length = episode.cell().world().axes[body].length.max(1e-3);

@@ -1,4 +1,5 @@
-//! Where an arm's instrument is among the tissue: what it is near, what it has gone into, and that it lets go.
+//! Where an arm's instrument is among the tissue: what it is near, what it has gone into, and that
+//! it lets go.
 
 use super::Station;
 use crate::World;
@@ -28,7 +29,8 @@ impl Station {
         self.now.held.as_ref().is_some_and(|held| held.organ == organ)
     }
 
-    /// Its convex parts where they are now, as far as they are round. The rest offset is the blades' thickness.
+    /// Its convex parts where they are now, as far as they are round. The rest offset is the
+    /// blades' thickness.
     pub fn rods(&self) -> Vec<Rod> {
         let rods = self.frames().into_iter().flat_map(|(tool, frame)| {
             let parts = self.fixed.parts.iter().filter(move |part| part.tool == tool);
@@ -49,7 +51,8 @@ impl Station {
         [(self.fixed.tools.gripper, self.now.gripper.pose), one, two]
     }
 
-    /// The organ that a part of the instrument has gone into, but for what the jaws hold and what blades shear.
+    /// The organ that a part of the instrument has gone into, but for what the jaws hold and what
+    /// blades shear.
     pub fn pierces(&self, world: &World) -> Option<usize> {
         let felt = if self.now.shears.is_some() || self.now.bare { 1 } else { 3 };
         self.pierced_by(world, felt)
@@ -72,7 +75,8 @@ impl Station {
         None
     }
 
-    /// Holds on by its latch alone: the blades are felt no more. False where they are so already, or where nothing but the blades holds.
+    /// Holds on by its latch alone: the blades are felt no more. False where they are so already,
+    /// or where nothing but the blades holds.
     pub fn bare(&mut self) -> bool {
         let can = !self.now.bare && self.force_kind() == ForceKind::Constraint;
         self.now.bare |= can;

@@ -68,10 +68,12 @@ impl Station {
         }
     }
 
-    /// Blades that close through tissue cut it, after they were open with tissue between them all the while (SPEC E1): the organ, and the cutter as wide as it was open.
+    /// Blades that close through tissue cut it, after they were open with tissue between them all
+    /// the while (SPEC E1): the organ, and the cutter as wide as it was open.
     ///
-    /// What closes past each other with edges shears: it goes through what lies between instead of pressing it flat. So from the closing on tissue does not feel the blades, until none is left where the
-    /// open blades were and they are out of all organs. The shaft is felt all the while.
+    /// What closes past each other with edges shears: it goes through what lies between instead of
+    /// pressing it flat. So from the closing on tissue does not feel the blades, until none is left
+    /// where the open blades were and they are out of all organs. The shaft is felt all the while.
     pub(super) fn cut(&mut self, world: &World) -> Option<(usize, Gripper)> {
         let length = self.fixed.blades.length;
         let between = |open: &Gripper| Mouth::sized(open, length).fullest(world).map(|(organ, _)| organ);
@@ -95,7 +97,8 @@ impl Station {
         None
     }
 
-    /// The organ that is held has been cut into `pieces`; `was` is the centroid of what is held before [m].
+    /// The organ that is held has been cut into `pieces`; `was` is the centroid of what is held
+    /// before [m].
     pub fn follow_cut(&mut self, world: &World, pieces: &[Piece], was: DVec3) {
         let Moving { held, gripper, .. } = &mut self.now;
         if let Some(held) = held {
@@ -104,7 +107,8 @@ impl Station {
         }
     }
 
-    /// The tissue between the blades now, and its organ; of blades that shear, between them as wide as they were.
+    /// The tissue between the blades now, and its organ; of blades that shear, between them as wide
+    /// as they were.
     pub fn tissue(&self, world: &World) -> Option<(usize, Mouthful)> {
         let jaw_angle = self.now.shears.unwrap_or(self.now.gripper.jaw_angle);
         Mouth::sized(&Gripper { jaw_angle, ..self.now.gripper }, self.fixed.blades.length).fullest(world)

@@ -26,7 +26,8 @@ const PRESSING: f64 = 0.95;
 /// Height at which tissue feels an instrument no more [m].
 const FAR: f64 = 100.0;
 
-/// Jaws are told to close, or to open, when the opening asked for is beyond the one they have by this much.
+/// Jaws are told to close, or to open, when the opening asked for is beyond the one they have by
+/// this much.
 const MEANT: f64 = 0.02;
 
 /// What never changes of an arm.
@@ -97,7 +98,8 @@ pub(super) struct Moving {
     pub exchange: Exchange,
     pub forces: [ToolForce; 3],
     scissors: Scissors,
-    /// A cutter's blades are closing, or have closed, through tissue: how wide they were [rad]. They shear it then and press none of it.
+    /// A cutter's blades are closing, or have closed, through tissue: how wide they were [rad].
+    /// They shear it then and press none of it.
     shears: Option<f64>,
     pub held: Option<Held>,
     /// Tissue does not feel the instrument for now.
@@ -118,7 +120,8 @@ pub(super) struct Station {
 }
 
 impl Station {
-    /// What an action's five numbers for this arm ask for; `first` is the place of the first of them.
+    /// What an action's five numbers for this arm ask for; `first` is the place of the first of
+    /// them.
     pub fn target(&self, action: &Action, first: usize) -> Result<Wanted> {
         let (space, limits) = (action.space, &self.fixed.limits);
         let n = &action.numbers[first..first + NUMBERS];
@@ -220,7 +223,8 @@ impl Station {
         motions
     }
 
-    /// A tissue frame is over: takes its forces, and lets the jaws take hold and let go. What a cutter closed through: the organ, and the cutter as wide as it was open.
+    /// A tissue frame is over: takes its forces, and lets the jaws take hold and let go. What a
+    /// cutter closed through: the organ, and the cutter as wide as it was open.
     pub fn after_frame(&mut self, world: &mut World, events: &mut Vec<CellEvent>) -> Option<(usize, Gripper)> {
         let Self { fixed, now, .. } = self;
         now.forces = fixed.tools.forces(world.forces());
@@ -268,7 +272,8 @@ impl Station {
 }
 
 impl Fixed {
-    /// The deepest insertion [m] at these pivots with which the tips of closed blades stay above the floor.
+    /// The deepest insertion [m] at these pivots with which the tips of closed blades stay above
+    /// the floor.
     fn deepest(&self, at: &Coordinates) -> f64 {
         let tip = self.port.tip(at);
         let along = tip.rotation * DVec3::X;

@@ -60,7 +60,8 @@ impl Moving {
         }
     }
 
-    /// Every number of the state, for its hash; the manipulator's and the tissue's are not among them.
+    /// Every number of the state, for its hash; the manipulator's and the tissue's are not among
+    /// them.
     pub fn numbers(&self) -> Vec<f64> {
         let (wanted, rejected) = match self.wanted {
             Wanted::Coordinates(c, rejected) => (c.to_action().to_vec(), rejected),
