@@ -27,7 +27,7 @@ pub enum GraspDesign {
 /// jaws.
 const SPRING: f64 = 20.0;
 
-/// Pull at which tissue tears out of the jaws [N]: a wall of 1 mm (two layers of 0.5) over the 5 mm
+/// Pull at which tissue tears out of the jaws (N): a wall of 1 mm (two layers of 0.5) over the 5 mm
 /// of the blades at a strength of 1 MPa.
 const TEAR_FORCE: f64 = 5.0;
 
@@ -45,7 +45,7 @@ impl GraspDesign {
         }
     }
 
-    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` [N] whose gripper,
+    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` (N) whose gripper,
     /// `tools` of the step, is at `pose`; none for friction, which needs none.
     pub fn grasp(
         self,

@@ -8,19 +8,19 @@ use glam::{DMat3, DQuat, DVec3};
 use trocar_geometry::{Pose, TriMesh};
 use trocar_tissue::ToolMotion;
 
-/// Widest angle between the blades [rad] (SPEC: theta_max 60 degrees).
+/// Widest angle between the blades (rad) (SPEC: theta_max 60 degrees).
 pub const MAX_ANGLE: f64 = std::f64::consts::FRAC_PI_3;
 
-/// Distance from the pivot at which tissue is taken [m]: the middle of the mouth.
+/// Distance from the pivot at which tissue is taken (m): the middle of the mouth.
 pub(crate) const GRIP_DISTANCE: f64 = 0.0115;
 
-/// The mouth begins this far beyond the pivot [m].
-pub(crate) const MOUTH_BEGIN: f64 = 0.002;
-/// The blades and the mouth end there [m].
+/// The mouth begins this far beyond the pivot (m).
+pub(crate) const JAW_REGION_BEGIN: f64 = 0.002;
+/// The blades and the mouth end there (m).
 pub(crate) const BLADE_TIP: f64 = 0.021;
 pub(crate) const BLADE_WIDTH: f64 = 0.005;
 pub(crate) const BLADE_THICKNESS: f64 = 0.0032;
-/// Width of a cutter's blade [m].
+/// Width of a cutter's blade (m).
 const CUTTER_WIDTH: f64 = 0.0012;
 pub(crate) const SHAFT_RADIUS: f64 = 0.0025;
 pub(crate) const SHAFT_LENGTH: f64 = 0.12;
@@ -30,7 +30,7 @@ pub(crate) const SHAFT_LENGTH: f64 = 0.12;
 pub struct Gripper {
     /// Pose of the gripper frame in the world (the recording frame).
     pub pose: Pose,
-    /// Angle between the blades [rad].
+    /// Angle between the blades (rad).
     pub jaw_angle: f64,
 }
 
@@ -58,18 +58,18 @@ impl Gripper {
         [ToolMotion { from: self.pose, to: next.pose }, blade(1.0), blade(-1.0)]
     }
 
-    /// Half the gap between the blades at distance `r` from the pivot [m].
+    /// Half the gap between the blades at distance `r` from the pivot (m).
     pub fn half_gap(&self, r: f64) -> f64 {
         r * (0.5 * self.jaw_angle).sin()
     }
 
-    /// The angle at which the blades touch tissue that reaches `half_width` [m] to either side in
+    /// The angle at which the blades touch tissue that reaches `half_width` (m) to either side in
     /// mid-mouth.
     pub fn angle_for(half_width: f64) -> f64 {
         (2.0 * (half_width / GRIP_DISTANCE).clamp(0.0, 1.0).asin()).min(MAX_ANGLE)
     }
 
-    /// Surface of the shaft and the two blades in the world [m], for pictures.
+    /// Surface of the shaft and the two blades in the world (m), for pictures.
     pub fn surface(&self) -> TriMesh {
         self.surface_of(BLADE_WIDTH, BLADE_THICKNESS, 0.0)
     }
@@ -79,7 +79,7 @@ impl Gripper {
         self.surface_of(CUTTER_WIDTH, BLADE_THICKNESS, 0.5 * CUTTER_WIDTH)
     }
 
-    /// Blades of a width and thickness [m], each shifted by `aside` [m] along z, and the shaft.
+    /// Blades of a width and thickness (m), each shifted by `aside` (m) along z, and the shaft.
     fn surface_of(&self, width: f64, thickness: f64, aside: f64) -> TriMesh {
         let mut mesh = TriMesh::default();
         for side in [1.0, -1.0] {

@@ -9,12 +9,12 @@
 use crate::FRAME;
 use crate::gripper::MAX_ANGLE;
 
-/// Force of the jaws [N] unless the user says otherwise: it squeezes the appendix, 9 mm of 12 kPa,
+/// Force of the jaws (N) unless the user says otherwise: it squeezes the appendix, 9 mm of 12 kPa,
 /// to about 3 mm, and two blades with friction 0.6 then bear 0.6 N, of which a lift of 15 mm needs
 /// 0.2 to 0.4. See `docs/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
 
-/// Time that the jaws take from wide open to closed on nothing [s].
+/// Time that the jaws take from wide open to closed on nothing (s).
 const CLOSING_TIME: f64 = 0.3;
 
 /// Share of the way to the budget that one step goes.
@@ -27,40 +27,40 @@ const DEADBAND: f64 = 0.02;
 /// ago is approached with care.
 const FORGETTING: f64 = 0.8;
 
-/// Least motion that gives a secant [rad]; with less, the tissue's creep would be taken for its
+/// Least motion that gives a secant (rad); with less, the tissue's creep would be taken for its
 /// stiffness.
 const LEAST_MOTION: f64 = 1e-4;
 
 /// A jaw that is driven by force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jaw {
-    /// Force with which it presses [N].
+    /// Force with which it presses (N).
     pub budget: f64,
-    /// Widest angle [rad].
+    /// Widest angle (rad).
     max_angle: f64,
-    /// Fastest motion [rad a frame].
+    /// Fastest motion (rad a frame).
     fastest: f64,
-    /// Opening force gained per angle closed [N/rad].
+    /// Opening force gained per angle closed (N/rad).
     stiffness: f64,
-    /// Angle [rad] and opening force [N] a frame ago.
+    /// Angle (rad) and opening force (N) a frame ago.
     last: Option<(f64, f64)>,
 }
 
 impl Jaw {
-    /// A jaw that presses with `budget` [N], opens to [`MAX_ANGLE`](crate::MAX_ANGLE) and closes in
+    /// A jaw that presses with `budget` (N), opens to [`MAX_ANGLE`](crate::MAX_ANGLE) and closes in
     /// 0.3 s.
     pub fn new(budget: f64) -> Self {
         Self::sized(budget, MAX_ANGLE, CLOSING_TIME)
     }
 
-    /// A jaw that presses with `budget` [N], opens to `max_angle` [rad] and closes in
-    /// `closing_time` [s].
+    /// A jaw that presses with `budget` (N), opens to `max_angle` (rad) and closes in
+    /// `closing_time` (s).
     pub fn sized(budget: f64, max_angle: f64, closing_time: f64) -> Self {
         Self { budget, max_angle, fastest: max_angle * FRAME / closing_time, stiffness: 0.0, last: None }
     }
 
-    /// The angle [rad] at the end of the next frame, for a jaw at `angle` that tissue pushes open
-    /// with `force` [N]. 0 to the widest.
+    /// The angle (rad) at the end of the next frame, for a jaw at `angle` that tissue pushes open
+    /// with `force` (N). 0 to the widest.
     pub fn squeeze(&mut self, angle: f64, force: f64) -> f64 {
         self.stiffness *= FORGETTING;
         if let Some((then, was)) = self.last
@@ -80,11 +80,12 @@ impl Jaw {
 
     /// The numbers of its state.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        let (angle, force) = self.last.unwrap_or((-1.0, 0.0));
-        [self.budget, self.stiffness, angle, force].into_iter()
+        let Self { budget, max_angle: _, fastest: _, stiffness, last } = *self;
+        let (angle, force) = last.unwrap_or((-1.0, 0.0));
+        [budget, stiffness, angle, force].into_iter()
     }
 
-    /// The angle [rad] at the end of the next frame on the way to `target` at full speed.
+    /// The angle (rad) at the end of the next frame on the way to `target` at full speed.
     pub fn turn_to(&mut self, angle: f64, target: f64) -> f64 {
         self.last = None;
         self.stiffness = 0.0;

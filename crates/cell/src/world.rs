@@ -9,16 +9,16 @@ use trocar_tissue::{
     State, Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
 };
 
-/// Length of a frame [s].
+/// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 60.0;
 
-/// Standard gravity [m/s2].
+/// Standard gravity (m/s2).
 pub(crate) const GRAVITY: f64 = 9.80665;
 
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
 
-/// Shear viscosity of tissue over its Young's modulus [s]. Sheared tissue creeps with three times
+/// Shear viscosity of tissue over its Young's modulus (s). Sheared tissue creeps with three times
 /// as long a time constant, 18 ms. The paper damps its elements without saying how much; this lets
 /// the organs of all phantoms come to rest within a second and stays far below the second that a
 /// lift takes.
@@ -165,8 +165,9 @@ impl World {
 
     /// All that changes.
     pub(crate) fn save(&self) -> WorldState {
-        let (model, state, axes) = (self.model.clone(), self.state.clone(), self.axes.clone());
-        WorldState { model, state, axes, cuts: self.cuts }
+        // The upward direction never changes, and the stepper follows the model.
+        let Self { model, state, axes, up: _, stepper: _, cuts } = self;
+        WorldState { model: model.clone(), state: state.clone(), axes: axes.clone(), cuts: *cuts }
     }
 
     /// Puts back what [`World::save`] gave. What comes after is the same to the bit.
@@ -186,6 +187,14 @@ impl World {
         self.axes.clone_from(&saved.axes);
         self.cuts = saved.cuts;
         Ok(())
+    }
+
+    /// Largest distance that any node has moved since `then`, a state of the same model (m).
+    pub(crate) fn largest_motion_since(&self, then: &State) -> f64 {
+        let bodies = self.model.bodies().iter().enumerate();
+        let nodes = bodies.flat_map(|(k, body)| (0..body.len()).map(move |i| (k, i)));
+        let way = |(k, i)| self.state.position(&self.model, k, i).distance(then.position(&self.model, k, i));
+        nodes.map(way).fold(0.0, f64::max)
     }
 
     /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and

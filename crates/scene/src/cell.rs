@@ -68,6 +68,10 @@ impl Side {
 pub struct Arm {
     /// left or right.
     pub name: Side,
+    /// What moves the instrument: dynamics (joint torques, through a port) or ideal (the tip goes
+    /// where it is commanded, within the speed limits of actions; no arm is simulated).
+    #[serde(default, skip_serializing_if = "Drive::is_default")]
+    pub drive: Drive,
     /// franka_fr3, or a URDF (.urdf) or MJCF (.xml, .mjcf) file relative to the scene file.
     #[serde(default = "franka_fr3")]
     pub model: String,
@@ -80,8 +84,9 @@ pub struct Arm {
     /// franka_fr3.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shapes: Option<String>,
-    /// Pose of the base in the cell frame.
-    pub base: Frame,
+    /// Pose of the base in the cell frame. An ideal arm has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<Frame>,
     /// Joint angles towards which the elbow is drawn [degrees], as many as the arm has joints; the
     /// model's own if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -89,8 +94,13 @@ pub struct Arm {
     /// What drives it.
     #[serde(default)]
     pub controller: Controller,
-    /// Name of the port that it works through.
-    pub port: String,
+    /// Name of the port that it works through. An ideal arm may have none: it then moves freely and
+    /// has no RCM.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub port: Option<String>,
+    /// Direction of the shaft of an arm without a port, towards its tip; straight down if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 3]>,
     /// Name of the instrument that it holds.
     pub instrument: String,
     /// Pose of the instrument in the port when an episode starts.
@@ -100,6 +110,24 @@ pub struct Arm {
 
 fn franka_fr3() -> String {
     FRANKA_FR3.to_owned()
+}
+
+/// What moves an instrument.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Drive {
+    /// An arm with a controller, friction and a wrong model of itself, through a port.
+    #[default]
+    Dynamics,
+    /// The tip goes where it is commanded, within the speed limits of actions.
+    Ideal,
+}
+
+impl Drive {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// The model of an arm.
@@ -131,9 +159,29 @@ impl Arm {
     pub fn drawn(&self) -> Option<&str> {
         match (self.shapes.as_deref(), self.source()) {
             (Some(SIMPLE), _) => None,
+            // An ideal arm has no links.
+            _ if self.drive == Drive::Ideal => None,
             (Some(file), _) => Some(file),
             (None, Some(ArmModel::Urdf(file) | ArmModel::Mjcf(file))) => Some(file),
             (None, _) => None,
+        }
+    }
+
+    /// An ideal arm without a port: its instrument starts with the pivot of its jaw at `start_m`.
+    pub fn free(name: Side, instrument: &str, start_m: [f64; 3]) -> Self {
+        Self {
+            name,
+            drive: Drive::Ideal,
+            model: franka_fr3(),
+            flange: None,
+            shapes: None,
+            base: None,
+            posture_deg: Vec::new(),
+            controller: Controller::default(),
+            port: None,
+            direction: None,
+            instrument: instrument.to_owned(),
+            start: Start { position_m: Some(start_m), jaw: 1.0, ..Start::default() },
         }
     }
 
@@ -143,12 +191,14 @@ impl Arm {
         Self {
             name,
             model: franka_fr3(),
+            drive: Drive::Dynamics,
             flange: None,
             shapes: None,
-            base: Frame { position_m: [x, 0.0, 0.0], rotation_wxyz: [half, 0.0, 0.0, half] },
+            base: Some(Frame { position_m: [x, 0.0, 0.0], rotation_wxyz: [half, 0.0, 0.0, half] }),
             posture_deg: Vec::new(),
             controller: Controller::default(),
-            port: name.name().to_owned(),
+            port: Some(name.name().to_owned()),
+            direction: None,
             instrument: instrument.to_owned(),
             start,
         }

@@ -29,9 +29,9 @@ pub use anatomy::{
 };
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
-pub use cell::{Arm, ArmModel, Controller, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Port, Side};
+pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Port, Side};
 pub use error::{Error, Result};
 pub use phantoms::{PHANTOMS, Phantom};
-pub use scene::{Rates, Scene};
+pub use scene::{Rates, Scene, Tool};
 pub use start::Start;
 pub use task::{Gates, GraspDesignName, Safety, Task, TaskName, Variation};

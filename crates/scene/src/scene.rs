@@ -61,6 +61,17 @@ pub struct Scene {
     pub folder: PathBuf,
 }
 
+/// An arm of a scene with its instrument and its port.
+#[derive(Clone, Copy, Debug)]
+pub struct Tool<'a> {
+    /// The arm.
+    pub arm: &'a Arm,
+    /// The port it works through; `None` for an ideal arm that moves freely.
+    pub port: Option<&'a Port>,
+    /// The instrument it holds.
+    pub instrument: &'a Instrument,
+}
+
 /// How often things happen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -143,22 +154,23 @@ impl Scene {
         self.instruments.iter().find(|i| i.name == name)
     }
 
-    /// The arms, the left one first, each with its port and instrument. A checked scene has them
-    /// all.
-    pub fn stations(&self) -> Vec<(&Arm, &Port, &Instrument)> {
+    /// The arms with what they hold, the left one first. A checked scene has a tool for every arm.
+    pub fn tools(&self) -> Vec<Tool<'_>> {
         let mut all = Vec::new();
         for arm in &self.arms {
-            if let (Some(port), Some(instrument)) = (self.port(&arm.port), self.instrument(&arm.instrument)) {
-                all.push((arm, port, instrument));
+            let port = arm.port.as_deref().map(|name| self.port(name));
+            // A port that is named and missing is a mistake, and not an arm without a port.
+            if let (None | Some(Some(_)), Some(instrument)) = (port, self.instrument(&arm.instrument)) {
+                all.push(Tool { arm, port: port.flatten(), instrument });
             }
         }
-        all.sort_by_key(|(arm, _, _)| arm.name);
+        all.sort_by_key(|tool| tool.arm.name);
         all
     }
 
     /// The first arm, the left one before the right one, whose instrument is of that kind.
     pub fn arm_with(&self, kind: InstrumentKind) -> Option<&Arm> {
-        self.stations().into_iter().find(|(_, _, instrument)| instrument.kind == kind).map(|(arm, _, _)| arm)
+        self.tools().into_iter().find(|tool| tool.instrument.kind == kind).map(|tool| tool.arm)
     }
 
     /// The arm that grasps: see [`PinEnd::Far`](crate::PinEnd::Far).

@@ -20,11 +20,15 @@ pub struct Start {
     pub roll_deg: f64,
     /// Jaw opening, 0 (closed) to 1.
     pub jaw: f64,
+    /// Where the pivot of the jaw is in the cell frame [m], of an arm without a port. Tilt, azimuth
+    /// and insertion mean nothing there.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub position_m: Option<[f64; 3]>,
 }
 
 impl Default for Start {
     fn default() -> Self {
-        Self { tilt_deg: 13.3, azimuth_deg: 0.0, insertion_mm: 100.0, roll_deg: 0.0, jaw: 0.5 }
+        Self { tilt_deg: 13.3, azimuth_deg: 0.0, insertion_mm: 100.0, roll_deg: 0.0, jaw: 0.5, position_m: None }
     }
 }
 

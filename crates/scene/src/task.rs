@@ -54,8 +54,16 @@ pub struct Task {
     pub episode_s: f64,
     /// How the grasper holds: friction, rest-pose, live-pose or compliant.
     pub grasp: GraspDesignName,
+    /// How the first grasp of an episode holds, where that differs from `grasp`: for tissue that is
+    /// dragged aside, let go of and grasped again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_grasp: Option<GraspDesignName>,
     /// A cut parts the tissue.
     pub sever: bool,
+    /// The episode ends when its last stage has passed. Without, it runs until its time is up or the
+    /// policy has finished.
+    #[serde(skip_serializing_if = "is_true")]
+    pub stop_when_passed: bool,
     /// When stages count as done.
     pub gates: Gates,
     /// How episodes differ by their seed.
@@ -69,11 +77,18 @@ impl Default for Task {
             organ: "appendix".to_owned(),
             episode_s: 40.0,
             grasp: GraspDesignName::default(),
+            first_grasp: None,
             sever: false,
+            stop_when_passed: true,
             gates: Gates::default(),
             variation: Variation::default(),
         }
     }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 impl Task {

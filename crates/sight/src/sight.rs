@@ -101,8 +101,8 @@ impl Sight {
         sight.rebuild(None)?;
         let room = Room { middle: middle(&placed) };
         let viewers = Viewer::all(scene, specimen.camera.as_ref(), room, &mut sight.stage)?;
-        for (k, (described, _, instrument)) in scene.stations().iter().enumerate() {
-            sight.add_arm(k, (scene, described), instrument, cell)?;
+        for (k, tool) in scene.tools().iter().enumerate() {
+            sight.add_arm(k, (scene, tool.arm), tool.instrument, cell)?;
         }
         sight.organs.iter_mut().for_each(|o| o.shape = None);
         sight.follow(cell)?;

@@ -28,7 +28,7 @@ macro_rules! row {
 row! {
     /// One arm in a period; all zero where the scene has no such arm. Flags are 0 or 1.
     ArmChannels {
-        /// First pivot, measured [rad].
+        /// First pivot, measured [rad]; 0 without a port, as the next two.
         pivot_1_rad,
         /// Second pivot [rad].
         pivot_2_rad,
@@ -102,8 +102,12 @@ row! {
         held_back,
         /// Tissue pushed with more than an arm bears.
         load_limited,
-        /// The instrument passes through tissue that it had crushed or overstretched.
-        unhooked,
+        /// Contact of the instrument with tissue is disabled: it had pierced or strained it.
+        contact_disabled,
+        /// Contact of the blades alone is disabled: they hold tissue that they had strained.
+        blades_disabled,
+        /// The force guard shortened the command.
+        guarded,
     }
 }
 
@@ -160,6 +164,14 @@ row! {
         fallbacks,
         /// The tissue diverged.
         diverged,
+        /// Times that contact of an instrument was disabled in the period.
+        disabled_contacts,
+        /// Times that contact of blades alone was disabled.
+        disabled_blades,
+        /// Times that an organ was relaxed outside of time.
+        relaxed,
+        /// Largest motion of any node in the first frame after jaws took hold [mm]; 0 where none did.
+        activation_step_mm,
     }
 }
 

@@ -5,9 +5,10 @@ use crate::measure::Subject;
 use crate::random::Random;
 use crate::stages::Tracker;
 use crate::start::{Arrangement, starts, targets};
+use crate::facts::Facts;
 use crate::{Channels, Error, Observation, Progress, Result, Summary, specimen_hash};
 use serde::{Deserialize, Serialize};
-use trocar_cell::{Action, Cell, CellEvent, CellState};
+use trocar_cell::{Action, Cell, CellEvent, CellState, Settling};
 use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
@@ -36,6 +37,8 @@ pub enum End {
         /// Why.
         why: String,
     },
+    /// The policy had nothing left to do, and not all stages are passed.
+    Finished,
     /// The policy gave no action that could be done.
     PolicyError {
         /// What was wrong with it.
@@ -51,6 +54,7 @@ impl End {
             Self::TimeOut => "time-out",
             Self::RcmAbort { .. } => "rcm-abort",
             Self::Diverged { .. } => "diverged",
+            Self::Finished => "finished",
             Self::PolicyError { .. } => "policy-error",
         }
     }
@@ -65,6 +69,7 @@ impl std::fmt::Display for End {
                 write!(f, "the {arm} RCM deviation of {deviation_mm:.2} mm is where hardware stops")
             }
             Self::Diverged { why } => write!(f, "diverged: {why}"),
+            Self::Finished => write!(f, "the policy had finished"),
             Self::PolicyError { why } => write!(f, "the policy failed: {why}"),
         }
     }
@@ -117,6 +122,7 @@ pub struct Episode {
     /// Where the specimen is in `cell`, and the tissue there when it has settled.
     arrangement: Arrangement,
     settled: CellState,
+    settling: Settling,
     now: Now,
 }
 
@@ -129,7 +135,7 @@ impl Episode {
     /// A scene without the task's organ or instruments, or one that cannot be built.
     pub fn new(scene: &Scene, specimen: &Specimen, threads: usize) -> Result<Self> {
         let arrangement = Arrangement::default();
-        let (cell, settled) = build(scene, specimen, threads, &arrangement)?;
+        let (cell, settled, settling) = build(scene, specimen, threads, &arrangement)?;
         let now = Now {
             seed: 0,
             subject: Subject::new(&cell, &scene.task.organ, &scene.task.gates, Vec::new()),
@@ -148,6 +154,7 @@ impl Episode {
             cell,
             arrangement,
             settled,
+            settling,
             now,
         };
         made.check()?;
@@ -183,7 +190,7 @@ impl Episode {
     pub fn reset(&mut self, seed: u64) -> Result<Observation> {
         let arrangement = Arrangement::of(&self.scene, seed);
         if arrangement != self.arrangement {
-            (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &arrangement)?;
+            (self.cell, self.settled, self.settling) = build(&self.scene, &self.specimen, self.threads, &arrangement)?;
             self.arrangement = arrangement;
         }
         let starts = starts(&self.scene, &self.cell, seed);
@@ -224,6 +231,8 @@ impl Episode {
                 channels.time_s += self.cell.period();
                 let task = &mut channels.task;
                 (task.diverged, task.cuts, task.torn, task.yielded) = (1.0, 0.0, 0.0, 0.0);
+                (task.disabled_contacts, task.disabled_blades, task.relaxed) = (0.0, 0.0, 0.0);
+                task.activation_step_mm = 0.0;
                 self.now.rows.push(channels);
                 let (progress, end) = (self.progress().clone(), self.now.end.clone());
                 return Ok(Step { channels, progress, end, events: Vec::new() });
@@ -239,10 +248,10 @@ impl Episode {
             Some(End::Diverged { why: why.to_string() })
         } else if let Some(arm) = abort {
             Some(End::RcmAbort { arm: arm.side.name().to_owned(), deviation_mm: 1e3 * arm.rcm_peak })
-        } else if self.now.tracker.progress().passed() {
+        } else if self.now.tracker.progress().passed() && self.scene.task.stop_when_passed {
             Some(End::Passed)
         } else if report.time >= self.scene.task.episode_s - 0.5 * self.cell.period() {
-            Some(End::TimeOut)
+            Some(if self.now.tracker.progress().passed() { End::Passed } else { End::TimeOut })
         } else {
             None
         };
@@ -250,6 +259,13 @@ impl Episode {
         self.now.events.extend(report.events.iter().map(|e| (report.time, e.clone())));
         let (progress, end) = (self.progress().clone(), self.now.end.clone());
         Ok(Step { channels, progress, end, events: report.events })
+    }
+
+    /// Ends the episode because its policy has nothing left to do.
+    pub fn finish(&mut self) {
+        if self.now.end.is_none() {
+            self.now.end = Some(if self.progress().passed() { End::Passed } else { End::Finished });
+        }
     }
 
     /// Ends the episode because its policy failed.
@@ -337,8 +353,38 @@ impl Episode {
     /// The episode in figures so far.
     pub fn summary(&self) -> Summary {
         let arms: Vec<&str> = self.cell.arms().iter().map(|(side, _)| side.name()).collect();
-        let threshold = self.scene.safety.rcm_threshold_mm;
-        Summary::of(&self.now.rows, self.progress(), self.end(), &arms, threshold)
+        let safety = self.scene.safety.rcm_threshold_mm;
+        let mut summary = Summary::of(&self.now.rows, self.progress(), self.end(), &arms, safety);
+        summary.add_facts(&self.facts());
+        summary
+    }
+
+    fn facts(&self) -> Facts<'_> {
+        let grasper = self.now.subject.grasper.and_then(|k| self.scene.tools().get(k).map(|t| t.instrument));
+        let bodies = self.bodies();
+        Facts {
+            task: &self.scene.task,
+            grasper: self.now.subject.grasper.map(|k| self.cell.arms()[k].0),
+            jaw_force_n: grasper.map_or(0.0, |i| i.jaw_force_n),
+            settling: self.settling,
+            inverted_rest: self.specimen.organs.iter().map(|o| o.body.inverted()).sum(),
+            pin_drift_mm: 1e3 * self.cell.pin_drift(),
+            organ_weight_n: self.cell.weight(&bodies),
+            events: &self.now.events,
+            rows: &self.now.rows,
+            heights: self.heights(),
+        }
+    }
+
+    /// Name and height of the centroid (m) of every body.
+    fn heights(&self) -> Vec<(String, f64)> {
+        let world = self.cell.world();
+        let bodies = world.model.bodies().iter().enumerate();
+        let heights = bodies.map(|(k, body)| {
+            let nodes: Vec<u32> = (0..body.len() as u32).collect();
+            (body.name().to_owned(), world.state.centroid(&world.model, k, &nodes).dot(world.up))
+        });
+        heights.collect()
     }
 
     /// The state as it is now.
@@ -366,7 +412,7 @@ impl Episode {
             return Err(Error::Option("state: is of another scene or specimen than this episode".to_owned()));
         }
         if state.arrangement != self.arrangement {
-            (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
+            (self.cell, self.settled, self.settling) = build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
             self.arrangement = state.arrangement;
         }
         self.cell.restore(&state.cell)?;
@@ -377,9 +423,11 @@ impl Episode {
     /// Hash over every bit that the future depends on, but for the seed's random numbers: cell and
     /// stages.
     pub fn state_hash(&self) -> u64 {
+        // What was recorded so far, and why the episode ended, decide nothing that follows.
+        let Now { seed: _, subject: _, tracker, rows: _, events: _, end: _ } = &self.now;
         let mut hash = Xxh3::new();
         hash.update(&self.cell.hash().to_le_bytes());
-        for number in self.now.tracker.numbers() {
+        for number in tracker.numbers() {
             hash.update(&number.to_bits().to_le_bytes());
         }
         hash.digest()
@@ -394,13 +442,15 @@ fn key(scene: &Scene, specimen: u64) -> Result<u64> {
     Ok(scene.hash(&[specimen])?)
 }
 
-/// The cell with the specimen as arranged, and its state once the organs have settled.
-fn build(scene: &Scene, specimen: &Specimen, threads: usize, at: &Arrangement) -> Result<(Cell, CellState)> {
+/// The cell with the specimen as arranged, its state once the organs have settled, and how they did.
+fn build(
+    scene: &Scene,
+    specimen: &Specimen,
+    threads: usize,
+    at: &Arrangement,
+) -> Result<(Cell, CellState, Settling)> {
     let mut cell = Cell::new(&at.scene(scene, specimen), specimen, threads)?;
-    let periods = (SETTLE_S / cell.period()).round() as usize;
-    for _ in 0..periods {
-        cell.advance()?;
-    }
+    let settling = cell.settle(SETTLE_S)?;
     let settled = cell.save();
-    Ok((cell, settled))
+    Ok((cell, settled, settling))
 }

@@ -10,7 +10,8 @@ use trocar_scene::Side;
 /// What is seen of one arm; all zero where the scene has no such arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ArmState {
-    /// Two pivots [rad], insertion [m], roll [rad], jaw opening 0 to 1: as in an action.
+    /// Two pivots (rad), insertion (m), roll (rad), jaw opening 0 to 1, as in an action. Of an arm
+    /// without a port the first three are the place of the jaw's pivot in the cell (m).
     pub coordinates: [f64; 5],
     /// Their rates a second.
     pub rates: [f64; 5],
@@ -100,7 +101,7 @@ impl ArmState {
     fn of(arm: &ArmObservation) -> Self {
         let q = upright(arm.tip.rotation);
         Self {
-            coordinates: arm.coordinates.to_action(),
+            coordinates: arm.measured.0,
             rates: arm.rates,
             tip_m: arm.tip.translation.to_array(),
             tip_wxyz: [q.w, q.x, q.y, q.z],

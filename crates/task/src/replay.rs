@@ -289,7 +289,7 @@ impl EpisodeFile {
                 return Ok(differs(Some(number), said));
             }
         }
-        let by_policy = matches!(header.end, Some(End::PolicyError { .. }));
+        let by_policy = matches!(header.end, Some(End::PolicyError { .. } | End::Finished));
         if !by_policy && header.end.as_ref() != episode.end() {
             let name = |end: Option<&End>| end.map_or("no end", End::name);
             let said = format!("it ends with {}, not {}", name(episode.end()), name(header.end.as_ref()));

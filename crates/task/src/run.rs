@@ -77,6 +77,10 @@ pub fn run(
     policy.begin(episode, seed)?;
     while episode.end().is_none() {
         let chunk = match policy.act(episode) {
+            Ok(chunk) if chunk.is_empty() && policy.finished() => {
+                episode.finish();
+                break;
+            }
             Ok(chunk) if chunk.is_empty() => {
                 episode.fail("it gave no action");
                 break;

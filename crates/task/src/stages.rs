@@ -254,8 +254,11 @@ impl Tracker {
 
     /// The numbers of the state, for its hash.
     pub fn numbers(&self) -> Vec<f64> {
-        let mut all = vec![self.progress.stage as f64, self.since.unwrap_or(-1.0), f64::from(u8::from(self.armed))];
-        all.extend(self.progress.stages.iter().flat_map(|s| [s.time_s.unwrap_or(-1.0), s.share]));
+        let Self { gates: _, progress: Progress { stage, stages }, since, armed } = self;
+        let mut all = vec![*stage as f64, since.unwrap_or(-1.0), f64::from(u8::from(*armed))];
+        for StageProgress { stage: _, passed: _, time_s, share } in stages {
+            all.extend([time_s.unwrap_or(-1.0), *share]);
+        }
         all
     }
 }

@@ -16,10 +16,10 @@ use trocar_robot::wrench::Wrench;
 use trocar_tissue::ToolForce;
 
 /// The most that tissue is taken to push or pull [N]: beyond, a joint of the wrist would give way.
-pub const MOST_LOAD: f64 = 40.0;
+pub const MAX_LOAD: f64 = 40.0;
 
 /// Stiffest that tissue is taken to be [N/m].
-const MOST_STIFFNESS: f64 = 2e4;
+const MAX_STIFFNESS: f64 = 2e4;
 
 /// What is left of the stiffness seen from one frame to the next.
 const FORGETTING: f64 = 0.8;
@@ -36,7 +36,7 @@ pub(super) struct Exchange {
     at: DVec3,
     /// Force gained a way gone [N/m].
     stiffness: f64,
-    /// The last frame's force was more than [`MOST_LOAD`].
+    /// The last frame's force was more than [`MAX_LOAD`].
     pub limited: bool,
 }
 
@@ -47,14 +47,14 @@ impl Exchange {
     }
 
     /// A frame is over: the tip is at `at` [m] and its tools feel `forces`.
-    pub fn after_frame(&mut self, at: DVec3, forces: &[ToolForce; 3]) {
+    pub fn end_frame(&mut self, at: DVec3, forces: &[ToolForce; 3]) {
         let mut load = Wrench::default();
         for force in forces {
             for part in [force.contact, force.constraint] {
                 load = load + Wrench { force: part.force, torque: part.torque };
             }
         }
-        let over = load.force.length() / MOST_LOAD;
+        let over = load.force.length() / MAX_LOAD;
         self.limited = over > 1.0;
         if self.limited {
             load = Wrench { force: load.force / over, torque: load.torque / over };
@@ -63,7 +63,7 @@ impl Exchange {
         self.stiffness *= FORGETTING;
         if way.length() > LEAST_MOTION {
             let secant = (self.load.force - load.force).dot(way) / way.length_squared();
-            self.stiffness = self.stiffness.max(secant).min(MOST_STIFFNESS);
+            self.stiffness = self.stiffness.max(secant).min(MAX_STIFFNESS);
         }
         (self.load, self.at) = (load, at);
     }
@@ -76,13 +76,14 @@ impl Exchange {
     /// What a tip that has come to `at` [m] feels.
     pub fn load(&self, at: DVec3) -> Wrench {
         let force = self.load.force - self.stiffness * (at - self.at);
-        Wrench { force: force.clamp_length_max(MOST_LOAD), torque: self.load.torque }
+        Wrench { force: force.clamp_length_max(MAX_LOAD), torque: self.load.torque }
     }
 
     /// The numbers of the state.
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let vectors = [self.load.force, self.load.torque, self.at].map(|v| v.to_array());
-        vectors.into_iter().flatten().chain([self.stiffness, f64::from(u8::from(self.limited))])
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let Self { load, at, stiffness, limited } = *self;
+        let vectors = [load.force, load.torque, at].map(|v| v.to_array());
+        vectors.into_iter().flatten().chain([stiffness, f64::from(u8::from(limited))])
     }
 }
 
@@ -101,7 +102,7 @@ mod tests {
             if step % 8 == 0 {
                 let mut forces = [ToolForce::default(); 3];
                 forces[1].contact.force.x = -stiffness * x;
-                exchange.after_frame(x * DVec3::X, &forces);
+                exchange.end_frame(x * DVec3::X, &forces);
             }
             let at = if carried_on { x * DVec3::X } else { exchange.at };
             v += dt * (exchange.load(at).force.x - damping * v - 3000.0 * x) / mass;
@@ -129,10 +130,10 @@ mod tests {
         forces[0].constraint.force = DVec3::new(0.0, 0.3, -0.4);
         forces[2].contact.force = DVec3::Y;
         let mut exchange = Exchange::new(DVec3::ZERO);
-        exchange.after_frame(DVec3::X, &forces);
+        exchange.end_frame(DVec3::X, &forces);
         assert_eq!(exchange.load(DVec3::X).force, DVec3::new(0.0, 1.3, -0.4));
         forces[2].contact.force = 1e4 * DVec3::Y;
-        exchange.after_frame(DVec3::X, &forces);
-        assert!(exchange.limited && exchange.load(DVec3::X).force.length() <= MOST_LOAD + 1e-9);
+        exchange.end_frame(DVec3::X, &forces);
+        assert!(exchange.limited && exchange.load(DVec3::X).force.length() <= MAX_LOAD + 1e-9);
     }
 }

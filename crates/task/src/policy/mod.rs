@@ -2,13 +2,16 @@
 //! passes, and five that are worse in one way each.
 
 mod aim;
+mod cut_place;
 mod perturbed;
+mod random_actions;
 mod random_walk;
 mod scripted;
 
 pub use perturbed::{DELAY_S, Delay, NOISE_M, NOISE_RAD, Noise, OFFSET_MM, Offset};
+pub use random_actions::RandomActions;
 pub use random_walk::RandomWalk;
-pub use scripted::{Scripted, Style};
+pub use scripted::{AfterHold, CutAt, Script, Scripted, Style};
 
 use crate::{Episode, Error, Result};
 use trocar_cell::Action;
@@ -33,6 +36,12 @@ pub trait Policy {
     /// # Errors
     /// Ends the episode as [`crate::End::PolicyError`].
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>>;
+
+    /// Whether it has nothing left to do. An episode whose policy gives no action and has finished ends
+    /// as [`crate::End::Finished`]; one whose policy gives none and has not, as a failure of the policy.
+    fn finished(&self) -> bool {
+        false
+    }
 }
 
 /// Names of the controllers.

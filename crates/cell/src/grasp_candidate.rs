@@ -1,37 +1,45 @@
 //! What jaws take hold of at the instant they have closed, whoever moves them.
 
-use crate::mouth::attached;
-use crate::{GraspDesign, Mouth, Mouthful, World};
+use crate::jaw_region::attached;
+use crate::{GraspDesign, JawRegion, TissueInJaws, World};
 use trocar_geometry::Pose;
 use trocar_tissue::Grasp;
 
 /// Tissue that jaws have closed on.
-pub(crate) struct Clasp {
+pub(crate) struct GraspCandidate {
     /// Organ coordinate of the attached cluster.
     pub s: f64,
     /// The nodes that are followed, and held by designs that hold nodes.
     pub nodes: Vec<u32>,
 }
 
-impl Clasp {
+impl GraspCandidate {
     /// What is held of the `tissue` of organ `organ` in the `mouth`: the attached cluster (SPEC
     /// C3), or for friction the tissue between the blades. None where no cluster is near. `reach`
     /// is how far jaws hold from the middle of what they pinch [m].
     pub fn on(
         world: &World,
         organ: usize,
-        mouth: &Mouth,
-        tissue: Mouthful,
+        region: &JawRegion,
+        tissue: TissueInJaws,
         reach: f64,
         design: GraspDesign,
     ) -> Option<Self> {
         let cluster = attached(world, organ, tissue.centroid, reach)?;
         let mut nodes = cluster.nodes;
         if design == GraspDesign::Friction {
-            let between = mouth.nodes_of(world, organ);
+            let between = region.nodes_of(world, organ);
             nodes = if between.is_empty() { nodes } else { between };
         }
         Some(Self { s: cluster.s, nodes })
+    }
+
+    /// Mean distance of the nodes from their places at rest (m).
+    pub fn displaced(&self, world: &World, organ: usize) -> f64 {
+        let rest = world.model.bodies()[organ].rest_positions();
+        let place = |i: u32| world.state.position(&world.model, organ, i as usize);
+        let sum = self.nodes.iter().map(|i| place(*i).distance(rest[*i as usize])).sum::<f64>();
+        sum / self.nodes.len().max(1) as f64
     }
 }
 

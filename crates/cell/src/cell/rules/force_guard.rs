@@ -1,13 +1,11 @@
-//! The force guard: a command does not push an instrument harder into tissue than the scene lets
-//! it.
+//! Rule: no command pushes an instrument harder into tissue than the scene's force limit.
 //!
-//! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N
-//! for a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a
-//! stop is not enough, because what is pressed stays pressed. So the part of a command's way that
-//! goes against the force gets shorter as the force nears the limit, and beyond the limit the
-//! instrument draws back. What a step may cost is known from the stiffness seen so far, as in
-//! [`crate::Jaw`]: a fixed gain would swing on stiff tissue or creep on soft. The rest of the way
-//! is the command's.
+//! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N for
+//! a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a stop
+//! is not enough, because what is pressed stays pressed. So the part of a command's way that goes
+//! against the force gets shorter as the force nears the limit, and beyond the limit the instrument
+//! draws back. What a step may cost is known from the stiffness seen so far, as in [`crate::Jaw`]: a
+//! fixed gain would swing on stiff tissue or creep on soft. The rest of the way is the command's.
 
 use glam::DVec3;
 
@@ -15,37 +13,37 @@ use glam::DVec3;
 const GAIN: f64 = 0.3;
 
 /// The limit matters from this share of it on.
-const FROM: f64 = 0.5;
+const FROM_SHARE: f64 = 0.5;
 
 /// Within this share of the limit it stands still.
 const DEADBAND: f64 = 0.02;
 
-/// Softest and stiffest that tissue is taken to be [N/m].
+/// Softest and stiffest that tissue is taken to be (N/m).
 const STIFFNESS: [f64; 2] = [2e3, 5e4];
 
 /// What is left of the stiffness from one period to the next.
 const FORGETTING: f64 = 0.98;
 
-/// Least motion that gives a secant [m].
+/// Least motion that gives a secant (m).
 const LEAST_MOTION: f64 = 2e-5;
 
-/// Fastest that it draws back [m a period].
+/// Fastest that it draws back (m a period).
 const RETREAT: f64 = 1e-3;
 
-/// The guard of one arm.
+/// The force guard of one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Guard {
-    /// Force gained a way gone against it [N/m].
+pub(in crate::cell) struct ForceGuard {
+    /// Force gained a way gone against it (N/m).
     stiffness: f64,
-    /// Force [N] and tip [m] a period ago.
+    /// Force (N) and tip (m) a period ago.
     last: [DVec3; 2],
-    /// The force is beyond the limit, and that was told.
-    pub told: bool,
+    /// The force is beyond the limit, and that was reported.
+    reported: bool,
 }
 
-impl Guard {
-    /// A period begins with the tip at `at` [m] under `force` [N].
-    pub fn look(&mut self, force: DVec3, at: DVec3) {
+impl ForceGuard {
+    /// A period begins with the tip at `at` (m) under `force` (N).
+    pub fn begin_period(&mut self, force: DVec3, at: DVec3) {
         let [was, there] = self.last;
         let (change, way) = (force - was, at - there);
         self.stiffness *= FORGETTING;
@@ -55,12 +53,12 @@ impl Guard {
         self.last = [force, at];
     }
 
-    /// What is left of a way [m] that is commanded for the next period where `limit` [N] must not
+    /// What is left of a way (m) that is commanded for the next period where `limit` (N) must not
     /// be passed; the same where it need not be changed.
     pub fn allow(&self, way: DVec3, limit: f64) -> DVec3 {
         let [force, _] = self.last;
         let size = force.length();
-        if size <= FROM * limit {
+        if size <= FROM_SHARE * limit {
             return way;
         }
         let out = force / size;
@@ -72,20 +70,21 @@ impl Guard {
         if allowed == against { way } else { way + (against - allowed) * out }
     }
 
-    /// Whether the force has just gone beyond `limit` [N].
-    pub fn tell(&mut self, limit: f64) -> Option<f64> {
+    /// Whether the force has just gone beyond `limit` (N).
+    pub fn newly_exceeded(&mut self, limit: f64) -> Option<f64> {
         let size = self.last[0].length();
-        // Told once, until it is well below.
-        let over = size > if self.told { 0.8 * limit } else { limit };
-        let new = over && !self.told;
-        self.told = over;
+        // Reported once, until it is well below.
+        let over = size > if self.reported { 0.8 * limit } else { limit };
+        let new = over && !self.reported;
+        self.reported = over;
         new.then_some(size)
     }
 
     /// The numbers of its state.
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let vectors = self.last.map(|v| v.to_array());
-        vectors.into_iter().flatten().chain([self.stiffness, f64::from(u8::from(self.told))])
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let Self { stiffness, last, reported } = *self;
+        let vectors = last.map(|v| v.to_array());
+        vectors.into_iter().flatten().chain([stiffness, f64::from(u8::from(reported))])
     }
 }
 
@@ -93,14 +92,14 @@ impl Guard {
 mod tests {
     use super::*;
 
-    /// Goes `speed` [m a period] into a wall of `stiffness` [N/m], the tip a share behind the
-    /// command: forces of 300 periods [N].
+    /// Goes `speed` (m a period) into a wall of `stiffness` (N/m), the tip a share behind the
+    /// command: forces of 300 periods (N).
     fn press(stiffness: f64, speed: f64, limit: f64) -> Vec<f64> {
-        let (mut guard, mut command, mut tip) = (Guard::default(), 0.01, 0.01_f64);
+        let (mut guard, mut command, mut tip) = (ForceGuard::default(), 0.01, 0.01_f64);
         let mut forces = Vec::new();
         for _ in 0..300 {
             let force = stiffness * (-tip).max(0.0);
-            guard.look(force * DVec3::X, tip * DVec3::X);
+            guard.begin_period(force * DVec3::X, tip * DVec3::X);
             command += guard.allow(DVec3::new(-speed, 0.001, 0.0), limit).x;
             tip += 0.8 * (command - tip);
             forces.push(force);
@@ -124,16 +123,16 @@ mod tests {
 
     #[test]
     fn what_goes_aside_or_away_is_let_go() {
-        let mut guard = Guard::default();
-        guard.look(9.5 * DVec3::Z, DVec3::ZERO);
+        let mut guard = ForceGuard::default();
+        guard.begin_period(9.5 * DVec3::Z, DVec3::ZERO);
         for way in [1e-3 * DVec3::X, 2e-3 * DVec3::Z] {
             assert_eq!(guard.allow(way, 10.0), way);
         }
         let slanted = guard.allow(DVec3::new(1e-3, 0.0, -1e-3), 10.0);
         assert!(slanted.x == 1e-3 && slanted.z > -1e-4 && slanted.z < 0.0, "{slanted}");
         assert_eq!(guard.allow(-1e-3 * DVec3::Z, 100.0), -1e-3 * DVec3::Z);
-        guard.look(30.0 * DVec3::Z, DVec3::ZERO);
+        guard.begin_period(30.0 * DVec3::Z, DVec3::ZERO);
         assert!(guard.allow(-1e-3 * DVec3::Z, 10.0).z > 0.0, "it draws back");
-        assert_eq!((guard.tell(10.0), guard.tell(10.0)), (Some(30.0), None));
+        assert_eq!((guard.newly_exceeded(10.0), guard.newly_exceeded(10.0)), (Some(30.0), None));
     }
 }

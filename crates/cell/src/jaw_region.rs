@@ -1,11 +1,11 @@
-//! What is between the blades (SPEC C3; paper section IV-C).
+//! The region between the blades, and the tissue in it (paper section IV-C).
 //!
-//! The mouth is a wedge from 2 to 21 mm beyond the pivot, 5 mm wide, whose half-gap at distance r
+//! The region is a wedge from 2 to 21 mm beyond the pivot, 5 mm wide, whose half-gap at distance r
 //! from the pivot is r sin(theta / 2). Tissue is grasped only if it lies in the wedge on both sides
 //! of the closing plane and the blades are farther apart than their contact skin.
 
-use crate::clusters::FEWEST_HELD;
-use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MOUTH_BEGIN};
+use crate::clusters::MIN_HELD_NODES;
+use crate::gripper::{BLADE_TIP, BLADE_WIDTH, JAW_REGION_BEGIN};
 use crate::{Cluster, Gripper, World, clusters};
 use glam::DVec3;
 use trocar_geometry::Pose;
@@ -24,7 +24,7 @@ const TOWARDS_CORNER: f64 = 0.5;
 
 /// The wedge between the blades at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mouth {
+pub struct JawRegion {
     gripper: Gripper,
     to_gripper: Pose,
     /// Length of the blades [m].
@@ -33,7 +33,7 @@ pub struct Mouth {
 
 /// Tissue between the blades.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mouthful {
+pub struct TissueInJaws {
     /// Its centroid in the world [m].
     pub centroid: DVec3,
     /// Its volume [m3].
@@ -42,7 +42,7 @@ pub struct Mouthful {
     pub gap: f64,
 }
 
-impl Mouth {
+impl JawRegion {
     /// The mouth of a gripper with the paper's blades.
     pub fn of(gripper: &Gripper) -> Self {
         Self::sized(gripper, BLADE_TIP)
@@ -61,7 +61,7 @@ impl Mouth {
     /// The same in the gripper's frame, with the blades farther apart by `beyond` [m] on each side.
     fn holds(&self, q: DVec3, beyond: f64) -> bool {
         let r = q.x.hypot(q.y);
-        let along = q.x > 0.0 && (MOUTH_BEGIN..=self.length).contains(&r);
+        let along = q.x > 0.0 && (JAW_REGION_BEGIN..=self.length).contains(&r);
         along && q.z.abs() <= 0.5 * BLADE_WIDTH && q.y.abs() <= self.gripper.half_gap(r) + beyond
     }
 
@@ -71,7 +71,7 @@ impl Mouth {
     /// Elements are looked at in five points, their middle and half way from there to each corner,
     /// each for a fifth of the volume: nodes alone are too far apart, and those that touch a blade
     /// may lie on either side of its face.
-    pub fn tissue(&self, tets: &[[u32; 4]], positions: &[DVec3]) -> Option<Mouthful> {
+    pub fn tissue(&self, tets: &[[u32; 4]], positions: &[DVec3]) -> Option<TissueInJaws> {
         let (mut sides, mut sum, mut volume) = ([0.0; 2], DVec3::ZERO, 0.0);
         for tet in tets {
             let corners = tet.map(|i| positions[i as usize]);
@@ -99,16 +99,16 @@ impl Mouth {
         let centroid = sum / volume;
         let q = self.to_gripper.transform(centroid);
         let gap = 2.0 * self.gripper.half_gap(q.x.hypot(q.y));
-        (gap > CONTACT_SKIN).then_some(Mouthful { centroid, volume, gap })
+        (gap > CONTACT_SKIN).then_some(TissueInJaws { centroid, volume, gap })
     }
 
     /// Tissue of organ `organ` between the blades, as [`tissue`](Self::tissue).
-    pub fn tissue_of(&self, world: &World, organ: usize) -> Option<Mouthful> {
+    pub fn tissue_of(&self, world: &World, organ: usize) -> Option<TissueInJaws> {
         self.tissue(world.model.bodies()[organ].tets(), &world.state.positions(&world.model, organ))
     }
 
     /// The organ with the most tissue between the blades, and that tissue.
-    pub fn fullest(&self, world: &World) -> Option<(usize, Mouthful)> {
+    pub fn fullest(&self, world: &World) -> Option<(usize, TissueInJaws)> {
         let near = |k: &usize| self.is_near(world, *k);
         let all = (0..world.model.bodies().len()).filter(near).filter_map(|k| Some((k, self.tissue_of(world, k)?)));
         all.reduce(|best, next| if next.1.volume > best.1.volume { next } else { best })
@@ -140,8 +140,8 @@ impl Mouth {
 /// [`Cluster::within_reach`]).
 pub fn attached(world: &World, organ: usize, centroid: DVec3, reach: f64) -> Option<Cluster> {
     let mut all: Vec<Cluster> = clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
-    if all.iter().any(|c| c.nodes.len() >= FEWEST_HELD) {
-        all.retain(|c| c.nodes.len() >= FEWEST_HELD);
+    if all.iter().any(|c| c.nodes.len() >= MIN_HELD_NODES) {
+        all.retain(|c| c.nodes.len() >= MIN_HELD_NODES);
     }
     let distance = |c: &Cluster| c.centroid(world, organ).distance(centroid);
     let nearest = all.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
@@ -163,7 +163,7 @@ mod tests {
     fn grasped(gripper: &Gripper, at: DVec3) -> bool {
         let (tets, mut nodes) = cube(at);
         nodes.iter_mut().for_each(|p| *p = gripper.pose.transform(*p));
-        Mouth::of(gripper).tissue(&tets, &nodes).is_some()
+        JawRegion::of(gripper).tissue(&tets, &nodes).is_some()
     }
 
     fn gripper(jaw_angle: f64) -> Gripper {
@@ -195,12 +195,12 @@ mod tests {
     #[test]
     fn the_half_gap_is_the_papers() {
         let open = gripper(0.5);
-        let mouth = Mouth::of(&open);
+        let region = JawRegion::of(&open);
         for r in [0.003, 0.010, 0.020] {
             let y = r * (0.25_f64).sin();
             let at = |y: f64| open.pose.transform(DVec3::new((r * r - y * y).sqrt(), y, 0.0));
-            assert!(mouth.contains(at(0.999 * y)) && mouth.contains(at(-0.999 * y)));
-            assert!(!mouth.contains(at(1.001 * y)) && !mouth.contains(at(-1.001 * y)));
+            assert!(region.contains(at(0.999 * y)) && region.contains(at(-0.999 * y)));
+            assert!(!region.contains(at(1.001 * y)) && !region.contains(at(-1.001 * y)));
         }
     }
 

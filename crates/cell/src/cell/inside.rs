@@ -1,18 +1,11 @@
-//! Instruments that have gone through the surface of an organ.
-//!
-//! Tissue touches with the vertices of its surface. A blade that presses hard enough opens a
-//! triangle so far that it goes through between the vertices, and from within it would drag them
-//! along, for ever if need be. No real tissue bears that: it is pierced. So as soon as the axis of
-//! a convex part lies inside an organ, deeper than the part is thick, the instrument has pierced
-//! it: it lets go and is not felt until it is out again. What the jaws hold may bulge round them
-//! and is left out.
+//! Whether a segment lies inside an organ.
 
 use crate::World;
 use glam::DVec3;
 
 /// The first organ, but for `spared`, in which one of `segments` lies in part, and where [m].
 /// Elements that are pinned all round do not count: nothing feels them.
-pub(super) fn pierced(world: &World, segments: &[[DVec3; 2]], spared: Option<usize>) -> Option<(usize, DVec3)> {
+pub(super) fn first_organ_around(world: &World, segments: &[[DVec3; 2]], spared: Option<usize>) -> Option<(usize, DVec3)> {
     let ends = segments.iter().flatten();
     let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
     let mut places = Vec::new();
