@@ -2,7 +2,7 @@
 
 use crate::jaw_region::attached;
 use crate::{GraspDesign, JawRegion, TissueInJaws, World};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::Grasp;
 
 /// Tissue that jaws have closed on.

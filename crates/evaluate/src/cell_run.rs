@@ -7,10 +7,10 @@ use crate::{Error, Result, report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use trocar_cell::{Cell, CellEvent, CellLift, CellLiftRun, CellLiftSummary};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_scene::{Scene, Source};
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 use trocar_specimen::{Specimen, StagedFolder};
 
 /// Frames of a phantom's recording: the composite's window.
@@ -78,7 +78,7 @@ impl CellSimulation {
         if task.organ.is_none() && specimen.organs.iter().any(|o| o.name == scene.task.organ) {
             task.organ = Some(scene.task.organ.clone());
         }
-        let mut watched = Watched::new(Sight::new(&scene, &specimen, &cell)?, &task.arm);
+        let mut watched = Watched::new(CameraRig::new(&scene, &specimen, &cell)?, &task.arm);
         let run = task.run_watched(&mut cell, progress, &mut |cell, phase| watched.look(cell, phase))?;
         let pictures = watched.finish(&cell)?;
         let made = CellRun {

@@ -115,7 +115,7 @@ pub enum Error {
     Scene(#[from] trocar_scene::Error),
     /// Two pictures cannot be compared.
     #[error(transparent)]
-    Similarity(#[from] trocar_similarity::Error),
+    Similarity(#[from] trocar_camera::metrics::Error),
     /// A specimen cannot be read or written.
     #[error(transparent)]
     Specimen(#[from] trocar_specimen::Error),
@@ -127,7 +127,7 @@ pub enum Error {
     Task(#[from] trocar_task::Error),
     /// A camera of the cell cannot see.
     #[error(transparent)]
-    Sight(#[from] trocar_sight::Error),
+    Sensors(#[from] trocar_sensors::Error),
     /// A task cannot be run.
     #[error(transparent)]
     Cell(#[from] trocar_cell::Error),

@@ -1,10 +1,10 @@
 //! The comparison of integrators on a tiny mesh: what diverges, what stays bounded, what is written.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
+use trocar_core::Silent;
 use trocar_evaluate::IntegratorsExperiment;
 use trocar_evaluate::scenes::Organs;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Silent;
 
 #[test]
 fn the_papers_finding_is_one_of_settings() {

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 use trocar_cell::{GraspDesign, GraspLift};
+use trocar_core::Silent;
 use trocar_evaluate::{reconstruct_surface, simulate};
 use trocar_geometry::io::Unit;
-use trocar_progress::Silent;
 use trocar_reconstruct::Settings;
 
 #[test]

@@ -3,8 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
 use std::path::Path;
+use trocar_core::Silent;
 use trocar_evaluate::RenderBench;
-use trocar_progress::Silent;
 
 #[test]
 fn rays_end_where_embrees_do() {

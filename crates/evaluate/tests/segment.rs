@@ -7,8 +7,8 @@ mod common;
 use common::{info, write};
 use std::path::{Path, PathBuf};
 use trocar_camera::Mask;
+use trocar_core::Silent;
 use trocar_evaluate::{Segment, wanted_weights};
-use trocar_progress::Silent;
 use trocar_reconstruct::{Settings, reconstruct};
 use trocar_recording::{InstrumentInfo, Recording, RecordingInfo};
 

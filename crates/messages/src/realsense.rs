@@ -13,7 +13,7 @@
 //! `rs2_extrinsics` in the same direction).
 
 use crate::{Topic, Transform};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 
 /// Indices of the topics of one depth and one colour stream.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

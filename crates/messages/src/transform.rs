@@ -5,7 +5,7 @@ use crate::reader::Reader;
 use crate::ros::{self, fields, of_topic, unknown};
 use crate::{Encoding, Topic, foxglove};
 use glam::{DQuat, DVec3};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 
 /// A frame's place in another: points of the child frame, rotated and then moved, are points of the parent frame.
 ///

@@ -12,8 +12,8 @@ use pyo3::types::PyBytes;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
+use trocar_core::Progress;
 use trocar_evaluate::{Error, Files, Job, Plan, PolicySpec, Store};
-use trocar_progress::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
 use trocar_camera::{ColorImage, DepthImage, Mask};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_recording::{Packet, Recording, RgbdFrame};
 use xxhash_rust::xxh3::Xxh3;
 

@@ -5,9 +5,9 @@ use crate::pipeline::program;
 use crate::{Error, Result, Settings};
 use glam::DVec3;
 use std::path::Path;
+use trocar_core::{Pose, Progress};
 use trocar_geometry::io::{Unit, read_surface};
-use trocar_geometry::{Pose, RepairReport, TriMesh, repair};
-use trocar_progress::Progress;
+use trocar_geometry::{RepairReport, TriMesh, repair};
 use trocar_specimen::{Material, Organ, Pins, Provenance, Specimen};
 use xxhash_rust::xxh3::xxh3_64;
 

@@ -8,7 +8,7 @@ use common::{info, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_camera::Mask;
-use trocar_progress::Silent;
+use trocar_core::Silent;
 use trocar_reconstruct::{Settings, reconstruct};
 use trocar_recording::{Recording, RecordingInfo};
 

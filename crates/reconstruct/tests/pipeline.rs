@@ -6,8 +6,8 @@ mod common;
 
 use common::{CENTRE, RADIUS, info, write};
 use std::path::Path;
+use trocar_core::{Silent, StopAfter};
 use trocar_geometry::io::Unit;
-use trocar_progress::{Silent, StopAfter};
 use trocar_reconstruct::{Settings, from_surface, reconstruct};
 use trocar_recording::Recording;
 use trocar_specimen::Specimen;

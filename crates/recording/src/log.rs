@@ -6,7 +6,8 @@ use crate::{DepthToColor, Error, Result, SourceInfo};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
-use trocar_camera::{Camera, Mask, Pose};
+use trocar_camera::{Camera, Mask};
+use trocar_core::Pose;
 use trocar_messages::{
     DepthValues, Guess, Image, MessageLog, decode_calibration, decode_float, decode_image, decode_transforms, read_one,
     realsense,

@@ -4,7 +4,8 @@ use crate::{Material, Organ, OrganFacts, Pins, Provenance, Specimen, check_name}
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use trocar_camera::Camera;
-use trocar_geometry::{Pose, TetMesh, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::{TetMesh, TriMesh};
 
 /// The whole file.
 #[derive(Serialize, Deserialize)]

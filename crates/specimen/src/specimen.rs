@@ -6,8 +6,9 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use trocar_camera::{Camera, ColorImage};
+use trocar_core::Pose;
 use trocar_geometry::io::{Unit, read_msh, read_surface, write_msh, write_ply};
-use trocar_geometry::{Pose, TetMesh, TriMesh};
+use trocar_geometry::{TetMesh, TriMesh};
 
 /// Where a specimen comes from.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -8,9 +8,9 @@ use super::setpoint::Setpoint;
 use super::workspace::{Reached, Workspace};
 use crate::{Error, Gripper, Result};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::manipulator::JointReadings;
-use trocar_robot::wrench::Wrench;
+use trocar_core::Wrench;
 
 impl Cell {
     fn index_of(&self, arm: &str) -> Result<usize> {

@@ -3,9 +3,9 @@
 use super::setpoint::Setpoint;
 use super::workspace::Workspace;
 use crate::{Error, Result};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::manipulator::{JointReadings, Manipulator, ManipulatorState};
-use trocar_robot::wrench::Wrench;
+use trocar_core::Wrench;
 
 /// What moves an instrument.
 #[derive(Clone, Debug)]

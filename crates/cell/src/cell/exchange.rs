@@ -12,7 +12,7 @@
 //! added.
 
 use glam::DVec3;
-use trocar_robot::wrench::Wrench;
+use trocar_core::Wrench;
 use trocar_tissue::ToolForce;
 
 /// The most that tissue is taken to push or pull [N]: beyond, a joint of the wrist would give way.
@@ -51,7 +51,7 @@ impl Exchange {
         let mut load = Wrench::default();
         for force in forces {
             for part in [force.contact, force.constraint] {
-                load = load + Wrench { force: part.force, torque: part.torque };
+                load += part;
             }
         }
         let over = load.force.length() / MAX_LOAD;

@@ -2,7 +2,7 @@
 
 use super::Cell;
 use crate::Result;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::manipulator::Manipulator;
 
 impl Cell {

@@ -5,8 +5,9 @@ use super::rules::RuleCounts;
 use super::setpoint::Setpoint;
 use crate::severance::Severance;
 use serde::Serialize;
-use trocar_geometry::Pose;
-use trocar_robot::wrench::{ForceKind, Wrench};
+use trocar_core::Pose;
+use trocar_core::Wrench;
+use trocar_robot::wrench::ForceKind;
 use trocar_scene::Side;
 use trocar_tissue::{Divergence, StepReport};
 

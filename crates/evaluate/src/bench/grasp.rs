@@ -11,8 +11,8 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use trocar_cell::{FRAME, GraspDesign, GraspLift, Session};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_specimen::Specimen;
 
 /// Phases that are timed: those in which the gripper is near the tissue.

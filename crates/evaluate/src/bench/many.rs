@@ -5,7 +5,7 @@ use crate::scenes::{Organs, Run, SOLVERS, Scene, material, solver_named};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 
 /// Frames before the timed ones, and most timed ones.
 const WARM_UP: usize = 3;

@@ -7,9 +7,9 @@ use crate::{Error, Result, report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use trocar_core::Progress;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, repair};
-use trocar_progress::Progress;
 use trocar_specimen::StagedFolder;
 
 /// The file that makes a folder one of this benchmark's.

@@ -8,7 +8,7 @@ use crate::scenes::{
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_tissue::Material;
 
 /// The frames of the tube at which errors are taken.

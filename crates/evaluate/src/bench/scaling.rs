@@ -8,7 +8,7 @@ use crate::workflow::REPORT;
 use crate::{Error, Result, report};
 use serde::Serialize;
 use std::path::Path;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_specimen::StagedFolder;
 
 /// The file that makes a folder one of this benchmark's.

@@ -4,7 +4,7 @@ use crate::scenes::{FRAME, Run};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 
 /// Timed frames.
 #[derive(Clone, Debug, Default, Serialize)]

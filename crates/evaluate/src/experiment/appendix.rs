@@ -4,8 +4,8 @@ use super::phantoms;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_specimen::{Organ, Specimen};
 use xxhash_rust::xxh3::Xxh3;
 

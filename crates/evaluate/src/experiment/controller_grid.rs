@@ -7,7 +7,7 @@ use crate::{Error, Result, report};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_robot::manipulator::{Law, Settings};
 
 /// The file that makes a folder one of this experiment's.

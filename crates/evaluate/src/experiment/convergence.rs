@@ -8,7 +8,7 @@ use crate::{Error, Result, report};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 
 /// The file that makes a folder one of this experiment's.
 const MARKER: &str = "convergence.json";

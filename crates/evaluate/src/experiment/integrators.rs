@@ -10,8 +10,8 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_cell::World;
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_tissue::{Model, Oracle, OracleState, Schedule, State, Stepper, stable_explicit_step};
 
 /// The file that makes a folder one of this experiment's.

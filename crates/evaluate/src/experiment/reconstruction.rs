@@ -10,9 +10,9 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_camera::DepthImage;
+use trocar_core::Progress;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
 use trocar_recording::Recording;
 

@@ -4,7 +4,7 @@ use crate::campaign::{Campaign, Kept, PolicyRow, PolicySpec, median};
 use crate::{CampaignResult, Error, Result, report};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_task::policy::POLICIES;
 
 /// The page that stands beside the campaign's own.

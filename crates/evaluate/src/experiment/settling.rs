@@ -8,8 +8,8 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 use trocar_cell::{FRAME, World};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 
 /// The file that makes a folder one of this experiment's.
 const MARKER: &str = "settling.json";

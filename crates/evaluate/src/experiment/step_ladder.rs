@@ -5,7 +5,7 @@ use crate::{Error, Result};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_tissue::{OracleState, Schedule, State, Stepper, ToolMotion};
 
 /// Steps of the oracle a frame on the way to the state.

@@ -6,9 +6,9 @@ use super::{colors, figures, overlays, views};
 use crate::Result;
 use crate::experiment::{ReconstructionResult, ReconstructionRow};
 use std::fmt::Write;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_reconstruct::Reconstruction;
-use trocar_render::Scene;
+use trocar_render::phong::PhongScene;
 
 /// What is asked of each organ: depth error, signed error [mm], volume error, dihedral angle [degrees].
 const DEPTH_ERROR: f64 = 1.0;
@@ -161,7 +161,7 @@ fn looks(made: &[Reconstruction]) -> Result<String> {
         let input = figures::img(&r.input, "input frame")?;
         shown.push(page::figure(&input, &format!("<b>{name}.</b> The window's centre frame as recorded.")));
         let scene =
-            Scene::new(views::surfaces(&r.specimen), None, colors::VIEW_GROUND).with_ambient_occlusion(24, 0.012);
+            PhongScene::new(views::surfaces(&r.specimen), None, colors::VIEW_GROUND).with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
         let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
         shown.push(page::figure(&rendered, "<b>Reconstructed.</b> The surfaces through the recording camera."));

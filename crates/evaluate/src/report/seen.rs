@@ -7,9 +7,9 @@ use super::table::{self, fixed, percent};
 use super::{figures, overlays, views};
 use crate::truth::quantile;
 use crate::{Error, Result};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_reconstruct::Reconstruction;
-use trocar_render::Scene;
+use trocar_render::phong::PhongScene;
 
 /// Refuses a reconstruction whose images differ in size.
 pub(super) fn check_sizes(r: &Reconstruction) -> Result<()> {
@@ -87,7 +87,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
     let mut top = vec![input, composite, depth_figure(r)?, masked];
     if let Some(camera) = &r.specimen.camera {
         let scene =
-            Scene::new(views::surfaces(&r.specimen), None, colors::VIEW_GROUND).with_ambient_occlusion(24, 0.012);
+            PhongScene::new(views::surfaces(&r.specimen), None, colors::VIEW_GROUND).with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
         let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
         let photograph = figures::img(&r.background, "composite, for comparison")?;

@@ -6,7 +6,8 @@ use crate::{Error, Result};
 use glam::DVec3;
 use std::f64::consts::TAU;
 use trocar_cell::VISCOSITY_TIME;
-use trocar_geometry::{OrganAxis, Pose};
+use trocar_core::Pose;
+use trocar_geometry::OrganAxis;
 use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, pins};
 
 /// Standard gravity [m/s2].

@@ -1,6 +1,6 @@
 //! STL surfaces, binary and text.
 
-use super::Parsed;
+use super::file::Parsed;
 use crate::TriMesh;
 use glam::DVec3;
 use std::io::Cursor;
@@ -10,30 +10,31 @@ const HEADER: usize = 84;
 /// Bytes of a facet: normal, three corners, two spare bytes.
 const FACET: usize = 50;
 
-/// Reads an STL file; every triangle has its own three vertices.
+/// Reads an STL file. Every triangle has its own three vertices.
 pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
     let promised = bytes.get(80..HEADER).map(|b| u64::from(u32::from_le_bytes([b[0], b[1], b[2], b[3]])));
     let size = bytes.len() as u64;
     if let Some(facets) = promised
         && HEADER as u64 + facets * FACET as u64 == size
     {
-        // Some programs start binary files with "solid", which the reader would take for text: blank the free header.
+        // Some programs start binary files with "solid", which the reader would interpret as text.
+        // Clearing the free header avoids this.
         let mut binary = bytes.to_vec();
         binary[..80].fill(0);
         return collect(&binary);
     }
     let text_start = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(0);
     if let Some(body) = bytes[text_start..].strip_prefix(b"solid") {
-        // The name is of no interest, and the reader insists on a space before it.
+        // The name is not needed, and the reader requires a space before it.
         let body = &body[body.iter().position(|&b| b == b'\n').unwrap_or(body.len())..];
         return collect(&[b"solid ", body].concat());
     }
     Err(match promised {
         Some(facets) => format!(
-            "a binary STL file of {facets} facets, as its header promises, has {} bytes; this one has {size}",
+            "a binary STL file of {facets} facets, as its header states, has {} bytes; this one has {size}",
             HEADER as u64 + facets * FACET as u64
         ),
-        None => format!("{size} bytes are too few for an STL file"),
+        None => format!("an STL file has at least 84 bytes; this one has {size}"),
     })
 }
 
@@ -68,7 +69,7 @@ mod tests {
     }
 
     #[test]
-    fn binary_files_come_back_whatever_their_header_says() {
+    fn binary_files_are_read_whatever_their_header_says() {
         let mesh = cube(DVec3::ONE, 2.0);
         let mut bytes = binary(&mesh);
         for header in [b"\0\0\0\0\0 ", b"solid "] {
@@ -80,13 +81,13 @@ mod tests {
     }
 
     #[test]
-    fn a_count_that_does_not_match_the_size_is_refused() {
+    fn a_count_that_does_not_match_the_size_is_rejected() {
         let mut bytes = binary(&cube(DVec3::ONE, 2.0));
         bytes.pop();
         assert!(parse(&bytes).unwrap_err().contains("12 facets"));
         bytes[80..84].fill(0xff);
         assert!(parse(&bytes).unwrap_err().contains("4294967295 facets"));
-        assert!(parse(&bytes[..50]).unwrap_err().contains("50 bytes"));
+        assert!(parse(&bytes[..50]).unwrap_err().contains("has 50"));
     }
 
     #[test]

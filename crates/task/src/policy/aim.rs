@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Cell, Cluster, Reached, Setpoint, clusters};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Nodes within this organ coordinate to either side tell where the organ is there.
 const SLICE: f64 = 0.04;

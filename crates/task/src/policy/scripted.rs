@@ -11,7 +11,7 @@ use super::{CHUNK, Policy};
 use crate::{Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::{Action, Setpoint};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_scene::TaskName;
 
 /// Way along the shaft from which open jaws come (m).

@@ -9,8 +9,8 @@ mod scaling;
 
 use crate::cli::{Bench, BenchName, MeshingBench};
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{MeshingResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &Bench, json: bool, progress: &dyn Progress) -> Result<()> {
     match &arguments.name {

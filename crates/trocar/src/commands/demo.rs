@@ -4,8 +4,8 @@ use crate::cli;
 use crate::commands::{reconstruct, simulate};
 use crate::output;
 use std::path::Path;
+use trocar_core::Progress;
 use trocar_evaluate::{Demo, DemoResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result<()> {
     let demo = Demo { frames: arguments.frames, seed: arguments.seed, threads: arguments.threads };

@@ -3,8 +3,8 @@
 use crate::cli;
 use crate::output;
 use serde::Serialize;
+use trocar_core::Progress;
 use trocar_evaluate::{EpisodeHeader, EpisodeMade, EpisodeRun, Error, Result, read_episode, replay, sweep_files};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Result<()> {
     let run = EpisodeRun {

@@ -2,8 +2,8 @@
 
 use crate::cli;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Campaign, CampaignResult, PolicySpec, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Result<()> {
     let policies = arguments.policies.iter().map(|p| PolicySpec::parse(p)).collect::<Result<_>>()?;

@@ -14,9 +14,9 @@ mod wrench;
 
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{ReconstructionResult, Result, Resumed};
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_reconstruct::Settings;
 
 pub fn run(arguments: &Experiment, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -14,8 +14,8 @@ mod segment;
 mod simulate;
 
 use crate::cli::{Cli, Command};
+use trocar_core::Progress;
 use trocar_evaluate::Result;
-use trocar_progress::Progress;
 
 /// Runs the command that was typed.
 pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {

@@ -2,9 +2,9 @@
 
 use crate::cli::Reconstruct;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Reconstructed, Result, reconstruct_recording, reconstruct_surface};
 use trocar_geometry::io::Unit;
-use trocar_progress::Progress;
 use trocar_reconstruct::{Settings, SurfaceRule};
 
 pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Result<()> {

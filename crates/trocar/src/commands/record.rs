@@ -3,9 +3,9 @@
 use crate::{cli::Record, output};
 use serde::Serialize;
 use std::time::Instant;
+use trocar_core::Progress;
 use trocar_evaluate::Result;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 
 #[derive(Serialize)]
 struct Recorded {

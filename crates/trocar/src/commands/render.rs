@@ -2,8 +2,8 @@
 
 use crate::cli::Render;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Rendered, Rendering, Result};
-use trocar_progress::Progress;
 
 /// Paths a pixel unless the user says otherwise.
 const SAMPLES: u32 = 64;

@@ -1,8 +1,8 @@
 //! `trocar segment`.
 
 use crate::{cli, output};
+use trocar_core::Progress;
 use trocar_evaluate::{Result, Segment, Segmented, Wanted, wanted_weights};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &cli::Segment, json: bool, progress: &dyn Progress) -> Result<()> {
     // clap asks for both unless the files are asked for.

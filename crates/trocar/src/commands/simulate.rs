@@ -3,9 +3,9 @@
 use crate::cli::{Simulate, Task};
 use crate::output;
 use trocar_cell::{CellLift, GraspDesign, GraspLift, JAW_FORCE, SeverAt, Severance, Summary};
+use trocar_core::Progress;
 use trocar_evaluate::scenes::solver_named;
 use trocar_evaluate::{CellRun, CellSimulation, Error, Result, SimulatedRun, simulate};
-use trocar_progress::Progress;
 use trocar_scene::Builtin;
 
 /// Organ coordinate of the grasp unless the user says otherwise, and where a cut needs room on the base's side.

@@ -7,8 +7,9 @@ use crate::cell::setpoint::Setpoint;
 use crate::hold::Hold;
 use crate::{GraspDesign, Gripper, Jaw, Scissors};
 use glam::DVec3;
-use trocar_geometry::Pose;
-use trocar_tissue::{ToolForce, Wrench};
+use trocar_core::Pose;
+use trocar_core::Wrench;
+use trocar_tissue::ToolForce;
 
 /// What an arm is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -5,7 +5,7 @@ use crate::World;
 use crate::cell::clearance::Rod;
 use crate::cell::inside::first_organ_around;
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::Shape;
 
 impl ArmUnit {

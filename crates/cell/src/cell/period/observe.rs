@@ -5,7 +5,8 @@ use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
 use crate::cell::report::{ArmObservation, CellEvent, CellReport, PeriodLog, TaggedForce};
 use glam::DVec3;
-use trocar_robot::wrench::{ForceKind, Wrench};
+use trocar_core::Wrench;
+use trocar_robot::wrench::ForceKind;
 use trocar_tissue::ToolForce;
 
 impl Cell {
@@ -63,6 +64,6 @@ impl ArmUnit {
             ForceKind::Contact => f.contact,
         };
         let parts = self.state.forces.iter().map(part);
-        parts.fold(Wrench::default(), |sum, w| sum + Wrench { force: w.force, torque: w.torque })
+        parts.fold(Wrench::default(), |sum, w| sum + w)
     }
 }

@@ -7,7 +7,7 @@ use crate::cell::report::PeriodLog;
 use crate::{FRAME, GraspDesign, Gripper};
 use glam::DVec3;
 use std::time::Instant;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{StepReport, ToolMotion};
 
 /// Height at which tissue feels no instrument (m).

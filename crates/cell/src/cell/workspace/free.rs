@@ -6,7 +6,7 @@ use super::Reached;
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// A free instrument goes this far from where it starts, along each axis of the cell (m).
 const REACH: f64 = 0.2;

@@ -9,7 +9,7 @@ pub use port::PortSpace;
 use super::setpoint::{NUMBERS, Setpoint};
 use crate::Result;
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Where an instrument may be.
 #[derive(Clone, Debug)]

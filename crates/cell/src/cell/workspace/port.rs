@@ -5,7 +5,7 @@ use super::super::setpoint::{NUMBERS, Setpoint, in_range};
 use super::Reached;
 use crate::Result;
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::{Coordinates, Instrument, Limits};
 use trocar_robot::port::Port;
 

@@ -7,8 +7,7 @@ use crate::Result;
 use crate::workflow::reconstruct_recording;
 use std::path::Path;
 use trocar_camera::{Camera, CameraModel, ColorImage, Endoscope, Mask, UndistortionMap};
-use trocar_geometry::Pose;
-use trocar_progress::Progress;
+use trocar_core::{Pose, Progress};
 use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_recording::Recording;
 

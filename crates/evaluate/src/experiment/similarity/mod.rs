@@ -19,8 +19,8 @@ use scenery::{Illumination, Scenery};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_recording::Recording;
 

@@ -2,8 +2,8 @@
 
 use crate::cli::CellBench;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{CellBenchResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &CellBench, json: bool, progress: &dyn Progress) -> Result<()> {
     let bench = trocar_evaluate::CellBench {

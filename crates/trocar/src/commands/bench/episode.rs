@@ -2,8 +2,8 @@
 
 use crate::cli::EpisodeBench;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{EpisodeBenchResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &EpisodeBench, json: bool, progress: &dyn Progress) -> Result<()> {
     let bench = trocar_evaluate::EpisodeBench {

@@ -2,8 +2,8 @@
 
 use crate::cli::GraspBench;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{GraspBenchResult, GraspPhaseTiming, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &GraspBench, json: bool, progress: &dyn Progress) -> Result<()> {
     let bench = trocar_evaluate::GraspBench {

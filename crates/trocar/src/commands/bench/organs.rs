@@ -2,8 +2,8 @@
 
 use crate::cli::OrgansBench;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{OrgansResult, Result, Timing};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &OrgansBench, json: bool, progress: &dyn Progress) -> Result<()> {
     let bench = trocar_evaluate::OrgansBench {

@@ -2,8 +2,8 @@
 
 use crate::cli::RenderBench;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{RenderBenchResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &RenderBench, json: bool, progress: &dyn Progress) -> Result<()> {
     let bench = trocar_evaluate::RenderBench {

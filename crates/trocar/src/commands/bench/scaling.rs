@@ -2,8 +2,8 @@
 
 use crate::cli::ScalingBench;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Result, ScalingResult};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &ScalingBench, json: bool, progress: &dyn Progress) -> Result<()> {
     let bench = trocar_evaluate::ScalingBench {

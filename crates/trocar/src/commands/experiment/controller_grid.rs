@@ -3,8 +3,8 @@
 use super::resumed;
 use crate::cli::ControllerGridExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{ControllerGridResult, ControllerRow, Result};
-use trocar_progress::Progress;
 
 /// Rows that are printed.
 const BEST: usize = 10;

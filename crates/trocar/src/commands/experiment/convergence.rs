@@ -2,8 +2,8 @@
 
 use crate::cli::ConvergenceExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{ConvergenceResult, OrganSource, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &ConvergenceExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let all = trocar_evaluate::ConvergenceExperiment::default();

@@ -2,8 +2,8 @@
 
 use crate::cli::ElementQualityExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{ElementQualityResult, ElementQualityRow, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &ElementQualityExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let experiment = trocar_evaluate::ElementQualityExperiment {

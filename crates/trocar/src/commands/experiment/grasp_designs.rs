@@ -2,8 +2,8 @@
 
 use crate::cli::GraspDesignsExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{GraspDesignRow, GraspDesignsResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &GraspDesignsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let experiment = trocar_evaluate::GraspDesignsExperiment {

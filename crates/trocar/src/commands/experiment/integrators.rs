@@ -2,9 +2,9 @@
 
 use crate::cli::IntegratorsExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{IntegratorsResult, Result};
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 
 pub fn run(arguments: &IntegratorsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let experiment = trocar_evaluate::IntegratorsExperiment {

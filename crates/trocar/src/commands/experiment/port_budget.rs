@@ -2,8 +2,8 @@
 
 use crate::cli::PortBudgetExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{PortBudgetResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &PortBudgetExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let experiment = trocar_evaluate::PortBudgetExperiment {

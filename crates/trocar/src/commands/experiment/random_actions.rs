@@ -2,8 +2,8 @@
 
 use crate::cli::RandomActionsExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{RandomActionsResult, Result};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &RandomActionsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let experiment = trocar_evaluate::RandomActionsExperiment {

@@ -2,8 +2,8 @@
 
 use crate::cli::RolloutsExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Result, RolloutsResult};
-use trocar_progress::Progress;
 
 pub fn run(arguments: &RolloutsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let experiment = trocar_evaluate::RolloutsExperiment {

@@ -2,9 +2,9 @@
 
 use crate::cli::SettlingExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Result, SettlingResult};
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 
 pub fn run(arguments: &SettlingExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let named = &arguments.phantoms;

@@ -2,9 +2,9 @@
 
 use crate::cli::SimilarityExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Result, SimilarityResult, SimilarityRow};
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 
 pub fn run(arguments: &SimilarityExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
     let named = &arguments.phantoms;

@@ -2,8 +2,8 @@
 
 use crate::cli::WrenchExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_evaluate::{Result, WrenchResult};
-use trocar_progress::Progress;
 use trocar_robot::wrench::SensorNoise;
 
 pub fn run(arguments: &WrenchExperiment, json: bool, progress: &dyn Progress) -> Result<()> {
