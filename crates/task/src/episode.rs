@@ -330,6 +330,12 @@ impl Episode {
         &self.cell
     }
 
+    /// Length of the most stretched edge of any organ now over that at rest: privileged. Takes a pass over
+    /// all edges.
+    pub fn max_stretch(&mut self) -> f64 {
+        self.cell.max_stretch()
+    }
+
     /// Places of the first grasper and of the first cutter among the arms.
     pub fn roles(&self) -> (Option<usize>, Option<usize>) {
         (self.now.subject.grasper, self.now.subject.cutter)

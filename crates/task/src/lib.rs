@@ -34,7 +34,7 @@ pub use policy::Policy;
 pub use prompt::prompt;
 pub use random::Random;
 pub use replay::{EpisodeFile, Header, Verdict, scene_hash};
-pub use run::{CHANNELS_FILE, EPISODE_FILE, EpisodeResult, RESULT_FILE, Recording, TimedEvent, run};
+pub use run::{CHANNELS_FILE, EPISODE_FILE, EpisodeResult, RESULT_FILE, Recording, TimedEvent, run, run_watched};
 pub use specimen::specimen_hash;
 pub use stages::{Progress, Stage, StageProgress, Tracker};
 pub use storage::{ChannelsInfo, read_channels, write_channels};

@@ -60,6 +60,8 @@ pub struct Timing {
     pub tissue: Duration,
     /// All of it.
     pub all: Duration,
+    /// Iterations of the tissue's solver, of all organs and substeps.
+    pub iterations: usize,
 }
 
 /// What touches what in a cell: for measuring the cost of contact.

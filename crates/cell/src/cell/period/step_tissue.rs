@@ -23,6 +23,7 @@ impl Cell {
         let clock = Instant::now();
         let report = self.world.step(&self.motions);
         self.timing.tissue += clock.elapsed();
+        self.timing.iterations += report.iterations;
         log.tissue.add(&report);
         if let Some(before) = before {
             log.activation_step = log.activation_step.max(self.world.largest_motion_since(&before));
