@@ -25,7 +25,7 @@ const PLAYERS: [&str; 13] = [
     "render/src",
     "robot/src",
     "scene/src",
-    "sight/src",
+    "sensors/src",
     "specimen/src",
     "task/src",
     "tissue/src",

@@ -62,7 +62,7 @@ def test_the_policy_of_the_document_stays_where_it_is(short_scene, tmp_path):
     """It is served as it is written there; only the server of another package is left out."""
     pytest.importorskip("msgpack")
     pytest.importorskip("websockets")
-    text = (ROOT / "docs/policies.md").read_text()
+    text = (ROOT / "docs/guides/policies.md").read_text()
     (code,) = [block.partition("```")[0] for block in text.split("```python\n")[1:]]
     kept = [line for line in code.splitlines() if "openpi_server" not in line and not line.startswith("WebsocketPolicyServer")]
     (tmp_path / "still.py").write_text("\n".join(kept))

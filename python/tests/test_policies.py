@@ -107,7 +107,7 @@ def test_a_server_answers_resets_and_tells_errors():
 
 
 def steps(file):
-    """Actions and state hashes of an episode file (docs/task.md)."""
+    """Actions and state hashes of an episode file (docs/guides/tasks.md)."""
     _, _, body = file.read_bytes().partition(b"\n")
     kind = np.dtype([("space", "u1"), ("action", "<f8", 10), ("hash", "<u8")])
     return np.frombuffer(body[:-8], kind)

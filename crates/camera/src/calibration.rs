@@ -1,10 +1,11 @@
-//! Calibration files: what OpenCV's samples and `FileStorage` write as YAML or JSON, and ROS's `camera_calibration` as YAML.
+//! Calibration files of OpenCV (samples and `FileStorage`, YAML or JSON) and ROS
+//! (`camera_calibration`, YAML).
 
 use crate::{Camera, CameraModel, Distortion, Error, Fisheye, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// A calibration is a page of text; more is refused before it is read.
+/// Maximum file size. A calibration is about a page of text; larger files are rejected unread.
 const MAX_BYTES: u64 = 1 << 20;
 
 /// A matrix as OpenCV and ROS write it.
@@ -19,7 +20,7 @@ struct Matrix {
     data: Vec<f64>,
 }
 
-/// The keys that matter; the others (board, views, errors) may be there.
+/// The keys that are used. Others (board, views, errors) are ignored.
 #[derive(Debug, Serialize, Deserialize)]
 struct File {
     #[serde(alias = "imageWidth", alias = "width")]
@@ -37,32 +38,46 @@ struct File {
 }
 
 impl CameraModel {
-    /// Reads a calibration file: JSON if it begins with a brace, else YAML (OpenCV's `%YAML:1.0` included). The model is
-    /// fisheye where `fisheye_model` is not 0 or `distortion_model` says fisheye or equidistant.
+    /// Reads a calibration file: JSON if it begins with a brace, otherwise YAML (including OpenCV's
+    /// `%YAML:1.0`). The model is fisheye if `fisheye_model` is not 0 or `distortion_model` is
+    /// `fisheye` or `equidistant`.
     ///
     /// # Errors
-    /// One line that names the file and what is wrong with it.
+    /// One line with the file and the reason.
     pub fn read_calibration(path: &Path) -> Result<Self> {
         let wrong = |reason: String| Error::Calibration { path: path.to_owned(), reason };
         let size = std::fs::metadata(path).map_err(|e| wrong(e.to_string()))?.len();
         if size > MAX_BYTES {
-            return Err(wrong(format!("{size} bytes; a calibration has at most {MAX_BYTES}")));
+            return Err(wrong(format!("the file has {size} bytes; a calibration has at most {MAX_BYTES}")));
         }
         let bytes = std::fs::read(path).map_err(|e| wrong(e.to_string()))?;
         Self::parse_calibration(&bytes).map_err(wrong)
     }
 
-    /// Parses what [`Self::read_calibration`] reads.
+    /// Parses the content of a calibration file, see [`Self::read_calibration`].
     ///
     /// # Errors
-    /// One line that says what is wrong.
+    /// One line with the reason.
+    ///
+    /// ```
+    /// use trocar_camera::CameraModel;
+    ///
+    /// let model = CameraModel::parse_calibration(b"
+    /// image_width: 640
+    /// image_height: 480
+    /// camera_matrix: {rows: 3, cols: 3, data: [600.0, 0, 319.5, 0, 600.0, 239.5, 0, 0, 1]}
+    /// distortion_coefficients: {rows: 1, cols: 5, data: [0.1, 0, 0, 0, 0]}
+    /// ")?;
+    /// assert_eq!(model.camera().fx, 600.0);
+    /// # Ok::<(), String>(())
+    /// ```
     pub fn parse_calibration(bytes: &[u8]) -> std::result::Result<Self, String> {
-        let text = std::str::from_utf8(bytes).map_err(|_| "is no text".to_owned())?;
+        let text = std::str::from_utf8(bytes).map_err(|_| "the file is not UTF-8 text".to_owned())?;
         let text = text.trim_start_matches('\u{feff}').trim_start();
         let file: File = if text.starts_with('{') {
-            serde_json::from_str(text).map_err(|e| format!("no OpenCV calibration: {e}"))?
+            serde_json::from_str(text).map_err(|e| format!("not an OpenCV calibration: {e}"))?
         } else {
-            // OpenCV's first line is its own (`%YAML:1.0`) and no directive that YAML knows.
+            // OpenCV's first line (`%YAML:1.0`) is not a valid YAML directive.
             let body = match text.split_once('\n') {
                 Some((first, rest)) if first.starts_with("%YAML") => rest,
                 _ => text,
@@ -70,16 +85,17 @@ impl CameraModel {
             serde_saphyr::from_str(body).map_err(|e| {
                 let message = e.to_string();
                 let first = message.lines().next().unwrap_or_default();
-                format!("no OpenCV calibration: {}", first.trim_start_matches("error: "))
+                format!("not an OpenCV calibration: {}", first.trim_start_matches("error: "))
             })?
         };
         file.model()
     }
 
-    /// Writes a calibration as OpenCV's `FileStorage` reads it: JSON where the name ends in `.json`, else YAML.
+    /// Writes a calibration for OpenCV's `FileStorage`: JSON if the name ends in `.json`, otherwise
+    /// YAML.
     ///
     /// # Errors
-    /// Names the file when it cannot be written.
+    /// A file that cannot be written.
     pub fn write_calibration(&self, path: &Path) -> Result<()> {
         let wrong = |reason: String| Error::Calibration { path: path.to_owned(), reason };
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -151,10 +167,10 @@ impl File {
             }
         }
         let &[fx, skew, cx, below, fy, cy, a, b, one] = self.camera_matrix.data.as_slice() else {
-            return Err(format!("camera_matrix has {} numbers; it has 3 x 3", self.camera_matrix.data.len()));
+            return Err(format!("camera_matrix has {} numbers; it must have 3 x 3", self.camera_matrix.data.len()));
         };
         if [skew, below, a, b] != [0.0; 4] || one != 1.0 {
-            return Err("camera_matrix is not [fx 0 cx; 0 fy cy; 0 0 1]; skewed pixels are not known here".into());
+            return Err("camera_matrix must be [fx 0 cx; 0 fy cy; 0 0 1]; skewed pixels are not supported".into());
         }
         let k = self.distortion_coefficients.data;
         let named = match self.distortion_model.as_deref() {
@@ -163,7 +179,7 @@ impl File {
             Some("equidistant" | "fisheye") => Some(true),
             Some(other) => {
                 let known = "plumb_bob, rational_polynomial, equidistant";
-                return Err(format!("distortion_model is '{other}'; known are {known}"));
+                return Err(format!("distortion_model is '{other}'; it must be one of {known}"));
             }
         };
         let fisheye = named.unwrap_or(false) || self.fisheye_model.is_some_and(|flag| flag != 0);
@@ -171,13 +187,13 @@ impl File {
             |distortion| Camera { width: self.image_width, height: self.image_height, fx, fy, cx, cy, distortion };
         let model = if fisheye {
             let k: [f64; 4] = k.try_into().map_err(|k: Vec<f64>| {
-                format!("distortion_coefficients has {} numbers; a fisheye has 4 (k1 k2 k3 k4)", k.len())
+                format!("distortion_coefficients has {} numbers; a fisheye lens must have 4 (k1 k2 k3 k4)", k.len())
             })?;
             CameraModel::Fisheye(camera(Distortion::default()), Fisheye(k))
         } else {
             if k.iter().skip(8).any(|k| *k != 0.0) {
                 return Err(format!(
-                    "distortion_coefficients has {} numbers; thin prisms and tilted sensors (beyond 8) are not known here",
+                    "distortion_coefficients has {} numbers; thin prisms and tilted sensors (more than 8) are not supported",
                     k.len()
                 ));
             }

@@ -1,50 +1,61 @@
-//! What a stereo depth camera makes of true depth: noise of the disparity, quantisation, and holes where two views do not match.
+//! Noise of a stereo depth camera: disparity noise, quantisation, and holes where the two views do
+//! not match.
 //!
-//! Every number is drawn from (seed, frame, pixel) alone, so the same call gives the same bits in any order and on any thread.
+//! Every random number depends only on seed, frame and pixel. So the result does not depend on
+//! order or threads.
 
 use crate::{Camera, ColorImage, DepthImage, Error, Result};
 use glam::DVec3;
 use rayon::prelude::*;
+use trocar_core::Random;
 
-/// A stereo camera's noise. [`DepthNoise::d405`] is a RealSense D405.
+/// Separates the random numbers of depth from those of other noise: "dept" in ASCII.
+const DEPTH_KEY: u64 = 0x6465_7074;
+
+/// The noise of a stereo camera, for example a RealSense D405 ([`DepthNoise::d405`]).
 ///
-/// Depth is z = f b / d, with the focal length f [px] along x, the baseline b and the disparity d [px]. An error sigma_d of the disparity is
-/// sigma_z = z^2 sigma_d / (f b) of depth (Intel, "Best-Known-Methods for Tuning Intel RealSense D400 Depth Cameras", depth RMS error).
+/// Depth is z = f b / d with the focal length f along x (px), the baseline b (m) and the disparity
+/// d (px). A disparity error sigma_d gives a depth error sigma_z = z^2 sigma_d / (f b) (Intel,
+/// "Best-Known-Methods for Tuning Intel RealSense D400 Depth Cameras", depth RMS error).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DepthNoise {
-    /// Distance of the two imagers [m].
+    /// Distance between the two imagers (m).
     pub baseline: f64,
-    /// Standard deviation of the disparity [px].
+    /// Standard deviation of the disparity (px).
     pub disparity_sigma: f64,
-    /// Step in which disparities are found [px]; 0 for none.
+    /// Quantisation step of the disparity (px); 0 for none.
     pub disparity_step: f64,
-    /// Step in which depth is told [m]; 0 for none.
+    /// Quantisation step of the depth (m); 0 for none.
     pub depth_step: f64,
-    /// Nearest and farthest depth that is told [m].
+    /// Smallest and largest reported depth (m).
     pub range: [f64; 2],
-    /// A pixel lies at an edge where a pixel within `edge_reach` differs by more than this in disparity [px].
+    /// A pixel is at an edge if a pixel within `edge_reach` differs by more than this in disparity
+    /// (px).
     pub edge_jump: f64,
-    /// Half the side of the window that is matched, within which an edge disturbs [px].
+    /// Half the side of the matching window, within which an edge causes errors (px).
     pub edge_reach: usize,
-    /// Share of the pixels at edges that are lost.
+    /// Fraction of the pixels at edges that become holes.
     pub edge_loss: f64,
-    /// Cosine of view and surface below which pixels begin to be lost; all are at 0.
+    /// Cosine between view and surface normal below which pixels become holes, all of them at 0.
     pub grazing: f64,
-    /// Value of the brightest channel from which a pixel is a highlight, which each imager sees elsewhere.
+    /// A pixel is a highlight if its brightest channel has at least this value. The two imagers see
+    /// highlights at different points of a surface.
     pub bright: u8,
-    /// Share of the highlights' pixels that are lost.
+    /// Fraction of the pixels in highlights that become holes.
     pub bright_loss: f64,
-    /// Share of all pixels that are lost for no reason.
+    /// Fraction of all pixels that become holes at random.
     pub speckle: f64,
-    /// Points that the second imager, `baseline` to the right, does not see are lost.
+    /// Whether points hidden from the second imager, `baseline` to the right, become holes.
     pub occlusion: bool,
 }
 
 impl DepthNoise {
-    /// A RealSense D405: baseline 18 mm, nearest depth 70 mm at 848 x 480, best up to 0.5 m (RealSense D400 series datasheet; it goes on
-    /// beyond, here to 1 m), depth in steps of 0.1 mm (librealsense). Its disparity is good to 0.08 px on well-textured
-    /// surfaces (the tuning guide's figure for the series), which makes 0.4 mm at 0.2 m and 2.5 mm at 0.5 m, within the datasheet's 2%. Disparities
-    /// are taken to come in 32nds of a pixel. Shares of lost pixels are ours, as the phantoms have them.
+    /// A RealSense D405. From the D400 series datasheet: baseline 18 mm, smallest depth 70 mm at
+    /// 848 x 480, best up to 0.5 m; reported up to 1 m here. From librealsense: depth in steps of
+    /// 0.1 mm. From the tuning guide of the series: a disparity noise of 0.08 px on well-textured
+    /// surfaces, that is, 0.4 mm at 0.2 m and 2.5 mm at 0.5 m, within the 2% of the datasheet.
+    /// Assumptions of this project, as in the phantoms: disparity in steps of 1/32 px, and all
+    /// fractions of holes.
     pub fn d405() -> Self {
         Self {
             baseline: 0.018,
@@ -63,16 +74,17 @@ impl DepthNoise {
         }
     }
 
-    /// Standard deviation of depth at `z` [m] through `camera`, quantisation aside [m].
+    /// Standard deviation of the depth at depth `z` (m) for `camera`, without quantisation (m).
     pub fn sigma(&self, camera: &Camera, z: f64) -> f64 {
         z * z * self.disparity_sigma / (camera.fx * self.baseline)
     }
 
-    /// The frame `frame` that the sensor tells of the true `depth`, which `camera` sees; `color` is the picture of the same pixels, where
-    /// highlights are to be found. Numbers out of range in the model itself are clamped; a depth that is no number is a hole.
+    /// The depth image that the sensor reports for the true `depth` of `camera`, in frame number
+    /// `frame`. `color` is the picture of the same pixels, which shows the highlights. Model
+    /// parameters out of range are clamped. A NaN depth becomes a hole.
     ///
     /// # Errors
-    /// Images whose pixels are not as many as their size or the camera's says.
+    /// Images whose size is not the camera's, or whose number of pixels does not match.
     pub fn apply(
         &self,
         depth: &DepthImage,
@@ -81,16 +93,17 @@ impl DepthNoise {
         seed: u64,
         frame: u64,
     ) -> Result<DepthImage> {
-        let mut told = depth.clone();
-        self.spoil(&mut told, color, camera, camera.fx, [seed, frame])?;
-        Ok(told)
+        let mut image = depth.clone();
+        self.spoil(&mut image, color, camera, camera.fx, [seed, frame])?;
+        Ok(image)
     }
 
-    /// As [`Self::apply`], in place, for a picture that is not what the sensor's imagers see but was made smaller or cut out of it: `focal` is the focal length of the imagers [px], in whose
-    /// pixels disparity is told, `camera` the one of the picture.
+    /// As [`Self::apply`], in place, for an image that is a scaled or cropped version of the
+    /// imagers' view. `camera` is the camera of the image. `focal` is the focal length of the
+    /// imagers (px), whose pixels are the unit of disparity.
     ///
     /// # Errors
-    /// Images whose pixels are not as many as their size or the camera's says; then nothing is changed.
+    /// As [`Self::apply`]. Then `depth` is unchanged.
     pub fn spoil(
         &self,
         depth: &mut DepthImage,
@@ -103,7 +116,7 @@ impl DepthNoise {
         let fits = |w: usize, h: usize, n: usize| (w, h) == (camera.width, camera.height) && n == w * h;
         if !fits(width, height, depth.depth.len()) || color.is_some_and(|c| !fits(c.width, c.height, c.pixels.len())) {
             return Err(Error::Camera(format!(
-                "depth is {width} x {height} pixels; depth and colour have the camera's {} x {}",
+                "depth has {width} x {height} pixels; depth and colour must have the camera's {} x {}",
                 camera.width, camera.height
             )));
         }
@@ -112,12 +125,12 @@ impl DepthNoise {
             depth.depth.iter().map(|z| if *z > 0.0 && z.is_finite() { scale / f64::from(*z) } else { 0.0 }).collect();
         let hidden = if self.occlusion { hidden(&disparity, width, camera.fx / focal) } else { Vec::new() };
         let truth = depth.clone();
-        let tell = |i: usize| {
+        let reported = |i: usize| {
             let d = disparity[i];
             if d <= 0.0 || hidden.get(i).is_some_and(|h| *h) {
                 return 0.0;
             }
-            let mut bits = key(&[seed, 0x6465_7074, frame, i as u64]);
+            let mut numbers = Random::from_keys(&[seed, DEPTH_KEY, frame, i as u64]).sequence();
             let mut kept = 1.0 - self.speckle.clamp(0.0, 1.0);
             let facing = facing(&truth, camera, i);
             if facing < self.grazing {
@@ -129,15 +142,15 @@ impl DepthNoise {
             if color.is_some_and(|c| c.pixels[i].iter().any(|v| *v >= self.bright)) {
                 kept *= 1.0 - self.bright_loss.clamp(0.0, 1.0);
             }
-            let lost = unit(&mut bits) >= kept;
-            let noisy = d + self.disparity_sigma * normal(&mut bits);
+            let lost = numbers.uniform() >= kept;
+            let noisy = d + self.disparity_sigma * numbers.normal();
             let z = scale / stepped(noisy, self.disparity_step).max(1e-9);
             let z = stepped(z, self.depth_step);
             if !lost && z >= self.range[0] && z <= self.range[1] { z as f32 } else { 0.0 }
         };
         depth.depth.par_chunks_mut(width.max(1)).enumerate().for_each(|(row, line)| {
-            for (column, told) in line.iter_mut().enumerate() {
-                *told = tell(row * width + column);
+            for (column, pixel) in line.iter_mut().enumerate() {
+                *pixel = reported(row * width + column);
             }
         });
         Ok(())
@@ -155,7 +168,8 @@ fn stepped(value: f64, step: f64) -> f64 {
     if step > 0.0 { (value / step).round() * step } else { value }
 }
 
-/// Which pixels the right imager does not see: a pixel farther right, being nearer, lands on or beyond them there. `stretch` is pixels of the picture in one of the imagers.
+/// Which pixels are hidden from the right imager: a closer pixel farther right maps to the same or
+/// a lower column there. `stretch` is the number of image pixels per imager pixel.
 fn hidden(disparity: &[f64], width: usize, stretch: f64) -> Vec<bool> {
     let mut out = vec![false; disparity.len()];
     if width == 0 {
@@ -165,7 +179,8 @@ fn hidden(disparity: &[f64], width: usize, stretch: f64) -> Vec<bool> {
         let mut leftmost = f64::INFINITY;
         for u in (0..row.len()).rev().filter(|u| row[*u] > 0.0) {
             let lands = u as f64 - stretch * row[u];
-            // Beside the right imager's picture nothing matches either, but rectified sensors are wider than what they show.
+            // Columns outside the right imager's picture count as visible, because rectified
+            // sensors are wider than their pictures.
             hidden[u] = lands >= leftmost;
             leftmost = leftmost.min(lands);
         }
@@ -184,12 +199,13 @@ fn at_edge(disparity: &[f64], width: usize, i: usize, reach: usize, jump: f64) -
     })
 }
 
-/// Cosine between view and surface at pixel `i`, by the smaller of the differences to both sides; 1 where there are none.
+/// Cosine between view and surface normal at pixel `i`, from the smaller of the differences to both
+/// sides. 1 without neighbours.
 fn facing(depth: &DepthImage, camera: &Camera, i: usize) -> f64 {
     let (u, v) = (i % depth.width, i / depth.width);
     let point = |u: usize, v: usize| {
         let z = f64::from(depth.depth[v * depth.width + u]);
-        // The lens's distortion tilts no surface that matters here.
+        // Lens distortion is negligible for the direction of the normal.
         let ray = DVec3::new((u as f64 - camera.cx) / camera.fx, (v as f64 - camera.cy) / camera.fy, 1.0);
         (z > 0.0 && z.is_finite()).then(|| ray * z)
     };
@@ -205,30 +221,6 @@ fn facing(depth: &DepthImage, camera: &Camera, i: usize) -> f64 {
         (Some(x), Some(y)) => x.cross(y).normalize_or_zero().dot(here.normalize()).abs(),
         _ => 1.0,
     }
-}
-
-/// Scrambles 64 bits (the finaliser of SplitMix64: Steele, Lea, Flood 2014).
-fn scramble(x: u64) -> u64 {
-    let z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-fn key(parts: &[u64]) -> u64 {
-    parts.iter().fold(0, |h, p| scramble(h ^ *p))
-}
-
-/// The next uniform number in 0..1.
-fn unit(bits: &mut u64) -> f64 {
-    *bits = scramble(*bits);
-    (*bits >> 11) as f64 / (1_u64 << 53) as f64
-}
-
-/// The next normal number, by Box and Muller's polar coordinates.
-fn normal(bits: &mut u64) -> f64 {
-    let (a, b) = (unit(bits), unit(bits));
-    (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
 }
 
 #[cfg(test)]
@@ -253,9 +245,9 @@ mod tests {
         image
     }
 
-    fn lost(told: &DepthImage, of: impl Fn(usize, usize) -> bool) -> f64 {
+    fn lost(image: &DepthImage, of: impl Fn(usize, usize) -> bool) -> f64 {
         let chosen: Vec<f32> =
-            (0..told.depth.len()).filter(|i| of(i % told.width, i / told.width)).map(|i| told.depth[i]).collect();
+            (0..image.depth.len()).filter(|i| of(i % image.width, i / image.width)).map(|i| image.depth[i]).collect();
         chosen.iter().filter(|z| **z == 0.0).count() as f64 / chosen.len() as f64
     }
 
@@ -263,71 +255,73 @@ mod tests {
     fn noise_grows_with_the_square_of_the_distance() {
         let model = DepthNoise { disparity_step: 0.0, depth_step: 0.0, ..DepthNoise::d405() };
         for z in [0.1, 0.2, 0.4] {
-            let told = model.apply(&filled(|_, _| z), None, &CAMERA, 7, 0).unwrap();
-            let valid: Vec<f64> = told.depth.iter().filter(|z| **z > 0.0).map(|d| f64::from(*d)).collect();
+            let image = model.apply(&filled(|_, _| z), None, &CAMERA, 7, 0).unwrap();
+            let valid: Vec<f64> = image.depth.iter().filter(|z| **z > 0.0).map(|d| f64::from(*d)).collect();
             let mean = valid.iter().sum::<f64>() / valid.len() as f64;
             let deviation = (valid.iter().map(|d| (d - mean).powi(2)).sum::<f64>() / valid.len() as f64).sqrt();
             let expected = f64::from(z * z) * 0.08 / (446.8 * 0.018);
             assert!((model.sigma(&CAMERA, f64::from(z)) - expected).abs() < 1e-9);
-            // 60,000 samples: the deviation is known to 0.3%, the mean to 0.4% of a deviation; 1/d is a little crooked.
+            // 60,000 samples: the deviation is known to 0.3%, the mean to 0.4% of a deviation. 1/d
+            // is slightly nonlinear.
             assert!((deviation / expected - 1.0).abs() < 0.015, "{z} m: {deviation} not {expected}");
             assert!((mean - f64::from(z)).abs() < 0.05 * expected, "{z} m: mean {mean}");
-            let speckle = lost(&told, |_, _| true);
+            let speckle = lost(&image, |_, _| true);
             assert!((speckle - 0.005).abs() < 0.0015, "{speckle} lost on a plane");
         }
     }
 
     #[test]
-    fn depth_comes_in_steps() {
-        let told = DepthNoise::d405().apply(&filled(|u, _| 0.2 + 1e-5 * u as f32), None, &CAMERA, 1, 0).unwrap();
-        assert!(told.depth.iter().all(|z| (z * 1e4 - (z * 1e4).round()).abs() < 1e-2), "tenths of millimetres");
+    fn depth_is_quantised() {
+        let image = DepthNoise::d405().apply(&filled(|u, _| 0.2 + 1e-5 * u as f32), None, &CAMERA, 1, 0).unwrap();
+        assert!(image.depth.iter().all(|z| (z * 1e4 - (z * 1e4).round()).abs() < 1e-2), "tenths of millimetres");
         let coarse = DepthNoise { disparity_sigma: 0.0, depth_step: 0.0, speckle: 0.0, ..DepthNoise::d405() };
-        let told = coarse.apply(&filled(|_, _| 0.3), None, &CAMERA, 1, 0).unwrap();
-        let thirty_seconds = 32.0 * 446.8 * 0.018 / f64::from(told.depth[0]);
+        let image = coarse.apply(&filled(|_, _| 0.3), None, &CAMERA, 1, 0).unwrap();
+        let thirty_seconds = 32.0 * 446.8 * 0.018 / f64::from(image.depth[0]);
         assert!((thirty_seconds - thirty_seconds.round()).abs() < 1e-3, "{thirty_seconds}");
     }
 
     #[test]
-    fn edges_grazing_surfaces_highlights_and_the_far_are_lost() {
+    fn edges_grazing_surfaces_highlights_and_far_points_become_holes() {
         let model = DepthNoise::d405();
         let step = model.apply(&filled(|u, _| if u < 150 { 0.25 } else { 0.2 }), None, &CAMERA, 3, 0).unwrap();
-        // 446.8 * 0.018 / 0.2 - 446.8 * 0.018 / 0.25 = 8.04 px beside the nearer surface are hidden from the right imager.
+        // 446.8 * 0.018 / 0.2 - 446.8 * 0.018 / 0.25 = 8.04 px beside the closer surface are hidden
+        // from the right imager.
         assert_eq!(lost(&step, |u, _| (142..150).contains(&u)), 1.0, "the shadow");
         assert!((lost(&step, |u, _| u == 150) - 0.7).abs() < 0.15, "the edge");
         assert!(lost(&step, |u, _| !(141..151).contains(&u)) < 0.01, "elsewhere");
 
-        // A plane seen under 84 degrees from its normal in the middle: 0.1 over 0.25 is kept.
+        // A plane at 84 degrees from its normal in the centre: the fraction 0.1 / 0.25 is kept.
         let slope = (84.26_f64).to_radians().tan();
         let steep = filled(|_, v| (0.3 / (1.0 - slope * (v as f64 - 99.5) / 446.8)).clamp(0.0, 10.0) as f32);
-        let told =
+        let image =
             DepthNoise { range: [0.0, 10.0], edge_jump: 50.0, ..model }.apply(&steep, None, &CAMERA, 3, 0).unwrap();
-        let kept = 1.0 - lost(&told, |u, v| (140..160).contains(&u) && (97..=102).contains(&v));
+        let kept = 1.0 - lost(&image, |u, v| (140..160).contains(&u) && (97..=102).contains(&v));
         assert!((kept - 0.4).abs() < 0.15, "{kept} kept of the steep plane");
 
         let mut color = ColorImage::new(CAMERA.width, CAMERA.height, [100; 3]);
         color.pixels[..300 * 50].fill([255, 240, 240]);
-        let told = model.apply(&filled(|_, _| 0.2), Some(&color), &CAMERA, 3, 0).unwrap();
-        assert!((lost(&told, |_, v| v < 50) - 0.8).abs() < 0.02 && lost(&told, |_, v| v >= 50) < 0.01);
+        let image = model.apply(&filled(|_, _| 0.2), Some(&color), &CAMERA, 3, 0).unwrap();
+        assert!((lost(&image, |_, v| v < 50) - 0.8).abs() < 0.02 && lost(&image, |_, v| v >= 50) < 0.01);
         for z in [0.05, 1.5, f32::NAN, f32::INFINITY, -1.0] {
-            let told = model.apply(&filled(|_, _| z), None, &CAMERA, 3, 0).unwrap();
-            assert!(told.depth.iter().all(|z| *z == 0.0), "{z} m");
+            let image = model.apply(&filled(|_, _| z), None, &CAMERA, 3, 0).unwrap();
+            assert!(image.depth.iter().all(|z| *z == 0.0), "{z} m");
         }
     }
 
     #[test]
-    fn the_same_frame_has_the_same_noise_and_the_next_another() {
+    fn noise_is_reproducible_and_differs_between_frames() {
         let model = DepthNoise::d405();
         let flat = filled(|_, _| 0.2);
-        let told = |seed, frame| model.apply(&flat, None, &CAMERA, seed, frame).unwrap();
-        assert_eq!(told(1, 4), told(1, 4));
+        let image = |seed, frame| model.apply(&flat, None, &CAMERA, seed, frame).unwrap();
+        assert_eq!(image(1, 4), image(1, 4));
         let differing = |a: &DepthImage, b: &DepthImage| a.depth.iter().zip(&b.depth).filter(|(a, b)| a != b).count();
-        assert!(differing(&told(1, 4), &told(1, 5)) > 40_000 && differing(&told(1, 4), &told(2, 4)) > 40_000);
+        assert!(differing(&image(1, 4), &image(1, 5)) > 40_000 && differing(&image(1, 4), &image(2, 4)) > 40_000);
         let other = Camera { width: 10, ..CAMERA };
         assert!(model.apply(&flat, None, &other, 1, 0).unwrap_err().to_string().contains("300 x 200"));
     }
 
     #[test]
-    fn a_picture_cut_out_of_the_sensors_has_the_sensors_noise() {
+    fn a_cropped_image_has_the_noise_of_the_sensor() {
         let camera = Camera { width: 200, height: 200, fx: 208.0, fy: 208.0, cx: 99.5, cy: 99.5, ..CAMERA };
         let exact = DepthNoise { disparity_step: 0.0, speckle: 0.0, ..DepthNoise::d405() };
         let model = DepthNoise { disparity_sigma: 0.05, edge_loss: 0.6, ..exact };
@@ -353,7 +347,8 @@ mod tests {
         let lost = |column: usize| (0..64).filter(|r| image.depth[r * 64 + column] == 0.0).count();
         assert!((25..55).contains(&lost(31)) && (25..55).contains(&lost(32)) && lost(10) == 0 && lost(33) == 0);
         assert!(image.depth.iter().all(|d| (f64::from(*d) / 1e-4 - (f64::from(*d) / 1e-4).round()).abs() < 1e-3));
-        // 445 * 0.018 / 0.2 - 445 * 0.018 / 0.3 = 13.4 px of the imagers, 6.2 of the picture, are hidden beside what is nearer on the right.
+        // 445 * 0.018 / 0.2 - 445 * 0.018 / 0.3 = 13.4 px of the imagers, 6.2 px of the image, are
+        // hidden beside the closer surface on the right.
         model.spoil(&mut shadowed, None, &camera, 445.0, [1, 2]).unwrap();
         let lost = |column: usize| (0..64).filter(|r| shadowed.depth[r * 64 + column] == 0.0).count();
         assert!(lost(26) == 64 && lost(24) == 0, "{} {}", lost(26), lost(24));

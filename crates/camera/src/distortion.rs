@@ -1,26 +1,28 @@
-//! Lens distortion as OpenCV writes it, both ways: the rational model of its `calib3d` and the equidistant one of its `fisheye`
-//! (OpenCV documentation, "Camera Calibration and 3D Reconstruction", "Fisheye camera model").
+//! OpenCV's lens distortion and its inverse: the rational model of `calib3d` and the equidistant
+//! model of `fisheye` (OpenCV documentation, "Camera Calibration and 3D Reconstruction" and
+//! "Fisheye camera model").
 
 use glam::{DMat2, DVec2};
 use serde::{Deserialize, Serialize};
 
-/// Image points are told apart down to this in units of the focal length: 1e-10 px on a lens of 1000 px.
-const CLOSE: f64 = 1e-13;
-/// Newton's method needs about five; the rest is for the lens's last pixel.
-const ITERATIONS: usize = 60;
+/// Tolerance of image points in units of the focal length: 1e-10 px for a focal length of 1000 px.
+const TOLERANCE: f64 = 1e-13;
+/// Maximum number of Newton steps. About five suffice except at the edge of the lens.
+const MAX_STEPS: usize = 60;
 
-/// OpenCV's rational distortion, coefficients in its order: k1 k2 p1 p2 k3 k4 k5 k6 (4, 5 or 8 of them in a file).
+/// OpenCV's rational distortion, with coefficients in its order: k1 k2 p1 p2 k3 k4 k5 k6. A file
+/// has the first 4, 5 or all 8.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Distortion(pub [f64; 8]);
 
 impl Distortion {
-    /// True when the lens does not distort.
+    /// Whether all coefficients are zero.
     pub fn is_none(&self) -> bool {
         self.0 == [0.0; 8]
     }
 
-    /// Where an ideal image point (x, y) = (X/Z, Y/Z) really lands.
+    /// The distorted image point of an ideal image point (x, y) = (X/Z, Y/Z).
     pub fn apply(&self, p: DVec2) -> DVec2 {
         let [k1, k2, p1, p2, k3, k4, k5, k6] = self.0;
         let r2 = p.length_squared();
@@ -32,27 +34,30 @@ impl Distortion {
         )
     }
 
-    /// The ideal image point that lands at `q`; `None` where none does on the lens's own side of the fold (a polynomial turns
-    /// back somewhere outside of the image it was fitted to, and points beyond land on others).
+    /// The ideal image point of the distorted image point `q`; `None` if there is none before the
+    /// fold. Outside the image it was fitted to, the polynomial may decrease again: beyond this
+    /// fold, points coincide with others.
     pub fn invert(&self, q: DVec2) -> Option<DVec2> {
         if self.is_none() {
             return Some(q);
         }
-        // From where it would be without distortion; if that runs over the fold, from the point that the radial part alone gives.
+        // Starts at the point without distortion. If that crosses the fold, starts at the solution
+        // of the radial part alone.
         self.newton(q, q).or_else(|| self.newton(q, self.radial_start(q)))
     }
 
-    /// The ideal image point that lands nearest to `q` as far as is known: [`Self::invert`], or a point at the fold.
-    pub(crate) fn undo(&self, q: DVec2) -> DVec2 {
+    /// [`Self::invert`], or a point at the fold if there is no inverse.
+    pub(crate) fn invert_or_fold(&self, q: DVec2) -> DVec2 {
         self.invert(q).unwrap_or_else(|| self.radial_start(q))
     }
 
-    /// Newton's method, each step halved until the residual falls and the map still keeps its sense of turning.
+    /// Newton's method. Each step is halved until the residual decreases and the map preserves
+    /// orientation.
     fn newton(&self, q: DVec2, start: DVec2) -> Option<DVec2> {
         let mut p = start;
         let mut residual = q - self.apply(p);
-        for _ in 0..ITERATIONS {
-            if residual.length_squared() < CLOSE * CLOSE {
+        for _ in 0..MAX_STEPS {
+            if residual.length_squared() < TOLERANCE * TOLERANCE {
                 break;
             }
             let jacobian = self.jacobian(p);
@@ -61,35 +66,35 @@ impl Distortion {
             loop {
                 let next = p + share * step;
                 let left = q - self.apply(next);
-                // Written so that NaN fails.
-                if left.length_squared() < residual.length_squared() && self.keeps_turning(next) {
+                // This form rejects NaN.
+                if left.length_squared() < residual.length_squared() && self.preserves_orientation(next) {
                     (p, residual) = (next, left);
                     break;
                 }
                 share *= 0.5;
                 if share < 1e-4 {
-                    // As near as rounding lets it, or stuck.
-                    return (residual.length() < 1e-11 && self.keeps_turning(p)).then_some(p);
+                    // Converged up to rounding, or stuck.
+                    return (residual.length() < 1e-11 && self.preserves_orientation(p)).then_some(p);
                 }
             }
         }
-        (residual.length() < 1e-11 && self.keeps_turning(p)).then_some(p)
+        (residual.length() < 1e-11 && self.preserves_orientation(p)).then_some(p)
     }
 
-    /// True at points that the map does not turn over, in radius or as a whole.
-    fn keeps_turning(&self, p: DVec2) -> bool {
+    /// Whether the map preserves orientation at `p`, in radius and as a whole.
+    fn preserves_orientation(&self, p: DVec2) -> bool {
         let [.., k4, k5, k6] = self.0;
         let r2 = p.length_squared();
         self.jacobian(p).determinant() > 0.0 && self.slope(r2) > 0.0 && 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)) > 0.0
     }
 
-    /// d(r radial)/dr at squared radius `r2`.
+    /// d(r radial)/dr at the squared radius `r2`.
     fn slope(&self, r2: f64) -> f64 {
         let (radial, change) = self.radial(r2);
         radial + 2.0 * r2 * change
     }
 
-    /// The radial factor and its derivative by the squared radius.
+    /// The radial factor and its derivative with respect to the squared radius.
     fn radial(&self, r2: f64) -> (f64, f64) {
         let [k1, k2, _, _, k3, k4, k5, k6] = self.0;
         let above = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
@@ -109,21 +114,22 @@ impl Distortion {
         )
     }
 
-    /// The point in `q`'s direction whose radial part lands as far out, or the last one before the fold.
+    /// The point in the direction of `q` whose radial part has the radius of `q`, or the last one
+    /// before the fold.
     fn radial_start(&self, q: DVec2) -> DVec2 {
         let wanted = q.length();
         let (mut low, mut high) = (0.0, 0.0);
-        // Outwards in small steps until it is passed, or the lens turns back.
+        // Small steps outwards until the radius is passed or the fold is reached.
         for _ in 0..4000 {
             high += 0.005 * (1.0 + high);
-            if !self.keeps_radius(high) || high * self.radial(high * high).0 >= wanted {
+            if !self.increases_radius(high) || high * self.radial(high * high).0 >= wanted {
                 break;
             }
             low = high;
         }
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
-            if self.keeps_radius(middle) && middle * self.radial(middle * middle).0 < wanted {
+            if self.increases_radius(middle) && middle * self.radial(middle * middle).0 < wanted {
                 low = middle;
             } else {
                 high = middle;
@@ -132,7 +138,7 @@ impl Distortion {
         q.normalize_or_zero() * low
     }
 
-    fn keeps_radius(&self, r: f64) -> bool {
+    fn increases_radius(&self, r: f64) -> bool {
         let [.., k4, k5, k6] = self.0;
         let r2 = r * r;
         self.slope(r2) > 0.0 && 1.0 + r2 * (k4 + r2 * (k5 + r2 * k6)) > 0.0
@@ -163,41 +169,42 @@ impl From<Distortion> for Vec<f64> {
     }
 }
 
-/// OpenCV's fisheye distortion k1 k2 k3 k4: a ray at angle a from the axis lands at distance a (1 + k1 a^2 + k2 a^4 + k3 a^6 +
-/// k4 a^8) from the middle, in units of the focal length.
+/// OpenCV's fisheye distortion k1 k2 k3 k4. The image of a ray at angle a from the axis is at
+/// distance a (1 + k1 a^2 + k2 a^4 + k3 a^6 + k4 a^8) from the centre, in units of the focal
+/// length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Fisheye(pub [f64; 4]);
 
 impl Fisheye {
-    /// Distance from the middle at which a ray lands that is `angle` [rad] off the axis.
+    /// Distance from the centre of the image of a ray at `angle` (rad) from the axis.
     pub fn apply(&self, angle: f64) -> f64 {
         let [k1, k2, k3, k4] = self.0;
         let a2 = angle * angle;
         angle * (1.0 + a2 * (k1 + a2 * (k2 + a2 * (k3 + a2 * k4))))
     }
 
-    /// The angle [rad] of the ray that lands `distance` from the middle; `None` beyond half a turn or where the polynomial
-    /// turns back before.
+    /// The angle (rad) of the ray whose image is at `distance` from the centre; `None` beyond half
+    /// a turn or beyond the fold.
     pub fn invert(&self, distance: f64) -> Option<f64> {
         let [k1, k2, k3, k4] = self.0;
         let slope = |a: f64| {
             let a2 = a * a;
             1.0 + a2 * (3.0 * k1 + a2 * (5.0 * k2 + a2 * (7.0 * k3 + a2 * 9.0 * k4)))
         };
-        const STEPS: usize = 64;
+        const SEARCH_STEPS: usize = 64;
         let (mut low, mut high) = (0.0, 0.0);
-        for i in 1..=STEPS {
-            high = std::f64::consts::PI * i as f64 / STEPS as f64;
+        for i in 1..=SEARCH_STEPS {
+            high = std::f64::consts::PI * i as f64 / SEARCH_STEPS as f64;
             if slope(high) <= 0.0 || self.apply(high) >= distance {
                 break;
             }
             low = high;
         }
-        // Bracketed, so Newton's method may be trusted wherever it stays inside.
+        // The root is bracketed. A Newton step that leaves the bracket is replaced by bisection.
         let mut a = distance.clamp(low, high);
-        for _ in 0..ITERATIONS {
+        for _ in 0..MAX_STEPS {
             let value = self.apply(a) - distance;
-            if value.abs() < CLOSE {
+            if value.abs() < TOLERANCE {
                 break;
             }
             if value > 0.0 || slope(a) <= 0.0 {
@@ -216,7 +223,8 @@ impl Fisheye {
 mod tests {
     use super::*;
 
-    /// OpenCV's own sample (5 coefficients), a wide rational one, a pincushion and a barrel that folds at r = 0.82.
+    /// OpenCV's sample (5 coefficients), a wide rational lens, a pincushion and a barrel that folds
+    /// at r = 0.82.
     const LENSES: [[f64; 8]; 4] = [
         [-0.2855, 0.0792, 1.27e-3, -1.1e-4, 0.0412, 0.0, 0.0, 0.0],
         [0.5479, -0.0210, -7.21e-5, 2.06e-5, -0.00265, 0.8897, 0.0861, -0.0139],
@@ -225,7 +233,7 @@ mod tests {
     ];
 
     #[test]
-    fn invert_undoes_apply_up_to_the_fold() {
+    fn invert_inverts_apply_up_to_the_fold() {
         for (lens, reach) in LENSES.iter().zip([0.9, 1.5, 2.0, 0.81]) {
             let lens = Distortion(*lens);
             for i in 0..40 {
@@ -240,13 +248,13 @@ mod tests {
     }
 
     #[test]
-    fn nothing_lands_beyond_the_fold() {
+    fn there_is_no_inverse_beyond_the_fold() {
         let lens = Distortion(LENSES[3]);
-        // It turns back at r^2 = 1 / 1.5, where it has come to two thirds of that.
+        // The fold is at r^2 = 1 / 1.5, where the distorted radius is two thirds of r.
         let farthest = (2.0_f64 / 3.0).sqrt() * 2.0 / 3.0;
         assert!(lens.invert(DVec2::new(0.999 * farthest, 0.0)).is_some());
         assert_eq!(lens.invert(DVec2::new(1.001 * farthest, 0.0)), None);
-        assert!((lens.undo(DVec2::new(2.0, 0.0)).x - (2.0_f64 / 3.0).sqrt()).abs() < 1e-6);
+        assert!((lens.invert_or_fold(DVec2::new(2.0, 0.0)).x - (2.0_f64 / 3.0).sqrt()).abs() < 1e-6);
         assert_eq!(Fisheye([-0.3, 0.0, 0.0, 0.0]).invert(1.0), None);
         for bad in [DVec2::NAN, DVec2::INFINITY] {
             assert_eq!(lens.invert(bad), None);

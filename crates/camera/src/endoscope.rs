@@ -1,24 +1,36 @@
-//! The oblique endoscope: a rigid shaft whose optics look aside.
+//! Rigid endoscopes with oblique optics.
 
 use crate::Camera;
 use glam::DQuat;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
-/// A rigid endoscope. Its shaft's frame has z along the shaft, towards the tip, and its origin at the lens.
+/// A rigid endoscope. The frame of its shaft has z along the shaft towards the tip and its origin
+/// at the lens.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_camera::Endoscope;
+/// use trocar_core::Pose;
+///
+/// let view = Endoscope::thirty_degrees().view(&Pose::IDENTITY);
+/// let angle = (view.rotation * DVec3::Z).angle_between(DVec3::Z);
+/// assert!((angle.to_degrees() - 30.0).abs() < 1e-9);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Endoscope {
     /// The camera behind the optics.
     pub camera: Camera,
-    /// Angle from the shaft to the middle of the view [rad]; 0 looks straight ahead.
+    /// Angle between the shaft and the centre of the view (rad). 0 looks straight ahead.
     pub oblique: f64,
-    /// Turn of the optics about the shaft against the camera head [rad]: the view swings round, the picture's top stays with
-    /// the head. 0 looks towards the shaft frame's +y, the picture's bottom.
+    /// Rotation of the optics about the shaft relative to the camera head (rad). It rotates the
+    /// viewing direction, while the top of the picture stays fixed to the head. At 0 the view
+    /// points towards +y of the shaft frame, the bottom of the picture.
     pub turn: f64,
 }
 
 impl Endoscope {
-    /// A thirty-degree forward-oblique laparoscope: 86.2 x 54.6 degrees at 1280 x 720, as the tower of the paper's laboratory
-    /// is after undistortion.
+    /// A forward-oblique laparoscope of 30 degrees with 86.2 x 54.6 degrees at 1280 x 720: the
+    /// paper's endoscope after undistortion.
     pub fn thirty_degrees() -> Self {
         let (width, height) = (1280, 720);
         let focal = |pixels: usize, deg: f64| 0.5 * pixels as f64 / (0.5 * deg.to_radians()).tan();
@@ -27,12 +39,12 @@ impl Endoscope {
         Self { camera, oblique: 30.0_f64.to_radians(), turn: 0.0 }
     }
 
-    /// Pose of the camera (OpenCV's axes) for a pose of the shaft, both in the same frame.
+    /// Pose of the camera (OpenCV axes) for a pose of the shaft in the same frame.
     pub fn view(&self, shaft: &Pose) -> Pose {
         Pose { rotation: shaft.rotation * self.bend(), translation: shaft.translation }
     }
 
-    /// Pose of the shaft for a pose of the camera: undoes [`Self::view`].
+    /// Pose of the shaft for a pose of the camera: the inverse of [`Self::view`].
     pub fn shaft(&self, view: &Pose) -> Pose {
         Pose { rotation: view.rotation * self.bend().inverse(), translation: view.translation }
     }
@@ -50,7 +62,7 @@ mod tests {
     use glam::DVec3;
 
     #[test]
-    fn the_view_is_thirty_degrees_off_the_shaft_and_comes_back() {
+    fn view_is_thirty_degrees_off_the_shaft_and_shaft_inverts_it() {
         let mut scope = Endoscope::thirty_degrees();
         let shaft = Pose { rotation: DQuat::from_rotation_y(2.1), translation: DVec3::new(0.1, 0.2, 0.3) };
         for turn in [0.0, 0.7, -2.0] {
@@ -67,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn its_field_of_view_is_the_towers() {
+    fn the_field_of_view_matches_the_paper() {
         let camera = Endoscope::thirty_degrees().camera;
         let wide = 2.0 * (-camera.ray(-0.5, camera.cy).x).atan().to_degrees();
         let high = 2.0 * (-camera.ray(camera.cx, -0.5).y).atan().to_degrees();

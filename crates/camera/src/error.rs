@@ -1,4 +1,4 @@
-//! What can go wrong with an image or a camera.
+//! Errors of images, calibration files and cameras.
 
 use std::path::PathBuf;
 
@@ -13,18 +13,18 @@ pub enum Error {
     Image {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
-    /// A calibration file could not be read, understood or written.
+    /// A calibration file could not be read, parsed or written.
     #[error("{path}: {reason}", path = path.display())]
     Calibration {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
-    /// The camera's numbers make no sense.
+    /// Invalid parameters or image sizes of a camera.
     #[error("{0}")]
     Camera(String),
 }

@@ -5,47 +5,47 @@ use image::{DynamicImage, ImageDecoder, ImageReader};
 use std::io::Cursor;
 use std::path::Path;
 
-/// Images larger than this on a side are refused before their pixels are allocated.
+/// Maximum width and height of an image (px). Larger images are rejected before allocation.
 const MAX_SIDE: u32 = 16_384;
 
-/// Bytes of pixels that a byte of a file may hold at most: 1032 by deflate.
-const MAX_PACKING: u64 = 1040;
+/// Maximum number of pixel bytes per file byte. Deflate reaches 1032.
+const MAX_COMPRESSION: u64 = 1040;
 
 /// An 8-bit sRGB image, rows from the top.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ColorImage {
-    /// Width [px].
+    /// Width (px).
     pub width: usize,
-    /// Height [px].
+    /// Height (px).
     pub height: usize,
-    /// One colour a pixel, row by row.
+    /// One colour per pixel, row by row.
     pub pixels: Vec<[u8; 3]>,
 }
 
 /// A depth image in metres; 0 is invalid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthImage {
-    /// Width [px].
+    /// Width (px).
     pub width: usize,
-    /// Height [px].
+    /// Height (px).
     pub height: usize,
-    /// One depth a pixel [m], row by row.
+    /// One depth per pixel (m), row by row.
     pub depth: Vec<f32>,
 }
 
-/// A yes/no image.
+/// A binary image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mask {
-    /// Width [px].
+    /// Width (px).
     pub width: usize,
-    /// Height [px].
+    /// Height (px).
     pub height: usize,
-    /// One flag a pixel, row by row.
+    /// One flag per pixel, row by row.
     pub set: Vec<bool>,
 }
 
 impl ColorImage {
-    /// An image of one colour.
+    /// An image with a single colour.
     pub fn new(width: usize, height: usize, color: [u8; 3]) -> Self {
         Self { width, height, pixels: vec![color; width * height] }
     }
@@ -53,15 +53,15 @@ impl ColorImage {
     /// Reads a PNG or JPEG.
     ///
     /// # Errors
-    /// Names the file when it is missing, truncated or no image.
+    /// A file that is missing, truncated or not an image.
     pub fn read(path: &Path) -> Result<Self> {
         Self::decode(&load(path)?, path)
     }
 
-    /// Decodes the bytes of a PNG or JPEG; `path` is the file that errors name.
+    /// Decodes the bytes of a PNG or JPEG. `path` is used in errors only.
     ///
     /// # Errors
-    /// Names the file when it is truncated or no image.
+    /// Bytes that are truncated or not an image.
     pub fn decode(bytes: &[u8], path: &Path) -> Result<Self> {
         let image = decode(bytes, path)?.into_rgb8();
         let (width, height) = (image.width() as usize, image.height() as usize);
@@ -71,7 +71,7 @@ impl ColorImage {
     /// Writes a PNG.
     ///
     /// # Errors
-    /// Names the file when it cannot be written.
+    /// A file that cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<()> {
         write(path, &self.to_png()?)
     }
@@ -79,42 +79,44 @@ impl ColorImage {
     /// The PNG file as bytes.
     ///
     /// # Errors
-    /// When the pixels are not as many as the size says.
+    /// A number of pixels that does not match the size.
     pub fn to_png(&self) -> Result<Vec<u8>> {
         encode(self.width, self.height, png::ColorType::Rgb, png::BitDepth::Eight, self.pixels.as_flattened())
     }
 }
 
 impl DepthImage {
-    /// An image without a single valid depth.
+    /// An image of invalid depths.
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, depth: vec![0.0; width * height] }
     }
 
-    /// Reads a 16-bit greyscale PNG whose unit is `scale` metres.
+    /// Reads a 16-bit greyscale PNG whose unit is `scale` (m).
     ///
     /// # Errors
-    /// Names the file when it is missing, truncated, or not 16-bit greyscale.
+    /// A file that is missing, truncated or not 16-bit greyscale.
     pub fn read(path: &Path, scale: f64) -> Result<Self> {
         Self::decode(&load(path)?, path, scale)
     }
 
-    /// Decodes the bytes of a 16-bit greyscale PNG whose unit is `scale` metres; `path` is the file that errors name.
+    /// Decodes the bytes of a 16-bit greyscale PNG whose unit is `scale` (m). `path` is used in
+    /// errors only.
     ///
     /// # Errors
-    /// Names the file when it is truncated, or not 16-bit greyscale.
+    /// Bytes that are truncated or not 16-bit greyscale.
     pub fn decode(bytes: &[u8], path: &Path, scale: f64) -> Result<Self> {
         let DynamicImage::ImageLuma16(image) = decode(bytes, path)? else {
-            return Err(wrong(path, &"not a 16-bit greyscale image; depth is one 16-bit channel"));
+            return Err(wrong(path, &"not a 16-bit greyscale image; a depth image must have one 16-bit channel"));
         };
         let (width, height) = (image.width() as usize, image.height() as usize);
         Ok(Self { width, height, depth: image.into_raw().into_iter().map(|d| (f64::from(d) * scale) as f32).collect() })
     }
 
-    /// Writes a 16-bit greyscale PNG whose unit is `scale` metres; depths beyond its range become invalid.
+    /// Writes a 16-bit greyscale PNG whose unit is `scale` (m). Depths beyond its range become
+    /// invalid.
     ///
     /// # Errors
-    /// Names the file when it cannot be written.
+    /// A file that cannot be written.
     pub fn write_png(&self, path: &Path, scale: f64) -> Result<()> {
         let quantise = |d: &f32| {
             let units = (f64::from(*d) / scale).round();
@@ -126,45 +128,46 @@ impl DepthImage {
 }
 
 impl Mask {
-    /// A mask with no pixel set.
+    /// A mask without set pixels.
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, set: vec![false; width * height] }
     }
 
-    /// Number of pixels set.
+    /// Number of set pixels.
     pub fn count(&self) -> usize {
         self.set.iter().filter(|s| **s).count()
     }
 
-    /// Reads an image; pixels above half brightness that are not transparent are set.
+    /// Reads an image. Opaque pixels above half brightness are set.
     ///
     /// # Errors
-    /// Names the file when it is missing, truncated or no image.
+    /// A file that is missing, truncated or not an image.
     pub fn read(path: &Path) -> Result<Self> {
         Self::decode(&load(path)?, path)
     }
 
-    /// Decodes the bytes of an image, as [`Mask::read`] does; `path` is the file that errors name.
+    /// Decodes the bytes of an image as [`Mask::read`] does. `path` is used in errors only.
     ///
     /// # Errors
-    /// Names the file when it is truncated or no image.
+    /// Bytes that are truncated or not an image.
     pub fn decode(bytes: &[u8], path: &Path) -> Result<Self> {
         let image = decode(bytes, path)?.into_luma_alpha8();
         let (width, height) = (image.width() as usize, image.height() as usize);
         Ok(Self { width, height, set: image.pixels().map(|p| p.0[0] > 127 && p.0[1] > 127).collect() })
     }
 
-    /// Writes an 8-bit greyscale PNG: 255 set, 0 not.
+    /// Writes an 8-bit greyscale PNG with 255 for set pixels and 0 for others.
     ///
     /// # Errors
-    /// Names the file when it cannot be written.
+    /// A file that cannot be written.
     pub fn write_png(&self, path: &Path) -> Result<()> {
         let bytes: Vec<u8> = self.set.iter().map(|s| if *s { 255 } else { 0 }).collect();
         write(path, &encode(self.width, self.height, png::ColorType::Grayscale, png::BitDepth::Eight, &bytes)?)
     }
 }
 
-/// The pixels left, right, above and below pixel `i` (row by row) of a `width` x `height` image, as far as there are any.
+/// The existing pixels left, right, above and below pixel `i` (row by row) of a `width` x `height`
+/// image.
 pub fn pixel_neighbours(i: usize, width: usize, height: usize) -> impl Iterator<Item = usize> {
     let (u, v) = (i % width, i / width);
     let near = [
@@ -177,7 +180,7 @@ pub fn pixel_neighbours(i: usize, width: usize, height: usize) -> impl Iterator<
 }
 
 fn wrong(path: &Path, reason: &dyn std::fmt::Display) -> Error {
-    // Some decoders break their messages into lines; ours are one.
+    // Some decoders' messages have several lines; ours have one.
     let reason = reason.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
     Error::Image { path: path.to_owned(), reason: reason.replace(" )", ")") }
 }
@@ -186,28 +189,35 @@ fn load(path: &Path) -> Result<Vec<u8>> {
     std::fs::read(path).map_err(|e| wrong(path, &e))
 }
 
-/// Decodes by content, not by extension.
+/// Decodes by content; the extension is ignored.
 fn decode(bytes: &[u8], path: &Path) -> Result<DynamicImage> {
     let unreadable =
-        |e: image::ImageError| wrong(path, &format!("unreadable image ({e}); expected a whole PNG or JPEG"));
+        |e: image::ImageError| wrong(path, &format!("unreadable image ({e}); it must be a complete PNG or JPEG"));
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| wrong(path, &e))?;
     reader.no_limits();
     let decoder = reader.into_decoder().map_err(unreadable)?;
     let (width, height) = decoder.dimensions();
     if width > MAX_SIDE || height > MAX_SIDE {
-        return Err(wrong(path, &format!("{width} x {height} pixels; at most {MAX_SIDE} on a side")));
-    }
-    // No image format packs more tightly than deflate can: what claims to is broken, and is refused before its pixels are allocated.
-    if decoder.total_bytes() > MAX_PACKING * bytes.len() as u64 {
         return Err(wrong(
             path,
-            &format!("{width} x {height} pixels do not fit into its {} bytes; it is cut or broken", bytes.len()),
+            &format!("the image has {width} x {height} pixels; each side must be at most {MAX_SIDE}"),
+        ));
+    }
+    // No image format compresses more than deflate can. A file that claims to is damaged, and is
+    // rejected before allocation.
+    if decoder.total_bytes() > MAX_COMPRESSION * bytes.len() as u64 {
+        return Err(wrong(
+            path,
+            &format!(
+                "{width} x {height} pixels do not fit into its {} bytes; the file is truncated or damaged",
+                bytes.len()
+            ),
         ));
     }
     DynamicImage::from_decoder(decoder).map_err(unreadable)
 }
 
-/// Fast compression: recordings are written once a frame and read soon after.
+/// Uses fast compression: recordings are written frame by frame and read soon after.
 fn encode(width: usize, height: usize, color: png::ColorType, depth: png::BitDepth, bytes: &[u8]) -> Result<Vec<u8>> {
     let failed = |e: png::EncodingError| Error::Camera(format!("a {width} x {height} image cannot be written: {e}"));
     let mut out = Vec::with_capacity(bytes.len() / 2);
@@ -238,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn files_come_back_as_they_were() {
+    fn images_are_read_back_as_written() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("image.png");
         gradient().write_png(&path).unwrap();

@@ -1,14 +1,15 @@
-//! Every camera that pictures are made with: the pinhole with OpenCV's distortion, and its fisheye.
+//! Calibrated cameras: OpenCV's pinhole and fisheye models.
 
 use crate::{Camera, ColorImage, Error, Fisheye, Result};
 use glam::{DVec2, DVec3};
 
-/// A calibrated camera of either of OpenCV's models.
+/// A calibrated camera of one of OpenCV's two models.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CameraModel {
-    /// Pinhole, without or with 4, 5 or 8 coefficients of distortion.
+    /// Pinhole, with 0, 4, 5 or 8 distortion coefficients.
     Pinhole(Camera),
-    /// Fisheye: size, focal lengths and principal point as a pinhole's (its `distortion` is not used), and the lens.
+    /// Fisheye: a [`Camera`] for size, focal lengths and principal point (its `distortion` is
+    /// ignored), and the lens.
     Fisheye(Camera, Fisheye),
 }
 
@@ -18,14 +19,15 @@ impl From<Camera> for CameraModel {
     }
 }
 
-/// Where each pixel of an undistorted picture comes from, row by row: OpenCV's `initUndistortRectifyMap`.
+/// For each pixel of an undistorted picture, its position in the distorted one. Equivalent to
+/// OpenCV's `initUndistortRectifyMap`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct UndistortionMap {
-    /// Width of the undistorted picture [px].
+    /// Width of the undistorted picture (px).
     pub width: usize,
-    /// Height of the undistorted picture [px].
+    /// Height of the undistorted picture (px).
     pub height: usize,
-    /// Place in the distorted picture [px]; not a number where nothing is seen.
+    /// Position in the distorted picture (px), row by row; NaN outside the field of view.
     pub from: Vec<DVec2>,
 }
 
@@ -37,20 +39,21 @@ impl CameraModel {
         }
     }
 
-    /// Refuses what [`Camera::validate`] refuses, and a fisheye with coefficients that are not finite.
+    /// Checks the parameters as [`Camera::validate`] does, and the coefficients of a fisheye lens.
     ///
     /// # Errors
-    /// Names the field.
+    /// An invalid parameter, with the name of the field.
     pub fn validate(&self) -> Result<()> {
         if let Self::Fisheye(_, Fisheye(k)) = self
             && k.iter().any(|k| !k.is_finite())
         {
-            return Err(Error::Camera(format!("camera.fisheye is {k:?}; every coefficient is a finite number")));
+            return Err(Error::Camera(format!("camera.fisheye is {k:?}; every coefficient must be finite")));
         }
         self.camera().validate()
     }
 
-    /// Pixel of a point in the camera frame [m]; `None` behind a pinhole camera, and straight behind a fisheye or at it.
+    /// Pixel of a point (m) in the camera frame. `None` behind a pinhole camera, and for a fisheye
+    /// at its centre or exactly behind it.
     pub fn project(&self, p: DVec3) -> Option<DVec2> {
         match self {
             Self::Pinhole(camera) => camera.project(p),
@@ -66,7 +69,8 @@ impl CameraModel {
         }
     }
 
-    /// Unit direction of the ray through pixel (u, v) in the camera frame; `None` where the lens shows nothing.
+    /// Unit direction of the ray through pixel (u, v) in the camera frame; `None` outside the field
+    /// of view.
     pub fn unproject(&self, u: f64, v: f64) -> Option<DVec3> {
         let camera = self.camera();
         let q = DVec2::new((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
@@ -79,7 +83,7 @@ impl CameraModel {
         }
     }
 
-    /// The pixels of `plain`, which should have no distortion, in this camera's picture.
+    /// Maps the pixels of `plain`, a camera without distortion, to this camera's picture.
     pub fn undistortion_map(&self, plain: &Camera) -> UndistortionMap {
         let place = |u: usize, v: usize| self.project(plain.ray(u as f64, v as f64)).unwrap_or(DVec2::NAN);
         let from = (0..plain.height).flat_map(|v| (0..plain.width).map(move |u| place(u, v))).collect();
@@ -88,12 +92,13 @@ impl CameraModel {
 }
 
 impl UndistortionMap {
-    /// The undistorted picture, bilinear in sRGB values as OpenCV's `remap`; black where nothing is seen.
+    /// The undistorted picture, with bilinear interpolation of sRGB values as in OpenCV's `remap`.
+    /// Black outside the field of view.
     pub fn apply(&self, image: &ColorImage) -> ColorImage {
         let mut out = ColorImage::new(self.width, self.height, [0; 3]);
         let (right, below) = (image.width as f64 - 1.0, image.height as f64 - 1.0);
         for (pixel, from) in out.pixels.iter_mut().zip(&self.from) {
-            // Written so that NaN is outside.
+            // This form treats NaN as outside.
             let inside = from.x >= 0.0 && from.y >= 0.0 && from.x <= right && from.y <= below;
             if !inside {
                 continue;

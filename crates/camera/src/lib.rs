@@ -1,7 +1,19 @@
-//! What a camera sees and where it stands.
+//! Camera models, images and their files, sensor noise and picture metrics.
 //!
-//! Camera frame: OpenCV's (x right, y down, z forward). Depth is z in metres, not ray length; 0 is invalid. The centre of
-//! the first pixel is (0, 0).
+//! The camera frame is OpenCV's: x right, y down, z forward. Depth is z in metres, not ray length;
+//! 0 is invalid. The centre of the first pixel is at (0, 0).
+//!
+//! ```
+//! use trocar_camera::{Camera, DepthImage, DepthNoise};
+//!
+//! let camera = Camera::d405();
+//! let mut depth = DepthImage::new(camera.width, camera.height);
+//! depth.depth.fill(0.2);
+//! let noisy = DepthNoise::d405().apply(&depth, None, &camera, 1, 0)?;
+//! let mean = noisy.depth.iter().filter(|z| **z > 0.0).sum::<f32>() / noisy.depth.len() as f32;
+//! assert!((mean - 0.2).abs() < 0.002);
+//! # Ok::<(), trocar_camera::Error>(())
+//! ```
 
 mod calibration;
 mod depth_noise;
@@ -10,6 +22,7 @@ mod endoscope;
 mod error;
 mod images;
 mod lens;
+pub mod metrics;
 mod model;
 mod raster;
 
@@ -21,4 +34,4 @@ pub use images::{ColorImage, DepthImage, Mask, pixel_neighbours};
 pub use lens::{CameraModel, UndistortionMap};
 pub use model::Camera;
 pub use raster::draw_triangle;
-pub use trocar_geometry::Pose;
+pub use trocar_core::Pose;

@@ -1,10 +1,10 @@
-//! Drawing depth: triangles between projected points.
+//! Rasterisation of triangles.
 
 use glam::DVec3;
 
-/// Calls `draw` with the index (row by row) and the depth of every pixel of a `width` x `height` image whose centre lies in the
-/// triangle of the `corners`, which are (u, v, 1/z): pixel and inverse depth [1/m]. Inverse depth is linear on the image of a
-/// plane. The edges belong to it.
+/// Calls `draw` with index (row by row) and depth (m) of every pixel of a `width` x `height` image
+/// whose centre lies in the triangle or on its edges. A corner is (u, v, 1/z): pixel and inverse
+/// depth (1/m). Inverse depth is linear over the image of a plane.
 pub fn draw_triangle(corners: [DVec3; 3], width: usize, height: usize, mut draw: impl FnMut(usize, f64)) {
     let [a, b, c] = corners;
     let edge = |p: DVec3, q: DVec3, u: f64, v: f64| (q.x - p.x) * (v - p.y) - (q.y - p.y) * (u - p.x);
@@ -12,7 +12,7 @@ pub fn draw_triangle(corners: [DVec3; 3], width: usize, height: usize, mut draw:
     if area == 0.0 || !area.is_finite() {
         return;
     }
-    // Rounding must not lose a pixel whose centre is a corner.
+    // Tolerance that keeps a pixel whose centre is a corner despite rounding.
     const SLACK: f64 = 1e-7;
     let (low, high) = (a.min(b).min(c) - SLACK, a.max(b).max(c) + SLACK);
     let range = |low: f64, high: f64, size: usize| {

@@ -1,4 +1,5 @@
-//! Camera models and calibration files against OpenCV, in whose pixels they must agree to 1e-4. Skipped, saying so, without it.
+//! Camera models and calibration files against OpenCV, in whose pixels they must agree to 1e-4.
+//! Skipped, saying so, without it.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::{Camera, CameraModel, Distortion, Fisheye};
 
-/// Agreement asked for [px].
+/// Agreement asked for (px).
 const CLOSE: f64 = 1e-4;
 
 /// The Python with OpenCV, or why there is none.
@@ -85,7 +86,8 @@ fn every_model_agrees_with_opencv() {
         let theirs = read(&file("map"));
         assert_eq!(map.from.len(), theirs.len());
         for (ours, theirs) in map.from.iter().zip(theirs) {
-            // OpenCV keeps its maps in single precision: half a unit in the last place of 639 is 3e-5.
+            // OpenCV keeps its maps in single precision: half a unit in the last place of 639 is
+            // 3e-5.
             worst[2] = worst[2].max((*ours - glam::DVec2::from(theirs)).length());
         }
         println!("{name}: projected {:.1e}, undistorted {:.1e}, maps {:.1e} px", worst[0], worst[1], worst[2]);

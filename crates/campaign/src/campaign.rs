@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_workflow::{Error, Result, refuse_overlap, scene_specimen};

@@ -3,8 +3,8 @@
 use crate::plan::Plan;
 use crate::store::{Kept, Store, film_name};
 use std::path::PathBuf;
-use trocar_progress::Progress;
-use trocar_render::Settings;
+use trocar_core::Progress;
+use trocar_render::RenderSettings;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
@@ -70,8 +70,8 @@ pub(super) fn film(
         let every = file.steps.len().div_ceil(FRAMES).max(1);
         let mut frames = Vec::new();
         let mut see = |again: &Replayed<'_>, time_ms: i32| -> Result<()> {
-            let settings = Settings::Preview { shadows: false };
-            let picture = sight.see(again.episode().cell(), "endoscope", SIZE, &settings)?;
+            let settings = RenderSettings::Preview { shadows: false };
+            let picture = sight.render(again.episode().cell(), "endoscope", SIZE, &settings)?;
             frames.push((picture.color.clone(), time_ms));
             Ok(())
         };

@@ -196,7 +196,7 @@ mod tests {
         }
         // Whatever an episode, its policies or what they see is made of.
         let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-        let mut open = vec!["task".to_owned(), "sight".to_owned(), "remote".to_owned()];
+        let mut open = vec!["task".to_owned(), "sensors".to_owned(), "remote".to_owned()];
         let mut seen = Vec::new();
         while let Some(name) = open.pop() {
             let text = std::fs::read_to_string(crates.join(&name).join("Cargo.toml")).unwrap();

@@ -12,9 +12,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use trocar_cell::{Action, ActionSpace};
 use trocar_remote::{Array, Client, Endpoint, Observation, Value};
-use trocar_render::Settings;
+use trocar_render::RenderSettings;
 use trocar_scene::Frame;
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 use trocar_specimen::Specimen;
 use trocar_task::policy::CHUNK;
 use trocar_task::{Bounds, Episode, Policy};
@@ -43,7 +43,7 @@ pub(super) struct Remote {
     bounds: Bounds,
     specimen: Specimen,
     /// What the cameras see, with where the specimen was when it was made; made in the first episode, and anew where the specimen lies elsewhere.
-    sight: Option<(Frame, Sight)>,
+    sight: Option<(Frame, CameraRig)>,
     stop: Arc<AtomicBool>,
     cameras: Vec<(String, [usize; 2])>,
     prompt: String,
@@ -148,13 +148,13 @@ impl Remote {
         seen.insert("observation/state".to_owned(), Value::Array(array));
         let scene = episode.arranged_scene();
         if self.sight.as_ref().is_none_or(|(placed, _)| *placed != scene.placement) {
-            let sight = Sight::new(&scene, &self.specimen, episode.cell()).map_err(|e| e.to_string())?;
+            let sight = CameraRig::new(&scene, &self.specimen, episode.cell()).map_err(|e| e.to_string())?;
             self.sight = Some((scene.placement, sight));
         }
         let Some((_, sight)) = &mut self.sight else { return Err("there are no cameras".to_owned()) };
         for (camera, size) in &self.cameras {
             let picture = sight
-                .see(episode.cell(), camera, *size, &Settings::Preview { shadows: false })
+                .render(episode.cell(), camera, *size, &RenderSettings::Preview { shadows: false })
                 .map_err(|e| e.to_string())?;
             let pixels = picture.color.pixels.as_flattened().to_vec();
             let array = Array::from_u8(&[size[1], size[0], 3], pixels).map_err(said)?;

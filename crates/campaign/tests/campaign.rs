@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
 use tempfile::TempDir;
 use trocar_campaign::{Campaign, Files, Job, Plan, PolicySpec, Store};
-use trocar_progress::{Silent, StopAfter};
+use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::{SpecimenSource, TaskName};
 use trocar_task::EpisodeFile;

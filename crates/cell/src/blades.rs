@@ -127,8 +127,7 @@ pub fn opening_force(gripper: &Gripper, tools: Tools, forces: &[ToolForce]) -> f
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trocar_geometry::Pose;
-    use trocar_tissue::Wrench;
+    use trocar_core::{Pose, Wrench};
 
     /// Distance of `p` [m, gripper frame] from the nearest surface at which tissue rests.
     fn rest_distance(gripper: &Gripper, p: DVec3) -> f64 {

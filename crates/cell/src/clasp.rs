@@ -2,7 +2,7 @@
 
 use crate::mouth::attached;
 use crate::{GraspDesign, Mouth, Mouthful, World};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::Grasp;
 
 /// Tissue that jaws have closed on.

@@ -3,7 +3,7 @@
 use crate::World;
 use crate::blades::{FRICTION, Tools};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{Compliance, Grasp};
 
 /// How jaws hold what is between them.

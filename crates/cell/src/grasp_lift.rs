@@ -6,7 +6,7 @@
 use crate::jaw::JAW_FORCE;
 use crate::{CutOrgan, Error, GraspDesign, Gripper, Phase, Result, Sample, Session, Summary};
 use glam::DVec3;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_specimen::Specimen;
 use trocar_tissue::Schedule;
 

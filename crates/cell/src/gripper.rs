@@ -5,7 +5,8 @@
 //! half-gap r sin(theta/2).
 
 use glam::{DMat3, DQuat, DVec3};
-use trocar_geometry::{Pose, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 use trocar_tissue::ToolMotion;
 
 /// Widest angle between the blades [rad] (SPEC: theta_max 60 degrees).

@@ -2,7 +2,7 @@
 
 use crate::World;
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::Piece;
 
 /// The tissue that was in the jaws when they closed, and where it was.

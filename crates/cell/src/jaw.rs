@@ -8,7 +8,7 @@ use crate::FRAME;
 use crate::gripper::MAX_ANGLE;
 
 /// Force of the jaws [N] unless the user says otherwise: it squeezes the appendix, 9 mm of 12 kPa, to about 3 mm, and two blades with friction 0.6 then bear 0.6 N, of which
-/// a lift of 15 mm needs 0.2 to 0.4. See `docs/grasp.md`.
+/// a lift of 15 mm needs 0.2 to 0.4. See `docs/measurements/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
 
 /// Time that the jaws take from wide open to closed on nothing [s].

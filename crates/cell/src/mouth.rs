@@ -7,7 +7,7 @@ use crate::clusters::FEWEST_HELD;
 use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MOUTH_BEGIN};
 use crate::{Cluster, Gripper, World, clusters};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Blades whose inner faces are no farther apart than this [m], where tissue is, hold nothing but each other's skin (the contact offset of SPEC C1).
 pub const CONTACT_SKIN: f64 = 0.0015;

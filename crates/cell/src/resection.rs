@@ -8,7 +8,8 @@ use crate::{Cluster, CutOrgan, Error, Gripper, MAX_ANGLE, Mouth, Phase, Result, 
 use crate::{SeveredPiece, World};
 use glam::DVec3;
 use std::time::Instant;
-use trocar_geometry::{Pose, TetMesh};
+use trocar_core::Pose;
+use trocar_geometry::TetMesh;
 use trocar_tissue::StepReport;
 
 /// How far the jaws rise after a cut [m].

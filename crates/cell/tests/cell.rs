@@ -8,8 +8,7 @@ mod common;
 use common::{ONE_END, meshed, scene, two_tubes};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellLift, CellReport, GraspDesign, RandomActions};
-use trocar_geometry::Pose;
-use trocar_progress::Silent;
+use trocar_core::{Pose, Silent};
 use trocar_robot::wrench::ForceKind;
 use trocar_specimen::{Pins, Specimen};
 

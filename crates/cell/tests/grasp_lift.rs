@@ -6,7 +6,7 @@ mod common;
 
 use common::{ONE_END, specimen};
 use trocar_cell::{GraspDesign, GraspLift, GraspLiftRun};
-use trocar_progress::Silent;
+use trocar_core::Silent;
 use trocar_specimen::Pins;
 
 fn run(task: &GraspLift, pins: Pins) -> GraspLiftRun {

@@ -6,7 +6,7 @@ mod common;
 
 use common::{ONE_END, specimen};
 use trocar_cell::{GraspDesign, GraspLift, GraspLiftRun, SeverAt};
-use trocar_progress::Silent;
+use trocar_core::Silent;
 use trocar_specimen::Pins;
 
 fn run(sever: SeverAt, at: f64, threads: usize, pins: Pins) -> GraspLiftRun {

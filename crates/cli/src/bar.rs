@@ -5,7 +5,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 
 /// What is shown of the stage at hand.
 enum Shown {

@@ -146,7 +146,7 @@ fn the_input_is_never_replaced() {
     fs::remove_dir_all(fixture.file("truth")).unwrap();
     let result = trocar(&["record", "phantom-a", "--frames", "1", "-o", recording.to_str().unwrap()]);
     assert_eq!(result.status.code(), Some(2));
-    assert!(String::from_utf8_lossy(&result.stderr).contains("no phantom made"));
+    assert!(String::from_utf8_lossy(&result.stderr).contains("not a phantom"));
     assert!(fixture.file("color/000002.png").is_file());
 }
 

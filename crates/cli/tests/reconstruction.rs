@@ -49,7 +49,7 @@ fn every_organ_of_every_phantom_meets_its_bars() {
 #[test]
 fn a_bag_is_inspected_and_gets_its_template() {
     let dir = tempfile::tempdir().unwrap();
-    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../messages/tests/fixtures/ros2_zstd.mcap");
+    let fixture = Path::new(env!("CARGO_MANIFEST_DIR")).join("../recording/tests/fixtures/ros2_zstd.mcap");
     std::fs::copy(fixture, dir.path().join("session.mcap")).unwrap();
     let said = trocar(dir.path(), &["inspect", "session.mcap", "--template"]);
     assert_eq!((&said["frames"], &said["camera"]["width"]), (&4.into(), &16.into()));

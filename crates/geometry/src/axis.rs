@@ -1,4 +1,4 @@
-//! Where along an organ a node lies: the organ coordinate s.
+//! The organ coordinate s: the position of each node along an organ.
 
 mod harmonic;
 
@@ -11,40 +11,45 @@ use std::collections::BinaryHeap;
 
 /// The centreline of an organ and the organ coordinate of each of its nodes.
 ///
-/// s is arc length along the centreline over its whole length, 0 at the base and 1 at the tip. The centreline runs through
-/// the centroids of the level sets of a harmonic field between the two ends, so it follows a curved tube.
+/// s is the arc length along the centreline divided by its total length: 0 at the base, 1 at the
+/// tip. The centreline runs through the centroids of the level sets of a harmonic field between the
+/// two ends, so it follows a curved tube.
 #[derive(Clone, Debug)]
 pub struct OrganAxis {
-    /// Points along the centreline, base first [m].
+    /// Points along the centreline, base first (m).
     pub centreline: Vec<DVec3>,
-    /// Length of the centreline [m].
+    /// Length of the centreline (m).
     pub length: f64,
-    /// Organ coordinate of each node, 0..=1.
+    /// Organ coordinate of each node, in [0, 1].
     pub s: Vec<f64>,
 }
 
-/// An end is held at one value over the nodes whose distance from the other end is within this share of the largest, or
-/// within [`CAP_EDGES`] median edges of it.
-const CAP_SHARE: f64 = 0.03;
+/// The field has a fixed value over the cap of each end. A cap contains the nodes whose distance
+/// from the other end is within this fraction of the largest, or within [`CAP_EDGES`] median edges
+/// of it.
+const CAP_FRACTION: f64 = 0.03;
 const CAP_EDGES: f64 = 1.0;
-/// From how far inside the ends are seen, round by round: mean radii of the body, and whether the axis is followed around
-/// its bend from there, for which it must be right already, or straight.
-const CAP_LOOKS: [(f64, bool); 3] = [(3.0, false), (2.0, false), (1.5, true)];
-/// Points on the centreline: about one per median edge of its length, within these limits.
-const FEWEST_POINTS: usize = 8;
-const MOST_POINTS: usize = 64;
-/// How often the centreline is drawn anew, evenly spaced along the one before. The first follows the field, which runs
-/// fast through narrow places.
-const ROUNDS: usize = 3;
+/// Rounds that locate the ends. Each round looks at an end from a point this many mean radii of the
+/// body inside it. The flag says whether the direction there follows the bend of the axis, which
+/// needs an axis that is nearly right, or is straight.
+const CAP_ROUNDS: [(f64, bool); 3] = [(3.0, false), (2.0, false), (1.5, true)];
+/// Limits of the number of centreline points, which is about one per median edge length.
+const MIN_CENTRELINE_POINTS: usize = 8;
+const MAX_CENTRELINE_POINTS: usize = 64;
+/// Number of times the centreline is computed, evenly spaced along the previous one. The first one
+/// follows the field, which changes fast in narrow places.
+const CENTRELINE_ROUNDS: usize = 3;
 
 impl OrganAxis {
-    /// Finds the axis of `mesh`. The ends are the two nodes farthest apart through the mesh; `base_hint` [m] says which is
-    /// the base (the end nearer to it).
+    /// Finds the axis of `mesh`. The ends are the two nodes farthest apart through the mesh. The
+    /// end nearer to `base_hint` (m) is the base.
     ///
-    /// Refuses a mesh without elements, in several parts, or with an element of no positive volume.
+    /// # Errors
+    /// A mesh without elements, in several parts, or with an element without positive volume; a
+    /// `base_hint` that is not finite.
     pub fn of(mesh: &TetMesh, base_hint: DVec3) -> Result<Self> {
         if !base_hint.is_finite() {
-            return Err(Error::Mesh(format!("the base hint {base_hint} m is not a point")));
+            return Err(Error::Mesh(format!("the base hint is {base_hint} m; it must be finite")));
         }
         let field = Stiffness::of(mesh)?;
         let (base, tip) = ends(mesh, &field, base_hint)?;
@@ -52,24 +57,25 @@ impl OrganAxis {
         let from_tip = distances(mesh, &field, tip);
         let apart = from_tip[base];
         let edge = median(field.edge_lengths(mesh));
-        let cap = (CAP_SHARE * apart).max(CAP_EDGES * edge);
-        let count = ((apart / edge).round() as usize).clamp(FEWEST_POINTS, MOST_POINTS);
+        let cap = (CAP_FRACTION * apart).max(CAP_EDGES * edge);
+        let count = ((apart / edge).round() as usize).clamp(MIN_CENTRELINE_POINTS, MAX_CENTRELINE_POINTS);
 
-        // Paths along edges bend towards the lattice's directions, so the farthest nodes may sit at the rim of a blunt
-        // end. The axis that they give is right away from the ends, and tells where the ends really are.
+        // Paths along edges prefer the directions of the lattice, so the farthest nodes may lie at
+        // the rim of a blunt end. The axis they give is correct away from the ends and locates the
+        // true ends.
         let rough_caps = (0..mesh.vertices.len()).map(|i| (from_tip[i] >= apart - cap, from_base[i] >= apart - cap));
         let guess = from_base.iter().zip(&from_tip).map(|(b, t)| b / (b + t)).collect();
         let mut u = field.solve(&fix(rough_caps, base, tip), guess);
         let line = (mesh.vertices[base], mesh.vertices[tip]);
         let mut axis = Self::through_level_sets(mesh, &u, count, line);
-        for look in CAP_LOOKS {
-            u = field.solve(&fix(axis.caps(mesh, cap, look).into_iter(), base, tip), u);
+        for round in CAP_ROUNDS {
+            u = field.solve(&fix(axis.caps(mesh, cap, round).into_iter(), base, tip), u);
             axis = Self::through_level_sets(mesh, &u, count, line);
         }
         Ok(axis)
     }
 
-    /// Point at organ coordinate `s` on the centreline [m].
+    /// The point of the centreline at organ coordinate `s` (m).
     pub fn point_at(&self, s: f64) -> DVec3 {
         let mut left = s.clamp(0.0, 1.0) * self.length;
         for pair in self.centreline.windows(2) {
@@ -82,12 +88,12 @@ impl OrganAxis {
         self.centreline.last().copied().unwrap_or(DVec3::ZERO)
     }
 
-    /// The axis along the level sets of `u`, drawn with `count` points; the straight `line` from base to tip when the body
-    /// is too small to have level sets.
+    /// The axis through the level sets of `u`, with `count` points. It is the straight `line` from
+    /// base to tip when the body is too small to have level sets.
     fn through_level_sets(mesh: &TetMesh, u: &[f64], count: usize, line: (DVec3, DVec3)) -> Self {
         let mut axis = Self { centreline: Vec::new(), length: 0.0, s: u.to_vec() };
-        for _ in 0..ROUNDS {
-            if !axis.redraw(mesh, u, count) {
+        for _ in 0..CENTRELINE_ROUNDS {
+            if !axis.recompute(mesh, u, count) {
                 let along = line.1 - line.0;
                 let s = mesh.vertices.iter().map(|&p| (p - line.0).dot(along) / along.length_squared());
                 return Self {
@@ -100,8 +106,8 @@ impl OrganAxis {
         axis
     }
 
-    /// For each node, whether it lies within `cap` [m] of the extremity of the base and of the tip, seen as in
-    /// [`CAP_LOOKS`].
+    /// Whether each node lies within `cap` (m) of the extremity of the base, and of the tip. One
+    /// round of [`CAP_ROUNDS`].
     fn caps(&self, mesh: &TetMesh, cap: f64, (radii, bend): (f64, bool)) -> Vec<(bool, bool)> {
         let radius = (mesh.volume() / (std::f64::consts::PI * self.length)).sqrt();
         let k = (radii * radius / self.length).clamp(0.05, 0.25);
@@ -122,10 +128,11 @@ impl OrganAxis {
         base.into_iter().zip(tip).collect()
     }
 
-    /// Draws the centreline through the centroids of `count` slices along the present coordinate, and the coordinate
-    /// along the new centreline. Slices overlap like the hat functions of linear interpolation, so that the centroids
-    /// do not jitter with the elements. False, and nothing drawn, with fewer than two slices.
-    fn redraw(&mut self, mesh: &TetMesh, u: &[f64], count: usize) -> bool {
+    /// Computes the centreline through the centroids of `count` slices along the present
+    /// coordinate, then the coordinate along the new centreline. Slices overlap like the hat
+    /// functions of linear interpolation, so the centroids do not jitter with the elements. Changes
+    /// nothing and returns false for fewer than two slices.
+    fn recompute(&mut self, mesh: &TetMesh, u: &[f64], count: usize) -> bool {
         let mut weight = vec![0.0; count];
         let mut centroid = vec![DVec3::ZERO; count];
         let mut level = vec![0.0; count];
@@ -158,7 +165,7 @@ impl OrganAxis {
         let (first, last) = (points[0], points[points.len() - 1]);
         let (low, high) = (levels[0], levels[levels.len() - 1]);
 
-        // Beyond the outermost centroids the line runs straight on, as far as the body there does.
+        // Beyond the outermost centroids the line continues straight to the end of the body.
         let beyond = |end: DVec3, along: DVec3, p: DVec3| (p - end).dot(along).max(0.0);
         let mut reach = [0.0f64; 2];
         for (&p, &u) in mesh.vertices.iter().zip(u) {
@@ -180,7 +187,8 @@ impl OrganAxis {
             .iter()
             .zip(u)
             .map(|(&p, &u)| {
-                // In the caps the field is constant or nearly so; there the straight continuation takes over from it.
+                // In the caps the field is nearly constant. The straight continuation replaces it
+                // there.
                 let along = if u < low {
                     let share = u / low;
                     reach[0] - (1.0 - share) * beyond(first, start, p)
@@ -201,8 +209,8 @@ impl OrganAxis {
     }
 }
 
-/// The value at which each node is held: 0 in the cap of the base, 1 in that of the tip. Where a body is so small that
-/// the caps overlap, only the end nodes themselves are held.
+/// The fixed value of each node: 0 in the cap of the base, 1 in the cap of the tip. If the caps
+/// overlap, as in a very small body, only the two end nodes are fixed.
 fn fix(caps: impl Iterator<Item = (bool, bool)>, base: usize, tip: usize) -> Vec<Option<f64>> {
     let caps: Vec<(bool, bool)> = caps.collect();
     let overlap = caps.iter().any(|&(at_base, at_tip)| at_base && at_tip);
@@ -217,13 +225,13 @@ fn fix(caps: impl Iterator<Item = (bool, bool)>, base: usize, tip: usize) -> Vec
         .collect()
 }
 
-/// Direction in which a curve through three evenly spaced points goes on from the last.
+/// The direction at the last of three evenly spaced points of a curve, by extrapolation.
 fn onward(points: [DVec3; 3]) -> DVec3 {
     let [before, last] = [points[1] - points[0], points[2] - points[1]].map(|chord| chord.normalize_or_zero());
     (1.5 * last - 0.5 * before).normalize_or(DVec3::X)
 }
 
-/// Outward directions of the line at its first and its last point, over a few points to be steady.
+/// Outward directions of the line at its first and last point, over several points for robustness.
 fn tangents(points: &[DVec3]) -> (DVec3, DVec3) {
     let last = points.len() - 1;
     let span = (points.len() / 16).max(1).min(last);
@@ -231,7 +239,7 @@ fn tangents(points: &[DVec3]) -> (DVec3, DVec3) {
     (onward([points[far], points[span], points[0]]), onward([points[last - far], points[last - span], points[last]]))
 }
 
-/// Two passes of a (1, 2, 1) / 4 average; the ends stay.
+/// Two passes of a (1, 2, 1) / 4 average. The ends are fixed.
 fn smooth(points: &mut [DVec3]) {
     for _ in 0..2 {
         let old = points.to_vec();
@@ -241,7 +249,8 @@ fn smooth(points: &mut [DVec3]) {
     }
 }
 
-/// Piecewise linear through (x, y), x ascending; `at` lies between the first and the last x.
+/// Piecewise linear interpolation of (x, y) with ascending x. `at` lies between the first and the
+/// last x.
 fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     let high = x.partition_point(|&x| x < at).clamp(1, x.len().max(2) - 1);
     match (x.get(high), y.get(high)) {
@@ -253,7 +262,8 @@ fn interpolate(x: &[f64], y: &[f64], at: f64) -> f64 {
     }
 }
 
-/// The base and the tip: two nodes (nearly) farthest apart along edges, by two sweeps from an arbitrary node.
+/// The base and the tip: two nodes that are nearly the farthest apart along edges, by two sweeps
+/// from an arbitrary node.
 fn ends(mesh: &TetMesh, field: &Stiffness, base_hint: DVec3) -> Result<(usize, usize)> {
     let farthest = |from: &[f64]| {
         let mut best = 0;
@@ -276,14 +286,14 @@ fn ends(mesh: &TetMesh, field: &Stiffness, base_hint: DVec3) -> Result<(usize, u
     Ok(if away(a) <= away(b) { (a, b) } else { (b, a) })
 }
 
-/// Length of the shortest path from node `start` to each node [m]; infinite where there is none. Paths go straight to
-/// neighbours and to neighbours of neighbours: along the 14 directions of a lattice's edges alone they would be up to a
-/// quarter too long, depending on the direction.
+/// Length of the shortest path from node `start` to each node (m), infinite where there is none. A
+/// path may go straight to neighbours and to their neighbours. Paths along the 14 directions of a
+/// lattice's edges alone would be up to a quarter too long, depending on the direction.
 fn distances(mesh: &TetMesh, field: &Stiffness, start: usize) -> Vec<f64> {
     let mut best = vec![f64::INFINITY; field.nodes()];
     let mut open = BinaryHeap::new();
     best[start] = 0.0;
-    // Lengths are not negative, and the bits of such numbers order as the numbers do.
+    // Lengths are not negative, so their bit patterns have the same order as the numbers.
     open.push(Reverse((0.0f64.to_bits(), start)));
     while let Some(Reverse((bits, node))) = open.pop() {
         let so_far = f64::from_bits(bits);
@@ -328,7 +338,7 @@ mod tests {
     }
 
     #[test]
-    fn along_a_cylinder_s_is_the_axial_coordinate() {
+    fn s_of_a_cylinder_is_the_axial_coordinate() {
         let body = cylinder(0.0021);
         let axis = OrganAxis::of(&body, DVec3::new(-0.05, 0.0, 0.0)).unwrap();
         let worst = body.vertices.iter().zip(&axis.s).map(|(p, s)| (s - (p.x + 0.04) / 0.08).abs()).fold(0.0, f64::max);
@@ -351,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn around_a_half_ring_s_is_arc_length() {
+    fn s_of_a_half_ring_is_arc_length() {
         // Bend radius 35 mm, tube radius 5 mm, flat ends in the plane y = 0.
         let body =
             mesh(0.0021, DVec3::new(0.041, 0.041, 0.006), |p| ((p.x.hypot(p.y) - 0.035).hypot(p.z) - 0.005).max(-p.y));
@@ -374,7 +384,7 @@ mod tests {
     }
 
     #[test]
-    fn round_ends_belong_to_the_length() {
+    fn the_length_includes_round_ends() {
         let ends = [DVec3::X * -0.03, DVec3::X * 0.03];
         let body = mesh(0.0021, DVec3::new(0.038, 0.008, 0.008), |p| {
             p.distance(DVec3::new(p.x.clamp(ends[0].x, ends[1].x), 0.0, 0.0)) - 0.008
@@ -388,7 +398,7 @@ mod tests {
     }
 
     #[test]
-    fn a_blob_gets_a_monotone_coordinate_along_its_longest_extent() {
+    fn s_of_an_ellipsoid_is_monotone_along_its_longest_extent() {
         let half = DVec3::new(0.05, 0.035, 0.025);
         let body = mesh(0.004, half, |p| ((p / half).length() - 1.0) * half.z);
         let axis = OrganAxis::of(&body, DVec3::new(-1.0, 0.0, 0.0)).unwrap();
@@ -399,8 +409,9 @@ mod tests {
     }
 
     #[test]
-    fn a_tapered_organ_is_measured_by_length_not_by_width() {
-        // A cone frustum, radius 12 mm at the base and 4 mm at the tip, over 80 mm: the field is far from linear.
+    fn s_of_a_cone_measures_length_not_width() {
+        // A cone frustum of 80 mm, radius 12 mm at the base and 4 mm at the tip: the field is far
+        // from linear.
         let body = mesh(0.002, DVec3::new(0.041, 0.013, 0.013), |p| {
             (0.95 * (p.y.hypot(p.z) - (0.008 - 0.1 * p.x))).max(p.x.abs() - 0.04)
         });
@@ -418,17 +429,17 @@ mod tests {
     }
 
     #[test]
-    fn one_element_is_enough_and_unusable_meshes_are_refused() {
+    fn one_element_suffices_and_unusable_meshes_are_rejected() {
         let one = TetMesh { vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z], tets: vec![[0, 1, 2, 3]] };
         let axis = OrganAxis::of(&one, DVec3::ZERO).unwrap();
         assert!(axis.s.iter().all(|s| s.is_finite()) && axis.length.is_finite());
-        let refused = |mesh: &TetMesh| OrganAxis::of(mesh, DVec3::ZERO).unwrap_err().to_string();
-        assert!(refused(&TetMesh::default()).contains("no elements"));
+        let rejection = |mesh: &TetMesh| OrganAxis::of(mesh, DVec3::ZERO).unwrap_err().to_string();
+        assert!(rejection(&TetMesh::default()).contains("no elements"));
         let mut flat = one.clone();
         flat.vertices[3] = DVec3::X + DVec3::Y;
-        assert!(refused(&flat).contains("element 0"));
+        assert!(rejection(&flat).contains("element 0"));
         let mut loose = one;
         loose.vertices.push(DVec3::splat(5.0));
-        assert!(refused(&loose).contains("node 4"));
+        assert!(rejection(&loose).contains("node 4"));
     }
 }

@@ -1,29 +1,43 @@
-//! Signed distance to a surface: inside is negative.
+//! Signed distance to a surface, negative inside.
 //!
-//! One tree of axis-aligned boxes serves both questions. The nearest point is exact (the Voronoi regions of a triangle:
-//! Ericson, "Real-Time Collision Detection", 2005, section 5.1.5). The sign is the generalized winding number (Jacobson et
-//! al. 2013), where a far part of the tree counts as one dipole: Barill et al., "Fast winding numbers for soups and
-//! clouds", ACM Transactions on Graphics 2018.
+//! One tree of axis-aligned boxes gives both magnitude and sign. The nearest point is exact, by the
+//! Voronoi regions of a triangle (C. Ericson, "Real-Time Collision Detection", 2005, section
+//! 5.1.5). The sign comes from the generalized winding number (A. Jacobson et al., 2013), with a
+//! distant part of the tree approximated by one dipole (G. Barill et al., "Fast winding numbers for
+//! soups and clouds", ACM Transactions on Graphics, 2018).
 
 use crate::{Error, Result, TriMesh};
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// Triangles in a leaf of the tree.
-const LEAF: usize = 4;
-/// A part of the surface counts as a dipole from this many of its radii away (Barill's beta).
-const FAR: f64 = 2.0;
-/// Deepest tree: halving 2^32 triangles, with room to spare.
-const STACK: usize = 64;
+/// Maximum number of triangles in a leaf of the tree.
+const LEAF_TRIANGLES: usize = 4;
+/// A part of the surface becomes a dipole at this many times its radius (beta of Barill et al.).
+const DIPOLE_RADII: f64 = 2.0;
+/// Size of the traversal stack: enough for a balanced tree of 2^32 triangles.
+const MAX_STACK: usize = 64;
 
-/// A shape known by its signed distance.
+/// A shape defined by its signed distance.
 pub trait SignedDistance: Sync {
-    /// Signed distance from `p` to the surface [m], negative inside. Exact or a good estimate near the surface.
+    /// Signed distance from `p` to the surface (m), negative inside. Near the surface it must be
+    /// exact or a good estimate.
     fn distance(&self, p: DVec3) -> f64;
 }
 
-/// Signed distance to a triangle soup: exact unsigned distance, sign from the generalized winding number, so that holes,
-/// cracks and stray triangles do not turn the inside out.
+/// Signed distance to a triangle soup. The magnitude is exact. The sign comes from the generalized
+/// winding number, so holes, cracks and stray triangles do not swap inside and outside.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_geometry::{MeshDistance, SignedDistance, TriMesh};
+///
+/// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+/// let field = MeshDistance::new(&TriMesh { vertices, triangles, colors: Vec::new() })?;
+/// assert!((field.distance(DVec3::new(0.1, 0.2, 0.2)) + 0.1).abs() < 1e-12);
+/// assert!((field.distance(DVec3::new(0.2, 0.2, -2.0)) - 2.0).abs() < 1e-12);
+/// # Ok::<(), trocar_geometry::Error>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct MeshDistance {
     nodes: Vec<Node>,
@@ -40,8 +54,8 @@ struct Node {
     centre: DVec3,
     /// Sum of their area vectors.
     dipole: DVec3,
-    /// Square of the distance from `centre` from which the dipole is good enough.
-    far2: f64,
+    /// Square of the distance from `centre` beyond which the dipole is accurate enough.
+    dipole2: f64,
     /// Inner node: index of the second child. Leaf: first triangle.
     next: u32,
     /// Triangles of a leaf; 0 for an inner node.
@@ -49,7 +63,7 @@ struct Node {
 }
 
 impl MeshDistance {
-    /// Prepares the search tree.
+    /// Builds the search tree.
     ///
     /// # Errors
     /// A mesh without triangles, with a vertex that is not finite, or with an index out of range.
@@ -57,16 +71,16 @@ impl MeshDistance {
         check(mesh)?;
         let corners: Vec<[DVec3; 3]> = (0..mesh.triangles.len()).map(|t| mesh.corners(t)).collect();
         let mut order: Vec<u32> = (0..corners.len() as u32).collect();
-        let mut nodes = Vec::with_capacity(2 * corners.len() / LEAF + 1);
+        let mut nodes = Vec::with_capacity(2 * corners.len() / LEAF_TRIANGLES + 1);
         build(&corners, &mut order, 0, &mut nodes);
         Ok(Self { nodes, triangles: order.iter().map(|&t| corners[t as usize]).collect() })
     }
 
-    /// Generalized winding number at `p`: 1 inside, 0 outside of a closed outward surface, between the two near a hole.
-    /// Far parts of the surface are approximated; the sum is good to about 0.05.
+    /// Generalized winding number at `p`: 1 inside and 0 outside a closed outward surface, in
+    /// between near a hole. Distant parts of the surface are approximated; the error is about 0.05.
     pub fn winding(&self, p: DVec3) -> f64 {
         let mut solid_angle = 0.0;
-        let mut stack = [0u32; STACK];
+        let mut stack = [0u32; MAX_STACK];
         let mut top = 1;
         while top > 0 {
             top -= 1;
@@ -74,7 +88,7 @@ impl MeshDistance {
             let node = &self.nodes[at];
             let away = node.centre - p;
             let d2 = away.length_squared();
-            if d2 > node.far2 {
+            if d2 > node.dipole2 {
                 solid_angle += node.dipole.dot(away) / (d2 * d2.sqrt());
             } else if node.count > 0 {
                 solid_angle += self.leaf(node).iter().map(|t| triangle_solid_angle(t, p)).sum::<f64>();
@@ -87,16 +101,16 @@ impl MeshDistance {
         solid_angle / (4.0 * PI)
     }
 
-    /// Distance from `p` to the nearest point of the surface [m], without a sign.
+    /// Distance from `p` to the nearest point of the surface (m), without a sign.
     pub fn unsigned(&self, p: DVec3) -> f64 {
         (p - self.closest_point(p)).length()
     }
 
-    /// The point of the surface nearest to `p` [m].
+    /// The point of the surface nearest to `p` (m).
     pub fn closest_point(&self, p: DVec3) -> DVec3 {
         let (mut best, mut best2) = (p, f64::INFINITY);
         // (node, square of the distance to its box); the nearer child is on top.
-        let mut stack = [(0u32, 0.0); STACK];
+        let mut stack = [(0u32, 0.0); MAX_STACK];
         let mut top = 1;
         while top > 0 {
             top -= 1;
@@ -148,7 +162,7 @@ impl SignedDistance for MeshDistance {
     }
 }
 
-/// Refuses meshes that no question can be asked of.
+/// Checks that a surface has triangles, finite vertices and valid indices.
 pub(crate) fn check(mesh: &TriMesh) -> Result<()> {
     if mesh.triangles.is_empty() {
         return Err(Error::Mesh("the surface has no triangles".into()));
@@ -164,12 +178,12 @@ pub(crate) fn check(mesh: &TriMesh) -> Result<()> {
     Ok(())
 }
 
-/// Appends the subtree over `order`, which starts at triangle `offset` of the tree order; splits at the median centroid
-/// along the longest side.
+/// Appends the subtree of the triangles `order`, the first of which is number `offset` in tree
+/// order. Splits at the median centroid along the longest side.
 fn build(corners: &[[DVec3; 3]], order: &mut [u32], offset: usize, nodes: &mut Vec<Node>) {
     let at = nodes.len();
     let mut node = bound(corners, order);
-    if order.len() <= LEAF {
+    if order.len() <= LEAF_TRIANGLES {
         (node.next, node.count) = (offset as u32, order.len() as u32);
         nodes.push(node);
         return;
@@ -185,7 +199,7 @@ fn build(corners: &[[DVec3; 3]], order: &mut [u32], offset: usize, nodes: &mut V
     nodes.push(node);
     let key = |t: u32| corners[t as usize].iter().map(|v| v[axis]).sum::<f64>();
     let half = order.len() / 2;
-    // Ties are broken by index: the tree does not depend on the sort's whims.
+    // Ties are broken by index, so the tree does not depend on the sorting algorithm.
     order.select_nth_unstable_by(half, |&a, &b| key(a).total_cmp(&key(b)).then(a.cmp(&b)));
     let (left, right) = order.split_at_mut(half);
     build(corners, left, offset, nodes);
@@ -193,7 +207,7 @@ fn build(corners: &[[DVec3; 3]], order: &mut [u32], offset: usize, nodes: &mut V
     build(corners, right, offset + half, nodes);
 }
 
-/// Box, dipole and far radius of some triangles.
+/// Box, dipole and dipole distance of some triangles.
 fn bound(corners: &[[DVec3; 3]], order: &[u32]) -> Node {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let (mut dipole, mut moment, mut area) = (DVec3::ZERO, DVec3::ZERO, 0.0);
@@ -209,10 +223,11 @@ fn bound(corners: &[[DVec3; 3]], order: &[u32]) -> Node {
     let centre = if area > 0.0 { moment / area } else { 0.5 * (low + high) };
     let radius2 =
         order.iter().flat_map(|&t| corners[t as usize]).map(|v| (v - centre).length_squared()).fold(0.0, f64::max);
-    Node { low, high, centre, dipole, far2: FAR * FAR * radius2, next: 0, count: 0 }
+    Node { low, high, centre, dipole, dipole2: DIPOLE_RADII * DIPOLE_RADII * radius2, next: 0, count: 0 }
 }
 
-/// Signed solid angle of a triangle seen from `p`: van Oosterom and Strackee, "The solid angle of a plane triangle", 1983.
+/// Signed solid angle of a triangle seen from `p` (A. van Oosterom, J. Strackee, "The solid angle
+/// of a plane triangle", 1983).
 fn triangle_solid_angle(triangle: &[DVec3; 3], p: DVec3) -> f64 {
     let [a, b, c] = triangle.map(|v| v - p);
     let (la, lb, lc) = (a.length(), b.length(), c.length());
@@ -221,7 +236,7 @@ fn triangle_solid_angle(triangle: &[DVec3; 3], p: DVec3) -> f64 {
     2.0 * numerator.atan2(denominator)
 }
 
-/// Point of a triangle nearest to `p`, by the Voronoi region that `p` lies in.
+/// The point of a triangle nearest to `p`, by the Voronoi region that contains `p`.
 fn closest_on_triangle(&[a, b, c]: &[DVec3; 3], p: DVec3) -> DVec3 {
     let (ab, ac, ap) = (b - a, c - a, p - a);
     let (d1, d2) = (ab.dot(ap), ac.dot(ap));
@@ -254,7 +269,7 @@ fn closest_on_triangle(&[a, b, c]: &[DVec3; 3], p: DVec3) -> DVec3 {
     a + ab * ratio(vb, sum) + ac * ratio(vc, sum)
 }
 
-/// Quotient that is 0 where a triangle has no extent.
+/// Quotient, or 0 for a degenerate triangle.
 fn ratio(part: f64, whole: f64) -> f64 {
     if whole == 0.0 { 0.0 } else { part / whole }
 }
@@ -265,7 +280,7 @@ mod tests {
     use crate::shapes::{cube, icosphere, scattered};
 
     #[test]
-    fn a_box_is_exact_everywhere() {
+    fn the_distance_to_a_box_is_exact() {
         let field = MeshDistance::new(&cube(DVec3::ZERO, 1.0)).unwrap();
         for p in scattered(2000) {
             let q = p.abs() - 0.5;
@@ -275,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sphere_is_near_and_its_winding_is_whole() {
+    fn the_winding_number_of_a_sphere_is_0_or_1() {
         let mesh = icosphere(5, 0.6);
         let field = MeshDistance::new(&mesh).unwrap();
         for p in scattered(2000) {
@@ -289,7 +304,7 @@ mod tests {
     }
 
     #[test]
-    fn the_tree_agrees_with_asking_every_triangle() {
+    fn the_tree_agrees_with_a_loop_over_all_triangles() {
         let mesh = icosphere(3, 0.7);
         let field = MeshDistance::new(&mesh).unwrap();
         for p in scattered(300) {
@@ -302,7 +317,7 @@ mod tests {
     }
 
     #[test]
-    fn a_hole_and_a_stray_triangle_do_not_turn_the_inside_out() {
+    fn a_hole_and_a_stray_triangle_do_not_swap_inside_and_outside() {
         let mut mesh = icosphere(4, 0.6);
         let whole = MeshDistance::new(&mesh).unwrap();
         // A hole of 20 degrees half-angle at the pole, and a stray triangle outside.
@@ -314,7 +329,7 @@ mod tests {
         mesh.triangles.push([n, n + 1, n + 2]);
         assert!(!mesh.is_watertight());
         let field = MeshDistance::new(&mesh).unwrap();
-        // Not within the hole's radius of it, where "inside" is a matter of taste.
+        // Near the hole, inside and outside are not defined.
         let hole = DVec3::new(0.0, 0.0, 0.6);
         for p in scattered(2000).into_iter().filter(|p| (*p - hole).length() > 0.25) {
             assert_eq!(field.winding(p) > 0.5, whole.winding(p) > 0.5, "{p}");
@@ -322,7 +337,7 @@ mod tests {
     }
 
     #[test]
-    fn a_triangle_without_extent_still_has_a_distance() {
+    fn a_degenerate_triangle_has_a_distance() {
         let mesh = TriMesh { vertices: vec![DVec3::X; 3], triangles: vec![[0, 1, 2]], colors: Vec::new() };
         let field = MeshDistance::new(&mesh).unwrap();
         assert_eq!(field.distance(DVec3::ZERO), 1.0);
@@ -330,7 +345,7 @@ mod tests {
     }
 
     #[test]
-    fn unusable_meshes_are_refused() {
+    fn unusable_meshes_are_rejected() {
         let mut mesh = cube(DVec3::ZERO, 1.0);
         mesh.vertices[5].y = f64::NAN;
         assert!(MeshDistance::new(&mesh).unwrap_err().to_string().contains("vertex 5"));

@@ -1,4 +1,4 @@
-//! What can go wrong with a mesh, said so that a person can act on it.
+//! Errors of meshes and mesh files.
 
 use std::path::PathBuf;
 
@@ -13,18 +13,18 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The file's content is not what its format promises.
+    /// The content of the file violates its format.
     #[error("{path}: {reason}", path = path.display())]
     Parse {
         /// The file.
         path: PathBuf,
-        /// What is wrong and what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
-    /// The mesh itself cannot be used (NaN, no volume, bad index, ...).
+    /// The mesh is unusable (NaN, no volume, bad index, ...).
     #[error("{0}")]
     Mesh(String),
 }

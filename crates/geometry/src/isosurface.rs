@@ -1,23 +1,45 @@
-//! The surface where a grid's values cross a level: marching cubes with polygons traced face by face.
+//! Marching cubes with polygons traced face by face: the surface where the values of a grid cross a
+//! level.
 //!
-//! Why the result is watertight and manifold: each cube face decides from the signs of its own four corners alone which of
-//! its crossed edges are joined, so the two cubes that share a face join the same pairs, in opposite directions. Each
-//! crossed edge of a cube lies in two of its faces and is entered in one and left in the other, so the joins close to
-//! polygons, and the polygons around a grid edge form one ring. A polygon is cut into triangles only along diagonals that
-//! do not lie in a cube face, where the neighbour could have the same; if there is no such cut it gets a vertex in its
-//! middle. Three vertices that are not all in one face cannot be collinear, so no triangle is without area.
+//! The result is watertight and manifold for these reasons. The signs of the four corners of a cube
+//! face alone decide which of its crossed edges are joined. So the two cubes that share a face join
+//! the same pairs, in opposite directions. Each crossed edge of a cube lies in two of its faces;
+//! the path enters it in one and leaves it in the other. So the joins close to polygons, and the
+//! polygons around a grid edge form one ring. A polygon is split into triangles only along
+//! diagonals that do not lie in a cube face, because the neighbour could have the same diagonal
+//! there. If no such split exists, the polygon gets a vertex in its middle. Three vertices that are
+//! not all in one face cannot be collinear, so every triangle has an area.
 
 use crate::{Grid, TriMesh};
 use glam::DVec3;
 
-/// Vertices keep this part of an edge away from its ends: those around one grid point stay apart.
-const MARGIN: f64 = 0.02;
+/// Minimum distance of a vertex from the ends of its grid edge, as a fraction of the edge. It keeps
+/// the vertices around a grid point distinct.
+const EDGE_MARGIN: f64 = 0.02;
 /// Marks a grid edge that the surface does not cross.
-const NONE: u32 = u32::MAX;
+const NO_VERTEX: u32 = u32::MAX;
 
-/// Extracts the surface `value = level`; values below are inside. Watertight and manifold by construction wherever the
-/// surface stays inside the grid, with outward triangles and none without area. Vertices lie on grid edges by linear
-/// interpolation, at least 2 % of the edge away from its ends. Values that are not numbers count as outside.
+/// Extracts the surface `value = level`. Lower values are inside, NaN is outside.
+///
+/// The surface is watertight and manifold by construction where it stays inside the grid. Triangles
+/// face outward and have a positive area. Vertices lie on grid edges by linear interpolation, at
+/// least 2% of the edge away from its ends.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_geometry::{SignedDistance, isosurface, sample_distance};
+///
+/// struct Ball;
+/// impl SignedDistance for Ball {
+///     fn distance(&self, p: DVec3) -> f64 {
+///         p.length() - 0.5
+///     }
+/// }
+///
+/// let grid = sample_distance(&Ball, (DVec3::splat(-0.5), DVec3::splat(0.5)), 0.05);
+/// let surface = isosurface(&grid, 0.0);
+/// assert!(surface.is_watertight() && (surface.volume() - 0.524).abs() < 0.01);
+/// ```
 pub fn isosurface(grid: &Grid, level: f32) -> TriMesh {
     let [nx, ny, nz] = grid.dims;
     let mut mesh = TriMesh::default();
@@ -60,18 +82,18 @@ struct Layer {
 
 impl Layer {
     fn new(points: usize) -> Self {
-        Self { crossing: [0, 1, 2].map(|_| vec![NONE; points]) }
+        Self { crossing: [0, 1, 2].map(|_| vec![NO_VERTEX; points]) }
     }
 
-    /// Makes the vertices on the edges within plane `k`.
+    /// Creates the vertices on the edges within plane `k`.
     fn cut(&mut self, grid: &Grid, level: f32, k: usize, vertices: &mut Vec<DVec3>) {
-        self.crossing[2].fill(NONE);
+        self.crossing[2].fill(NO_VERTEX);
         for axis in 0..2 {
             self.cut_along(axis, grid, level, k, vertices);
         }
     }
 
-    /// Makes the vertices on the edges from plane `k` to the next.
+    /// Creates the vertices on the edges from plane `k` to the next.
     fn cut_up(&mut self, grid: &Grid, level: f32, k: usize, vertices: &mut Vec<DVec3>) {
         self.cut_along(2, grid, level, k, vertices);
     }
@@ -84,14 +106,14 @@ impl Layer {
                 let mut to = from;
                 to[axis] += 1;
                 let slot = &mut self.crossing[axis][j * nx + i];
-                *slot = NONE;
+                *slot = NO_VERTEX;
                 if to[axis] >= grid.dims[axis] {
                     continue;
                 }
                 let (a, b) = (grid.values[grid.index(from)], grid.values[grid.index(to)]);
                 if (a < level) != (b < level) {
                     let part = f64::from(level - a) / f64::from(b - a);
-                    let part = if part.is_finite() { part.clamp(MARGIN, 1.0 - MARGIN) } else { 0.5 };
+                    let part = if part.is_finite() { part.clamp(EDGE_MARGIN, 1.0 - EDGE_MARGIN) } else { 0.5 };
                     *slot = vertices.len() as u32;
                     vertices.push(grid.point(from).lerp(grid.point(to), part));
                 }
@@ -103,12 +125,13 @@ impl Layer {
 /// A closed ring of crossed cube edges, outward by the right-hand rule.
 struct Polygon {
     edges: Vec<u8>,
-    /// Where a fan whose diagonals avoid the cube's faces starts; `None` if it needs a vertex in the middle.
+    /// First vertex of a fan whose diagonals avoid the cube's faces; `None` if the polygon needs a
+    /// vertex in its middle.
     apex: Option<usize>,
 }
 
 impl Polygon {
-    /// Appends the polygon's triangles; `corner` says which vertex is on a cube edge.
+    /// Appends the polygon's triangles. `corner` gives the vertex on a cube edge.
     fn emit(&self, corner: impl Fn(u8) -> u32, mesh: &mut TriMesh) {
         let n = self.edges.len();
         let at = |i: usize| corner(self.edges[i % n]);
@@ -158,8 +181,8 @@ fn face_corners(axis: usize, side: usize) -> [usize; 4] {
 /// The polygons of a cube whose corners in the bit set `case` are inside.
 fn polygons(case: usize) -> Vec<Polygon> {
     let inside = |corner: usize| case >> corner & 1 == 1;
-    // In each face, going round counterclockwise, every run of inside corners is cut off on its own, from where it is
-    // entered to where it is left.
+    // Counterclockwise around each face, every run of inside corners is separated by one segment,
+    // from the edge that enters the run to the edge that leaves it.
     let mut next = [None; 12];
     for axis in 0..3 {
         for side in 0..2 {
@@ -215,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn a_ball_comes_out_as_a_sphere() {
+    fn a_ball_gives_a_sphere() {
         let h = 0.04;
         let grid = sample_distance(&Ball(0.5), (DVec3::splat(-0.5), DVec3::splat(0.5)), h);
         let mesh = isosurface(&grid, 0.0);
@@ -260,7 +283,7 @@ mod tests {
     }
 
     #[test]
-    fn noise_is_watertight_and_manifold_with_every_case_there_is() {
+    fn noise_covers_every_case_and_is_watertight_and_manifold() {
         let n = 24;
         let mut values: Vec<f32> = scattered(n * n * n).iter().map(|p| p.x as f32).collect();
         for (c, value) in values.iter_mut().enumerate() {
@@ -284,7 +307,7 @@ mod tests {
     }
 
     #[test]
-    fn a_surface_through_grid_points_keeps_its_triangles_apart() {
+    fn a_surface_through_grid_points_has_no_degenerate_triangles() {
         // A cube whose faces, edges and corners all lie on grid points.
         struct Cube;
         impl crate::SignedDistance for Cube {
@@ -301,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_inside_gives_an_empty_mesh() {
+    fn a_grid_without_inside_gives_an_empty_mesh() {
         let grid = Grid { origin: DVec3::ZERO, spacing: 1.0, dims: [3; 3], values: vec![1.0; 27] };
         assert_eq!(isosurface(&grid, 0.0), TriMesh::default());
         let flat = Grid { dims: [3, 3, 1], values: vec![-1.0; 9], ..grid };

@@ -1,7 +1,29 @@
-//! Meshes and the way from one to the other.
+//! Triangle and tetrahedral meshes, and the conversions between them.
 //!
-//! A closed surface ([`TriMesh`]) is seen as a signed distance ([`SignedDistance`]); a signed distance becomes a clean
-//! surface ([`isosurface`]) or a tetrahedral body ([`mesher::LatticeMesher`]). All lengths are metres, all geometry `f64`.
+//! A closed surface ([`TriMesh`]) defines a signed distance ([`SignedDistance`]). From a signed
+//! distance, [`isosurface`] extracts a clean surface, and [`LatticeMesher`] builds a tetrahedral
+//! body ([`TetMesh`]). All lengths are in metres, all coordinates `f64`.
+//!
+//! ```
+//! use glam::DVec3;
+//! use trocar_geometry::{LatticeMesher, OrganAxis, SignedDistance, TetQuality};
+//!
+//! /// A rod of radius 5 mm along x.
+//! struct Rod;
+//! impl SignedDistance for Rod {
+//!     fn distance(&self, p: DVec3) -> f64 {
+//!         p.distance(DVec3::X * p.x.clamp(0.0, 0.05)) - 0.005
+//!     }
+//! }
+//!
+//! let bounds = (DVec3::new(-0.005, -0.005, -0.005), DVec3::new(0.055, 0.005, 0.005));
+//! let body = LatticeMesher::uniform(0.003).mesh_shape(&Rod, bounds)?;
+//! assert!(TetQuality::of(&body).min_dihedral_deg > 10.7);
+//!
+//! let axis = OrganAxis::of(&body, DVec3::ZERO)?;
+//! assert!(axis.point_at(1.0).distance(DVec3::X * 0.055) < 0.003);
+//! # Ok::<(), trocar_geometry::Error>(())
+//! ```
 
 mod axis;
 mod distance;
@@ -9,7 +31,6 @@ mod error;
 mod grid;
 mod isosurface;
 pub mod mesher;
-mod pose;
 mod quality;
 mod repair;
 #[cfg(test)]
@@ -27,10 +48,10 @@ pub use error::{Error, Result};
 pub use grid::{Grid, sample_distance, sample_everywhere};
 pub use isosurface::isosurface;
 pub use mesher::{LatticeMesher, Mesher, TetgenMesher};
-pub use pose::Pose;
 pub use quality::TetQuality;
 pub use repair::{RepairReport, repair};
 pub use skin::Skin;
 pub use smooth::taubin;
 pub use tet_mesh::{CutAway, TetMesh};
 pub use tri_mesh::TriMesh;
+pub use trocar_core::Pose;

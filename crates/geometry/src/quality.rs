@@ -1,4 +1,4 @@
-//! How good the elements of a tetrahedral mesh are.
+//! Element quality of tetrahedral meshes.
 
 use crate::TetMesh;
 use crate::tet_mesh::adjacency::EDGES;
@@ -8,26 +8,27 @@ use rayon::prelude::*;
 /// Element quality of a mesh.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TetQuality {
-    /// Smallest dihedral angle over all elements [degrees].
+    /// Smallest dihedral angle over all elements (degrees).
     pub min_dihedral_deg: f64,
-    /// Median over elements of each element's smallest dihedral angle [degrees].
+    /// Median over elements of each element's smallest dihedral angle (degrees).
     pub median_min_dihedral_deg: f64,
-    /// Largest dihedral angle over all elements [degrees].
+    /// Largest dihedral angle over all elements (degrees).
     pub max_dihedral_deg: f64,
-    /// Largest ratio of an element's circumradius to its shortest edge; infinite for a flat element.
+    /// Largest ratio of an element's circumradius to its shortest edge; infinite for a flat
+    /// element.
     pub max_radius_edge: f64,
-    /// Median edge length [m].
+    /// Median edge length (m).
     pub median_edge: f64,
-    /// Length that 95 % of the edges do not exceed [m].
+    /// 95th percentile of the edge lengths (m).
     pub p95_edge: f64,
-    /// Elements with signed volume at or below 0.
+    /// Number of elements with signed volume at or below 0.
     pub inverted: usize,
-    /// Volume [m3].
+    /// Volume (m3).
     pub volume: f64,
 }
 
 impl TetQuality {
-    /// Measures `mesh`; all zero for an empty one.
+    /// Measures `mesh`. All values are zero for an empty mesh.
     pub fn of(mesh: &TetMesh) -> Self {
         if mesh.tets.is_empty() {
             return Self::default();
@@ -53,22 +54,22 @@ impl TetQuality {
     }
 }
 
-/// The angles between the two faces at each of the [`EDGES`] [rad], 0..=pi.
+/// The angles between the two faces at each of the [`EDGES`] (rad), 0..=pi.
 pub(crate) fn dihedral_angles(corners: &[DVec3; 4]) -> [f64; 6] {
     EDGES.map(|[i, j]| {
-        // The corners sum to 6; k and l are the two that are not on the edge.
+        // k and l are the two corners that are not on the edge. The four indices sum to 6.
         let k = (0..4).find(|&k| k != i && k != j).unwrap_or(0);
         let l = 6 - i - j - k;
         let along = corners[j] - corners[i];
         let m = along.cross(corners[k] - corners[i]);
         let n = along.cross(corners[l] - corners[i]);
-        // atan2 keeps full precision near 0 and pi, where the arc cosine loses half the digits.
+        // atan2 keeps full precision near 0 and pi, where the arc cosine loses half of its digits.
         m.cross(n).length().atan2(m.dot(n))
     })
 }
 
-/// Circumradius over shortest edge: sqrt(6) / 4 for a regular tet. The circumcentre c, from one corner, solves
-/// u.c = u.u / 2 for the edges u from there.
+/// Circumradius over shortest edge: sqrt(6) / 4 for a regular tet. The circumcentre c, from one
+/// corner, solves u.c = u.u / 2 for the edges u from there.
 fn radius_edge(corners: &[DVec3; 4]) -> f64 {
     let [u, v, w] = [1, 2, 3].map(|i| corners[i] - corners[0]);
     let sum = u.length_squared() * v.cross(w) + v.length_squared() * w.cross(u) + w.length_squared() * u.cross(v);
@@ -94,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_regular_tet_and_a_corner_tet() {
+    fn regular_and_corner_tets_have_their_known_quality() {
         let regular = TetMesh {
             vertices: vec![
                 DVec3::new(1.0, 1.0, 1.0),
@@ -120,12 +121,14 @@ mod tests {
     }
 
     #[test]
-    fn a_sliver_is_seen_exactly_and_nothing_is_zero() {
-        // Four points of a square, one pair raised by h: the two flat angles are 2 atan(h) for unit half-diagonals.
+    fn a_sliver_has_its_exact_angles_and_an_empty_mesh_has_zeros() {
+        // The four points of a square with one pair raised by h. The two flat angles are 2 atan(h)
+        // for unit half-diagonals.
         let h = 1e-7;
         let vertices = vec![DVec3::X, -DVec3::X, DVec3::new(0.0, -1.0, h), DVec3::new(0.0, 1.0, h)];
         let q = TetQuality::of(&TetMesh { vertices, tets: vec![[0, 1, 3, 2]] });
-        // At edge (+x, +y): normals of the two faces there differ from +-z by h / 1 each, in the same plane.
+        // At the edge (+x, +y) the normals of the two faces differ from +-z by h each, in the same
+        // plane.
         assert!(q.min_dihedral_deg > 0.0 && q.min_dihedral_deg < 2e-5, "{}", q.min_dihedral_deg);
         assert!(q.max_dihedral_deg > 179.99998);
         assert_eq!(TetQuality::of(&TetMesh::default()), TetQuality::default());

@@ -1,9 +1,9 @@
-//! Shapes with known answers, for tests.
+//! Shapes with known properties, for tests.
 
 use crate::{SignedDistance, TriMesh};
 use glam::DVec3;
 
-/// An axis-aligned cube of `edge` [m] about `centre`, outward.
+/// An axis-aligned cube of `edge` (m) about `centre`, outward.
 pub(crate) fn cube(centre: DVec3, edge: f64) -> TriMesh {
     let vertices = (0..8)
         .map(|c| centre + edge * (DVec3::new((c & 1) as f64, (c >> 1 & 1) as f64, (c >> 2) as f64) - 0.5))
@@ -13,7 +13,8 @@ pub(crate) fn cube(centre: DVec3, edge: f64) -> TriMesh {
     TriMesh { vertices, triangles, colors: Vec::new() }
 }
 
-/// A subdivided octahedron projected on the sphere of `radius` [m] about the origin: 8 * 4^levels triangles, outward.
+/// A subdivided octahedron projected on the sphere of `radius` (m) about the origin: 8 * 4^levels
+/// triangles, outward.
 pub(crate) fn icosphere(levels: usize, radius: f64) -> TriMesh {
     let mut vertices = vec![DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z];
     let mut triangles: Vec<[u32; 3]> =

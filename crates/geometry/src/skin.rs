@@ -1,4 +1,4 @@
-//! A fine surface carried by a coarse tetrahedral body.
+//! Skins: a fine surface that follows a coarse tetrahedral body.
 
 mod box_grid;
 
@@ -7,32 +7,47 @@ use box_grid::BoxGrid;
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// Barycentric attachment of surface vertices to the elements that hold (or are nearest to) them.
+/// Barycentric embedding of a surface in a tetrahedral body.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_geometry::{Skin, TetMesh, TriMesh};
+///
+/// let corners = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let body = TetMesh { vertices: corners, tets: vec![[0, 1, 2, 3]] };
+/// let surface = TriMesh { vertices: vec![DVec3::splat(0.25)], ..TriMesh::default() };
+/// let skin = Skin::bind(&surface, &body);
+///
+/// let stretched: Vec<DVec3> = body.vertices.iter().map(|p| 2.0 * *p).collect();
+/// let mut positions = vec![DVec3::ZERO; 1];
+/// skin.deform(&body, &stretched, &mut positions);
+/// assert!(positions[0].distance(DVec3::splat(0.5)) < 1e-12);
+/// ```
 #[derive(Clone, Debug)]
 pub struct Skin {
-    /// For each surface vertex: element and four weights that sum to 1.
+    /// For each surface vertex: its element and four weights that sum to 1.
     pub bindings: Vec<(u32, [f64; 4])>,
 }
 
-/// A vertex this little outside an element, as a weight, still counts as inside.
-const ROUNDING: f64 = 1e-9;
-/// No weight lies further than this below 0 or above 1. A vertex far outside the body would swing with every strain of
-/// one element; it is bound nearer to the body instead, and rests there.
-const MOST_EXTRAPOLATED: f64 = 3.0;
+/// Tolerance of the weights for a vertex to count as inside an element.
+const INSIDE_TOLERANCE: f64 = 1e-9;
+/// Weights lie at most this far below 0 or above 1. A vertex far outside the body would amplify
+/// every strain of one element. It is bound closer to the body instead, so its rest position moves.
+const MAX_EXTRAPOLATION: f64 = 3.0;
 
 impl Skin {
-    /// Binds each vertex of `surface` to `body` in the rest shape: to the element that holds it, else to the one whose
-    /// boundary triangle is nearest, with extrapolating weights.
+    /// Binds each vertex of `surface` to `body` in the rest shape: to the element that contains it,
+    /// or else to the element of the nearest boundary triangle with extrapolating weights.
     ///
-    /// Vertices farther from the body than about an element's height are moved towards it, so that no weight leaves
-    /// -3..=4. Without any element of positive volume nothing is bound.
+    /// Vertices farther from the body than about an element's height are moved towards it to keep
+    /// all weights in [-3, 4]. If no element has a positive volume, no vertex is bound.
     pub fn bind(surface: &TriMesh, body: &TetMesh) -> Self {
         let around = |points: &[DVec3]| {
             points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), &p| (lo.min(p), hi.max(p)))
         };
         let frames: Vec<Frame> = (0..body.tets.len()).into_par_iter().map(|t| Frame::of(&body.corners(t))).collect();
         let boxes: Vec<_> = (0..body.tets.len()).map(|t| around(&body.corners(t))).collect();
-        // A plane that has the whole body on its negative side leaves the whole boundary, each triangle with its element.
+        // A cut plane beyond the body keeps the whole boundary, with the element of each triangle.
         let outside = body.cut_away(body.bounds().map_or(DVec3::ZERO, |(_, hi)| hi + DVec3::ONE), DVec3::ONE);
         let triangles: Vec<[DVec3; 3]> =
             outside.surface.triangles.iter().map(|t| t.map(|i| outside.surface.vertices[i as usize])).collect();
@@ -45,7 +60,7 @@ impl Skin {
             for &t in elements.at(p) {
                 let weights = frames[t as usize].weights(p);
                 let least = weights.iter().copied().fold(f64::INFINITY, f64::min);
-                if least >= -ROUNDING && inside.is_none_or(|(best, ..)| least > best) {
+                if least >= -INSIDE_TOLERANCE && inside.is_none_or(|(best, ..)| least > best) {
                     inside = Some((least, t, weights));
                 }
             }
@@ -58,17 +73,17 @@ impl Skin {
                     let frame = &frames[outside.tets[k as usize] as usize];
                     (outside.tets[k as usize], limited(frame.weights(to(k)), frame.weights(p)))
                 }
-                // Only a vertex that is not a number has no nearest triangle.
+                // Only a NaN vertex has no nearest triangle.
                 None => (0, [f64::NAN; 4]),
             }
         };
         Self { bindings: surface.vertices.par_iter().map(bind).collect() }
     }
 
-    /// Surface vertex positions when the body's nodes are at `nodes` [m], written to `out`.
+    /// Writes the surface vertex positions (m) for node positions `nodes` (m) to `out`.
     ///
-    /// `nodes` has one entry for each node of `body`, the mesh that the skin was bound to; `out` one for each vertex.
-    /// Follows every affine motion of the body exactly, and allocates nothing.
+    /// `body` is the mesh of [`Skin::bind`]; `nodes` has one entry per node, `out` one per vertex.
+    /// Affine motions of the body are followed exactly. Does not allocate.
     pub fn deform(&self, body: &TetMesh, nodes: &[DVec3], out: &mut [DVec3]) {
         for (vertex, &(t, weights)) in out.iter_mut().zip(&self.bindings) {
             let [a, b, c, d] = body.tets[t as usize].map(|node| nodes[node as usize]);
@@ -80,7 +95,7 @@ impl Skin {
 /// Barycentric coordinates of an element.
 struct Frame {
     origin: DVec3,
-    /// Rows are the gradients of the last three weights [1/m].
+    /// Rows are the gradients of the last three weights (1/m).
     gradients: DMat3,
 }
 
@@ -95,19 +110,21 @@ impl Frame {
     }
 }
 
-/// The weights on the way from `near` (a point of the element) to `wanted` that are as far along as the limit allows.
+/// The weights between `near` (a point of the element) and `wanted` that are closest to `wanted`
+/// within the limit.
 fn limited(near: [f64; 4], wanted: [f64; 4]) -> [f64; 4] {
     let mut share: f64 = 1.0;
     for (from, to) in near.into_iter().zip(wanted) {
-        let limit = if to > from { 1.0 + MOST_EXTRAPOLATED } else { -MOST_EXTRAPOLATED };
-        if !(-MOST_EXTRAPOLATED..=1.0 + MOST_EXTRAPOLATED).contains(&to) {
+        let limit = if to > from { 1.0 + MAX_EXTRAPOLATION } else { -MAX_EXTRAPOLATION };
+        if !(-MAX_EXTRAPOLATION..=1.0 + MAX_EXTRAPOLATION).contains(&to) {
             share = share.min((limit - from) / (to - from));
         }
     }
     [0, 1, 2, 3].map(|i| near[i] + share * (wanted[i] - near[i]))
 }
 
-/// The point of a triangle nearest to `p`: its foot in the plane where that lies inside, else the best of the edges.
+/// The point of a triangle nearest to `p`: the projection onto its plane if that lies inside, or
+/// else the nearest point of the edges.
 fn closest_on_triangle(p: DVec3, &[a, b, c]: &[DVec3; 3]) -> DVec3 {
     let normal = (b - a).cross(c - a);
     let foot = p - normal * ((p - a).dot(normal) / normal.length_squared());
@@ -137,7 +154,7 @@ mod tests {
         LatticeMesher::uniform(cell).mesh_shape(&Ball, (DVec3::splat(-0.03), DVec3::splat(0.03))).unwrap()
     }
 
-    /// Points evenly over a sphere, as a surface without triangles.
+    /// Evenly distributed points on a sphere, as a surface without triangles.
     fn sphere(radius: f64, count: usize) -> TriMesh {
         let vertices = (0..count)
             .map(|i| {
@@ -171,14 +188,14 @@ mod tests {
     }
 
     #[test]
-    fn inside_points_are_bound_to_the_element_that_holds_them() {
+    fn inside_points_are_bound_to_the_element_that_contains_them() {
         let body = body(0.004);
         let skin = Skin::bind(&sphere(0.02, 3000), &body);
         assert!(skin.bindings.iter().all(|(_, w)| w.iter().all(|&w| w >= -1e-9)));
     }
 
     #[test]
-    fn outside_points_are_bound_to_the_nearest_boundary_and_stay_bounded() {
+    fn outside_points_are_bound_to_the_nearest_boundary_with_bounded_weights() {
         let body = body(0.006);
         let (surface, _) = body.boundary();
         for radius in [0.0304, 0.035, 0.3] {

@@ -3,9 +3,10 @@
 use crate::TriMesh;
 use glam::DVec3;
 
-/// Taubin smoothing: `iterations` pairs of a shrinking (`lambda` > 0) and an inflating (`mu` < -`lambda`) umbrella step.
-/// Each step moves every vertex by that factor times the way to the mean of its neighbours; the triangles stay as they are.
-/// Taubin, "A signal processing approach to fair surface design", 1995.
+/// Taubin smoothing (G. Taubin, "A signal processing approach to fair surface design", 1995):
+/// `iterations` pairs of a shrinking (`lambda` > 0) and an inflating (`mu` < -`lambda`) step. A
+/// step moves every vertex by the factor times the vector to the mean of its neighbours. Triangles
+/// do not change.
 pub fn taubin(mesh: &mut TriMesh, lambda: f64, mu: f64, iterations: usize) {
     let (start, neighbours) = neighbours(mesh);
     let mut moved = mesh.vertices.clone();
@@ -24,7 +25,7 @@ pub fn taubin(mesh: &mut TriMesh, lambda: f64, mu: f64, iterations: usize) {
     }
 }
 
-/// Neighbours of vertex v: `list[start[v]..start[v + 1]]`.
+/// `(start, list)`: the neighbours of vertex v are `list[start[v]..start[v + 1]]`.
 fn neighbours(mesh: &TriMesh) -> (Vec<usize>, Vec<u32>) {
     let mut edges: Vec<(u32, u32)> =
         mesh.triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, a), (b, c), (c, b), (c, a), (a, c)]).collect();
@@ -46,7 +47,7 @@ mod tests {
     use crate::shapes::{icosphere, scattered};
 
     #[test]
-    fn a_noisy_sphere_gets_smooth_and_keeps_its_volume() {
+    fn a_noisy_sphere_becomes_smooth_and_keeps_its_volume() {
         let clean = icosphere(5, 0.05);
         let mut mesh = clean.clone();
         for (v, shift) in mesh.vertices.iter_mut().zip(scattered(clean.vertices.len())) {
@@ -69,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vertex_without_neighbours_stays() {
+    fn a_vertex_without_neighbours_does_not_move() {
         let mut mesh = TriMesh { vertices: vec![DVec3::ONE], ..TriMesh::default() };
         taubin(&mut mesh, 0.5, -0.53, 3);
         assert_eq!(mesh.vertices, [DVec3::ONE]);

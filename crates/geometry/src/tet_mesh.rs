@@ -1,4 +1,4 @@
-//! Tetrahedral bodies.
+//! Tetrahedral meshes.
 
 pub(crate) mod adjacency;
 
@@ -7,66 +7,79 @@ use adjacency::{EDGES, FACES, NO_TET, face_neighbours};
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// A tetrahedral mesh. Every element [a, b, c, d] has positive signed volume (b-a)x(c-a).(d-a)/6.
+/// A tetrahedral mesh. The signed volume (b-a)x(c-a).(d-a)/6 of every element `[a, b, c, d]` is
+/// positive.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_geometry::TetMesh;
+///
+/// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let mesh = TetMesh { vertices, tets: vec![[0, 1, 2, 3]] };
+/// assert!((mesh.volume() - 1.0 / 6.0).abs() < 1e-15);
+/// let (surface, nodes) = mesh.boundary();
+/// assert!(surface.is_watertight() && nodes.len() == 4);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TetMesh {
-    /// Node positions [m].
+    /// Node positions (m).
     pub vertices: Vec<DVec3>,
     /// Node indices of each element.
     pub tets: Vec<[u32; 4]>,
 }
 
-/// What remains visible of a body when part of it is cut away, see [`TetMesh::cut_away`].
+/// The surface of a body after part of it is cut away, see [`TetMesh::cut_away`].
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CutAway {
-    /// Outward-facing surface of the elements that remain.
+    /// Outward-facing surface of the remaining elements.
     pub surface: TriMesh,
-    /// For each vertex of `surface`, the node it is.
+    /// For each vertex of `surface`, its node.
     pub nodes: Vec<u32>,
-    /// For each triangle of `surface`, the element it belongs to.
+    /// For each triangle of `surface`, its element.
     pub tets: Vec<u32>,
-    /// For each triangle of `surface`, true when it lay inside the body and the cut laid it bare.
+    /// For each triangle of `surface`, whether the cut exposed it (it was inside the body).
     pub bared: Vec<bool>,
 }
 
 impl TetMesh {
-    /// Positions of the four corners of element `t` [m].
+    /// Positions of the four corners of element `t` (m).
     pub fn corners(&self, t: usize) -> [DVec3; 4] {
         self.tets[t].map(|node| self.vertices[node as usize])
     }
 
-    /// Signed volume of element `t` [m3].
+    /// Signed volume of element `t` (m3).
     pub fn tet_volume(&self, t: usize) -> f64 {
         let [a, b, c, d] = self.corners(t);
         (b - a).cross(c - a).dot(d - a) / 6.0
     }
 
-    /// Sum of the signed volumes [m3].
+    /// Sum of the signed volumes (m3).
     pub fn volume(&self) -> f64 {
         (0..self.tets.len()).map(|t| self.tet_volume(t)).sum()
     }
 
-    /// Number of elements with signed volume at or below 0 (or NaN).
+    /// Number of elements whose signed volume is not positive (or NaN).
     pub fn inverted(&self) -> usize {
         (0..self.tets.len()).filter(|&t| !matches!(self.tet_volume(t), v if v > 0.0)).count()
     }
 
-    /// For each element and each of its corners, the element across the face opposite the corner; `None` on the boundary. A face of three or more elements, which no conforming mesh has,
-    /// counts as boundary of each.
+    /// For each element and each of its corners, the element across the opposite face; `None` on
+    /// the boundary. A face of three or more elements, which no conforming mesh has, counts as
+    /// boundary of each.
     pub fn neighbours(&self) -> Vec<[Option<u32>; 4]> {
         let across = |t: u32| (t != NO_TET).then_some(t);
         face_neighbours(&self.tets).into_iter().map(|faces| faces.map(across)).collect()
     }
 
-    /// Outward-facing boundary surface and, for each of its vertices, the node it is. Triangles follow the order of
-    /// their elements, vertices the order of the nodes.
+    /// The outward-facing boundary surface and the node of each of its vertices. Triangles have the
+    /// order of their elements, vertices the order of the nodes.
     pub fn boundary(&self) -> (TriMesh, Vec<u32>) {
         let (faces, _) = self.open_faces(&face_neighbours(&self.tets), |_| true);
         self.surface_of(faces)
     }
 
-    /// Surface of the elements whose centroid lies on the negative side of the plane through `point` [m] with normal
-    /// `normal` (any length): a look into the body.
+    /// Surface of the elements whose centroid is on the negative side of the plane through `point`
+    /// (m) with normal `normal` (any length). Used for cross-sections.
     pub fn cut_away(&self, point: DVec3, normal: DVec3) -> CutAway {
         let neighbours = face_neighbours(&self.tets);
         let keep: Vec<bool> = (0..self.tets.len())
@@ -78,7 +91,7 @@ impl TetMesh {
         CutAway { surface, nodes, tets: owners.into_iter().map(|(t, _)| t).collect(), bared }
     }
 
-    /// Every edge once, as (smaller node, larger node), sorted.
+    /// All distinct edges as (smaller node, larger node), sorted.
     pub fn edges(&self) -> Vec<[u32; 2]> {
         let mut edges: Vec<[u32; 2]> = self
             .tets
@@ -90,13 +103,14 @@ impl TetMesh {
         edges
     }
 
-    /// Smallest and largest coordinates [m]; `None` without nodes.
+    /// Smallest and largest coordinates (m); `None` without nodes.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         let first = *self.vertices.first()?;
         Some(self.vertices.iter().fold((first, first), |(lo, hi), &p| (lo.min(p), hi.max(p))))
     }
 
-    /// Faces, as nodes and as (element, face), between an element that is kept and none or one that is not.
+    /// Faces between a kept element and no element or one that is not kept, as nodes and as
+    /// (element, face).
     fn open_faces(&self, neighbours: &[[u32; 4]], keep: impl Fn(usize) -> bool) -> (Vec<[u32; 3]>, Vec<(u32, usize)>) {
         let mut faces = Vec::new();
         let mut owners = Vec::new();
@@ -112,7 +126,7 @@ impl TetMesh {
         (faces, owners)
     }
 
-    /// A surface of its own from triangles over the nodes.
+    /// A surface with its own vertices from triangles over the nodes, and the node of each vertex.
     fn surface_of(&self, mut triangles: Vec<[u32; 3]>) -> (TriMesh, Vec<u32>) {
         let mut nodes: Vec<u32> = triangles.iter().flatten().copied().collect();
         nodes.sort_unstable();
@@ -155,13 +169,13 @@ mod tests {
         assert_eq!(mesh.bounds(), Some((DVec3::ZERO, DVec3::splat(2.0))));
         let (surface, nodes) = mesh.boundary();
         assert_eq!((surface.triangles.len(), nodes), (12, (0..8).collect()));
-        // The six tets stand around the diagonal in a ring.
+        // The six tets form a ring around the diagonal.
         assert_eq!(mesh.neighbours()[0], [None, Some(1), Some(5), None]);
         assert!((surface_volume(&surface) - 8.0).abs() < 1e-12, "triangles must face outward");
     }
 
     #[test]
-    fn swapping_two_corners_inverts() {
+    fn swapping_two_corners_inverts_an_element() {
         let mut mesh = cube();
         mesh.tets[2].swap(0, 1);
         assert_eq!(mesh.inverted(), 1);
@@ -170,9 +184,10 @@ mod tests {
     }
 
     #[test]
-    fn cutting_away_bares_the_inside() {
+    fn cutting_away_exposes_the_inside() {
         let mesh = cube();
-        // Keeps the three tets with x > y on average: one half of the cube, cut along the diagonal plane x = y.
+        // Keeps the three tets with x > y on average: one half of the cube, cut along the diagonal
+        // plane x = y.
         let half = mesh.cut_away(DVec3::ZERO, DVec3::new(-1.0, 1.0, 0.0));
         assert_eq!(half.bared.iter().filter(|&&b| b).count(), 2);
         assert_eq!(half.surface.triangles.len(), 8);

@@ -2,10 +2,22 @@
 
 use glam::DVec3;
 
-/// A triangle surface, optionally coloured per vertex. Outward normals follow the right-hand rule.
+/// A triangle surface with optional vertex colours. Outward normals follow the right-hand rule.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_geometry::TriMesh;
+///
+/// let vertices = vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+/// let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+/// let mut mesh = TriMesh { vertices, triangles, colors: Vec::new() };
+/// assert!(mesh.is_watertight() && (mesh.volume() - 1.0 / 6.0).abs() < 1e-15);
+/// mesh.triangles.pop();
+/// assert_eq!(mesh.open_edges(), 3);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TriMesh {
-    /// Vertex positions [m].
+    /// Vertex positions (m).
     pub vertices: Vec<DVec3>,
     /// Vertex indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
@@ -20,13 +32,13 @@ pub(crate) struct HalfEdge {
     pub edge: (u32, u32),
     /// The triangle.
     pub triangle: u32,
-    /// True when the triangle runs from the smaller to the larger index.
+    /// Whether the triangle traverses the edge from the smaller to the larger index.
     pub forward: bool,
 }
 
 impl TriMesh {
-    /// True when every edge is shared by exactly two triangles that run along it in opposite directions. False for a mesh
-    /// without triangles.
+    /// Whether every edge has exactly two triangles that traverse it in opposite directions. False
+    /// for a mesh without triangles.
     pub fn is_watertight(&self) -> bool {
         let sides = self.half_edges();
         !sides.is_empty() && edge_groups(&sides).all(|group| group.len() == 2 && group[0].forward != group[1].forward)
@@ -42,25 +54,27 @@ impl TriMesh {
         edge_groups(&self.half_edges()).count()
     }
 
-    /// Enclosed volume [m3]; negative when the triangles face inward. By the divergence theorem, summed about the middle
-    /// of the bounding box; for a surface with holes it is the volume closed by cones from there.
+    /// Enclosed volume (m3), negative if the triangles face inward. By the divergence theorem about
+    /// the centre of the bounding box. For a surface with holes it is the volume with the holes
+    /// closed by cones from there.
     pub fn volume(&self) -> f64 {
         let centre = self.bounds().map_or(DVec3::ZERO, |(low, high)| 0.5 * (low + high));
         (0..self.triangles.len()).map(|t| self.cone_volume(t, centre)).sum()
     }
 
-    /// Surface area [m2].
+    /// Surface area (m2).
     pub fn area(&self) -> f64 {
         (0..self.triangles.len()).map(|t| self.area_vector(t).length()).sum()
     }
 
-    /// Area-weighted normal of triangle `t`: its length is the area [m2].
+    /// Normal of triangle `t` whose length is the area (m2).
     pub fn area_vector(&self, t: usize) -> DVec3 {
         let [a, b, c] = self.corners(t);
         0.5 * (b - a).cross(c - a)
     }
 
-    /// Unit normal per vertex, weighted by triangle area; zero for a vertex without area around it.
+    /// Unit normal of each vertex, weighted by triangle area. Zero for a vertex without area around
+    /// it.
     pub fn vertex_normals(&self) -> Vec<DVec3> {
         let mut normals = vec![DVec3::ZERO; self.vertices.len()];
         for (t, triangle) in self.triangles.iter().enumerate() {
@@ -72,24 +86,24 @@ impl TriMesh {
         normals.into_iter().map(DVec3::normalize_or_zero).collect()
     }
 
-    /// Smallest and largest coordinates [m]; `None` without vertices.
+    /// Smallest and largest coordinates (m); `None` without vertices.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         bounds(&self.vertices)
     }
 
-    /// Positions of the three corners of triangle `t` [m].
+    /// Positions of the three corners of triangle `t` (m).
     pub fn corners(&self, t: usize) -> [DVec3; 3] {
         self.triangles[t].map(|v| self.vertices[v as usize])
     }
 
-    /// Component of each triangle and the number of components. Triangles that share an edge belong together; components
-    /// are numbered in the order of their first triangle.
+    /// The component of each triangle and the number of components. Triangles that share an edge
+    /// are in one component. Components are numbered in the order of their first triangle.
     pub fn components(&self) -> (Vec<u32>, usize) {
         let mut parent: Vec<u32> = (0..self.triangles.len() as u32).collect();
         for group in edge_groups(&self.half_edges()) {
             for pair in group.windows(2) {
                 let (a, b) = (find(&mut parent, pair[0].triangle), find(&mut parent, pair[1].triangle));
-                // The smaller root wins, so that a root is its component's first triangle.
+                // The smaller root wins, so a root is the first triangle of its component.
                 parent[a.max(b) as usize] = a.min(b);
             }
         }
@@ -107,8 +121,8 @@ impl TriMesh {
         (label, count as usize)
     }
 
-    /// The component that encloses the largest volume in absolute terms, with its vertices renumbered in order; empty for
-    /// an empty mesh.
+    /// The component with the largest absolute volume, with its vertices renumbered in order. Empty
+    /// for an empty mesh.
     pub fn largest_component(&self) -> Self {
         let (label, count) = self.components();
         if count <= 1 {
@@ -119,7 +133,7 @@ impl TriMesh {
         self.submesh(|t| label[t] as usize == largest)
     }
 
-    /// Signed volume of each component [m3], about the component's own first vertex.
+    /// Signed volume of each component (m3), about the component's own first vertex.
     pub(crate) fn component_volumes(&self, label: &[u32], count: usize) -> Vec<f64> {
         let mut volumes = vec![0.0; count];
         let mut origin = vec![None; count];
@@ -130,7 +144,7 @@ impl TriMesh {
         volumes
     }
 
-    /// The triangles that `keep` wants and the vertices they use, both in their old order.
+    /// The triangles for which `keep` holds and their vertices, both in their original order.
     pub(crate) fn submesh(&self, keep: impl Fn(usize) -> bool) -> Self {
         let mut used = vec![false; self.vertices.len()];
         let kept: Vec<[u32; 3]> =
@@ -153,7 +167,7 @@ impl TriMesh {
         result
     }
 
-    /// Turns every triangle round.
+    /// Flips the orientation of every triangle.
     pub fn flip(&mut self) {
         for triangle in &mut self.triangles {
             triangle.swap(1, 2);
@@ -179,12 +193,12 @@ impl TriMesh {
     }
 }
 
-/// The sides in runs of the same edge.
+/// Groups of sides with the same edge.
 pub(crate) fn edge_groups(sorted: &[HalfEdge]) -> impl Iterator<Item = &[HalfEdge]> {
     sorted.chunk_by(|a, b| a.edge == b.edge)
 }
 
-/// Root of `i` in a union-find forest, halving the path on the way.
+/// Root of `i` in a union-find forest, with path halving.
 fn find(parent: &mut [u32], mut i: u32) -> u32 {
     while parent[i as usize] != i {
         parent[i as usize] = parent[parent[i as usize] as usize];
@@ -224,7 +238,7 @@ mod tests {
     }
 
     #[test]
-    fn one_turned_triangle_is_not_watertight() {
+    fn one_flipped_triangle_is_not_watertight() {
         let mut mesh = cube(DVec3::ZERO, 1.0);
         mesh.triangles[0].swap(0, 1);
         assert!(!mesh.is_watertight());
@@ -232,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_not_watertight() {
+    fn an_empty_mesh_is_not_watertight() {
         let empty = TriMesh::default();
         assert!(!empty.is_watertight());
         assert_eq!(empty.volume(), 0.0);
@@ -241,7 +255,7 @@ mod tests {
     }
 
     #[test]
-    fn the_largest_component_is_the_one_with_most_volume() {
+    fn the_largest_component_has_the_largest_volume() {
         let small = icosphere(3, 0.3);
         let large = cube(DVec3::splat(5.0), 2.0);
         let mut both = small;

@@ -1,4 +1,5 @@
-//! The graded lattice: the same surface as a uniform one, sound, and far fewer elements in a large body.
+//! The graded lattice: the same surface as a uniform one, sound, and far fewer elements in a large
+//! body.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -31,13 +32,14 @@ fn blob(seed: u64) -> Named {
     };
     let waves: Vec<(DVec3, f64)> = (0..6).map(|_| (150.0 * DVec3::new(next(), next(), next()), 3.0 * next())).collect();
     named(&format!("blob {seed}"), DVec3::splat(0.05), move |p| {
-        // Six waves of at most 260 rad/m and 0.6 mm are at most 0.94 steep together; the ball's share is scaled to match.
+        // Six waves of at most 260 rad/m and 0.6 mm are at most 0.94 steep together; the ball's
+        // share is scaled to match.
         let rough: f64 = waves.iter().map(|(k, phase)| 6e-4 * (k.dot(p) + phase).sin()).sum();
         0.3 * (p.length() - 0.03) + rough
     })
 }
 
-/// Shapes with half the extent of their bounds [m], to be meshed with cells of 2.5 mm.
+/// Shapes with half the extent of their bounds (m), to be meshed with cells of 2.5 mm.
 fn zoo() -> Vec<Named> {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 0.2);
     let mut zoo = vec![
@@ -119,7 +121,8 @@ fn the_same_mesh_whatever_the_threads() {
     assert!(mesh(1) == mesh(3));
 }
 
-/// The inside of a graded body is neither sampled nor stored: twice as fine costs four times, not eight.
+/// The inside of a graded body is neither sampled nor stored: twice as fine costs four times, not
+/// eight.
 #[test]
 fn the_cost_follows_the_surface() {
     let cost = |cell: f64| {

@@ -29,7 +29,8 @@ fn shapes() -> Vec<(&'static str, DVec3, Box<dyn SignedDistance>)> {
         boxed("torus", DVec3::new(0.04, 0.04, 0.01), |p| {
             DVec2::new(DVec2::new(p.x, p.y).length() - 0.03, p.z).length() - 0.01
         }),
-        // A lower bound of the distance that is exact to first order at the surface along the shortest axis.
+        // A lower bound of the distance that is exact to first order at the surface along the
+        // shortest axis.
         boxed("ellipsoid", DVec3::new(0.04, 0.025, 0.015), |p| {
             ((p / DVec3::new(0.04, 0.025, 0.015)).length() - 1.0) * 0.015
         }),

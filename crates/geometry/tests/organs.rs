@@ -15,7 +15,8 @@ fn shared(path: &str) -> Option<PathBuf> {
     Some(full)
 }
 
-/// File, volume [cm3] as another library sums it, tolerance (part of it), whether it has to be rebuilt.
+/// File, volume (cm3) as another library sums it, tolerance (part of it), whether it has to be
+/// rebuilt.
 const ORGANS: [(&str, f64, f64, bool); 9] = [
     ("openhelp/Liver.stl", 1817.66, 1e-4, false),
     ("openhelp/Stomach.stl", 289.35, 1e-4, false),

@@ -1,4 +1,5 @@
-//! TetGen as a mesher: with the program where it is installed, and with scripts that stand in for it and misbehave.
+//! TetGen as a mesher: with the program where it is installed, and with scripts that stand in for
+//! it and misbehave.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
@@ -14,7 +15,8 @@ use std::time::{Duration, Instant};
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, repair};
 
-/// One test at a time: a script that another thread's child still has open for writing cannot be run.
+/// One test at a time: a script that another thread's child still has open for writing cannot be
+/// run.
 static ONE: Mutex<()> = Mutex::new(());
 
 /// Whether the program is there; says so if not.
@@ -26,7 +28,7 @@ fn installed() -> bool {
     found
 }
 
-/// A box of edges `size` [m], outward.
+/// A box of edges `size` (m), outward.
 fn cuboid(centre: DVec3, size: DVec3) -> TriMesh {
     let corner = |c: u32| DVec3::new(f64::from(c & 1), f64::from(c >> 1 & 1), f64::from(c >> 2)) - 0.5;
     let quads = [[0u32, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
@@ -89,15 +91,15 @@ fn unfit_surfaces_are_refused() {
     open.triangles.pop();
     assert!(refusal(&mesher, &open).contains("3 open edges"));
     assert!(refusal(&mesher, &TriMesh::default()).contains("no triangles"));
-    assert!(refusal(&TetgenMesher { radius_edge: f64::NAN, ..mesher.clone() }, &brick()).contains("1 to 100"));
+    assert!(refusal(&TetgenMesher { radius_edge: f64::NAN, ..mesher.clone() }, &brick()).contains("[1, 100]"));
     if !installed() {
         return;
     }
     let crossing = join(brick(), &cuboid(DVec3::splat(0.004), DVec3::splat(0.015)));
-    assert!(refusal(&mesher, &crossing).contains("crosses itself"));
+    assert!(refusal(&mesher, &crossing).contains("intersects itself"));
     let mut hollow = cuboid(DVec3::ZERO, DVec3::splat(0.005));
     hollow.flip();
-    assert!(refusal(&mesher, &join(brick(), &hollow)).contains("without hollows"));
+    assert!(refusal(&mesher, &join(brick(), &hollow)).contains("without cavities"));
 }
 
 #[test]
@@ -132,9 +134,11 @@ fn a_program_that_misbehaves_gives_one_line() {
     let absent = TetgenMesher { program: "no-such-program-as-this".into(), ..TetgenMesher::default() };
     assert!(refusal(&absent, &brick()).contains("apt install tetgen"));
     assert!(refusal(&script("echo 'Error: out of luck'; echo more; exit 3"), &brick()).contains("out of luck"));
-    assert!(refusal(&script("echo 'Facet #1 intersects facet #2'; kill -9 $$"), &brick()).contains("crosses itself"));
-    assert!(refusal(&script("exit 1"), &brick()).contains("without a word"));
-    assert!(refusal(&script("true"), &brick()).contains("without a word"));
+    assert!(
+        refusal(&script("echo 'Facet #1 intersects facet #2'; kill -9 $$"), &brick()).contains("intersects itself")
+    );
+    assert!(refusal(&script("exit 1"), &brick()).contains("without a message"));
+    assert!(refusal(&script("true"), &brick()).contains("without a message"));
     assert!(refusal(&script("yes 'error: 0123456789' | head -c 1000000; exit 1"), &brick()).contains("0123456789"));
     assert!(refusal(&script("echo 5 3 0 0 > body.1.node; echo 1 4 0 > body.1.ele"), &brick()).contains("ends before"));
     let nodes = "printf '5 3 0 0\\n1 0 0 0\\n2 1 0 0\\n3 0 1 0\\n4 0 0 1\\n5 1 1 0\\n' > body.1.node";
@@ -143,7 +147,8 @@ fn a_program_that_misbehaves_gives_one_line() {
     assert!(refusal(&with("1 4 0\\n1 1 2 3 5\\n"), &brick()).contains("without volume"));
     assert!(refusal(&with("0 4 0\\n"), &brick()).contains("no elements"));
 
-    // The right answer, turned inside out and with a node too many, is made sound. Switches and input are as documented.
+    // The right answer, turned inside out and with a node too many, is made sound. Switches and
+    // input are as documented.
     let tet = TriMesh {
         vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
         triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],

@@ -2,20 +2,20 @@
 
 use crate::bed::Bed;
 use crate::noise;
-use crate::plan::{Organ, Plan};
+use crate::spec::{Organ, PhantomSpec};
 
-/// What lies in front of the camera, in its frame.
+/// The anatomy in front of the camera, in the camera frame.
 pub(crate) struct Anatomy {
     pub organs: Vec<Organ>,
     pub bed: Bed,
 }
 
 impl Anatomy {
-    /// The anatomy of a seed: the plan, varied.
-    pub fn new(plan: &Plan, seed: u64) -> Self {
-        let mut bed = Bed::new(plan.bed, noise::key(&[seed, 1]));
-        let mut organs = (plan.organs)(seed, &bed);
-        organs.sort_by_key(|o| plan.listed.iter().position(|name| *name == o.name));
+    /// The anatomy of a seed: the specification with random variations.
+    pub fn new(spec: &PhantomSpec, seed: u64) -> Self {
+        let mut bed = Bed::new(spec.bed, noise::key(&[seed, 1]));
+        let mut organs = (spec.organs)(seed, &bed);
+        organs.sort_by_key(|o| spec.organ_names.iter().position(|name| *name == o.name));
         bed.imprint(organs.iter().map(|o| o.body.clone()).collect());
         Self { organs, bed }
     }
@@ -33,37 +33,37 @@ mod tests {
     use trocar_camera::Camera;
     use trocar_geometry::{SignedDistance, isosurface, sample_distance};
 
-    const PLANS: [&Plan; 3] = [&phantom_a::PLAN, &phantom_b::PLAN, &phantom_c::PLAN];
+    const SPECS: [&PhantomSpec; 3] = [&phantom_a::SPEC, &phantom_b::SPEC, &phantom_c::SPEC];
     const SEEDS: std::ops::Range<u64> = 0..6;
 
-    /// A phantom of a seed.
+    /// A phantom with a seed.
     struct Case {
-        plan: &'static Plan,
+        spec: &'static PhantomSpec,
         seed: u64,
         anatomy: Anatomy,
         which: String,
     }
 
-    /// All phantoms for all seeds; made once.
+    /// All phantoms for all seeds, built once.
     fn cases() -> &'static [Case] {
         static CASES: OnceLock<Vec<Case>> = OnceLock::new();
         CASES.get_or_init(|| {
-            let each = PLANS.into_iter().flat_map(|plan| SEEDS.map(move |seed| (plan, seed)));
-            let make = |(plan, seed): (&'static Plan, u64)| Case {
-                plan,
+            let each = SPECS.into_iter().flat_map(|spec| SEEDS.map(move |seed| (spec, seed)));
+            let make = |(spec, seed): (&'static PhantomSpec, u64)| Case {
+                spec,
                 seed,
-                anatomy: Anatomy::new(plan, seed),
-                which: format!("{} seed {seed}", plan.name),
+                anatomy: Anatomy::new(spec, seed),
+                which: format!("{} seed {seed}", spec.name),
             };
             each.map(make).collect()
         })
     }
 
     #[test]
-    fn organs_touch_but_do_not_overlap_and_are_listed_in_order() {
-        for Case { plan, anatomy, which, .. } in cases() {
+    fn organs_touch_without_overlap_in_listed_order() {
+        for Case { spec, anatomy, which, .. } in cases() {
             let names: Vec<&str> = anatomy.organs.iter().map(|o| o.name).collect();
-            assert_eq!(names, plan.listed);
+            assert_eq!(names, spec.organ_names);
             for (i, organ) in anatomy.organs.iter().enumerate() {
                 let others = anatomy.organs.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, o)| &o.body);
                 let gap = gap(&organ.body, others);
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn the_camera_sees_where_each_organ_begins() {
+    fn base_of_each_organ_is_visible() {
         for Case { anatomy, which, .. } in cases() {
             for organ in &anatomy.organs {
                 let base = organ.body.base();
@@ -109,14 +109,14 @@ mod tests {
                 let gaps = organ.body.samples().into_iter().map(|p| organ.body.distance(under(p)));
                 let nearest = gaps.fold(f64::INFINITY, f64::min);
                 assert!(nearest > 0.0, "{} reaches {nearest} m into the bed", organ.name);
-                // A gallbladder lies on its liver.
+                // The gallbladder lies on the liver.
                 assert!(nearest < 1e-3 || organ.name == "gallbladder", "{} floats {nearest} m up", organ.name);
             }
         }
     }
 
     #[test]
-    fn distance_is_a_distance_near_the_surface() {
+    fn signed_distance_has_unit_gradient_near_the_surface() {
         for case in cases().iter().filter(|c| c.seed == 3) {
             for organ in &case.anatomy.organs {
                 let body = &organ.body;
@@ -126,7 +126,7 @@ mod tests {
                         [DVec3::X, DVec3::Y, DVec3::Z]
                             .map(|e| (body.distance(p + e * 1e-5) - body.distance(p - e * 1e-5)) / 2e-5),
                     );
-                    // A crease between loops has no slope to speak of.
+                    // A crease between loops has no defined gradient.
                     let creased = matches!(body, Body::Blend(_)) && gradient.length() > 0.2;
                     points += 1;
                     far += usize::from((gradient.length() - 1.0).abs() >= 0.4);
@@ -140,15 +140,15 @@ mod tests {
     }
 
     #[test]
-    fn surfaces_are_closed_of_one_piece_and_as_large_as_the_papers() {
-        for Case { plan, anatomy, which, .. } in cases() {
-            let (paper, within): (&[f64], [f64; 5]) = match plan.name {
+    fn surfaces_are_closed_connected_and_of_the_papers_volume() {
+        for Case { spec, anatomy, which, .. } in cases() {
+            let (paper, within): (&[f64], [f64; 5]) = match spec.name {
                 "phantom-b" => (&[0.90, 3.40, 14.9, 0.59, 2.72], [0.12; 5]),
-                "phantom-c" => (&[phantom_c::LIVER * 1e6, 45.0], [0.02, 0.15, 0.0, 0.0, 0.0]),
+                "phantom-c" => (&[phantom_c::LIVER_VOLUME * 1e6, 45.0], [0.02, 0.15, 0.0, 0.0, 0.0]),
                 _ => (&[], [0.0; 5]),
             };
             for (i, organ) in anatomy.organs.iter().enumerate() {
-                let surface = sample_distance(&organ.body, organ.body.bounds(), 2.0 * plan.fineness.surface);
+                let surface = sample_distance(&organ.body, organ.body.bounds(), 2.0 * spec.resolution.surface);
                 let surface = isosurface(&surface, 0.0);
                 assert!(surface.is_watertight(), "{which}: {}", organ.name);
                 assert_eq!(surface.components().1, 1, "{which}: {}", organ.name);
@@ -160,9 +160,9 @@ mod tests {
     }
 
     #[test]
-    fn seeds_vary_every_organ() {
+    fn every_organ_varies_with_the_seed() {
         for (i, case) in cases().iter().enumerate() {
-            for other in cases()[..i].iter().filter(|o| o.plan.name == case.plan.name) {
+            for other in cases()[..i].iter().filter(|o| o.spec.name == case.spec.name) {
                 for (a, b) in case.anatomy.organs.iter().zip(&other.anatomy.organs) {
                     assert!(a.body.samples() != b.body.samples(), "{} is {}'s {}", case.which, other.which, a.name);
                 }

@@ -1,79 +1,79 @@
-//! A body of several parts that flow into each other: the lobes of a liver, the loops of a coiled bowel.
+//! A body of several blended parts: the lobes of a liver or the loops of a coiled bowel.
 
-use crate::body::Local;
 use crate::noise;
-use crate::tube::Tube;
+use crate::tube::{LocalPoint, Tube};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 use std::sync::OnceLock;
 use trocar_geometry::{SignedDistance, isosurface, sample_distance};
 
-/// One of the parts.
+/// A part of a [`Blend`].
 #[derive(Clone, Debug)]
 pub(crate) enum Part {
-    /// `turn` has the axes as columns, `radii` the semi-axes.
+    /// An ellipsoid. The columns of `turn` are its axes, `radii` its semi-axes.
     Ellipsoid { centre: DVec3, turn: DMat3, radii: DVec3 },
-    /// A round strand along a polyline, thinner by the share `folds.0` every `folds.1` metres.
+    /// A round strand along a polyline. Every `folds.1` metres it is thinner by the share
+    /// `folds.0`.
     Strand { line: Vec<DVec3>, radius: f64, folds: (f64, f64), seed: u64 },
 }
 
-/// How uneven the wall is: bumps of a height, as wide as the second number [m].
+/// Wall unevenness: height and width of bumps (m).
 pub(crate) type Bumps = (f64, f64);
 
-/// What a [`Blend`] is made from.
+/// Specification of a [`Blend`].
 #[derive(Clone, Debug)]
-pub(crate) struct Recipe {
+pub(crate) struct BlendSpec {
     pub parts: Vec<Part>,
-    /// How far from each other two parts' surfaces begin to merge [m].
+    /// Width over which the surfaces of two parts merge (m).
     pub blend: f64,
     pub bumps: [Bumps; 2],
     pub seed: u64,
-    /// Where the organ begins and ends, for whoever needs to know.
+    /// Both ends of the organ.
     pub ends: [DVec3; 2],
-    /// What lies in a groove of this body; the space left around it [m].
+    /// A tube that lies in a groove of this body, and the gap around it (m).
     pub groove: Option<(Tube, f64)>,
-    /// Distance between the samples on the surface [m].
+    /// Distance between samples on the surface (m).
     pub sampling: f64,
 }
 
-/// Parts under one skin, known by a signed distance.
+/// Blended parts, defined by a signed distance.
 #[derive(Clone, Debug)]
 pub(crate) struct Blend {
-    recipe: Recipe,
-    /// A ball around each part, as long as the parts.
+    spec: BlendSpec,
+    /// A bounding ball per part.
     balls: Vec<(DVec3, f64)>,
-    /// Points on the surface, once somebody has asked for them.
+    /// Points on the surface, computed on first use.
     samples: OnceLock<Vec<DVec3>>,
 }
 
-/// Width over which a groove's rim is rounded [m].
+/// Width over which the rim of a groove is rounded (m).
 const RIM: f64 = 4e-3;
 
 impl Blend {
-    pub fn new(recipe: Recipe) -> Self {
-        let balls = recipe.parts.iter().map(Part::ball).collect();
-        Self { recipe, balls, samples: OnceLock::new() }
+    pub fn new(spec: BlendSpec) -> Self {
+        let balls = spec.parts.iter().map(Part::ball).collect();
+        Self { spec, balls, samples: OnceLock::new() }
     }
 
     pub fn base(&self) -> DVec3 {
-        self.recipe.ends[0]
+        self.spec.ends[0]
     }
 
     pub fn tip(&self) -> DVec3 {
-        self.recipe.ends[1]
+        self.spec.ends[1]
     }
 
-    /// Length of all strands; without strands the distance between the ends [m].
+    /// Length of all strands; without strands the distance between the ends (m).
     pub fn length(&self) -> f64 {
-        let strands: f64 = self.recipe.parts.iter().map(Part::length).sum();
+        let strands: f64 = self.spec.parts.iter().map(Part::length).sum();
         if strands > 0.0 { strands } else { (self.tip() - self.base()).length() }
     }
 
-    /// A box that holds the body.
+    /// A bounding box.
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        let margin = 0.5 * self.recipe.blend + self.recipe.bumps.iter().map(|b| 2.0 * b.0).sum::<f64>();
+        let margin = 0.5 * self.spec.blend + self.spec.bumps.iter().map(|b| 2.0 * b.0).sum::<f64>();
         let (mut low, mut high) = (DVec3::MAX, DVec3::MIN);
-        for part in &self.recipe.parts {
+        for part in &self.spec.parts {
             let (l, h) = part.bounds();
             (low, high) = (low.min(l), high.max(h));
         }
@@ -83,21 +83,22 @@ impl Blend {
     /// Points on the surface.
     pub fn samples(&self) -> &[DVec3] {
         self.samples.get_or_init(|| {
-            let rough = isosurface(&sample_distance(self, self.bounds(), self.recipe.sampling), 0.0);
+            let rough = isosurface(&sample_distance(self, self.bounds(), self.spec.sampling), 0.0);
             rough.vertices.into_par_iter().map(|p| self.onto(p)).collect()
         })
     }
 
-    /// What lies in the groove.
+    /// The tube in the groove.
     pub fn groove(&self) -> Option<&Tube> {
-        self.recipe.groove.as_ref().map(|(tube, _)| tube)
+        self.spec.groove.as_ref().map(|(tube, _)| tube)
     }
 
-    /// Where `p` is: along the strands one after the other, or along the line between the ends.
-    pub fn local(&self, p: DVec3) -> Local {
+    /// Local coordinates of `p`: along the strands in their order, or along the line between the
+    /// ends.
+    pub fn local(&self, p: DVec3) -> LocalPoint {
         let (total, mut before) = (self.length(), 0.0);
         let (mut nearest, mut local) = (f64::INFINITY, None);
-        for part in &self.recipe.parts {
+        for part in &self.spec.parts {
             if let Part::Strand { line, radius, .. } = part {
                 let (along, foot, tangent) = foot(line, p);
                 let d = p - foot;
@@ -105,7 +106,7 @@ impl Blend {
                     nearest = d.length() - radius;
                     let across = DVec3::Z.cross(tangent).normalize_or(DVec3::Y);
                     let angle = d.dot(across.cross(tangent)).atan2(d.dot(across));
-                    local = Some(Local { s: (before + along) / total, angle });
+                    local = Some(LocalPoint { s: (before + along) / total, angle });
                 }
             }
             before += part.length();
@@ -115,11 +116,11 @@ impl Blend {
             let s = (p - self.base()).dot(axis) / axis.length_squared();
             let d = p - self.base() - axis * s;
             let across = DVec3::Z.cross(axis).normalize_or(DVec3::Y);
-            Local { s: s.clamp(0.0, 1.0), angle: (-d.z).atan2(d.dot(across)) }
+            LocalPoint { s: s.clamp(0.0, 1.0), angle: (-d.z).atan2(d.dot(across)) }
         })
     }
 
-    /// The point of the surface near `p`, by Newton's method along the gradient.
+    /// The surface point near `p`, by Newton's method along the gradient.
     fn onto(&self, mut p: DVec3) -> DVec3 {
         const H: f64 = 1e-5;
         for _ in 0..4 {
@@ -133,11 +134,12 @@ impl Blend {
 }
 
 impl SignedDistance for Blend {
-    /// A polynomial smooth minimum of the parts: outside of the width of the blend it is the nearest part's distance.
+    /// Polynomial smooth minimum of the parts. Outside the blend width it is the distance to the
+    /// nearest part.
     fn distance(&self, p: DVec3) -> f64 {
-        let k = self.recipe.blend;
+        let k = self.spec.blend;
         let mut d = f64::INFINITY;
-        for (part, (centre, reach)) in self.recipe.parts.iter().zip(&self.balls) {
+        for (part, (centre, reach)) in self.spec.parts.iter().zip(&self.balls) {
             let least = (p - *centre).length() - reach;
             if least > d + k {
                 continue;
@@ -145,15 +147,15 @@ impl SignedDistance for Blend {
             let next = part.distance(p).max(least);
             d = if d.is_finite() { smooth_min(d, next, k) } else { next };
         }
-        // Far off the bumps do not matter, and they fade.
+        // Bumps fade with the distance from the surface.
         let smooth = d;
-        for (i, &(height, width)) in self.recipe.bumps.iter().enumerate() {
+        for (i, &(height, width)) in self.spec.bumps.iter().enumerate() {
             let fade = (2.0 - smooth.abs() / (4.0 * width)).clamp(0.0, 1.0);
             if height > 0.0 && fade > 0.0 {
-                d += fade * height * noise::fractal(self.recipe.seed.wrapping_add(10 * i as u64), p / width, 2);
+                d += fade * height * noise::fractal(self.spec.seed.wrapping_add(10 * i as u64), p / width, 2);
             }
         }
-        match &self.recipe.groove {
+        match &self.spec.groove {
             Some((tube, space)) => -smooth_min(-d, tube.distance(p) - space, RIM),
             None => d,
         }
@@ -161,7 +163,7 @@ impl SignedDistance for Blend {
 }
 
 impl Part {
-    /// At most the distance to the surface when outside, and exact to first order on it.
+    /// At most the distance to the surface outside, exact to first order on it.
     fn distance(&self, p: DVec3) -> f64 {
         match self {
             Self::Ellipsoid { centre, turn, radii } => {
@@ -169,7 +171,8 @@ impl Part {
                 let k0 = q.length();
                 let k1 = (q / *radii).length();
                 let thin = radii.min_element();
-                // k0 is convex, so outside this is below the true distance; inside it would be above it.
+                // k0 is convex, so this is below the true distance outside. Inside it would be
+                // above it.
                 if k1 < 1e-9 { -thin } else { (k0 * (k0 - 1.0) / k1).max(-thin) }
             }
             Self::Strand { line, radius, folds: (depth, distance), seed } => {
@@ -214,7 +217,7 @@ impl Part {
     }
 }
 
-/// Nearest point of a polyline: how far along it is, where, and the direction there.
+/// Nearest point of a polyline: arc length, position, and direction.
 fn foot(line: &[DVec3], p: DVec3) -> (f64, DVec3, DVec3) {
     let mut best = (0.0, line.first().copied().unwrap_or_default(), DVec3::X);
     let (mut nearest, mut before) = (f64::INFINITY, 0.0);
@@ -233,7 +236,8 @@ fn foot(line: &[DVec3], p: DVec3) -> (f64, DVec3, DVec3) {
     best
 }
 
-/// The lesser of two, rounded where they differ by less than `k` (Quilez's quadratic smooth minimum).
+/// Minimum of two values, rounded where they differ by less than `k` (Quilez's quadratic smooth
+/// minimum).
 fn smooth_min(a: f64, b: f64, k: f64) -> f64 {
     let h = (k - (a - b).abs()).max(0.0) / k;
     a.min(b) - 0.25 * k * h * h
@@ -244,14 +248,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_ball_is_a_ball_and_two_of_them_merge() {
+    fn one_ball_is_exact_and_two_merge() {
         let ball = |x: f64| Part::Ellipsoid {
             centre: DVec3::new(x, 0.0, 0.2),
             turn: DMat3::IDENTITY,
             radii: DVec3::splat(0.02),
         };
         let blend = |parts| {
-            Blend::new(Recipe {
+            Blend::new(BlendSpec {
                 parts,
                 blend: 5e-3,
                 bumps: [(0.0, 1.0); 2],

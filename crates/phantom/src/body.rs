@@ -1,27 +1,19 @@
-//! The shapes organs come in, seen as one.
+//! The shape of an organ, either a tube or a blend.
 
 use crate::blend::Blend;
-use crate::tube::Tube;
+use crate::tube::{LocalPoint, Tube};
 use glam::DVec3;
 use trocar_geometry::{SignedDistance, isosurface, sample_distance};
 
-/// The shape of an organ in its place, in the camera's frame.
+/// The shape of a placed organ, in the camera frame.
 #[derive(Clone, Debug)]
 pub(crate) enum Body {
     Tube(Tube),
     Blend(Blend),
 }
 
-/// A point in a body's own terms.
-pub(crate) struct Local {
-    /// Organ coordinate, 0 at the base, 1 at the tip.
-    pub s: f64,
-    /// Angle around the centreline [rad], 0 to the side along the bed, pi/2 away from the bed.
-    pub angle: f64,
-}
-
 impl Body {
-    /// Where the organ begins.
+    /// Start of the organ.
     pub fn base(&self) -> DVec3 {
         match self {
             Self::Tube(tube) => tube.base(),
@@ -29,7 +21,7 @@ impl Body {
         }
     }
 
-    /// Where it ends.
+    /// End of the organ.
     pub fn tip(&self) -> DVec3 {
         match self {
             Self::Tube(tube) => tube.tip(),
@@ -37,7 +29,7 @@ impl Body {
         }
     }
 
-    /// Length from base to tip along the centreline [m].
+    /// Length from base to tip along the centreline (m).
     pub fn length(&self) -> f64 {
         match self {
             Self::Tube(tube) => tube.length(),
@@ -45,7 +37,7 @@ impl Body {
         }
     }
 
-    /// A box that holds it.
+    /// A bounding box.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         match self {
             Self::Tube(tube) => tube.bounds(),
@@ -53,7 +45,7 @@ impl Body {
         }
     }
 
-    /// Points all over the surface.
+    /// Points on the whole surface.
     pub fn samples(&self) -> Vec<DVec3> {
         match self {
             Self::Tube(tube) => tube.samples(),
@@ -61,18 +53,15 @@ impl Body {
         }
     }
 
-    /// Where `p` is in the body's own terms.
-    pub fn local(&self, p: DVec3) -> Local {
+    /// Local coordinates of `p`.
+    pub fn local(&self, p: DVec3) -> LocalPoint {
         match self {
-            Self::Tube(tube) => {
-                let local = tube.local(p);
-                Local { s: local.s, angle: local.angle }
-            }
+            Self::Tube(tube) => tube.local(p),
             Self::Blend(blend) => blend.local(p),
         }
     }
 
-    /// Volume, measured on a grid of `spacing` [m3].
+    /// Volume, measured on a grid of `spacing` (m³).
     pub fn volume(&self, spacing: f64) -> f64 {
         isosurface(&sample_distance(self, self.bounds(), spacing), 0.0).volume()
     }
@@ -87,7 +76,8 @@ impl SignedDistance for Body {
     }
 }
 
-/// Distance between `body`'s surface and the nearest of `others` [m], negative where they overlap. Sampled on both.
+/// Distance between `body` and the nearest of `others` (m), negative if they overlap. Sampled on
+/// both surfaces.
 pub(crate) fn gap<'a>(body: &Body, others: impl Iterator<Item = &'a Body>) -> f64 {
     let least = |of: &Body, to: &Body| of.samples().into_iter().map(|p| to.distance(p)).fold(f64::INFINITY, f64::min);
     others.map(|o| least(body, o).min(least(o, body))).fold(f64::INFINITY, f64::min)

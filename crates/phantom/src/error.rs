@@ -1,25 +1,25 @@
-//! What can go wrong while a phantom is recorded.
+//! Errors of recording a phantom.
 
-/// Result of this crate.
+/// Result type of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A phantom that cannot be made or recorded.
+/// Why a phantom cannot be built or recorded.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// There is no phantom of that name.
-    #[error("unknown phantom '{name}'; did you mean '{nearest}'? Known: {known}")]
+    #[error("no phantom '{name}'; the phantoms are {known}{hint}", hint = nearest.map(|n| format!("; did you mean '{n}'?")).unwrap_or_default())]
     Unknown {
-        /// What was asked for.
+        /// The name that was given.
         name: String,
-        /// The phantom whose name is most like it.
-        nearest: &'static str,
-        /// All names.
+        /// The most similar known name.
+        nearest: Option<&'static str>,
+        /// All known names.
         known: String,
     },
     /// An option is out of range.
     #[error("{0}")]
     Option(String),
-    /// The user asked to stop.
+    /// The user interrupted the recording.
     #[error("interrupted")]
     Interrupted,
     /// The recording cannot be written.
@@ -28,7 +28,7 @@ pub enum Error {
     /// An image cannot be written.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),
-    /// A mesh is unusable.
+    /// A mesh cannot be written.
     #[error(transparent)]
     Geometry(#[from] trocar_geometry::Error),
 }

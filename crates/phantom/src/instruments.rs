@@ -1,24 +1,25 @@
-//! Two laparoscopic instruments that move over the organs: shafts of 5 mm, or more, with a jaw.
+//! Two laparoscopic instruments that move in front of the organs: shafts of 5 mm or more with a
+//! jaw.
 
 use glam::{DMat3, DVec3};
 use std::f64::consts::{PI, TAU};
 use trocar_geometry::TriMesh;
 
-/// How large the instruments are and where they move.
+/// Size and motion of both instruments.
 #[derive(Clone, Copy)]
-pub(crate) struct Reach {
+pub(crate) struct InstrumentMotion {
     /// Size relative to instruments with 5 mm shafts.
     pub scale: f64,
-    /// The left and the right one.
+    /// Motion of the left and the right instrument.
     pub sweeps: [Sweep; 2],
 }
 
-/// Where an instrument moves, in the camera frame [m].
+/// Motion of an instrument in the camera frame (m).
 #[derive(Clone, Copy)]
 pub(crate) struct Sweep {
     /// Where the shaft passes the abdominal wall, outside the picture.
     pub port: DVec3,
-    /// Middle and amplitudes of the tip's motion.
+    /// Centre and amplitudes of the tip's motion.
     pub centre: DVec3,
     pub amplitude: DVec3,
 }
@@ -27,18 +28,18 @@ const SIDES: usize = 28;
 const SHAFT_RADIUS: f64 = 2.5e-3;
 const JAW_LENGTH: f64 = 15e-3;
 
-/// One instrument and how it moves.
+/// An instrument with its motion.
 pub(crate) struct Instrument {
     scale: f64,
     sweep: Sweep,
-    /// Periods [s] and phases [rad] of the tip's motion.
+    /// Periods (s) and phases (rad) of the tip's motion.
     period: DVec3,
     phase: DVec3,
 }
 
-/// The left and the right instrument; `phase` shifts their motion [rad].
-pub(crate) fn pair(reach: &Reach, phase: f64) -> [Instrument; 2] {
-    let Reach { scale, sweeps: [left, right] } = *reach;
+/// The left and the right instrument; `phase` shifts their motion (rad).
+pub(crate) fn pair(reach: &InstrumentMotion, phase: f64) -> [Instrument; 2] {
+    let InstrumentMotion { scale, sweeps: [left, right] } = *reach;
     [
         Instrument {
             scale,
@@ -56,7 +57,7 @@ pub(crate) fn pair(reach: &Reach, phase: f64) -> [Instrument; 2] {
 }
 
 impl Instrument {
-    /// The instrument's surface at `time` [s], in the camera frame.
+    /// Surface of the instrument at `time` (s), in the camera frame.
     pub fn mesh(&self, time: f64) -> TriMesh {
         let swing = |p: f64, phase: f64| (TAU * time / p + phase).sin();
         let offset = DVec3::new(
@@ -79,7 +80,7 @@ impl Instrument {
         let round = |x: f64, r: f64| (DVec3::new(x, 0.0, 0.0), r, r);
         let dark = [58, 58, 64];
         let steel = [172, 176, 184];
-        // In short pieces, so that what lies outside the picture can be told from what does not.
+        // Short segments, so that those outside the picture can be discarded.
         let pieces = (reach / 6e-3).ceil() as usize;
         let end = hinge - 11e-3;
         let at = |i: usize| -reach + (end + reach) * i as f64 / pieces as f64;
@@ -94,7 +95,7 @@ impl Instrument {
             let rings: Vec<_> = (0..=12)
                 .map(|i| {
                     let s = f64::from(i) / 12.0;
-                    // Blunt at the tip, slightly bowed outward.
+                    // Blunt at the tip, slightly bowed outwards.
                     let blunt = (1.0 - (s - 0.75).max(0.0).powi(2) / 0.0625).max(0.0).sqrt().max(0.15);
                     let (along, out) = (s * JAW_LENGTH, side * (0.75e-3 + 0.7e-3 * (PI * s).sin()));
                     let centre = DVec3::new(hinge + along * cos - out * sin, along * sin + out * cos, 0.0);
@@ -126,7 +127,7 @@ fn loft(mesh: &mut TriMesh, rings: &[(DVec3, f64, f64)], color: [u8; 3]) {
             mesh.triangles.extend([[a, b, a + sides], [b, b + sides, a + sides]]);
         }
     }
-    // Ends with vertices of their own, so that their edge stays sharp.
+    // End caps have their own vertices, so that their edge stays sharp.
     for (ring, flip) in [(0, true), (rings.len() - 1, false)] {
         let cap = mesh.vertices.len() as u32;
         let start = first as usize + ring * SIDES;
@@ -150,7 +151,7 @@ mod tests {
 
     #[test]
     fn surfaces_face_outward() {
-        for instrument in pair(&crate::phantom_a::PLAN.reach, 0.3) {
+        for instrument in pair(&crate::phantom_a::SPEC.reach, 0.3) {
             let mesh = instrument.mesh(1.0);
             let volume: f64 = mesh
                 .triangles

@@ -1,11 +1,26 @@
-//! Procedural anatomies with known truth, filmed by a simulated depth camera.
+//! Synthetic recordings with known ground truth: procedural anatomies seen by a simulated depth
+//! camera.
+//!
+//! A phantom replaces a recording of real organs in tests and demonstrations. [`record`] writes a
+//! recording folder with colour, depth and masks. Its subfolder `truth/` contains the exact
+//! picture, depth and organ surfaces.
+//!
+//! ```
+//! use trocar_phantom::{NAMES, RecordOptions, describe};
+//!
+//! assert_eq!(NAMES, ["phantom-a", "phantom-b", "phantom-c"]);
+//! let info = describe("phantom-c", &RecordOptions::default())?;
+//! assert_eq!(info.organs[0].name, "liver");
+//! # Ok::<(), trocar_phantom::Error>(())
+//! ```
 
 mod anatomy;
 mod bed;
 mod blend;
 mod body;
+mod catalog;
 mod error;
-mod film;
+mod frame;
 mod instruments;
 mod noise;
 mod pack;
@@ -13,17 +28,17 @@ mod paint;
 mod phantom_a;
 mod phantom_b;
 mod phantom_c;
-mod plan;
 mod record;
 mod sensor;
+mod spec;
+mod static_view;
 mod stereo;
-mod still;
 mod tube;
 
 #[cfg(test)]
 mod tests;
 
+pub use catalog::NAMES;
 pub use error::{Error, Result};
-pub use plan::NAMES;
 pub use record::{RecordOptions, describe, record};
 pub use sensor::Sensor;

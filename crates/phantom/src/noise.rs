@@ -1,42 +1,33 @@
-//! Random numbers by position instead of by order, so that no thread can change them; and smooth noise made of them.
+//! Random numbers by key instead of by sequence, so that they do not depend on threads, and smooth
+//! noise.
 
 use glam::DVec3;
+pub(crate) use trocar_core::unit;
+use trocar_core::{Random, mix};
 
-/// Scrambles 64 bits (the finaliser of SplitMix64, Steele, Lea, Flood 2014).
-pub(crate) fn scramble(x: u64) -> u64 {
-    let mut z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
-/// One number for a list of keys.
+/// Hash of a list of keys.
 pub(crate) fn key(parts: &[u64]) -> u64 {
-    parts.iter().fold(0, |h, p| scramble(h ^ *p))
+    Random::from_keys(parts).key()
 }
 
-/// Uniform in 0..1.
-pub(crate) fn unit(h: u64) -> f64 {
-    (h >> 11) as f64 / (1u64 << 53) as f64
-}
-
-/// Nearly normal with standard deviation 1: the sum of four uniform numbers, never beyond 3.5.
+/// An approximately standard normal number: the sum of four uniform numbers, at most 3.5 in
+/// magnitude.
 pub(crate) fn normal(h: u64) -> f32 {
     const PER_SIGMA: f32 = 1.732_050_8 / 65536.0;
     let sum: u32 = [0, 16, 32, 48].iter().map(|s| ((h >> s) & 0xffff) as u32).sum();
     (sum as f32 - 131_070.0) * PER_SIGMA
 }
 
-/// Smooth noise in -1..1 whose bumps are about one unit wide.
+/// Smooth noise in [-1, 1] with features about one unit wide.
 pub(crate) fn smooth(seed: u64, p: DVec3) -> f64 {
     let cell = p.floor();
     let f = p - cell;
     let w = f * f * (3.0 - 2.0 * f);
     let corner = |dx: i64, dy: i64, dz: i64| {
         let [x, y, z] = [cell.x as i64 + dx, cell.y as i64 + dy, cell.z as i64 + dz];
-        // Cells are few enough that 21 bits an axis never repeat.
+        // 21 bits per axis exceed the number of cells.
         let packed = (x as u64 & 0x1f_ffff) | (y as u64 & 0x1f_ffff) << 21 | (z as u64 & 0x1f_ffff) << 42;
-        2.0 * unit(scramble(seed ^ scramble(packed))) - 1.0
+        Random::new(seed).symmetric(mix(packed))
     };
     let mix = |a: f64, b: f64, t: f64| a + (b - a) * t;
     let edge = |dy, dz| mix(corner(0, dy, dz), corner(1, dy, dz), w.x);
@@ -44,7 +35,8 @@ pub(crate) fn smooth(seed: u64, p: DVec3) -> f64 {
     mix(face(0), face(1), w.z)
 }
 
-/// Smooth noise with detail: `octaves` layers, each half as wide and half as strong as the one before.
+/// Fractal noise: `octaves` layers, each with half the width and half the strength of the previous
+/// one.
 pub(crate) fn fractal(seed: u64, p: DVec3, octaves: u32) -> f64 {
     let layer = |k: u32| {
         let scale = f64::from(1 << k);
@@ -58,9 +50,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn normal_numbers_are_normal() {
+    fn normal_numbers_have_mean_0_and_variance_1() {
         let n = 100_000;
-        let values: Vec<f64> = (0..n).map(|i| f64::from(normal(scramble(i)))).collect();
+        let values: Vec<f64> = (0..n).map(|i| f64::from(normal(mix(i)))).collect();
         let mean = values.iter().sum::<f64>() / n as f64;
         let variance = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / n as f64;
         assert!(mean.abs() < 0.01 && (variance - 1.0).abs() < 0.02, "mean {mean}, variance {variance}");

@@ -1,51 +1,53 @@
-//! Packs organs on the bed: each is slid against those before it until it touches.
+//! Packs organs on the bed: each organ slides until it touches those placed before.
 
 use crate::bed::Bed;
-use crate::blend::{Blend, Part, Recipe};
+use crate::blend::{Blend, BlendSpec, Part};
 use crate::body::{Body, gap};
 use crate::noise;
-use crate::plan::{Look, Organ, PinRule};
+use crate::spec::{Organ, PinRule, TissueAppearance};
 use crate::tube::{Shape, Tube};
 use glam::DVec3;
 
-/// Distance at which two organs touch [m].
-const TOUCH: f64 = 0.2e-3;
-/// How far above the bed an organ's centreline runs, relative to its height: the rest sinks in.
+/// Gap at which two organs count as touching (m).
+const TOUCHING_GAP: f64 = 0.2e-3;
+/// Height of an organ's centreline above the bed, relative to the organ's height. The rest sinks
+/// in.
 const LIFT: f64 = 0.45;
 
-/// A shape, where it comes from, and the way it slides until it touches what is there.
-pub(crate) struct Item {
+/// An organ to place: its shape, its start and the direction in which it slides.
+pub(crate) struct OrganPlacement {
     pub name: &'static str,
     pub young_modulus: f64,
     pub pins: PinRule,
-    pub look: Look,
+    pub look: TissueAppearance,
     pub form: Form,
-    /// Where the base should be [mm] if nothing were in the way.
+    /// Position of the base without obstacles (mm).
     pub base: (f64, f64),
     pub heading_deg: f64,
     pub slide_deg: f64,
 }
 
-/// What kind of shape.
+/// Shape of an organ.
 #[derive(Clone, Copy)]
 pub(crate) enum Form {
     Tube(Shape),
     Coil(Coil),
 }
 
-/// A bowel folded into a mass: two layers of runs side by side and a loop across them. It begins at the end of its first run.
+/// A bowel folded into a mass: two layers of parallel runs and a loop across them. It starts at the
+/// end of its first run.
 #[derive(Clone, Copy)]
 pub(crate) struct Coil {
-    /// Number of runs in the lower layer, at least two; the upper has one less.
+    /// Number of runs in the lower layer, at least two. The upper layer has one less.
     pub runs: usize,
-    /// Length of the lower layer's middle [m]; runs at the sides and above are shorter.
+    /// Length of the central run of the lower layer (m). Other runs are shorter.
     pub width: f64,
     pub radius: f64,
-    /// Distance between runs [m].
+    /// Distance between runs (m).
     pub pitch: f64,
 }
 
-/// A tube's shape from millimetres.
+/// A tube's shape from lengths in millimetres.
 pub(crate) fn shape(
     length: f64,
     across: f64,
@@ -66,8 +68,8 @@ pub(crate) fn shape(
     }
 }
 
-/// Lays `items`, varied by the seed, in their order.
-pub(crate) fn pack(items: impl IntoIterator<Item = Item>, seed: u64, bed: &Bed) -> Vec<Organ> {
+/// Places `items` in their order, with random variations.
+pub(crate) fn pack(items: impl IntoIterator<Item = OrganPlacement>, seed: u64, bed: &Bed) -> Vec<Organ> {
     let mut organs: Vec<Organ> = Vec::new();
     for (index, mut item) in items.into_iter().enumerate() {
         let seed = noise::key(&[seed, 2, index as u64]);
@@ -78,14 +80,14 @@ pub(crate) fn pack(items: impl IntoIterator<Item = Item>, seed: u64, bed: &Bed) 
         }
         item.heading_deg += vary(2, 4.0);
         let body = slide(&item, seed, bed, &organs);
-        let Item { name, young_modulus, pins, look, .. } = item;
+        let OrganPlacement { name, young_modulus, pins, look, .. } = item;
         organs.push(Organ { name, body, young_modulus, pins, look, seed });
     }
     organs
 }
 
-/// Starts far off and moves by as much as the gap allows until it closes.
-fn slide(item: &Item, seed: u64, bed: &Bed, organs: &[Organ]) -> Body {
+/// Starts far away and advances by the gap until it closes.
+fn slide(item: &OrganPlacement, seed: u64, bed: &Bed, organs: &[Organ]) -> Body {
     const START: f64 = 0.12;
     const STEPS: usize = 200;
     let (sin, cos) = item.slide_deg.to_radians().sin_cos();
@@ -106,17 +108,17 @@ fn slide(item: &Item, seed: u64, bed: &Bed, organs: &[Organ]) -> Body {
     let mut along = -START;
     for _ in 0..STEPS {
         let gap = gap(&at(along), organs.iter().map(|o| &o.body));
-        if gap < 1.5 * TOUCH || along > START {
+        if gap < 1.5 * TOUCHING_GAP || along > START {
             break;
         }
-        // Less than the gap: the distance is only an estimate.
-        along += (0.7 * (gap - TOUCH)).max(0.02e-3);
+        // Advance less than the gap, because the distance is an estimate.
+        along += (0.7 * (gap - TOUCHING_GAP)).max(0.02e-3);
     }
     at(along)
 }
 
 impl Coil {
-    /// Lays the mass down; runs are along `heading` [rad] through `base`, the first on one side, the last on the other.
+    /// Places the mass. Runs are parallel to `heading` (rad), from one side of `base` to the other.
     fn lay(&self, seed: u64, base: (f64, f64), heading: f64, bed: &Bed) -> Blend {
         const POINTS: usize = 25;
         let Self { runs, width, radius, pitch } = *self;
@@ -133,7 +135,7 @@ impl Coil {
             folds: (0.10, 0.0095),
             seed: noise::key(&[seed, 70 + k]),
         };
-        // Two layers, the upper in the furrows of the lower.
+        // Two layers, the upper in the grooves of the lower.
         let layers = (0..runs).map(|row| (row, runs, 0.0)).chain((0..runs - 1).map(|row| (row, runs - 1, 1.45)));
         for (k, (row, rows, level)) in layers.enumerate() {
             let k = k as u64;
@@ -142,7 +144,7 @@ impl Coil {
             let outward = 2.0 * y / (pitch * runs as f64);
             let half = 0.5 * (width - level * radius) * (1.0 - 0.35 * outward * outward + 0.07 * vary(k));
             let shift = 0.05 * width * vary(10 + k);
-            // To and fro, so that the loops follow each other; each end turns towards the neighbour it goes over into.
+            // Alternating directions connect the loops. Each end turns towards the next run.
             let forward = if row % 2 == 0 { 1.0 } else { -1.0 };
             let line = (0..POINTS)
                 .map(|i| {
@@ -157,7 +159,7 @@ impl Coil {
                 .collect();
             parts.push(strand(line, k));
         }
-        // A loop that has slipped on top of the others.
+        // A loop on top of the others.
         let line = (0..2 * POINTS)
             .map(|i| {
                 let t = 2.0 * i as f64 / (2 * POINTS - 1) as f64 - 1.0;
@@ -172,7 +174,7 @@ impl Coil {
             }
             _ => [DVec3::ZERO; 2],
         };
-        Blend::new(Recipe {
+        Blend::new(BlendSpec {
             parts,
             blend: 0.4 * radius,
             bumps: [(0.2e-3, 5e-3), (0.0, 1.0)],

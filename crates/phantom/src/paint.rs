@@ -1,9 +1,9 @@
-//! The looks of tissue: base colours, mottling, branching vessels, fat, painted per vertex.
+//! Tissue colours per vertex: base colours, mottling, branching vessels, fat.
 
-use crate::bed::{Bed, BedPlan};
+use crate::bed::{Bed, BedSpec};
 use crate::body::Body;
 use crate::noise::{fractal, smooth};
-use crate::plan::{Look, Organ, Vessels};
+use crate::spec::{Organ, TissueAppearance, Vessels};
 use glam::DVec3;
 use rayon::prelude::*;
 use trocar_geometry::{SignedDistance, TriMesh};
@@ -11,12 +11,12 @@ use trocar_geometry::{SignedDistance, TriMesh};
 const VEIN: DVec3 = DVec3::new(112.0, 28.0, 40.0);
 const FAT: DVec3 = DVec3::new(226.0, 176.0, 104.0);
 
-/// Fills in the colours of an organ's surface.
+/// Computes the vertex colours of an organ.
 pub(crate) fn organ(organ: &Organ, mesh: &mut TriMesh) {
     mesh.colors = mesh.vertices.par_iter().map(|p| bytes(organ_color(organ, *p))).collect();
 }
 
-/// Fills in the colours of the bed.
+/// Computes the vertex colours of the bed.
 pub(crate) fn bed(bed: &Bed, mesh: &mut TriMesh) {
     mesh.colors = mesh.vertices.par_iter().map(|p| bytes(bed_color(bed, *p))).collect();
 }
@@ -26,19 +26,19 @@ fn bytes(color: DVec3) -> [u8; 3] {
 }
 
 /// Strength of the highlights on an organ.
-pub(crate) fn gloss(look: Look) -> f32 {
+pub(crate) fn gloss(look: TissueAppearance) -> f32 {
     match look {
-        Look::Bowel { .. } => 0.4,
-        Look::Liver => 0.5,
-        Look::Gallbladder => 0.45,
+        TissueAppearance::Bowel { .. } => 0.4,
+        TissueAppearance::Liver => 0.5,
+        TissueAppearance::Gallbladder => 0.45,
     }
 }
 
 fn organ_color(organ: &Organ, p: DVec3) -> DVec3 {
     match organ.look {
-        Look::Bowel { base, flush, vessels } => bowel_color(organ, p, [base, flush], vessels),
-        Look::Liver => liver_color(organ, p),
-        Look::Gallbladder => gallbladder_color(organ, p),
+        TissueAppearance::Bowel { base, flush, vessels } => bowel_color(organ, p, [base, flush], vessels),
+        TissueAppearance::Liver => liver_color(organ, p),
+        TissueAppearance::Gallbladder => gallbladder_color(organ, p),
     }
 }
 
@@ -50,7 +50,7 @@ fn bowel_color(organ: &Organ, p: DVec3, [base, flush]: [DVec3; 2], vessels: Vess
     let patches = 0.5 + 0.7 * fractal(seed + 1, p / 9e-3, 3);
     let mut color = base.lerp(flush, patches.clamp(0.0, 1.0));
     color *= 1.0 + 0.09 * fractal(seed + 2, p / 2e-3, 2);
-    // Fat clings to the side that hangs on the mesentery.
+    // Fat lies on the side of the mesentery.
     let fat = fractal(seed + 3, p / 5e-3, 3) + 0.1 - 0.8 * local.angle.sin();
     color = color.lerp(FAT, 0.8 * step(0.0, 0.25, fat));
     let vessels = match vessels {
@@ -66,7 +66,7 @@ fn liver_color(organ: &Organ, p: DVec3) -> DVec3 {
     let warm = DVec3::new(114.0, 52.0, 41.0);
     let mut color = dark.lerp(warm, (0.5 + 0.6 * fractal(seed + 1, p / 35e-3, 3)).clamp(0.0, 1.0));
     color *= 1.0 + 0.07 * fractal(seed + 2, p / 5e-3, 2);
-    // A pig's lobules show through the capsule: paler septa around them.
+    // Pale septa around the lobules of a pig's liver, visible through the capsule.
     let septum = 1.0 - step(0.0, 0.22, fractal(seed + 3, p / 6e-3, 2).abs());
     color = color.lerp(DVec3::new(158.0, 84.0, 66.0), 0.2 * septum);
     let vessels = network(seed + 4, p, 45e-3, 2.4e-3).max(0.6 * network(seed + 5, p, 20e-3, 1.6e-3));
@@ -86,7 +86,7 @@ fn gallbladder_color(organ: &Organ, p: DVec3) -> DVec3 {
     let wall = DVec3::new(134.0, 138.0, 86.0);
     let mut color = bile.lerp(wall, (0.45 + 0.7 * fractal(seed + 1, p / 22e-3, 3)).clamp(0.0, 1.0));
     color *= 1.0 + 0.06 * fractal(seed + 2, p / 5e-3, 2);
-    // The neck is paler, and some fat clings to it.
+    // The neck is paler, with some fat.
     let s = organ.body.local(p).s;
     let fat = fractal(seed + 3, p / 12e-3, 3) + 0.25 - 1.6 * s;
     color = color.lerp(FAT, 0.7 * step(0.0, 0.3, fat));
@@ -97,7 +97,7 @@ fn gallbladder_color(organ: &Organ, p: DVec3) -> DVec3 {
 fn bed_color(bed: &Bed, p: DVec3) -> DVec3 {
     let seed = bed.seed;
     let flat = p.with_z(0.0);
-    let BedPlan { meat, film, fat, scale, .. } = bed.plan;
+    let BedSpec { meat, film, fat, scale, .. } = bed.spec;
     let mut color = meat.lerp(film, (0.5 + 0.8 * fractal(seed + 31, flat / (0.018 * scale), 3)).clamp(0.0, 1.0));
     // Lobules of fat with red seams between them.
     let much = step(0.0, 0.6, fractal(seed + 32, flat / (0.04 * scale), 3));
@@ -109,18 +109,19 @@ fn bed_color(bed: &Bed, p: DVec3) -> DVec3 {
     color.lerp(VEIN, 0.7 * vessels)
 }
 
-/// 0 below `low`, 1 above `high`, smooth between.
+/// Smooth step: 0 below `low`, 1 above `high`.
 fn step(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
 
-/// Branching lines: where warped noise of `size` [m] crosses zero, about `width` [m] wide and broken off here and there.
+/// Branching lines at zero crossings of warped noise of feature size `size` (m): about `width` (m)
+/// wide, with interruptions.
 fn network(seed: u64, p: DVec3, size: f64, width: f64) -> f64 {
     let warp = |k: u64| fractal(seed.wrapping_add(100 + k), p / (0.6 * size), 2);
     let q = p / size + 0.35 * DVec3::new(warp(0), warp(1), warp(2));
     let field = |q: DVec3| smooth(seed, q);
-    // Distance to the zero crossing is the value over its slope.
+    // The distance to a zero crossing is the value divided by the slope.
     let h = 0.02;
     let value = field(q);
     let slope =
@@ -132,9 +133,9 @@ fn network(seed: u64, p: DVec3, size: f64, width: f64) -> f64 {
     present * (1.0 - step(0.4 * wide, wide, distance))
 }
 
-/// Vessels that climb around a bowel from its mesenteric side, fork and thin out.
+/// Vessels that climb around a bowel from its mesenteric side, branch and taper.
 fn rungs(seed: u64, along: f64, angle: f64, p: DVec3) -> f64 {
-    // How far up the wall: 0 at the mesentery, 1 on top.
+    // Position on the wall: 0 at the mesentery, 1 on top.
     let up = 0.5 + 0.5 * angle.sin();
     let phase = along / 5.5e-3 + 0.45 * fractal(seed, p / 4e-3, 3);
     let fork = if up > 0.72 { 2.0 } else { 1.0 };

@@ -1,38 +1,38 @@
-//! Phantom C: a pig's liver of 815 cm3, seen from below, with its gallbladder in a fossa.
+//! Phantom C: a pig's liver of 815 cm³, seen from below, with its gallbladder in a fossa.
 //!
-//! The gallbladder has 45 cm3, a pig's: its count in the paper's table I says little, as the paper's meshes have an element
-//! per 16 mm3 of the liver and one per 0.7 mm3 of a rabbit's organs.
+//! The gallbladder has the 45 cm³ of a pig's. Its count in Table I of the paper does not determine
+//! its volume: the paper's meshes have one element per 16 mm³ of liver but one per 0.7 mm³ of a
+//! rabbit's organs.
 
-use crate::bed::{Bed, BedPlan};
-use crate::blend::{Blend, Part, Recipe};
+use crate::bed::{Bed, BedSpec};
+use crate::blend::{Blend, BlendSpec, Part};
 use crate::body::Body;
-use crate::instruments::{Reach, Sweep};
+use crate::instruments::{InstrumentMotion, Sweep};
 use crate::noise;
 use crate::pack::shape;
-use crate::plan::{Look, Organ, PinRule, Plan};
-use crate::still::Fineness;
+use crate::spec::{Organ, PhantomSpec, PinRule, Resolution, TissueAppearance};
 use crate::tube::Tube;
 use glam::{DMat3, DVec3};
 use trocar_geometry::SignedDistance;
 
-/// Volume of the liver [m3], the paper's.
-pub(crate) const LIVER: f64 = 815e-6;
-/// How much larger everything around the organs is than with a rabbit.
+/// Volume of the liver in the paper (m³).
+pub(crate) const LIVER_VOLUME: f64 = 815e-6;
+/// Size of the surroundings relative to a rabbit's.
 const SCALE: f64 = 2.6;
 
-pub(crate) const PLAN: Plan = Plan {
+pub(crate) const SPEC: PhantomSpec = PhantomSpec {
     name: "phantom-c",
     organs,
-    listed: &["liver", "gallbladder"],
+    organ_names: &["liver", "gallbladder"],
     density: 1050.0,
-    bed: BedPlan {
+    bed: BedSpec {
         depth: 0.410,
         scale: SCALE,
         meat: DVec3::new(168.0, 92.0, 78.0),
         film: DVec3::new(204.0, 132.0, 110.0),
         fat: 0.7,
     },
-    reach: Reach {
+    reach: InstrumentMotion {
         scale: 2.0,
         sweeps: [
             Sweep {
@@ -47,19 +47,19 @@ pub(crate) const PLAN: Plan = Plan {
             },
         ],
     },
-    fineness: Fineness { surface: 1.0e-3, bed: 2.0e-3 },
-    lit_at: 0.40,
-    crease: 30e-3,
+    resolution: Resolution { surface: 1.0e-3, bed: 2.0e-3 },
+    lamp_distance: 0.40,
+    occlusion_reach: 30e-3,
 };
 
-/// A lobe before scaling: where its middle is, where it points to in the plane of x and y, its semi-axes. Millimetres.
+/// A lobe before scaling: centre, direction in the plane of x and y, semi-axes (mm).
 struct Lobe {
     at: (f64, f64),
     heading_deg: f64,
     radii: (f64, f64, f64),
 }
 
-/// Four lobes that come from the middle at the top.
+/// Four lobes that start at the central lobe on top.
 #[rustfmt::skip]
 const LOBES: [Lobe; 5] = [
     Lobe { at: (4.0, -26.0), heading_deg: 2.0, radii: (76.0, 35.0, 23.0) },
@@ -68,34 +68,41 @@ const LOBES: [Lobe; 5] = [
     Lobe { at: (40.0, 30.0), heading_deg: 73.0, radii: (64.0, 30.0, 20.0) },
     Lobe { at: (86.0, 4.0), heading_deg: 41.0, radii: (66.0, 38.0, 20.0) },
 ];
-/// The thickest lobe's semi-axis [mm]; the bed gives way to a quarter of it.
-const THICK: f64 = 23.0;
-/// Where the neck of the gallbladder is [mm], before scaling.
+/// Semi-axis of the thickest lobe (mm). A quarter of it sinks into the bed.
+const THICKEST_LOBE: f64 = 23.0;
+/// Position of the gallbladder's neck before scaling (mm).
 const NECK: (f64, f64) = (9.0, -12.0);
 
-/// Space between the gallbladder and the liver [m].
+/// Gap between gallbladder and liver (m).
 const FOSSA: f64 = 0.4e-3;
 
 fn organs(seed: u64, bed: &Bed) -> Vec<Organ> {
     let seeds = [0, 1].map(|index| noise::key(&[seed, 2, index]));
     let mut scale = 1.0;
-    // The volume is that of the parts but for bumps and fossa, which do not scale: a few rounds settle it.
+    // Bumps and fossa do not scale with the parts, so the scale takes a few iterations.
     for _ in 0..3 {
         let gallbladder = gallbladder(seeds[1], scale, &liver(seeds[0], scale, bed, None), bed);
         let carved = Body::Blend(liver(seeds[0], scale, bed, Some(gallbladder)));
-        scale *= (LIVER / carved.volume(4e-3)).cbrt();
+        scale *= (LIVER_VOLUME / carved.volume(4e-3)).cbrt();
     }
     let gallbladder = gallbladder(seeds[1], scale, &liver(seeds[0], scale, bed, None), bed);
     let liver = liver(seeds[0], scale, bed, Some(gallbladder.clone()));
     let pins = PinRule::Band(0.066);
     vec![
-        Organ { name: "liver", body: Body::Blend(liver), young_modulus: 10e3, pins, look: Look::Liver, seed: seeds[0] },
+        Organ {
+            name: "liver",
+            body: Body::Blend(liver),
+            young_modulus: 10e3,
+            pins,
+            look: TissueAppearance::Liver,
+            seed: seeds[0],
+        },
         Organ {
             name: "gallbladder",
             body: Body::Tube(gallbladder),
             young_modulus: 5e3,
             pins,
-            look: Look::Gallbladder,
+            look: TissueAppearance::Gallbladder,
             seed: seeds[1],
         },
     ]
@@ -105,7 +112,7 @@ fn organs(seed: u64, bed: &Bed) -> Vec<Organ> {
 fn liver(seed: u64, scale: f64, bed: &Bed, gallbladder: Option<Tube>) -> Blend {
     let vary = |k: u64, by: f64| by * (2.0 * noise::unit(noise::key(&[seed, k])) - 1.0);
     let mm = scale * 1e-3;
-    let middle = bed.smooth_height(0.0, 0.0) - 0.75 * THICK * mm;
+    let middle = bed.smooth_height(0.0, 0.0) - 0.75 * THICKEST_LOBE * mm;
     let parts = LOBES.iter().enumerate().map(|(i, lobe)| {
         let k = 10 * i as u64;
         let at = DVec3::new(lobe.at.0 + vary(k, 4.0), lobe.at.1 + vary(k + 1, 4.0), 0.0) * mm;
@@ -115,12 +122,12 @@ fn liver(seed: u64, scale: f64, bed: &Bed, gallbladder: Option<Tube>) -> Blend {
             lobe.radii.2 * (1.0 + vary(k + 4, 0.06)),
         ) * mm;
         let heading = (lobe.heading_deg + vary(k + 5, 6.0)).to_radians();
-        // Lobes droop outward, and lean a little, so that they overlap like petals.
+        // Lobes droop outwards and lean slightly, so that they overlap.
         let (droop, lean) = (0.10 + vary(k + 6, 0.04), vary(k + 7, 0.07));
         let turn = DMat3::from_rotation_z(heading) * DMat3::from_rotation_y(-droop) * DMat3::from_rotation_x(lean);
         Part::Ellipsoid { centre: at.with_z(middle), turn, radii }
     });
-    Blend::new(Recipe {
+    Blend::new(BlendSpec {
         parts: parts.collect(),
         blend: 9.0 * mm,
         bumps: [(2.2e-3, 40e-3), (0.25e-3, 9e-3)],
@@ -131,7 +138,8 @@ fn liver(seed: u64, scale: f64, bed: &Bed, gallbladder: Option<Tube>) -> Blend {
     })
 }
 
-/// The gallbladder: half sunk into the liver's face at its neck, its fundus over the liver's edge.
+/// The gallbladder: half sunk into the liver's face at its neck, with its fundus beyond the liver's
+/// edge.
 fn gallbladder(seed: u64, scale: f64, liver: &Blend, bed: &Bed) -> Tube {
     let vary = |k: u64, by: f64| by * (2.0 * noise::unit(noise::key(&[seed, k])) - 1.0);
     let shape = shape(76.0, 6.4, 6.1, 2.2, 0.34, (0.02, 30.0), [0.35 + vary(0, 0.1), -0.5 + vary(1, 0.1)]);
@@ -146,7 +154,7 @@ fn gallbladder(seed: u64, scale: f64, liver: &Blend, bed: &Bed) -> Tube {
     })
 }
 
-/// Depth of the liver's face at (x, y) [m]; the bed's where it is not.
+/// Depth of the liver's face at (x, y) (m), or of the bed beside the liver.
 fn face(liver: &Blend, x: f64, y: f64, bed: &Bed) -> f64 {
     let floor = bed.smooth_height(x, y);
     let mut z = floor - 0.15;

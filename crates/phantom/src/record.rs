@@ -1,31 +1,32 @@
-//! Filming a phantom.
+//! Recording a phantom.
 
 use crate::anatomy::Anatomy;
-use crate::film::{RATE_HZ, Take, shoot};
-use crate::plan::{Organ, Plan};
+use crate::frame::{FrameSettings, RATE_HZ, record_frame};
 use crate::sensor::Sensor;
-use crate::still::{Fineness, Still};
-use crate::{Error, Result, instruments, noise, sensor};
+use crate::spec::{Organ, PhantomSpec, Resolution};
+use crate::static_view::StaticView;
+use crate::{Error, Result, catalog, instruments, noise, sensor};
 use rayon::prelude::*;
 use std::path::Path;
 use trocar_camera::Camera;
+use trocar_core::Progress;
 use trocar_geometry::io::write_ply;
-use trocar_progress::Progress;
 use trocar_recording::{InstrumentRule, OrganInfo, RecordingInfo, RecordingWriter};
 
-/// File names hold six digits.
+/// File names have six digits.
 const MAX_FRAMES: usize = 1_000_000;
-/// Unit of the truth's depth image [m].
+/// Unit of the ground-truth depth image (m).
 const TRUTH_DEPTH_SCALE: f64 = 0.0001;
 
-/// How a phantom is filmed.
+/// Options of [`record`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RecordOptions {
-    /// Frames to record at 30 Hz (paper: 60 s).
+    /// Number of frames at 30 Hz. The paper records 60 s.
     pub frames: usize,
-    /// Seed of the anatomy, of the instruments' motion and of the noise: the same seed gives the same files.
+    /// Seed of the anatomy, of the instruments' motion and of the noise. The same seed gives
+    /// identical files.
     pub seed: u64,
-    /// What kind of noise depth has.
+    /// Model of the depth noise.
     pub sensor: Sensor,
 }
 
@@ -36,36 +37,38 @@ impl Default for RecordOptions {
     }
 }
 
-/// Records the phantom `name` (one of [`NAMES`](crate::NAMES)) into the folder `dir`, with its truth under `truth/`: the
-/// picture without instruments and noise, and the organs' surfaces in the camera's frame, in metres.
+/// Records the phantom `name` (one of [`NAMES`](crate::NAMES)) into the folder `dir`, with its
+/// ground truth in `truth/`: the picture without instruments and noise, and the organs' surfaces in
+/// the camera frame (m).
 ///
-/// The organs' masks are the truth too: the pixels in which the picture without instruments shows the organ. On an organ's
-/// mask `truth/depth.png` is therefore that organ's own front, in 0.1 mm; where another organ lies on top, the mask is the
-/// other's.
+/// The masks of the organs are ground truth too: the pixels that show the organ in the picture
+/// without instruments. Within the mask of an organ, `truth/depth.png` is the depth of that organ's
+/// surface in 0.1 mm. Where organs overlap, the pixel belongs to the mask of the front one.
 ///
 /// # Errors
-/// An unknown name, no frames, a folder that cannot be written, or an interruption; nothing is left behind then.
+/// The name is unknown, the number of frames is out of range, the folder cannot be written, or the
+/// user interrupts. The folder is removed in these cases.
 pub fn record(name: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
-    let plan = Plan::named(name)?;
-    record_with(plan, options, &Camera::d405(), plan.fineness, dir, progress)
+    let spec = catalog::named(name)?;
+    record_with(spec, options, &Camera::d405(), spec.resolution, dir, progress)
 }
 
-/// [`record`] with a camera and a fineness of one's choice.
+/// [`record`] with a given camera and resolution.
 pub(crate) fn record_with(
-    plan: &Plan,
+    spec: &PhantomSpec,
     options: &RecordOptions,
     camera: &Camera,
-    fineness: Fineness,
+    resolution: Resolution,
     dir: &Path,
     progress: &dyn Progress,
 ) -> Result<()> {
     let RecordOptions { frames, seed, sensor } = *options;
     if frames == 0 || frames > MAX_FRAMES {
-        return Err(Error::Option(format!("frames is {frames}; a recording has 1 to {MAX_FRAMES} frames")));
+        return Err(Error::Option(format!("frames is {frames}; must be in [1, {MAX_FRAMES}]")));
     }
     if dir.join("recording.toml").exists() && !dir.join("truth").is_dir() {
         return Err(Error::Option(format!(
-            "{}: a recording that no phantom made lies there, so it is not overwritten; name a new folder",
+            "{}: contains a recording that is not a phantom and is not overwritten; choose another folder",
             dir.display()
         )));
     }
@@ -73,10 +76,10 @@ pub(crate) fn record_with(
     if progress.interrupted() {
         return Err(Error::Interrupted);
     }
-    let anatomy = Anatomy::new(plan, seed);
-    let info = info(plan, options, camera, &anatomy);
+    let anatomy = Anatomy::new(spec, seed);
+    let info = info(spec, options, camera, &anatomy);
     let writer = RecordingWriter::create(dir, &info)?;
-    let still = Still::new(plan, &anatomy, camera, fineness);
+    let still = StaticView::new(spec, &anatomy, camera, resolution);
     for (index, organ) in anatomy.organs.iter().enumerate() {
         writer.organ_mask(organ.name, &still.organ_mask(index))?;
     }
@@ -85,13 +88,13 @@ pub(crate) fn record_with(
     progress.end();
 
     progress.begin("frames", frames as u64);
-    let instruments = instruments::pair(&plan.reach, std::f64::consts::TAU * noise::unit(noise::key(&[seed, 3])));
-    let take = Take { instruments: &instruments, camera, sensor, seed };
+    let instruments = instruments::pair(&spec.reach, std::f64::consts::TAU * noise::unit(noise::key(&[seed, 3])));
+    let take = FrameSettings { instruments: &instruments, camera, sensor, seed };
     (0..frames).into_par_iter().try_for_each(|index| {
         if progress.interrupted() {
             return Err(Error::Interrupted);
         }
-        let shot = shoot(&still, &take, index);
+        let shot = record_frame(&still, &take, index);
         writer.frame(index, &shot.color, &shot.depth, Some(&shot.instruments))?;
         progress.advance(1);
         Ok(())
@@ -100,17 +103,17 @@ pub(crate) fn record_with(
     Ok(writer.finish()?)
 }
 
-/// What [`record`] writes into `recording.toml` for these options.
+/// The contents of `recording.toml` that [`record`] writes for these options.
 ///
 /// # Errors
-/// An unknown name.
+/// The name is unknown.
 pub fn describe(name: &str, options: &RecordOptions) -> Result<RecordingInfo> {
-    let plan = Plan::named(name)?;
-    Ok(info(plan, options, &Camera::d405(), &Anatomy::new(plan, options.seed)))
+    let spec = catalog::named(name)?;
+    Ok(info(spec, options, &Camera::d405(), &Anatomy::new(spec, options.seed)))
 }
 
 /// Contents of `recording.toml`.
-fn info(plan: &Plan, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
+fn info(spec: &PhantomSpec, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy) -> RecordingInfo {
     let seed = options.seed;
     let noise = if options.sensor == Sensor::Stereo { ", stereo noise" } else { "" };
     let pixel = |p| camera.project(p).map(|q| [(q.x * 10.0).round() / 10.0, (q.y * 10.0).round() / 10.0]);
@@ -120,11 +123,11 @@ fn info(plan: &Plan, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy
         points: Vec::new(),
         points_outside: Vec::new(),
         base_px: pixel(o.body.base()),
-        material: o.material(plan),
+        material: o.material(spec),
         pins: o.pins(),
     };
     RecordingInfo {
-        name: plan.name.to_owned(),
+        name: spec.name.to_owned(),
         rate_hz: Some(RATE_HZ),
         depth_scale_m: Some(sensor::DEPTH_SCALE),
         up: [0.0, 0.0, -1.0],
@@ -141,7 +144,7 @@ fn info(plan: &Plan, options: &RecordOptions, camera: &Camera, anatomy: &Anatomy
     }
 }
 
-fn write_truth(dir: &Path, anatomy: &Anatomy, still: &Still) -> Result<()> {
+fn write_truth(dir: &Path, anatomy: &Anatomy, still: &StaticView) -> Result<()> {
     let io = |path: &Path| {
         let path = path.to_owned();
         move |source| trocar_recording::Error::Io { path, source }

@@ -1,45 +1,48 @@
-//! What the camera makes of a picture: noise, quantisation and holes, each from (seed, frame, pixel) alone.
+//! Camera noise, quantisation and holes. All depend on (seed, frame, pixel) alone.
 
-use crate::noise::{key, normal, scramble, unit};
+use crate::noise::{key, normal, unit};
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_core::mix;
 use trocar_render::srgb;
 
-/// What kind of depth camera films.
+/// Noise model of the depth camera.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Sensor {
-    /// Noise of its own at every pixel and frame, holes at edges and on steep surfaces, whole millimetres.
+    /// Independent noise per pixel and frame, holes at edges and on steep surfaces, depth in whole
+    /// millimetres.
     #[default]
     Plain,
-    /// The same, and what stereo matching adds: an error that neighbouring pixels and following frames share, and
-    /// foreground that spills over its silhouette.
+    /// Like `Plain`, with the errors of stereo matching: an error that neighbouring pixels and
+    /// successive frames share, and a foreground that extends beyond its silhouette.
     Stereo,
 }
 
-/// Unit of recorded depth [m].
+/// Unit of recorded depth (m).
 pub(crate) const DEPTH_SCALE: f64 = 0.001;
-/// Standard deviation of depth at 0.2 m [m]; stereo's grows with the square of the distance.
+/// Standard deviation of depth at 0.2 m (m). It grows with the square of the distance.
 const DEPTH_SIGMA: f32 = 0.3e-3;
 /// Standard deviation of a colour channel, of 255.
 const COLOR_SIGMA: f32 = 2.0;
-/// Surfaces steeper than this (cosine) begin to lose their depth.
+/// Cosine between normal and ray below which surfaces lose depth.
 const GRAZING: f32 = 0.25;
-/// A jump between neighbouring pixels beyond this is an edge [m].
+/// Depth difference between neighbouring pixels that counts as an edge (m).
 const EDGE: f32 = 4e-3;
-/// Share of pixels lost along edges, and anywhere.
+/// Share of pixels lost along edges, and everywhere.
 const EDGE_LOSS: f64 = 0.7;
 const SPECKLE: f64 = 0.005;
 
-/// A noisy frame of a noise-free one; `facing` is the cosine of view and surface at each pixel.
-pub(crate) fn expose(color: &mut ColorImage, depth: &mut DepthImage, facing: &[f32], seed: u64, frame: usize) {
+/// Adds noise to a frame. `facing` is the cosine between the surface normal and the ray at each
+/// pixel.
+pub(crate) fn add_noise(color: &mut ColorImage, depth: &mut DepthImage, facing: &[f32], seed: u64, frame: usize) {
     let (width, height) = (depth.width, depth.height);
     let clean = depth.depth.clone();
     let stream = key(&[seed, 77, frame as u64]);
     for v in 0..height {
         for u in 0..width {
             let i = v * width + u;
-            let mut h = scramble(stream ^ i as u64);
+            let mut h = mix(stream ^ i as u64);
             let mut next = || {
-                h = scramble(h);
+                h = mix(h);
                 h
             };
             let common = 0.8 * normal(next());
@@ -67,21 +70,21 @@ pub(crate) fn expose(color: &mut ColorImage, depth: &mut DepthImage, facing: &[f
     }
 }
 
-/// Brightness at a pixel relative to the lamp's at the depth `lit_at` [m]: the lamp sits at the lens, its light fades with distance and
-/// towards the corners.
-pub(crate) fn lamp(camera: &Camera, u: f64, v: f64, depth: f32, lit_at: f32) -> f32 {
+/// Brightness at a pixel relative to the lamp's brightness at distance `lamp_distance` (m). The
+/// lamp is at the lens; its light fades with distance and towards the corners.
+pub(crate) fn lamp_brightness(camera: &Camera, u: f64, v: f64, depth: f32, lamp_distance: f32) -> f32 {
     let (x, y) = ((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy);
     let off_axis2 = (x * x + y * y) as f32;
-    let near = if depth > 0.0 { (lit_at / depth).clamp(0.5, 1.5) } else { 1.0 };
+    let near = if depth > 0.0 { (lamp_distance / depth).clamp(0.5, 1.5) } else { 1.0 };
     near / (1.0 + 0.9 * off_axis2)
 }
 
-/// A colour under another brightness.
-pub(crate) fn lit(color: [u8; 3], brightness: f32) -> [u8; 3] {
+/// A colour at another brightness.
+pub(crate) fn with_brightness(color: [u8; 3], brightness: f32) -> [u8; 3] {
     srgb::from_linear(srgb::to_linear(color).map(|l| l * brightness))
 }
 
-/// `mask` grown by `by` pixels (a square).
+/// `mask` extended by `by` pixels in each direction (a square).
 pub(crate) fn dilate(mask: &Mask, by: usize) -> Mask {
     let (width, height) = (mask.width, mask.height);
     let mut rows = vec![false; width * height];
@@ -107,12 +110,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn noise_has_the_sizes_it_should() {
+    fn noise_has_the_specified_magnitude() {
         let (w, h) = (200, 200);
         let mut color = ColorImage::new(w, h, [120; 3]);
         let mut depth = DepthImage::new(w, h);
         depth.depth.fill(0.2003);
-        expose(&mut color, &mut depth, &vec![1.0; w * h], 5, 9);
+        add_noise(&mut color, &mut depth, &vec![1.0; w * h], 5, 9);
         let n = (w * h) as f64;
         let variance = color.pixels.iter().map(|p| (f64::from(p[1]) - 120.0).powi(2)).sum::<f64>() / n;
         assert!((variance.sqrt() - 2.0).abs() < 0.15, "colour sigma {}", variance.sqrt());
@@ -120,7 +123,8 @@ mod tests {
         let lost = 1.0 - valid.len() as f64 / n;
         assert!((lost - 0.005).abs() < 0.002, "{lost} lost");
         let mean = valid.iter().sum::<f64>() / valid.len() as f64;
-        // Noise of 0.3 steps dithers the rounding away but for exp(-2 (0.3 pi)^2) / pi of a step.
+        // Noise of 0.3 steps removes the rounding bias except for exp(-2 (0.3 pi)^2) / pi of a
+        // step.
         assert!((mean - 0.2003).abs() < 6e-5, "mean {mean}");
         assert!(valid.iter().all(|d| (d * 1000.0 - (d * 1000.0).round()).abs() < 1e-4), "whole millimetres");
     }
@@ -132,7 +136,7 @@ mod tests {
             *d = if i % 100 < 50 { 0.2 } else { 0.25 };
         }
         let facing: Vec<f32> = (0..10_000).map(|i| if i / 100 < 50 { 1.0 } else { 0.05 }).collect();
-        expose(&mut ColorImage::new(100, 100, [0; 3]), &mut depth, &facing, 1, 1);
+        add_noise(&mut ColorImage::new(100, 100, [0; 3]), &mut depth, &facing, 1, 1);
         let lost = |pick: &dyn Fn(usize, usize) -> bool| {
             let chosen: Vec<usize> = (0..10_000).filter(|i| pick(i % 100, i / 100)).collect();
             chosen.iter().filter(|i| depth.depth[**i] == 0.0).count() as f64 / chosen.len() as f64
@@ -143,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn dilation_grows_a_pixel_into_a_square() {
+    fn dilation_extends_a_pixel_to_a_square() {
         let mut mask = Mask::new(9, 9);
         mask.set[4 * 9 + 1] = true;
         let grown = dilate(&mask, 2);

@@ -1,34 +1,37 @@
-//! What stereo matching adds to the noise of depth: errors that neighbours share and that last, and fat edges.
+//! Errors of stereo matching: spatially and temporally correlated noise, and fattened edges.
 //!
-//! A matcher compares windows of several pixels, so its error is smooth over about a window; the texture it locks on to
-//! stands still, so the error does too, but for slow drift of light and temperature. A window that holds an edge matches the
-//! foreground: it spills over the silhouette by a pixel or two.
+//! A matcher compares windows of several pixels, so its error is smooth over about a window. The
+//! texture it matches does not move, so the error persists, except for a slow drift with light and
+//! temperature. A window that contains an edge matches the foreground, which extends beyond its
+//! silhouette by a pixel or two.
 
 use crate::noise::{key, smooth};
 use glam::DVec3;
 use trocar_camera::DepthImage;
 
-/// Standard deviation of the shared error at [`SIGMA_AT`] [m]; it grows with the square of the distance.
+/// Standard deviation of the correlated error at distance [`SIGMA_AT`] (m). It grows with the
+/// square of the distance.
 const SIGMA: f64 = 0.5e-3;
 const SIGMA_AT: f64 = 0.28;
-/// Width of the error's bumps [px].
+/// Correlation length of the error (px).
 const WINDOW: f64 = 8.0;
 /// Frames over which the drifting part changes.
-const DRIFT: f64 = 60.0;
-/// Share of the variance that drifts; the rest stays.
-const DRIFTING: f64 = 0.3;
-/// Standard deviation of [`smooth`] over the plane at a third coordinate of one half, and over space (measured).
+const DRIFT_FRAMES: f64 = 60.0;
+/// Share of the variance that drifts; the rest is constant.
+const DRIFT_SHARE: f64 = 0.3;
+/// Standard deviation of [`smooth`] over the plane with a third coordinate of one half, and over
+/// space (measured).
 const PLANE_SIGMA: f64 = 0.303;
 const SPACE_SIGMA: f64 = 0.370;
-/// A jump between neighbouring pixels beyond this spills over [m].
-const JUMP: f32 = 4e-3;
+/// Depth difference at which the foreground fattens (m).
+const EDGE_STEP: f32 = 4e-3;
 
-/// Bends the depth of frame `index` before the noise of single pixels is added.
-pub(crate) fn bend(depth: &mut DepthImage, seed: u64, index: usize) {
-    fatten(depth, key(&[seed, 78]));
+/// Adds the stereo error to the depth of frame `index`, before the noise of single pixels.
+pub(crate) fn add_error(depth: &mut DepthImage, seed: u64, index: usize) {
+    fatten_foreground(depth, key(&[seed, 78]));
     let (width, stays, drifts) = (depth.width, key(&[seed, 79]), key(&[seed, 80]));
-    let (still, moving) = (SIGMA * (1.0 - DRIFTING).sqrt() / PLANE_SIGMA, SIGMA * DRIFTING.sqrt() / SPACE_SIGMA);
-    let time = index as f64 / DRIFT;
+    let (still, moving) = (SIGMA * (1.0 - DRIFT_SHARE).sqrt() / PLANE_SIGMA, SIGMA * DRIFT_SHARE.sqrt() / SPACE_SIGMA);
+    let time = index as f64 / DRIFT_FRAMES;
     for (i, z) in depth.depth.iter_mut().enumerate().filter(|(_, z)| **z > 0.0) {
         let (u, v) = ((i % width) as f64 / WINDOW, (i / width) as f64 / WINDOW);
         let error = still * smooth(stays, DVec3::new(u, v, 0.5)) + moving * smooth(drifts, DVec3::new(u, v, time));
@@ -36,8 +39,8 @@ pub(crate) fn bend(depth: &mut DepthImage, seed: u64, index: usize) {
     }
 }
 
-/// Lets near surfaces spill over far ones by one pixel, or by two where the texture is poor.
-fn fatten(depth: &mut DepthImage, seed: u64) {
+/// Extends near surfaces over far ones by one pixel, or by two where texture is poor.
+fn fatten_foreground(depth: &mut DepthImage, seed: u64) {
     let (width, height) = (depth.width, depth.height);
     let clean = depth.depth.clone();
     for v in 0..height {
@@ -45,13 +48,13 @@ fn fatten(depth: &mut DepthImage, seed: u64) {
             let z = clean[v * width + u];
             let poor = || smooth(seed, DVec3::new(u as f64 / WINDOW, v as f64 / WINDOW, 0.5)) > 0.0;
             let mut nearest = z;
-            // Two pixels away only counts where it is poor, and that is asked only where it matters.
+            // Texture is evaluated only where a surface two pixels away matters.
             for (reach, counts) in [(1, true), (2, false)] {
                 let rows = v.saturating_sub(reach)..(v + reach + 1).min(height);
                 let columns = u.saturating_sub(reach)..(u + reach + 1).min(width);
                 let near = rows.flat_map(|y| clean[y * width + columns.start..y * width + columns.end].iter());
                 let near = near.copied().filter(|n| *n > 0.0).fold(f32::INFINITY, f32::min);
-                if near + JUMP < nearest && (counts || poor()) {
+                if near + EDGE_STEP < nearest && (counts || poor()) {
                     nearest = near;
                 }
             }
@@ -69,7 +72,7 @@ mod tests {
     fn flat(z: f32, frame: usize) -> Vec<f64> {
         let mut depth = DepthImage::new(400, 300);
         depth.depth.fill(z);
-        bend(&mut depth, 3, frame);
+        add_error(&mut depth, 3, frame);
         depth.depth.iter().map(|d| f64::from(d - z)).collect()
     }
 
@@ -78,7 +81,7 @@ mod tests {
     }
 
     #[test]
-    fn the_error_has_its_size_is_shared_by_neighbours_and_lasts() {
+    fn stereo_error_has_its_magnitude_and_correlations() {
         let error = flat(0.28, 0);
         let rms = product(&error, &error).sqrt();
         assert!((rms - SIGMA).abs() < 0.1 * SIGMA, "rms {rms}");
@@ -93,12 +96,12 @@ mod tests {
     }
 
     #[test]
-    fn the_foreground_spills_over_by_one_or_two_pixels() {
+    fn foreground_fattens_by_one_or_two_pixels() {
         let mut depth = DepthImage::new(100, 100);
         for (i, d) in depth.depth.iter_mut().enumerate() {
             *d = if i % 100 < 50 { 0.2 } else { 0.25 };
         }
-        fatten(&mut depth, 1);
+        fatten_foreground(&mut depth, 1);
         let mut two = 0;
         for row in depth.depth.chunks(100) {
             assert!(row[49] == 0.2 && row[50] == 0.2 && row[52] == 0.25);

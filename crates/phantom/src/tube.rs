@@ -1,13 +1,13 @@
-//! A curved, tapered, elliptical tube with rounded ends, known by its signed distance.
+//! A curved, tapered, elliptical tube with rounded ends, defined by a signed distance.
 
 use crate::noise;
 use glam::DVec3;
 use trocar_geometry::SignedDistance;
 
-/// Points along a centreline.
+/// Number of points of a centreline.
 const POINTS: usize = 97;
 
-/// How an organ is built, independent of where it lies. Lengths in metres.
+/// Shape of a tube, independent of its position. Lengths in metres.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Shape {
     /// Length of the centreline.
@@ -16,24 +16,25 @@ pub(crate) struct Shape {
     pub across: f64,
     /// Semi-axis of the cross-section away from the bed.
     pub high: f64,
-    /// Radius at the tip over that at the base.
+    /// Radius at the tip relative to the base.
     pub taper: f64,
-    /// How much wider the middle is.
+    /// Relative widening of the middle.
     pub bulge: f64,
-    /// Depth of the constrictions relative to the radius, and their distance.
+    /// Depth of the constrictions relative to the radius, and the distance between them.
     pub folds: (f64, f64),
-    /// The heading's change per unit of organ coordinate at the base and at the tip [rad].
+    /// Curvature at the base and at the tip: change of heading per unit of the organ coordinate
+    /// (rad).
     pub bends: [f64; 2],
 }
 
 impl Shape {
-    /// No radius is larger [m].
-    fn thickest(&self) -> f64 {
+    /// Upper bound of the radius (m).
+    fn max_radius(&self) -> f64 {
         1.3 * (1.0 + self.bulge) * self.across.max(self.high) * self.taper.max(1.0)
     }
 }
 
-/// A [`Shape`] laid down. Noise makes its wall uneven.
+/// A placed [`Shape`]. Noise makes its wall uneven.
 #[derive(Clone, Debug)]
 pub(crate) struct Tube {
     shape: Shape,
@@ -41,21 +42,21 @@ pub(crate) struct Tube {
     line: Vec<DVec3>,
     tangents: Vec<DVec3>,
     centre: DVec3,
-    /// No point of the surface is farther from `centre`.
+    /// Radius of a bounding ball around `centre`.
     reach: f64,
 }
 
-/// A point in the tube's own terms.
-pub(crate) struct Local {
-    /// Organ coordinate, 0 at the base, 1 at the tip.
+/// A point in local coordinates of an organ.
+pub(crate) struct LocalPoint {
+    /// Organ coordinate: 0 at the base, 1 at the tip.
     pub s: f64,
-    /// Angle around the centreline [rad], 0 to the side along the bed, pi/2 away from the bed.
+    /// Angle around the centreline (rad): 0 to the side along the bed, pi/2 away from the bed.
     pub angle: f64,
-    offset: DVec3,
 }
 
 impl Tube {
-    /// Lays `shape` down from `base` towards `heading` [rad] in the plane of x and y; `height` gives the centreline's z.
+    /// Places `shape` from `base` towards `heading` (rad) in the plane of x and y. `height` gives
+    /// the centreline's z.
     pub fn lay(shape: Shape, seed: u64, base: (f64, f64), heading: f64, height: impl Fn(f64, f64) -> f64) -> Self {
         let step = 1.0 / (POINTS - 1) as f64;
         let [k0, k1] = shape.bends;
@@ -73,8 +74,8 @@ impl Tube {
             .map(|i| (line[(i + 1).min(POINTS - 1)] - line[i.saturating_sub(1)]).normalize_or(DVec3::X))
             .collect();
         let centre = line.iter().sum::<DVec3>() / POINTS as f64;
-        let thickest = shape.thickest();
-        let reach = line.iter().map(|p| (p - centre).length()).fold(0.0, f64::max) + thickest;
+        let max_radius = shape.max_radius();
+        let reach = line.iter().map(|p| (p - centre).length()).fold(0.0, f64::max) + max_radius;
         Self { shape, seed, line, tangents, centre, reach }
     }
 
@@ -88,14 +89,14 @@ impl Tube {
         self.line[POINTS - 1]
     }
 
-    /// Length of the centreline [m].
+    /// Length of the centreline (m).
     pub fn length(&self) -> f64 {
         self.shape.length
     }
 
-    /// A box that holds the tube.
+    /// A bounding box.
     pub fn bounds(&self) -> (DVec3, DVec3) {
-        let margin = DVec3::splat(self.shape.thickest());
+        let margin = DVec3::splat(self.shape.max_radius());
         let low = self.line.iter().copied().fold(DVec3::MAX, DVec3::min);
         let high = self.line.iter().copied().fold(DVec3::MIN, DVec3::max);
         (low - margin, high + margin)
@@ -125,8 +126,15 @@ impl Tube {
         points
     }
 
-    /// Where `p` is in the tube's own terms.
-    pub fn local(&self, p: DVec3) -> Local {
+    /// Local coordinates of `p`.
+    pub fn local(&self, p: DVec3) -> LocalPoint {
+        let (s, offset) = self.project(p);
+        LocalPoint { s, angle: offset.y.atan2(offset.x) }
+    }
+
+    /// The organ coordinate of the nearest centreline point, and the offset from it in the local
+    /// frame (across, up, along).
+    fn project(&self, p: DVec3) -> (f64, DVec3) {
         let nearest = (0..POINTS)
             .map(|i| (i, p.distance_squared(self.line[i])))
             .fold((0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best })
@@ -139,7 +147,8 @@ impl Tube {
         let before = on_segment(nearest.saturating_sub(1));
         let after = on_segment(nearest.min(POINTS - 2));
         let (at, foot) = if p.distance_squared(before.1) < p.distance_squared(after.1) { before } else { after };
-        // The polyline's corners would tear the wall; along its smoothed tangents there are none.
+        // The corners of the polyline would tear the wall, so the foot point moves along smoothed
+        // tangents.
         let (mut s, mut foot) = (at / (POINTS - 1) as f64, foot);
         for _ in 0..3 {
             s = (s + (p - foot).dot(self.tangent(s)) / self.shape.length).clamp(0.0, 1.0);
@@ -148,7 +157,7 @@ impl Tube {
         let (across, up) = self.frame(s);
         let d = p - foot;
         let offset = DVec3::new(d.dot(across), d.dot(up), d.dot(self.tangent(s)));
-        Local { s, angle: offset.y.atan2(offset.x), offset }
+        (s, offset)
     }
 
     fn point(&self, s: f64) -> DVec3 {
@@ -174,7 +183,7 @@ impl Tube {
     fn radii(&self, s: f64) -> (f64, f64) {
         let Shape { length, across, high, taper, bulge, folds: (depth, distance), .. } = self.shape;
         let uneven = 0.05 * noise::smooth(self.seed, DVec3::new(s * length / 0.012, 0.5, 0.5));
-        // Constrictions are narrow, what is between them is wide: the cosine to a high power.
+        // The cosine to a high power makes constrictions narrow and the parts between them wide.
         let phase = s * length / distance + 0.6 * noise::smooth(self.seed + 1, DVec3::new(s * length / 0.02, 0.5, 0.5));
         let fold = (std::f64::consts::PI * phase).cos().powi(6);
         let r = (1.0 + (taper - 1.0) * s)
@@ -185,14 +194,14 @@ impl Tube {
 }
 
 impl SignedDistance for Tube {
-    /// The implicit function of the ellipse over the length of its gradient: exact to first order at the surface. Far away
-    /// the distance to a bounding sphere, which is less than the true one, will do.
+    /// Implicit function of the ellipse divided by the length of its gradient: exact to first order
+    /// at the surface. Far away it is the distance to a bounding sphere, which is a lower bound.
     fn distance(&self, p: DVec3) -> f64 {
         let outside = (p - self.centre).length() - self.reach;
         if outside > 0.01 {
             return outside;
         }
-        let Local { s, offset, .. } = self.local(p);
+        let (s, offset) = self.project(p);
         let (a, b) = self.radii(s);
         let q = offset / DVec3::new(a, b, a);
         let k0 = q.length();
@@ -200,7 +209,7 @@ impl SignedDistance for Tube {
         if k1 < 1e-9 || k0 < 1e-6 {
             return -a.min(b);
         }
-        // Where the wall runs obliquely to the centreline, the distance to it is shorter.
+        // A wall oblique to the centreline is closer than its radial distance.
         const H: f64 = 2e-3;
         let slope = (self.radii(s + H).0 - self.radii(s - H).0) / (2.0 * H * self.shape.length);
         let bumps = 0.2e-3 * noise::fractal(self.seed + 2, p / 5e-3, 2);

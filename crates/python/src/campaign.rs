@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
 use trocar_campaign::{Error, Files, Job, Plan, PolicySpec, Store};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 

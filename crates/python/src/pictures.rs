@@ -7,9 +7,9 @@ use crate::prepare;
 use numpy::{PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
-use trocar_render::Settings;
+use trocar_render::RenderSettings;
 use trocar_scene::Scene;
-use trocar_sight::{DepthNoise, Sensor, Sight};
+use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
 use trocar_specimen::Specimen;
 use trocar_task::Episode;
 
@@ -17,18 +17,18 @@ use trocar_task::Episode;
 const COLOR_NOISE: [f32; 2] = [0.015, 0.003];
 
 /// Pictures are made by direct light without shadows, which is what policies of campaigns see too.
-const SETTINGS: Settings = Settings::Preview { shadows: false };
+const SETTINGS: RenderSettings = RenderSettings::Preview { shadows: false };
 
 /// The sights of the cells; each is made when its cell is first looked at.
 pub struct Eyes {
-    sights: Vec<Option<Sight>>,
+    sights: Vec<Option<CameraRig>>,
     specimen: Specimen,
     noise: bool,
 }
 
 /// A cell that is looked at, with the pieces of the arrays that are its own.
 struct Look<'a> {
-    sight: &'a mut Option<Sight>,
+    sight: &'a mut Option<CameraRig>,
     episode: &'a Episode,
     color: Vec<&'a mut [u8]>,
     depth: Vec<&'a mut [f32]>,
@@ -50,25 +50,25 @@ impl Eyes {
 
 /// The sight of `episode`, made if it is not there, with the noise of its seed.
 fn awake<'a>(
-    sight: &'a mut Option<Sight>,
+    sight: &'a mut Option<CameraRig>,
     episode: &Episode,
     specimen: &Specimen,
     noise: bool,
-) -> trocar_sight::Result<&'a mut Sight> {
+) -> trocar_sensors::Result<&'a mut CameraRig> {
     let sensor = if noise {
         let seed = episode.seed();
         // Both halves of the seed count.
         let seed = (seed ^ (seed >> 32)) as u32;
-        Sensor { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
+        SensorNoise { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
     } else {
-        Sensor::default()
+        SensorNoise::default()
     };
     let made = match sight.take() {
         Some(made) => made,
-        None => Sight::new(&episode.arranged_scene(), specimen, episode.cell())?,
+        None => CameraRig::new(&episode.arranged_scene(), specimen, episode.cell())?,
     };
     let sight = sight.insert(made);
-    sight.sensor = sensor;
+    sight.noise = sensor;
     Ok(sight)
 }
 
@@ -121,10 +121,10 @@ impl Cells {
             .filter(|(_, active)| **active)
             .map(|(((sight, episode), (color, depth)), _)| Look { sight, episode, color, depth })
             .collect();
-        let see = |look: &mut Look<'_>| -> trocar_sight::Result<()> {
+        let see = |look: &mut Look<'_>| -> trocar_sensors::Result<()> {
             let sight = awake(look.sight, look.episode, specimen, noise)?;
             for (k, (camera, (height, width))) in cameras.iter().zip(size).enumerate() {
-                let picture = sight.see(look.episode.cell(), camera, [*width, *height], &SETTINGS)?;
+                let picture = sight.render(look.episode.cell(), camera, [*width, *height], &SETTINGS)?;
                 if let Some(to) = look.color.get_mut(k) {
                     to.copy_from_slice(picture.color.pixels.as_flattened());
                 }
@@ -134,9 +134,9 @@ impl Cells {
             }
             Ok(())
         };
-        let done: Vec<trocar_sight::Result<()>> =
+        let done: Vec<trocar_sensors::Result<()>> =
             py.detach(|| pool.install(|| looks.par_iter_mut().map(see).collect()));
-        done.into_iter().collect::<trocar_sight::Result<()>>().map_err(wrong)
+        done.into_iter().collect::<trocar_sensors::Result<()>>().map_err(wrong)
     }
 
     /// See `Cells.picture`.
@@ -155,11 +155,11 @@ impl Cells {
         let pixels = py.detach(|| {
             pool.install(|| {
                 let sight = awake(sight, episode, specimen, noise)?;
-                let picture = sight.see(episode.cell(), camera, [width, height], &SETTINGS)?;
+                let picture = sight.render(episode.cell(), camera, [width, height], &SETTINGS)?;
                 Ok(picture.color.pixels.as_flattened().to_vec())
             })
         });
-        let pixels: Vec<u8> = pixels.map_err(|e: trocar_sight::Error| wrong(e))?;
+        let pixels: Vec<u8> = pixels.map_err(|e: trocar_sensors::Error| wrong(e))?;
         numpy::PyArray1::from_vec(py, pixels).reshape([height, width, 3])
     }
 }

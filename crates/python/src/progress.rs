@@ -4,7 +4,7 @@ use pyo3::Python;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 
 /// How often signals are looked at.
 const EVERY: Duration = Duration::from_millis(200);

@@ -2,7 +2,7 @@
 //!
 //! An [`Observation`] goes out as one binary message of MessagePack with NumPy arrays in it, a chunk of [`Actions`] comes back.
 //! Nothing that a server sends is trusted: every size, shape and type is checked before it is used, every wait has a deadline, and
-//! whatever goes wrong is an [`Error`] of one line. The format and the errors are described in `docs/policies.md`.
+//! whatever goes wrong is an [`Error`] of one line. The format and the errors are described in `docs/guides/policies.md`.
 //!
 //! ```no_run
 //! use trocar_remote::{ActionQueue, Array, Client, Endpoint, Observation, Playback};

@@ -1,32 +1,32 @@
-//! What can be wrong with a stage.
+//! Errors of a stage.
 
-/// Result of this crate.
+/// Result type of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Something that a stage does not have, or that does not fit it.
+/// An identifier or a mesh that does not fit the stage.
 #[derive(Debug, thiserror::Error, PartialEq)]
 pub enum Error {
-    /// No such shape or body.
+    /// The stage has no such shape or body.
     #[error("there is no {what} {index}; the stage has {count}")]
     Unknown {
         /// `shape` or `body`.
         what: &'static str,
-        /// What was asked for.
+        /// The index that was given.
         index: usize,
-        /// How many there are.
+        /// The number of them on the stage.
         count: usize,
     },
-    /// A shape was given another number of vertices.
+    /// The number of positions differs from the shape's number of vertices.
     #[error("shape {shape} has {has} vertices, but {given} positions were given")]
     Vertices {
-        /// The shape.
+        /// Index of the shape.
         shape: usize,
-        /// Its vertices.
+        /// Number of vertices of the shape.
         has: usize,
-        /// Positions given.
+        /// Number of positions that were given.
         given: usize,
     },
-    /// The stage would have more than the trees can number.
-    #[error("a mesh of {0} triangles is too large; at most 2^27 fit")]
+    /// The mesh has more triangles than a search tree can index.
+    #[error("the mesh has {0} triangles; must be at most 2^27")]
     TooLarge(usize),
 }

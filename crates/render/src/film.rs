@@ -1,51 +1,52 @@
-//! From light to a picture: exposure, vignette, noise, sRGB.
+//! From radiance to a picture: exposure, vignette, noise, sRGB.
 
-use crate::eye::Eye;
 use crate::random::{normal, numbers};
+use crate::rays::RayGenerator;
 use crate::srgb;
 
-/// What the sensor and its electronics do.
+/// Response of the image sensor and its electronics.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Film {
-    /// Factor on radiance; 1 shows radiance 1 as white.
+    /// Factor on radiance. With exposure 1, radiance 1 is white.
     pub exposure: f32,
-    /// Loss of light at the picture's rim, 0 to 1, falling with the square of the distance from the middle.
+    /// Loss of light at the rim of the picture, in [0, 1]. It grows with the square of the distance
+    /// from the centre.
     pub vignette: f32,
-    /// Where highlights begin to be compressed, 0 to 1; 1 clips them.
+    /// Level at which highlight compression starts, in [0, 1]; 1 clips highlights.
     pub shoulder: f32,
-    /// Noise; none if left out.
+    /// Sensor noise; `None` for a noise-free picture.
     pub noise: Option<Noise>,
 }
 
-/// A sensor's noise, on linear light.
+/// Noise of an image sensor, added to linear light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Noise {
-    /// Standard deviation at white that grows with the root of the light.
+    /// Standard deviation of the shot noise at white. It scales with the square root of the light.
     pub shot: f32,
-    /// Standard deviation that is there without light.
+    /// Standard deviation of the read noise, independent of the light.
     pub read: f32,
     /// Seed.
     pub seed: u32,
-    /// Number of the frame; each has noise of its own.
+    /// Frame number. Each frame has its own noise.
     pub frame: u32,
 }
 
 impl Default for Film {
-    /// Exposure 1, nothing else.
+    /// Exposure 1, no vignette, no highlight compression, no noise.
     fn default() -> Self {
         Self { exposure: 1.0, vignette: 0.0, shoulder: 1.0, noise: None }
     }
 }
 
 impl Film {
-    /// The tower of an endoscope: highlights roll off, corners are darker.
+    /// The camera processor of an endoscope: compressed highlights and darker corners.
     pub fn endoscope() -> Self {
         Self { exposure: 1.0, vignette: 0.45, shoulder: 0.7, noise: None }
     }
 
     /// The sRGB colour of a pixel with linear radiance `light`.
-    pub(crate) fn develop(&self, eye: &Eye, pixel: usize, light: [f32; 3]) -> [u8; 3] {
-        let gain = self.exposure * (1.0 - self.vignette * eye.eccentricity_squared(pixel)).max(0.0);
+    pub(crate) fn develop(&self, rays: &RayGenerator, pixel: usize, light: [f32; 3]) -> [u8; 3] {
+        let gain = self.exposure * (1.0 - self.vignette * rays.eccentricity_squared(pixel)).max(0.0);
         let mut values = light.map(|l| l * gain);
         if let Some(noise) = self.noise {
             let [a, b, c, d] = numbers([pixel as u32, noise.frame, 0x6e6f_6973, noise.seed]);

@@ -1,53 +1,57 @@
-//! Lights. Radiance is linear and relative: 1 is what a sensor at exposure 1 shows as white.
+//! Light sources. Radiance is linear and relative: a sensor with exposure 1 shows radiance 1 as
+//! white.
 
-use crate::tree::Ray;
+use crate::bvh::Ray;
 use glam::{DVec3, Vec3A};
-use trocar_camera::Pose;
+use trocar_core::Pose;
 
-/// A light.
+/// A light source.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Light {
-    /// A point that shines into a cone, its light falling off with the square of the distance.
+    /// A point light that shines into a cone. Its light falls off with the square of the distance.
     Spot {
-        /// Where it is [m].
+        /// Position (m).
         position: DVec3,
-        /// The cone's axis.
+        /// Axis of the cone.
         direction: DVec3,
-        /// Linear radiant intensity on the axis: radiance times square metres.
+        /// Linear radiant intensity on the axis (radiance times m²).
         intensity: [f32; 3],
-        /// Half the angle up to which it is as bright as on the axis [rad].
+        /// Half angle of the fully lit inner cone (rad).
         inner: f64,
-        /// Half the angle beyond which it is dark [rad]; pi for a light to all sides.
+        /// Half angle of the outer cone, beyond which it is dark (rad); pi for a light in all
+        /// directions.
         outer: f64,
     },
-    /// A rectangle that shines to the side of `along` x `across`, and is seen.
+    /// A visible rectangle that shines to the side of `along` x `across`.
     Panel {
-        /// One corner [m].
+        /// One corner (m).
         corner: DVec3,
-        /// One edge from it [m].
+        /// Edge vector from the corner (m).
         along: DVec3,
-        /// The other edge from it [m].
+        /// The other edge vector from the corner (m).
         across: DVec3,
-        /// Linear radiance.
+        /// Linear radiance of the surface.
         radiance: [f32; 3],
     },
 }
 
-/// What a light sends to a point.
-pub(crate) struct Arriving {
-    /// Unit direction towards the light.
+/// Light that arrives at a point from one sampled position on a light source.
+pub(crate) struct IncidentLight {
+    /// Unit direction towards the light source.
     pub direction: Vec3A,
-    /// Distance to it [m].
+    /// Distance to the light source (m).
     pub distance: f32,
-    /// Radiance, over the probability of this sample where there was a choice.
+    /// Radiance, divided by the probability density if the position was sampled.
     pub light: Vec3A,
-    /// Density of that probability over solid angle; 0 for a point, which no other sampling finds.
+    /// Probability density per solid angle; 0 for a point light, which only explicit light sampling
+    /// can reach.
     pub density: f32,
 }
 
 impl Light {
-    /// The light of an endoscope: beside the lens by `beside` [m] towards the picture's top, warm white, wide. A white matte
-    /// surface `white_at` [m] before it, facing it, has radiance 1.
+    /// The light of an endoscope: warm white, wide, and `beside` (m) from the lens towards the top
+    /// of the picture. A white matte surface at distance `white_at` (m) that faces it has radiance
+    /// 1.
     pub fn endoscope(view: &Pose, beside: f64, white_at: f64) -> Self {
         let power = std::f32::consts::PI * (white_at * white_at) as f32;
         Self::Spot {
@@ -60,7 +64,7 @@ impl Light {
     }
 }
 
-/// A light made ready for rendering.
+/// A light source prepared for rendering.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Lamp {
     Spot { position: Vec3A, direction: Vec3A, intensity: Vec3A, bright: f32, dark: f32 },
@@ -75,7 +79,7 @@ impl Lamp {
                 direction: direction.normalize_or_zero().as_vec3a(),
                 intensity: intensity.into(),
                 bright: inner.cos() as f32,
-                // Below any cosine, where it shines to all sides.
+                // Less than any cosine: the light shines in all directions.
                 dark: if outer >= std::f64::consts::PI { f32::NEG_INFINITY } else { outer.cos() as f32 },
             },
             Light::Panel { corner, along, across, radiance } => {
@@ -87,16 +91,17 @@ impl Lamp {
         }
     }
 
-    /// The light's middle [m].
-    pub fn middle(&self) -> Vec3A {
+    /// Centre of the light source (m).
+    pub fn centre(&self) -> Vec3A {
         match *self {
             Self::Spot { position, .. } => position,
             Self::Panel { corner, along, across, .. } => corner + 0.5 * along + 0.5 * across,
         }
     }
 
-    /// What arrives at `point` from the place of the light that two random numbers choose; `None` where nothing does.
-    pub fn arriving(&self, point: Vec3A, [a, b]: [f32; 2]) -> Option<Arriving> {
+    /// Light that arrives at `point` from the position on the light source that two random numbers
+    /// select; `None` if no light arrives.
+    pub fn arriving(&self, point: Vec3A, [a, b]: [f32; 2]) -> Option<IncidentLight> {
         match *self {
             Self::Spot { position, direction, intensity, bright, dark } => {
                 let to_light = position - point;
@@ -110,7 +115,7 @@ impl Lamp {
                     x * x * (3.0 - 2.0 * x)
                 };
                 let light = intensity * (share / (distance * distance).max(1e-12));
-                (share > 0.0 && light.is_finite()).then_some(Arriving {
+                (share > 0.0 && light.is_finite()).then_some(IncidentLight {
                     direction: towards,
                     distance,
                     light,
@@ -126,14 +131,14 @@ impl Lamp {
                     return None;
                 }
                 let density = distance * distance / (cos * area);
-                Some(Arriving { direction: towards, distance, light: radiance / density, density })
+                Some(IncidentLight { direction: towards, distance, light: radiance / density, density })
             }
         }
     }
 
-    /// Distance along a ray at which a panel is met from its bright side before `reach`, its radiance, and the density with which
-    /// [`Self::arriving`] chooses that direction.
-    pub fn met(&self, ray: &Ray, reach: f32) -> Option<(f32, Vec3A, f32)> {
+    /// Intersection of a ray with the lit side of a panel before `reach`: ray parameter, radiance,
+    /// and the density with which [`Self::arriving`] samples that direction.
+    pub fn intersect(&self, ray: &Ray, reach: f32) -> Option<(f32, Vec3A, f32)> {
         let Self::Panel { corner, along, across, normal, area, radiance } = *self else { return None };
         let slope = ray.direction.dot(normal);
         if slope >= 0.0 {

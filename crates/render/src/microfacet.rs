@@ -1,55 +1,57 @@
-//! The GGX distribution of facets: what it reflects between two directions, how to choose one, and how much in all.
+//! The GGX microfacet distribution: evaluation, sampling, and directional albedo.
 
-use crate::material::fresnel;
 use glam::Vec3A;
 use std::f32::consts::{PI, TAU};
 
-/// Slopes at which energies are kept.
-const SLOPES: usize = 48;
-/// Samples of each.
+/// Number of tabulated cosines.
+const COSINES: usize = 48;
+/// Samples per tabulated cosine.
 const SAMPLES: u32 = 512;
 
-/// Facets of one width. Directions are in the local frame, z the normal, and point away from the surface.
+/// A GGX lobe of one width. Directions are in the local frame with the normal along z, and point
+/// away from the surface.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Lobe {
+pub(crate) struct GgxLobe {
     width: f32,
 }
 
-/// Share of the light from a direction that the facets reflect, summed over all directions it goes to: `scale` times the
-/// reflectance head-on plus `offset` (Karis, "Real Shading in Unreal Engine 4", 2013).
+/// Directional albedo of a lobe: `scale` times the reflectance at normal incidence plus `offset`
+/// (Karis, "Real Shading in Unreal Engine 4", 2013).
 #[derive(Clone, Debug)]
-pub(crate) struct Table {
-    scale: [f32; SLOPES],
-    offset: [f32; SLOPES],
+pub(crate) struct AlbedoTable {
+    scale: [f32; COSINES],
+    offset: [f32; COSINES],
 }
 
-impl Lobe {
+impl GgxLobe {
     pub fn new(width: f32) -> Self {
         Self { width }
     }
 
-    /// Reflection without Fresnel's factor times the cosine of `to_light`, the density of [`Self::reflect`], and the cosine
-    /// between either direction and the facet (Heitz 2014, "Understanding the Masking-Shadowing Function").
-    pub fn between(&self, to_eye: Vec3A, to_light: Vec3A) -> (f32, f32, f32) {
+    /// Returns the reflection without the Fresnel factor times the cosine of `to_light`, the
+    /// density of [`Self::reflect`], and the cosine between either direction and the facet (Heitz
+    /// 2014, "Understanding the Masking-Shadowing Function").
+    pub fn evaluate(&self, to_eye: Vec3A, to_light: Vec3A) -> (f32, f32, f32) {
         let half = (to_eye + to_light).normalize_or_zero();
         let a2 = self.width * self.width;
-        // 1 - z^2 + a2 z^2, written so that narrow lobes keep their digits.
+        // 1 - z^2 + a2 z^2, in a form that keeps its digits for narrow lobes.
         let spread = half.x * half.x + half.y * half.y + a2 * half.z * half.z;
         let distribution = a2 / (PI * spread * spread);
-        let (eye, light) = (self.masking(to_eye.z), self.masking(to_light.z));
+        let (eye, light) = (self.smith_lambda(to_eye.z), self.smith_lambda(to_light.z));
         let value = distribution / (1.0 + eye + light) / (4.0 * to_eye.z);
         let density = distribution / (1.0 + eye) / (4.0 * to_eye.z);
         (value, density, to_eye.dot(half).max(0.0))
     }
 
-    /// Smith's Lambda.
-    fn masking(&self, z: f32) -> f32 {
+    /// Smith's Lambda function.
+    fn smith_lambda(&self, z: f32) -> f32 {
         let z2 = z * z;
         0.5 * ((1.0 + self.width * self.width * (1.0 - z2).max(0.0) / z2).sqrt() - 1.0)
     }
 
-    /// The mirror direction at a facet that is seen from `to_eye`, chosen by its visible area (Dupuy and Benyoub 2023, "Sampling
-    /// Visible GGX Normals with Spherical Caps"); `None` where it goes into the surface.
+    /// The mirror direction at a facet sampled by its area visible from `to_eye` (Dupuy and Benyoub
+    /// 2023, "Sampling Visible GGX Normals with Spherical Caps"); `None` if it points into the
+    /// surface.
     pub fn reflect(&self, to_eye: Vec3A, a: f32, b: f32) -> Option<Vec3A> {
         let stretched = Vec3A::new(self.width * to_eye.x, self.width * to_eye.y, to_eye.z).normalize();
         let z = (1.0 - b) * (1.0 + stretched.z) - stretched.z;
@@ -62,17 +64,17 @@ impl Lobe {
     }
 }
 
-impl Table {
-    pub fn of(lobe: &Lobe) -> Self {
-        let mut table = Self { scale: [0.0; SLOPES], offset: [0.0; SLOPES] };
-        for i in 0..SLOPES {
-            let z = (i as f32 + 0.5) / SLOPES as f32;
+impl AlbedoTable {
+    pub fn new(lobe: &GgxLobe) -> Self {
+        let mut table = Self { scale: [0.0; COSINES], offset: [0.0; COSINES] };
+        for i in 0..COSINES {
+            let z = (i as f32 + 0.5) / COSINES as f32;
             let to_eye = Vec3A::new((1.0 - z * z).sqrt(), 0.0, z);
             for n in 0..SAMPLES {
-                // Hammersley's points.
+                // Hammersley points.
                 let (a, b) = ((n as f32 + 0.5) / SAMPLES as f32, n.reverse_bits() as f32 / 4_294_967_296.0);
                 let Some(out) = lobe.reflect(to_eye, a, b) else { continue };
-                let (value, density, facing) = lobe.between(to_eye, out);
+                let (value, density, facing) = lobe.evaluate(to_eye, out);
                 let share = value / density / SAMPLES as f32;
                 let grazing = fresnel(0.0, facing);
                 table.scale[i] += share * (1.0 - grazing);
@@ -82,19 +84,25 @@ impl Table {
         table
     }
 
-    /// Share reflected of light from slope `z`.
-    pub fn energy(&self, head_on: f32, z: f32) -> f32 {
-        let x = (z * SLOPES as f32 - 0.5).clamp(0.0, SLOPES as f32 - 1.0);
-        let i = (x as usize).min(SLOPES - 2);
+    /// Directional albedo at cosine `z`.
+    pub fn albedo(&self, head_on: f32, z: f32) -> f32 {
+        let x = (z * COSINES as f32 - 0.5).clamp(0.0, COSINES as f32 - 1.0);
+        let i = (x as usize).min(COSINES - 2);
         let at = |i: usize| head_on * self.scale[i] + self.offset[i];
         at(i) + (x - i as f32) * (at(i + 1) - at(i))
     }
 
-    /// Share reflected of even light from all sides.
+    /// Albedo under uniform illumination.
     pub fn mean(&self, head_on: f32) -> f32 {
-        let sum: f32 = (0..SLOPES)
-            .map(|i| (head_on * self.scale[i] + self.offset[i]) * (i as f32 + 0.5) * 2.0 / (SLOPES * SLOPES) as f32)
+        let sum: f32 = (0..COSINES)
+            .map(|i| (head_on * self.scale[i] + self.offset[i]) * (i as f32 + 0.5) * 2.0 / (COSINES * COSINES) as f32)
             .sum();
         sum.min(1.0)
     }
+}
+
+/// Schlick's approximation of the Fresnel reflectance.
+pub(crate) fn fresnel(head_on: f32, facing: f32) -> f32 {
+    let rest = (1.0 - facing).clamp(0.0, 1.0);
+    head_on + (1.0 - head_on) * rest * rest * rest * rest * rest
 }

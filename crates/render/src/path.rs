@@ -1,17 +1,17 @@
-//! Light by paths: every bounce is joined with the lights and goes on in a random direction; what both ways can find is weighed
-//! between them (Veach 1997, the power heuristic).
+//! Path tracing. Every vertex of a path samples the lights directly and a direction of its
+//! material; light that both can find is weighted with the power heuristic (Veach 1997).
 
-use crate::material::{Material, body_direction};
-use crate::preview::{Frame, offset};
+use crate::bvh::{Ray, Stacks};
+use crate::material::{Material, cosine_direction};
 use crate::random::numbers;
-use crate::stage::{Stage, Surface, Touch};
-use crate::tree::{Ray, Stacks};
+use crate::shading_frame::{ShadingFrame, offset};
+use crate::stage::{Stage, StageHit, Surface};
 use glam::Vec3A;
 
-/// Bounces after which paths are ended at random.
-const SURE: u32 = 3;
+/// Number of bounces before Russian roulette starts.
+const ROULETTE_START: u32 = 3;
 
-/// What a path's random numbers are for; `draw` numbers its draws.
+/// Key of the random numbers of one path.
 #[derive(Clone, Copy)]
 pub(crate) struct Key {
     pub seed: u32,
@@ -20,28 +20,28 @@ pub(crate) struct Key {
 }
 
 impl Key {
-    /// Four numbers for purpose `what` at a bounce.
-    pub fn draw(self, bounce: u32, what: u32) -> [f32; 4] {
-        numbers([self.pixel, self.sample, bounce << 8 | what, self.seed])
+    /// Four random numbers for `purpose` at a bounce.
+    pub fn draw(self, bounce: u32, purpose: u32) -> [f32; 4] {
+        numbers([self.pixel, self.sample, bounce << 8 | purpose, self.seed])
     }
 }
 
-/// Purposes of random numbers; lights have theirs from `LIGHTS` on.
+/// Purposes of random numbers. Light `i` uses `LIGHTS + i`.
 pub(crate) const LENS: u32 = 0;
-const GO_ON: u32 = 1;
-const WANDER: u32 = 2;
-const END: u32 = 3;
+const DIRECTION: u32 = 1;
+const SUBSURFACE: u32 = 2;
+const ROULETTE: u32 = 3;
 const LIGHTS: u32 = 16;
 
-/// A place where light is gathered, with its axes.
-struct Place {
+/// A surface point where light is gathered, with its local frame.
+struct PathVertex {
     surface: Surface,
-    frame: Frame,
-    /// Light of the body's part here for one at the place that is seen: wandering chooses it.
+    frame: ShadingFrame,
+    /// Radiance of the base lobe here relative to the visible point. Subsurface sampling sets it.
     weight: Vec3A,
 }
 
-/// Radiance that comes back along one path from `origin` along `direction`, of at most `bounces` bounces.
+/// Radiance along one path from `origin` in `direction` with at most `bounces` bounces.
 pub(crate) fn radiance(
     stage: &Stage,
     origin: Vec3A,
@@ -53,48 +53,50 @@ pub(crate) fn radiance(
     let (mut origin, mut direction) = (origin, direction);
     let mut throughput = Vec3A::ONE;
     let mut sum = Vec3A::ZERO;
-    // Density with which the last bounce chose this direction; none other could for the eye's.
+    // Density with which the last bounce sampled this direction; infinite for camera rays, which
+    // have no alternative.
     let mut density = f32::INFINITY;
     for bounce in 0..=bounces {
-        let touch = stage.first(origin, direction, f32::INFINITY, stacks);
-        let reach = touch.map_or(f32::INFINITY, |t| t.t);
+        let hit = stage.first(origin, direction, f32::INFINITY, stacks);
+        let reach = hit.map_or(f32::INFINITY, |t| t.t);
         if let Some(light) = panel(stage, origin, direction, reach, density) {
             return sum + throughput * light;
         }
-        let Some(touch) = touch else { return sum + throughput * Vec3A::from(stage.environment) };
+        let Some(hit) = hit else { return sum + throughput * Vec3A::from(stage.environment) };
         if bounce == bounces {
             return sum;
         }
-        let surface = stage.surface(&touch, direction);
-        let material = if bounce == 0 { stage.material(&touch) } else { stage.blunt(&touch) };
-        let seen = Place { surface, frame: Frame::new(surface.smooth), weight: Vec3A::ONE };
-        let to_eye = seen.frame.local(-direction.normalize());
-        let below = if bounce == 0 { wander(stage, &touch, &seen, material, key, stacks) } else { None };
-        let share = material.gloss_share(surface.albedo, to_eye);
-        sum += throughput * from_lights(stage, &seen, below.as_ref(), material, to_eye, share, bounce, key, stacks);
+        let surface = stage.surface(&hit, direction);
+        let material = if bounce == 0 { stage.material(&hit) } else { stage.path_material(&hit) };
+        let visible = PathVertex { surface, frame: ShadingFrame::new(surface.smooth), weight: Vec3A::ONE };
+        let to_eye = visible.frame.local(-direction.normalize());
+        let entry = if bounce == 0 { subsurface_entry(stage, &hit, &visible, material, key, stacks) } else { None };
+        let gloss_probability = material.gloss_probability(surface.albedo, to_eye);
+        sum += throughput
+            * direct_light(stage, &visible, entry.as_ref(), material, to_eye, gloss_probability, bounce, key, stacks);
 
-        let [choice, a, b, _] = key.draw(bounce, GO_ON);
-        let (place, towards, factor, chosen) = if choice < share {
-            let Some(towards) = material.gloss_direction(to_eye, [a, b]) else { return sum };
-            let parts = material.parts(surface.albedo, to_eye, towards);
-            (&seen, towards, parts.gloss, parts.gloss_density * share)
+        let [choice, a, b, _] = key.draw(bounce, DIRECTION);
+        let (vertex, towards, factor, chosen) = if choice < gloss_probability {
+            let Some(towards) = material.sample_gloss(to_eye, [a, b]) else { return sum };
+            let lobes = material.lobes(surface.albedo, to_eye, towards);
+            (&visible, towards, lobes.gloss, lobes.gloss_density * gloss_probability)
         } else {
-            let place = below.as_ref().unwrap_or(&seen);
-            let towards = body_direction([a, b]);
-            let parts = material.parts(place.surface.albedo, to_eye, towards);
-            (place, towards, parts.body * place.weight, parts.body_density * (1.0 - share))
+            let vertex = entry.as_ref().unwrap_or(&visible);
+            let towards = cosine_direction([a, b]);
+            let lobes = material.lobes(vertex.surface.albedo, to_eye, towards);
+            (vertex, towards, lobes.base * vertex.weight, lobes.base_density * (1.0 - gloss_probability))
         };
-        direction = place.frame.world(towards);
-        // A smooth normal may send it below the triangle.
-        if chosen.is_nan() || chosen <= 0.0 || direction.dot(place.surface.flat) <= 0.0 {
+        direction = vertex.frame.world(towards);
+        // A shading normal can send the direction below the triangle.
+        if chosen.is_nan() || chosen <= 0.0 || direction.dot(vertex.surface.flat) <= 0.0 {
             return sum;
         }
         throughput *= factor / chosen;
         density = chosen;
-        origin = place.surface.position + place.surface.flat * offset(place.surface.position);
-        if bounce >= SURE {
+        origin = vertex.surface.position + vertex.surface.flat * offset(vertex.surface.position);
+        if bounce >= ROULETTE_START {
             let survives = throughput.max_element().min(0.95);
-            if survives.is_nan() || key.draw(bounce, END)[0] >= survives {
+            if survives.is_nan() || key.draw(bounce, ROULETTE)[0] >= survives {
                 return sum;
             }
             throughput /= survives;
@@ -103,29 +105,30 @@ pub(crate) fn radiance(
     sum
 }
 
-/// Radiance of the nearest panel before `reach`, weighed against the joining that could have found it.
+/// Radiance of the nearest panel before `reach`, weighted against direct light sampling.
 fn panel(stage: &Stage, origin: Vec3A, direction: Vec3A, reach: f32, density: f32) -> Option<Vec3A> {
     let ray = Ray::new(origin, direction);
     let mut nearest: Option<(f32, Vec3A)> = None;
     for lamp in stage.lamps() {
         let limit = nearest.map_or(reach, |n| n.0);
-        if let Some((t, radiance, joined)) = lamp.met(&ray, limit) {
-            let weight = if density.is_infinite() { 1.0 } else { heuristic(density, joined) };
+        if let Some((t, radiance, joined)) = lamp.intersect(&ray, limit) {
+            let weight = if density.is_infinite() { 1.0 } else { power_heuristic(density, joined) };
             nearest = Some((t, radiance * weight));
         }
     }
     nearest.map(|n| n.1)
 }
 
-/// Light from all lights by joining: the gloss at the place seen, the body where light went in.
-#[allow(clippy::too_many_arguments, reason = "one call; the arguments are one place on a path")]
-fn from_lights(
+/// Direct light from all lights: the gloss lobe at the visible point, the base lobe where light
+/// entered.
+#[allow(clippy::too_many_arguments, reason = "one call; the arguments are one vertex on a path")]
+fn direct_light(
     stage: &Stage,
-    seen: &Place,
-    below: Option<&Place>,
+    visible: &PathVertex,
+    entry: Option<&PathVertex>,
     material: &Material,
     to_eye: Vec3A,
-    share: f32,
+    gloss_probability: f32,
     bounce: u32,
     key: Key,
     stacks: &mut Stacks,
@@ -133,68 +136,70 @@ fn from_lights(
     let mut sum = Vec3A::ZERO;
     for (index, lamp) in stage.lamps().iter().enumerate() {
         let [a, b, ..] = key.draw(bounce, LIGHTS + (index as u32 & 0x7f));
-        let mut gather = |place: &Place, gloss: bool, body: bool| {
-            let Some(arriving) = lamp.arriving(place.surface.position, [a, b]) else { return };
-            if arriving.direction.dot(place.surface.flat) <= 0.0 {
+        let mut gather = |vertex: &PathVertex, gloss: bool, base: bool| {
+            let Some(arriving) = lamp.arriving(vertex.surface.position, [a, b]) else { return };
+            if arriving.direction.dot(vertex.surface.flat) <= 0.0 {
                 return;
             }
-            let parts = material.parts(place.surface.albedo, to_eye, place.frame.local(arriving.direction));
+            let lobes = material.lobes(vertex.surface.albedo, to_eye, vertex.frame.local(arriving.direction));
             let mut back = Vec3A::ZERO;
             if gloss {
-                back += parts.gloss * joined_weight(arriving.density, parts.gloss_density * share);
+                back += lobes.gloss * direct_weight(arriving.density, lobes.gloss_density * gloss_probability);
             }
-            if body {
-                let weight = joined_weight(arriving.density, parts.body_density * (1.0 - share));
-                back += parts.body * place.weight * weight;
+            if base {
+                let weight = direct_weight(arriving.density, lobes.base_density * (1.0 - gloss_probability));
+                back += lobes.base * vertex.weight * weight;
             }
             if back == Vec3A::ZERO {
                 return;
             }
-            let origin = place.surface.position + place.surface.flat * offset(place.surface.position);
+            let origin = vertex.surface.position + vertex.surface.flat * offset(vertex.surface.position);
             if !stage.blocked(origin, arriving.direction, arriving.distance * (1.0 - 1e-4), stacks) {
                 sum += back * arriving.light;
             }
         };
-        match below {
-            None => gather(seen, true, true),
-            Some(below) => {
-                gather(seen, true, false);
-                gather(below, false, true);
+        match entry {
+            None => gather(visible, true, true),
+            Some(entry) => {
+                gather(visible, true, false);
+                gather(entry, false, true);
             }
         }
     }
     sum
 }
 
-/// Weight of joining against going on; points are only found by joining.
-fn joined_weight(joined: f32, going_on: f32) -> f32 {
-    if joined == 0.0 { 1.0 } else { heuristic(joined, going_on) }
+/// Weight of direct light sampling against direction sampling. Only direct sampling finds point
+/// lights.
+fn direct_weight(direct: f32, sampled: f32) -> f32 {
+    if direct == 0.0 { 1.0 } else { power_heuristic(direct, sampled) }
 }
 
 /// The power heuristic.
-fn heuristic(chosen: f32, other: f32) -> f32 {
+fn power_heuristic(chosen: f32, other: f32) -> f32 {
     let (a, b) = (chosen * chosen, other * other);
     if a.is_infinite() { 1.0 } else { a / (a + b).max(1e-30) }
 }
 
-/// Where light that comes out at `seen` went in: Burley's profile of normalised diffusion (Christensen and Burley 2015,
-/// "Approximate Reflectance Profiles for Efficient Subsurface Scattering"), found by a short ray through the same body. The
-/// profile integrates to 1 for each colour, so no light is lost or made on a flat surface.
-fn wander(
+/// Point where light that leaves at `visible` entered the surface: Burley's profile of normalised
+/// diffusion (Christensen and Burley 2015, "Approximate Reflectance Profiles for Efficient
+/// Subsurface Scattering"), found by a short ray through the same body. The profile integrates to 1
+/// for each colour, so a flat surface loses and gains no light.
+fn subsurface_entry(
     stage: &Stage,
-    touch: &Touch,
-    seen: &Place,
+    hit: &StageHit,
+    visible: &PathVertex,
     material: &Material,
     key: Key,
     stacks: &mut Stacks,
-) -> Option<Place> {
-    let lengths = material.wander;
+) -> Option<PathVertex> {
+    let lengths = material.scattering_length;
     if lengths == Vec3A::ZERO {
         return None;
     }
-    let [which, a, b, turn] = key.draw(0, WANDER);
+    let [which, a, b, turn] = key.draw(0, SUBSURFACE);
     let length = lengths[((which * 3.0) as usize).min(2)];
-    // A quarter falls off with the length, the rest with three times it.
+    // A quarter of the profile decays with the length, the rest with three times the length.
     let scale = if a < 0.25 { length } else { 3.0 * length };
     let radius = -scale * (1.0 - b).ln();
     let profile = |length: f32| {
@@ -210,16 +215,16 @@ fn wander(
     if mean.is_nan() || mean <= 0.0 || !radius.is_finite() {
         return None;
     }
-    let normal = seen.surface.flat;
+    let normal = visible.surface.flat;
     let (x, y) = normal.any_orthonormal_pair();
     let (sin, cos) = (std::f32::consts::TAU * turn).sin_cos();
     let height = radius + 0.5 * length;
-    let above = seen.surface.position + (x * cos + y * sin) * radius + normal * height;
-    let found = stage.first_of(touch.body, above, -normal, 2.0 * height, stacks);
+    let above = visible.surface.position + (x * cos + y * sin) * radius + normal * height;
+    let found = stage.first_of(hit.body, above, -normal, 2.0 * height, stacks);
     let surface = match found {
         Some(found) => stage.surface(&found, -normal),
-        // Beside a rim: it comes out where it went in.
-        None => seen.surface,
+        // Beside a rim: light leaves where it entered.
+        None => visible.surface,
     };
-    Some(Place { surface, frame: Frame::new(surface.smooth), weight: each / mean })
+    Some(PathVertex { surface, frame: ShadingFrame::new(surface.smooth), weight: each / mean })
 }

@@ -1,27 +1,29 @@
-//! A rendered ChArUco board, calibrated by OpenCV, gives back the camera that it was rendered with. Skipped, saying so, without OpenCV.
+//! Renders a ChArUco board and calibrates the camera from the pictures with OpenCV. The result must
+//! be the camera that rendered them. Prints that it is skipped if OpenCV is missing.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
 use glam::{DQuat, DVec3};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use trocar_camera::{Camera, CameraModel, ColorImage, Distortion, Fisheye, Pose};
+use trocar_camera::{Camera, CameraModel, ColorImage, Distortion, Fisheye};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
-use trocar_render::{Eye, Film, Look, Settings, Stage, render, srgb};
+use trocar_render::{Appearance, Film, RayGenerator, RenderSettings, Stage, render, srgb};
 
-/// Squares of the board.
+/// Number of squares of the board.
 const COLUMNS: usize = 10;
 const ROWS: usize = 8;
-/// Cells of a square, and a cell's side [m].
+/// Cells per side of a square, and the side of a cell (m).
 const CELLS: usize = 12;
 const CELL: f64 = 1.25e-3;
-/// White around the board [cells].
+/// White margin around the board, in cells.
 const MARGIN: usize = 4;
-/// Rays along each side of a pixel.
+/// Supersampling factor per side of a pixel.
 const FINER: usize = 3;
 const POSES: usize = 30;
 
-/// The Python with OpenCV's ArUco, or why there is none.
+/// The Python interpreter with OpenCV's ArUco, if it is installed.
 fn python() -> Option<PathBuf> {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
     let imports = Command::new(&python).args(["-c", "import cv2; cv2.aruco.CharucoDetector"]).output();
@@ -38,7 +40,8 @@ fn script(python: &Path, arguments: &[&str]) {
     assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
-/// The board in its own plane, its middle at the origin, a quad of its own vertices for each cell: colours do not run into one another.
+/// The board in its own plane, centred at the origin. Each cell is a quad with its own vertices, so
+/// that colours do not blend.
 fn board(cells: &[u8]) -> TriMesh {
     let (columns, rows) = (CELLS * COLUMNS, CELLS * ROWS);
     let mut mesh = TriMesh::default();
@@ -59,10 +62,11 @@ fn board(cells: &[u8]) -> TriMesh {
     mesh
 }
 
-/// Board to camera: near and far, all over the picture, tilted by 23 to 52 degrees to all sides and turned.
+/// Poses of the board in the camera frame: near and far, all over the picture, tilted by 23 to 52
+/// degrees in all directions and rotated.
 fn poses(model: &CameraModel) -> Vec<Pose> {
     let camera = model.camera();
-    // Shares of 1 that fill the cube evenly (Roberts' R4 sequence).
+    // A low-discrepancy sequence in the unit cube (Roberts' R4 sequence).
     let share = |i: usize, k: i32| (0.5 + i as f64 * 1.167_303_978_261_418_7_f64.powi(-k)).fract();
     (0..POSES)
         .map(|i| {
@@ -79,7 +83,7 @@ fn poses(model: &CameraModel) -> Vec<Pose> {
         .collect()
 }
 
-/// The camera with `FINER` times as many pixels a side.
+/// The camera with `FINER` times as many pixels per side.
 fn finer(model: &CameraModel) -> CameraModel {
     let k = FINER as f64;
     let fine = |c: &Camera| Camera {
@@ -97,7 +101,7 @@ fn finer(model: &CameraModel) -> CameraModel {
     }
 }
 
-/// The mean light of every `FINER` x `FINER` pixels.
+/// Averages the light over blocks of `FINER` x `FINER` pixels.
 fn reduced(light: &[[f32; 3]], width: usize, height: usize) -> ColorImage {
     let mut out = ColorImage::new(width, height, [0; 3]);
     for (i, pixel) in out.pixels.iter_mut().enumerate() {
@@ -112,7 +116,8 @@ fn reduced(light: &[[f32; 3]], width: usize, height: usize) -> ColorImage {
     out
 }
 
-/// Pictures of the board through `model`, calibrated: pictures and corners used, RMS, and the worst relative error of the intrinsics.
+/// Renders the board through `model` and calibrates the camera. Returns the RMS reprojection error
+/// (px) and the largest relative error of the intrinsics.
 fn calibrated(python: &Path, name: &str, model: &CameraModel) -> (f64, f64) {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().to_str().unwrap();
@@ -121,12 +126,12 @@ fn calibrated(python: &Path, name: &str, model: &CameraModel) -> (f64, f64) {
     let mut stage = Stage::new();
     stage.environment = [1.0; 3];
     let shape = stage.add_shape(&board(&std::fs::read(folder.path().join("board")).unwrap())).unwrap();
-    let body = stage.add_body(shape, &Pose::IDENTITY, 1, &Look::matte([128; 3])).unwrap();
-    let eye = Eye::new(finer(model));
+    let body = stage.add_body(shape, &Pose::IDENTITY, 1, &Appearance::matte([128; 3])).unwrap();
+    let eye = RayGenerator::new(finer(model));
     let (width, height) = (model.camera().width, model.camera().height);
     for (i, pose) in poses(model).iter().enumerate() {
         stage.place(body, pose).unwrap();
-        let settings = Settings::Preview { shadows: false };
+        let settings = RenderSettings::Preview { shadows: false };
         let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
         let picture = reduced(&picture.light, width, height);
         picture.write_png(&folder.path().join(format!("{i:02}.png"))).unwrap();
@@ -159,7 +164,7 @@ fn calibrated(python: &Path, name: &str, model: &CameraModel) -> (f64, f64) {
 }
 
 #[test]
-fn opencv_gives_back_the_camera_that_a_board_was_rendered_with() {
+fn opencv_recovers_the_rendering_camera() {
     let Some(python) = python() else { return };
     let camera = Camera {
         width: 800,

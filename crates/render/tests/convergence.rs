@@ -1,4 +1,5 @@
-//! Path tracing in a box lit from its ceiling comes nearer to the truth with the root of the samples.
+//! The error of path tracing falls with the square root of the number of samples, in a box lit from
+//! its ceiling.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -6,10 +7,11 @@ mod common;
 
 use common::{quad, sphere};
 use glam::DVec3;
-use trocar_camera::{Camera, Pose};
-use trocar_render::{Eye, Film, Light, Look, Settings, Stage, render};
+use trocar_camera::Camera;
+use trocar_core::Pose;
+use trocar_render::{Appearance, Film, Light, RayGenerator, RenderSettings, Stage, render};
 
-/// A Cornell-like box of 10 cm, open to the eye, with a tissue ball and a steel one.
+/// A Cornell-like box of 10 cm, open towards the camera, with a tissue ball and a steel ball.
 fn stage() -> Stage {
     let mut stage = Stage::new();
     let (x, y, z) = (0.1 * DVec3::X, 0.1 * DVec3::Y, 0.1 * DVec3::Z);
@@ -22,10 +24,10 @@ fn stage() -> Stage {
         (quad(o + x, y, z), [30, 170, 40]),
     ];
     for (wall, color) in walls {
-        stage.add_mesh(&wall, 1, &Look::matte(color)).unwrap();
+        stage.add_mesh(&wall, 1, &Appearance::matte(color)).unwrap();
     }
-    stage.add_mesh(&sphere(DVec3::new(-0.02, 0.03, 0.16), 0.02, 40), 2, &Look::tissue([200, 90, 80])).unwrap();
-    stage.add_mesh(&sphere(DVec3::new(0.02, 0.035, 0.15), 0.015, 40), 3, &Look::steel()).unwrap();
+    stage.add_mesh(&sphere(DVec3::new(-0.02, 0.03, 0.16), 0.02, 40), 2, &Appearance::tissue([200, 90, 80])).unwrap();
+    stage.add_mesh(&sphere(DVec3::new(0.02, 0.035, 0.15), 0.015, 40), 3, &Appearance::steel()).unwrap();
     stage.lights.push(Light::Panel {
         corner: DVec3::new(-0.02, -0.0499, 0.13),
         along: 0.04 * DVec3::Z,
@@ -36,11 +38,11 @@ fn stage() -> Stage {
 }
 
 #[test]
-fn the_error_falls_with_the_root_of_the_samples() {
-    let eye = Eye::new(Camera::centred(24, 24, 0.9));
+fn error_falls_with_the_square_root_of_the_samples() {
+    let eye = RayGenerator::new(Camera::centred(24, 24, 0.9));
     let mut stage = stage();
     let mut light = |samples: u32, seed: u32| -> Vec<f64> {
-        let settings = Settings::Path { samples, bounces: 6, seed };
+        let settings = RenderSettings::Path { samples, bounces: 6, seed };
         let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
         picture.light.iter().flatten().map(|l| f64::from(*l)).collect()
     };
@@ -48,7 +50,7 @@ fn the_error_falls_with_the_root_of_the_samples() {
     let mean = truth.iter().sum::<f64>() / truth.len() as f64;
     assert!(mean > 0.1, "the box is lit: {mean}");
     let mut error = |samples: u32| {
-        // Several seeds, so that the figure is sharp enough to tell 1/2 from 0.45.
+        // Several seeds, so that the estimate can distinguish an exponent of 0.5 from 0.45.
         let squares: f64 =
             (0..4).map(|seed| light(samples, seed).iter().zip(&truth).map(|(a, b)| (a - b).powi(2)).sum::<f64>()).sum();
         (squares / (4.0 * truth.len() as f64)).sqrt()

@@ -1,4 +1,4 @@
-//! The ray tracer on scenes whose pictures are known.
+//! The ray tracer on stages with known pictures.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -7,16 +7,19 @@ mod common;
 use common::{quad, sphere};
 use glam::{DQuat, DVec3};
 use std::f64::consts::PI;
-use trocar_camera::{Camera, CameraModel, Distortion, Fisheye, Pose};
+use trocar_camera::{Camera, CameraModel, Distortion, Fisheye};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
-use trocar_render::{Error, Eye, Film, Light, Look, Noise, Picture, Settings, Stage, SurfaceKind, render};
+use trocar_render::{
+    Appearance, Error, Film, Light, Noise, Picture, RayGenerator, RenderSettings, Stage, SurfaceKind, render,
+};
 
 fn camera(width: usize, height: usize) -> Camera {
     Camera::centred(width, height, 1.2)
 }
 
-fn preview(stage: &mut Stage, eye: &Eye, pose: &Pose) -> Picture {
-    render(stage, eye, pose, &Settings::preview(), &Film::default())
+fn preview(stage: &mut Stage, eye: &RayGenerator, pose: &Pose) -> Picture {
+    render(stage, eye, pose, &RenderSettings::preview(), &Film::default())
 }
 
 fn lit(lights: Vec<Light>, environment: f32) -> Stage {
@@ -43,7 +46,7 @@ fn models() -> Vec<CameraModel> {
 }
 
 #[test]
-fn depth_labels_and_normals_are_exact_through_every_lens() {
+fn depth_labels_and_normals_are_exact_for_every_lens() {
     let pose = askew();
     let middle = DVec3::new(0.01, 0.02, 0.3);
     let normal = DVec3::new(0.25, -0.4, -1.0).normalize();
@@ -53,15 +56,15 @@ fn depth_labels_and_normals_are_exact_through_every_lens() {
     let (ball, radius) = (DVec3::new(-0.02, 0.01, 0.2), 0.03);
     for model in models() {
         let mut stage = Stage::new();
-        stage.add_mesh(&plane, 7, &Look::matte([200; 3])).unwrap();
-        stage.add_mesh(&sphere(pose.transform(ball), radius, 240), 3, &Look::steel()).unwrap();
-        let picture = preview(&mut stage, &Eye::new(model), &pose);
+        stage.add_mesh(&plane, 7, &Appearance::matte([200; 3])).unwrap();
+        stage.add_mesh(&sphere(pose.transform(ball), radius, 240), 3, &Appearance::steel()).unwrap();
+        let picture = preview(&mut stage, &RayGenerator::new(model), &pose);
         let (mut checked, mut balls) = (0, 0);
         for i in 0..160 * 120 {
             let ray = model.unproject((i % 160) as f64, (i / 160) as f64).unwrap();
             let along = ray.dot(ball);
             let aside2 = ball.length_squared() - along * along;
-            // Off the ball's edge, which is a polygon's.
+            // Skip the edge of the ball, which is a polygon.
             if (aside2.sqrt() - radius).abs() < 1e-4 {
                 continue;
             }
@@ -86,20 +89,20 @@ fn depth_labels_and_normals_are_exact_through_every_lens() {
 }
 
 #[test]
-fn a_placed_body_is_as_if_its_vertices_had_been_moved() {
+fn placing_a_body_equals_moving_its_vertices() {
     let pose = Pose { rotation: DQuat::from_rotation_y(0.7), translation: DVec3::new(0.02, -0.01, 0.25) };
     let shape = sphere(DVec3::new(0.03, 0.0, 0.0), 0.04, 12);
     let moved = TriMesh { vertices: shape.vertices.iter().map(|p| pose.transform(*p)).collect(), ..shape.clone() };
-    let eye = Eye::new(camera(120, 90));
+    let eye = RayGenerator::new(camera(120, 90));
     let mut placed = Stage::new();
     let id = placed.add_shape(&shape).unwrap();
     let far = Pose { translation: DVec3::Z, ..Pose::IDENTITY };
-    let body = placed.add_body(id, &far, 1, &Look::steel()).unwrap();
-    placed.add_body(id, &pose, 2, &Look::steel()).unwrap();
+    let body = placed.add_body(id, &far, 1, &Appearance::steel()).unwrap();
+    placed.add_body(id, &pose, 2, &Appearance::steel()).unwrap();
     preview(&mut placed, &eye, &Pose::IDENTITY);
     placed.place(body, &Pose { translation: DVec3::new(0.0, 0.0, -1.0), ..Pose::IDENTITY }).unwrap();
     let mut baked = Stage::new();
-    baked.add_mesh(&moved, 2, &Look::steel()).unwrap();
+    baked.add_mesh(&moved, 2, &Appearance::steel()).unwrap();
     let (a, b) = (preview(&mut placed, &eye, &Pose::IDENTITY), preview(&mut baked, &eye, &Pose::IDENTITY));
     let meeting = placed.cast(glam::Vec3::ZERO, glam::Vec3::new(0.02, -0.01, 0.25)).unwrap();
     assert!(meeting.body != body && meeting.t < 1.0);
@@ -112,58 +115,58 @@ fn a_placed_body_is_as_if_its_vertices_had_been_moved() {
 }
 
 #[test]
-fn a_deformed_shape_is_as_one_built_anew() {
+fn deformed_shape_equals_rebuilt_shape() {
     let rest = sphere(DVec3::new(0.0, 0.0, 0.3), 0.06, 40);
     let bent: Vec<DVec3> = rest
         .vertices
         .iter()
         .map(|p| *p + DVec3::new(0.03 * (40.0 * p.y).sin(), 0.0, 0.02 * (50.0 * p.x).cos()))
         .collect();
-    let eye = Eye::new(camera(120, 90));
+    let eye = RayGenerator::new(camera(120, 90));
     let lights = vec![Light::endoscope(&Pose::IDENTITY, 0.01, 0.2)];
     let mut deformed = lit(lights.clone(), 0.0);
-    let (shape, _) = deformed.add_mesh(&rest, 1, &Look::tissue([180, 80, 70])).unwrap();
+    let (shape, _) = deformed.add_mesh(&rest, 1, &Appearance::tissue([180, 80, 70])).unwrap();
     preview(&mut deformed, &eye, &Pose::IDENTITY);
     deformed.deform(shape, &bent).unwrap();
     let mut anew = lit(lights, 0.0);
-    anew.add_mesh(&TriMesh { vertices: bent, ..rest }, 1, &Look::tissue([180, 80, 70])).unwrap();
+    anew.add_mesh(&TriMesh { vertices: bent, ..rest }, 1, &Appearance::tissue([180, 80, 70])).unwrap();
     assert_eq!(preview(&mut deformed, &eye, &Pose::IDENTITY), preview(&mut anew, &eye, &Pose::IDENTITY));
 }
 
 #[test]
-fn one_thread_and_two_give_the_same_bits() {
-    let picture = |threads: usize, settings: &Settings| {
+fn picture_does_not_depend_on_thread_count() {
+    let picture = |threads: usize, settings: &RenderSettings| {
         let mut stage = lit(Vec::new(), 0.1);
         stage.lights.push(Light::endoscope(&Pose::IDENTITY, 0.005, 0.2));
-        stage.add_mesh(&sphere(DVec3::new(0.0, 0.0, 0.25), 0.05, 20), 1, &Look::tissue([180, 80, 70])).unwrap();
+        stage.add_mesh(&sphere(DVec3::new(0.0, 0.0, 0.25), 0.05, 20), 1, &Appearance::tissue([180, 80, 70])).unwrap();
         let floor = quad(DVec3::new(-1.0, -1.0, 0.35), 2.0 * DVec3::X, 2.0 * DVec3::Y);
-        stage.add_mesh(&floor, 2, &Look::steel()).unwrap();
+        stage.add_mesh(&floor, 2, &Appearance::steel()).unwrap();
         let film = Film { noise: Some(Noise { shot: 0.02, read: 0.005, seed: 4, frame: 2 }), ..Film::endoscope() };
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| render(&mut stage, &Eye::new(camera(61, 47)), &Pose::IDENTITY, settings, &film))
+        pool.install(|| render(&mut stage, &RayGenerator::new(camera(61, 47)), &Pose::IDENTITY, settings, &film))
     };
-    for settings in [Settings::preview(), Settings::path(4)] {
+    for settings in [RenderSettings::preview(), RenderSettings::path(4)] {
         assert!(picture(1, &settings) == picture(2, &settings), "{settings:?}");
     }
-    let other = Settings::Path { samples: 4, bounces: 8, seed: 1 };
-    assert!(picture(1, &other) != picture(1, &Settings::path(4)), "another seed gives other noise");
+    let other = RenderSettings::Path { samples: 4, bounces: 8, seed: 1 };
+    assert!(picture(1, &other) != picture(1, &RenderSettings::path(4)), "another seed gives other noise");
 }
 
 #[test]
-fn in_a_white_room_a_white_body_cannot_be_seen() {
+fn white_body_is_invisible_in_a_white_room() {
     let kinds = [
         SurfaceKind::Matte,
         SurfaceKind::Metal { roughness: 0.3 },
         SurfaceKind::Metal { roughness: 0.9 },
-        SurfaceKind::Coated { roughness: 0.3, ior: 1.4, wander: [0.0; 3] },
-        SurfaceKind::Coated { roughness: 0.3, ior: 1.4, wander: [2e-3, 1e-3, 0.5e-3] },
+        SurfaceKind::Coated { roughness: 0.3, ior: 1.4, scattering_length: [0.0; 3] },
+        SurfaceKind::Coated { roughness: 0.3, ior: 1.4, scattering_length: [2e-3, 1e-3, 0.5e-3] },
     ];
     for kind in kinds {
         let mut stage = lit(Vec::new(), 1.0);
-        let look = Look { color: [255; 3], surface: kind };
+        let look = Appearance { color: [255; 3], surface: kind };
         stage.add_mesh(&sphere(DVec3::new(0.0, 0.0, 0.3), 0.1, 300), 1, &look).unwrap();
-        let eye = Eye::new(camera(32, 32));
-        let settings = Settings::Path { samples: 256, bounces: 32, seed: 3 };
+        let eye = RayGenerator::new(camera(32, 32));
+        let settings = RenderSettings::Path { samples: 256, bounces: 32, seed: 3 };
         let picture = render(&mut stage, &eye, &Pose::IDENTITY, &settings, &Film::default());
         let seen: Vec<usize> = (0..32 * 32).filter(|i| picture.labels[*i] == 1).collect();
         assert!(seen.len() > 100);
@@ -175,8 +178,9 @@ fn in_a_white_room_a_white_body_cannot_be_seen() {
 }
 
 #[test]
-fn a_panel_lights_as_its_form_factor_says() {
-    // A point below the middle of a parallel square of half side a at height h: the view factor has a closed form.
+fn panel_light_matches_its_form_factor() {
+    // View factor of a point below the centre of a parallel square with half side a at height h, in
+    // closed form.
     let (a, h) = (0.1_f64, 0.15_f64);
     let mut stage = Stage::new();
     stage.lights.push(Light::Panel {
@@ -186,11 +190,11 @@ fn a_panel_lights_as_its_form_factor_says() {
         radiance: [2.0; 3],
     });
     let floor = quad(DVec3::new(-1.0, -1.0, 0.3), 2.0 * DVec3::X, 2.0 * DVec3::Y);
-    stage.add_mesh(&floor, 1, &Look::matte([255; 3])).unwrap();
-    // From aside, below the panel; a view of a millimetre about the middle.
+    stage.add_mesh(&floor, 1, &Appearance::matte([255; 3])).unwrap();
+    // Seen from the side, below the panel, with a field of view of a millimetre around the centre.
     let pose = Pose::look_at(DVec3::new(0.1, 0.0, 0.2), DVec3::new(0.0, 0.0, 0.3), DVec3::Y);
-    let eye = Eye::new(Camera::centred(8, 8, 0.005));
-    let settings = Settings::Path { samples: 4000, bounces: 4, seed: 0 };
+    let eye = RayGenerator::new(Camera::centred(8, 8, 0.005));
+    let settings = RenderSettings::Path { samples: 4000, bounces: 4, seed: 0 };
     let picture = render(&mut stage, &eye, &pose, &settings, &Film::default());
     let mean = picture.light.iter().map(|l| f64::from(l[0])).sum::<f64>() / 64.0;
     let x = a / (a * a + h * h).sqrt();
@@ -199,14 +203,14 @@ fn a_panel_lights_as_its_form_factor_says() {
 }
 
 #[test]
-fn a_spot_falls_off_with_the_square_and_ends_at_its_cone() {
+fn spot_light_falls_off_with_the_square_and_ends_at_its_cone() {
     let light = |distance: f64, aim: DVec3| {
         let mut stage = Stage::new();
         let (inner, outer) = (0.3, 0.4);
         stage.lights.push(Light::Spot { position: DVec3::ZERO, direction: aim, intensity: [1.0; 3], inner, outer });
         let floor = quad(DVec3::new(-1.0, -1.0, distance), 2.0 * DVec3::X, 2.0 * DVec3::Y);
-        stage.add_mesh(&floor, 1, &Look::matte([255; 3])).unwrap();
-        let eye = Eye::new(Camera::centred(1, 1, 0.01));
+        stage.add_mesh(&floor, 1, &Appearance::matte([255; 3])).unwrap();
+        let eye = RayGenerator::new(Camera::centred(1, 1, 0.01));
         preview(&mut stage, &eye, &Pose::IDENTITY).light[0][0]
     };
     let near = light(0.1, DVec3::Z);
@@ -218,13 +222,13 @@ fn a_spot_falls_off_with_the_square_and_ends_at_its_cone() {
 }
 
 #[test]
-fn a_lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
+fn lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
     let mut stage = Stage::new();
     let position = DVec3::new(0.1, 0.0, 0.0);
     stage.lights.push(Light::Spot { position, direction: DVec3::Z, intensity: [0.1; 3], inner: PI, outer: PI });
     let floor = quad(DVec3::new(-1.0, -1.0, 0.3), 2.0 * DVec3::X, 2.0 * DVec3::Y);
-    stage.add_mesh(&floor, 1, &Look::matte([255; 3])).unwrap();
-    stage.add_mesh(&sphere(DVec3::new(0.0, 0.0, 0.2), 0.02, 30), 2, &Look::matte([255; 3])).unwrap();
+    stage.add_mesh(&floor, 1, &Appearance::matte([255; 3])).unwrap();
+    stage.add_mesh(&sphere(DVec3::new(0.0, 0.0, 0.2), 0.02, 30), 2, &Appearance::matte([255; 3])).unwrap();
     let camera = camera(90, 60);
     let at = |picture: &Picture, x: f64| {
         let p = camera.project(DVec3::new(x, 0.0, 0.3)).unwrap().round();
@@ -232,22 +236,23 @@ fn a_lamp_beside_the_lens_casts_a_shadow_in_both_settings() {
         assert_eq!(picture.labels[i], 1, "the floor at {x}");
         picture.light[i][0]
     };
-    // The lamp's ray through the ball's middle meets the floor at x = -0.05.
-    for settings in [Settings::preview(), Settings::Path { samples: 4, bounces: 1, seed: 0 }] {
-        let picture = render(&mut stage, &Eye::new(camera), &Pose::IDENTITY, &settings, &Film::default());
+    // The lamp's ray through the centre of the ball meets the floor at x = -0.05.
+    for settings in [RenderSettings::preview(), RenderSettings::Path { samples: 4, bounces: 1, seed: 0 }] {
+        let picture = render(&mut stage, &RayGenerator::new(camera), &Pose::IDENTITY, &settings, &Film::default());
         assert_eq!(at(&picture, -0.05), 0.0, "{settings:?}");
         assert!(at(&picture, 0.06) > 0.0, "{settings:?}");
     }
-    let without = Settings::Preview { shadows: false };
-    let picture = render(&mut stage, &Eye::new(camera), &Pose::IDENTITY, &without, &Film::default());
+    let without = RenderSettings::Preview { shadows: false };
+    let picture = render(&mut stage, &RayGenerator::new(camera), &Pose::IDENTITY, &without, &Film::default());
     assert!(at(&picture, -0.05) > 0.0);
 }
 
 #[test]
-fn the_film_does_what_it_says() {
+fn film_applies_exposure_vignette_noise_and_shoulder() {
     let mut stage = lit(Vec::new(), 0.25);
-    let eye = Eye::new(camera(200, 100)).round(0.9);
-    let shot = |stage: &mut Stage, film: &Film| render(stage, &eye, &Pose::IDENTITY, &Settings::preview(), film).color;
+    let eye = RayGenerator::new(camera(200, 100)).with_circular_image(0.9);
+    let shot =
+        |stage: &mut Stage, film: &Film| render(stage, &eye, &Pose::IDENTITY, &RenderSettings::preview(), film).color;
     let plain = shot(&mut stage, &Film { exposure: 2.0, ..Film::default() });
     assert_eq!(plain.pixels[50 * 200 + 100], [188; 3], "half the light");
     assert_eq!(plain.pixels[50 * 200 + 10], [0; 3], "outside of the circle");
@@ -274,10 +279,10 @@ fn the_film_does_what_it_says() {
 }
 
 #[test]
-fn what_does_not_fit_is_refused_and_nonsense_is_survived() {
+fn mismatches_are_rejected_and_invalid_input_is_handled() {
     let mut stage = Stage::new();
-    let (shape, _) = stage.add_mesh(&sphere(DVec3::Z, 0.1, 8), 1, &Look::steel()).unwrap();
-    let other = Stage::new().add_body(shape, &Pose::IDENTITY, 1, &Look::steel());
+    let (shape, _) = stage.add_mesh(&sphere(DVec3::Z, 0.1, 8), 1, &Appearance::steel()).unwrap();
+    let other = Stage::new().add_body(shape, &Pose::IDENTITY, 1, &Appearance::steel());
     assert_eq!(other.unwrap_err().to_string(), "there is no shape 0; the stage has 0");
     let error = stage.deform(shape, &[DVec3::ZERO]).unwrap_err();
     assert_eq!(error, Error::Vertices { shape: 0, has: 144, given: 1 });
@@ -286,50 +291,54 @@ fn what_does_not_fit_is_refused_and_nonsense_is_survived() {
     broken.vertices[20] = DVec3::NAN;
     broken.vertices[40] = DVec3::splat(1e300);
     broken.triangles.push([0, 1, 99_999]);
-    let odd = Look {
+    let odd = Appearance {
         color: [255; 3],
-        surface: SurfaceKind::Coated { roughness: f32::NAN, ior: f32::INFINITY, wander: [f32::NAN, -1.0, 1e30] },
+        surface: SurfaceKind::Coated {
+            roughness: f32::NAN,
+            ior: f32::INFINITY,
+            scattering_length: [f32::NAN, -1.0, 1e30],
+        },
     };
     let (shape, body) = stage.add_mesh(&broken, 2, &odd).unwrap();
     stage.lights.push(Light::endoscope(&Pose::IDENTITY, 0.0, f64::NAN));
     stage.lights.push(Light::Panel { corner: DVec3::ZERO, along: DVec3::ZERO, across: DVec3::NAN, radiance: [1.0; 3] });
-    let eyes = [Eye::new(camera(16, 16)), Eye::new(camera(16, 16)).round(f32::NAN)];
+    let eyes = [RayGenerator::new(camera(16, 16)), RayGenerator::new(camera(16, 16)).with_circular_image(f32::NAN)];
     for eye in &eyes {
-        for settings in [Settings::preview(), Settings::path(2)] {
+        for settings in [RenderSettings::preview(), RenderSettings::path(2)] {
             render(&mut stage, eye, &Pose::IDENTITY, &settings, &Film { exposure: f32::NAN, ..Film::default() });
         }
     }
     stage.deform(shape, &vec![DVec3::NAN; 144]).unwrap();
     stage.place(body, &Pose { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), translation: DVec3::NAN }).unwrap();
-    render(&mut stage, &eyes[0], &Pose::IDENTITY, &Settings::path(2), &Film::default());
+    render(&mut stage, &eyes[0], &Pose::IDENTITY, &RenderSettings::path(2), &Film::default());
     assert!(preview(&mut Stage::new(), &eyes[0], &Pose::IDENTITY).labels.iter().all(|l| *l == 0));
 }
 
 #[test]
-fn a_tile_finds_what_each_of_its_rays_finds() {
+fn tile_agrees_with_single_rays() {
     let mut stage = Stage::new();
     let shape = stage.add_shape(&sphere(DVec3::ZERO, 0.03, 60)).unwrap();
     for i in 0..40 {
         let turn = DQuat::from_rotation_y(f64::from(i)) * DQuat::from_rotation_x(2.0 * f64::from(i));
-        // All round the camera, which some enclose.
+        // Balls in all directions around the camera; some enclose it.
         let pose = Pose { rotation: turn, translation: turn * DVec3::new(0.0, 0.0, 0.004 * f64::from(i)) };
-        stage.add_body(shape, &pose, i as u16 + 1, &Look::steel()).unwrap();
+        stage.add_body(shape, &pose, i as u16 + 1, &Appearance::steel()).unwrap();
     }
     for model in models() {
         let camera = *model.camera();
         for pose in [Pose::IDENTITY, askew(), Pose::look_at(DVec3::new(0.3, 0.1, 0.0), DVec3::ZERO, DVec3::Z)] {
-            let picture = preview(&mut stage, &Eye::new(model), &pose);
+            let picture = preview(&mut stage, &RayGenerator::new(model), &pose);
             let mut differing = 0;
             for i in (0..camera.width * camera.height).step_by(7) {
                 let ray = model.unproject((i % camera.width) as f64, (i / camera.width) as f64).unwrap();
                 let ray = if matches!(model, CameraModel::Pinhole(_)) { ray / ray.z } else { ray };
                 let found = stage.cast(pose.translation.as_vec3(), (pose.rotation * ray).as_vec3());
                 let depth = found.map_or(0.0, |m| m.t * ray.z as f32);
-                // The ray is turned in another precision here.
+                // This test rotates the ray in another precision.
                 let off = (depth - picture.depth.depth[i]).abs();
                 differing += usize::from(off > 1e-4);
             }
-            // At silhouettes only.
+            // Differences occur at silhouettes only.
             assert!(differing <= 8, "{differing} of 2743 pixels");
         }
     }

@@ -3,9 +3,10 @@
 use crate::colors::VIEW_GROUND;
 use glam::DVec3;
 use std::collections::BTreeMap;
-use trocar_camera::{Camera, ColorImage, Pose};
+use trocar_camera::{Camera, ColorImage};
+use trocar_core::Pose;
 use trocar_geometry::{TetMesh, TriMesh};
-use trocar_render::{Instance, Scene};
+use trocar_render::phong::{Instance, PhongScene};
 
 /// A camera and where it stands.
 #[derive(Clone, Copy, Debug)]
@@ -42,7 +43,7 @@ impl View {
     pub fn picture(&self, instances: Vec<Instance>, samples: usize) -> ColorImage {
         let light = self.pose.rotation * DVec3::new(-0.45, -0.8, -0.9);
         let wires = instances.iter().any(|i| i.shading.wireframe);
-        let scene = Scene::new(instances, Some(light), VIEW_GROUND);
+        let scene = PhongScene::new(instances, Some(light), VIEW_GROUND);
         let scene = if wires { scene } else { scene.with_ambient_occlusion(24, 0.012) };
         scene.render(&self.camera, &self.pose, samples).color
     }

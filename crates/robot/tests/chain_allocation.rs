@@ -59,7 +59,7 @@ fn stepping_and_searching_allocate_nothing() {
         }
         let state = controlled.state();
         controlled.restore(&state).unwrap();
-        controlled.step(trocar_robot::wrench::Wrench::default(), 1.0 / 480.0).unwrap();
+        controlled.step(trocar_core::Wrench::default(), 1.0 / 480.0).unwrap();
         pushed += controlled.measured_cf().force.length() + controlled.coordinates().0.insertion;
     }
     let controlling = ALLOCATIONS.load(Ordering::Relaxed) - made;

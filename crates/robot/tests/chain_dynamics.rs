@@ -6,7 +6,7 @@ mod common;
 
 use common::{Random, free_fr3, noise, posture, rod, skewed};
 use glam::{DQuat, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::chain::{ArmState, Drive, JointFactor, Joints, LinkLoad, SerialArm};
 
 fn arms() -> Vec<SerialArm> {

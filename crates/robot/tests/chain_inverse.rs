@@ -7,7 +7,7 @@ mod common;
 use common::{Random, between, noise, posture, skewed};
 use glam::{DQuat, DVec3};
 use std::time::Instant;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::chain::{InverseOptions, Joints, SerialArm};
 
 fn apart(a: &Joints, b: &Joints) -> f64 {

@@ -10,7 +10,7 @@ use glam::DVec3;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::chain::{ArmState, Drive, JointKind, JointLimits, Joints, SerialArm};
 
 const STATES: usize = 1000;

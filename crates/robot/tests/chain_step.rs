@@ -135,7 +135,7 @@ fn a_stiff_coupling_is_stable_and_right() {
     // The last joint of the arm slides a link of 0.5 kg.
     let mut segments = skewed(3).segments().to_vec();
     segments[2].mass = rod(0.5, 0.1);
-    let arm = SerialArm::new("light", segments, trocar_geometry::Pose::IDENTITY).unwrap();
+    let arm = SerialArm::new("light", segments, trocar_core::Pose::IDENTITY).unwrap();
     for stiffness in [1e3, 5e4, 1e6, 1e9] {
         let mut state = ArmState::at_rest(arm.zeros());
         let mut place = None;

@@ -5,7 +5,7 @@ mod common;
 
 use common::Random;
 use glam::{DQuat, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::{Coordinates, Instrument, Limits};
 use trocar_robot::port::{Port, Twist};
 

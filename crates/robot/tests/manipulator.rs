@@ -5,11 +5,11 @@ mod common;
 
 use common::{Random, cell, start, tip_circle};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Wrench};
 use trocar_robot::chain::Joints;
 use trocar_robot::instrument::Coordinates;
 use trocar_robot::manipulator::{Law, Manipulator, ModelError, Settings, StepReport};
-use trocar_robot::wrench::{LoadModel, Wrench};
+use trocar_robot::wrench::LoadModel;
 
 const DT: f64 = 1.0 / 480.0;
 

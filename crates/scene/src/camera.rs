@@ -5,7 +5,7 @@ use glam::DQuat;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use trocar_camera::{Camera, Distortion};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// One camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]

@@ -5,7 +5,7 @@ use glam::{DQuat, DVec3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Name of the built-in arm model.
 pub const FRANKA_FR3: &str = "franka_fr3";

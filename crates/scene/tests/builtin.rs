@@ -99,7 +99,7 @@ fn phantoms_are_those_that_can_be_filmed() {
 
 #[test]
 fn the_example_of_the_page_is_a_scene() {
-    let page = include_str!("../../../docs/scenes.md");
+    let page = include_str!("../../../docs/guides/scenes.md");
     let example = page.split("```toml\n").nth(1).unwrap().split("```").next().unwrap();
     let text = example.replace("path = \"../specimens/rabbit\"", "phantom = \"phantom-a\"");
     let scene = Scene::parse(&text, "example", "".as_ref()).unwrap();

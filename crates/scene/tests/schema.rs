@@ -54,7 +54,7 @@ fn every_key_is_explained_with_its_unit() {
     let mut found = Vec::new();
     keys(&Scene::json_schema(), &mut found);
     assert!(found.len() > 80, "{}", found.len());
-    let page = include_str!("../../../docs/scenes.md");
+    let page = include_str!("../../../docs/guides/scenes.md");
     let units = [
         ("_mm", "[mm]"),
         ("_m", "[m]"),
@@ -74,7 +74,7 @@ fn every_key_is_explained_with_its_unit() {
         for (ending, unit) in units {
             assert!(!key.ends_with(ending) || said.contains(unit), "{key} lacks {unit}: {said}");
         }
-        assert!(page.contains(&format!("`{key}`")), "docs/scenes.md lacks `{key}`");
+        assert!(page.contains(&format!("`{key}`")), "docs/guides/scenes.md lacks `{key}`");
     }
     let said = |key: &str| found.iter().find(|(k, _)| k == key).unwrap().1.clone();
     assert!(said("hole_diameter_mm").ends_with("Default: 6.0."), "{}", said("hole_diameter_mm"));

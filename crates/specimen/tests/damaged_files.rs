@@ -1,4 +1,5 @@
-//! Damaged specimens give a specimen or a one-line error: never a panic, a hang, or more memory than their size calls for.
+//! Damaged specimens give a specimen or a one-line error: never a panic, a hang, or more memory
+//! than their size calls for.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;

@@ -41,7 +41,7 @@ pub enum Error {
     TissueScene(#[from] trocar_testing::scenes::Error),
     /// Two pictures cannot be compared.
     #[error(transparent)]
-    Similarity(#[from] trocar_similarity::Error),
+    Similarity(#[from] trocar_camera::metrics::Error),
 }
 
 impl From<trocar_workflow::Error> for Error {
@@ -75,7 +75,7 @@ through_work!(
     trocar_report,
     trocar_robot,
     trocar_scene,
-    trocar_sight,
+    trocar_sensors,
     trocar_specimen,
     trocar_task,
     trocar_tissue

@@ -1,8 +1,8 @@
 //! The comparison of integrators on a tiny mesh: what diverges, what stays bounded, what is written.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
+use trocar_core::Silent;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Silent;
 use trocar_studies::IntegratorsExperiment;
 use trocar_testing::scenes::Organs;
 

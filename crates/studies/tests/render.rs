@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
 use std::path::Path;
-use trocar_progress::Silent;
+use trocar_core::Silent;
 use trocar_studies::RenderBench;
 
 #[test]

@@ -1,7 +1,7 @@
 //! Options of the rollouts that cannot be.
 
 use tempfile::TempDir;
-use trocar_progress::Silent;
+use trocar_core::Silent;
 use trocar_studies::RolloutsExperiment;
 
 #[test]

@@ -1,8 +1,8 @@
 //! Phantom B, which in the paper still moves at 0.136 m/s, comes to rest within a second.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
+use trocar_core::Silent;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Silent;
 use trocar_studies::SettlingExperiment;
 
 #[test]

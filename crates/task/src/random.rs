@@ -21,7 +21,7 @@ impl Random {
 
     /// A number from 0 up to, without, 1 at `index`.
     pub fn unit(&self, index: u64) -> f64 {
-        (self.bits(index) >> 11) as f64 / (1_u64 << 53) as f64
+        trocar_core::unit(self.bits(index))
     }
 
     /// A number between `low` and `high` at `index`.
@@ -36,8 +36,7 @@ impl Random {
 
     /// A number of the standard normal distribution at `index` (Box and Muller 1958).
     pub fn normal(&self, index: u64) -> f64 {
-        let (a, b) = (self.unit(2 * index), self.unit(2 * index + 1));
-        (-2.0 * (1.0 - a).ln()).sqrt() * (std::f64::consts::TAU * b).cos()
+        trocar_core::standard_normal(self.unit(2 * index), self.unit(2 * index + 1))
     }
 }
 

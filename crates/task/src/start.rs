@@ -4,7 +4,7 @@ use crate::Result;
 use crate::random::Random;
 use glam::{DQuat, DVec3};
 use trocar_cell::Cell;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::Coordinates;
 use trocar_scene::{Frame, Scene, Start};
 use trocar_specimen::Specimen;

@@ -7,7 +7,7 @@
 use crate::contact::Hanging;
 use crate::{Body, Event, Model, State};
 use glam::{DVec3, Vec3A};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Pose of a tool at the beginning and the end of a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -40,7 +40,7 @@ mod untangle;
 pub use body::Body;
 pub use builder::{BodyDescription, MassFloor, ModelBuilder};
 pub use comparator::{SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep, stable_explicit_step};
-pub use contact::{BodyContact, Collider, Event, Hull, Nearest, Shape, ToolForce, Wrench};
+pub use contact::{BodyContact, Collider, Event, Hull, Nearest, Shape, ToolForce};
 pub use cutting::{Cut, Piece, Severed, sever};
 pub use energy::Energy;
 pub use error::{Error, Result};

@@ -7,7 +7,7 @@ use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Compliance, Grasp, Load, Material, ModelBuilder, Schedule, Shape, State,
     Stepper, ToolMotion,

@@ -6,7 +6,8 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, many_sweeps, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
-use trocar_geometry::{Pose, TetMesh};
+use trocar_core::Pose;
+use trocar_geometry::TetMesh;
 use trocar_tissue::{
     Body, BodyContact, BodyDescription, Divergence, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper,
     ToolMotion,

@@ -6,7 +6,8 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::{DQuat, DVec3};
-use trocar_geometry::{Pose, TetMesh};
+use trocar_core::Pose;
+use trocar_geometry::TetMesh;
 use trocar_tissue::{
     BodyDescription, Collider, Material, Model, ModelBuilder, Schedule, Shape, State, Stepper, Support, SupportPlane,
     ToolMotion,

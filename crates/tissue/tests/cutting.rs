@@ -6,7 +6,8 @@ mod common;
 
 use common::{FRAME, GRAVITY, appendix, block, nodes, tissue};
 use glam::DVec3;
-use trocar_geometry::{Pose, TetMesh};
+use trocar_core::Pose;
+use trocar_geometry::TetMesh;
 use trocar_tissue::{
     BodyDescription, Compliance, Cut, Grasp, MassFloor, Material, Model, ModelBuilder, Schedule, Severed, State,
     Stepper, sever,

@@ -6,7 +6,7 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::{DQuat, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper, SupportField,
     SupportPlane, ToolMotion,

@@ -6,7 +6,8 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
-use trocar_geometry::{Pose, TetMesh};
+use trocar_core::Pose;
+use trocar_geometry::TetMesh;
 use trocar_tissue::{Compliance, Divergence, Event, Grasp, Material, Model, Schedule, State, Stepper, ToolMotion};
 
 fn at(translation: DVec3) -> Pose {

@@ -4,7 +4,7 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, model, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Newton, Schedule,
     SemiImplicit, Shape, State, Stepper, ToolMotion, Xpbd,

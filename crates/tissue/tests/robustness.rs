@@ -6,7 +6,8 @@ mod common;
 
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::{DQuat, DVec3};
-use trocar_geometry::{Pose, TetMesh};
+use trocar_core::Pose;
+use trocar_geometry::TetMesh;
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper, ToolMotion,
 };

@@ -7,9 +7,9 @@ use crate::workflow::{REPORT, refuse_overlap};
 use crate::{Error, Result, pages};
 use std::path::{Path, PathBuf};
 use trocar_cell::{Cell, CellLift, CellLiftRun};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_scene::Scene;
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 use trocar_specimen::StagedFolder;
 
 /// The file that makes a folder a run.
@@ -50,7 +50,7 @@ impl CellSimulation {
         if task.organ.is_none() && specimen.organs.iter().any(|o| o.name == scene.task.organ) {
             task.organ = Some(scene.task.organ.clone());
         }
-        let mut watched = Watched::new(Sight::new(&scene, &specimen, &cell)?, &task.arm);
+        let mut watched = Watched::new(CameraRig::new(&scene, &specimen, &cell)?, &task.arm);
         let run = task.run_watched(&mut cell, progress, &mut |cell, phase| watched.look(cell, phase))?;
         let pictures = watched.finish(&cell)?;
         let made = CellRun {

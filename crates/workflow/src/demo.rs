@@ -6,8 +6,8 @@ use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 use trocar_cell::{GraspLift, Summary};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_reconstruct::Settings;
 
 /// How the demonstration is run.

@@ -6,7 +6,7 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::{

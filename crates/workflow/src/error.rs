@@ -106,7 +106,7 @@ pub enum Error {
     Task(#[from] trocar_task::Error),
     /// A camera of the cell cannot see.
     #[error(transparent)]
-    Sight(#[from] trocar_sight::Error),
+    Sensors(#[from] trocar_sensors::Error),
     /// A task cannot be run.
     #[error(transparent)]
     Cell(#[from] trocar_cell::Error),

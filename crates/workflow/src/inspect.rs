@@ -99,7 +99,7 @@ fn write_template(recording: &Recording, written: &mut Vec<PathBuf>) -> Result<(
     let example = with_organ.split_once("[[organ]]").map_or(String::new(), |(_, rest)| format!("[[organ]]{rest}"));
     let example: String =
         example.lines().map(|l| if l.is_empty() { "#\n".into() } else { format!("# {l}\n") }).collect();
-    let comment = "# What is known of this recording; docs/recordings.md explains every key. Cameras and depth scale come from the log\n\
+    let comment = "# What is known of this recording; docs/guides/recordings.md explains every key. Cameras and depth scale come from the log\n\
                    # unless they are said here. Name each organ below, with its outline in pixels of the colour image, or a mask.\n";
     let path = recording.toml().to_owned();
     std::fs::write(&path, format!("{comment}{text}\n{example}"))

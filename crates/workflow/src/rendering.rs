@@ -20,10 +20,10 @@ use glam::DVec3;
 use std::path::{Path, PathBuf};
 use trocar_camera::ColorImage;
 use trocar_cell::Cell;
-use trocar_progress::Progress;
-use trocar_render::{Picture, Settings};
+use trocar_core::Progress;
+use trocar_render::{Picture, RenderSettings};
 use trocar_scene::Scene;
-use trocar_sight::{DepthNoise, OUTSIDE, Sensor, Sight};
+use trocar_sensors::{CameraRig, DepthNoise, OUTSIDE, SensorNoise};
 use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
 
@@ -118,7 +118,7 @@ impl Rendering {
         let film = begin()?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let cell = Cell::new(&scene, &specimen, self.threads)?;
-        let sight = Sight::new(&scene, &specimen, &cell)?;
+        let sight = CameraRig::new(&scene, &specimen, &cell)?;
         self.play(&mut Script::new(&scene, cell)?, sight, (self.at.or(Some(0.0)), film), output, progress)
     }
 
@@ -150,7 +150,7 @@ impl Rendering {
     fn play(
         &self,
         play: &mut dyn Play,
-        sight: Sight,
+        sight: CameraRig,
         (at, film): (Option<f64>, Option<(u32, Moving)>),
         output: &Path,
         progress: &dyn Progress,
@@ -164,15 +164,15 @@ impl Rendering {
         }
     }
 
-    fn ready(&self, mut sight: Sight) -> Sight {
+    fn ready(&self, mut sight: CameraRig) -> CameraRig {
         if self.noise {
-            sight.sensor = Sensor { color: Some([0.015, 0.003]), depth: Some(DepthNoise::default()), seed: 1 };
+            sight.noise = SensorNoise { color: Some([0.015, 0.003]), depth: Some(DepthNoise::default()), seed: 1 };
         }
         sight
     }
 
-    fn settings(&self) -> Settings {
-        self.samples.map_or_else(Settings::preview, Settings::path)
+    fn settings(&self) -> RenderSettings {
+        self.samples.map_or_else(RenderSettings::preview, RenderSettings::path)
     }
 
     /// Direct light is seen at twice the size and averaged: it has one ray a pixel, and edges would be stairs.
@@ -182,15 +182,17 @@ impl Rendering {
 
     fn specimen(&self, folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Rendered> {
         let specimen = Specimen::read(folder)?;
-        let mut sight = self.ready(Sight::of_specimen(&specimen)?);
+        let mut sight = self.ready(CameraRig::from_specimen(&specimen)?);
         let camera = self.camera.clone().or_else(|| sight.cameras().first().map(|c| (*c).to_owned()));
         let camera = camera.unwrap_or_else(|| OUTSIDE.to_owned());
         let size = self.size.map_or_else(|| sight.size(&camera), Ok)?;
         self.cut(&mut sight, &camera, size, &specimen_points(&specimen))?;
         let clock = std::time::Instant::now();
-        let color =
-            averaged(&sight.see_still(&camera, size.map(|n| n * self.finer()), &self.settings())?.color, self.finer());
-        let picture = sight.see_still(&camera, size, &Settings::Preview { shadows: false })?.clone();
+        let color = averaged(
+            &sight.render_still(&camera, size.map(|n| n * self.finer()), &self.settings())?.color,
+            self.finer(),
+        );
+        let picture = sight.render_still(&camera, size, &RenderSettings::Preview { shadows: false })?.clone();
         let render_s = clock.elapsed().as_secs_f64();
         if progress.interrupted() {
             return Err(Error::Interrupted);
@@ -198,12 +200,12 @@ impl Rendering {
         self.write(&sight, &camera, &color, &picture, output, (0.0, render_s))
     }
 
-    fn cut(&self, sight: &mut Sight, camera: &str, size: [usize; 2], points: &[DVec3]) -> Result<()> {
+    fn cut(&self, sight: &mut CameraRig, camera: &str, size: [usize; 2], points: &[DVec3]) -> Result<()> {
         if self.cut_away {
             let (_, pose) = sight.model(camera, size)?;
             let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
             let towards = pose.translation - middle;
-            sight.section(Some((middle, DVec3::new(towards.x, towards.y, 0.0))));
+            sight.set_section(Some((middle, DVec3::new(towards.x, towards.y, 0.0))));
         }
         Ok(())
     }
@@ -211,7 +213,7 @@ impl Rendering {
     fn still(
         &self,
         play: &mut dyn Play,
-        mut sight: Sight,
+        mut sight: CameraRig,
         (camera, at): (&str, Option<f64>),
         output: &Path,
         progress: &dyn Progress,
@@ -226,9 +228,9 @@ impl Rendering {
         let clock = std::time::Instant::now();
         let finer = self.finer();
         let (color, picture) = play::stage(progress, "picture", 1, || {
-            let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
+            let fine = sight.render(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
             let color = averaged(&fine.color, finer);
-            Ok((color, sight.see(play.cell(), camera, size, &Settings::Preview { shadows: false })?.clone()))
+            Ok((color, sight.render(play.cell(), camera, size, &RenderSettings::Preview { shadows: false })?.clone()))
         })?;
         if progress.interrupted() {
             return Err(Error::Interrupted);
@@ -241,7 +243,7 @@ impl Rendering {
     fn moving(
         &self,
         play: &mut dyn Play,
-        mut sight: Sight,
+        mut sight: CameraRig,
         camera: &str,
         (most, mut film): (u32, Moving),
         output: &Path,
@@ -262,7 +264,7 @@ impl Rendering {
                 if play.cell().time() >= f64::from(frames) / f64::from(hz) - 1e-9 {
                     let clock = std::time::Instant::now();
                     let finer = self.finer();
-                    let fine = sight.see(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
+                    let fine = sight.render(play.cell(), camera, size.map(|n| n * finer), &self.settings())?;
                     film.add(averaged(&fine.color, finer), 1000.0 * f64::from(frames) / f64::from(hz), hz)?;
                     picture.labels.clone_from(&fine.labels);
                     render_s += clock.elapsed().as_secs_f64();
@@ -297,7 +299,7 @@ impl Rendering {
 
     fn write(
         &self,
-        sight: &Sight,
+        sight: &CameraRig,
         camera: &str,
         color: &ColorImage,
         picture: &Picture,

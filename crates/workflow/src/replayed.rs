@@ -1,7 +1,7 @@
 //! Episodes done again from their files, a control period at a time: for pictures.
 
 use crate::Result;
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 use trocar_specimen::Specimen;
 use trocar_task::{Episode, EpisodeFile};
 
@@ -29,8 +29,8 @@ impl<'a> Replayed<'a> {
     ///
     /// # Errors
     /// A camera without a lens.
-    pub fn sight(&self, specimen: &Specimen) -> Result<Sight> {
-        Ok(Sight::new(&self.episode.arranged_scene(), specimen, self.episode.cell())?)
+    pub fn sight(&self, specimen: &Specimen) -> Result<CameraRig> {
+        Ok(CameraRig::new(&self.episode.arranged_scene(), specimen, self.episode.cell())?)
     }
 
     /// Does the next step; false when there is none, or when it cannot be done, which is where an episode of another program would end.

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_camera::{ColorImage, Mask};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_recording::{Recording, RgbdFrame};
 use trocar_report::overlays::overlay;
 use trocar_segment::{MetalDetector, Picture, Sam2, Segmenter, Target, Tracker, WantedFile, wanted_files};

@@ -5,8 +5,8 @@ use crate::rendering::{averaged, shown};
 use crate::{Error, Result};
 use trocar_camera::ColorImage;
 use trocar_cell::Cell;
-use trocar_render::Settings;
-use trocar_sight::{DepthNoise, Sensor, Sight};
+use trocar_render::RenderSettings;
+use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
 
 /// Size of the stills and of the moving picture [px]; each is seen at twice the size and averaged.
 const STILL: [usize; 2] = [640, 360];
@@ -27,7 +27,7 @@ pub struct Pictures {
 
 /// Watches a run through the scene's cameras.
 pub(crate) struct Watched {
-    sight: Sight,
+    sight: CameraRig,
     arm: String,
     /// The camera that watches, and the one that measures depth.
     camera: String,
@@ -40,7 +40,7 @@ pub(crate) struct Watched {
 }
 
 impl Watched {
-    pub fn new(sight: Sight, arm: &str) -> Self {
+    pub fn new(sight: CameraRig, arm: &str) -> Self {
         let name = |wanted: &str| sight.cameras().iter().find(|c| **c == wanted).map(|c| (*c).to_owned());
         let camera = name("endoscope").or_else(|| sight.cameras().first().map(|c| (*c).to_owned()));
         let depth = name("d405");
@@ -72,14 +72,14 @@ impl Watched {
             self.still(cell, "Lifted")?;
         }
         if cell.time() >= EVERY * self.frames.len() as f64 - 1e-9 && self.frames.len() < MOST {
-            let picture = self.sight.see(cell, &self.camera, FILM.map(|n| 2 * n), &Settings::preview())?;
+            let picture = self.sight.render(cell, &self.camera, FILM.map(|n| 2 * n), &RenderSettings::preview())?;
             self.frames.push((averaged(&picture.color, 2), (1e3 * cell.time()).round() as i32));
         }
         Ok(())
     }
 
     fn still(&mut self, cell: &Cell, what: &str) -> Result<()> {
-        let picture = self.sight.see(cell, &self.camera, STILL.map(|n| 2 * n), &Settings::preview())?;
+        let picture = self.sight.render(cell, &self.camera, STILL.map(|n| 2 * n), &RenderSettings::preview())?;
         let caption = format!("{what}, {:.2} s; {}", cell.time(), self.camera);
         self.stills.push((caption, averaged(&picture.color, 2)));
         Ok(())
@@ -95,10 +95,10 @@ impl Watched {
         }
         self.still(cell, "At the end")?;
         if let Some(depth) = self.depth.clone() {
-            let picture = self.sight.see(cell, &depth, STILL.map(|n| 2 * n), &Settings::preview())?;
+            let picture = self.sight.render(cell, &depth, STILL.map(|n| 2 * n), &RenderSettings::preview())?;
             self.stills.push((format!("{depth} at the end"), averaged(&picture.color, 2)));
-            self.sight.sensor = Sensor { depth: Some(DepthNoise::default()), ..Sensor::default() };
-            let picture = self.sight.see(cell, &depth, STILL, &Settings::Preview { shadows: false })?;
+            self.sight.noise = SensorNoise { depth: Some(DepthNoise::default()), ..SensorNoise::default() };
+            let picture = self.sight.render(cell, &depth, STILL, &RenderSettings::Preview { shadows: false })?;
             self.stills.push((format!("Depth of {depth} with its noise, near is bright"), shown(&picture.depth)));
         }
         let film = if self.frames.len() > 1 { Some((webp(&self.frames)?, FILM)) } else { None };

@@ -3,7 +3,6 @@
 use std::path::Path;
 use trocar_cell::{GraspDesign, GraspLift};
 use trocar_geometry::io::Unit;
-use trocar_progress::Silent;
 use trocar_reconstruct::Settings;
 use trocar_workflow::{reconstruct_surface, simulate};
 

@@ -6,10 +6,11 @@ use glam::{DQuat, DVec3};
 use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
 use trocar_cell::{GraspLift, GraspLiftRun, Gripper, Phase, Sample, SeverAt, Snapshot, Summary};
-use trocar_geometry::{Pose, RepairReport, TetMesh, TetQuality, TriMesh};
-use trocar_progress::Silent;
+use trocar_core::Pose;
+use trocar_core::Silent;
+use trocar_geometry::{RepairReport, TetMesh, TetQuality, TriMesh};
 use trocar_reconstruct::{CompositeTimes, OrganView, Reconstruction};
-use trocar_render::{Instance, Scene, Shading};
+use trocar_render::phong::{Instance, PhongScene, Shading};
 use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 use trocar_workflow::pages as report;
 
@@ -144,7 +145,7 @@ fn reconstruction() -> Reconstruction {
         label: i as u16 + 1,
         shading: Shading { color: [200; 3], gloss: 0.3, wireframe: false },
     });
-    let frame = Scene::new(instances.collect(), None, [120, 60, 50]).render(&camera, &Pose::IDENTITY, 2);
+    let frame = PhongScene::new(instances.collect(), None, [120, 60, 50]).render(&camera, &Pose::IDENTITY, 2);
     let mut depth = frame.depth.clone();
     for (i, d) in depth.depth.iter_mut().enumerate() {
         *d = if *d > 0.0 { *d + 0.002 * (i as f32 * 0.013).sin() } else { 0.21 };

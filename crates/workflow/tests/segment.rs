@@ -7,7 +7,7 @@ mod common;
 use common::{info, write};
 use std::path::{Path, PathBuf};
 use trocar_camera::Mask;
-use trocar_progress::Silent;
+use trocar_core::Silent;
 use trocar_reconstruct::{Settings, reconstruct};
 use trocar_recording::{InstrumentInfo, Recording, RecordingInfo};
 use trocar_workflow::{Segment, wanted_weights};

@@ -5,7 +5,7 @@ use super::report::TaggedForce;
 use super::station::{Station, Wanted};
 use crate::{Error, GraspDesign, Gripper, Result};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::{Coordinates, Limits};
 use trocar_robot::manipulator::JointReadings;
 use trocar_robot::port::{Port, Solution};

@@ -7,7 +7,7 @@
 //! too large, the difference resists every motion and vanishes at the next frame: it damps. Where the tip rests, nothing is added.
 
 use glam::DVec3;
-use trocar_robot::wrench::Wrench;
+use trocar_core::Wrench;
 use trocar_tissue::ToolForce;
 
 /// The most that tissue is taken to push or pull [N]: beyond, a joint of the wrist would give way.
@@ -46,7 +46,7 @@ impl Exchange {
         let mut load = Wrench::default();
         for force in forces {
             for part in [force.contact, force.constraint] {
-                load = load + Wrench { force: part.force, torque: part.torque };
+                load += part;
             }
         }
         let over = load.force.length() / MOST_LOAD;

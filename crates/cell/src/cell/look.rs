@@ -2,7 +2,7 @@
 
 use super::Cell;
 use crate::Result;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 impl Cell {
     /// Poses in the cell of an arm's base, of each of its links from the first that moves, and of its flange, as they are now.

@@ -2,7 +2,8 @@
 
 use crate::{Error, Result, Surroundings};
 use glam::DVec3;
-use trocar_geometry::{OrganAxis, Pose};
+use trocar_core::Pose;
+use trocar_geometry::OrganAxis;
 use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind};
 use trocar_specimen::{End, Organ, Specimen};
 use trocar_tissue::BodyContact;

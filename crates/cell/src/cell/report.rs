@@ -2,9 +2,9 @@
 
 use glam::DVec3;
 use serde::Serialize;
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Wrench};
 use trocar_robot::instrument::Coordinates;
-use trocar_robot::wrench::{ForceKind, Wrench};
+use trocar_robot::wrench::ForceKind;
 use trocar_scene::Side;
 use trocar_tissue::{Divergence, StepReport};
 

@@ -9,8 +9,7 @@ use crate::session::smoothstep;
 use crate::target::Target;
 use crate::{Action, Cell, Error, GraspDesign, Policy, Result};
 use glam::{DMat3, DQuat, DVec3};
-use trocar_geometry::Pose;
-use trocar_progress::Progress;
+use trocar_core::{Pose, Progress};
 use trocar_robot::instrument::Coordinates;
 use trocar_robot::port::Solution;
 

@@ -36,7 +36,7 @@ pub fn meshed(pins: Pins, edge: f64) -> Specimen {
     Specimen {
         name: "tube".into(),
         up: -DVec3::Z,
-        placement: trocar_geometry::Pose::IDENTITY,
+        placement: trocar_core::Pose::IDENTITY,
         camera: None,
         organs: vec![Organ {
             name: "tube".into(),

@@ -9,7 +9,7 @@ mod scaling;
 
 use crate::cli::{Bench, BenchName, MeshingBench};
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{MeshingResult, Result};
 
 pub fn run(arguments: &Bench, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -4,7 +4,7 @@ use crate::cli;
 use crate::commands::{reconstruct, simulate};
 use crate::output;
 use std::path::Path;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_workflow::{Demo, DemoResult, Result};
 
 pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -3,7 +3,7 @@
 use crate::cli;
 use crate::output;
 use serde::Serialize;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_workflow::{EpisodeHeader, EpisodeMade, EpisodeRun, Error, Result, read_episode, replay, sweep_files};
 
 pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -3,7 +3,7 @@
 use crate::cli;
 use crate::output;
 use trocar_campaign::{Campaign, CampaignResult, PolicySpec};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_workflow::Result;
 
 pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -15,7 +15,6 @@ mod wrench;
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_reconstruct::Settings;
 use trocar_studies::{ReconstructionResult, Result, Resumed};
 

@@ -14,7 +14,7 @@ mod segment;
 mod simulate;
 
 use crate::cli::{Cli, Command};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::Result;
 
 /// Runs the command that was typed.

@@ -3,7 +3,6 @@
 use crate::cli::Reconstruct;
 use crate::output;
 use trocar_geometry::io::Unit;
-use trocar_progress::Progress;
 use trocar_reconstruct::{Settings, SurfaceRule};
 use trocar_workflow::{Reconstructed, Result, reconstruct_recording, reconstruct_surface};
 

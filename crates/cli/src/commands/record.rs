@@ -3,8 +3,8 @@
 use crate::{cli::Record, output};
 use serde::Serialize;
 use std::time::Instant;
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_workflow::Result;
 
 #[derive(Serialize)]

@@ -2,7 +2,7 @@
 
 use crate::cli::Render;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_workflow::{Rendered, Rendering, Result};
 
 /// Paths a pixel unless the user says otherwise.

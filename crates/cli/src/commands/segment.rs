@@ -1,7 +1,7 @@
 //! `trocar segment`.
 
 use crate::{cli, output};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_workflow::{Result, Segment, Segmented, Wanted, wanted_weights};
 
 pub fn run(arguments: &cli::Segment, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -3,7 +3,7 @@
 use crate::cli::{Simulate, Task};
 use crate::output;
 use trocar_cell::{CellLift, GraspDesign, GraspLift, JAW_FORCE, SeverAt, Severance, Summary};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_scene::Builtin;
 use trocar_workflow::solver_named;
 use trocar_workflow::{CellRun, CellSimulation, Error, Result, SimulatedRun, simulate};

@@ -4,11 +4,11 @@ use crate::tet_mesh::adjacency::EDGES;
 use crate::{Error, Result, TetMesh};
 use rayon::prelude::*;
 
-/// The solution is found when the residual has fallen by this factor.
+/// Conjugate gradients stop when the residual has decreased by this factor.
 const TOLERANCE: f64 = 1e-7;
 
-/// The stiffness matrix of Laplace's equation, the entries off the diagonal in compressed rows: K_ij is the integral of
-/// grad phi_i . grad phi_j [m].
+/// The stiffness matrix of Laplace's equation: K_ij is the integral of grad phi_i . grad phi_j (m).
+/// Off-diagonal entries are stored in compressed rows.
 pub(super) struct Stiffness {
     starts: Vec<usize>,
     columns: Vec<u32>,
@@ -17,10 +17,11 @@ pub(super) struct Stiffness {
 }
 
 impl Stiffness {
-    /// Assembles the matrix. Refuses a mesh without elements or with one of no positive volume.
+    /// Assembles the matrix. Rejects a mesh without elements, or with an element without positive
+    /// volume.
     pub(super) fn of(mesh: &TetMesh) -> Result<Self> {
         if mesh.tets.is_empty() {
-            return Err(Error::Mesh("the tetrahedral mesh has no elements; an organ axis needs some".into()));
+            return Err(Error::Mesh("the tetrahedral mesh has no elements; an organ axis needs at least one".into()));
         }
         let edges = mesh.edges();
         let nodes = mesh.vertices.len();
@@ -31,7 +32,8 @@ impl Stiffness {
         for i in 0..nodes {
             starts[i + 1] += starts[i];
         }
-        // Edges are sorted, so filling the lower half of all rows before the upper half leaves each row sorted.
+        // Edges are sorted, so filling the lower half of all rows before the upper half leaves each
+        // row sorted.
         let mut fill = starts.clone();
         let mut columns = vec![0; 2 * edges.len()];
         for half in [[1, 0], [0, 1]] {
@@ -69,22 +71,23 @@ impl Stiffness {
         self.diagonal.len()
     }
 
-    /// The nodes that share an edge with `node`, each with the place of its entry.
+    /// The nodes that share an edge with `node`, each with the index of its entry.
     pub(super) fn row(&self, node: usize) -> impl Iterator<Item = (usize, usize)> {
         (self.starts[node]..self.starts[node + 1]).map(|entry| (entry, self.columns[entry] as usize))
     }
 
-    /// Length of the edge that belongs to each entry [m].
+    /// Length of the edge of each entry (m).
     pub(super) fn edge_lengths(&self, mesh: &TetMesh) -> Vec<f64> {
         (0..self.nodes())
             .flat_map(|i| self.row(i).map(move |(_, j)| mesh.vertices[i].distance(mesh.vertices[j])))
             .collect()
     }
 
-    /// The harmonic field that takes the `fixed` values, started from `guess`; each value within 0..=1.
+    /// The harmonic field with the `fixed` values, from the initial guess `guess`. Each value is in
+    /// [0, 1].
     ///
-    /// Conjugate gradients with the diagonal as preconditioner. Sums run in fixed order, so the result is the same for
-    /// any number of threads.
+    /// Conjugate gradients with a diagonal preconditioner. Sums have a fixed order, so the result
+    /// is the same for any number of threads.
     pub(super) fn solve(&self, fixed: &[Option<f64>], guess: Vec<f64>) -> Vec<f64> {
         let mut u: Vec<f64> = fixed.iter().zip(guess).map(|(fixed, guess)| fixed.unwrap_or(guess)).collect();
         let free = |i: usize| fixed[i].is_none();
@@ -114,7 +117,7 @@ impl Stiffness {
                 *direction = scaled + turn * *direction;
             }
         }
-        // Obtuse elements may let the discrete field overshoot its ends a little.
+        // With obtuse elements the discrete field may overshoot its bounds slightly.
         u.iter_mut().for_each(|u| *u = u.clamp(0.0, 1.0));
         u
     }
@@ -140,7 +143,8 @@ mod tests {
 
     #[test]
     fn a_linear_field_is_reproduced() {
-        // A 3 x 3 x 3 block of cubes of six tets each, jittered inside; linear functions are harmonic and in the space.
+        // A 3 x 3 x 3 block of cubes of six tets each, with perturbed inner nodes. Linear functions
+        // are harmonic, and the elements represent them exactly.
         let n = 4;
         let at = |i: usize| DVec3::new((i % n) as f64, (i / n % n) as f64, (i / n / n) as f64);
         let inside = |p: DVec3| p.min_element() > 0.0 && p.max_element() < 3.0;

@@ -1,5 +1,6 @@
 //! Mesh files.
 
+mod file;
 mod msh;
 mod obj;
 mod ply;
@@ -8,10 +9,11 @@ mod stl;
 pub use msh::{read_msh, read_msh_groups, write_msh};
 pub use ply::write_ply;
 
-use crate::{Error, Result, TriMesh};
+use crate::{Result, TriMesh};
+use file::{bad, read};
 use std::path::Path;
 
-/// Unit of the lengths in a file that does not say.
+/// Unit of length of a file that does not state one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// Millimetres.
@@ -23,7 +25,7 @@ pub enum Unit {
 }
 
 impl Unit {
-    /// Metres in one of the unit.
+    /// Length of the unit (m).
     pub fn metres(self) -> f64 {
         match self {
             Self::Millimetre => 1e-3,
@@ -33,28 +35,36 @@ impl Unit {
     }
 }
 
-/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours if there are any) or `.obj`, into metres. The
-/// vertices are those of the file: in an STL file every triangle has its own (see [`repair`](crate::repair)).
+/// Reads a surface from `.stl` (binary or text), `.ply` (with vertex colours, if present) or
+/// `.obj`, converted to metres. The vertices are those of the file. In an STL file every triangle
+/// has its own; [`repair`](crate::repair) merges them.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read. [`Error::Parse`] for another extension, content that is damaged or cut short,
-/// an index out of range, a vertex that is not finite, or no triangles.
+/// [`Error::Io`](crate::Error::Io) if the file cannot be read.
+/// [`Error::Parse`](crate::Error::Parse) for another extension, damaged or truncated content, an
+/// index out of range, a vertex that is not finite, or no triangles.
+///
+/// ```
+/// use trocar_geometry::io::{Unit, read_surface};
+///
+/// let path = std::env::temp_dir().join("trocar-read-surface.obj");
+/// std::fs::write(&path, "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\n")?;
+/// let surface = read_surface(&path, Unit::Millimetre)?;
+/// assert!((surface.area() - 5e-5).abs() < 1e-15);
+/// # std::fs::remove_file(path)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
 pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
     let extension = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let parse = match extension.as_str() {
         "stl" => stl::parse,
         "ply" => ply::parse,
         "obj" => obj::parse,
-        _ => return Err(bad(path, "not a known surface file; supported are .stl, .ply and .obj")),
+        _ => return Err(bad(path, "the extension must be .stl, .ply or .obj")),
     };
-    if !path.exists() {
-        let source = std::io::Error::new(std::io::ErrorKind::NotFound, "no such file");
-        return Err(Error::Io { path: path.into(), source });
-    }
-    let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    let mut mesh = parse(&bytes).map_err(|reason| bad(path, reason))?;
+    let mut mesh = parse(&read(path)?).map_err(|reason| bad(path, reason))?;
     if mesh.triangles.is_empty() {
-        return Err(bad(path, "the file has no triangles"));
+        return Err(bad(path, "the file has no triangles; a surface needs at least one"));
     }
     if let Some(v) = mesh.vertices.iter().position(|v| !v.is_finite()) {
         return Err(bad(path, format!("vertex {v} is {}; coordinates must be finite", mesh.vertices[v])));
@@ -70,28 +80,15 @@ pub fn read_surface(path: &Path, unit: Unit) -> Result<TriMesh> {
     Ok(mesh)
 }
 
-/// What a parser found, or why it could not: the path is added by its caller.
-type Parsed<T> = std::result::Result<T, String>;
-
-/// An [`Error::Parse`]. Some parsers break their messages into lines; ours are one.
-fn bad(path: &Path, reason: impl Into<String>) -> Error {
-    let reason: String = reason.into();
-    Error::Parse { path: path.into(), reason: reason.split_whitespace().collect::<Vec<_>>().join(" ") }
-}
-
-/// Writes a whole file.
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.into(), source })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Error;
 
     #[test]
-    fn files_that_are_no_surfaces_are_named() {
+    fn unknown_and_missing_files_are_named() {
         let message = read_surface(Path::new("organ.step"), Unit::Metre).unwrap_err().to_string();
-        assert!(message.contains("organ.step") && message.contains(".stl, .ply and .obj"), "{message}");
+        assert!(message.contains("organ.step") && message.contains(".stl, .ply or .obj"), "{message}");
         assert!(matches!(read_surface(Path::new("absent.stl"), Unit::Metre), Err(Error::Io { .. })));
     }
 }

@@ -1,10 +1,11 @@
 //! Wavefront OBJ surfaces, without materials.
 
-use super::Parsed;
+use super::file::Parsed;
 use crate::TriMesh;
 use glam::DVec3;
 
-/// Reads all objects of the file as one surface; polygons become fans. Colours are not read.
+/// Reads all objects of the file as one surface. Polygons become fans of triangles. Colours are not
+/// read.
 pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
     let options =
         tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..Default::default() };
@@ -41,7 +42,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cube_comes_back() {
+    fn a_cube_is_read() {
         let mesh = cube(DVec3::ZERO, 2.0);
         let read = parse(text(&mesh).as_bytes()).unwrap();
         assert!(read.is_watertight());
@@ -57,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn damage_is_an_error() {
+    fn damaged_files_are_rejected() {
         for text in ["v 0 zero 0\n", "v 0 0 0\nf 1 2 9\n", "f 1 2 3\n", "v 0 0\nf 1 1 1\n"] {
             assert!(parse(text.as_bytes()).is_err(), "{text}");
         }

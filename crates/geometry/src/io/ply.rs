@@ -1,6 +1,6 @@
 //! Stanford PLY surfaces.
 
-use super::{Parsed, write};
+use super::file::{Parsed, write};
 use crate::{Result, TriMesh};
 use glam::DVec3;
 use ply_rs_bw::parser::{Parser, Reader};
@@ -8,7 +8,7 @@ use ply_rs_bw::ply::{ElementDef, Header, Property, PropertyAccess, PropertyAcces
 use std::io::Cursor;
 use std::path::Path;
 
-/// A vertex while it is read.
+/// A vertex of the file.
 #[derive(Default)]
 struct Vertex {
     position: DVec3,
@@ -35,7 +35,7 @@ impl PropertyAccess for Vertex {
     }
 }
 
-/// A face while it is read; `None` where its corners are not a list of numbers from 0 on.
+/// A face of the file; `None` if its corners are not a list of non-negative integers.
 #[derive(Default)]
 struct Face {
     corners: Option<Vec<u32>>,
@@ -54,7 +54,7 @@ impl PropertyAccess for Face {
     }
 }
 
-/// An element that is of no interest.
+/// An element that is ignored.
 struct Skipped;
 
 impl PropertyAccess for Skipped {
@@ -80,7 +80,7 @@ fn number(property: &Property) -> Option<f64> {
     }
 }
 
-/// Reads vertices, their colours if there are any, and faces; polygons become fans.
+/// Reads vertices, their colours (if present) and faces. Polygons become fans of triangles.
 pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
     let mut reader = Reader::new(Cursor::new(bytes));
     let header = Parser::<Skipped>::new().read_header(&mut reader).map_err(|e| e.to_string())?;
@@ -99,7 +99,7 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
                 for (f, face) in read::<Face>(&mut reader, element, &header)?.iter().enumerate() {
                     let corners = face.corners.as_deref().unwrap_or_default();
                     if corners.len() < 3 {
-                        return Err(format!("face {f} must list at least three vertices from 0 on"));
+                        return Err(format!("face {f} must list at least three non-negative vertex indices"));
                     }
                     mesh.triangles.extend(corners[1..].windows(2).map(|pair| [corners[0], pair[0], pair[1]]));
                 }
@@ -112,19 +112,20 @@ pub(super) fn parse(bytes: &[u8]) -> Parsed<TriMesh> {
     Ok(mesh)
 }
 
-/// Refuses a header that promises more than `size` bytes can hold, or lacks what a surface needs.
+/// Rejects a header that states more elements than `size` bytes can contain, or lacks what a
+/// surface needs.
 fn check(header: &Header, size: usize) -> Parsed<()> {
     for element in header.elements.values() {
         let (name, count) = (&element.name, element.count);
-        // Every element takes a byte at the least.
+        // Every element has at least one byte.
         if count > size || (count > 0 && element.properties.is_empty()) {
             return Err(format!(
-                "the header promises {count} elements {name:?}, more than the file's {size} bytes hold"
+                "the header states {count} elements {name:?}, more than the file's {size} bytes can contain"
             ));
         }
     }
     let vertex = header.elements.get("vertex").ok_or("the header has no element \"vertex\"")?;
-    let face = header.elements.get("face").ok_or("the header has no element \"face\": this is not a surface")?;
+    let face = header.elements.get("face").ok_or("the header has no element \"face\"; a surface needs one")?;
     if !["x", "y", "z"].iter().all(|&name| has(vertex, &[name])) {
         return Err("the element \"vertex\" must have the properties x, y and z".into());
     }
@@ -146,7 +147,8 @@ fn read<E: PropertyAccess>(
     Parser::<E>::new().read_payload_for_element(reader, element, header).map_err(|e| e.to_string())
 }
 
-/// Writes a binary little-endian `.ply` in metres (coordinates as `double`), with vertex colours when the mesh has them.
+/// Writes a binary little-endian `.ply` in metres (coordinates as `double`), with vertex colours if
+/// the mesh has them.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be written.
@@ -181,7 +183,7 @@ mod tests {
     use crate::shapes::icosphere;
 
     #[test]
-    fn a_colored_surface_comes_back_exactly() {
+    fn a_colored_surface_is_read_back_exactly() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("organ.ply");
         let mut mesh = icosphere(2, 0.1);
@@ -195,21 +197,21 @@ mod tests {
     }
 
     #[test]
-    fn text_with_polygons_and_other_elements() {
+    fn text_with_polygons_and_other_elements_is_read() {
         let text = "ply\nformat ascii 1.0\nelement camera 1\nproperty float f\nelement vertex 4\nproperty float x\n\
             property float y\nproperty float z\nelement face 1\nproperty list uchar uint vertex_index\nend_header\n\
             3.5\n0 0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n";
         let mesh = parse(text.as_bytes()).unwrap();
         assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
         assert!((mesh.area() - 1.0).abs() < 1e-12);
-        let refused = |from: &str, to: &str, why: &str| {
+        let rejected = |from: &str, to: &str, why: &str| {
             let message = parse(text.replace(from, to).as_bytes()).unwrap_err();
             assert!(message.contains(why), "{message}");
         };
-        refused("vertex 4", "vertex 99999999999", "99999999999");
-        refused("property float z\n", "", "x, y and z");
-        refused("4 0 1 2 3", "2 0 1", "face 0");
-        refused("4 0 1 2 3\n", "", "face");
-        refused("property float f\n", "", "camera");
+        rejected("vertex 4", "vertex 99999999999", "99999999999");
+        rejected("property float z\n", "", "x, y and z");
+        rejected("4 0 1 2 3", "2 0 1", "face 0");
+        rejected("4 0 1 2 3\n", "", "face");
+        rejected("property float f\n", "", "camera");
     }
 }

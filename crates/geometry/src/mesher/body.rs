@@ -1,37 +1,38 @@
-//! From a heap of conforming tets to one body with a proper surface.
+//! Cleanup of conforming tets: one connected body with a manifold surface.
 
 use crate::TetMesh;
 use crate::tet_mesh::adjacency::{EDGES, FACES, NO_TET, face_neighbours};
 
-/// The largest part of `mesh` (by volume) whose elements hang together by faces, with a surface every edge of which has
-/// exactly two triangles.
+/// The largest part of `mesh` (by volume) that is connected through faces. Every edge of its
+/// surface has exactly two triangles.
 ///
-/// - Parts that only touch at a node or an edge come apart: each gets its own copy of the nodes.
-/// - Where one part touches itself along an edge, the thinnest fans of elements around that edge are removed.
+/// - Parts that only touch at a node or an edge are separated: each gets its own copy of the nodes.
+/// - Where a part touches itself along an edge, all but the largest fan of elements around that
+///   edge are removed.
 ///
-/// Nodes are numbered in the order in which the elements name them; unused ones are gone.
+/// Nodes are numbered in the order of their first use. Unused nodes are removed.
 pub(super) fn largest_body(mut mesh: TetMesh) -> TetMesh {
     loop {
         let neighbours = face_neighbours(&mesh.tets);
         let keep = largest_part(&mesh, &neighbours);
-        mesh.tets = filter_by(&mesh.tets, &keep);
-        // Removing whole parts leaves the neighbours of the others as they were, only renumbered.
+        mesh.tets = filtered(&mesh.tets, &keep);
+        // Removing whole parts does not change the neighbours of the others, but renumbers them.
         let neighbours = if keep.contains(&false) { face_neighbours(&mesh.tets) } else { neighbours };
-        mesh = part_nodes(&mesh, &neighbours);
+        mesh = separate_nodes(&mesh, &neighbours);
         let pinched = pinched_edges(&mesh, &neighbours);
         if pinched.is_empty() {
             return mesh;
         }
-        let keep = without_thin_fans(&mesh, &neighbours, &pinched);
-        mesh.tets = filter_by(&mesh.tets, &keep);
+        let keep = keep_largest_fans(&mesh, &neighbours, &pinched);
+        mesh.tets = filtered(&mesh.tets, &keep);
     }
 }
 
-fn filter_by(tets: &[[u32; 4]], keep: &[bool]) -> Vec<[u32; 4]> {
+fn filtered(tets: &[[u32; 4]], keep: &[bool]) -> Vec<[u32; 4]> {
     tets.iter().zip(keep).filter(|&(_, &keep)| keep).map(|(&tet, _)| tet).collect()
 }
 
-/// True for the elements of the part with the largest volume.
+/// Whether each element is in the part with the largest volume.
 fn largest_part(mesh: &TetMesh, neighbours: &[[u32; 4]]) -> Vec<bool> {
     let mut part = vec![u32::MAX; mesh.tets.len()];
     let mut volumes: Vec<f64> = Vec::new();
@@ -64,8 +65,8 @@ fn largest_part(mesh: &TetMesh, neighbours: &[[u32; 4]]) -> Vec<bool> {
     part.iter().map(|&number| number as usize == largest).collect()
 }
 
-/// Gives each group of elements around a node that hangs together by faces its own copy of the node.
-fn part_nodes(mesh: &TetMesh, neighbours: &[[u32; 4]]) -> TetMesh {
+/// Gives each face-connected group of elements around a node its own copy of the node.
+fn separate_nodes(mesh: &TetMesh, neighbours: &[[u32; 4]]) -> TetMesh {
     // Union-find over the corners of the elements: corner c of element t is item 4 t + c.
     let mut groups = Groups::new(4 * mesh.tets.len());
     for (t, across) in neighbours.iter().enumerate() {
@@ -82,21 +83,21 @@ fn part_nodes(mesh: &TetMesh, neighbours: &[[u32; 4]]) -> TetMesh {
         }
     }
     let mut number = vec![u32::MAX; 4 * mesh.tets.len()];
-    let mut parted = TetMesh { vertices: Vec::with_capacity(mesh.vertices.len()), tets: mesh.tets.clone() };
-    for (t, tet) in parted.tets.iter_mut().enumerate() {
+    let mut separated = TetMesh { vertices: Vec::with_capacity(mesh.vertices.len()), tets: mesh.tets.clone() };
+    for (t, tet) in separated.tets.iter_mut().enumerate() {
         for (corner, node) in tet.iter_mut().enumerate() {
             let group = groups.root(4 * t + corner);
             if number[group] == u32::MAX {
-                number[group] = parted.vertices.len() as u32;
-                parted.vertices.push(mesh.vertices[*node as usize]);
+                number[group] = separated.vertices.len() as u32;
+                separated.vertices.push(mesh.vertices[*node as usize]);
             }
             *node = number[group];
         }
     }
-    parted
+    separated
 }
 
-/// Edges of the boundary that more than two of its triangles share, sorted.
+/// Boundary edges shared by more than two boundary triangles, sorted.
 fn pinched_edges(mesh: &TetMesh, neighbours: &[[u32; 4]]) -> Vec<[u32; 2]> {
     let mut edges: Vec<[u32; 2]> = Vec::new();
     for (tet, across) in mesh.tets.iter().zip(neighbours) {
@@ -109,8 +110,9 @@ fn pinched_edges(mesh: &TetMesh, neighbours: &[[u32; 4]]) -> Vec<[u32; 2]> {
     edges.chunk_by(|a, b| a == b).filter(|same| same.len() > 2).map(|same| same[0]).collect()
 }
 
-/// False for the elements around a pinched edge that are not in the fan of the largest volume there.
-fn without_thin_fans(mesh: &TetMesh, neighbours: &[[u32; 4]], pinched: &[[u32; 2]]) -> Vec<bool> {
+/// Whether to keep each element: false around a pinched edge for elements outside the fan of the
+/// largest volume.
+fn keep_largest_fans(mesh: &TetMesh, neighbours: &[[u32; 4]], pinched: &[[u32; 2]]) -> Vec<bool> {
     let mut around: Vec<Vec<u32>> = vec![Vec::new(); pinched.len()];
     for (t, tet) in mesh.tets.iter().enumerate() {
         for [a, b] in EDGES {
@@ -123,7 +125,8 @@ fn without_thin_fans(mesh: &TetMesh, neighbours: &[[u32; 4]], pinched: &[[u32; 2
     for tets in around {
         let mut groups = Groups::new(tets.len());
         for (i, &t) in tets.iter().enumerate() {
-            // Two elements at the edge that share a face share one that holds the edge, for they differ in one node.
+            // Two elements at the edge that share a face differ in one node, so the face contains
+            // the edge.
             for across in neighbours[t as usize] {
                 if let Ok(j) = tets.binary_search(&across) {
                     groups.join(i, j);
@@ -175,7 +178,7 @@ mod tests {
     use glam::DVec3;
 
     #[test]
-    fn parts_that_touch_at_a_node_come_apart_and_the_larger_stays() {
+    fn parts_that_touch_at_a_node_are_separated_and_the_larger_is_kept() {
         let vertices = vec![
             DVec3::ZERO,
             DVec3::X,
@@ -194,10 +197,9 @@ mod tests {
     }
 
     #[test]
-    fn a_ring_that_touches_itself_is_parted() {
-        // A closed ring of cubes (6 tets each) around the z axis at distance 1, whose first and last cube share an edge
-        // only: the chain visits (0,0), (1,0), (2,0), (2,1), (2,2), (1,2), (0,2) in the plane, and (0,2)'s neighbour
-        // (-1, 1) touches (0,0) along the edge x = 0, y = 1.
+    fn a_ring_that_touches_itself_is_separated() {
+        // A chain of cubes (6 tets each) around a hole. Its last cube (-1, 1) touches the first
+        // cube (0, 0) only along the edge x = 0, y = 1.
         let cells = [(0, 0), (1, 0), (2, 0), (2, 1), (2, 2), (1, 2), (0, 2), (-1, 2), (-1, 1)];
         let node = |x: i32, y: i32, z: i32| (((x + 1) * 5 + y) * 2 + z) as u32;
         let vertices =
@@ -213,7 +215,7 @@ mod tests {
         assert_eq!(pinched_edges(&mesh, &face_neighbours(&mesh.tets)).len(), 1);
         let nodes = mesh.tets.iter().flatten().copied().collect::<std::collections::BTreeSet<_>>().len();
         let body = largest_body(mesh);
-        // Both ends of the shared edge are doubled; no element is lost.
+        // Both nodes of the shared edge are duplicated. No element is removed.
         assert_eq!(body.tets.len(), 6 * cells.len());
         assert_eq!(body.vertices.len(), nodes + 2);
         assert!(pinched_edges(&body, &face_neighbours(&body.tets)).is_empty());

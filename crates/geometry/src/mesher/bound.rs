@@ -1,28 +1,30 @@
-//! The bound on dihedral angles, found by going through everything that can happen to a lattice tet.
+//! The bound on dihedral angles, by enumeration of all configurations of a lattice tet.
 //!
-//! A corner of the tet is inside, outside, or has moved onto the surface: along one of its 14 edges, at most the snap share of
-//! it, towards a point on the other side. A cut point lies anywhere on its edge but within the snap shares of the ends. The worst
-//! angles are at the ends of these ranges, which are all tried; points within them, drawn at random, do not go below.
+//! A corner of the tet is inside, outside, or was moved onto the surface: along one of its 14
+//! edges, at most by the snap fraction, towards a point on the other side. A cut point is anywhere
+//! on its edge outside the snap fractions of the ends. The worst angles are at the limits of these
+//! ranges, which are all tested. Random points within the ranges do not give smaller angles.
 
-use super::bcc::{LONG_STEPS, Point, STEPS};
 use super::cuts::{SNAP_LONG, SNAP_SHORT};
+use super::points::{LONG_STEPS, Point, STEPS};
 use super::stencil::{Corner, Side, fill};
 use crate::{TetMesh, TetQuality};
 use glam::{DVec3, IVec3};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::Rng;
 
-/// A positive lattice tet, long edges (0, 1) and (2, 3). The others are its mirror images.
+/// A positive lattice tet with the long edges (0, 1) and (2, 3). The others are its mirror images.
 const TET: [Point; 4] = [[1, 1, 1], [3, 1, 1], [2, 0, 0], [2, 2, 0]];
 
 fn at(i: usize) -> DVec3 {
     IVec3::from(TET[i]).as_dvec3()
 }
 
-/// Where each corner has moved: along which step (none: it stays), and how far, of its limit.
+/// Move of each corner: the step and the distance as a fraction of its limit. `None` for no move.
 type Moves = [Option<(usize, f64)>; 4];
 
-/// Whether some signs before the moves fit them: a move goes towards the other side, and no two corners towards each other.
+/// Whether signs before the moves exist that are consistent with them: each move is towards the
+/// other side, and no two corners move towards each other.
 fn possible(sides: &[Side; 4], moves: &Moves) -> bool {
     let to = [0, 1, 2, 3].map(|i| {
         let (step, _) = moves[i]?;
@@ -39,7 +41,8 @@ fn possible(sides: &[Side; 4], moves: &Moves) -> bool {
     })
 }
 
-/// Smallest and largest angle of the filling. `share` gives where in its range, 0 to 1, the cut of an edge lies.
+/// Smallest and largest angle of the resulting tets. `share` gives the position of an edge's cut in
+/// its range, in [0, 1].
 fn angles(sides: &[Side; 4], moves: &Moves, share: &dyn Fn(usize, usize) -> f64) -> (f64, f64) {
     let place = |i: usize| match moves[i] {
         Some((step, far)) => {
@@ -66,7 +69,7 @@ fn angles(sides: &[Side; 4], moves: &Moves, share: &dyn Fn(usize, usize) -> f64)
 }
 
 #[test]
-fn no_lattice_tet_can_be_filled_worse() {
+fn every_lattice_tet_keeps_the_angle_bound() {
     let kinds = [Side::Inside, Side::Surface, Side::Outside];
     let mut rng = Pcg64Mcg::new(1);
     let mut unit = || (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64;
@@ -88,7 +91,7 @@ fn no_lattice_tet_can_be_filled_worse() {
             if !possible(&sides, &moves) {
                 continue;
             }
-            // A bit for each pair of corners: at which end its cut lies.
+            // One bit per pair of corners: the end at which its cut lies.
             let pairs: Vec<(usize, usize)> = (0..4)
                 .flat_map(|i| (0..4).map(move |j| (i, j)))
                 .filter(|&(i, j)| sides[i] == Side::Inside && sides[j] == Side::Outside)

@@ -1,93 +1,100 @@
 //! The tets of a graded lattice.
 //!
-//! Labelle and Shewchuk (2007), section 4. Two leaves of the same size that share a face have a tet over each edge of that
-//! face, between their centres; where smaller leaves put a vertex in the middle of the edge, the tet is halved there. On a
-//! face with four smaller leaves behind it, the larger leaf has eight tets (quarters of a lattice tet) and each smaller one
-//! two halves of a pyramid; all have the middle of the large face as a corner, so the diagonals agree.
+//! After Labelle and Shewchuk (2007), section 4. Two leaves of the same size that share a face have
+//! a tet for each edge of that face, between their centres. If smaller leaves put a vertex in the
+//! middle of the edge, the tet is halved there. On a face with four smaller leaves behind it, the
+//! larger leaf has eight tets (quarters of a lattice tet) and each smaller leaf has two halves of a
+//! pyramid. All of them have the middle of the large face as a corner, so the diagonals agree.
+//!
+//! Every possible node has an id: slots of lattice points first, then cut points, then points deep
+//! inside that have no slot.
 
-use super::bcc::{At, BLOCK, BLOCK_POINTS, Lattice, MapWith, Point, jumps};
+use super::bcc::{Lattice, jumps};
+use super::blocks::{At, BLOCK, BLOCK_POINTS, Blocks};
 use super::cuts::Cuts;
 use super::octree::Octree;
+use super::points::{MapWith, Point};
 use super::stencil::{Corner, Side, fill};
 use crate::{Error, Result, TetMesh};
 use rayon::prelude::*;
 
-/// Names for the points of a block that is one leaf or part of one: corners at 0 and middles at half of each axis.
-const WHOLE_POINTS: usize = 8;
+/// Ids of the points of a block that is one leaf or part of one: the corner and the middle along
+/// each axis.
+const LEAF_POINTS: usize = 8;
 /// Level of a leaf as large as a block.
 const BLOCK_LEVEL: u32 = BLOCK.ilog2();
-/// Most points that may have names.
-const MOST_NAMES: usize = 1 << 27;
-/// Most elements that are made.
-const MOST_TETS: usize = 30_000_000;
-/// Blocks that are filled at a time, before the elements are counted.
-const AT_A_TIME: usize = 1024;
-/// Marks a block whose points have no extra names.
-const NONE: u32 = u32::MAX;
+/// Maximum number of ids.
+const MAX_IDS: usize = 1 << 27;
+/// Maximum number of elements.
+const MAX_TETS: usize = 30_000_000;
+/// Blocks filled in parallel before the elements are counted.
+const BLOCKS_PER_BATCH: usize = 1024;
+/// Marks a block whose points have no extra ids.
+const NO_IDS: u32 = u32::MAX;
 
-/// A warped lattice and its leaves, ready to be filled.
+/// A warped lattice and its leaves, from which the tets are built.
 pub(super) struct Filling<'a> {
     lattice: &'a Lattice,
     cuts: &'a Cuts,
     tree: Octree,
-    /// First name of the points of each block without slots that lies inside.
+    /// First id of the points of each inside block without slots.
     first: Vec<u32>,
-    /// Names in use: slots, cut points, then the points without slots.
-    names: usize,
-    /// The blocks with extra names, in that order.
+    /// Number of ids: slots, cut points, then the points without slots.
+    ids: usize,
+    /// The blocks with extra ids, in order of the ids.
     extra: Vec<u32>,
 }
 
 impl<'a> Filling<'a> {
-    /// Prepares to fill with leaves of at most `coarsest` cells.
+    /// Prepares leaves of at millions `coarsest` cells.
     pub(super) fn new(lattice: &'a Lattice, cuts: &'a Cuts, coarsest: u32) -> Result<Self> {
         let tree = Octree::over(lattice, coarsest);
-        let blocks = lattice.blocks.iter().product();
-        let mut names = lattice.values.len() + cuts.len();
-        let (mut first, mut extra) = (vec![NONE; blocks], Vec::new());
-        for block in (0..blocks).filter(|&block| lattice.block_at(block) == At::Inside) {
-            first[block] = names as u32;
+        let blocks = lattice.blocks.count.iter().product();
+        let mut ids = lattice.values.len() + cuts.len();
+        let (mut first, mut extra) = (vec![NO_IDS; blocks], Vec::new());
+        for block in (0..blocks).filter(|&block| lattice.blocks.block_at(block) == At::Inside) {
+            first[block] = ids as u32;
             extra.push(block as u32);
-            let whole = tree.level(lattice.first_cell(block).map(|c| c as i32)) >= BLOCK_LEVEL;
-            names += if whole { WHOLE_POINTS } else { BLOCK_POINTS };
-            // Not divided: that many tets a block, whatever there is at the surface.
-            let surely = if coarsest < 2 { 6 * BLOCK_POINTS * extra.len() } else { 0 };
-            if names > MOST_NAMES || surely > MOST_TETS {
+            let whole = tree.level(lattice.blocks.first_cell(block).map(|c| c as i32)) >= BLOCK_LEVEL;
+            ids += if whole { LEAF_POINTS } else { BLOCK_POINTS };
+            // A uniform lattice has at least this many tets, whatever is at the surface.
+            let at_least = if coarsest < 2 { 6 * BLOCK_POINTS * extra.len() } else { 0 };
+            if ids > MAX_IDS || at_least > MAX_TETS {
                 return Err(too_many(lattice));
             }
         }
-        Ok(Self { lattice, cuts, tree, first, names, extra })
+        Ok(Self { lattice, cuts, tree, first, ids, extra })
     }
 
-    /// All tets, nodes numbered in the order of their first use.
+    /// All tets, with nodes numbered in the order of their first use.
     pub(super) fn tets(&self) -> Result<TetMesh> {
         let blocks: Vec<usize> =
-            (0..self.first.len()).filter(|&block| self.lattice.block_at(block) != At::Outside).collect();
+            (0..self.first.len()).filter(|&block| self.lattice.blocks.block_at(block) != At::Outside).collect();
         let mut mesh = TetMesh::default();
-        for some in blocks.chunks(AT_A_TIME) {
+        for some in blocks.chunks(BLOCKS_PER_BATCH) {
             let filled: Vec<Result<Vec<[u32; 4]>>> = some.par_iter().map(|&block| self.block(block)).collect();
             for tets in filled {
                 mesh.tets.extend(tets?);
             }
-            if mesh.tets.len() > MOST_TETS {
+            if mesh.tets.len() > MAX_TETS {
                 return Err(too_many(self.lattice));
             }
         }
-        let mut number = vec![u32::MAX; self.names];
+        let mut number = vec![u32::MAX; self.ids];
         for node in mesh.tets.iter_mut().flatten() {
-            let name = *node as usize;
-            if number[name] == u32::MAX {
-                number[name] = mesh.vertices.len() as u32;
+            let id = *node as usize;
+            if number[id] == u32::MAX {
+                number[id] = mesh.vertices.len() as u32;
                 let slots = self.lattice.values.len();
-                mesh.vertices.push(if name < slots {
+                mesh.vertices.push(if id < slots {
                     self.cuts.position_of_point(self.lattice, *node)
-                } else if name < slots + self.cuts.len() {
-                    self.cuts.position(self.lattice, name - slots)
+                } else if id < slots + self.cuts.len() {
+                    self.cuts.position(self.lattice, id - slots)
                 } else {
-                    self.lattice.position(self.far_point(*node))
+                    self.lattice.blocks.position(self.far_point(*node))
                 });
             }
-            *node = number[name];
+            *node = number[id];
         }
         Ok(mesh)
     }
@@ -95,7 +102,7 @@ impl<'a> Filling<'a> {
     /// The tets of the leaves whose lower corner lies in a block.
     fn block(&self, block: usize) -> Result<Vec<[u32; 4]>> {
         let mut tets = Vec::new();
-        let first = self.lattice.first_cell(block);
+        let first = self.lattice.blocks.first_cell(block);
         for n in 0..BLOCK_POINTS / 2 {
             let cell = first.map_with([n % BLOCK, n / BLOCK % BLOCK, n / BLOCK / BLOCK], |a, b| (a + b) as i32);
             let level = self.tree.level(cell);
@@ -109,8 +116,8 @@ impl<'a> Filling<'a> {
         Ok(tets)
     }
 
-    /// The tets of one leaf that are its to make: those at its upper faces, and at its lower ones where the neighbour's
-    /// size differs.
+    /// The tets that belong to one leaf: those at its upper faces, and at its lower faces if the
+    /// neighbour's size differs.
     fn leaf(&self, cell: Point, level: u32, tets: &mut Vec<[u32; 4]>) -> Result<()> {
         let size = 1 << level;
         for axis in 0..3 {
@@ -133,12 +140,13 @@ impl<'a> Filling<'a> {
         Ok(())
     }
 
-    /// The four lattice tets at a face between two leaves of the same size, halved where an edge has a middle vertex.
+    /// The four lattice tets at a face between two leaves of the same size, halved at edges with a
+    /// middle vertex.
     fn lattice_tets(&self, face: &Face, cell: Point, level: u32, tets: &mut Vec<[u32; 4]>) -> Result<()> {
         let centres = [face.at(0, 0, 0), face.at(2, 0, 0)];
         for i in 0..4 {
             let [a, middle, b] = face.edge(i);
-            // The two other leaves around the edge: across it from each of the two.
+            // The two other leaves around the edge.
             let mut beside = cell;
             for other in (0..3).filter(|&other| other != face.axis) {
                 beside[other] += match middle[other] - face.centre[other] {
@@ -171,7 +179,8 @@ impl<'a> Filling<'a> {
 
     /// The two halves of the pyramid of a leaf at a face with a larger leaf behind it.
     fn half_pyramids(&self, face: &Face, level: u32, tets: &mut Vec<[u32; 4]>) -> Result<()> {
-        // The middle of the large face is the corner that is an odd multiple of this leaf's size along both axes.
+        // The middle of the large face is the corner at an odd multiple of this leaf's size along
+        // both axes.
         let odd = |p: &Point| (0..3).filter(|&a| a != face.axis).all(|a| p[a] >> (level + 1) & 1 == 1);
         let rim = [0, 1, 2, 3].map(|i| face.edge(i)[0]);
         let middle = rim.iter().position(odd).unwrap_or(0);
@@ -180,24 +189,24 @@ impl<'a> Filling<'a> {
         self.push([face.centre, m, opposite, b], tets)
     }
 
-    /// Adds a tet that must be wholly inside.
+    /// Adds a tet that must lie entirely inside.
     fn push(&self, points: [Point; 4], tets: &mut Vec<[u32; 4]>) -> Result<()> {
         let mut tet = [0; 4];
-        for (name, p) in tet.iter_mut().zip(points) {
-            *name = match self.name(p) {
-                Some(name) if self.lattice.is_inside(p) => name,
-                _ => return Err(jumps(self.lattice.position(p))),
+        for (id, p) in tet.iter_mut().zip(points) {
+            *id = match self.id(p) {
+                Some(id) if self.lattice.is_inside(p) => id,
+                _ => return Err(jumps(self.lattice.blocks.position(p))),
             };
         }
         tets.push(tet);
         Ok(())
     }
 
-    /// Fills the four lattice tets at a face between two cells, whatever side of the surface they are on.
+    /// Fills the four lattice tets at a face between two cells, which may cross the surface.
     fn stuff(&self, face: &Face, tets: &mut Vec<[u32; 4]>) {
         let rim = [0, 1, 2, 3].map(|i| face.edge(i)[0]);
         let points = [face.centre, face.at(2, 0, 0), rim[0], rim[1], rim[2], rim[3]];
-        let sides = points.map(|p| match self.lattice.at(p) {
+        let sides = points.map(|p| match self.lattice.blocks.at(p) {
             At::Outside => Side::Outside,
             At::Inside => Side::Inside,
             At::Slot(slot) => match self.lattice.values[slot as usize] {
@@ -213,40 +222,41 @@ impl<'a> Filling<'a> {
             let of = [0, 1, 2 + i, 2 + (i + 1) % 4];
             let corners = of.map(|k| points[k]);
             fill(&corners, &of.map(|k| sides[k]), |tet| {
-                // Inside and surface corners have a name, and every edge from inside to outside a cut.
-                let name = |corner| match corner {
-                    Corner::Point(k) => self.name(corners[k]),
+                // Inside and surface corners have an id, and every edge from inside to outside has
+                // a cut.
+                let id = |corner| match corner {
+                    Corner::Point(k) => self.id(corners[k]),
                     Corner::Cut(k, l) => self
                         .cuts
                         .between(self.lattice, corners[k], corners[l])
                         .map(|cut| (self.lattice.values.len() + cut) as u32),
                 };
-                if let [Some(a), Some(b), Some(c), Some(d)] = tet.map(name) {
+                if let [Some(a), Some(b), Some(c), Some(d)] = tet.map(id) {
                     tets.push([a, b, c, d]);
                 }
             });
         }
     }
 
-    /// Name of a point that is not far outside.
-    fn name(&self, p: Point) -> Option<u32> {
-        match self.lattice.at(p) {
+    /// Id of a point that is not far outside.
+    fn id(&self, p: Point) -> Option<u32> {
+        match self.lattice.blocks.at(p) {
             At::Outside => None,
             At::Slot(slot) => Some(slot),
             At::Inside => {
                 let cell = p.map(|c| (c >> 1) as usize);
-                let first = self.first[self.lattice.block(cell)];
+                let first = self.first[self.lattice.blocks.block(cell)];
                 let whole = self.tree.level(cell.map(|c| c as i32)) >= BLOCK_LEVEL;
                 let [x, y, z] = cell.map(|c| usize::from(c % BLOCK != 0));
-                Some(first + if whole { 4 * z + 2 * y + x } else { Lattice::local(p) } as u32)
+                Some(first + if whole { 4 * z + 2 * y + x } else { Blocks::local(p) } as u32)
             }
         }
     }
 
-    /// The point without a slot that has a name.
-    fn far_point(&self, name: u32) -> Point {
-        let block = self.extra[self.extra.partition_point(|&block| self.first[block as usize] <= name) - 1] as usize;
-        let (cell, local) = (self.lattice.first_cell(block), (name - self.first[block]) as usize);
+    /// The point without a slot that has this id.
+    fn far_point(&self, id: u32) -> Point {
+        let block = self.extra[self.extra.partition_point(|&block| self.first[block as usize] <= id) - 1] as usize;
+        let (cell, local) = (self.lattice.blocks.first_cell(block), (id - self.first[block]) as usize);
         if self.tree.level(cell.map(|c| c as i32)) >= BLOCK_LEVEL {
             cell.map_with([local & 1, local >> 1 & 1, local >> 2], |c, middle| (2 * c + BLOCK * middle) as i32)
         } else {
@@ -257,24 +267,25 @@ impl<'a> Filling<'a> {
 }
 
 fn too_many(lattice: &Lattice) -> Error {
-    let (cell, most) = (lattice.cell, MOST_TETS / 1_000_000);
-    Error::Mesh(format!("a cell of {cell} m gives more than about {most} million elements; use a larger one"))
+    let (cell, millions) = (lattice.blocks.cell, MAX_TETS / 1_000_000);
+    Error::Mesh(format!("a cell of {cell} m gives more than about {millions} million elements; use a larger one"))
 }
 
-/// A face of a leaf, with lengths in half cells.
+/// A face of a leaf. Lengths are in half cells.
 struct Face {
     /// Centre of the leaf.
     centre: Point,
-    /// Edge of the leaf in cells, which is half of it in half cells.
+    /// Edge of the leaf in cells, that is, half the edge in half cells.
     size: i32,
-    /// The axis across the face.
+    /// The axis normal to the face.
     axis: usize,
     /// Whether the face is the upper one along that axis.
     upper: bool,
 }
 
 impl Face {
-    /// The point so many half edges of the leaf from its centre: outward through the face, and along the two other axes.
+    /// The point at the given offsets from the leaf's centre, in half edges of the leaf: outward
+    /// through the face, and along the two other axes.
     fn at(&self, out: i32, u: i32, v: i32) -> Point {
         let mut p = self.centre;
         p[self.axis] += if self.upper { out * self.size } else { -out * self.size };
@@ -283,8 +294,8 @@ impl Face {
         p
     }
 
-    /// First corner, middle and second corner of the face's edge `i`. Counter-clockwise seen from outside, which makes
-    /// (centre, anything beyond on the axis, first, second) positive.
+    /// First corner, middle and second corner of the face's edge `i`, counterclockwise seen from
+    /// outside. So the tet (centre, point beyond the face on the axis, first, second) is positive.
     fn edge(&self, i: usize) -> [Point; 3] {
         const RIM: [[i32; 2]; 4] = [[-1, -1], [1, -1], [1, 1], [-1, 1]];
         let [a, b] = [RIM[i], RIM[(i + 1) % 4]];
@@ -309,7 +320,8 @@ mod tests {
         }
     }
 
-    /// Lattice tets have 60 to 90 degrees; the graded ones, halves and quarters of them and half pyramids, 45 to 120.
+    /// Lattice tets have angles of 60 to 90 degrees. The graded tets (halves and quarters of
+    /// lattice tets, half pyramids) have 45 to 120.
     #[test]
     fn the_inner_tets_are_of_four_kinds_with_good_angles() {
         let mut lattice = Lattice::sample(&Ball, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).unwrap();
@@ -318,13 +330,15 @@ mod tests {
         let filling = Filling::new(&lattice, &cuts, 64).unwrap();
         let slots = lattice.values.len();
         // Position of a point that is inside and has not moved.
-        let inner = |name: u32| match name as usize {
-            slot if slot < slots => (lattice.values[slot] < 0.0).then(|| lattice.position(lattice.point(name))),
+        let inner = |id: u32| match id as usize {
+            slot if slot < slots => {
+                (lattice.values[slot] < 0.0).then(|| lattice.blocks.position(lattice.blocks.point(id)))
+            }
             cut if cut < slots + cuts.len() => None,
-            _ => Some(lattice.position(filling.far_point(name))),
+            _ => Some(lattice.blocks.position(filling.far_point(id))),
         };
         let mut kinds: BTreeMap<[i64; 6], (usize, f64)> = BTreeMap::new();
-        for block in (0..filling.first.len()).filter(|&block| lattice.block_at(block) != At::Outside) {
+        for block in (0..filling.first.len()).filter(|&block| lattice.blocks.block_at(block) != At::Outside) {
             for tet in filling.block(block).unwrap() {
                 if let [Some(a), Some(b), Some(c), Some(d)] = tet.map(inner) {
                     let mut angles =
@@ -343,18 +357,19 @@ mod tests {
         assert!(kinds.values().all(|&(count, volume)| count > 100 && volume > 0.0));
     }
 
-    /// A field may hide an outside from the search for the surface. Where the lattice meets it after all, it is refused.
+    /// A field may hide an outside region from the surface search. If the lattice reaches it, the
+    /// field is rejected.
     #[test]
-    fn a_field_that_breaks_its_promise_is_refused() {
-        struct Burrow;
-        impl SignedDistance for Burrow {
+    fn a_field_that_overestimates_distances_is_rejected() {
+        struct Hole;
+        impl SignedDistance for Hole {
             fn distance(&self, p: DVec3) -> f64 {
-                // Straight in from the surface; promises to be a ball all around.
+                // A straight hole from the surface that the distances around it do not show.
                 if p.x > 0.0 && p.y.hypot(p.z) < 0.04 { 0.5 } else { p.length() - 1.0 }
             }
         }
-        let refused =
-            Lattice::sample(&Burrow, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).err().map(|e| e.to_string());
-        assert!(refused.as_ref().is_some_and(|words| words.contains("promised none")), "{refused:?}");
+        let rejection =
+            Lattice::sample(&Hole, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).err().map(|e| e.to_string());
+        assert!(rejection.as_ref().is_some_and(|words| words.contains("excludes one")), "{rejection:?}");
     }
 }

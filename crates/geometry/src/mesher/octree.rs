@@ -1,18 +1,21 @@
-//! Which cubes of cells the graded lattice takes as one leaf.
+//! The octree of the graded lattice: cubes of cells that form one leaf.
 //!
-//! Leaves have edges of 1, 2, 4, ... cells and are aligned with their size. Leaves that share a face, an edge or a corner
-//! differ by at most a factor of two. A tet of the lattice that has a corner on the surface or outside belongs to cells of
-//! the finest size only, so that the bounds on the angles of a uniform lattice hold there.
+//! Leaves have edges of 1, 2, 4, ... cells and are aligned to multiples of their size. Leaves that
+//! share a face, an edge or a corner differ by at most a factor of two. A lattice tet with a corner
+//! on the surface or outside belongs to cells of the finest size only. So the angle bounds of a
+//! uniform lattice hold there.
 
-use super::bcc::{At, BLOCK, Lattice, Point};
+use super::bcc::Lattice;
+use super::blocks::{At, BLOCK};
+use super::points::Point;
 use rayon::prelude::*;
 
-/// Deepest tree: leaves of 2^20 cells, more than any lattice has along an axis.
-const DEEPEST: u32 = 20;
+/// Maximum level: leaves of 2^20 cells, more than any lattice has along an axis.
+const MAX_LEVEL: u32 = 20;
 
 /// The leaves over a lattice.
 pub(super) struct Octree {
-    /// For each level from 1 on, the cubes of 2^level cells that are not divided further.
+    /// For each level from 1, the cubes of 2^level cells that are not subdivided.
     whole: Vec<Bits>,
 }
 
@@ -20,12 +23,13 @@ impl Octree {
     /// The coarsest tree with leaves of at most `coarsest` cells. `lattice` is warped.
     pub(super) fn over(lattice: &Lattice, coarsest: u32) -> Self {
         let mut whole: Vec<Bits> = Vec::new();
-        let most = coarsest.max(1).ilog2().min(DEEPEST);
+        let most = coarsest.max(1).ilog2().min(MAX_LEVEL);
         for level in 1..=most {
-            let dims = lattice.blocks.map(|n| (n * BLOCK) >> level);
+            let dims = lattice.blocks.count.map(|n| (n * BLOCK) >> level);
             let bits = match whole.last() {
                 None => Bits::fill(dims, |pair| may_double(lattice, pair)),
-                // A leaf needs its eight parts to be whole, and those around it, so that none is smaller than half.
+                // All eight children and the cubes around them must be whole, so no neighbour is
+                // smaller than half.
                 Some(finer) => Bits::fill(dims, |cube| {
                     let low = cube.map(|c| 2 * c as i32 - 1);
                     (0..4).all(|z| (0..4).all(|y| (0..4).all(|x| finer.get([low[0] + x, low[1] + y, low[2] + z]))))
@@ -39,7 +43,7 @@ impl Octree {
         Self { whole }
     }
 
-    /// Level of the leaf that holds a cell: it has an edge of 2^level cells. 0 outside the lattice.
+    /// Level of the leaf that contains a cell; its edge is 2^level cells. 0 outside the lattice.
     pub(super) fn level(&self, cell: [i32; 3]) -> u32 {
         let mut level = 0;
         for bits in &self.whole {
@@ -52,15 +56,14 @@ impl Octree {
     }
 }
 
-/// Whether the eight cells of a pair of cells along each axis may be one leaf: no tet of theirs has a corner that is not
-/// inside.
+/// Whether a cube of 2 x 2 x 2 cells may be one leaf: all corners of all its tets are inside.
 fn may_double(lattice: &Lattice, pair: [usize; 3]) -> bool {
     let first = pair.map(|c| 2 * c);
-    match lattice.block_at(lattice.block(first)) {
+    match lattice.blocks.block_at(lattice.blocks.block(first)) {
         At::Outside => false,
         At::Inside => true,
         At::Slot(_) => {
-            // In half cells: the pair reaches from 0 to 4.
+            // In half cells: the cube extends from 0 to 4.
             let first: Point = first.map(|c| 2 * c as i32);
             let inside = |x: i32, y: i32, z: i32| lattice.is_inside([first[0] + x, first[1] + y, first[2] + z]);
             let corners = [0, 2, 4];
@@ -83,7 +86,7 @@ struct Bits {
 }
 
 impl Bits {
-    /// The cubes for which `holds` does.
+    /// The cubes for which `holds` is true.
     fn fill(dims: [usize; 3], holds: impl Fn([usize; 3]) -> bool + Sync) -> Self {
         let count: usize = dims.iter().product();
         let words = (0..count.div_ceil(64))
@@ -99,9 +102,9 @@ impl Bits {
         Self { dims, words }
     }
 
-    /// Whether a cube is in the set; none outside the grid is.
+    /// Whether a cube is in the set. Cubes outside the grid are not.
     fn get(&self, at: [i32; 3]) -> bool {
-        // A negative coordinate becomes a huge one.
+        // A negative coordinate becomes a very large one.
         let [x, y, z] = at.map(|c| c as usize);
         let [nx, ny, nz] = self.dims;
         let n = (z.wrapping_mul(ny).wrapping_add(y)).wrapping_mul(nx).wrapping_add(x);
@@ -130,7 +133,7 @@ mod tests {
     fn leaves_are_balanced_and_the_surface_is_finest() {
         let lattice = Lattice::sample(&Ball, (DVec3::splat(-1.0), DVec3::splat(1.0)), 0.03).unwrap();
         let tree = Octree::over(&lattice, 1 << 30);
-        let n = lattice.blocks.map(|n| (n * BLOCK) as i32);
+        let n = lattice.blocks.count.map(|n| (n * BLOCK) as i32);
         let mut cells = [0usize; 8];
         for z in 0..n[2] {
             for y in 0..n[1] {

@@ -1,12 +1,13 @@
-//! How a lattice tet that crosses the surface is filled.
+//! Stencils: filling a lattice tet that crosses the surface.
 //!
-//! The part of the tet on the inside is a tet, a pyramid or a triangular prism over its inside corners, its corners on
-//! the surface and the cut points of its edges. Pyramids and prisms have quadrilateral faces which a neighbour shares;
-//! both must split them along the same diagonal, so the choice depends on nothing but the face.
+//! The inside part of the tet is a tet, a pyramid or a triangular prism. Its corners are the tet's
+//! inside corners, the tet's corners on the surface and the cut points of its edges. Neighbours
+//! share the quadrilateral faces of pyramids and prisms and must split them along the same
+//! diagonal. So the choice depends only on the face.
 
-use super::bcc::Point;
+use super::points::Point;
 
-/// Where a corner of the tet lies.
+/// Location of a corner of the tet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Side {
     Inside,
@@ -14,16 +15,17 @@ pub(super) enum Side {
     Outside,
 }
 
-/// A corner of a tet of the filling.
+/// A corner of a resulting tet.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Corner {
-    /// A corner of the lattice tet, 0..4.
+    /// Corner 0, 1, 2 or 3 of the lattice tet.
     Point(usize),
     /// The cut point on the edge from an inside to an outside corner.
     Cut(usize, usize),
 }
 
-/// Fills the inside of a positive lattice tet, whose long edges are (0, 1) and (2, 3), with positive tets.
+/// Fills the inside of a positive lattice tet, whose long edges are (0, 1) and (2, 3), with
+/// positive tets.
 pub(super) fn fill(points: &[Point; 4], sides: &[Side; 4], mut emit: impl FnMut([Corner; 4])) {
     use Corner::{Cut, Point};
     let mut corners = [[0; 4]; 3];
@@ -55,8 +57,9 @@ pub(super) fn fill(points: &[Point; 4], sides: &[Side; 4], mut emit: impl FnMut(
         [2, ..] => {
             let ([a, b], [c, d]) = ([inside[0], inside[1]], [outside[0], outside[1]]);
             let (first, second) = (diagonal_at_first(points, a, b, c), diagonal_at_first(points, a, b, d));
-            // The third quadrilateral is the surface itself. The rules above always leave one diagonal at `a` and one at
-            // `b`, and only this choice of the third does not run the three in a cycle, which nothing can fill.
+            // The third quadrilateral is the surface itself. The rules above always give one
+            // diagonal at `a` and one at `b`. Only this choice of the third avoids a cycle of the
+            // three, which cannot be filled.
             prism([Point(a), Cut(a, c), Cut(a, d)], [Point(b), Cut(b, c), Cut(b, d)], [first, second, second], emit);
         }
         [_, ..] => {
@@ -67,21 +70,23 @@ pub(super) fn fill(points: &[Point; 4], sides: &[Side; 4], mut emit: impl FnMut(
     }
 }
 
-/// Whether the quadrilateral a, b, cut(b, c), cut(a, c) of inside corners a and b and outside corner c is split by the
-/// diagonal from a (else by the one from b).
+/// Whether the diagonal from a (otherwise the one from b) splits the quadrilateral a, b, cut(b, c),
+/// cut(a, c) of inside corners a and b and outside corner c.
 ///
-/// Every lattice triangle has one long and two short edges. When a cut edge is the long one, the diagonal ends at its cut
-/// point. When both are short, the parity rule of Labelle and Shewchuk (2007), section 3.2, decides: a and b, two
-/// neighbours along an axis, differ in whether an even number of their coordinates exceed those of c.
+/// Every lattice triangle has one long and two short edges. If a cut edge is the long one, the
+/// diagonal ends at its cut point. If both are short, the parity rule of Labelle and Shewchuk
+/// (2007), section 3.2, decides: for the neighbours a and b along an axis, the number of
+/// coordinates that exceed those of c is even for one and odd for the other.
 fn diagonal_at_first(points: &[Point; 4], a: usize, b: usize, c: usize) -> bool {
     let long = |i: usize, j: usize| i / 2 == j / 2;
     if long(a, b) { (0..3).filter(|&axis| points[a][axis] > points[c][axis]).count() % 2 == 0 } else { long(b, c) }
 }
 
-/// Splits a prism with the triangles `a` and `b` into three tets. `diagonals` says for the quadrilaterals over (0, 1),
-/// (0, 2) and (1, 2) whether the diagonal starts at the first of the two in `a` (and ends at the second in `b`).
+/// Splits a prism between the triangles `a` and `b` into three tets. `diagonals` states for the
+/// quadrilaterals over (0, 1), (0, 2) and (1, 2) whether the diagonal starts at the first of the
+/// two in `a` and ends at the second in `b`.
 fn prism(a: [Corner; 3], b: [Corner; 3], diagonals: [bool; 3], mut emit: impl FnMut([Corner; 4])) {
-    // How many diagonals start at each corner of `a`. Without a cycle these are 2, 1 and 0.
+    // Number of diagonals that start at each corner of `a`. Without a cycle these are 2, 1 and 0.
     let starts = [
         usize::from(diagonals[0]) + usize::from(diagonals[1]),
         usize::from(!diagonals[0]) + usize::from(diagonals[2]),
@@ -95,8 +100,9 @@ fn prism(a: [Corner; 3], b: [Corner; 3], diagonals: [bool; 3], mut emit: impl Fn
     emit([a[u], a[v], a[w], b[w]]);
 }
 
-/// Orders the corners so that the tet is positive. The sign is that of the unmoved lattice with cut points half way,
-/// whole numbers throughout: moves and cuts within their limits never turn a tet over.
+/// Orders the corners for a positive tet. The sign is that of the undeformed lattice with cut
+/// points in the middle of edges, in integers. Moves and cuts within their limits never invert a
+/// tet.
 fn positive(points: &[Point; 4], mut tet: [Corner; 4]) -> [Corner; 4] {
     let twice = |corner: Corner| match corner {
         Corner::Point(i) => points[i].map(|c| 2 * c),
@@ -119,7 +125,8 @@ fn positive(points: &[Point; 4], mut tet: [Corner; 4]) -> [Corner; 4] {
 mod tests {
     use super::*;
 
-    /// With every cut half way, each of the 81 patterns must fill exactly the volume that is inside.
+    /// With every cut in the middle of its edge, each of the 81 patterns must fill exactly the
+    /// inside volume.
     #[test]
     fn every_pattern_fills_its_volume() {
         let points: [Point; 4] = [[1, 1, 1], [3, 1, 1], [2, 0, 0], [2, 2, 0]];
@@ -138,7 +145,8 @@ mod tests {
                 share += volume / 4.0;
             });
             let count = |side| sides.iter().filter(|&&s| s == side).count();
-            // The tet scaled by 1/2 at a corner has 1/8 of the volume; each corner on the surface halves a side less.
+            // The tet scaled by 1/2 at a corner has 1/8 of the volume. Each corner on the surface
+            // doubles it.
             let expected = match (count(Side::Inside), count(Side::Surface), count(Side::Outside)) {
                 (0, ..) => 0.0,
                 (_, _, 0) => 1.0,

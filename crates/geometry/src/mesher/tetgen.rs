@@ -1,12 +1,13 @@
-//! TetGen as a mesher: the separate program of that name, which the paper's meshes were made with.
+//! Mesher that runs the separate program TetGen, which produced the paper's meshes.
 //!
-//! Hang Si, "TetGen, a Delaunay-based quality tetrahedral mesh generator", ACM Transactions on Mathematical Software 41(2),
-//! 2015. The program is under the AGPL. It is only ever run as a process of its own, on files.
+//! H. Si, "TetGen, a Delaunay-based quality tetrahedral mesh generator", ACM Transactions on
+//! Mathematical Software 41(2), 2015. TetGen is licensed under the AGPL. It runs only as a separate
+//! process, on files.
 
 mod files;
 
-use super::Mesher;
 use super::body::largest_body;
+use super::interface::Mesher;
 use crate::distance::check;
 use crate::{Error, Result, TetMesh, TriMesh};
 use std::fs::File;
@@ -15,29 +16,31 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// How often the running program is looked at.
-const GLANCE: Duration = Duration::from_millis(5);
-/// Most of the program's text that is read when it fails [bytes].
-const MOST_TEXT: u64 = 64 * 1024;
-/// Most of a line of its text that is repeated [characters].
-const MOST_WORDS: usize = 160;
-/// Part by which the elements' volume may differ from the surface's. Both follow the same triangles.
+/// Interval at which the running program is polled.
+const POLL_INTERVAL: Duration = Duration::from_millis(5);
+/// Maximum program output that is read after a failure (bytes).
+const MAX_OUTPUT_BYTES: u64 = 64 * 1024;
+/// Maximum length of a quoted output line (characters).
+const MAX_MESSAGE_CHARS: usize = 160;
+/// Largest relative difference between the volume of the elements and of the surface, which have
+/// the same triangles.
 const VOLUME_TOLERANCE: f64 = 1e-3;
-/// The surface's file, and the stem of the program's.
+/// Name of the input file. TetGen derives its output names from it.
 const INPUT: &str = "body.smesh";
 
-/// Fills a surface with TetGen, if it is installed. The nodes of the surface are kept and others may be added on it.
+/// Meshes a surface with TetGen, if it is installed. The nodes of the surface are kept, and TetGen
+/// may add nodes on it.
 ///
-/// The defaults are the paper's settings, and those of TetGen 1.5: radius-edge ratio 1.6, smallest dihedral angle 10
-/// degrees. TetGen aims at both and reaches neither everywhere (1.5 degrees in a real kidney); much stricter ones may keep
-/// it busy for ever.
+/// The defaults are the settings of the paper and of TetGen 1.5: radius-edge ratio 1.6, smallest
+/// dihedral angle 10 degrees. TetGen does not reach both everywhere (1.5 degrees in a real kidney).
+/// It may not terminate for much stricter settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TetgenMesher {
-    /// The program: a name to be looked for in `PATH`, or a path.
+    /// The program: a name to search in `PATH`, or a path.
     pub program: PathBuf,
     /// Largest ratio of an element's circumradius to its shortest edge.
     pub radius_edge: f64,
-    /// Smallest dihedral angle to aim at [degrees].
+    /// Target for the smallest dihedral angle (degrees).
     pub min_dihedral_deg: f64,
     /// Time after which the program is stopped.
     pub time_limit: Duration,
@@ -55,36 +58,36 @@ impl Default for TetgenMesher {
 }
 
 impl Mesher for TetgenMesher {
-    /// Runs the program in a private folder that is gone afterwards. Elements it gives with negative volume are turned;
-    /// of several parts the largest stays.
+    /// Runs the program in a temporary folder. Elements with negative volume are flipped. Of
+    /// several parts the largest is kept.
     ///
     /// # Errors
-    /// When the surface is not closed or crosses itself, the program is missing, fails, takes too long or writes files
-    /// that make no sense, and when its elements do not fill the surface.
+    /// A surface that is not closed or intersects itself; a program that is missing, fails, exceeds
+    /// the time limit or writes invalid files; elements that do not fill the surface.
     fn mesh(&self, surface: &TriMesh) -> Result<TetMesh> {
         check(surface)?;
         if !surface.is_watertight() {
             let open = surface.open_edges();
-            return Err(self.wrong(&format!("needs a closed surface; this one has {open} open edges")));
+            return Err(self.error(&format!("needs a closed surface; this one has {open} open edges")));
         }
         let switches = self.switches()?;
         let folder = tempfile::Builder::new()
             .prefix("trocar-tetgen-")
             .tempdir()
-            .map_err(|e| self.wrong(&format!("needs a folder for temporary files, and none can be made: {e}")))?;
+            .map_err(|e| self.error(&format!("could not create a temporary folder: {e}")))?;
         let folder = folder.path();
-        // Without vertices that no triangle uses: they would become nodes.
+        // Unused vertices are removed; they would become nodes.
         files::write_smesh(&folder.join(INPUT), &surface.submesh(|_| true))?;
 
         let deadline = Instant::now() + self.time_limit;
         let status = self.run(&switches, folder, deadline)?;
         let (nodes, elements) = (folder.join("body.1.node"), folder.join("body.1.ele"));
         if !(status.success() && nodes.exists() && elements.exists()) {
-            return Err(self.explain(status, folder, deadline));
+            return Err(self.failure(status, folder, deadline));
         }
         let (first, vertices) = files::read_nodes(&nodes)?;
         let tets = files::read_elements(&elements, first, vertices.len())?;
-        self.sound(TetMesh { vertices, tets }, surface)
+        self.checked(TetMesh { vertices, tets }, surface)
     }
 
     fn describe(&self) -> String {
@@ -94,22 +97,23 @@ impl Mesher for TetgenMesher {
 }
 
 impl TetgenMesher {
-    /// p: the surface stays; q: quality; Q: quiet; F: no files of faces and edges.
+    /// Switches: p keeps the surface, q sets the quality, Q is quiet, F writes no face and edge
+    /// files.
     fn switches(&self) -> Result<String> {
         let (ratio, angle) = (self.radius_edge, self.min_dihedral_deg);
-        // Below about 1 TetGen does not come to an end.
+        // Below a ratio of about 1 TetGen does not terminate.
         if !((1.0..=100.0).contains(&ratio) && (0.0..=60.0).contains(&angle)) {
-            return Err(self.wrong(&format!(
-                "takes a radius-edge ratio of 1 to 100 and dihedral angles of 0 to 60 degrees, not {ratio} and {angle}"
+            return Err(self.error(&format!(
+                "needs a radius-edge ratio in [1, 100] and a dihedral angle in [0, 60] degrees, not {ratio} and {angle}"
             )));
         }
         Ok(format!("-pq{ratio}/{angle}QF"))
     }
 
-    /// Runs the program on the input in `folder`; its text goes to files there.
+    /// Runs the program on the input in `folder`. Its output goes to files there.
     fn run(&self, switches: &str, folder: &Path, deadline: Instant) -> Result<ExitStatus> {
-        let io = |e: std::io::Error| self.wrong(&format!("could not be run: {e}"));
-        // A path is taken from here, not from the folder the program runs in.
+        let io = |e: std::io::Error| self.error(&format!("could not be run: {e}"));
+        // A relative path refers to the current folder, not to the folder the program runs in.
         let is_path = self.program.components().count() > 1;
         let program = if is_path { std::path::absolute(&self.program).map_err(io)? } else { self.program.clone() };
         let mut child = Command::new(program)
@@ -120,8 +124,8 @@ impl TetgenMesher {
             .stderr(File::create(folder.join("err.txt")).map_err(io)?)
             .spawn()
             .map_err(|e| match e.kind() {
-                std::io::ErrorKind::NotFound => self.wrong(
-                    "is not installed (Debian, Ubuntu: apt install tetgen); the lattice mesher needs no other program",
+                std::io::ErrorKind::NotFound => self.error(
+                    "is not installed (Debian, Ubuntu: apt install tetgen); the lattice mesher needs no external program",
                 ),
                 _ => io(e),
             })?;
@@ -130,36 +134,38 @@ impl TetgenMesher {
                 return Ok(status);
             }
             if Instant::now() >= deadline {
-                // Both fail only when it has just ended by itself.
+                // Both fail only if the program has just ended.
                 let _ = child.kill();
                 let _ = child.wait();
-                return Err(self.wrong(&format!(
-                    "was stopped after {:.0} s; a surface of fewer triangles, a higher time limit or the lattice mesher helps",
+                return Err(self.error(&format!(
+                    "was stopped after {:.0} s; use a surface with fewer triangles, a higher time limit or the lattice mesher",
                     self.time_limit.as_secs_f64()
                 )));
             }
-            std::thread::sleep(GLANCE);
+            std::thread::sleep(POLL_INTERVAL);
         }
     }
 
-    /// What went wrong, from what the program says; where it died without a word, from its own check of the surface.
-    fn explain(&self, status: ExitStatus, folder: &Path, deadline: Instant) -> Error {
-        let mut said = complaint(folder);
-        // TetGen's last words are lost when it aborts: ask it for the triangles that cross.
+    /// The cause of a failure from the program's output, or from its own check of the surface if
+    /// there is none.
+    fn failure(&self, status: ExitStatus, folder: &Path, deadline: Instant) -> Error {
+        let mut said = failure_message(folder);
+        // TetGen's output is lost when it aborts. `-d` reports intersecting triangles.
         if !status.success() && self.run("-dNEF", folder, deadline).is_ok() {
-            said = complaint(folder).filter(|text| text.contains("intersect") && !text.starts_with("No ")).or(said);
+            said =
+                failure_message(folder).filter(|text| text.contains("intersect") && !text.starts_with("No ")).or(said);
         }
         match said {
-            Some(text) if text.contains("intersect") => self.wrong(&format!(
-                "refuses a surface that crosses itself ({text}); repair it, or use the lattice mesher"
+            Some(text) if text.contains("intersect") => self.error(&format!(
+                "rejects a surface that intersects itself ({text}); repair it, or use the lattice mesher"
             )),
-            Some(text) => self.wrong(&format!("failed ({status}): {text}")),
-            None => self.wrong(&format!("failed ({status}) without a word; the lattice mesher may do better")),
+            Some(text) => self.error(&format!("failed ({status}): {text}")),
+            None => self.error(&format!("failed ({status}) without a message; try the lattice mesher")),
         }
     }
 
-    /// Positive elements in one body that fills the surface.
-    fn sound(&self, mut mesh: TetMesh, surface: &TriMesh) -> Result<TetMesh> {
+    /// Checks the elements and returns one body of positive elements that fills the surface.
+    fn checked(&self, mut mesh: TetMesh, surface: &TriMesh) -> Result<TetMesh> {
         for t in 0..mesh.tets.len() {
             if mesh.tet_volume(t) < 0.0 {
                 mesh.tets[t].swap(2, 3);
@@ -167,16 +173,16 @@ impl TetgenMesher {
         }
         let flat = mesh.inverted();
         if flat > 0 {
-            return Err(self.wrong(&format!("gave {flat} of {} elements without volume", mesh.tets.len())));
+            return Err(self.error(&format!("returned {flat} of {} elements without volume", mesh.tets.len())));
         }
         if mesh.tets.is_empty() {
-            return Err(self.wrong("gave no elements"));
+            return Err(self.error("returned no elements"));
         }
         let (filled, enclosed) = (mesh.volume(), surface.volume());
         let off = ((filled - enclosed) / enclosed).abs();
         if off.is_nan() || off > VOLUME_TOLERANCE {
-            return Err(self.wrong(&format!(
-                "filled {:.3} cm3 of a surface that encloses {:.3} cm3; is it a single outward surface without hollows?",
+            return Err(self.error(&format!(
+                "filled {:.3} cm3 of a surface that encloses {:.3} cm3; the surface must be a single outward one without cavities",
                 1e6 * filled,
                 1e6 * enclosed
             )));
@@ -184,27 +190,27 @@ impl TetgenMesher {
         Ok(largest_body(mesh))
     }
 
-    fn wrong(&self, what: &str) -> Error {
+    fn error(&self, what: &str) -> Error {
         Error::Mesh(format!("TetGen ({}) {what}", self.program.display()))
     }
 }
 
-/// The line of the program's text that says most about a failure.
-fn complaint(folder: &Path) -> Option<String> {
+/// The output line that best describes a failure.
+fn failure_message(folder: &Path) -> Option<String> {
     let text = ["out.txt", "err.txt"].map(|name| tail(&folder.join(name)).unwrap_or_default()).join("\n");
     let lines = || text.lines().map(str::trim).filter(|line| !line.is_empty());
     let marked = |mark: &str| lines().find(|line| line.to_lowercase().contains(mark));
     let line =
         ["!!", "intersect", "error", "fail", "stop"].iter().find_map(|mark| marked(mark)).or(lines().next_back())?;
-    Some(line.trim_start_matches(['!', ' ']).chars().filter(|c| !c.is_control()).take(MOST_WORDS).collect())
+    Some(line.trim_start_matches(['!', ' ']).chars().filter(|c| !c.is_control()).take(MAX_MESSAGE_CHARS).collect())
 }
 
-/// The end of a text file.
+/// The last [`MAX_OUTPUT_BYTES`] of a text file.
 fn tail(path: &Path) -> std::io::Result<String> {
     let mut file = File::open(path)?;
     let length = file.metadata()?.len();
-    file.seek(SeekFrom::Start(length.saturating_sub(MOST_TEXT)))?;
+    file.seek(SeekFrom::Start(length.saturating_sub(MAX_OUTPUT_BYTES)))?;
     let mut bytes = Vec::new();
-    file.take(MOST_TEXT).read_to_end(&mut bytes)?;
+    file.take(MAX_OUTPUT_BYTES).read_to_end(&mut bytes)?;
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }

@@ -1,8 +1,8 @@
-//! Boxes sorted into the cells of a uniform grid, to find those near a point.
+//! A uniform grid over boxes, to find the boxes near a point.
 
 use glam::DVec3;
 
-/// Cells of a grid, each with the boxes that overlap it.
+/// A grid whose cells list the boxes that overlap them.
 pub(super) struct BoxGrid {
     origin: DVec3,
     cell: f64,
@@ -12,13 +12,13 @@ pub(super) struct BoxGrid {
 }
 
 impl BoxGrid {
-    /// Sorts `boxes` (smallest and largest coordinates [m]) into cells about as large as the mean box. `None` without boxes
-    /// or when their coordinates are not finite.
+    /// Sorts `boxes`, given by their smallest and largest coordinates (m), into cells about as
+    /// large as the mean box. `None` if there are no boxes or coordinates are not finite.
     pub(super) fn new(boxes: &[(DVec3, DVec3)]) -> Option<Self> {
         let &first = boxes.first()?;
         let (lo, hi) = boxes.iter().fold(first, |(lo, hi), b| (lo.min(b.0), hi.max(b.1)));
         let mean = boxes.iter().map(|b| (b.1 - b.0).max_element()).sum::<f64>() / boxes.len() as f64;
-        // No more than a few cells a box, however the boxes lie.
+        // Limits the number of cells to a few per box for any arrangement.
         let coarsest = ((hi - lo).max(DVec3::splat(mean)).element_product() / (8 * boxes.len()) as f64).cbrt();
         let cell = mean.max(coarsest);
         if !(cell > 0.0 && (hi - lo).is_finite()) {
@@ -27,7 +27,7 @@ impl BoxGrid {
         let dims = ((hi - lo) / cell).to_array().map(|n| n as usize + 1);
         let mut grid =
             Self { origin: lo, cell, dims, starts: vec![0; dims.iter().product::<usize>() + 1], items: vec![] };
-        // Counting sort: how many a cell, then where each starts, then the boxes themselves.
+        // Counting sort: the count per cell, the start of each cell, then the boxes.
         for b in boxes {
             let range = grid.range(b);
             grid.each_cell(range, |cell, starts| starts[cell + 1] += 1);
@@ -48,26 +48,28 @@ impl BoxGrid {
         Some(grid)
     }
 
-    /// The boxes that overlap the cell of `p`, in ascending order; none when `p` lies outside the grid.
+    /// The boxes that overlap the cell of `p` in ascending order; none if `p` is outside the grid.
     pub(super) fn at(&self, p: DVec3) -> &[u32] {
         let at = (p - self.origin) / self.cell;
         let inside = at.cmpge(DVec3::ZERO).all() && (0..3).all(|a| at[a] < self.dims[a] as f64);
         if inside { self.cell_items(self.clamped(p)) } else { &[] }
     }
 
-    /// The item of the least `distance` [m] from `p`; `distance` must be that of something within the item's box. Ties
-    /// go to the lower item. `None` when no distance is a number.
+    /// The item with the smallest `distance` (m) from `p`, where `distance` is that of an object
+    /// within the item's box. Of equal distances the lower item wins. `None` if every distance is
+    /// NaN.
     pub(super) fn nearest(&self, p: DVec3, distance: impl Fn(u32) -> f64) -> Option<u32> {
         let mut best: Option<(f64, u32)> = None;
         let centre = self.clamped(p);
         for ring in 0..=self.dims.iter().copied().max().unwrap_or(0) {
-            // A cell of this ring is at least ring - 1 cells away from the cell of `p`, seen from within the grid.
+            // A cell of this ring is at least ring - 1 cells away from the cell of `p`.
             let away = (ring as f64 - 1.0).max(0.0) * self.cell;
             if best.is_some_and(|(least, _)| least < away) {
                 break;
             }
             self.each_of_ring(centre, ring, |cell| {
-                // What lies nearest lies in a cell that lists it, so a cell farther away than the best has nothing to add.
+                // The nearest object lies in a cell that lists it, so farther cells than the best
+                // distance are skipped.
                 if best.is_some_and(|(least, _)| least < self.distance_to_cell(p, cell)) {
                     return;
                 }
@@ -82,7 +84,7 @@ impl BoxGrid {
         best.map(|(_, item)| item)
     }
 
-    /// Distance from `p` to a cell [m], less a little for rounding.
+    /// Distance from `p` to a cell (m), reduced slightly for rounding.
     fn distance_to_cell(&self, p: DVec3, cell: [usize; 3]) -> f64 {
         let lo = self.origin + self.cell * DVec3::from(cell.map(|c| c as f64));
         p.distance(p.clamp(lo, lo + self.cell)) - 1e-9 * self.cell
@@ -116,7 +118,7 @@ impl BoxGrid {
         }
     }
 
-    /// The cells at exactly `ring` cells from `centre` along the axis on which they are farthest.
+    /// The cells at Chebyshev distance `ring` from `centre`.
     fn each_of_ring(&self, centre: [usize; 3], ring: usize, mut f: impl FnMut([usize; 3])) {
         let [xs, ys, zs] = [0, 1, 2].map(|a| centre[a].saturating_sub(ring)..=(centre[a] + ring).min(self.dims[a] - 1));
         for z in zs {

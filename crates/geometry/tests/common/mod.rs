@@ -14,8 +14,9 @@ impl<F: Fn(DVec3) -> f64 + Sync> SignedDistance for Shape<F> {
     }
 }
 
-/// Panics unless the tets conform and their boundary is a closed surface every edge of which has two triangles that run
-/// along it in opposite directions. Returns the number of boundary nodes where the surface touches itself.
+/// Panics unless the tets conform and their boundary is a closed surface every edge of which has
+/// two triangles that run along it in opposite directions. Returns the number of boundary nodes
+/// where the surface touches itself.
 pub fn check_conforming(mesh: &TetMesh) -> usize {
     let mut faces: Vec<[u32; 3]> = Vec::new();
     for &[a, b, c, d] in &mesh.tets {

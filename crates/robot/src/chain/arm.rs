@@ -5,7 +5,7 @@ use super::mass::MassProperties;
 use crate::{Error, Result};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Standard gravity in a world with z up [m/s2], as most simulators have it.
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);

@@ -5,7 +5,7 @@ use super::mass::MassProperties;
 use crate::Result;
 use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// A joint's figures and its link's.
 struct Row {

@@ -3,7 +3,7 @@
 use super::arm::{JointKind, SerialArm};
 use super::joints::{Joints, MAX_JOINTS};
 use glam::{DQuat, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// The poses of all links and of the flange in the world, at one posture.
 #[derive(Clone, Copy, Debug)]

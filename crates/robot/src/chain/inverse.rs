@@ -9,7 +9,7 @@ use super::joints::{JointSet, Joints};
 use super::matrix::JointMatrix;
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Rotations are weighed against translations as if at this distance [m]: about an instrument's length.
 pub(crate) const LEVER: f64 = 0.3;

@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use glam::{DMat3, DVec3};
 use serde::{Deserialize, Serialize};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// How a rigid body resists motion, in axes that are fixed to it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

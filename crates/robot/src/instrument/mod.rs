@@ -19,7 +19,7 @@ use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Standard gravity as all of Trocar uses it [m/s2].
 pub const GRAVITY: f64 = 9.81;

@@ -4,9 +4,8 @@ use super::{Manipulator, reference};
 use crate::chain::{ArmState, Frames, Joints};
 use crate::instrument::{Coordinates, compose};
 use crate::port::{Measured, Shaft, Twist};
-use crate::wrench::Wrench;
 use glam::{DMat3, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Wrench};
 
 /// What is read at the joints.
 #[derive(Clone, Copy, Debug, PartialEq)]

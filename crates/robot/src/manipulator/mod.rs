@@ -23,13 +23,12 @@ pub use settings::{Gains, Law, ModelError, Settings};
 use crate::chain::{self, ArmState, CouplingLaw, Drive, InverseOptions, JointSet, Joints, SerialArm};
 use crate::instrument::{Coordinates, Excess, Instrument, Limits, share};
 use crate::port::{Port, RimState, Shaft};
-use crate::wrench::Wrench;
 use crate::{Error, Result};
 use control::{Memory, Plan};
 use glam::DVec3;
 use reference::{Reference, Ways};
 use serde::{Deserialize, Serialize};
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Wrench};
 
 /// The longest physics step [s].
 const LONGEST: f64 = 0.02;

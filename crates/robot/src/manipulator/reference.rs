@@ -14,7 +14,7 @@ use crate::instrument::{Coordinates, Instrument, Limits, coordinates};
 use crate::port::Port;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Highest speed and acceleration of the control points: the two pivots [rad/s, rad/s2], insertion [m/s, m/s2], roll [rad/s, rad/s2]. Commands that stay below both
 /// pass unchanged.

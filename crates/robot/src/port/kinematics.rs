@@ -5,7 +5,7 @@ use crate::instrument::{Coordinates, Excess, Instrument, Limits, compose, coordi
 use crate::{Error, Result};
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::TAU;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Least cosine of the tilt at which a shaft is taken to go through the port and not to lie in its plane.
 pub(super) const LEAST_COS: f64 = 0.05;

@@ -33,7 +33,7 @@ use crate::instrument::Limits;
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use serde::{Deserialize, Serialize};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// A round hole in a sheet.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

@@ -2,7 +2,7 @@
 
 use crate::instrument::Instrument;
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// How a rigid body moves.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

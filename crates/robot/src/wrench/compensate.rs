@@ -1,9 +1,9 @@
 //! Readings with the instrument's weight taken off, tared at reset.
 
-use super::{ForceKind, Identification, SensorNoise, Wrench, check_pose, regressor};
+use super::{ForceKind, Identification, SensorNoise, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
-use nalgebra::SMatrix;
+use trocar_core::Wrench;
 
 /// What is left of a reading: the force on the instrument.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,14 +99,13 @@ impl Compensator {
             rows.iter_mut().flatten().zip(then.iter().flatten()).for_each(|(a, b)| *a -= b);
             readings += 1.0 / tare.count as f64;
         }
-        let noise = SMatrix::<f64, 6, 6>::from_fn(|i, j| {
-            if i == j { readings * self.noise.of_row(i) * self.noise.of_row(i) } else { 0.0 }
-        });
-        let covariance = self.load.spread(&rows) + noise;
+        let mut covariance = self.load.spread(&rows);
+        for (i, row) in covariance.iter_mut().enumerate() {
+            row[i] += readings * self.noise.of_row(i) * self.noise.of_row(i);
+        }
         let turn = DMat3::from_quat(orientation);
         let block = |k: usize| {
-            let column =
-                |j: usize| DVec3::new(covariance[(k, k + j)], covariance[(k + 1, k + j)], covariance[(k + 2, k + j)]);
+            let column = |j: usize| DVec3::from_array([0, 1, 2].map(|i| covariance[k + i][k + j]));
             turn * DMat3::from_cols(column(0), column(1), column(2)) * turn.transpose()
         };
         Ok(ForceReading {

@@ -1,9 +1,10 @@
 //! The load model from readings at rest: weighted least squares, with what it does not know.
 
-use super::{LoadModel, SensorNoise, Wrench, check_pose, regressor};
+use super::svd::Svd;
+use super::{LoadModel, SensorNoise, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
-use nalgebra::{DMatrix, DVector, SMatrix, SVD};
+use trocar_core::Wrench;
 
 /// Parameters of a [`LoadModel`]: mass, first moment (3), bias of force (3) and torque (3), in this order.
 pub const PARAMETERS: usize = 10;
@@ -34,37 +35,40 @@ pub struct Identification {
     pub chi_squared: f64,
     /// Equations less parameters.
     pub degrees: usize,
-    covariance: SMatrix<f64, PARAMETERS, PARAMETERS>,
+    covariance: [[f64; PARAMETERS]; PARAMETERS],
+    /// The inverse of the covariance: the normal matrix of the weighted equations.
+    information: [[f64; PARAMETERS]; PARAMETERS],
 }
 
 impl Identification {
     /// Covariance of the parameters in the order of [`PARAMETERS`], SI units.
     pub fn covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
-        std::array::from_fn(|i| std::array::from_fn(|j| self.covariance[(i, j)]))
+        self.covariance
     }
 
     /// Standard deviation of every parameter.
     pub fn deviations(&self) -> LoadModel {
-        LoadModel::from_array(std::array::from_fn(|i| self.covariance[(i, i)].max(0.0).sqrt()))
+        LoadModel::from_array(std::array::from_fn(|i| self.covariance[i][i].max(0.0).sqrt()))
     }
 
-    /// Square of the distance from the estimate to `truth` in standard deviations: chi-squared with ten degrees of freedom where noise is all that is wrong.
-    ///
-    /// # Errors
-    /// A covariance that cannot be inverted.
-    pub fn distance_squared(&self, truth: &LoadModel) -> Result<f64> {
+    /// Square of the distance from the estimate to `truth` in standard deviations. It is chi-squared
+    /// with ten degrees of freedom where noise is the only error.
+    pub fn distance_squared(&self, truth: &LoadModel) -> f64 {
         let (a, b) = (self.model.to_array(), truth.to_array());
-        let off = SMatrix::<f64, PARAMETERS, 1>::from_fn(|i, _| a[i] - b[i]);
-        let factor = self.covariance.cholesky();
-        let factor =
-            factor.ok_or_else(|| Error::invalid("identification", "its covariance is not positive definite"))?;
-        Ok(off.dot(&factor.solve(&off)))
+        let off: [f64; PARAMETERS] = std::array::from_fn(|i| a[i] - b[i]);
+        quadratic(&self.information, &off, &off)
     }
 
-    pub(super) fn spread(&self, rows: &[[f64; PARAMETERS]; 6]) -> SMatrix<f64, 6, 6> {
-        let a = SMatrix::<f64, 6, PARAMETERS>::from_fn(|i, j| rows[i][j]);
-        a * self.covariance * a.transpose()
+    /// Covariance of a reading whose regressor is `rows`.
+    pub(super) fn spread(&self, rows: &[[f64; PARAMETERS]; 6]) -> [[f64; 6]; 6] {
+        std::array::from_fn(|i| std::array::from_fn(|j| quadratic(&self.covariance, &rows[i], &rows[j])))
     }
+}
+
+/// a' M b.
+fn quadratic(m: &[[f64; PARAMETERS]; PARAMETERS], a: &[f64; PARAMETERS], b: &[f64; PARAMETERS]) -> f64 {
+    let row = |i: usize| (0..PARAMETERS).map(|j| m[i][j] * b[j]).sum::<f64>();
+    (0..PARAMETERS).map(|i| a[i] * row(i)).sum()
 }
 
 /// Identifies the load from readings at rest under `gravity` [m/s2] (in the cell) of a sensor with `noise`.
@@ -80,8 +84,8 @@ pub fn identify(poses: &[StaticReading], noise: &SensorNoise, gravity: DVec3) ->
         ));
     }
     let count = 6 * poses.len();
-    let mut equations = DMatrix::<f64>::zeros(count, PARAMETERS);
-    let mut readings = DVector::<f64>::zeros(count);
+    let mut equations = Vec::with_capacity(count);
+    let mut readings = Vec::with_capacity(count);
     for (p, pose) in poses.iter().enumerate() {
         check_pose(&format!("static pose {p}"), pose.orientation, gravity)?;
         if !pose.reading.is_finite() {
@@ -90,52 +94,53 @@ pub fn identify(poses: &[StaticReading], noise: &SensorNoise, gravity: DVec3) ->
         let (rows, read) = (regressor(pose.orientation, gravity), pose.reading.to_array());
         for (r, row) in rows.iter().enumerate() {
             let weight = 1.0 / noise.of_row(r);
-            readings[6 * p + r] = weight * read[r];
-            row.iter().enumerate().for_each(|(j, v)| equations[(6 * p + r, j)] = weight * v);
+            readings.push(weight * read[r]);
+            equations.push(row.map(|v| weight * v));
         }
     }
-    solve(equations, &readings)
+    solve(&equations, &readings)
 }
 
 /// Least squares by the singular values of the equations with columns of length 1.
-fn solve(mut equations: DMatrix<f64>, readings: &DVector<f64>) -> Result<Identification> {
+fn solve(equations: &[[f64; PARAMETERS]], readings: &[f64]) -> Result<Identification> {
     let alike = |condition: f64| {
         let reason = format!(
             "their orientations are too alike (condition number {condition:.1e}, at most {WORST_CONDITION}); tilt the instrument by 20 degrees or more to several sides"
         );
         Error::invalid("static poses", reason)
     };
-    let scales: Vec<f64> = equations.column_iter().map(|c| c.norm()).collect();
+    let dot = |i: usize, j: usize| -> f64 { equations.iter().map(|row| row[i] * row[j]).sum() };
+    let information = std::array::from_fn(|i| std::array::from_fn(|j| dot(i, j)));
+    let scales: [f64; PARAMETERS] = std::array::from_fn(|j| dot(j, j).sqrt());
     if scales.iter().any(|s| *s <= 0.0 || !s.is_finite()) {
         return Err(alike(f64::INFINITY));
     }
-    for (j, scale) in scales.iter().enumerate() {
-        equations.column_mut(j).scale_mut(1.0 / scale);
-    }
-    let svd = SVD::try_new(equations.clone(), true, true, f64::EPSILON, 10_000);
-    let Some((u, v, values)) = svd.and_then(|s| Some((s.u?, s.v_t?, s.singular_values))) else {
+    let scale = |row: &[f64; PARAMETERS]| -> [f64; PARAMETERS] { std::array::from_fn(|j| row[j] / scales[j]) };
+    let Some(svd) = Svd::new(equations.iter().map(scale).collect()) else {
         return Err(Error::invalid(
             "static poses",
             "their equations have no singular values; look for absurd readings",
         ));
     };
-    let condition = values.max() / values.min();
+    let (least, most) =
+        svd.values.iter().fold((f64::INFINITY, 0.0_f64), |(least, most), v| (least.min(*v), most.max(*v)));
+    let condition = most / least;
     if condition.is_nan() || condition >= WORST_CONDITION {
         return Err(alike(condition));
     }
-    let projected = (u.transpose() * readings).component_div(&values);
-    let scaled = v.transpose() * &projected;
-    let residual = readings - equations * &scaled;
-    let parameters = std::array::from_fn(|j| scaled[j] / scales[j]);
-    let covariance = SMatrix::from_fn(|i, j| {
-        let sum: f64 = (0..PARAMETERS).map(|k| v[(k, i)] * v[(k, j)] / (values[k] * values[k])).sum();
-        sum / (scales[i] * scales[j])
-    });
+    let scaled = svd.solve(readings);
+    let parameters: [f64; PARAMETERS] = std::array::from_fn(|j| scaled[j] / scales[j]);
+    let residual = |(row, reading): (&[f64; PARAMETERS], &f64)| {
+        reading - row.iter().zip(&parameters).map(|(a, p)| a * p).sum::<f64>()
+    };
     Ok(Identification {
         model: LoadModel::from_array(parameters),
         condition,
-        chi_squared: residual.norm_squared(),
+        chi_squared: equations.iter().zip(readings).map(residual).map(|r| r * r).sum(),
         degrees: readings.len() - PARAMETERS,
-        covariance,
+        covariance: std::array::from_fn(|i| {
+            std::array::from_fn(|j| svd.inverse_normal(i, j) / (scales[i] * scales[j]))
+        }),
+        information,
     })
 }

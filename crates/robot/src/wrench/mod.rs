@@ -9,6 +9,7 @@
 mod compensate;
 mod identify;
 mod poses;
+mod svd;
 
 pub use compensate::{Compensator, ForceReading};
 pub use identify::{Identification, PARAMETERS, StaticReading, identify};
@@ -19,6 +20,7 @@ use crate::instrument::Instrument;
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
+use trocar_core::Wrench;
 
 /// What a force is, so that nobody mistakes one for the other (SPEC C8).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -28,46 +30,6 @@ pub enum ForceKind {
     Contact,
     /// A latched grasp holds nodes where the jaws are: the force that this takes, not the tissue's reaction to a touch.
     Constraint,
-}
-
-/// A force and a torque.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Wrench {
-    /// Force [N].
-    pub force: DVec3,
-    /// Torque about the frame's origin [N m].
-    pub torque: DVec3,
-}
-
-impl Wrench {
-    /// Of a force [N] at a point [m].
-    pub fn at(force: DVec3, point: DVec3) -> Self {
-        Self { force, torque: point.cross(force) }
-    }
-
-    /// Whether all six numbers are finite.
-    pub fn is_finite(&self) -> bool {
-        self.force.is_finite() && self.torque.is_finite()
-    }
-
-    fn to_array(self) -> [f64; 6] {
-        let (f, t) = (self.force, self.torque);
-        [f.x, f.y, f.z, t.x, t.y, t.z]
-    }
-}
-
-impl std::ops::Add for Wrench {
-    type Output = Self;
-    fn add(self, other: Self) -> Self {
-        Self { force: self.force + other.force, torque: self.torque + other.torque }
-    }
-}
-
-impl std::ops::Sub for Wrench {
-    type Output = Self;
-    fn sub(self, other: Self) -> Self {
-        Self { force: self.force - other.force, torque: self.torque - other.torque }
-    }
 }
 
 /// What a sensor at the mount reads when the instrument touches nothing: linear in these ten numbers.

@@ -9,7 +9,7 @@ pub mod random;
 pub use random::Random;
 
 use glam::{DMat3, DVec3};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::chain::{Joint, JointKind, JointLimits, Joints, MassProperties, Segment, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument};
 use trocar_robot::manipulator::{Manipulator, Settings};

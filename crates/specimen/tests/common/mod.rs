@@ -2,7 +2,8 @@
 
 use glam::{DQuat, DVec3};
 use trocar_camera::{Camera, ColorImage};
-use trocar_geometry::{Pose, TetMesh, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::{TetMesh, TriMesh};
 use trocar_specimen::{End, Material, MaterialModel, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 pub fn specimen() -> Specimen {

@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
 use trocar_cell::{Action, Cell, CellLift, CellLiftPolicy, Policy};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_robot::instrument::Coordinates;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;

@@ -8,10 +8,10 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use trocar_progress::Progress;
-use trocar_render::Settings;
+use trocar_core::Progress;
+use trocar_render::RenderSettings;
 use trocar_scene::Scene;
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 use trocar_task::{Episode, Policy, policy};
 use trocar_workflow::scene_specimen;
 
@@ -110,7 +110,7 @@ impl EpisodeBench {
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let machine = Machine::here();
         let mut episode = Episode::new(&scene, &specimen, self.threads)?;
-        let mut sight = Sight::new(&scene, &specimen, episode.cell())?;
+        let mut sight = CameraRig::new(&scene, &specimen, episode.cell())?;
         let mut scripted = policy::named("scripted")?;
         let (mut runs, mut hashes) = (Vec::new(), Vec::new());
         progress.begin("episodes", self.runs as u64);
@@ -156,7 +156,7 @@ impl EpisodeBench {
     fn once(
         &self,
         episode: &mut Episode,
-        sight: &mut Sight,
+        sight: &mut CameraRig,
         scripted: &mut dyn Policy,
         progress: &dyn Progress,
     ) -> Result<Took> {
@@ -173,7 +173,7 @@ impl EpisodeBench {
                 let looking = Instant::now();
                 for camera in &self.cameras {
                     let size = [self.size; 2];
-                    sight.see(episode.cell(), camera, size, &Settings::Preview { shadows: false })?;
+                    sight.render(episode.cell(), camera, size, &RenderSettings::Preview { shadows: false })?;
                 }
                 pictures += looking.elapsed();
                 if ended {

@@ -10,8 +10,8 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use trocar_cell::{FRAME, GraspDesign, GraspLift, Session};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_specimen::Specimen;
 use trocar_workflow::phantoms;
 

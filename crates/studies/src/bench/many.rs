@@ -4,7 +4,7 @@ use super::timing::median;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_testing::scenes::{Organs, Run, Scene, material};
 use trocar_workflow::{SOLVERS, solver_named};
 

@@ -5,7 +5,7 @@ use super::timing::Timing;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_testing::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
 use trocar_tissue::Material;
 use trocar_workflow::solver_named;

@@ -10,12 +10,12 @@ use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
-use trocar_camera::{Camera, Endoscope, Pose};
+use trocar_camera::{Camera, Endoscope};
 use trocar_cell::Cell;
-use trocar_progress::Progress;
-use trocar_render::{BodyId, Eye, Film, Light, Look, Settings, ShapeId, Stage, render};
+use trocar_core::{Pose, Progress};
+use trocar_render::{Appearance, BodyId, Film, Light, RayGenerator, RenderSettings, ShapeId, Stage, render};
 use trocar_scene::Scene;
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 use trocar_testing::scenes::{LaparoscopicScene, endoscope_view};
 use trocar_workflow::Script;
 use trocar_workflow::scene_specimen;
@@ -126,11 +126,12 @@ impl Set {
         let mut stage = Stage::new();
         let mut shapes = Vec::new();
         for (i, organ) in scene.organs.iter().enumerate() {
-            shapes.push(stage.add_mesh(organ, i as u16 + 1, &Look::tissue([200, 110, 100]))?.0);
+            shapes.push(stage.add_mesh(organ, i as u16 + 1, &Appearance::tissue([200, 110, 100]))?.0);
         }
         let instrument = stage.add_shape(&scene.instrument)?;
-        let mut place =
-            |right: bool, label| stage.add_body(instrument, &scene.instrument_pose(right, 0.0), label, &Look::steel());
+        let mut place = |right: bool, label| {
+            stage.add_body(instrument, &scene.instrument_pose(right, 0.0), label, &Appearance::steel())
+        };
         let instruments = [place(false, 101)?, place(true, 102)?];
         stage.lights.push(Light::endoscope(&view, 0.006, 0.11));
         stage.environment = [0.02; 3];
@@ -151,7 +152,7 @@ impl Set {
             cy: 111.5,
             ..camera
         };
-        let eye = Eye::new(policy);
+        let eye = RayGenerator::new(policy);
         let film = Film::endoscope();
         let mut times = Vec::with_capacity(FRAMES);
         for frame in 0..FRAMES + FRAMES / 10 {
@@ -163,7 +164,7 @@ impl Set {
             for (body, pose) in self.instruments.iter().zip(&poses) {
                 self.stage.place(*body, pose)?;
             }
-            let picture = render(&mut self.stage, &eye, &self.view, &Settings::Preview { shadows }, &film);
+            let picture = render(&mut self.stage, &eye, &self.view, &RenderSettings::Preview { shadows }, &film);
             let took = 1e3 * clock.elapsed().as_secs_f64();
             std::hint::black_box(picture);
             if frame >= FRAMES / 10 {
@@ -240,7 +241,7 @@ impl RenderBench {
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let cell = Cell::new(&scene, &specimen, 0)?;
         let clock = Instant::now();
-        let mut sight = Sight::new(&scene, &specimen, &cell)?;
+        let mut sight = CameraRig::new(&scene, &specimen, &cell)?;
         let begin_ms = 1e3 * clock.elapsed().as_secs_f64();
         let mut script = Script::new(&scene, cell)?;
         let names: Vec<String> = scene.cameras.iter().map(|c| c.name.clone()).collect();
@@ -249,7 +250,7 @@ impl RenderBench {
         let mut follow = Vec::new();
         for frame in 0..FRAMES + FRAMES / 10 {
             let mut step =
-                |timed: &mut dyn FnMut(&mut Sight, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
+                |timed: &mut dyn FnMut(&mut CameraRig, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
                     if progress.interrupted() {
                         return Err(Error::Interrupted);
                     }
@@ -265,8 +266,8 @@ impl RenderBench {
             let k = frame % names.len().max(1);
             let see = |shadows: bool| {
                 let camera = &names[k];
-                move |sight: &mut Sight, cell: &Cell| -> Result<()> {
-                    std::hint::black_box(sight.see(cell, camera, [224; 2], &Settings::Preview { shadows })?);
+                move |sight: &mut CameraRig, cell: &Cell| -> Result<()> {
+                    std::hint::black_box(sight.render(cell, camera, [224; 2], &RenderSettings::Preview { shadows })?);
                     Ok(())
                 }
             };
@@ -274,7 +275,7 @@ impl RenderBench {
                 step(&mut see(true), &mut shadowed[k])?;
                 step(&mut see(false), &mut plain[k])?;
             }
-            step(&mut |sight, cell| Ok(sight.follow(cell)?), &mut follow)?;
+            step(&mut |sight, cell| Ok(sight.update(cell)?), &mut follow)?;
         }
         let rows = names.into_iter().zip(shadowed.iter_mut().zip(&mut plain));
         let cameras = rows
@@ -289,9 +290,9 @@ impl RenderBench {
     }
 
     fn path(&self, set: &mut Set) -> Result<f64> {
-        let eye = Eye::new(Endoscope::thirty_degrees().camera);
+        let eye = RayGenerator::new(Endoscope::thirty_degrees().camera);
         let clock = Instant::now();
-        let picture = render(&mut set.stage, &eye, &set.view, &Settings::path(self.samples), &Film::endoscope());
+        let picture = render(&mut set.stage, &eye, &set.view, &RenderSettings::path(self.samples), &Film::endoscope());
         let took = 1e3 * clock.elapsed().as_secs_f64();
         if let Some(path) = &self.picture {
             picture.color.write_png(path)?;

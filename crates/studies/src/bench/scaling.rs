@@ -6,7 +6,7 @@ use super::timing::Timing;
 use crate::{Error, Result, pages};
 use serde::Serialize;
 use std::path::Path;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_specimen::StagedFolder;
 use trocar_testing::scenes::{Organs, Run, Scene, material};
 use trocar_workflow::REPORT;

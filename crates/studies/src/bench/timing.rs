@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_testing::scenes::{FRAME, Run};
 
 /// Timed frames.

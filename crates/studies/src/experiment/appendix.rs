@@ -3,8 +3,8 @@
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::{Path, PathBuf};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_specimen::{Organ, Specimen};
 use trocar_workflow::phantoms;
 use xxhash_rust::xxh3::Xxh3;

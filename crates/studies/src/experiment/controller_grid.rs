@@ -6,7 +6,7 @@ use crate::{Error, Result, pages};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_robot::manipulator::{Law, Settings};
 use trocar_workflow::REPORT;
 

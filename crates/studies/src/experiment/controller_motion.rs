@@ -4,12 +4,11 @@ use crate::Result;
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, TAU};
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Wrench};
 use trocar_robot::chain::SerialArm;
 use trocar_robot::instrument::{Coordinates, Instrument};
 use trocar_robot::manipulator::{Manipulator, Settings};
 use trocar_robot::port::{Deviation, Port};
-use trocar_robot::wrench::Wrench;
 
 /// Steps and commands a second (SPEC E4).
 const PHYSICS: usize = 480;

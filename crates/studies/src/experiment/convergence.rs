@@ -6,7 +6,7 @@ use crate::{Error, Result, pages};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_testing::scenes::{Organs, SCENES, Scene, material};
 use trocar_workflow::REPORT;
 use trocar_workflow::SOLVERS;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 use trocar_cell::{GraspDesign, GraspLift};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_specimen::{Organ, Pins, Specimen};
 use trocar_workflow::REPORT;
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 use trocar_cell::{GraspDesign, GraspLift, GraspLiftRun, World, clusters};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_specimen::{Material, Specimen};
 use trocar_tissue::Schedule;
 use trocar_workflow::REPORT;

@@ -6,7 +6,7 @@ use serde::Serialize;
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::path::Path;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_robot::port::{Port, RimState, Shaft, Twist};
 use trocar_workflow::REPORT;
 
@@ -284,7 +284,7 @@ fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use trocar_progress::Silent;
+    use trocar_core::Silent;
 
     pub(crate) fn measured() -> PortBudgetResult {
         let experiment = PortBudgetExperiment { hole: 6e-3, shaft: 5e-3, thickness: 0.0, push: 5.0 };

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_cell::{Cell, CellEvent, Policy, RandomActions};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_workflow::REPORT;

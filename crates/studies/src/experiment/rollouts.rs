@@ -5,7 +5,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 use trocar_campaign::CampaignResult;
 use trocar_campaign::{Campaign, Kept, PolicyRow, PolicySpec, median};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_task::policy::POLICIES;
 
 /// The page that stands beside the campaign's own.

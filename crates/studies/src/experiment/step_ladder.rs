@@ -5,7 +5,7 @@ use crate::{Error, Result};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_testing::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
 use trocar_tissue::{OracleState, Schedule, State, Stepper, ToolMotion};
 use trocar_workflow::solver_named;

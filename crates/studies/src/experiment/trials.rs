@@ -13,7 +13,7 @@ use std::fs::{File, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
 /// The file in the experiment's folder.
@@ -222,7 +222,7 @@ fn program() -> &'static str {
 mod tests {
     use super::*;
     use std::sync::atomic::{AtomicUsize, Ordering};
-    use trocar_progress::{Silent, StopAfter};
+    use trocar_core::{Silent, StopAfter};
 
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     struct Row {

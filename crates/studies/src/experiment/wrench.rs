@@ -6,11 +6,10 @@ use glam::{DQuat, DVec3};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
-use trocar_progress::Progress;
+use trocar_core::{Progress, Wrench};
 use trocar_robot::instrument::{GRAVITY, Instrument};
 use trocar_robot::wrench::{
-    Compensator, ForceKind, Identification, LoadModel, SensorNoise, StaticReading, Wrench, identify,
-    static_orientations,
+    Compensator, ForceKind, Identification, LoadModel, SensorNoise, StaticReading, identify, static_orientations,
 };
 use trocar_workflow::REPORT;
 
@@ -198,7 +197,7 @@ impl WrenchExperiment {
                 return Err(Error::Interrupted);
             }
             let found = self.weigh(run as u64, self.tilt)?;
-            distances.push(found.distance_squared(&self::truth())?);
+            distances.push(found.distance_squared(&self::truth()));
             residual += found.chi_squared / found.degrees as f64;
             estimates.push(numbers(&found.model));
             progress.advance(1);
@@ -350,7 +349,7 @@ fn numbers(m: &LoadModel) -> [f64; 10] {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
-    use trocar_progress::Silent;
+    use trocar_core::Silent;
 
     pub(crate) fn measured() -> WrenchResult {
         let noise = SensorNoise { force: 0.02, torque: 1e-3 };

@@ -3,9 +3,9 @@
 use crate::Result;
 use crate::experiment::{ReconstructionResult, ReconstructionRow};
 use std::fmt::Write;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_reconstruct::Reconstruction;
-use trocar_render::Scene;
+use trocar_render::phong::PhongScene;
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::table::{count, fixed, percent};
 use trocar_report::{colors, figures, overlays};
@@ -160,8 +160,9 @@ fn looks(made: &[Reconstruction]) -> Result<String> {
         let name = page::escape(&r.specimen.name);
         let input = figures::img(&r.input, "input frame")?;
         shown.push(page::figure(&input, &format!("<b>{name}.</b> The window's centre frame as recorded.")));
-        let scene = Scene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
-            .with_ambient_occlusion(24, 0.012);
+        let scene =
+            PhongScene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
+                .with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
         let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
         shown.push(page::figure(&rendered, "<b>Reconstructed.</b> The surfaces through the recording camera."));

@@ -3,12 +3,12 @@
 use crate::Result;
 use crate::experiment::{SimilarityPictures, SimilarityResult, SimilarityRow};
 use trocar_camera::ColorImage;
+use trocar_camera::metrics::ImageMetrics;
 use trocar_report::colors::{self, SEQUENTIAL};
 use trocar_report::figures;
 use trocar_report::overlays;
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::table::{self, fixed};
-use trocar_similarity::Likeness;
 
 /// What is asked of a phantom's silhouettes.
 const BAR: f64 = 0.95;
@@ -50,7 +50,7 @@ fn capital(text: &str) -> String {
 fn cards(r: &SimilarityResult) -> String {
     let p = r.paper;
     let least = |rows: &[SimilarityRow]| rows.iter().map(|row| row.iou).fold(f64::INFINITY, f64::min);
-    let mean = |f: &dyn Fn(&Likeness) -> f64| {
+    let mean = |f: &dyn Fn(&ImageMetrics) -> f64| {
         r.rows.iter().map(|row| f(&row.rendered)).sum::<f64>() / r.rows.len().max(1) as f64
     };
     let pair = |[ssim, psnr]: [f64; 2]| format!("{} / {} dB", fixed(ssim, 2), fixed(psnr, 1));
@@ -78,7 +78,7 @@ fn cards(r: &SimilarityResult) -> String {
 fn table(r: &SimilarityResult) -> String {
     let head =
         ["Specimen", "What beside the first frame", "IoU", "SSIM", "PSNR [dB]", "matched SSIM", "matched PSNR [dB]"];
-    let cells = |l: &Likeness| [l.ssim, l.psnr_db, l.ssim_matched, l.psnr_matched_db];
+    let cells = |l: &ImageMetrics| [l.ssim, l.psnr_db, l.ssim_matched, l.psnr_matched_db];
     let row = |name: &str, what: &str, iou: Option<f64>, [a, b, c, d]: [f64; 4]| {
         let iou = iou.map_or(String::new(), |v| fixed(v, 3));
         vec![name.to_owned(), what.to_owned(), iou, fixed(a, 3), fixed(b, 1), fixed(c, 3), fixed(d, 1)]

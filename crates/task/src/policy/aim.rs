@@ -3,7 +3,7 @@
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Cell, clusters};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::Coordinates;
 use trocar_robot::port::Solution;
 

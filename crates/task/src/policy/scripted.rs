@@ -7,7 +7,7 @@ use super::{CHUNK, Policy};
 use crate::{Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::Action;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::Coordinates;
 use trocar_scene::TaskName;
 

@@ -1,7 +1,8 @@
 //! A laparoscopic view of procedural organs, for the renderer's benchmark and picture tests: tubes and a bed, two instruments.
 
 use glam::{DQuat, DVec3};
-use trocar_geometry::{Pose, TriMesh};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
 
 /// What is on the stage, in metres, the camera at [`view`].
 pub struct LaparoscopicScene {

@@ -5,7 +5,8 @@ use super::organs::{Organ, Organs};
 use glam::DVec3;
 use std::f64::consts::TAU;
 use trocar_cell::VISCOSITY_TIME;
-use trocar_geometry::{OrganAxis, Pose};
+use trocar_core::Pose;
+use trocar_geometry::OrganAxis;
 use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, pins};
 
 /// Length of a frame [s].

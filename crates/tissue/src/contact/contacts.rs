@@ -12,6 +12,7 @@ use crate::integrator::Frame;
 use crate::state::BodyState;
 use crate::support::LocalSupport;
 use glam::Vec3A;
+use trocar_core::Wrench;
 
 /// A vertex this much away from a surface [m], and what it may travel in two frames, may touch it in a frame.
 const NEAR: f32 = 1e-3;
@@ -370,7 +371,7 @@ impl Contacts {
                 let tool = frame.colliders[c as usize].tool;
                 if let (Some(force), Some(Some(placed))) = (self.forces.get_mut(tool), self.placed.get(c as usize)) {
                     let arm = body.origin + here.as_dvec3() - placed.to.translation;
-                    force.contact.add(push.gradient.as_dvec3(), arm);
+                    force.contact += Wrench::at(push.gradient.as_dvec3(), arm);
                     force.pressing += f64::from(touch.stiffness * -touch.height(here));
                     force.touching += usize::from(counted != Some((touch.vertex, tool)));
                     counted = Some((touch.vertex, tool));
@@ -382,7 +383,7 @@ impl Contacts {
             let grasp = &frame.grasps[held.grasp as usize];
             if let (Some(force), Some(tool)) = (self.forces.get_mut(grasp.tool), frame.tools.get(grasp.tool)) {
                 let arm = body.origin + x(held.vertex as usize).as_dvec3() - tool.at(share).translation;
-                force.constraint.add(held.pull.as_dvec3(), arm);
+                force.constraint += Wrench::at(held.pull.as_dvec3(), arm);
             }
         }
     }

@@ -1,30 +1,12 @@
 //! What contact and grasp do to the tools, and what a user must hear of.
 
-use glam::DVec3;
-
-/// A force and its torque about a tool's origin, in world axes.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Wrench {
-    /// [N]
-    pub force: DVec3,
-    /// About the tool's origin at the end of the frame [N m].
-    pub torque: DVec3,
-}
-
-impl Wrench {
-    /// Adds a force that acts at `arm` [m] from the tool's origin.
-    pub(crate) fn add(&mut self, force: DVec3, arm: DVec3) {
-        self.force += force;
-        self.torque += arm.cross(force);
-    }
-}
+use trocar_core::Wrench;
 
 impl ToolForce {
     /// Adds what another body does.
     pub(crate) fn add(&mut self, other: &Self) {
         for (sum, part) in [(&mut self.contact, &other.contact), (&mut self.constraint, &other.constraint)] {
-            sum.force += part.force;
-            sum.torque += part.torque;
+            *sum += *part;
         }
         self.pressing += other.pressing;
         self.touching += other.touching;

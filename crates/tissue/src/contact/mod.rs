@@ -23,7 +23,7 @@ pub use body_contact::BodyContact;
 pub use collider::Collider;
 pub(crate) use contacts::{Anchor, Contacts};
 pub(crate) use coupling::Coupling;
-pub use force::{Event, ToolForce, Wrench};
+pub use force::{Event, ToolForce};
 pub(crate) use hanging::Hanging;
 pub use hull::Hull;
 pub(crate) use pairs::{Pairs, Stretch};

@@ -4,7 +4,7 @@ use super::contacts::Contacts;
 use crate::integrator::Frame;
 use crate::{Body, Collider};
 use glam::Vec3A;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 impl Contacts {
     pub(super) fn place_tools(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64) {

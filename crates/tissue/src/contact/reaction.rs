@@ -6,6 +6,7 @@ use crate::integrator::Frame;
 use crate::state::BodyState;
 use crate::{Body, Grasp, Hyperelastic};
 use glam::{DMat3, DVec3};
+use trocar_core::Wrench;
 
 /// Finds the constraint forces of a body's rigid grasps: the elastic forces of their nodes and their weight. Dashpots and the nodes' own inertia are left out: they vanish when the tool rests.
 pub(crate) struct Reaction {
@@ -42,7 +43,7 @@ impl Reaction {
         let mut pull = |node: u32, force: DVec3| {
             if let Some(tool) = self.carrier[vertex(node)] {
                 let arm = body.origin + place(node) - frame.tools[tool].to.translation;
-                self.forces[tool].constraint.add(force, arm);
+                self.forces[tool].constraint += Wrench::at(force, arm);
             }
         };
         for (t, tet) in body.rest.tets.iter().enumerate() {
@@ -63,7 +64,7 @@ impl Reaction {
     pub fn press(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState, vertex: usize, force: DVec3) {
         if let Some(tool) = self.carrier[vertex] {
             let arm = body.origin + state.x[vertex].as_dvec3() - frame.tools[tool].to.translation;
-            self.forces[tool].constraint.add(force, arm);
+            self.forces[tool].constraint += Wrench::at(force, arm);
         }
     }
 }

@@ -4,7 +4,7 @@ use crate::contact::{Anchor, Source};
 use crate::state::BodyState;
 use crate::{Body, Error, Grasp, Model, Result, State};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// A node whose position at the end of a step is prescribed.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,7 +7,7 @@ use color_quant::NeuQuant;
 use glam::DVec3;
 use trocar_cell::{CUT_OPENED, CutOrgan, GraspLiftRun, Gripper, Snapshot};
 use trocar_geometry::Skin;
-use trocar_render::{Instance, Scene, Shading};
+use trocar_render::phong::{Instance, PhongScene, Shading};
 use trocar_report::colors::{self, METAL, VIEW_GROUND};
 use trocar_report::views::View;
 use trocar_specimen::Specimen;
@@ -180,7 +180,7 @@ impl<'a> Lift<'a> {
         let sideways = [-0.9, -0.35, 0.35, 0.9];
         let heights = [0.45, 0.75];
         let instances = self.surfaces(last.unwrap_or(top));
-        let scene = Scene::new(instances, None, VIEW_GROUND);
+        let scene = PhongScene::new(instances, None, VIEW_GROUND);
         let mut best: Option<(usize, View)> = None;
         for height in heights {
             for side in sideways {
@@ -222,7 +222,7 @@ impl<'a> Lift<'a> {
             .shown()
             .into_iter()
             .map(|snapshot| {
-                let scene = Scene::new(self.surfaces(snapshot), Some(self.light()), VIEW_GROUND);
+                let scene = PhongScene::new(self.surfaces(snapshot), Some(self.light()), VIEW_GROUND);
                 scene.render(&self.view.camera, &self.view.pose, 2).color
             })
             .collect();

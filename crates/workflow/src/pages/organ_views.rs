@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use trocar_geometry::TetMesh;
-use trocar_render::{Instance, Shading};
+use trocar_render::phong::{Instance, Shading};
 use trocar_report::colors;
 use trocar_report::views::shell;
 use trocar_specimen::Specimen;

@@ -3,9 +3,9 @@
 use super::organ_views;
 use crate::truth::quantile;
 use crate::{Error, Result};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_reconstruct::Reconstruction;
-use trocar_render::Scene;
+use trocar_render::phong::PhongScene;
 use trocar_report::colors::{self, DIVERGING, INSTRUMENT, SEQUENTIAL};
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::{Line, Plot};
@@ -90,8 +90,8 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
     );
     let mut top = vec![input, composite, depth_figure(r)?, masked];
     if let Some(camera) = &r.specimen.camera {
-        let scene =
-            Scene::new(organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND).with_ambient_occlusion(24, 0.012);
+        let scene = PhongScene::new(organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
+            .with_ambient_occlusion(24, 0.012);
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
         let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
         let photograph = figures::img(&r.background, "composite, for comparison")?;

@@ -249,7 +249,7 @@ fn close_up(specimen: &Specimen, cut: &CutOrgan, at: &Snapshot) -> Option<View> 
 }
 
 /// The organ at `index` of the specimen, cut, as a body of its own in a picture.
-pub(super) fn instance(index: usize, mesh: TriMesh, gloss: f32, wireframe: bool) -> trocar_render::Instance {
-    let shading = trocar_render::Shading { color: colors::organ(index), gloss, wireframe };
-    trocar_render::Instance { mesh, label: organ_views::label(index), shading }
+pub(super) fn instance(index: usize, mesh: TriMesh, gloss: f32, wireframe: bool) -> trocar_render::phong::Instance {
+    let shading = trocar_render::phong::Shading { color: colors::organ(index), gloss, wireframe };
+    trocar_render::phong::Instance { mesh, label: organ_views::label(index), shading }
 }

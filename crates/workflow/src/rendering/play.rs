@@ -4,7 +4,7 @@ use super::script::Script;
 use crate::replayed::Replayed;
 use crate::{Error, Result};
 use trocar_cell::Cell;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 
 /// A cell in which something goes on.
 pub(crate) trait Play {

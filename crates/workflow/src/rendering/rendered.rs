@@ -2,7 +2,7 @@
 
 use super::colors::label_color;
 use serde::Serialize;
-use trocar_sight::Sight;
+use trocar_sensors::CameraRig;
 
 /// A picture that was made.
 #[derive(Clone, Debug, Serialize)]
@@ -46,7 +46,7 @@ pub struct Seen {
 }
 
 /// What is in a picture of `labels`, with its shares.
-pub(super) fn seen(sight: &Sight, labels: &[u16]) -> Vec<Seen> {
+pub(super) fn seen(sight: &CameraRig, labels: &[u16]) -> Vec<Seen> {
     let count = |label: u16| labels.iter().filter(|l| **l == label).count() as f64 / labels.len().max(1) as f64;
     let row = |(label, name): &(u16, String)| Seen {
         name: name.clone(),

@@ -6,7 +6,7 @@ use crate::cell::clearance::Rod;
 use crate::cell::pierce::pierced;
 use crate::cell::report::CellEvent;
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::wrench::ForceKind;
 use trocar_tissue::Shape;
 

@@ -13,7 +13,7 @@ use crate::blades::{Blades, Tools, opening_force};
 use crate::hold::Hold;
 use crate::{GraspDesign, Gripper, Jaw, Result, Scissors, World};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::{Coordinates, Instrument, Limits};
 use trocar_robot::manipulator::Manipulator;
 use trocar_robot::port::{Port, Solution};

@@ -5,7 +5,7 @@ use crate::cell::exchange::Exchange;
 use crate::cell::guard::Guard;
 use crate::{GraspDesign, Gripper, Jaw, Scissors};
 use glam::DVec3;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 use trocar_robot::instrument::Coordinates;
 use trocar_tissue::ToolForce;
 

@@ -5,8 +5,9 @@ use crate::GraspDesign;
 use crate::blades::{Tools, opening_force};
 use crate::cell::report::{ArmObservation, TaggedForce};
 use glam::DVec3;
+use trocar_core::Wrench;
 use trocar_robot::instrument::Coordinates;
-use trocar_robot::wrench::{ForceKind, Wrench};
+use trocar_robot::wrench::ForceKind;
 use trocar_tissue::ToolForce;
 
 impl Station {
@@ -15,7 +16,7 @@ impl Station {
         let Self { fixed, now, .. } = self;
         let contact: DVec3 = now.forces.iter().map(|f| f.contact.force).sum();
         let constraint: DVec3 = now.forces.iter().map(|f| f.constraint.force).sum();
-        let sum = |part: fn(&ToolForce) -> trocar_tissue::Wrench| {
+        let sum = |part: fn(&ToolForce) -> trocar_core::Wrench| {
             now.forces
                 .iter()
                 .map(part)

@@ -2,7 +2,7 @@
 
 use crate::cli::CellBench;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{CellBenchResult, Result};
 
 pub fn run(arguments: &CellBench, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::cli::EpisodeBench;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{EpisodeBenchResult, Result};
 
 pub fn run(arguments: &EpisodeBench, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::cli::GraspBench;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{GraspBenchResult, GraspPhaseTiming, Result};
 
 pub fn run(arguments: &GraspBench, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::cli::OrgansBench;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{OrgansResult, Result, Timing};
 
 pub fn run(arguments: &OrgansBench, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::cli::RenderBench;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{RenderBenchResult, Result};
 
 pub fn run(arguments: &RenderBench, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::cli::ScalingBench;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{Result, ScalingResult};
 
 pub fn run(arguments: &ScalingBench, json: bool, progress: &dyn Progress) -> Result<()> {

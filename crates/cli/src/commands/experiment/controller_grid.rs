@@ -3,7 +3,7 @@
 use super::resumed;
 use crate::cli::ControllerGridExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{ControllerGridResult, ControllerRow, Result};
 
 /// Rows that are printed.

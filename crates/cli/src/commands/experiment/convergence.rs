@@ -2,7 +2,7 @@
 
 use crate::cli::ConvergenceExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{ConvergenceResult, OrganSource, Result};
 
 pub fn run(arguments: &ConvergenceExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::cli::ElementQualityExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{ElementQualityResult, ElementQualityRow, Result};
 
 pub fn run(arguments: &ElementQualityExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

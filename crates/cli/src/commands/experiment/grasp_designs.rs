@@ -2,7 +2,7 @@
 
 use crate::cli::GraspDesignsExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{GraspDesignRow, GraspDesignsResult, Result};
 
 pub fn run(arguments: &GraspDesignsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,8 +2,8 @@
 
 use crate::cli::IntegratorsExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_studies::{IntegratorsResult, Result};
 
 pub fn run(arguments: &IntegratorsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

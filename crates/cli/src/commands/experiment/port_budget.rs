@@ -2,7 +2,7 @@
 
 use crate::cli::PortBudgetExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{PortBudgetResult, Result};
 
 pub fn run(arguments: &PortBudgetExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

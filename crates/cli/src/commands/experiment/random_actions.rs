@@ -2,7 +2,7 @@
 
 use crate::cli::RandomActionsExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{RandomActionsResult, Result};
 
 pub fn run(arguments: &RandomActionsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

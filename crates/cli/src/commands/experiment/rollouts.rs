@@ -2,7 +2,7 @@
 
 use crate::cli::RolloutsExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_studies::{Result, RolloutsResult};
 
 pub fn run(arguments: &RolloutsExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,8 +2,8 @@
 
 use crate::cli::SettlingExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_studies::{Result, SettlingResult};
 
 pub fn run(arguments: &SettlingExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,8 +2,8 @@
 
 use crate::cli::SimilarityExperiment;
 use crate::output;
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_progress::Progress;
 use trocar_studies::{Result, SimilarityResult, SimilarityRow};
 
 pub fn run(arguments: &SimilarityExperiment, json: bool, progress: &dyn Progress) -> Result<()> {

@@ -2,7 +2,7 @@
 
 use crate::cli::WrenchExperiment;
 use crate::output;
-use trocar_progress::Progress;
+use trocar_core::Progress;
 use trocar_robot::wrench::SensorNoise;
 use trocar_studies::{Result, WrenchResult};
 

@@ -1,4 +1,5 @@
-//! TetGen's files: `.smesh` for a surface, `.node` and `.ele` for the elements in it. See its manual, section 5.
+//! TetGen's file formats (TetGen manual, section 5): `.smesh` for a surface, `.node` and `.ele` for
+//! the elements.
 
 use crate::{Error, Result, TriMesh};
 use glam::DVec3;
@@ -6,18 +7,19 @@ use std::fs::File;
 use std::io::{BufRead, BufReader, BufWriter, Write};
 use std::path::Path;
 
-/// Most items for which memory is set aside on a file's word alone.
-const TRUSTED: usize = 1 << 20;
-/// Longest line that is read [bytes].
-const LONGEST: u64 = 4096;
+/// Maximum number of items for which memory is reserved from a count in the file.
+const MAX_RESERVED: usize = 1 << 20;
+/// Maximum line length (bytes).
+const MAX_LINE_BYTES: u64 = 4096;
 
-/// Writes a closed surface as a piecewise linear complex: every triangle a facet, no holes, no regions.
+/// Writes a closed surface as a piecewise linear complex: one facet per triangle, no holes, no
+/// regions.
 pub(super) fn write_smesh(path: &Path, surface: &TriMesh) -> Result<()> {
     let write = || -> std::io::Result<()> {
         let mut out = BufWriter::new(File::create(path)?);
         writeln!(out, "{} 3 0 0", surface.vertices.len())?;
         for (i, v) in surface.vertices.iter().enumerate() {
-            // Enough digits to come back as the same number.
+            // Enough digits to read back the same number.
             writeln!(out, "{i} {:e} {:e} {:e}", v.x, v.y, v.z)?;
         }
         writeln!(out, "{} 0", surface.triangles.len())?;
@@ -30,15 +32,15 @@ pub(super) fn write_smesh(path: &Path, surface: &TriMesh) -> Result<()> {
     write().map_err(|source| Error::Io { path: path.to_owned(), source })
 }
 
-/// Number of the first node (0 or 1) and all positions of a `.node` file.
+/// The index of the first node (0 or 1) and all positions of a `.node` file.
 pub(super) fn read_nodes(path: &Path) -> Result<(u64, Vec<DVec3>)> {
     let mut table = Table::open(path)?;
     let [count, dimensions] = table.header("the number of nodes and 3")?;
     if dimensions != 3 {
-        return Err(table.wrong(&format!("has {dimensions} coordinates a node; there must be 3")));
+        return Err(table.error(&format!("has {dimensions} coordinates per node; there must be 3")));
     }
     let mut first = 0;
-    let mut nodes = Vec::with_capacity((count as usize).min(TRUSTED));
+    let mut nodes = Vec::with_capacity((count as usize).min(MAX_RESERVED));
     for i in 0..count {
         let row = table.row(&format!("node {i} of {count}"))?;
         let mut fields = row.split_ascii_whitespace();
@@ -47,27 +49,27 @@ pub(super) fn read_nodes(path: &Path) -> Result<(u64, Vec<DVec3>)> {
             first = index.unwrap_or(u64::MAX);
         }
         if first > 1 || index != Some(first + i) {
-            return Err(table.wrong("has nodes that are not numbered one by one from 0 or 1"));
+            return Err(table.error("has nodes that are not numbered consecutively from 0 or 1"));
         }
         let mut axis = || fields.next().and_then(|field| field.parse().ok()).unwrap_or(f64::NAN);
         let node = DVec3::new(axis(), axis(), axis());
         if !node.is_finite() {
-            return Err(table.wrong("has a node without three finite coordinates"));
+            return Err(table.error("has a node without three finite coordinates"));
         }
         nodes.push(node);
     }
     Ok((first, nodes))
 }
 
-/// Corners of all elements of an `.ele` file over `nodes` nodes, the first of which has number `first` in the file. Of
-/// elements with further nodes on their edges only the corners are taken.
+/// Corners of all elements of an `.ele` file. There are `nodes` nodes, and the first has index
+/// `first` in the file. Nodes on element edges are ignored.
 pub(super) fn read_elements(path: &Path, first: u64, nodes: usize) -> Result<Vec<[u32; 4]>> {
     let mut table = Table::open(path)?;
     let [count, corners] = table.header("the number of elements and 4")?;
     if corners != 4 && corners != 10 {
-        return Err(table.wrong(&format!("has {corners} nodes an element; there must be 4 or 10")));
+        return Err(table.error(&format!("has {corners} nodes per element; there must be 4 or 10")));
     }
-    let mut tets = Vec::with_capacity((count as usize).min(TRUSTED));
+    let mut tets = Vec::with_capacity((count as usize).min(MAX_RESERVED));
     for i in 0..count {
         let row = table.row(&format!("element {i} of {count}"))?;
         let mut fields = row.split_ascii_whitespace().skip(1);
@@ -76,18 +78,18 @@ pub(super) fn read_elements(path: &Path, first: u64, nodes: usize) -> Result<Vec
             let node = fields.next().and_then(|field| field.parse::<u64>().ok()).and_then(|n| n.checked_sub(first));
             *corner = match node {
                 Some(node) if node < nodes as u64 => node as u32,
-                _ => return Err(table.wrong(&format!("has an element that does not name four of {nodes} nodes"))),
+                _ => return Err(table.error(&format!("has an element without four valid nodes; there are {nodes}"))),
             };
         }
         if (0..4).any(|a| tet[..a].contains(&tet[a])) {
-            return Err(table.wrong("has an element that names a node twice"));
+            return Err(table.error("has an element with a repeated node"));
         }
         tets.push(tet);
     }
     Ok(tets)
 }
 
-/// A file of rows of numbers, with empty lines and comments after `#`.
+/// A file with rows of numbers, empty lines and comments after `#`.
 struct Table<'a> {
     path: &'a Path,
     reader: BufReader<File>,
@@ -100,26 +102,26 @@ impl<'a> Table<'a> {
         Ok(Self { path, reader: BufReader::new(file), line: 0 })
     }
 
-    /// The first two whole numbers of the first row.
+    /// The first two integers of the first row.
     fn header(&mut self, what: &str) -> Result<[u64; 2]> {
         let row = self.row(what)?;
         let mut fields = row.split_ascii_whitespace().map(|field| field.parse::<u64>().ok());
         match (fields.next().flatten(), fields.next().flatten()) {
-            // Nodes and elements are numbered with 32 bits.
+            // Node and element indices have 32 bits.
             (Some(count), Some(width)) if count < u64::from(u32::MAX) => Ok([count, width]),
-            _ => Err(self.wrong(&format!("must begin with {what}"))),
+            _ => Err(self.error(&format!("must begin with {what}"))),
         }
     }
 
-    /// The next row that holds something.
+    /// The next row that is not empty.
     fn row(&mut self, what: &str) -> Result<String> {
         loop {
             let mut bytes = Vec::new();
-            let mut limited = std::io::Read::take(&mut self.reader, LONGEST);
+            let mut limited = std::io::Read::take(&mut self.reader, MAX_LINE_BYTES);
             let read = limited.read_until(b'\n', &mut bytes);
             let length = read.map_err(|source| Error::Io { path: self.path.to_owned(), source })?;
             if length == 0 {
-                return Err(self.wrong(&format!("ends before {what}")));
+                return Err(self.error(&format!("ends before {what}")));
             }
             self.line += 1;
             let text = String::from_utf8_lossy(&bytes);
@@ -130,7 +132,7 @@ impl<'a> Table<'a> {
         }
     }
 
-    fn wrong(&self, what: &str) -> Error {
+    fn error(&self, what: &str) -> Error {
         Error::Parse { path: self.path.to_owned(), reason: format!("line {}: TetGen's file {what}", self.line) }
     }
 }
@@ -154,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn files_are_read_from_0_and_from_1() {
+    fn indices_may_start_at_0_or_1() {
         let (nodes, tets) = read(NODES.as_bytes(), ELEMENTS.as_bytes()).unwrap();
         assert_eq!(nodes[4], DVec3::new(0.0, 0.5, 0.5));
         assert_eq!(tets, [[2, 0, 3, 4], [1, 0, 3, 4]]);
@@ -166,29 +168,29 @@ mod tests {
     }
 
     #[test]
-    fn wrong_files_are_refused_in_words() {
-        let refusal =
+    fn invalid_files_are_rejected_with_a_reason() {
+        let rejection =
             |nodes: &str, elements: &str| read(nodes.as_bytes(), elements.as_bytes()).unwrap_err().to_string();
-        assert!(refusal("", ELEMENTS).contains("ends before"));
-        assert!(refusal("5 2 0 0\n", ELEMENTS).contains("there must be 3"));
-        assert!(refusal("4000000000 3 0 0\n", ELEMENTS).contains("ends before node 0"));
-        assert!(refusal("99999999999999999999 3\n", ELEMENTS).contains("must begin"));
-        assert!(refusal("2 3 0 0\n2 0 0 0\n3 0 0 0\n", ELEMENTS).contains("from 0 or 1"));
-        assert!(refusal("2 3 0 0\n0 0 0 0\n2 0 0 0\n", ELEMENTS).contains("from 0 or 1"));
-        assert!(refusal("1 3 0 0\n0 0 nan 0\n", ELEMENTS).contains("finite"));
-        assert!(refusal(NODES, "2 4 0\n1 3 1 4 5\n").contains("ends before element 1"));
-        assert!(refusal(NODES, "1 3 0\n").contains("4 or 10"));
-        assert!(refusal(NODES, "1 4 0\n1 0 1 2 3\n").contains("four of 5 nodes"));
-        assert!(refusal(NODES, "1 4 0\n1 1 2 3 6\n").contains("four of 5 nodes"));
-        assert!(refusal(NODES, "1 4 0\n1 1 2 3 3\n").contains("twice"));
+        assert!(rejection("", ELEMENTS).contains("ends before"));
+        assert!(rejection("5 2 0 0\n", ELEMENTS).contains("there must be 3"));
+        assert!(rejection("4000000000 3 0 0\n", ELEMENTS).contains("ends before node 0"));
+        assert!(rejection("99999999999999999999 3\n", ELEMENTS).contains("must begin"));
+        assert!(rejection("2 3 0 0\n2 0 0 0\n3 0 0 0\n", ELEMENTS).contains("from 0 or 1"));
+        assert!(rejection("2 3 0 0\n0 0 0 0\n2 0 0 0\n", ELEMENTS).contains("from 0 or 1"));
+        assert!(rejection("1 3 0 0\n0 0 nan 0\n", ELEMENTS).contains("finite"));
+        assert!(rejection(NODES, "2 4 0\n1 3 1 4 5\n").contains("ends before element 1"));
+        assert!(rejection(NODES, "1 3 0\n").contains("4 or 10"));
+        assert!(rejection(NODES, "1 4 0\n1 0 1 2 3\n").contains("four valid nodes"));
+        assert!(rejection(NODES, "1 4 0\n1 1 2 3 6\n").contains("four valid nodes"));
+        assert!(rejection(NODES, "1 4 0\n1 1 2 3 3\n").contains("repeated node"));
     }
 
     proptest! {
         #![proptest_config(ProptestConfig { cases: 300, failure_persistence: None, ..ProptestConfig::default() })]
 
-        /// Truncated and garbled files give sound tets or an error.
+        /// Truncated and damaged files give valid tets or an error.
         #[test]
-        fn damage_does_no_harm(
+        fn damaged_files_give_valid_tets_or_an_error(
             cut in any::<(u8, u8)>(),
             hits in proptest::collection::vec((any::<bool>(), any::<u8>(), any::<u8>()), 0..6),
         ) {

@@ -14,7 +14,7 @@ use crate::chain::mass::MassProperties;
 use glam::{DMat3, DQuat, DVec3};
 use roxmltree::Node;
 use std::path::Path;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 impl SerialArm {
     /// Reads the arm that ends in `tip`, a body or a site, from an MJCF file: joints, limits (`range`, `actuatorfrcrange`), armature, damping,

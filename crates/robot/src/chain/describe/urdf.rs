@@ -13,7 +13,7 @@ use glam::{DMat3, DQuat, DVec3, EulerRot};
 use roxmltree::Node;
 use std::collections::BTreeMap;
 use std::path::Path;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 impl SerialArm {
     /// Reads the arm from the link `base` to the link `tip` from a URDF file. Without `base` it begins at the root, without `tip` it ends at the

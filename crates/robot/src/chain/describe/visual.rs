@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 use std::path::PathBuf;
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// A shape that a description shows of a link.
 #[derive(Clone, Debug, PartialEq)]

@@ -7,9 +7,10 @@ use glam::Vec3;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use std::time::Instant;
-use trocar_camera::{Camera, Pose};
+use trocar_camera::Camera;
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
-use trocar_render::{Look, Stage};
+use trocar_render::{Appearance, Stage};
 
 /// Times that rays are cast; the fastest counts, for the machine may be shared.
 const TRIES: usize = 5;
@@ -39,7 +40,7 @@ impl RenderBench {
     /// Both kinds of rays, by us and by Embree.
     pub(super) fn rays(&self, mesh: &TriMesh, view: &Pose) -> Result<(Vec<RayRow>, Option<String>)> {
         let mut stage = Stage::new();
-        stage.add_mesh(mesh, 1, &Look::matte([128; 3]))?;
+        stage.add_mesh(mesh, 1, &Appearance::matte([128; 3]))?;
         let camera = Camera::centred(self.rays, self.rays, 1.2);
         let eye = view.translation.as_vec3();
         let ahead: Vec<(Vec3, Vec3)> = (0..self.rays * self.rays)

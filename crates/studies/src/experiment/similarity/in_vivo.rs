@@ -6,8 +6,7 @@ use super::{SimilarityExperiment, SimilarityPictures, SimilarityRow, oblique, st
 use crate::Result;
 use std::path::Path;
 use trocar_camera::{Camera, CameraModel, ColorImage, Endoscope, Mask, UndistortionMap};
-use trocar_geometry::Pose;
-use trocar_progress::Progress;
+use trocar_core::{Pose, Progress};
 use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_recording::Recording;
 use trocar_workflow::reconstruct_recording;

@@ -3,8 +3,8 @@
 use crate::Result;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use trocar_camera::metrics::{ImageMetrics, compare, iou, mean_colour, union};
 use trocar_camera::{ColorImage, Mask};
-use trocar_similarity::{Likeness, compare, iou, mean_colour, union};
 
 /// One specimen: its silhouettes, and its picture beside a real frame, within the organs.
 #[derive(Clone, Debug, Serialize)]
@@ -19,13 +19,13 @@ pub struct SimilarityRow {
     pub organ_iou: BTreeMap<String, f64>,
     /// The rendered picture beside the recording's first frame.
     #[serde(flatten)]
-    pub rendered: Likeness,
+    pub rendered: ImageMetrics,
     /// The recording's second frame beside its first; `None` where it has but one.
-    pub second_frame: Option<Likeness>,
+    pub second_frame: Option<ImageMetrics>,
     /// The first frame's mean colour beside it.
-    pub mean_colour: Likeness,
+    pub mean_colour: ImageMetrics,
     /// The rendered picture beside the composite, whose colours it has.
-    pub composite: Option<Likeness>,
+    pub composite: Option<ImageMetrics>,
     /// Where the masks come from, and in what light the picture was rendered.
     pub note: String,
 }

@@ -9,11 +9,10 @@ use crate::Result;
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, DepthNoise, Mask};
-use trocar_geometry::Pose;
+use trocar_core::{Pose, Progress};
 use trocar_geometry::io::{Unit, read_surface};
-use trocar_progress::Progress;
 use trocar_recording::{InstrumentRule, OrganInfo, Recording, RecordingInfo, RecordingWriter};
-use trocar_render::{Eye, Film, Light, Look, Noise, Settings, Stage, render};
+use trocar_render::{Appearance, Film, Light, Noise, RayGenerator, RenderSettings, Stage, render};
 use trocar_workflow::truth::DEPTH_UNIT;
 
 /// Width of the pictures [px].
@@ -36,20 +35,20 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
     let mut masks = Vec::new();
     for (k, organ) in filmed.info.organs.iter().enumerate() {
         let mesh = read_surface(&truth.join(format!("{}.ply", organ.name)), Unit::Metre)?;
-        stage.add_mesh(&mesh, k as u16 + 1, &Look::tissue([150, 60, 55]))?;
+        stage.add_mesh(&mesh, k as u16 + 1, &Appearance::tissue([150, 60, 55]))?;
         points.extend(mesh.vertices);
         masks.push(Mask::read(&from.join("masks").join(format!("{}.png", organ.name)))?);
     }
     let photo = ColorImage::read(&truth.join("color.png"))?;
     let depth = DepthImage::read(&truth.join("depth.png"), DEPTH_UNIT)?;
     let around = surroundings(&photo, &depth, masks.iter(), &camera);
-    stage.add_mesh(&around, filmed.info.organs.len() as u16 + 1, &Look::tissue([150, 100, 90]))?;
+    stage.add_mesh(&around, filmed.info.organs.len() as u16 + 1, &Appearance::tissue([150, 100, 90]))?;
 
     let middle = points.iter().sum::<DVec3>() / points.len().max(1) as f64;
     let pose = Pose::look_at(middle + DISTANCE * TOWARDS.normalize(), middle, DVec3::NEG_Z);
     stage.lights.push(Light::endoscope(&pose, BESIDE_LENS, 1.25 * DISTANCE));
     let scope = endoscope_camera(WIDTH);
-    let eye = Eye::new(scope);
+    let eye = RayGenerator::new(scope);
     let mut writer: Option<RecordingWriter> = None;
     progress.begin("oblique frames", u64::from(FRAMES));
     for frame in 0..FRAMES {
@@ -57,7 +56,7 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
             progress.end();
             return Err(e);
         }
-        let settings = Settings::Path { samples, bounces: 4, seed: frame };
+        let settings = RenderSettings::Path { samples, bounces: 4, seed: frame };
         let noise = Noise { shot: 0.01, read: 0.004, seed: 5, frame };
         let film = Film { noise: Some(noise), ..Film::endoscope() };
         let picture = render(&mut stage, &eye, &pose, &settings, &film);

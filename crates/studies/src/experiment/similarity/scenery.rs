@@ -5,10 +5,11 @@ use crate::{Error, Result};
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
-use trocar_camera::{Camera, ColorImage, DepthImage, Mask, Pose};
+use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
+use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_reconstruct::Reconstruction;
-use trocar_render::{Eye, Film, Light, Look, Picture, Settings, Stage, render, srgb};
+use trocar_render::{Appearance, Film, Light, Picture, RayGenerator, RenderSettings, Stage, render, srgb};
 
 /// Triangles of the organs at most, once they are split finely enough for the photograph.
 const MOST_TRIANGLES: usize = 3_000_000;
@@ -99,20 +100,20 @@ impl Scenery {
                 outer: PI,
             }),
         }
-        let settings = Settings::Path { samples, bounces: 3, seed: 1 };
-        Ok(render(&mut stage, &Eye::new(*camera), &Pose::IDENTITY, &settings, &Film::default()).color)
+        let settings = RenderSettings::Path { samples, bounces: 3, seed: 1 };
+        Ok(render(&mut stage, &RayGenerator::new(*camera), &Pose::IDENTITY, &settings, &Film::default()).color)
     }
 
     /// Everything through `camera` at `pose`, wet, in the light of an endoscope that makes a white surface `white_at` [m] before it white.
     pub fn through_endoscope(&self, camera: &Camera, pose: &Pose, white_at: f64, samples: u32) -> Result<ColorImage> {
         let mut stage = self.stage(true)?;
         stage.lights.push(Light::endoscope(pose, BESIDE_LENS, white_at));
-        let settings = Settings::Path { samples, bounces: 4, seed: 1 };
-        Ok(render(&mut stage, &Eye::new(*camera), pose, &settings, &Film::endoscope()).color)
+        let settings = RenderSettings::Path { samples, bounces: 4, seed: 1 };
+        Ok(render(&mut stage, &RayGenerator::new(*camera), pose, &settings, &Film::endoscope()).color)
     }
 
     fn stage(&self, wet: bool) -> Result<Stage> {
-        let look = |color| if wet { Look::tissue(color) } else { Look::matte(color) };
+        let look = |color| if wet { Appearance::tissue(color) } else { Appearance::matte(color) };
         let mut stage = Stage::new();
         for (k, mesh) in self.organs.iter().enumerate() {
             stage.add_mesh(mesh, k as u16 + 1, &look([150, 60, 55]))?;
@@ -126,10 +127,10 @@ impl Scenery {
 fn silhouettes(organs: &[TriMesh], camera: &Camera) -> Result<Picture> {
     let mut stage = Stage::new();
     for (k, mesh) in organs.iter().enumerate() {
-        stage.add_mesh(mesh, k as u16 + 1, &Look::matte([150; 3]))?;
+        stage.add_mesh(mesh, k as u16 + 1, &Appearance::matte([150; 3]))?;
     }
-    let settings = Settings::Preview { shadows: false };
-    Ok(render(&mut stage, &Eye::new(*camera), &Pose::IDENTITY, &settings, &Film::default()))
+    let settings = RenderSettings::Preview { shadows: false };
+    Ok(render(&mut stage, &RayGenerator::new(*camera), &Pose::IDENTITY, &settings, &Film::default()))
 }
 
 /// Halves every edge.

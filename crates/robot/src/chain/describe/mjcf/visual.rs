@@ -8,7 +8,7 @@ use crate::chain::frames::compose;
 use glam::{DQuat, DVec3};
 use roxmltree::Node;
 use std::path::{Path, PathBuf};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// Groups of geoms up to this one are seen.
 const SEEN: f64 = 2.0;

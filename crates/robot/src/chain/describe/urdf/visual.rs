@@ -8,7 +8,7 @@ use crate::chain::frames::compose;
 use glam::DVec3;
 use roxmltree::Node;
 use std::path::{Component, Path, PathBuf};
-use trocar_geometry::Pose;
+use trocar_core::Pose;
 
 /// What the arm between `base` and `tip` of a URDF file looks like, as [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf) reads it: of the base first, then of each link that a joint moves.
 /// `package://NAME/...` is looked for where a folder NAME lies beside the file or above it.

@@ -1,0 +1,17 @@
+//! Small types that every crate of the workspace shares.
+//!
+//! - [`Pose`] and [`Wrench`]: a rigid transform, and a force with its torque.
+//! - [`Random`]: a counter-based random generator, independent of the order of evaluation.
+//! - [`interpolate`]: linear and smooth interpolation of numbers.
+//! - [`Progress`]: how long work reports its progress and learns that it should stop.
+
+pub mod interpolate;
+mod pose;
+mod progress;
+mod random;
+mod wrench;
+
+pub use pose::Pose;
+pub use progress::{Progress, Silent, StopAfter};
+pub use random::{Random, RandomSequence, mix, standard_normal, unit};
+pub use wrench::Wrench;

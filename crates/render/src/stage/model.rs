@@ -1,0 +1,349 @@
+//! A stage: shapes, some of which deform, and the bodies that show them at a pose.
+
+use crate::bvh::{Bounds, BoxTree, Ray, TriangleTree};
+use crate::light::{Lamp, Light};
+use crate::material::{Appearance, Material};
+use crate::{Error, Result, srgb};
+use fearless_simd::Level;
+use glam::{DVec3, Mat3A, Quat, Vec3A};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
+
+/// Maximum number of triangles of a mesh.
+const MAX_TRIANGLES: usize = 1 << 27;
+
+/// Leaves of a shape's tree per entry of its body in the tree over all bodies.
+const LEAVES_PER_ENTRY: usize = 32;
+/// Maximum number of entries per body.
+const MAX_ENTRIES_PER_BODY: usize = 64;
+
+/// Identifier of a shape on a [`Stage`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ShapeId(usize);
+
+/// Identifier of a body on a [`Stage`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BodyId(pub(super) usize);
+
+/// Shapes, bodies and lights, rendered through any number of cameras (see [`crate::render`]).
+///
+/// A *shape* is a surface with its search tree; [`Stage::deform`] refits the tree. A *body* is a
+/// shape at a pose with an appearance and a label; several bodies can share a shape. Positions are
+/// in metres in one world frame.
+#[derive(Clone, Debug)]
+pub struct Stage {
+    pub(super) shapes: Vec<Shape>,
+    pub(super) bodies: Vec<Body>,
+    pub(super) top: BoxTree,
+    /// For each leaf of the tree over bodies: the body and the entry node of its shape's tree.
+    pub(super) entries: Vec<(u32, u32)>,
+    lamps: Vec<Lamp>,
+    stale: bool,
+    pub(super) level: Level,
+    /// Lights, in the world frame.
+    pub lights: Vec<Light>,
+    /// Linear radiance of the uniform environment.
+    pub environment: [f32; 3],
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    pub(super) tree: TriangleTree,
+    positions: Vec<Vec3A>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<Vec3A>,
+    /// Linear colour per vertex; empty if the mesh has none.
+    colors: Vec<Vec3A>,
+}
+
+#[derive(Clone, Debug)]
+pub(super) struct Body {
+    pub(super) shape: usize,
+    label: u16,
+    material: Material,
+    /// Material for paths that have bounced before.
+    path_material: Material,
+    /// Linear colour, used if the shape has none.
+    color: Vec3A,
+    /// Whether the pose is the identity.
+    pub(super) is_identity: bool,
+    rotation: Mat3A,
+    /// Inverse rotation.
+    pub(super) inverse_rotation: Mat3A,
+    pub(super) translation: Vec3A,
+}
+
+/// First intersection of a ray with the stage.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct StageHit {
+    /// Ray parameter, in units of the ray's direction.
+    pub t: f32,
+    pub body: u32,
+    pub(super) triangle: u32,
+    pub(super) u: f32,
+    pub(super) v: f32,
+}
+
+/// A point on a surface, in the world frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Surface {
+    pub position: Vec3A,
+    /// Unit normal of the triangle, towards the origin of the ray.
+    pub flat: Vec3A,
+    /// Interpolated unit normal, on the same side.
+    pub smooth: Vec3A,
+    /// Linear colour.
+    pub albedo: Vec3A,
+}
+
+impl Default for Stage {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Stage {
+    /// An empty, dark stage.
+    pub fn new() -> Self {
+        Self {
+            shapes: Vec::new(),
+            bodies: Vec::new(),
+            top: BoxTree::default(),
+            entries: Vec::new(),
+            lamps: Vec::new(),
+            stale: true,
+            level: Level::new(),
+            lights: Vec::new(),
+            environment: [0.0; 3],
+        }
+    }
+
+    /// Adds a surface. Triangles with a missing or non-finite vertex are invisible. Normals are
+    /// interpolated across vertices that triangles share.
+    ///
+    /// # Errors
+    /// The mesh has more than 2^27 triangles.
+    pub fn add_shape(&mut self, mesh: &TriMesh) -> Result<ShapeId> {
+        if mesh.triangles.len() > MAX_TRIANGLES {
+            return Err(Error::TooLarge(mesh.triangles.len()));
+        }
+        let positions: Vec<Vec3A> = mesh.vertices.iter().map(|p| p.as_vec3a()).collect();
+        let tree = TriangleTree::new(&positions, &mesh.triangles);
+        let colored = mesh.colors.len() == mesh.vertices.len();
+        let colors =
+            if colored { mesh.colors.iter().map(|c| srgb::to_linear(*c).into()).collect() } else { Vec::new() };
+        let mut shape = Shape { tree, positions, triangles: mesh.triangles.clone(), normals: Vec::new(), colors };
+        shape.update_normals();
+        self.shapes.push(shape);
+        Ok(ShapeId(self.shapes.len() - 1))
+    }
+
+    /// Moves the vertices of a shape to `positions` (m). The search tree is refitted, not rebuilt.
+    ///
+    /// # Errors
+    /// The shape is unknown, or the number of positions differs from its number of vertices.
+    pub fn deform(&mut self, shape: ShapeId, positions: &[DVec3]) -> Result<()> {
+        let count = self.shapes.len();
+        let unknown = Error::Unknown { what: "shape", index: shape.0, count };
+        let found = self.shapes.get_mut(shape.0).ok_or(unknown)?;
+        if positions.len() != found.positions.len() {
+            let (has, given) = (found.positions.len(), positions.len());
+            return Err(Error::Vertices { shape: shape.0, has, given });
+        }
+        for (to, from) in found.positions.iter_mut().zip(positions) {
+            *to = from.as_vec3a();
+        }
+        found.tree.refit(&found.positions, &found.triangles);
+        found.update_normals();
+        self.stale = true;
+        Ok(())
+    }
+
+    /// Adds a body that shows `shape` at `pose` (shape frame to world frame). `label` is its value
+    /// in label images; 0 means no body.
+    ///
+    /// # Errors
+    /// The shape is unknown.
+    pub fn add_body(&mut self, shape: ShapeId, pose: &Pose, label: u16, appearance: &Appearance) -> Result<BodyId> {
+        if shape.0 >= self.shapes.len() {
+            return Err(Error::Unknown { what: "shape", index: shape.0, count: self.shapes.len() });
+        }
+        self.bodies.push(Body {
+            shape: shape.0,
+            label,
+            path_material: Material::new(&appearance.surface.for_paths()),
+            material: Material::new(&appearance.surface),
+            color: srgb::to_linear(appearance.color).into(),
+            is_identity: true,
+            rotation: Mat3A::IDENTITY,
+            inverse_rotation: Mat3A::IDENTITY,
+            translation: Vec3A::ZERO,
+        });
+        let id = BodyId(self.bodies.len() - 1);
+        self.place(id, pose)?;
+        Ok(id)
+    }
+
+    /// Moves a body to `pose`.
+    ///
+    /// # Errors
+    /// The body is unknown.
+    pub fn place(&mut self, body: BodyId, pose: &Pose) -> Result<()> {
+        let unknown = Error::Unknown { what: "body", index: body.0, count: self.bodies.len() };
+        let body = self.bodies.get_mut(body.0).ok_or(unknown)?;
+        body.is_identity = *pose == Pose::IDENTITY;
+        body.rotation = rotation_of(pose);
+        body.inverse_rotation = body.rotation.transpose();
+        body.translation = pose.translation.as_vec3a();
+        self.stale = true;
+        Ok(())
+    }
+
+    /// Adds a mesh in world coordinates as its own shape and body: [`Self::add_shape`] and
+    /// [`Self::add_body`].
+    ///
+    /// # Errors
+    /// The mesh has more than 2^27 triangles.
+    pub fn add_mesh(&mut self, mesh: &TriMesh, label: u16, appearance: &Appearance) -> Result<(ShapeId, BodyId)> {
+        let shape = self.add_shape(mesh)?;
+        Ok((shape, self.add_body(shape, &Pose::IDENTITY, label, appearance)?))
+    }
+
+    /// Number of triangles of all bodies.
+    pub fn triangles(&self) -> usize {
+        self.bodies.iter().map(|b| self.shapes[b.shape].triangles.len()).sum()
+    }
+
+    /// Updates the lamps and the tree over bodies. Large bodies enter the tree with many of their
+    /// nodes, so that a ray need not descend into every body whose box it crosses (Benthin and
+    /// others 2017, "Improved Two-Level BVHs using Partial Re-Braiding").
+    pub(crate) fn update_acceleration(&mut self) {
+        self.lamps = self.lights.iter().map(Lamp::new).collect();
+        if !self.stale {
+            return;
+        }
+        self.entries.clear();
+        let mut bounds = Vec::new();
+        for (index, body) in self.bodies.iter().enumerate() {
+            let tree = &self.shapes[body.shape].tree;
+            for (entry, held) in tree.entries((tree.leaves() / LEAVES_PER_ENTRY).clamp(1, MAX_ENTRIES_PER_BODY)) {
+                self.entries.push((index as u32, entry));
+                bounds.push(body.world_bounds(held));
+            }
+        }
+        self.top = BoxTree::over(&bounds);
+        self.stale = false;
+    }
+
+    /// The prepared lights.
+    #[inline]
+    pub(crate) fn lamps(&self) -> &[Lamp] {
+        &self.lamps
+    }
+
+    #[inline]
+    pub(crate) fn label(&self, hit: &StageHit) -> u16 {
+        self.bodies[hit.body as usize].label
+    }
+
+    #[inline]
+    pub(crate) fn material(&self, hit: &StageHit) -> &Material {
+        &self.bodies[hit.body as usize].material
+    }
+
+    /// Material for paths that have bounced before, see [`crate::SurfaceKind`].
+    #[inline]
+    pub(crate) fn path_material(&self, hit: &StageHit) -> &Material {
+        &self.bodies[hit.body as usize].path_material
+    }
+
+    /// The surface point that a ray in `direction` hit.
+    #[inline]
+    pub(crate) fn surface(&self, hit: &StageHit, direction: Vec3A) -> Surface {
+        let body = &self.bodies[hit.body as usize];
+        let shape = &self.shapes[body.shape];
+        let corners = shape.triangles[hit.triangle as usize].map(|v| v as usize);
+        let (u, v) = (hit.u, hit.v);
+        let mixed = |of: &[Vec3A]| {
+            let [a, b, c] = corners.map(|i| of[i]);
+            a + u * (b - a) + v * (c - a)
+        };
+        let [a, b, c] = corners.map(|i| shape.positions[i]);
+        let mut position = a + u * (b - a) + v * (c - a);
+        let mut flat = (b - a).cross(c - a);
+        let mut smooth = mixed(&shape.normals);
+        if !body.is_identity {
+            position = body.rotation * position + body.translation;
+            flat = body.rotation * flat;
+            smooth = body.rotation * smooth;
+        }
+        flat = flat.normalize_or_zero();
+        if flat.dot(direction) > 0.0 {
+            flat = -flat;
+        }
+        if smooth.dot(flat) < 0.0 {
+            smooth = -smooth;
+        }
+        // An interpolated normal can face away from the eye; the triangle's normal replaces it.
+        let smooth = smooth.try_normalize().filter(|n| n.dot(direction) < 0.0).unwrap_or(flat);
+        let albedo = if shape.colors.is_empty() { body.color } else { mixed(&shape.colors) };
+        Surface { position, flat, smooth, albedo }
+    }
+}
+
+impl Body {
+    /// The ray in the shape's frame.
+    #[inline(always)]
+    pub(super) fn local(&self, ray: &Ray) -> Ray {
+        if self.is_identity {
+            return *ray;
+        }
+        Ray::new(self.inverse_rotation * (ray.origin - self.translation), self.inverse_rotation * ray.direction)
+    }
+
+    /// A box of the shape, in the world frame.
+    fn world_bounds(&self, bounds: Bounds) -> Bounds {
+        let Bounds { low, high } = bounds;
+        if self.is_identity || low.x > high.x {
+            return Bounds { low, high };
+        }
+        let corner = |i: usize| {
+            let pick = |k: usize| if i >> k & 1 == 0 { low[k] } else { high[k] };
+            self.rotation * Vec3A::new(pick(0), pick(1), pick(2)) + self.translation
+        };
+        let mut bounds = (0..8).map(corner).fold(Bounds::EMPTY, Bounds::with);
+        // The margin covers the rounding error of the rotation.
+        let margin = 1e-6 * (bounds.high - bounds.low).max_element();
+        bounds.low -= margin;
+        bounds.high += margin;
+        bounds
+    }
+}
+
+impl Shape {
+    /// Computes area-weighted vertex normals.
+    fn update_normals(&mut self) {
+        self.normals.clear();
+        self.normals.resize(self.positions.len(), Vec3A::ZERO);
+        for triangle in &self.triangles {
+            let [a, b, c] = triangle.map(|v| v as usize);
+            if let (Some(p), Some(q), Some(r)) = (self.positions.get(a), self.positions.get(b), self.positions.get(c)) {
+                let normal = (*q - *p).cross(*r - *p);
+                if normal.is_finite() {
+                    for v in [a, b, c] {
+                        self.normals[v] += normal;
+                    }
+                }
+            }
+        }
+        for normal in &mut self.normals {
+            *normal = normal.normalize_or_zero();
+        }
+    }
+}
+
+/// Rotation of a pose in single precision.
+pub(crate) fn rotation_of(pose: &Pose) -> Mat3A {
+    let q = pose.rotation.normalize();
+    Mat3A::from_quat(Quat::from_xyzw(q.x as f32, q.y as f32, q.z as f32, q.w as f32).normalize())
+}

@@ -1,0 +1,315 @@
+//! The stage of a cell: organs, their surroundings, arms and instruments, updated from the cell.
+
+use crate::camera::is_endoscope;
+use crate::field::{Field, Recorded};
+use crate::instrument::Shapes;
+use crate::organ::{BoundSurface, OrganSkin, Piece};
+use crate::section::section;
+use crate::{Error, Result, arm, furniture};
+use glam::DVec3;
+use std::path::PathBuf;
+use trocar_cell::Cell;
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
+use trocar_render::{Appearance, BodyId, ShapeId, Stage, SurfaceKind};
+use trocar_scene::{InstrumentKind, Scene};
+use trocar_specimen::Specimen;
+
+/// First labels of instruments, arms, and other objects. Labels of organs start at 1.
+const INSTRUMENTS: u16 = 101;
+const ARMS: u16 = 111;
+const OTHERS: u16 = 201;
+
+/// Everything that cameras of a cell can see.
+pub(crate) struct CellStage {
+    /// The current stage.
+    pub stage: Stage,
+    /// Labels with the names of their objects.
+    pub labels: Vec<(u16, String)>,
+    /// The stage without the organs.
+    base: Stage,
+    organs: Vec<OrganOnStage>,
+    arms: Vec<Arm>,
+    section: Option<(DVec3, DVec3)>,
+}
+
+/// An organ on the stage.
+struct OrganOnStage {
+    recorded: OrganSkin,
+    label: u16,
+    surface: BoundSurface,
+    shape: Option<ShapeId>,
+    /// Bodies of the cell that are pieces of this organ, and their elements.
+    bodies: Vec<usize>,
+    tets: Vec<Vec<[u32; 4]>>,
+    nodes: Vec<DVec3>,
+    /// Nodes when the stage was last updated.
+    drawn_nodes: Vec<DVec3>,
+    skin: Vec<DVec3>,
+}
+
+/// An arm on the stage.
+struct Arm {
+    name: &'static str,
+    /// Description file of its shapes, and the shapes of base and links.
+    drawn: Option<ShapeSource>,
+    shapes: Vec<ShapeId>,
+    links: Vec<BodyId>,
+    shaft: BodyId,
+    motor: BodyId,
+    blades: [BodyId; 2],
+}
+
+/// Everything that determines the shapes of a described arm, except the number of its links.
+#[derive(PartialEq)]
+struct ShapeSource {
+    file: PathBuf,
+    flange: Option<String>,
+    /// Whether the scene requests the shapes of the file. If so, simple shapes do not replace
+    /// missing ones.
+    requested: bool,
+    model: String,
+}
+
+impl CellStage {
+    /// Organs in the world frame (up along z), on their field in the surroundings of `scene`,
+    /// without cameras. `recording` is the pose of the recording camera.
+    pub fn new(placed: &Specimen, recording: Pose, scene: Option<&Scene>) -> Result<Self> {
+        let mut all = Self {
+            labels: Vec::new(),
+            base: Stage::new(),
+            stage: Stage::new(),
+            organs: Vec::new(),
+            arms: Vec::new(),
+            section: None,
+        };
+        for (k, organ) in placed.organs.iter().enumerate() {
+            let label = 1 + k as u16;
+            all.labels.push((label, organ.name.clone()));
+            let recorded = OrganSkin::new(organ);
+            let surface = recorded.whole_surface();
+            let nodes = recorded.body.vertices.clone();
+            let bodies = Vec::new();
+            all.organs.push(OrganOnStage {
+                recorded,
+                label,
+                surface,
+                shape: None,
+                bodies,
+                tets: Vec::new(),
+                nodes,
+                drawn_nodes: Vec::new(),
+                skin: Vec::new(),
+            });
+        }
+        let surfaces: Vec<&TriMesh> = placed.organs.iter().map(|o| &o.surface).collect();
+        let recorded = match (&placed.background, &placed.camera) {
+            (Some(picture), Some(camera)) => Some(Recorded { picture, camera, pose: recording }),
+            _ => None,
+        };
+        let field = Field::under(&surfaces, recorded.as_ref())?;
+        all.add("field", &field.mesh, &wet(0.36))?;
+        let ports = scene.map_or(&[][..], |s| &s.ports);
+        let mut pieces = furniture::room(&field, ports);
+        for (scene, camera) in scene.iter().flat_map(|s| s.cameras.iter().map(move |c| (s, c))) {
+            if is_endoscope(camera) {
+                pieces.extend(furniture::scope(&camera.shaft(&scene.placement), furniture::table(&field)));
+            }
+        }
+        for piece in pieces {
+            all.add(piece.name, &piece.mesh, &piece.appearance)?;
+        }
+        Ok(all)
+    }
+
+    fn label(&mut self, first: u16, name: &str) -> u16 {
+        if let Some((label, _)) = self.labels.iter().find(|(_, n)| n == name) {
+            return *label;
+        }
+        let count = self.labels.iter().filter(|(l, _)| (first..first + 10).contains(l)).count() as u16;
+        self.labels.push((first + count, name.to_owned()));
+        first + count
+    }
+
+    fn add(&mut self, name: &str, mesh: &TriMesh, appearance: &Appearance) -> Result<()> {
+        let label = self.label(OTHERS, name);
+        self.base.add_mesh(mesh, label, appearance)?;
+        Ok(())
+    }
+
+    /// Adds an arm with its instrument. The next update places it.
+    pub fn add_arm(
+        &mut self,
+        k: usize,
+        (scene, arm): (&Scene, &trocar_scene::Arm),
+        held: &trocar_scene::Instrument,
+        cell: &Cell,
+    ) -> Result<()> {
+        let name = arm.name.name();
+        let poses = cell.link_poses(name)?;
+        let label = ARMS + k as u16;
+        self.labels.push((label, format!("{name} arm")));
+        let shell = Appearance {
+            color: [232; 3],
+            surface: SurfaceKind::Coated { roughness: 0.42, ior: 1.48, scattering_length: [0.0; 3] },
+        };
+        // Arms with the same description share their shapes.
+        let model = cell.arm_model(name)?;
+        let drawn = arm.drawn().map(|file| ShapeSource {
+            file: scene.resolve(file),
+            flange: arm.flange.clone(),
+            requested: arm.shapes.is_some(),
+            model: model.to_owned(),
+        });
+        let same = |a: &&Arm| drawn.is_some() && a.drawn == drawn && a.shapes.len() + 1 == poses.len();
+        let known = self.arms.iter().find(same).map(|a| a.shapes.clone());
+        let shapes = match known {
+            Some(shapes) => shapes,
+            None => {
+                let meshes = arm::links(scene, arm, model, &poses)?;
+                meshes.iter().map(|mesh| self.base.add_shape(mesh)).collect::<std::result::Result<Vec<_>, _>>()?
+            }
+        };
+        let mut links = Vec::new();
+        for (shape, pose) in shapes.iter().zip(&poses) {
+            links.push(self.base.add_body(*shape, pose, label, &shell)?);
+        }
+        let held_shapes = Shapes::of(held);
+        let label = INSTRUMENTS + k as u16;
+        self.labels.push((label, held.name.clone()));
+        let polished = Appearance { surface: SurfaceKind::Metal { roughness: 0.3 }, ..Appearance::steel() };
+        let dark = Appearance { color: [58, 61, 66], ..shell };
+        let mut body = |mesh: &TriMesh, appearance: &Appearance| -> Result<BodyId> {
+            let shape = self.base.add_shape(mesh)?;
+            Ok(self.base.add_body(shape, &Pose::IDENTITY, label, appearance)?)
+        };
+        let shaft = body(&held_shapes.shaft, &polished)?;
+        let motor = body(&held_shapes.motor, if held.kind == InstrumentKind::Grasper { &dark } else { &shell })?;
+        let blades = [body(&held_shapes.blades[0], &polished)?, body(&held_shapes.blades[1], &polished)?];
+        self.arms.push(Arm { name, drawn, shapes, links, shaft, motor, blades });
+        Ok(())
+    }
+
+    /// Mean position of the organs' nodes at rest (m).
+    pub fn organs_middle(&self) -> DVec3 {
+        let all = self.organs.iter().flat_map(|o| &o.recorded.body.vertices);
+        let (sum, n) = all.fold((DVec3::ZERO, 0_usize), |(sum, n), p| (sum + *p, n + 1));
+        sum / n.max(1) as f64
+    }
+
+    /// Sets the section plane (point, normal); `None` shows whole organs.
+    pub fn set_section(&mut self, plane: Option<(DVec3, DVec3)>) {
+        self.section = plane.map(|(point, normal)| (point, normal.normalize_or(DVec3::X)));
+        self.invalidate();
+    }
+
+    /// Shows the organs as they were recorded, unless a cell was shown before.
+    pub fn ensure_organs(&mut self) -> Result<()> {
+        if self.organs.iter().any(|o| o.shape.is_none()) { self.rebuild() } else { Ok(()) }
+    }
+
+    /// Marks the organs as changed: the next update rebuilds the stage.
+    pub fn invalidate(&mut self) {
+        self.organs.iter_mut().for_each(|o| o.shape = None);
+    }
+
+    /// Updates the stage to the current state of the cell.
+    pub fn update(&mut self, cell: &Cell) -> Result<()> {
+        let world = cell.world();
+        let bodies = world.model.bodies();
+        let mut same = true;
+        for organ in &mut self.organs {
+            let name = organ.recorded.name.as_str();
+            let of = |b: &str| b.strip_prefix(name).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
+            let is_same = organ.shape.is_some()
+                && bodies.iter().filter(|b| of(b.name())).count() == organ.bodies.len()
+                && organ
+                    .bodies
+                    .iter()
+                    .zip(&organ.tets)
+                    .all(|(b, tets)| bodies.get(*b).is_some_and(|b| of(b.name()) && b.tets() == tets));
+            if !is_same {
+                same = false;
+                organ.bodies = (0..bodies.len()).filter(|b| of(bodies[*b].name())).collect();
+                organ.tets = organ.bodies.iter().map(|b| bodies[*b].tets().to_vec()).collect();
+                let pieces: Vec<Piece<'_>> = organ
+                    .bodies
+                    .iter()
+                    .map(|b| Piece { rest: bodies[*b].rest_positions(), tets: bodies[*b].tets() })
+                    .collect();
+                let whole = pieces.len() == 1 && pieces[0].tets == organ.recorded.body.tets;
+                let surface = if whole {
+                    Some(organ.recorded.whole_surface())
+                } else {
+                    organ.recorded.surface_of_pieces(&pieces)
+                };
+                organ.surface =
+                    surface.ok_or_else(|| Error::Mismatch(format!("organ '{name}' has different elements")))?;
+            }
+            organ.nodes.clear();
+            for b in &organ.bodies {
+                organ.nodes.extend((0..bodies[*b].len()).map(|i| world.state.position(&world.model, *b, i)));
+            }
+        }
+        if same && self.section.is_none() {
+            for organ in &mut self.organs {
+                if organ.nodes == organ.drawn_nodes {
+                    continue;
+                }
+                organ.surface.positions(&organ.nodes, &mut organ.skin);
+                if let Some(shape) = organ.shape {
+                    self.stage.deform(shape, &organ.skin)?;
+                }
+                organ.drawn_nodes.clone_from(&organ.nodes);
+            }
+            self.pose_arms(cell)
+        } else {
+            self.rebuild()?;
+            self.pose_arms(cell)
+        }
+    }
+
+    /// Rebuilds the stage: copies the static part and adds the organs.
+    pub fn rebuild(&mut self) -> Result<()> {
+        self.stage = self.base.clone();
+        for organ in &mut self.organs {
+            organ.surface.positions(&organ.nodes, &mut organ.skin);
+            let mut mesh = organ.surface.mesh.clone();
+            mesh.vertices.clone_from(&organ.skin);
+            let in_one = organ.nodes.len() == organ.recorded.body.vertices.len();
+            if let Some((point, normal)) = self.section.filter(|_| in_one) {
+                mesh = section(&organ.recorded, &organ.skin, &organ.nodes, point, normal);
+            }
+            let (shape, _) = self.stage.add_mesh(&mesh, organ.label, &wet(0.3))?;
+            organ.shape = Some(shape);
+            organ.drawn_nodes.clone_from(&organ.nodes);
+        }
+        Ok(())
+    }
+
+    fn pose_arms(&mut self, cell: &Cell) -> Result<()> {
+        for arm in &self.arms {
+            for (body, pose) in arm.links.iter().zip(cell.link_poses(arm.name)?) {
+                self.stage.place(*body, &pose)?;
+            }
+            let gripper = cell.gripper(arm.name)?;
+            self.stage.place(arm.shaft, &gripper.pose)?;
+            self.stage.place(arm.motor, &gripper.pose)?;
+            for (body, side) in arm.blades.iter().zip([1.0, -1.0]) {
+                self.stage.place(*body, &gripper.blade(side))?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Wet tissue with the given roughness of its film of water.
+fn wet(roughness: f32) -> Appearance {
+    let tissue = Appearance::tissue([190, 96, 88]);
+    match tissue.surface {
+        SurfaceKind::Coated { ior, scattering_length, .. } => {
+            Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..tissue }
+        }
+        _ => tissue,
+    }
+}

@@ -1,0 +1,25 @@
+//! Pictures from the cameras of a simulated cell.
+//!
+//! A [`CameraRig`] combines the cameras of a scene, a running cell and the ray tracer of
+//! `trocar-render`. It shows the organs with their surfaces (in pieces after a cut), the field
+//! below them, instruments with moving jaws, arms, ports and the room. [`CameraRig::render`]
+//! returns colour, metric depth, labels and normals. The result depends on the state of the cell
+//! only, not on the number of threads.
+
+mod arm;
+mod camera;
+mod cell_stage;
+mod error;
+mod field;
+mod furniture;
+mod instrument;
+mod organ;
+mod rig;
+mod section;
+mod solid;
+mod visuals;
+
+pub use camera::OUTSIDE;
+pub use error::{Error, Result};
+pub use rig::{CameraRig, SensorNoise};
+pub use trocar_camera::DepthNoise;
