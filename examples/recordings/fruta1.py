@@ -1,8 +1,9 @@
-"""Turns the folder fruta1 of the public repository fsousa96/image_processing into a recording folder.
+"""Converts the folder fruta1 of the public repository fsousa96/image_processing to a recording.
 
     python3 fruta1.py image_processing/fruta1 recording        # needs scipy, numpy, pillow
 
-Colour PNGs are copied; depth (MATLAB files, millimetres) becomes 16-bit PNG; recording.toml is fruta1.toml beside this file.
+Colour PNGs are copied. Depth (MATLAB files, millimetres) becomes 16-bit PNG. recording.toml is
+fruta1.toml beside this file.
 """
 
 import pathlib

@@ -110,7 +110,7 @@ fn set_up() -> Outcome<Places> {
         }
     }
     eprintln!("== trocar");
-    if !crate::cargo(&["build", "--release", "--locked", "-p", "trocar"], &[]) {
+    if !crate::cargo(&["build", "--release", "--locked", "-p", "trocar-cli"], &[]) {
         return Err("trocar cannot be built".to_owned());
     }
     let absolute = |path: PathBuf| std::path::absolute(&path).map_err(|e| format!("{}: {e}", path.display()));

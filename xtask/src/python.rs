@@ -31,7 +31,7 @@ pub fn test() -> bool {
     };
     let (Ok(folder), Ok(source)) = (std::path::absolute(FOLDER), std::path::absolute("python")) else { return false };
     // The program evaluates Python policies in one of the tests.
-    if !crate::cargo(&["build", "--release", "--locked", "-p", "trocar"], &[]) {
+    if !crate::cargo(&["build", "--release", "--locked", "-p", "trocar-cli"], &[]) {
         return false;
     }
     let run = |arguments: &[&str]| {

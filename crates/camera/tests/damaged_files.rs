@@ -4,7 +4,7 @@ mod common;
 
 use common::{ROS, SAMPLE};
 use trocar_camera::CameraModel;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

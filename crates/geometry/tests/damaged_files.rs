@@ -3,9 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use std::path::Path;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_geometry::io::{Unit, read_msh, read_msh_groups, read_surface, write_msh, write_ply};
 use trocar_geometry::{TetMesh, TriMesh, repair};
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

@@ -13,10 +13,6 @@ pub const NAMES: [&str; 3] = [SPECS[0].name, SPECS[1].name, SPECS[2].name];
 
 /// The specification of the phantom `name`.
 pub(crate) fn named(name: &str) -> Result<&'static PhantomSpec> {
-    let unknown = || Error::Unknown {
-        name: name.to_owned(),
-        nearest: nearest(name, NAMES).unwrap_or_default(),
-        known: NAMES.join(", "),
-    };
+    let unknown = || Error::Unknown { name: name.to_owned(), nearest: nearest(name, NAMES), known: NAMES.join(", ") };
     SPECS.into_iter().find(|p| p.name == name).ok_or_else(unknown)
 }

@@ -7,12 +7,12 @@ pub type Result<T> = std::result::Result<T, Error>;
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// There is no phantom of that name.
-    #[error("unknown phantom '{name}'; did you mean '{nearest}'? Known: {known}")]
+    #[error("no phantom '{name}'; the phantoms are {known}{hint}", hint = nearest.map(|n| format!("; did you mean '{n}'?")).unwrap_or_default())]
     Unknown {
         /// The name that was given.
         name: String,
         /// The most similar known name.
-        nearest: &'static str,
+        nearest: Option<&'static str>,
         /// All known names.
         known: String,
     },

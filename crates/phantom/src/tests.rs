@@ -224,7 +224,10 @@ fn invalid_requests_are_rejected_and_leave_no_files() {
     let options = RecordOptions { frames: 2, ..RecordOptions::default() };
     let silent = &trocar_core::Silent;
     let unknown = record("fantom-c", &options, &to, silent).unwrap_err().to_string();
-    assert_eq!(unknown, "unknown phantom 'fantom-c'; did you mean 'phantom-c'? Known: phantom-a, phantom-b, phantom-c");
+    assert_eq!(
+        unknown,
+        "no phantom 'fantom-c'; the phantoms are phantom-a, phantom-b, phantom-c; did you mean 'phantom-c'?"
+    );
     let none = record("phantom-a", &RecordOptions { frames: 0, ..options }, &to, silent).unwrap_err().to_string();
     assert!(none.contains("frames is 0"), "{none}");
     let stopped = crate::record::record_with(SPECS[0], &options, &small(), coarse(SPECS[0]), &to, &Stop);

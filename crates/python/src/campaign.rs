@@ -12,8 +12,8 @@ use pyo3::types::PyBytes;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
+use trocar_campaign::{Error, Files, Job, Plan, PolicySpec, Store};
 use trocar_core::Progress;
-use trocar_evaluate::{Error, Files, Job, Plan, PolicySpec, Store};
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 
@@ -130,12 +130,12 @@ impl Stop {
 /// A cell that runs one job after the other.
 #[pyclass(frozen, module = "trocar._native")]
 pub struct Worker {
-    worker: Mutex<trocar_evaluate::Worker>,
+    worker: Mutex<trocar_campaign::Worker>,
     stop: Arc<AtomicBool>,
 }
 
 impl Worker {
-    fn worker(&self) -> PyResult<MutexGuard<'_, trocar_evaluate::Worker>> {
+    fn worker(&self) -> PyResult<MutexGuard<'_, trocar_campaign::Worker>> {
         self.worker.lock().map_err(|_| wrong("the worker failed before; make another"))
     }
 }
@@ -171,7 +171,7 @@ impl Worker {
                 ));
             }
             go_on(&stop)?;
-            let worker = trocar_evaluate::Worker::new(&scene, &specimen).map_err(|e| evaluate(&e))?;
+            let worker = trocar_campaign::Worker::new(&scene, &specimen).map_err(|e| evaluate(&e))?;
             let worker = Mutex::new(worker.stopped_by(Arc::clone(&stop)).served_by(python));
             Ok(Self { worker, stop })
         })

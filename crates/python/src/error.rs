@@ -14,9 +14,9 @@ pub fn forked() -> PyErr {
 }
 
 /// An error of making or reading a specimen or scene.
-pub fn evaluate(error: &trocar_evaluate::Error) -> PyErr {
+pub fn evaluate(error: &trocar_workflow::Error) -> PyErr {
     match error {
-        trocar_evaluate::Error::Interrupted => PyKeyboardInterrupt::new_err(()),
+        trocar_workflow::Error::Interrupted => PyKeyboardInterrupt::new_err(()),
         other => wrong(other),
     }
 }

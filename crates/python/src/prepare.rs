@@ -5,9 +5,9 @@ use crate::error::{evaluate, wrong};
 use crate::progress::Signals;
 use pyo3::prelude::*;
 use std::path::Path;
-use trocar_evaluate::scene_specimen;
 use trocar_scene::{BUILTINS, Scene, TaskName};
 use trocar_specimen::Specimen;
+use trocar_workflow::scene_specimen;
 
 /// Names of the built-in scenes.
 #[pyfunction]

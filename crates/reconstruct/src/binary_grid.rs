@@ -1,17 +1,18 @@
-//! The paper's own way to a surface, for comparison: occupancy on a binary grid (paper section III).
+//! The paper's surface, for comparison: occupancy on a binary grid (paper section III).
 //!
-//! Voxels that a pixel's ray meets between front and back are marked, closed morphologically, and enclosed by marching cubes
-//! at 0.5, half a cell beyond their centres. Half a cell of outward bias and filled concavities come with it (paper section
-//! VII-A); [`crate::resample`] has neither.
+//! Voxels that a pixel's ray meets between front and back are marked, closed morphologically, and
+//! enclosed by marching cubes at 0.5, half a cell beyond their centres. This gives half a cell of
+//! outward bias and fills concavities (paper section VII-A); [`crate::resample`] does neither.
 
 use glam::DVec3;
 use trocar_camera::{Camera, Mask};
 use trocar_geometry::{Grid, TriMesh, isosurface};
 
-/// Edge of a voxel (paper) [m].
+/// Edge of a voxel in the paper (m).
 const VOXEL: f64 = 1.5e-3;
 
-/// The surface of the voxels between `front` and `front` + `h` (depths along z, a value a pixel of `mask`) [m] inside `bounds`.
+/// The surface of the voxels between `front` and `front` + `h` inside `bounds` (m). `front` and `h`
+/// are depths along z, one per pixel of `mask`.
 pub fn binary_grid(front: &[f64], h: &[f64], mask: &Mask, camera: &Camera, bounds: (DVec3, DVec3)) -> TriMesh {
     let mut grid = Grid::covering(bounds, VOXEL);
     let mut marked = vec![false; grid.values.len()];
@@ -32,12 +33,12 @@ pub fn binary_grid(front: &[f64], h: &[f64], mask: &Mask, camera: &Camera, bound
     isosurface(&grid, 0.0)
 }
 
-/// Marked, or with a marked neighbour across a face.
+/// Dilation: marked, or with a marked neighbour across a face.
 fn dilated(marked: &[bool], dims: [usize; 3]) -> Vec<bool> {
     (0..marked.len()).map(|i| marked[i] || neighbours(i, dims).any(|j| marked[j])).collect()
 }
 
-/// Marked, and all neighbours across faces too.
+/// Erosion: marked, with all neighbours across faces.
 fn eroded(marked: &[bool], dims: [usize; 3]) -> Vec<bool> {
     (0..marked.len()).map(|i| marked[i] && neighbours(i, dims).all(|j| marked[j])).collect()
 }
@@ -71,7 +72,8 @@ mod tests {
         assert_eq!(eroded(&dilated(&marked, dims), dims), whole);
     }
 
-    /// A slab that faces the camera, seen with pixels finer than the voxels: on average half a voxel is added on every side.
+    /// A slab that faces the camera, seen with pixels finer than the voxels: on average half a
+    /// voxel is added on every side.
     #[test]
     fn a_slab_grows_by_half_a_voxel() {
         let camera = Camera { width: 160, height: 120, fx: 400.0, fy: 400.0, cx: 79.5, cy: 59.5, ..Camera::d405() };

@@ -1,4 +1,4 @@
-//! The tetrahedra that fill a closed surface, measured.
+//! Fills a closed surface with tetrahedra and measures them.
 
 use crate::resample::smooth;
 use crate::{Error, MesherRule, Result, Settings};
@@ -13,7 +13,7 @@ use trocar_specimen::OrganFacts;
 /// When the mesher fails or leaves an element without volume.
 pub fn fill_with_tets(organ: &str, surface: &TriMesh, settings: &Settings) -> Result<(TetMesh, OrganFacts)> {
     let wrong = |reason: String| Error::Organ { organ: organ.to_owned(), reason };
-    let body = fill(surface, settings).map_err(|e| wrong(format!("no tetrahedra could be made: {e}")))?;
+    let body = fill(surface, settings).map_err(|e| wrong(format!("it cannot be filled with tetrahedra: {e}")))?;
     let quality = TetQuality::of(&body);
     if quality.inverted > 0 {
         return Err(wrong(format!("{} of {} tetrahedra have no positive volume", quality.inverted, body.tets.len())));
@@ -44,7 +44,8 @@ fn fill(surface: &TriMesh, settings: &Settings) -> trocar_geometry::Result<TetMe
     }
 }
 
-/// The surface with triangles of about `size` [m]: TetGen keeps those it is given, and ours are as fine as the pixels.
+/// The surface with triangles of about `size` (m). TetGen keeps the triangles it gets, and those of
+/// a reconstruction are as fine as the pixels.
 fn with_edges_of(size: f64, surface: &TriMesh) -> trocar_geometry::Result<TriMesh> {
     let bounds = surface.bounds().ok_or_else(|| trocar_geometry::Error::Mesh("the surface is empty".into()))?;
     let grid = sample_distance(&MeshDistance::new(surface)?, bounds, size);

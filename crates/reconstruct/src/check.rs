@@ -1,4 +1,4 @@
-//! The reconstructed surface against the depth it was made from.
+//! Compares the reconstructed surface with the depth it was made from.
 
 use glam::DVec3;
 use trocar_camera::{Camera, DepthImage, Mask, draw_triangle};
@@ -6,19 +6,20 @@ use trocar_geometry::TriMesh;
 
 /// Depth errors of a surface.
 pub struct DepthCheck {
-    /// Surface minus measured depth on the compared pixels [m]; 0 elsewhere.
+    /// Surface minus measured depth on the compared pixels (m); 0 elsewhere.
     pub error: Vec<f32>,
     /// Compared pixels: in the mask, measured, and covered by the surface.
     pub compared: Mask,
-    /// Median of the absolute error [m].
+    /// Median of the absolute error (m).
     pub median_absolute: f64,
-    /// Median of the signed error [m].
+    /// Median of the signed error (m).
     pub median_signed: f64,
-    /// Compared pixels / pixels of the mask.
+    /// Compared pixels over pixels of the mask.
     pub covered: f64,
 }
 
-/// Renders `surface` through `camera` and compares it with `measured` inside `mask`. `None` without a pixel to compare.
+/// Renders `surface` through `camera` and compares it with `measured` inside `mask`. `None` without
+/// a pixel to compare.
 pub fn check(surface: &TriMesh, measured: &DepthImage, mask: &Mask, camera: &Camera) -> Option<DepthCheck> {
     let rendered = render_depth(surface, camera);
     let mut error = vec![0.0; rendered.len()];
@@ -41,8 +42,9 @@ pub fn check(surface: &TriMesh, measured: &DepthImage, mask: &Mask, camera: &Cam
     Some(DepthCheck { error, compared, median_absolute, median_signed: median(signed)?, covered })
 }
 
-/// Depth of the nearest surface at each pixel's centre [m]; infinite where there is none. Triangles are small against the
-/// lens, so they are drawn straight between their projected corners; 1/z is linear on the image.
+/// Depth of the nearest surface at each pixel's centre (m); infinite where there is none. Triangles
+/// are small against the lens's distortion, so they are drawn straight between their projected
+/// corners; 1/z is linear on the image.
 fn render_depth(surface: &TriMesh, camera: &Camera) -> Vec<f64> {
     let (w, h) = (camera.width, camera.height);
     let mut depth = vec![f64::INFINITY; w * h];

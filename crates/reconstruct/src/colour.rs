@@ -1,10 +1,11 @@
-//! Vertex colours, by projection into the photograph.
+//! Vertex colours by projection into the image.
 
 use trocar_camera::{Camera, ColorImage, Mask, pixel_neighbours};
 use trocar_geometry::TriMesh;
 
-/// Colours the vertices of `mesh` with the pixels they project to; the unseen back takes the colour seen in front of it.
-/// Only pixels of `mask` that are also `colored` serve: elsewhere the nearest of them does.
+/// Colours the vertices of `mesh` with the pixels they project to; the unseen back gets the colour
+/// seen in front of it. Only pixels of `mask` that are also `colored` are used; elsewhere the
+/// nearest of them is.
 pub fn color_vertices(mesh: &mut TriMesh, image: &ColorImage, colored: &Mask, mask: &Mask, camera: &Camera) {
     let (w, h) = (image.width, image.height);
     // Breadth first from the usable pixels over the whole image.

@@ -1,8 +1,10 @@
-//! The background: per-pixel medians over a window of frames, instruments left out (paper section III, "Instrument
-//! removal").
+//! The composite: per-pixel medians over a window of frames without the instruments (paper section
+//! III, "Instrument removal").
 
+use crate::error::{Error, Result};
 use crate::masks::instruments;
-use crate::{Error, Result, Settings};
+use crate::motion::moves;
+use crate::settings::Settings;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Instant;
@@ -11,7 +13,7 @@ use trocar_core::Progress;
 use trocar_recording::{Packet, Recording, RgbdFrame};
 use xxhash_rust::xxh3::Xxh3;
 
-/// What a window of frames says of the scene behind the instruments.
+/// The scene behind the instruments, from a window of frames.
 pub struct Composite {
     /// The centre frame's colour.
     pub input: ColorImage,
@@ -21,7 +23,7 @@ pub struct Composite {
     pub color: ColorImage,
     /// Pixels with enough samples of colour.
     pub colored: Mask,
-    /// Median depth; 0 with too few samples [m].
+    /// Median depth (m); 0 with too few samples.
     pub depth: DepthImage,
     /// Frames used.
     pub frames_used: usize,
@@ -29,26 +31,28 @@ pub struct Composite {
     pub recovered_share: f64,
     /// Share of the image with depth.
     pub coverage: f64,
-    /// Median over pixels of the 10th to 90th percentile range of depth [m].
+    /// Median over pixels of the 10th to 90th percentile range of depth (m).
     pub depth_range_median: f64,
+    /// Pixels whose depth changes by more than the sensor's noise.
+    pub moving: Mask,
     /// Hash of the bytes of all used frames.
     pub hash: u64,
-    /// Where the time went.
+    /// Times of its parts.
     pub times: CompositeTimes,
 }
 
-/// Where a composite's time went.
+/// Times of the parts of a composite.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CompositeTimes {
-    /// Wall time of reading and decoding the frames [s].
+    /// Wall time of reading and decoding the frames (s).
     pub frames: f64,
-    /// Time of all threads together spent decoding images [s].
+    /// Time that all threads together decode images (s).
     pub decoding: f64,
-    /// Wall time of the medians [s].
+    /// Wall time of the medians (s).
     pub medians: f64,
 }
 
-/// One frame, as small as it can be held: the whole window is in memory at once.
+/// One frame in compact form, because the whole window is in memory at once.
 struct Sample {
     frame: usize,
     color: Vec<[u8; 3]>,
@@ -62,11 +66,24 @@ struct Sample {
 #[derive(Clone, Copy, Default)]
 struct Pixel {
     color: Option<[u8; 3]>,
-    /// Median and inter-percentile range, in units of the recording.
+    /// Median and 10th to 90th percentile range, in units of the recording.
     depth: Option<(f64, f64)>,
+    /// Whether its depth changes by more than the sensor's noise.
+    moving: bool,
 }
 
-/// Builds the composite. Memory is bounded by the window, 6 bytes a pixel and frame. Broken frames are left out with a note.
+/// Buffers for the samples of one pixel, reused from pixel to pixel.
+#[derive(Default)]
+struct Scratch {
+    /// Red, green, blue, depth; sorted.
+    sorted: [Vec<u16>; 4],
+    /// Depth in the order of time.
+    depths: Vec<u16>,
+    differences: Vec<u16>,
+}
+
+/// Builds the composite. It takes 6 bytes per pixel and frame of the window. Broken frames are left
+/// out, with a note.
 ///
 /// # Errors
 /// A centre outside the recording, too few whole frames, or an interruption.
@@ -87,9 +104,9 @@ pub fn composite(
     let needed = settings.min_samples.clamp(1, samples.len());
     let mut pixels = vec![Pixel::default(); width * height];
     pixels.par_chunks_mut(width).enumerate().for_each(|(row, out)| {
-        let mut values: [Vec<u16>; 4] = Default::default();
+        let mut scratch = Scratch::default();
         for (column, pixel) in out.iter_mut().enumerate() {
-            *pixel = medians(&samples, row * width + column, needed, &mut values);
+            *pixel = medians(&samples, row * width + column, needed, scale, &mut scratch);
         }
     });
 
@@ -102,6 +119,7 @@ pub fn composite(
     };
     let mut color = ColorImage::new(width, height, [0; 3]);
     let (mut colored, mut depth) = (Mask::new(width, height), DepthImage::new(width, height));
+    let mut moving = Mask::new(width, height);
     let (mut ranges, mut recovered) = (Vec::new(), 0usize);
     for (i, pixel) in pixels.iter().enumerate() {
         if let Some(c) = pixel.color {
@@ -113,6 +131,7 @@ pub fn composite(
             ranges.push(range * scale);
             recovered += usize::from(centre.instruments[i]);
         }
+        moving.set[i] = pixel.moving;
     }
     let all = (width * height) as f64;
     ranges.sort_by(f64::total_cmp);
@@ -126,6 +145,7 @@ pub fn composite(
         recovered_share: recovered as f64 / all,
         coverage: ranges.len() as f64 / all,
         depth_range_median: ranges.get(ranges.len() / 2).copied().unwrap_or(0.0),
+        moving,
         hash: hash.digest(),
         times,
     })
@@ -166,7 +186,8 @@ fn read_window(
         progress.advance(1);
         (packet.frame, sample)
     };
-    // One thread reads while the others decode; what is read is decoded at once, so no more than a packet a thread waits.
+    // One thread reads while the others decode. A packet is decoded at once, so at most one per
+    // thread waits.
     let mut read: Vec<(usize, Result<Sample>)> = recording.packets(window).par_bridge().map(read).collect();
     progress.end();
     if progress.interrupted() {
@@ -192,7 +213,7 @@ fn read_window(
     Ok(samples)
 }
 
-/// A depth [m] in whole units of `scale` [m]; what 16 bits do not hold is invalid, 0.
+/// A depth (m) in whole units of `scale` (m); 0, which is invalid, beyond 16 bits.
 fn units(depth: f32, scale: f64) -> u16 {
     let units = (f64::from(depth) / scale).round();
     if units <= f64::from(u16::MAX) { units as u16 } else { 0 }
@@ -202,37 +223,52 @@ fn units(depth: f32, scale: f64) -> u16 {
 fn window(recording: &Recording, settings: &Settings, centre: usize) -> Result<Vec<usize>> {
     let wrong = |reason: String| Error::Input { path: recording.dir().to_owned(), reason };
     if centre >= recording.len() {
-        return Err(wrong(format!("the window's centre is frame {centre}; the recording has {}", recording.len())));
+        return Err(wrong(format!(
+            "the window's centre is frame {centre}; the recording has {} frames (--centre)",
+            recording.len()
+        )));
     }
     if settings.stride == 0 {
-        return Err(wrong("the window's stride is 0; at least 1".into()));
+        return Err(wrong("the window's stride is 0; it must be at least 1".into()));
+    }
+    let longest = recording.len().max(Settings::default().window);
+    if settings.window > longest {
+        let reason = format!(
+            "the window is {} frames on each side of its centre; the recording has {} frames in all (--window)",
+            settings.window,
+            recording.len()
+        );
+        return Err(wrong(reason));
     }
     let first = centre - settings.window.min(centre) / settings.stride * settings.stride;
     let last = centre.saturating_add(settings.window).min(recording.len() - 1);
     Ok((first..=last).step_by(settings.stride).collect())
 }
 
-/// Median over V(u,v): colour over the frames in which the pixel is not masked, depth over those that also measured it.
-fn medians(samples: &[Sample], i: usize, needed: usize, values: &mut [Vec<u16>; 4]) -> Pixel {
-    values.iter_mut().for_each(Vec::clear);
+/// Medians over V(u,v): colour over the frames in which no instrument covers the pixel, depth over
+/// those of them that measured it.
+fn medians(samples: &[Sample], i: usize, needed: usize, scale: f64, scratch: &mut Scratch) -> Pixel {
+    let Scratch { sorted, depths, differences } = scratch;
+    sorted.iter_mut().for_each(Vec::clear);
     for sample in samples.iter().filter(|s| !s.instruments[i]) {
-        for (v, c) in values.iter_mut().zip(sample.color[i]) {
+        for (v, c) in sorted.iter_mut().zip(sample.color[i]) {
             v.push(u16::from(c));
         }
         if sample.depth[i] > 0 {
-            values[3].push(sample.depth[i]);
+            sorted[3].push(sample.depth[i]);
         }
     }
-    values.iter_mut().for_each(|v| v.sort_unstable());
+    depths.clone_from(&sorted[3]);
+    sorted.iter_mut().for_each(|v| v.sort_unstable());
     let enough = |v: &[u16]| v.len() >= needed;
-    let [r, g, b, depth] = values;
-    Pixel {
-        color: enough(r).then(|| [&*r, g, b].map(|v| percentile(v, 0.5).round() as u8)),
-        depth: enough(depth).then(|| (percentile(depth, 0.5), percentile(depth, 0.9) - percentile(depth, 0.1))),
-    }
+    let [r, g, b, depth] = sorted;
+    let color = enough(r).then(|| [&*r, g, b].map(|v| percentile(v, 0.5).round() as u8));
+    let depth = enough(depth).then(|| (percentile(depth, 0.5), percentile(depth, 0.9) - percentile(depth, 0.1)));
+    let moving = depth.is_some_and(|(_, range)| moves(depths, range, scale, differences));
+    Pixel { color, depth, moving }
 }
 
-/// Percentile `p` (0..=1) of sorted values, linear between neighbours.
+/// Percentile `p` in [0, 1] of sorted values, linear between neighbours.
 fn percentile(sorted: &[u16], p: f64) -> f64 {
     let at = p * (sorted.len() - 1) as f64;
     let (low, high) = (sorted[at.floor() as usize], sorted[at.ceil() as usize]);
@@ -259,12 +295,12 @@ mod tests {
             sample(30, 104, false),
             sample(40, 102, false),
         ];
-        let pixel = medians(&samples, 0, 3, &mut Default::default());
+        let pixel = medians(&samples, 0, 3, 1e-3, &mut Scratch::default());
         assert_eq!(pixel.color, Some([25; 3]));
         let (median, range) = pixel.depth.unwrap();
         assert_eq!(median, 102.0);
         assert!((range - 3.2).abs() < 1e-12);
-        assert!(medians(&samples, 0, 4, &mut Default::default()).depth.is_none());
-        assert!(medians(&samples, 0, 4, &mut Default::default()).color.is_some());
+        assert!(medians(&samples, 0, 4, 1e-3, &mut Scratch::default()).depth.is_none());
+        assert!(medians(&samples, 0, 4, 1e-3, &mut Scratch::default()).color.is_some());
     }
 }

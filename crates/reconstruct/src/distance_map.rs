@@ -1,13 +1,14 @@
 //! Exact Euclidean distance to a silhouette.
 //!
-//! Felzenszwalb and Huttenlocher, "Distance transforms of sampled functions", Theory of Computing 8, 2012.
+//! Felzenszwalb and Huttenlocher, "Distance transforms of sampled functions", Theory of Computing
+//! 8, 2012.
 
 use trocar_camera::Mask;
 
-/// Distance from each set pixel's centre to the nearest pixel that is not set, pixels being `spacing` = (x, y) apart; the
-/// world beyond the image is not set. 0 outside of the mask.
+/// Distance from each set pixel's centre to the nearest pixel that is not set; 0 outside the mask.
+/// Pixels are `spacing` = (x, y) apart, and outside the image nothing is set.
 pub fn distance_map(mask: &Mask, spacing: [f64; 2]) -> Vec<f64> {
-    // One pixel of the world around the image is enough.
+    // A border of one pixel around the image is enough.
     let (width, height) = (mask.width + 2, mask.height + 2);
     let mut squared = vec![0.0; width * height];
     for v in 0..mask.height {
@@ -34,9 +35,9 @@ pub fn distance_map(mask: &Mask, spacing: [f64; 2]) -> Vec<f64> {
     (0..mask.set.len()).map(inner).collect()
 }
 
-/// min over j of f(j) + (step (i - j))^2, for every i: the lower envelope of parabolas.
+/// min over j of f(j) + (step (i - j))^2 for every i: the lower envelope of parabolas.
 fn lower_envelope(f: &[f64], step: f64) -> Vec<f64> {
-    // Parabola at `.0` is the lowest from `.1` on.
+    // The parabola at `.0` is the lowest from `.1` on.
     let mut hull: Vec<(usize, f64)> = Vec::with_capacity(f.len());
     let at = |j: usize| step * j as f64;
     for j in (0..f.len()).filter(|j| f[*j].is_finite()) {

@@ -1,11 +1,11 @@
-//! What can go wrong on the way from a recording to a specimen.
+//! Errors of the reconstruction.
 
 use std::path::PathBuf;
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// An unusable recording, or a stage that cannot do its work.
+/// An unusable recording, or a stage that fails.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file or folder could not be opened, read or written.
@@ -13,15 +13,15 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The recording, or the surface in its place, is not what it should be.
+    /// The recording, or the surface file, has wrong contents.
     #[error("{path}: {reason}", path = path.display())]
     Input {
         /// File or folder.
         path: PathBuf,
-        /// Field or frame, what is wrong, what would be right.
+        /// The field or frame, what is wrong, and what would be right.
         reason: String,
     },
     /// An organ cannot be reconstructed.
@@ -29,7 +29,7 @@ pub enum Error {
     Organ {
         /// Its name.
         organ: String,
-        /// Why, and what would help.
+        /// The reason, and what would help.
         reason: String,
     },
     /// A setting is out of range.
@@ -41,7 +41,7 @@ pub enum Error {
     /// The recording is unusable.
     #[error(transparent)]
     Recording(#[from] trocar_recording::Error),
-    /// Something cannot be found in a picture.
+    /// A target cannot be found in an image.
     #[error(transparent)]
     Segment(#[from] trocar_segment::Error),
     /// An image or camera is unusable.

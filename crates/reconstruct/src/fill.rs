@@ -1,13 +1,14 @@
-//! Missing depth inside a mask, by mask-confined Laplace diffusion (paper section III).
+//! Fills missing depth inside a mask by Laplace diffusion confined to the mask (paper section III).
 
 use trocar_camera::Mask;
 
-/// Iterations stop when no equation is off by more than this [m].
+/// Residual of every equation at which iterations stop (m).
 const TOLERANCE: f64 = 1e-9;
 
-/// Replaces the values of `depth` [m] that are 0 inside `mask` by the harmonic extension of the others: each filled pixel
-/// is the mean of its neighbours in the mask, which is the natural boundary condition at the mask's edge. Solved by
-/// conjugate gradients. Returns how many were filled; `None` when a piece of the mask has no measured pixel.
+/// Replaces the values of `depth` (m) that are 0 inside `mask` by the harmonic extension of the
+/// others: each filled pixel is the mean of its neighbours in the mask, which is the natural
+/// boundary condition at the mask's edge. Solved by conjugate gradients. Returns the number of
+/// filled pixels; `None` when a piece of the mask has no measured pixel.
 pub fn fill(depth: &mut [f64], mask: &Mask) -> Option<usize> {
     let width = mask.width;
     let mut number = vec![usize::MAX; mask.set.len()];
@@ -32,7 +33,8 @@ pub fn fill(depth: &mut [f64], mask: &Mask) -> Option<usize> {
         .collect::<Vec<_>>()
     };
     let around: Vec<Vec<usize>> = unknowns.iter().map(|&i| neighbours(i)).collect();
-    // Starts from the nearest measured values, breadth first; what is never reached has nothing to extend.
+    // The initial values are the nearest measured ones, breadth first. A pixel that is never
+    // reached belongs to a piece without measurements.
     let mut ring: Vec<usize> = (0..unknowns.len()).collect();
     while !ring.is_empty() {
         let reached: Vec<(usize, f64)> = ring
@@ -50,7 +52,8 @@ pub fn fill(depth: &mut [f64], mask: &Mask) -> Option<usize> {
         }
         ring.retain(|&k| depth[unknowns[k]] == 0.0);
     }
-    // A x = b with A = the graph Laplacian of the unknowns, b = their measured neighbours; r = b - A x.
+    // A x = b with A = the graph Laplacian of the unknowns, b = their measured neighbours; r = b -
+    // A x.
     let residual = |x: &[f64], out: &mut [f64]| {
         for (k, near) in around.iter().enumerate() {
             out[k] = near.iter().map(|&j| x[j]).sum::<f64>() - near.len() as f64 * x[unknowns[k]];
@@ -93,7 +96,7 @@ pub fn fill(depth: &mut [f64], mask: &Mask) -> Option<usize> {
 mod tests {
     use super::*;
 
-    /// Fills a hole in a field; the largest error in it.
+    /// Fills a hole in a field; returns the largest error in it.
     fn error(field: impl Fn(f64, f64) -> f64) -> f64 {
         let (w, h) = (48, 40);
         let mut mask = Mask::new(w, h);

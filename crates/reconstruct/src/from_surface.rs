@@ -1,4 +1,4 @@
-//! A specimen from a ready surface: a real organ model in place of a recording.
+//! Makes a specimen from a surface file instead of a recording.
 
 use crate::body::fill_with_tets;
 use crate::pipeline::program;
@@ -11,11 +11,11 @@ use trocar_geometry::{RepairReport, TriMesh, repair};
 use trocar_specimen::{Material, Organ, Pins, Provenance, Specimen};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// Makes a one-organ specimen of a ready surface (a real organ model), repaired if need be; z is up. The organ is named
-/// after the file, its base is its lowest end.
+/// Makes a specimen of one organ from a surface file (a real organ model), repaired where needed; z
+/// is up. The organ has the file's name; its base is its lowest end.
 ///
 /// # Errors
-/// When the file is no surface, its size is no organ's, or it encloses no volume.
+/// When the file is not a surface, its size is not an organ's, or it encloses no volume.
 pub fn from_surface(
     path: &Path,
     unit: Unit,
@@ -45,7 +45,7 @@ fn make(path: &Path, unit: Unit, settings: &Settings, progress: &dyn Progress) -
     }
     step()?;
     let name = organ_name(path);
-    let (body, facts) = fill_with_tets(&name, &surface, settings)?;
+    let (body, facts) = fill_with_tets(&name, &surface, settings).map_err(|e| with_units(e, &surface, unit))?;
     step()?;
     let lowest = |a: &&DVec3, b: &&DVec3| a.z.total_cmp(&b.z);
     let organ = Organ {
@@ -76,10 +76,30 @@ fn make(path: &Path, unit: Unit, settings: &Settings, progress: &dyn Progress) -
     Ok((specimen, report))
 }
 
-/// Refuses what is too large or too small for an organ: nearly always the wrong unit.
+/// The values of `--units`.
+const UNITS: [(&str, Unit); 3] = [("mm", Unit::Millimetre), ("cm", Unit::Centimetre), ("m", Unit::Metre)];
+
+/// The error of a mesher with the surface's size: a surface that no element fits into often has the
+/// wrong unit.
+fn with_units(error: Error, surface: &TriMesh, unit: Unit) -> Error {
+    match (error, surface.bounds()) {
+        (Error::Organ { organ, reason }, Some((low, high))) => {
+            let size = 1e3 * (high - low);
+            let name = UNITS.iter().find(|(_, u)| *u == unit).map_or("mm", |(name, _)| name);
+            let reason = format!(
+                "{reason}; with --units {name} the surface is {:.1} x {:.1} x {:.1} mm: is the unit right?",
+                size.x, size.y, size.z
+            );
+            Error::Organ { organ, reason }
+        }
+        (error, _) => error,
+    }
+}
+
+/// Refuses a surface that is too large or too small for an organ, which is usually a wrong unit.
 fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
     let Some((low, high)) = surface.bounds() else {
-        return Err(Error::Input { path: path.to_owned(), reason: "no vertices".into() });
+        return Err(Error::Input { path: path.to_owned(), reason: "the surface has no vertices".into() });
     };
     let metres = |unit: Unit| match unit {
         Unit::Millimetre => 1e-3,
@@ -91,10 +111,9 @@ fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
     if organ.contains(&extent) || !extent.is_finite() {
         return Ok(());
     }
-    let units = [("mm", Unit::Millimetre), ("cm", Unit::Centimetre), ("m", Unit::Metre)];
-    // Of the units that would do, the one that makes the most ordinary organ: about 10 cm.
+    // Of the possible units, the one that makes the most typical organ: about 10 cm.
     let oddness = |u: Unit| (extent / metres(unit) * metres(u) / 0.1).ln().abs();
-    let better = units
+    let better = UNITS
         .into_iter()
         .filter(|(_, u)| organ.contains(&(extent / metres(unit) * metres(*u))))
         .min_by(|a, b| oddness(a.1).total_cmp(&oddness(b.1)));
@@ -102,13 +121,13 @@ fn check_size(path: &Path, surface: &TriMesh, unit: Unit) -> Result<()> {
         Some((name, u)) => {
             format!("try --units {name}, which makes it {:.0} mm", 1e3 * extent / metres(unit) * metres(u))
         }
-        None => "organs are 2 mm to 1 m long".into(),
+        None => "organs must be in [2 mm, 1 m]".into(),
     };
-    let reason = format!("the surface is {extent:.3} m long, which is no organ; {advice}");
+    let reason = format!("the surface is {extent:.3} m long, which is not an organ's size; {advice}");
     Err(Error::Input { path: path.to_owned(), reason })
 }
 
-/// The file's stem in the letters an organ's name may have.
+/// The file's stem in characters of organ names.
 fn organ_name(path: &Path) -> String {
     let stem = path.file_stem().map(|s| s.to_string_lossy().to_lowercase()).unwrap_or_default();
     let legal = |c: char| if c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' { c } else { '-' };
@@ -140,5 +159,19 @@ mod tests {
         assert!(error(180.0, Unit::Metre).contains("--units mm"));
         assert!(error(0.000_18, Unit::Millimetre).contains("--units m,"));
         assert!(check_size(Path::new("liver.stl"), &box_of(0.18), Unit::Millimetre).is_ok());
+    }
+
+    /// A liver in centimetres read as millimetres has an organ's length, but no element fits into it.
+    #[test]
+    fn a_mesher_that_fails_names_the_unit() {
+        let corners = [[0.0, 0.0, 0.0], [3e-3, 0.0, 0.0], [0.0, 2e-3, 0.0], [0.0, 0.0, 1e-3]];
+        let surface = TriMesh {
+            vertices: corners.map(DVec3::from_array).to_vec(),
+            triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+            ..TriMesh::default()
+        };
+        let failed = fill_with_tets("liver", &surface, &Settings::default()).unwrap_err();
+        let text = with_units(failed, &surface, Unit::Millimetre).to_string();
+        assert!(text.contains("with --units mm the surface is 3.0 x 2.0 x 1.0 mm"), "{text}");
     }
 }

@@ -4,21 +4,21 @@ use crate::fill::fill;
 use rayon::prelude::*;
 use trocar_camera::{Camera, DepthImage, Mask};
 
-/// Half width of the window of medians and fits [px].
+/// Half width of the window of medians and fits (px).
 const REACH: usize = 3;
 
 /// Depth of an organ's front at every pixel of its mask.
 pub struct Front {
-    /// Depth [m]; 0 outside of the mask.
+    /// Depth (m); 0 outside the mask.
     pub depth: Vec<f64>,
-    /// Pixels whose measured depth was not the organ's (the bed seen at an edge, flying pixels).
+    /// Pixels whose measured depth was not the organ's (the bed behind an edge, flying pixels).
     pub outliers: usize,
     /// Pixels filled in, outliers included.
     pub filled: usize,
 }
 
-/// Cleans, fills and smooths the depth inside `mask`. `radius` [m] is about half the organ's width, `noise` [m] the size of
-/// depth errors. `None` without any depth in the mask.
+/// Cleans, fills and smooths the depth inside `mask`. `radius` (m) is about half the organ's width,
+/// `noise` (m) the size of depth errors. `None` without any depth in the mask.
 pub fn front(measured: &DepthImage, mask: &Mask, camera: &Camera, radius: f64, noise: f64) -> Option<Front> {
     let mut depth: Vec<f64> =
         measured.depth.iter().zip(&mask.set).map(|(z, set)| if *set { f64::from(*z) } else { 0.0 }).collect();
@@ -30,8 +30,8 @@ pub fn front(measured: &DepthImage, mask: &Mask, camera: &Camera, radius: f64, n
     Some(Front { depth: smooth(&depth, mask, noise), outliers: outliers.len(), filled })
 }
 
-/// Pixels farther from the median around them than a round organ allows: within r of its silhouette a profile of radius R
-/// drops by sqrt(2 R r) at most.
+/// Pixels farther from the median around them than a round organ allows: within r of its silhouette
+/// a profile of radius R drops by at most sqrt(2 R r).
 fn outliers(depth: &[f64], mask: &Mask, camera: &Camera, radius: f64, noise: f64) -> Vec<usize> {
     let width = mask.width;
     let is_outlier = |&i: &usize| {
@@ -44,9 +44,9 @@ fn outliers(depth: &[f64], mask: &Mask, camera: &Camera, radius: f64, noise: f64
     (0..width * mask.height).into_par_iter().filter(|&i| mask.set[i] && depth[i] > 0.0).filter(is_outlier).collect()
 }
 
-/// Replaces each depth by a quadratic fitted to the mask's pixels around it (weighted least squares, Gaussian of 1.5 px).
-/// A quadratic leaves curvature alone where an average would flatten it; a correction larger than the noise is structure
-/// and is not made.
+/// Replaces each depth by a quadratic fitted to the mask's pixels around it (weighted least
+/// squares, Gaussian of 1.5 px). A quadratic keeps curvature, which an average would flatten. A
+/// correction larger than the noise is structure and is not applied.
 fn smooth(depth: &[f64], mask: &Mask, noise: f64) -> Vec<f64> {
     let width = mask.width;
     let value = |i: usize| {
@@ -73,10 +73,10 @@ fn smooth(depth: &[f64], mask: &Mask, noise: f64) -> Vec<f64> {
     (0..depth.len()).into_par_iter().map(value).collect()
 }
 
-/// First unknown of a symmetric 6 x 6 system with its right side in the last column, by elimination; `None` where the
-/// pixels do not determine it.
+/// First unknown of a symmetric 6 x 6 system with its right-hand side in the last column, by
+/// elimination; `None` where the pixels do not determine it.
 fn solve_first(mut m: [[f64; 7]; 6]) -> Option<f64> {
-    // Eliminated from the last unknown to the first, which then stands alone.
+    // Eliminates from the last unknown to the first, which then stands alone.
     for k in (0..6).rev() {
         if m[k][k].abs() < 1e-9 {
             return None;
@@ -91,7 +91,7 @@ fn solve_first(mut m: [[f64; 7]; 6]) -> Option<f64> {
     Some(m[0][6] / m[0][0])
 }
 
-/// Pixels of the mask within REACH of pixel `i`, itself included.
+/// Pixels of the mask within REACH of pixel `i`, including itself.
 fn window(mask: &Mask, i: usize) -> impl Iterator<Item = usize> + '_ {
     let (w, h) = (mask.width, mask.height);
     let (u, v) = (i % w, i / w);

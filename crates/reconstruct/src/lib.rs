@@ -1,7 +1,8 @@
 //! From a fixed-view RGB-D recording to watertight, tetrahedral organs (paper section III).
 //!
 //! ```text
-//! Recording -> composite -> masks -> outline -> front (fill) -> thickness -> closed_surface -> resample -> body -> check -> Specimen
+//! Recording -> composite -> masks -> outline -> front (fill) -> thickness -> closed_surface
+//!           -> resample -> body -> check -> Specimen
 //! ```
 
 mod binary_grid;
@@ -16,6 +17,7 @@ mod fill;
 mod from_surface;
 mod front;
 mod masks;
+mod motion;
 mod organ;
 mod outline;
 mod pipeline;
@@ -31,5 +33,5 @@ pub use pipeline::{OrganView, Reconstruction, reconstruct};
 pub use settings::{BackRule, MesherRule, Settings, SurfaceRule};
 pub use thickness::modelled_volume;
 
-/// Colour of tissue that no photograph shows.
+/// Colour of tissue that no image shows.
 const TISSUE_COLOR: [u8; 3] = [150, 60, 55];

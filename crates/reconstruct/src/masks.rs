@@ -1,4 +1,4 @@
-//! Where organs and instruments are seen: each by the segmenter that its description calls for.
+//! Finds organs and instruments: each by the segmenter that its description needs.
 
 use crate::{Error, Result, Settings};
 use std::path::Path;
@@ -10,11 +10,11 @@ use trocar_segment::{MaskFolder, MetalDetector, Picture, Polygon, Sam2, Segmente
 pub struct OrganSegmenters {
     files: MaskFolder,
     polygon: Polygon,
-    /// Opened where an organ is only pointed at.
+    /// Opened where an organ has only points.
     sam: Option<Sam2>,
 }
 
-/// What an organ's description says of it.
+/// The segmentation target of an organ.
 fn target(organ: &OrganInfo) -> Target {
     Target {
         name: organ.name.clone(),
@@ -25,17 +25,18 @@ fn target(organ: &OrganInfo) -> Target {
     }
 }
 
-/// True where the organ has neither an outline nor a mask file, but points.
+/// Whether the organ has points, but neither an outline nor a mask file.
 fn only_points(organ: &OrganInfo, masks: &Path) -> bool {
     !organ.points.is_empty() && organ.polygon.is_empty() && !masks.join(format!("{}.png", organ.name)).is_file()
 }
 
 impl OrganSegmenters {
-    /// Opens what the organs of `recording` need, and makes sure that each can be found: a missing mask should not be noticed
-    /// after minutes of work.
+    /// Opens the segmenters of the organs of `recording` and checks that each organ can be found,
+    /// so that a missing mask is not noticed after minutes of work.
     ///
     /// # Errors
-    /// An organ without mask, outline or points; a mask of another size, or empty; points without a SAM 2.1.
+    /// An organ without mask, outline or points; a mask of another size, or empty; points without
+    /// SAM 2.1.
     pub fn open(recording: &Recording, settings: &Settings) -> Result<Self> {
         let folder = recording.dir().join("masks");
         let organs = &recording.info.organs;
@@ -44,8 +45,8 @@ impl OrganSegmenters {
             (None, _) => None,
             (Some(_), Some(weights)) => Some(Sam2::open(weights, settings.onnxruntime.as_deref())?),
             (Some(organ), None) => {
-                let reason = "it is only pointed at, for which SAM 2.1 is needed (--sam FOLDER; `trocar segment --weights` \
-                              says which files); else a polygon or a mask";
+                let reason = "it has only points, which need SAM 2.1 (--sam FOLDER; `trocar segment --weights` \
+                              lists the files); otherwise draw a polygon or a mask";
                 return Err(Error::Organ { organ: organ.name.clone(), reason: reason.into() });
             }
         };
@@ -69,8 +70,10 @@ impl OrganSegmenters {
             _ if !organ.polygon.is_empty() => &self.polygon,
             Some(sam) if only_points(organ, &self.files.folder) => sam,
             _ if !file.is_file() => {
-                let reason =
-                    format!("no mask: {} does not exist, and there is no polygon and no points", file.display());
+                let reason = format!(
+                    "it has no mask: {} does not exist, and there are neither a polygon nor points",
+                    file.display()
+                );
                 return Err(wrong(reason));
             }
             _ => &self.files,
@@ -78,13 +81,17 @@ impl OrganSegmenters {
         let picture = Picture { color, depth: None, name: "the composite" };
         let mask = segmenter.segment(&picture, &target(organ)).map_err(|e| wrong(e.to_string()))?;
         if mask.count() == 0 {
-            return Err(wrong(format!("{} covers no pixel of the image", segmenter.describe())));
+            return Err(wrong(format!(
+                "its mask is empty ({}); it covers no pixel of the image",
+                segmenter.describe()
+            )));
         }
         Ok(mask)
     }
 }
 
-/// Pixels of a frame that instruments cover, by the recording's rule.
+/// Pixels of a frame that instruments cover, by the recording's rule; `None` for the recording's
+/// own masks.
 ///
 /// # Errors
 /// When the detector cannot work on the frame.

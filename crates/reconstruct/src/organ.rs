@@ -1,4 +1,4 @@
-//! One organ, from its mask in the composite to its closed surface.
+//! Closes one organ: from its mask in the composite to its closed surface.
 
 use crate::binary_grid::binary_grid;
 use crate::check::{DepthCheck, check};
@@ -15,36 +15,36 @@ use trocar_camera::{Camera, Mask};
 use trocar_geometry::TriMesh;
 use trocar_recording::OrganInfo;
 
-/// What all organs of a recording are made from.
+/// The common input of a recording's organs.
 pub struct View<'a> {
     /// The scene without instruments.
     pub background: &'a Composite,
-    /// The camera that saw it.
+    /// The camera of the composite.
     pub camera: Camera,
-    /// Unit of the recording's depth [m].
+    /// Unit of the recording's depth (m).
     pub depth_scale: f64,
-    /// How thick organs are.
+    /// The rule for the thickness of organs.
     pub back: BackRule,
-    /// How surfaces are made.
+    /// The rule for surfaces.
     pub surface: SurfaceRule,
 }
 
 /// An organ before it is filled with tetrahedra.
 pub struct Closed {
-    /// Closed, outward, coloured surface in the camera frame [m].
+    /// Closed, outward, coloured surface in the camera frame (m).
     pub surface: TriMesh,
-    /// The tidied mask.
+    /// The cleaned mask.
     pub mask: Mask,
-    /// A point near the organ's base [m].
+    /// A point near the organ's base (m).
     pub base: DVec3,
-    /// The surface against the measured depth.
+    /// The surface compared with the measured depth.
     pub check: DepthCheck,
 }
 
-/// Closes the organ seen inside `mask`; what the user should know is added to `notes`.
+/// Closes the organ inside `mask`. Adds notes for the user to `notes`.
 ///
 /// # Errors
-/// When no depth was measured inside the mask, or nothing closed comes out.
+/// When no depth was measured inside the mask, or no closed surface results.
 pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<String>) -> Result<Closed> {
     let View { background, ref camera, depth_scale, back: back_rule, surface: rule } = *view;
     let name = &info.name;
@@ -52,7 +52,7 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
     let pixels = mask.count();
     let mut note = |what: String| notes.push(format!("{name}: {what}."));
     if tidied.dropped > 0 {
-        note(format!("{} mask pixels apart from its largest piece were dropped", tidied.dropped));
+        note(format!("{} mask pixels outside its largest piece were dropped", tidied.dropped));
     }
     if tidied.filled > 0 {
         note(format!("{} pixels of small holes in its mask were filled", tidied.filled));
@@ -69,13 +69,13 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
     let mut measured: Vec<f64> = inside.map(|(z, _)| f64::from(*z)).collect();
     measured.sort_by(f64::total_cmp);
     let middle = *measured.get(measured.len() / 2).ok_or_else(unmeasured)?;
-    // Noise of the composite: the recording's unit, or what the window shows.
+    // Noise of the composite: the recording's unit, or the window's range.
     let noise = depth_scale.max(0.5 * background.depth_range_median);
-    // A first radius, from the mask at one depth, tells edges from outliers.
+    // A first radius, from the mask at one depth, separates edges from outliers.
     let flat = thickness(&vec![middle; mask.set.len()], &mask, camera, BackRule::Rounded).radius;
     let front = front(&background.depth, &mask, camera, flat, noise).ok_or_else(unmeasured)?;
     if front.outliers > 0 {
-        note(format!("{} depths that are not the organ's were left out", front.outliers));
+        note(format!("{} depths that are not the organ's were dropped", front.outliers));
     }
     if 10 * front.filled > pixels {
         let share = 100.0 * front.filled as f64 / pixels as f64;
@@ -100,21 +100,21 @@ pub fn close(info: &OrganInfo, mut mask: Mask, view: &View<'_>, notes: &mut Vec<
     Ok(Closed { surface, mask, base, check })
 }
 
-/// Refuses what is too large or too small for an organ: nearly always a wrong unit.
+/// Refuses a surface that is too large or too small for an organ, which is usually a wrong unit.
 fn check_size(name: &str, surface: &TriMesh) -> Result<()> {
     let extent = surface.bounds().map_or(0.0, |(low, high)| (high - low).max_element());
     if (2e-3..=1.0).contains(&extent) {
         return Ok(());
     }
     let reason = format!(
-        "it would be {:.1} mm long; organs are 2 mm to 1 m: is depth_scale_m right, and camera.fx and camera.fy?",
+        "it would be {:.1} mm long, but organs are in [2 mm, 1 m]; check depth_scale_m, camera.fx and camera.fy",
         1e3 * extent
     );
     Err(Error::Organ { organ: name.to_owned(), reason })
 }
 
-/// The organ's point at `base_px`, or at the mask's pixel nearest to it; by default the point that the image's centre shows
-/// at the organ's depth `middle` [m].
+/// The organ's point at `base_px`, or at the mask's pixel nearest to it; by default the point at
+/// the image's centre and the organ's depth `middle` (m).
 fn base(base_px: Option<[f64; 2]>, mask: &Mask, front: &[f64], camera: &Camera, middle: f64) -> DVec3 {
     let pixel = |i: usize| DVec2::new((i % mask.width) as f64, (i / mask.width) as f64);
     let Some(at) = base_px.map(DVec2::from) else {
@@ -136,7 +136,8 @@ mod tests {
     use trocar_camera::{ColorImage, DepthImage};
     use trocar_specimen::{Material, Pins};
 
-    /// An ellipsoid with half axes `a` [m] whose centre is `c` [m] away, seen by the D405 at 1 mm quantisation.
+    /// An ellipsoid with half axes `a` (m) and centre `c` (m), seen by the D405 at 1 mm
+    /// quantisation.
     fn closed(c: DVec3, a: DVec3) -> Closed {
         let camera = Camera::d405();
         let (w, h) = (camera.width, camera.height);
@@ -161,6 +162,7 @@ mod tests {
             recovered_share: 0.0,
             coverage: 1.0,
             depth_range_median: 0.0,
+            moving: Mask::new(w, h),
             hash: 0,
             times: CompositeTimes::default(),
         };

@@ -1,4 +1,4 @@
-//! Making a still mask fit for closing: one piece without pinholes.
+//! Prepares a mask for closing: one piece without pinholes.
 
 use trocar_camera::{Mask, pixel_neighbours};
 
@@ -9,12 +9,12 @@ pub struct Tidied {
     pub dropped: usize,
     /// Pixels of small holes, filled.
     pub filled: usize,
-    /// Pixels on the image's border: the organ goes on beyond it.
+    /// Pixels on the image's border, beyond which the organ continues.
     pub on_border: usize,
 }
 
-/// Keeps the largest 4-connected piece of `mask` and fills enclosed holes of less than 2% of its area: a pinhole in a mask
-/// would become a tunnel through the organ.
+/// Keeps the largest 4-connected piece of `mask` and fills enclosed holes of less than 2% of its
+/// area, because a pinhole in a mask would become a tunnel through the organ.
 pub fn tidy(mask: &mut Mask) -> Tidied {
     let pieces = pieces(mask, true);
     let mut tidied = Tidied::default();

@@ -1,8 +1,9 @@
-//! The stages in their order.
+//! The stages of the reconstruction in order.
 
 use crate::body::fill_with_tets;
 use crate::composite::{Composite, CompositeTimes, composite};
 use crate::masks::OrganSegmenters;
+use crate::motion::WARN_SHARE;
 use crate::organ::{Closed, View, close};
 use crate::{Error, Result, Settings};
 use trocar_camera::{ColorImage, DepthImage, Mask};
@@ -11,20 +12,22 @@ use trocar_recording::{OrganInfo, Recording};
 use trocar_specimen::{Organ, Provenance, Specimen};
 use xxhash_rust::xxh3::Xxh3;
 
-/// What the camera saw of one organ, for the report.
+/// One organ in the composite, for the report.
 #[derive(Clone, Debug)]
 pub struct OrganView {
     /// Its name.
     pub name: String,
     /// Its mask in the composite.
     pub mask: Mask,
-    /// Surface depth minus measured depth on the compared pixels [m]; 0 elsewhere.
+    /// Surface depth minus measured depth on the compared pixels (m); 0 elsewhere.
     pub depth_error: Vec<f32>,
-    /// Which pixels were compared.
+    /// The compared pixels.
     pub compared: Mask,
+    /// Share of its pixels with depth that move during the window.
+    pub moving_share: f64,
 }
 
-/// A specimen and what was seen on the way to it.
+/// A specimen and its intermediate results.
 #[derive(Clone, Debug)]
 pub struct Reconstruction {
     /// The result.
@@ -39,21 +42,24 @@ pub struct Reconstruction {
     pub depth: DepthImage,
     /// Frames the composite used.
     pub frames_used: usize,
-    /// Share of the image that only the composite could fill under the instrument masks of the centre frame.
+    /// Share of the image under the instruments of the centre frame that the composite recovered.
     pub recovered_share: f64,
     /// Share of pixels with composite depth.
     pub coverage: f64,
-    /// Median over pixels of the range between the 10th and 90th percentile of depth [m].
+    /// Median over pixels of the range between the 10th and 90th percentile of depth (m).
     pub depth_range_median: f64,
-    /// Where the composite's time went.
+    /// Times of the parts of the composite.
     pub times: CompositeTimes,
     /// Per organ, in the specimen's order.
     pub organs: Vec<OrganView>,
-    /// Things the user should know (dropped frames, filled holes, clipped organs), a sentence each.
+    /// Warnings that the result may be wrong (organs that move during the window), one sentence
+    /// each.
+    pub warnings: Vec<String>,
+    /// Notes for the user (dropped frames, filled holes, clipped organs), one sentence each.
     pub notes: Vec<String>,
 }
 
-/// Name and version for the provenance.
+/// The program's name and version, for the provenance.
 pub(crate) fn program() -> String {
     format!("trocar {}", env!("CARGO_PKG_VERSION"))
 }
@@ -61,13 +67,14 @@ pub(crate) fn program() -> String {
 /// Reconstructs every organ of a recording.
 ///
 /// # Errors
-/// A setting out of range, a broken recording, an organ that cannot be closed or filled, or an interruption.
+/// A setting out of range, a broken recording, an organ that cannot be closed or filled, or an
+/// interruption.
 pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
     settings.validate()?;
     if recording.info.organs.is_empty() {
         return Err(Error::Input {
             path: recording.toml().to_owned(),
-            reason: "no [[organ]]; name at least one, with a mask in masks/, a polygon or points (`trocar inspect` writes a template)".into(),
+            reason: "there is no [[organ]]; add at least one, with a mask in masks/, a polygon or points (`trocar inspect --template` writes an example)".into(),
         });
     }
     let segmenters = OrganSegmenters::open(recording, settings)?;
@@ -92,7 +99,7 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         let made = if progress.interrupted() {
             Err(Error::Interrupted)
         } else {
-            close(info, mask, &view, &mut notes).and_then(|closed| with_body(info, closed, settings))
+            close(info, mask, &view, &mut notes).and_then(|closed| with_body(info, closed, &background, settings))
         };
         match made {
             Ok((organ, view)) => {
@@ -133,29 +140,61 @@ pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Pr
         coverage: background.coverage,
         depth_range_median: background.depth_range_median,
         times: background.times,
+        warnings: motion_warning(&views, settings.window).into_iter().collect(),
         organs: views,
         notes,
     })
 }
 
-/// The organ and what was seen of it, from its closed surface.
-fn with_body(info: &OrganInfo, closed: Closed, settings: &Settings) -> Result<(Organ, OrganView)> {
+/// The organ and its view, from its closed surface.
+fn with_body(
+    info: &OrganInfo,
+    closed: Closed,
+    background: &Composite,
+    settings: &Settings,
+) -> Result<(Organ, OrganView)> {
     let Closed { surface, mask, base, check } = closed;
+    let moving_share = moving_share(&mask, background);
     let (body, mut facts) = fill_with_tets(&info.name, &surface, settings)?;
     facts.depth_error_median_mm = Some(1e3 * check.median_absolute);
     facts.depth_error_signed_mm = Some(1e3 * check.median_signed);
     facts.covered = Some(check.covered);
     let name = info.name.clone();
-    let view = OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared };
+    let view = OrganView { name: name.clone(), mask, depth_error: check.error, compared: check.compared, moving_share };
     Ok((Organ { name, body, surface, material: info.material, pins: info.pins, base, facts }, view))
 }
 
-/// Hash of everything the result depends on: what is known of the recording, the used frames, the masks.
+/// Share of the pixels of `mask` with depth that move.
+fn moving_share(mask: &Mask, background: &Composite) -> f64 {
+    let measured = |i: &usize| mask.set[*i] && background.depth.depth[*i] > 0.0;
+    let measured: Vec<usize> = (0..mask.set.len()).filter(measured).collect();
+    let moving = measured.iter().filter(|i| background.moving.set[**i]).count();
+    moving as f64 / measured.len().max(1) as f64
+}
+
+/// A warning about the organs that move, with the remedy.
+fn motion_warning(views: &[OrganView], window: usize) -> Option<String> {
+    let moving: Vec<String> = views
+        .iter()
+        .filter(|v| v.moving_share > WARN_SHARE)
+        .map(|v| format!("{} ({:.0}% of its pixels)", v.name, 100.0 * v.moving_share))
+        .collect();
+    (!moving.is_empty()).then(|| {
+        format!(
+            "Tissue moves during the window: {}. A composite blurs what moves, and the shapes below are wrong there. \
+             Choose frames in which it is still: --centre FRAME and a --window below {window}.",
+            moving.join(", ")
+        )
+    })
+}
+
+/// Hash of everything that the result depends on: the recording's facts, the used frames, the
+/// masks.
 fn input_hash(recording: &Recording, background: &Composite, views: &[OrganView]) -> Result<u64> {
     let mut hash = Xxh3::new();
     let said = toml::to_string(&recording.info).map_err(|e| Error::Setting(format!("the recording's facts: {e}")))?;
     hash.update(said.as_bytes());
-    // What a log says of its cameras is not in there.
+    // The cameras that a log describes are not part of the recording's facts.
     let cameras = (recording.camera(), recording.depth_scale(), recording.registration());
     hash.update(format!("{cameras:?}").as_bytes());
     hash.update(&background.hash.to_le_bytes());

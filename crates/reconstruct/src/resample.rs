@@ -1,4 +1,5 @@
-//! From a surface as rough as its pixels to a clean one, through a signed distance: no outward bias.
+//! Resamples a surface as rough as its pixels to a smooth one through a signed distance, without
+//! outward bias.
 
 use crate::{Error, Result};
 use trocar_geometry::{MeshDistance, TriMesh, isosurface, sample_distance, taubin};
@@ -8,25 +9,26 @@ const LAMBDA: f64 = 0.5;
 const MU: f64 = -0.53;
 const SMOOTHING_ITERATIONS: usize = 10;
 
-/// Resamples `raw`, which closes but is as rough as its pixels: signed distance on a grid, surface at 0, largest component,
-/// Taubin smoothing. The grid is the paper's 1.5 mm, finer where the organ's `radius` [m] asks for it.
+/// Resamples `raw`, which is closed but as rough as its pixels: signed distance on a grid, surface
+/// at 0, largest component, Taubin smoothing. The grid is the paper's 1.5 mm, finer where the
+/// organ's `radius` (m) needs it.
 ///
 /// # Errors
-/// When nothing closed comes out.
+/// When no closed surface results.
 pub fn resample(organ: &str, raw: &TriMesh, radius: f64) -> Result<TriMesh> {
     let wrong = |reason: &str| Error::Organ { organ: organ.to_owned(), reason: reason.to_owned() };
     let bounds = raw.bounds().ok_or_else(|| wrong("its surface is empty"))?;
     let extent = (bounds.1 - bounds.0).max_element();
-    // Never more than 200 cells along an axis: past that the grid, not the recording, is what takes the time.
+    // At most 200 cells along an axis; beyond that the grid takes more time than the recording.
     let spacing = 1.5e-3_f64.min(radius / 4.0).max(extent / 200.0);
     let grid = sample_distance(&MeshDistance::new(raw)?, bounds, spacing);
     tidy(organ, &isosurface(&grid, 0.0))
 }
 
-/// The largest component of a voxel surface, smoothed as in the paper, and sure to close.
+/// The largest component of a voxel surface, smoothed as in the paper, and checked to be closed.
 ///
 /// # Errors
-/// When nothing closed is left.
+/// When no closed surface remains.
 pub fn tidy(organ: &str, rough: &TriMesh) -> Result<TriMesh> {
     let wrong = |reason: &str| Error::Organ { organ: organ.to_owned(), reason: reason.to_owned() };
     let mut surface = rough.largest_component();

@@ -1,50 +1,52 @@
-//! The choices of a reconstruction; one set serves every recording.
+//! Settings of the reconstruction; one set serves every recording.
 
 use crate::{Error, Result};
 use std::path::PathBuf;
 
-/// Settings of the reconstruction.
+/// Settings of a reconstruction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Frames on each side of the window's centre (paper: 90).
     pub window: usize,
-    /// Every how many frames of the window are used (paper: 2).
+    /// Step between the used frames of the window (paper: 2).
     pub stride: usize,
     /// Frame at the window's centre; the middle of the recording by default.
     pub centre: Option<usize>,
-    /// Fewest samples a pixel needs (paper: 3); a recording of fewer frames needs as many as it has.
+    /// Least samples of a pixel (paper: 3); a recording of fewer frames needs as many as it has.
     pub min_samples: usize,
-    /// Folder with the networks of SAM 2.1, for organs that are only pointed at.
+    /// Folder with the networks of SAM 2.1, for organs that have only points.
     pub sam: Option<PathBuf>,
-    /// ONNX Runtime's library, or a folder with a Python `onnxruntime`; `ORT_DYLIB_PATH` by default.
+    /// ONNX Runtime's library, or a folder with a Python `onnxruntime`; `ORT_DYLIB_PATH` by
+    /// default.
     pub onnxruntime: Option<PathBuf>,
-    /// How thick an organ is taken to be behind its front.
+    /// The rule for the thickness of an organ behind its front.
     pub back: BackRule,
-    /// How the surface is made from front and back.
+    /// The rule for the surface from front and back.
     pub surface: SurfaceRule,
-    /// What fills it with tetrahedra.
+    /// The mesher that fills it with tetrahedra.
     pub mesher: MesherRule,
-    /// Edge of the elements at the surface [m] (and of the triangles that TetGen is given); by default `finest_cell`, or larger so that there are no more than `max_tets`.
+    /// Edge of the elements at the surface (m), and of the triangles that TetGen gets. By default
+    /// `finest_cell`, or larger so that there are no more than `max_tets`.
     pub element_size: Option<f64>,
-    /// Edge of the finest lattice cell where no `element_size` is given [m].
+    /// Edge of the finest lattice cell where `element_size` is not set (m).
     pub finest_cell: f64,
-    /// About how many tetrahedra a body may have where no `element_size` is given.
+    /// Approximate largest number of tetrahedra of a body where `element_size` is not set.
     pub max_tets: usize,
 }
 
-/// How thick an organ is taken to be behind its front; no camera saw its back.
+/// The rule for the thickness of an organ behind its front; no camera saw its back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BackRule {
-    /// A round profile of the silhouette's width (paper eq. 1). Flat organs come out too thick.
+    /// A round profile of the silhouette's width (paper eq. 1). Flat organs become too thick.
     #[default]
     Rounded,
-    /// As high against its width as the front rises above its rim, and the same below: right for organs that are alike above
-    /// and below their widest outline; of one that is sunk in or covered to half its height, half is missed. 0.2 to 1.5 times as
-    /// high as wide.
+    /// As high against its width as the front rises above its rim, and the same below; 0.2 to 1.5
+    /// times as high as wide. Right for organs that are symmetric above and below their widest
+    /// outline. Half is missed of an organ that is sunk in or covered to half its height.
     Fitted,
 }
 
-/// How a surface is made from front and back.
+/// The rule for the surface from front and back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SurfaceRule {
     /// From a signed distance: no outward bias.
@@ -54,7 +56,7 @@ pub enum SurfaceRule {
     BinaryGrid,
 }
 
-/// What fills a surface with tetrahedra.
+/// The mesher that fills a surface with tetrahedra.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MesherRule {
     /// Isosurface stuffing: no slivers.
@@ -84,27 +86,27 @@ impl Default for Settings {
 }
 
 impl Settings {
-    /// Refuses settings that make no sense.
+    /// Refuses settings out of range.
     ///
     /// # Errors
-    /// Names the setting, its value and what would be right.
+    /// Names the setting, its value, and what would be right.
     pub fn validate(&self) -> Result<()> {
         let wrong = |reason: String| Err(Error::Setting(reason));
         if self.stride == 0 {
-            return wrong("stride is 0; at least 1 frame".into());
+            return wrong("stride is 0; it must be at least 1 frame".into());
         }
         if self.min_samples == 0 {
-            return wrong("min_samples is 0; at least 1 frame".into());
+            return wrong("min_samples is 0; it must be at least 1 frame".into());
         }
         for (name, length) in [("finest cell", Some(self.finest_cell)), ("element size", self.element_size)] {
             if let Some(length) = length
                 && !(1e-4..=0.1).contains(&length)
             {
-                return wrong(format!("the {name} is {} mm; 0.1 to 100 mm", 1e3 * length));
+                return wrong(format!("the {name} is {} mm; it must be in [0.1, 100] mm", 1e3 * length));
             }
         }
         if self.max_tets < 100 {
-            return wrong(format!("max_tets is {}; at least 100", self.max_tets));
+            return wrong(format!("max_tets is {}; it must be at least 100", self.max_tets));
         }
         Ok(())
     }

@@ -1,28 +1,30 @@
-//! The unseen back: how thick an organ is behind each pixel (paper section III).
+//! Models the unseen back: the thickness of an organ behind each pixel (paper section III).
 
 use crate::BackRule;
 use crate::distance_map::distance_map;
 use glam::{DMat4, DVec4};
 use trocar_camera::{Camera, Mask};
 
-/// Thickness along z behind each pixel [m] and what it was made with.
+/// Thickness along z behind each pixel (m), and its parameters.
 pub struct Thickness {
-    /// h = 2 k sqrt(d (2R - d)), z_back = z_front + h; 0 outside of the mask.
+    /// h = 2 k sqrt(d (2R - d)), z_back = z_front + h; 0 outside the mask.
     pub h: Vec<f64>,
-    /// R: the 99.5th percentile of d, the distance to the silhouette [m].
+    /// R: the 99.5th percentile of d, the distance to the silhouette (m).
     pub radius: f64,
-    /// k: how high the profile is against its width; 1 is round.
+    /// k: height of the profile over its width; 1 is round.
     pub height_ratio: f64,
 }
 
-/// Models the back of an organ whose front is at `front` [m].
+/// Models the back of an organ whose front is at `front` (m).
 ///
-/// d is metric at the depth of the organ's middle, z_front + h/2, where a ray passes nearest to the centre of a round
-/// profile: measured at the front, a 25 mm sphere seen from 275 mm would come back 10% too small. h follows from d and d
-/// from h, so both are iterated; each round shrinks the change by about R/z.
+/// d is metric at the depth of the organ's middle, z_front + h/2, where a ray passes nearest to the
+/// centre of a round profile. Measured at the front, a 25 mm sphere seen from 275 mm would become
+/// 10% too small. h depends on d and d on h, so both are iterated; each iteration shrinks the
+/// change by about R/z.
 pub fn thickness(front: &[f64], mask: &Mask, camera: &Camera, rule: BackRule) -> Thickness {
     const ROUNDS: usize = 6;
-    // Distances per unit of depth. The silhouette runs half a pixel beyond the centres of the outermost pixels.
+    // Distances per unit of depth. The silhouette is half a pixel beyond the centres of the
+    // outermost pixels.
     let spacing = [1.0 / camera.fx, 1.0 / camera.fy];
     let half_pixel = 0.25 * (spacing[0] + spacing[1]);
     let angular: Vec<f64> = distance_map(mask, spacing).into_iter().map(|d| d - half_pixel).collect();
@@ -45,10 +47,11 @@ pub fn thickness(front: &[f64], mask: &Mask, camera: &Camera, rule: BackRule) ->
     Thickness { h, radius, height_ratio }
 }
 
-/// k of z_front = a + b x + c y - k `profile` by least squares: how far the organ's front rises above a plane through its rim,
-/// against how far a round one would. An organ as high below its rim as above is then as thick as twice that.
+/// k of z_front = a + b x + c y - k `profile` by least squares: how far the organ's front rises
+/// above a plane through its rim, over how far a round one would. An organ that is as high below
+/// its rim as above is then twice that thick.
 fn fitted_ratio(front: &[f64], inside: &[usize], profile: &[f64], width: usize, camera: &Camera) -> f64 {
-    /// Beyond these it is not the organ's shape that speaks.
+    /// Beyond these limits the fit does not reflect the organ's shape.
     const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.2..=1.5;
     let row = |k: usize| {
         let i = inside[k];
@@ -65,7 +68,7 @@ fn fitted_ratio(front: &[f64], inside: &[usize], profile: &[f64], width: usize, 
             *normal.col_mut(column) += terms * terms[column];
         }
     }
-    // Too few pixels to tell leave it round.
+    // With too few pixels it stays round.
     if normal.determinant().abs() < 1e-30 {
         return 1.0;
     }
@@ -73,16 +76,17 @@ fn fitted_ratio(front: &[f64], inside: &[usize], profile: &[f64], width: usize, 
     if ratio.is_finite() { ratio.clamp(*PLAUSIBLE.start(), *PLAUSIBLE.end()) } else { 1.0 }
 }
 
-/// Volume between `front` and the back that is modelled behind it by `rule` [m3]: what a reconstruction of an organ whose front
-/// is known exactly should enclose. Each pixel is a frustum between its front and back depth. `front` is a depth a pixel [m]. For a
-/// camera without distortion.
+/// Volume between `front` and the back that is modelled behind it by `rule` (m3): the volume that a
+/// reconstruction of an organ with exactly known front should enclose. Each pixel is a frustum
+/// between its front and back depth. `front` has a depth per pixel (m). For a camera without
+/// distortion.
 pub fn modelled_volume(front: &[f64], mask: &Mask, camera: &Camera, rule: BackRule) -> f64 {
     let back = thickness(front, mask, camera, rule);
     let frustum = |i: usize| ((front[i] + back.h[i]).powi(3) - front[i].powi(3)) / (3.0 * camera.fx * camera.fy);
     (0..front.len()).filter(|i| mask.set[*i]).map(frustum).sum()
 }
 
-/// Percentile `p` (0..=1) of sorted values, linear between neighbours; 0 without values.
+/// Percentile `p` in [0, 1] of sorted values, linear between neighbours; 0 without values.
 fn percentile(sorted: &[f64], p: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
     let at = p * last as f64;

@@ -77,7 +77,7 @@ fn metal_is_found_where_the_recording_says_so() {
 }
 
 #[test]
-fn broken_frames_are_left_out_and_told() {
+fn broken_frames_are_left_out_with_a_note() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("recording");
     write(&dir, &info(), 12);
@@ -89,6 +89,6 @@ fn broken_frames_are_left_out_and_told() {
     let made =
         reconstruct(&Recording::open(&dir).unwrap(), &Settings { stride: 1, ..Settings::default() }, &Silent).unwrap();
     assert_eq!(made.frames_used, 10);
-    let told = made.notes.iter().any(|n| n.contains("2 of 12 frames are broken") && n.contains("depth/000002.png"));
-    assert!(told, "{:?}", made.notes);
+    let noted = made.notes.iter().any(|n| n.contains("2 of 12 frames are broken") && n.contains("depth/000002.png"));
+    assert!(noted, "{:?}", made.notes);
 }

@@ -1,10 +1,11 @@
-//! From a recording to organs, against the truth it was made from.
+//! Reconstructs recordings with known truth.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 #[path = "../../recording/tests/common/mod.rs"]
 mod common;
 
-use common::{CENTRE, RADIUS, info, write};
+use common::{CENTRE, RADIUS, info, write, write_moving};
+use glam::DVec3;
 use std::path::Path;
 use trocar_core::{Silent, StopAfter};
 use trocar_geometry::io::Unit;
@@ -20,13 +21,14 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     let recording = Recording::open(&dir).unwrap();
     let made = reconstruct(&recording, &Settings::default(), &Silent).unwrap();
 
-    // The composite: no trace of the bar, which covered an eighth of the image.
+    // The composite has no trace of the bar, which covered an eighth of the image.
     let (color, depth, mask) = common::scene(&recording.camera());
     assert_eq!(made.background, color);
     assert_eq!(made.frames_used, 12, "stride 2");
     assert_eq!(made.coverage, 1.0);
     assert_eq!(made.recovered_share, 0.125);
     assert_eq!(made.depth_range_median, 0.0);
+    assert_eq!((made.warnings.len(), made.organs[0].moving_share), (0, 0.0));
     for (z, truth) in made.depth.depth.iter().zip(&depth.depth) {
         assert!((z - truth).abs() <= 0.5001e-3);
     }
@@ -41,13 +43,14 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     let truth = 4.0 / 3.0 * std::f64::consts::PI * (100.0 * RADIUS).powi(3);
     assert!((0.88..1.02).contains(&(facts.volume_cm3 / truth)), "{} of {truth} cm3", facts.volume_cm3);
     let (low, high) = organ.body.bounds().unwrap();
-    // The modelled back of a sphere is up to a fifth of R short (see the thickness); its front and outline are measured.
+    // The modelled back of a sphere is up to a fifth of R short; its front and outline are
+    // measured.
     assert!((0.5 * (low + high) - CENTRE).length() < 0.15 * RADIUS);
     assert_eq!(made.organs[0].mask, mask);
     let red = organ.surface.colors.iter().filter(|c| **c == [180, 60, 50]).count();
     assert_eq!(red, organ.surface.vertices.len());
 
-    // Written and read again, and the same bits a second time.
+    // Written and read again, and a second time with the same bits.
     let out = root.path().join("specimen");
     made.specimen.write(&out).unwrap();
     assert_eq!(Specimen::read(&out).unwrap().organs[0].body, organ.body);
@@ -58,8 +61,34 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     assert_eq!(again.specimen.provenance, made.specimen.provenance);
 }
 
+/// An organ that is lifted, swings or breathes during the window gets a warning that names it and
+/// `--window`; a window in which it is still gets none.
 #[test]
-fn stops_when_asked_and_says_what_is_wrong() {
+fn an_organ_that_moves_is_warned_of() {
+    let root = tempfile::tempdir().unwrap();
+    let dir = root.path().join("recording");
+    let lifted = |f: usize| CENTRE - DVec3::Z * if f < 40 { 0.0 } else { 0.006 };
+    let swinging = |f: usize| CENTRE + DVec3::X * 0.008 * (0.1 * f as f64).sin();
+    let breathing = |f: usize| CENTRE + DVec3::Z * 0.004 * (0.2 * f as f64).sin();
+    let ways: [(&str, &dyn Fn(usize) -> DVec3); 3] =
+        [("lifted", &lifted), ("swinging", &swinging), ("breathing", &breathing)];
+    for (way, centre) in ways {
+        write_moving(&dir, &info(), 80, centre);
+        let recording = Recording::open(&dir).unwrap();
+        let made = reconstruct(&recording, &Settings::default(), &Silent).unwrap();
+        println!("{way}: {:.2} of the pixels move", made.organs[0].moving_share);
+        let [warning] = &made.warnings[..] else { panic!("{way}: {:?}", made.warnings) };
+        assert!(warning.contains("ball") && warning.contains("--window below 90"), "{warning}");
+    }
+    write_moving(&dir, &info(), 80, lifted);
+    let recording = Recording::open(&dir).unwrap();
+    let still = Settings { centre: Some(20), window: 18, ..Settings::default() };
+    let made = reconstruct(&recording, &still, &Silent).unwrap();
+    assert_eq!((made.warnings.len(), made.organs[0].moving_share), (0, 0.0));
+}
+
+#[test]
+fn interruptions_and_wrong_settings_are_named() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("recording");
     write(&dir, &info(), 4);
@@ -72,6 +101,9 @@ fn stops_when_asked_and_says_what_is_wrong() {
     assert!(failure(Settings { centre: Some(4), ..Settings::default() }).contains("frame 4; the recording has 4"));
     assert!(failure(Settings { stride: 0, ..Settings::default() }).contains("stride is 0"));
     assert!(failure(Settings { finest_cell: 0.0, ..Settings::default() }).contains("finest cell is 0 mm"));
+
+    let failed = failure(Settings { window: 99_999_999_999_999, ..Settings::default() });
+    assert!(failed.contains("the window is 99999999999999 frames") && failed.contains("has 4 frames"), "{failed}");
 
     // An organ where no depth was measured.
     let mut blind = info();

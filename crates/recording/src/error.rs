@@ -1,4 +1,4 @@
-//! What can be wrong with a recording.
+//! Errors of recordings.
 
 use std::path::{Path, PathBuf};
 
@@ -13,20 +13,20 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The recording is not what it should be.
+    /// The recording is incomplete or inconsistent.
     #[error("{path}: {reason}", path = path.display())]
     Recording {
         /// File or folder.
         path: PathBuf,
-        /// Field or frame, what is wrong, what would be right.
+        /// The field or frame, what is wrong, and what would be right.
         reason: String,
     },
     /// A bag or MCAP file is unusable.
     #[error(transparent)]
-    Messages(#[from] trocar_messages::Error),
+    Messages(#[from] crate::messages::Error),
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),

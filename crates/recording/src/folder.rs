@@ -1,12 +1,12 @@
 //! Frames from folders of image files.
 
+use crate::error::{Error, Result};
 use crate::frame_list::{FrameFiles, FrameList, list_frames, stem};
 use crate::source::{FrameSource, Images, Packet, Parts};
-use crate::{Error, Result};
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, Mask};
 
-/// The images of a recording folder, one file each.
+/// The images of a recording folder, one file per image.
 #[derive(Debug)]
 pub struct Folder {
     frames: Vec<FrameFiles>,
@@ -15,10 +15,11 @@ pub struct Folder {
 }
 
 impl Folder {
-    /// Lists the frames of the recording folder `dir`, whose depth is in units of `depth_scale_m`.
+    /// Lists the frames of the recording folder `dir`, whose depth has the unit `depth_scale_m`
+    /// (m).
     ///
     /// # Errors
-    /// Names what is missing.
+    /// Names the missing file or folder.
     pub fn open(dir: &Path, depth_scale_m: f64) -> Result<Self> {
         let FrameList { frames, notes } = list_frames(dir)?;
         Ok(Self { frames, notes, depth_scale_m })

@@ -1,7 +1,7 @@
-//! Which files make a frame: from `frames.csv`, or by pairing the files of the folders.
+//! Lists the files of each frame: from `frames.csv`, or by pairing the files of the folders.
 
+use crate::error::{Error, Result};
 use crate::pairing::Pairing;
-use crate::{Error, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -17,11 +17,11 @@ pub struct FrameFiles {
     pub instruments: Option<PathBuf>,
 }
 
-/// Frames in recorded order, and what was dropped on the way.
+/// Frames in recorded order, and notes on dropped ones.
 pub struct FrameList {
     /// At least one frame.
     pub frames: Vec<FrameFiles>,
-    /// A sentence for each thing the user should know.
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
 }
 
@@ -40,12 +40,12 @@ struct Row {
 /// Lists the frames of the recording folder `dir`.
 ///
 /// # Errors
-/// When there is no depth folder, no frame, or `frames.csv` is not what it should be.
+/// When there is no depth folder or no frame, or when `frames.csv` is invalid.
 pub fn list_frames(dir: &Path) -> Result<FrameList> {
     let index = dir.join("frames.csv");
     let list = if index.is_file() { from_csv(dir, &index)? } else { from_folders(dir)? };
     match list.frames.is_empty() {
-        true => Err(wrong(dir, "no frames; depth images belong into depth/, colour images into color/")),
+        true => Err(wrong(dir, "there are no frames; depth images must be in depth/, colour images in color/")),
         false => Ok(list),
     }
 }
@@ -61,22 +61,26 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
         let row = row.map_err(|e| wrong(path, explain(&e)))?;
         let at = |reason: String| wrong(path, format!("line {line}: {reason}"));
         if !row.time_s.is_finite() || row.time_s < last_time {
-            return Err(at(format!("time_s is {}; seconds, not before the line above", row.time_s)));
+            return Err(at(format!(
+                "time_s is {}; it must be finite seconds, at least those of the line above",
+                row.time_s
+            )));
         }
         last_time = row.time_s;
         if previous.is_some_and(|p| p >= row.index) {
-            return Err(at(format!("index is {} after {}; indices ascend", row.index, previous.unwrap_or(0))));
+            return Err(at(format!("index is {} after {}; indices must ascend", row.index, previous.unwrap_or(0))));
         }
         previous = Some(row.index);
         let file = |column: &str, name: &str| match name {
             "" => Ok(None),
             _ if Path::new(name).components().all(|c| matches!(c, Component::Normal(_))) => Ok(Some(dir.join(name))),
-            _ => Err(at(format!("{column} is '{name}'; a path inside the recording folder, without '..'"))),
+            _ => Err(at(format!("{column} is '{name}'; it must be a path inside the recording folder, without '..'"))),
         };
         let color = file("color", &row.color)?;
-        let depth = file("depth", &row.depth)?.ok_or_else(|| at("depth is empty; a file of the folder".into()))?;
+        let depth =
+            file("depth", &row.depth)?.ok_or_else(|| at("depth is empty; it must name a file of the folder".into()))?;
         let instruments = file("instruments", &row.instruments)?;
-        // A frame whose mask is missing shows no instrument; that is told below.
+        // A frame without its mask file shows no instrument; a note below says so.
         let instruments = instruments.filter(|f| {
             let there = f.is_file();
             maskless += usize::from(!there);
@@ -91,10 +95,13 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
     if frames.is_empty() {
         return Err(match missing.first() {
             Some(first) => wrong(first, "no such file, and no frame of frames.csv has all of its files"),
-            None => wrong(path, "no frames: no line below the header; remove it to pair the files by name"),
+            None => wrong(
+                path,
+                "there are no frames below the header; add lines, or remove the file to pair images by name",
+            ),
         });
     }
-    // Masks that were made later are found by name.
+    // Masks made later are found by name.
     let masks = dir.join("masks/instruments");
     for frame in frames.iter_mut().filter(|f: &&mut FrameFiles| f.instruments.is_none()) {
         let mask = masks.join(format!("{}.png", stem(frame.color.as_ref().unwrap_or(&frame.depth))));
@@ -102,13 +109,14 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
     }
     let with_color = frames.iter().filter(|f| f.color.is_some()).count();
     if with_color != 0 && with_color != frames.len() {
-        let reason = format!("{with_color} of {} frames have a color file; all of them or none should", frames.len());
+        let reason =
+            format!("{with_color} of {} frames have a color file; all of them or none must have one", frames.len());
         return Err(wrong(path, reason));
     }
     let mut notes = Vec::new();
     if maskless > 0 {
         notes.push(format!(
-            "{maskless} instrument masks that frames.csv names are missing; these frames were taken to show no instrument."
+            "{maskless} instrument masks of frames.csv are missing; these frames count as without instruments."
         ));
     }
     if let Some(first) = missing.first() {
@@ -121,7 +129,7 @@ fn from_csv(dir: &Path, path: &Path) -> Result<FrameList> {
     Ok(FrameList { frames, notes })
 }
 
-/// Line and column of a mistake that the CSV reader found.
+/// The CSV reader's error, with line and column.
 fn explain(error: &csv::Error) -> String {
     match error.kind() {
         csv::ErrorKind::Deserialize { pos, err } => {
@@ -136,7 +144,7 @@ fn explain(error: &csv::Error) -> String {
 fn from_folders(dir: &Path) -> Result<FrameList> {
     let depth_dir = dir.join("depth");
     if !depth_dir.is_dir() {
-        return Err(wrong(&depth_dir, "no such folder; depth images (16-bit PNG) belong there"));
+        return Err(wrong(&depth_dir, "the folder does not exist; depth images (16-bit PNG) must be in it"));
     }
     let depth = images(&depth_dir)?;
     let mut notes = Vec::new();
@@ -144,18 +152,21 @@ fn from_folders(dir: &Path) -> Result<FrameList> {
     let mut frames: Vec<FrameFiles> = if let Some(color_dir) = color_dir {
         let color = images(&color_dir)?;
         if color.is_empty() {
-            return Err(wrong(&color_dir, "no PNG or JPEG in it; remove the folder if the recording has depth alone"));
+            return Err(wrong(
+                &color_dir,
+                "there is no PNG or JPEG in it; remove the folder if the recording has depth alone",
+            ));
         }
         pair(&color, &depth, &mut notes)
     } else {
-        notes.push("The recording has no colour; a grey shading of its depth stands in for it.".into());
+        notes.push("The recording has no colour; a grey shading of its depth replaces it.".into());
         depth.into_iter().map(|depth| FrameFiles { color: None, depth, instruments: None }).collect()
     };
     attach_instruments(&dir.join("masks/instruments"), &mut frames, &mut notes)?;
     Ok(FrameList { frames, notes })
 }
 
-/// Pairs files of equal stem; where no two are equal, by the times in their names; where there are none, in order.
+/// Pairs files of equal stem; without any, by the times in their names; without times, in order.
 fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<FrameFiles> {
     let by_stem: BTreeMap<String, &PathBuf> = depth.iter().map(|d| (stem(d), d)).collect();
     let frame = |c: &PathBuf, d: &PathBuf| FrameFiles { color: Some(c.clone()), depth: d.clone(), instruments: None };
@@ -163,7 +174,7 @@ fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<Fr
     if !frames.is_empty() {
         if frames.len() != color.len() || frames.len() != depth.len() {
             notes.push(format!(
-                "{} colour and {} depth images were paired by name into {} frames; the others were dropped.",
+                "{} colour and {} depth images were paired by name into {} frames; the rest were dropped.",
                 color.len(),
                 depth.len(),
                 frames.len()
@@ -178,7 +189,7 @@ fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<Fr
     }
     frames = color.iter().zip(depth).map(|(c, d)| frame(c, d)).collect();
     notes.push(format!(
-        "No colour and depth image have the same name or a time in it, so {} colour and {} depth images were paired by order \
+        "No colour and depth images share a name or have times in their names, so {} colour and {} depth images were paired in order \
          into {} frames.",
         color.len(),
         depth.len(),
@@ -187,8 +198,8 @@ fn pair(color: &[PathBuf], depth: &[PathBuf], notes: &mut Vec<String>) -> Vec<Fr
     frames
 }
 
-/// Times in the names of all files [s]: the last number of the name, which has a decimal point, as the tools of RealSense
-/// and the TUM benchmark write them.
+/// Times in the names of all files (s): the last number of the name with a decimal point, as the
+/// tools of RealSense and the TUM benchmark write them.
 fn times(files: &[PathBuf]) -> Option<Vec<f64>> {
     let time = |file: &PathBuf| {
         let stem = stem(file);
@@ -198,7 +209,8 @@ fn times(files: &[PathBuf]) -> Option<Vec<f64>> {
     files.iter().map(time).collect()
 }
 
-/// Gives each frame the instrument mask of its stem; where no stem is equal and the counts are, in order.
+/// Assigns each frame the instrument mask of its stem. Where no stem matches and the counts are
+/// equal, assigns them in order.
 fn attach_instruments(dir: &Path, frames: &mut [FrameFiles], notes: &mut Vec<String>) -> Result<()> {
     if !dir.is_dir() || frames.is_empty() {
         return Ok(());
@@ -215,8 +227,11 @@ fn attach_instruments(dir: &Path, frames: &mut [FrameFiles], notes: &mut Vec<Str
     let mut without = frames.iter().filter(|f| f.instruments.is_none()).count();
     if without == frames.len() {
         if masks.len() != frames.len() {
-            let reason =
-                format!("{} masks for {} frames, and no mask has the name of a frame", masks.len(), frames.len());
+            let reason = format!(
+                "there are {} masks for {} frames, and no mask has the name of a frame",
+                masks.len(),
+                frames.len()
+            );
             return Err(wrong(dir, reason));
         }
         for (frame, mask) in frames.iter_mut().zip(masks) {
@@ -225,12 +240,12 @@ fn attach_instruments(dir: &Path, frames: &mut [FrameFiles], notes: &mut Vec<Str
         without = 0;
     }
     if without > 0 {
-        notes.push(format!("{without} frames have no instrument mask and were taken to show no instrument."));
+        notes.push(format!("{without} frames have no instrument mask and count as without instruments."));
     }
     Ok(())
 }
 
-/// The image files of a folder in natural order of their names (2 before 10).
+/// The image files of a folder, in natural order of their names (2 before 10).
 fn images(dir: &Path) -> Result<Vec<PathBuf>> {
     let mut files = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(Error::io(dir))? {
@@ -244,12 +259,12 @@ fn images(dir: &Path) -> Result<Vec<PathBuf>> {
     Ok(files)
 }
 
-/// The file's name without its extension.
+/// The file's name without extension.
 pub fn stem(path: &Path) -> String {
     path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
 }
 
-/// A key under which numbers sort by value: runs of digits are padded.
+/// A sort key that orders numbers by value: runs of digits are padded.
 fn natural(name: &str) -> String {
     let (mut key, mut digits) = (String::new(), String::new());
     for c in name.chars().chain(['\0']) {

@@ -1,26 +1,27 @@
 //! Frames from a log file: a RealSense bag, any other ROS 1 bag, or MCAP.
 
+use crate::error::{Error, Result};
+use crate::info::{DepthToColor, SourceInfo};
+use crate::messages::{
+    self, DepthValues, Image, MessageLog, RgbdTopics, decode_calibration, decode_float, decode_image,
+    decode_transforms, read_one, realsense,
+};
 use crate::pairing::Pairing;
 use crate::source::{FrameSource, Images, Packet, Parts};
-use crate::{DepthToColor, Error, Result, SourceInfo};
 use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use trocar_camera::{Camera, Mask};
 use trocar_core::Pose;
-use trocar_messages::{
-    DepthValues, Guess, Image, MessageLog, decode_calibration, decode_float, decode_image, decode_transforms, read_one,
-    realsense,
-};
 
-/// Unit of 16-bit depth where the log does not say (ROS REP 118) [m].
+/// Unit of 16-bit depth where the log has none (ROS REP 118) (m).
 const MILLIMETRE: f64 = 1e-3;
-/// Depth in floating-point metres is kept in this unit [m]: up to 6.5 m.
+/// Unit in which depth in floating-point metres is kept (m); it holds up to 6.5 m.
 const FLOAT_UNIT: f64 = 1e-4;
-/// Messages of a topic of transforms that are looked at: those between fixed frames come first and again and again.
+/// Messages of a transform topic that are read: those between fixed frames come first and repeat.
 const TRANSFORMS: usize = 200;
 
-/// The colour and depth images of a log file, paired by their times.
+/// The colour and depth images of a log file, paired by time.
 pub struct Log {
     log: Box<dyn MessageLog>,
     color: usize,
@@ -33,58 +34,59 @@ pub struct Log {
     notes: Vec<String>,
 }
 
-/// What a log file says of its cameras.
+/// The cameras that a log file describes.
 #[derive(Clone, Debug, Default)]
 pub struct LogCameras {
     /// Colour.
     pub color: Option<Camera>,
     /// Depth.
     pub depth: Option<Camera>,
-    /// Between the two.
+    /// From the depth camera's frame to the colour camera's.
     pub depth_to_color: Option<DepthToColor>,
-    /// Metres a unit of depth.
+    /// Unit of depth (m).
     pub depth_scale_m: f64,
 }
 
 impl Log {
-    /// Opens the log `source` of the folder `dir`. `depth_scale_m` overrules what the log says of its unit.
+    /// Opens the log `source` of the folder `dir`. `depth_scale_m` (m) overrides the log's unit of
+    /// depth.
     ///
     /// # Errors
-    /// Names the file, and the topics when colour and depth are not to be found among them.
+    /// Names the file; lists the topics when colour or depth is not among them.
     pub fn open(dir: &Path, source: &SourceInfo, depth_scale_m: Option<f64>) -> Result<(Self, LogCameras)> {
         let path = dir.join(&source.file);
-        let log = trocar_messages::open(&path)?;
-        let guess = trocar_messages::guess(&*log, source.color_topic.as_deref(), source.depth_topic.as_deref());
-        // In a damaged file what is missing may be what was lost.
-        let guess = guess.map_err(|e| match (e, log.problems().first()) {
-            (trocar_messages::Error::Choice { reason, .. }, Some(problem)) => {
+        let log = messages::open(&path)?;
+        let found = messages::find_rgbd_topics(&*log, source.color_topic.as_deref(), source.depth_topic.as_deref());
+        // In a damaged file, a missing topic may be among the lost data.
+        let found = found.map_err(|e| match (e, log.problems().first()) {
+            (messages::Error::Choice { reason, .. }, Some(problem)) => {
                 Error::wrong(&path, format!("{problem}; {reason}"))
             }
             (e, _) => e.into(),
         })?;
-        let mut cameras = cameras(&*log, &guess);
+        let mut cameras = cameras(&*log, &found);
         let said = cameras.depth_scale_m;
         cameras.depth_scale_m = depth_scale_m.unwrap_or(said);
         let seconds = |topic: usize| -> Vec<f64> { log.times(topic).iter().map(|t| 1e-9 * *t as f64).collect() };
-        let pairing = Pairing::by_time(&seconds(guess.color), &seconds(guess.depth));
+        let pairing = Pairing::by_time(&seconds(found.color), &seconds(found.depth));
         let mut notes = log.problems().to_vec();
         notes.extend(pairing.notes());
         if (cameras.depth_scale_m / said - 1.0).abs() > 1e-6 {
             let given = cameras.depth_scale_m;
-            notes.push(format!("depth_scale_m = {given} is used, although the file says {said}."));
+            notes.push(format!("depth_scale_m = {given} overrides the file's {said}."));
         }
         if pairing.pairs.is_empty() {
             let name = |t: usize| &log.topics()[t].name;
             let reason =
-                format!("no image of {} was taken at the time of one of {}", name(guess.color), name(guess.depth));
+                format!("no image of {} was taken at the time of an image of {}", name(found.color), name(found.depth));
             return Err(Error::wrong(&path, reason));
         }
         let depth_scale_m = cameras.depth_scale_m;
         let instruments = dir.join("masks/instruments");
         let log = Self {
             log,
-            color: guess.color,
-            depth: guess.depth,
+            color: found.color,
+            depth: found.depth,
             pairs: pairing.pairs,
             depth_scale_m,
             instruments,
@@ -109,7 +111,7 @@ impl FrameSource for Log {
         self.pairs.len()
     }
 
-    /// Colour and depth of a frame lie apart in the file: the earlier one waits for the other.
+    /// Colour and depth of a frame are apart in the file: the first waits for the second.
     fn packets<'a>(&'a self, wanted: &[usize]) -> Box<dyn Iterator<Item = Packet> + Send + 'a> {
         let wanted: Vec<usize> = wanted.iter().copied().filter(|i| *i < self.pairs.len()).collect();
         let mut messages = Vec::with_capacity(2 * wanted.len());
@@ -200,44 +202,44 @@ impl FrameSource for Log {
     }
 }
 
-/// What the log says of its cameras; what it does not say, or says wrongly, is left out and asked for later.
-fn cameras(log: &dyn MessageLog, guess: &Guess) -> LogCameras {
+/// Reads the log's cameras. Missing or invalid ones are left out; the caller asks for them.
+fn cameras(log: &dyn MessageLog, found: &RgbdTopics) -> LogCameras {
     let topics = log.topics();
     let first = |t: usize| Some((&topics[t], read_one(log, t, 0).ok()?));
     let camera = |t: usize| first(t).and_then(|(topic, bytes)| decode_calibration(topic, &bytes).ok());
     let image = |t: usize| first(t).and_then(|(topic, bytes)| decode_image(topic, &bytes).ok());
-    let depth = image(guess.depth);
+    let depth = image(found.depth);
     let float = depth
         .as_ref()
         .is_some_and(|d| matches!(&d.image, Image::Depth(d) if matches!(d.values, DepthValues::Metres(_))));
-    let said = guess.depth_units.and_then(first).and_then(|(topic, bytes)| decode_float(topic, &bytes).ok());
+    let said = found.depth_units.and_then(first).and_then(|(topic, bytes)| decode_float(topic, &bytes).ok());
     let said = said.or(depth.as_ref().and_then(|d| d.depth_unit)).map(f64::from).filter(|s| (1e-6..=0.1).contains(s));
     let transform =
         |t: usize| first(t).and_then(|(topic, bytes)| decode_transforms(topic, &bytes).ok()?.into_iter().next());
-    let pose = match (guess.color_transform.and_then(transform), guess.depth_transform.and_then(transform)) {
+    let pose = match (found.color_transform.and_then(transform), found.depth_transform.and_then(transform)) {
         (Some(color), Some(depth)) => Some(realsense::color_from_depth(&color, &depth)),
-        _ => image(guess.color).zip(depth).and_then(|(color, depth)| between(log, guess, &color.frame, &depth.frame)),
+        _ => image(found.color).zip(depth).and_then(|(color, depth)| between(log, found, &color.frame, &depth.frame)),
     };
     LogCameras {
-        color: guess.color_info.and_then(camera),
-        depth: guess.depth_info.and_then(camera),
+        color: found.color_info.and_then(camera),
+        depth: found.depth_info.and_then(camera),
         depth_to_color: pose.map(|pose| DepthToColor {
             rotation: glam::DMat3::from_quat(pose.rotation).transpose().to_cols_array_2d(),
             translation_m: pose.translation.into(),
         }),
-        // 32-bit floats are rounded to what the user meant: 0.001, not 0.0010000000474974513.
+        // Rounds 32-bit floats to the intended number: 0.001, not 0.0010000000474974513.
         depth_scale_m: if float { FLOAT_UNIT } else { said.map_or(MILLIMETRE, |s| (s * 1e9).round() / 1e9) },
     }
 }
 
-/// From the frame of depth to that of colour, along the log's transforms between frames.
-fn between(log: &dyn MessageLog, guess: &Guess, color: &str, depth: &str) -> Option<Pose> {
+/// The transform from the frame of depth to that of colour, along the log's transforms.
+fn between(log: &dyn MessageLog, found: &RgbdTopics, color: &str, depth: &str) -> Option<Pose> {
     if color.is_empty() || color == depth {
         return None;
     }
-    // Child frame to parent frame; the first that is said of a child.
+    // Child frame to parent frame; the first message about a child counts.
     let mut parents: BTreeMap<String, (String, Pose)> = BTreeMap::new();
-    for &topic in &guess.transforms {
+    for &topic in &found.transforms {
         let wanted: Vec<(usize, usize)> = (0..log.topics()[topic].count.min(TRANSFORMS)).map(|i| (topic, i)).collect();
         for bytes in log.messages(&wanted).filter_map(|m| m.bytes.ok()) {
             for t in decode_transforms(&log.topics()[topic], &bytes).unwrap_or_default() {
@@ -246,7 +248,7 @@ fn between(log: &dyn MessageLog, guess: &Guess, color: &str, depth: &str) -> Opt
             }
         }
     }
-    // Every ancestor of a frame, and the way there.
+    // Every ancestor of a frame, and the transform to it.
     let ancestors = |frame: &str| {
         let mut ways = vec![(frame.to_owned(), Pose::IDENTITY)];
         while let Some((parent, pose)) = ways.last().and_then(|(frame, _)| parents.get(frame)) {

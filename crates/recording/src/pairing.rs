@@ -1,25 +1,27 @@
-//! Pairs two streams of images by the times they were taken.
+//! Pairs two streams of images by time.
 
-/// Which images of two streams belong together.
+/// The pairs of two streams of images.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pairing {
-    /// (index of the colour image, index of the depth image), in the order of time.
+    /// (Index of the colour image, index of the depth image), ordered by time.
     pub pairs: Vec<(usize, usize)>,
     /// Colour images without a depth image close enough in time.
     pub lone_color: usize,
     /// Depth images without a colour image close enough in time.
     pub lone_depth: usize,
-    /// Frames missing inside the depth stream: gaps of at least one and a half intervals, counted in intervals.
+    /// Frames missing in the depth stream: gaps of at least one and a half intervals, counted in
+    /// intervals.
     pub gaps: usize,
-    /// Median time between the two images of a pair [s].
+    /// Median time between the images of a pair (s).
     pub offset_s: f64,
-    /// Median time between depth images [s]; 0 for fewer than two.
+    /// Median time between depth images (s); 0 for fewer than two.
     pub interval_s: f64,
 }
 
 impl Pairing {
-    /// Pairs images taken at the times `color` and `depth` [s]: each with the nearest of the other stream, both ways, no farther
-    /// apart than half a depth interval. Times need not ascend; those that are not finite pair with nothing.
+    /// Pairs images taken at the times `color` and `depth` (s). Images pair when each is nearest to
+    /// the other and they are at most half a depth interval apart. Times need not ascend; those
+    /// that are not finite pair with nothing.
     pub fn by_time(color: &[f64], depth: &[f64]) -> Self {
         let ordered = |times: &[f64]| {
             let mut order: Vec<usize> = (0..times.len()).filter(|i| times[*i].is_finite()).collect();
@@ -30,7 +32,7 @@ impl Pairing {
         let mut intervals: Vec<f64> = depths.windows(2).map(|w| depth[w[1]] - depth[w[0]]).collect();
         intervals.sort_by(f64::total_cmp);
         let interval_s = intervals.get(intervals.len() / 2).copied().unwrap_or(0.0);
-        // A hair more than half: two streams may run exactly half an interval apart.
+        // Slightly more than half: two streams may run exactly half an interval apart.
         let tolerance = if interval_s > 0.0 { 0.501 * interval_s } else { f64::INFINITY };
         let nearest = |time: f64, order: &[usize], times: &[f64]| {
             let after = order.partition_point(|i| times[*i] < time);
@@ -61,12 +63,12 @@ impl Pairing {
         }
     }
 
-    /// What the user should know of the pairing, a sentence each; empty when every image has its partner.
+    /// Notes for the user, one sentence each; empty when every image has a partner.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.lone_color + self.lone_depth > 0 {
             notes.push(format!(
-                "{} frames were paired by time ({:.1} ms apart in the median); {} colour and {} depth images without a partner \
+                "{} frames were paired by time (median {:.1} ms apart); {} colour and {} depth images without a partner \
                  were dropped.",
                 self.pairs.len(),
                 1e3 * self.offset_s,
@@ -76,7 +78,7 @@ impl Pairing {
         }
         if self.gaps > 0 {
             notes.push(format!(
-                "The camera dropped {} frames: gaps in the times of depth ({:.1} ms apart otherwise).",
+                "The camera dropped {} frames: depth has gaps (images are {:.1} ms apart otherwise).",
                 self.gaps,
                 1e3 * self.interval_s
             ));
@@ -89,7 +91,7 @@ impl Pairing {
 mod tests {
     use super::*;
 
-    /// Frames at 30 Hz from `start` [s] without those of `missing`.
+    /// Frames at 30 Hz from `start` (s) without those of `missing`.
     fn stream(start: f64, frames: usize, missing: &[usize]) -> Vec<f64> {
         (0..frames).filter(|i| !missing.contains(i)).map(|i| start + i as f64 / 30.0).collect()
     }
@@ -106,7 +108,7 @@ mod tests {
         assert!(notes[0].contains("1 colour and 6 depth") && notes[1].contains("dropped 1 frames"), "{notes:?}");
         assert!(
             Pairing::by_time(&depth, &depth).notes().len() == 1,
-            "a stream pairs with itself; only its gap is told"
+            "a stream pairs with itself; only its gap is noted"
         );
     }
 

@@ -1,17 +1,18 @@
-//! A recording opened for reading: frames stream from their source and come out registered, on one camera's pixels.
+//! Reads recordings: frames stream from their source, registered to the pixels of one camera.
 
+use crate::error::{Error, Result};
 use crate::folder::Folder;
+use crate::info::{DepthToColor, MARKER, RecordingInfo, SourceInfo};
 use crate::log::{Log, LogCameras};
 use crate::register::Registration;
 use crate::shade::shade;
 use crate::source::{FrameSource, Images, Packet, Parts};
-use crate::{DepthToColor, Error, MARKER, RecordingInfo, Result, SourceInfo};
 use glam::DMat3;
 use std::path::{Path, PathBuf};
 use trocar_camera::{Camera, ColorImage, DepthImage, Mask};
 use trocar_specimen::read_toml;
 
-/// How many of the first frames may be broken before the recording is refused.
+/// Number of first frames that may all be broken before the recording is refused.
 const BROKEN_AT_START: usize = 10;
 
 /// A recording opened for reading.
@@ -21,7 +22,7 @@ pub struct Recording {
     pub info: RecordingInfo,
     toml: PathBuf,
     source: Box<dyn FrameSource>,
-    /// Camera of the frames as they are returned.
+    /// Camera of the returned frames.
     camera: Camera,
     depth_scale_m: f64,
     registration: Option<Registration>,
@@ -33,15 +34,16 @@ pub struct Recording {
 pub struct RgbdFrame {
     /// Colour.
     pub color: ColorImage,
-    /// Depth on the colour image's pixels [m].
+    /// Depth on the colour image's pixels (m).
     pub depth: DepthImage,
-    /// Pixels covered by instruments as far as the recording has masks; none set where it has none.
+    /// Pixels of instruments by the recording's masks; empty where it has none.
     pub instruments: Mask,
 }
 
 impl Recording {
-    /// Opens a recording and checks that its parts fit together (at least one whole frame, sizes). `path` is a folder with a
-    /// `recording.toml`, or a `.bag` or `.mcap` file, about which a `.toml` of the same name beside it may say more.
+    /// Opens a recording and checks that its parts fit together (sizes, at least one good frame).
+    /// `path` is a folder with a `recording.toml`, or a `.bag` or `.mcap` file with an optional
+    /// `.toml` of the same name beside it.
     ///
     /// # Errors
     /// Names the file, field or frame that is missing or wrong.
@@ -52,8 +54,7 @@ impl Recording {
             (_, true) => read_toml(&toml)?,
             (Some(_), false) => RecordingInfo::of_log(path),
             (None, false) if !path.is_dir() => {
-                let reason =
-                    "no such file or folder; a recording is a folder with a recording.toml, a .bag or an .mcap file";
+                let reason = "no such file or folder; a recording is a folder with a recording.toml, a .bag file or an .mcap file";
                 return Err(Error::wrong(path, reason));
             }
             (None, false) => {
@@ -65,7 +66,7 @@ impl Recording {
             if named.file != file {
                 return Err(Error::wrong(
                     &toml,
-                    format!("source.file is '{}', but it stands beside {file}", named.file),
+                    format!("source.file is '{}'; it must be '{file}', the log beside it", named.file),
                 ));
             }
         }
@@ -81,14 +82,14 @@ impl Recording {
                 (Box::new(Folder::open(dir, scale)?), said)
             }
             (None, None) => {
-                return Err(Error::wrong(&toml, "depth_scale_m is needed: metres per unit of the depth images"));
+                return Err(Error::wrong(&toml, "depth_scale_m is missing: the unit of the depth images in metres"));
             }
         };
         let depth_scale_m = said.depth_scale_m;
         let (camera, registration) = cameras(&info, &said).map_err(|reason| Error::wrong(&toml, reason))?;
         let mut notes = source.notes().to_vec();
         if info.source.is_some() && info.depth_camera.or(said.depth).is_none() {
-            notes.push("Nothing is known of the depth camera; its images are taken as registered to colour.".into());
+            notes.push("The depth camera is unknown; its images count as registered to colour.".into());
         }
         let mut recording = Self { notes, source, camera, depth_scale_m, registration, toml, info };
         let [du, dv] = recording.offset();
@@ -98,7 +99,7 @@ impl Recording {
         Ok(recording)
     }
 
-    /// Decodes the first frame that can be: what is wrong with all of them is wrong with the recording.
+    /// Decodes the first good frame. A defect of all first frames is a defect of the recording.
     fn probe(&self) -> Result<()> {
         let mut first_error = None;
         for index in 0..self.len().min(BROKEN_AT_START) {
@@ -120,27 +121,27 @@ impl Recording {
         &self.toml
     }
 
-    /// What was dropped or replaced while the frames were listed, a sentence each.
+    /// Notes on dropped or replaced frames, one sentence each.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// What the recording's log holds, a line a topic; empty for a folder of images.
+    /// The topics of the recording's log, one line each; empty for a folder of images.
     pub fn describe(&self) -> Vec<String> {
         self.source.describe()
     }
 
-    /// How depth comes onto the colour camera's pixels, where its own camera is another.
+    /// The registration of depth to colour, where depth has a camera of its own.
     pub fn registration(&self) -> Option<&Registration> {
         self.registration.as_ref()
     }
 
-    /// The camera of the frames as they are returned: colour's; without colour, the depth's.
+    /// The camera of the returned frames: colour's, or depth's without colour.
     pub fn camera(&self) -> Camera {
         self.camera
     }
 
-    /// Metres per unit of recorded depth.
+    /// Unit of recorded depth (m).
     pub fn depth_scale(&self) -> f64 {
         self.depth_scale_m
     }
@@ -150,22 +151,22 @@ impl Recording {
         self.source.len()
     }
 
-    /// True without frames (an opened recording never is).
+    /// True without frames; an opened recording has at least one.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// File name of frame `index`'s instrument mask in `masks/instruments`, as it is looked for.
+    /// File name of frame `index`'s instrument mask in `masks/instruments`.
     pub fn mask_file_name(&self, index: usize) -> String {
         format!("{}.png", self.source.mask_stem(index))
     }
 
-    /// What to call frame `index` in a message.
+    /// Name of frame `index` in messages.
     pub fn frame_name(&self, index: usize) -> String {
         self.source.name(index)
     }
 
-    /// The `wanted` frames (ascending indices) undecoded, in the order they lie on disk.
+    /// The `wanted` frames (ascending indices), undecoded, in the order of the file.
     pub fn packets<'a>(&'a self, wanted: &[usize]) -> Box<dyn Iterator<Item = Packet> + Send + 'a> {
         self.source.packets(wanted)
     }
@@ -178,13 +179,14 @@ impl Recording {
         match self.packets(&[index]).next() {
             Some(packet) => self.decode(index, &packet.parts?),
             None => {
-                let reason = format!("frame {index} is asked for; the recording has {}", self.len());
+                let reason = format!("frame {index} does not exist; the recording has {} frames", self.len());
                 Err(Error::wrong(self.dir(), reason))
             }
         }
     }
 
-    /// Turns the bytes of frame `index` into images on [`Recording::camera`]'s pixels; may be called from many threads.
+    /// Decodes the bytes of frame `index` into images on [`Recording::camera`]'s pixels. May be
+    /// called from many threads.
     ///
     /// # Errors
     /// Names the file that is broken or of the wrong size.
@@ -196,7 +198,7 @@ impl Recording {
         if (depth.width, depth.height) != (depth_camera.width, depth_camera.height) {
             let field = if self.registration.is_some() { "depth_camera" } else { "camera" };
             return Err(wrong(format!(
-                "{} x {} pixels, but recording.toml or its log says {field}.width x {field}.height = {} x {}",
+                "it has {} x {} pixels, but in recording.toml or the log {field}.width x {field}.height = {} x {}",
                 depth.width, depth.height, depth_camera.width, depth_camera.height
             )));
         }
@@ -205,7 +207,7 @@ impl Recording {
         {
             let hint = if self.registration.is_some() { "" } else { "; depth of another size needs [depth_camera]" };
             let reason = format!(
-                "its colour image has {} x {} pixels, but recording.toml says camera.width x camera.height = {} x {}{hint}",
+                "its colour image has {} x {} pixels, but in recording.toml camera.width x camera.height = {} x {}{hint}",
                 color.width, color.height, size.0, size.1
             );
             return Err(wrong(reason));
@@ -214,7 +216,7 @@ impl Recording {
             && (mask.width, mask.height) != size
         {
             let reason = format!(
-                "its instrument mask has {} x {} pixels, but the images have {} x {}; masks lie on the image's pixels",
+                "its instrument mask has {} x {} pixels; it must have the image's {} x {}",
                 mask.width, mask.height, size.0, size.1
             );
             return Err(wrong(reason));
@@ -230,7 +232,7 @@ impl Recording {
         self.info.depth_offset_px.map(|o| o.round() as i64)
     }
 
-    /// Moves depth onto the colour image's pixels and cuts what is beyond the limit.
+    /// Moves depth to the colour image's pixels and removes depth beyond the limit.
     fn place(&self, depth: DepthImage) -> DepthImage {
         let mut out = match (&self.registration, self.offset()) {
             (Some(registration), _) => registration.apply(&depth),
@@ -246,9 +248,10 @@ impl Recording {
     }
 }
 
-/// The camera of the frames, and how depth gets there, from what the user says and else from what the log `said`.
+/// The camera of the frames and the registration of depth, from the user's facts or else from the
+/// log's.
 fn cameras(info: &RecordingInfo, said: &LogCameras) -> std::result::Result<(Camera, Option<Registration>), String> {
-    let missing = "the log says nothing of its colour camera; a [camera] with width, height, fx, fy, cx, cy is needed";
+    let missing = "the log has no calibration of its colour camera; add [camera] with width, height, fx, fy, cx, cy";
     let color = info.camera.or(said.color).ok_or(missing)?;
     let Some(depth) = info.depth_camera.or(said.depth) else { return Ok((color, None)) };
     let same_place = |m: &DepthToColor| {
@@ -266,12 +269,12 @@ fn cameras(info: &RecordingInfo, said: &LogCameras) -> std::result::Result<(Came
             }),
         )),
         Some(_) => Ok((color, None)),
-        // Depth aligned to colour has colour's camera, give or take how many digits were written.
+        // Depth aligned to colour has colour's camera, apart from rounding.
         None if (depth.width, depth.height) == (color.width, color.height) && (depth.fx / color.fx - 1.0).abs() < 0.01 => {
             Ok((color, None))
         }
-        None => Err("the log's depth camera is not its colour camera, and it does not say where they stand; \
-                     [depth_to_color] with rotation and translation_m is needed, or the topic of depth aligned to colour"
+        None => Err("the log's depth camera is not its colour camera, and the log has no transform between them; \
+                     add [depth_to_color] with rotation and translation_m, or choose the topic of depth aligned to colour"
             .into()),
     }
 }

@@ -1,30 +1,33 @@
-//! Moves depth from its own camera onto the pixels of the colour camera.
+//! Registers depth: moves it from its own camera to the pixels of the colour camera.
 
 use glam::{DMat3, DVec3};
 use trocar_camera::{Camera, DepthImage, draw_triangle};
 
-/// Neighbouring depths that differ by more than this share are two surfaces, not a steep one.
-const STEEPEST: f32 = 0.03;
+/// Neighbouring depths that differ by more than this share belong to two surfaces, not to a steep
+/// one.
+const MAX_SLOPE: f32 = 0.03;
 
-/// A depth camera that stands beside the colour camera.
+/// A depth camera beside the colour camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Registration {
     /// The depth camera.
     pub depth: Camera,
-    /// The colour camera, onto whose pixels depth is moved.
+    /// The colour camera, to whose pixels depth is moved.
     pub color: Camera,
     /// Rotation from the depth camera's frame to the colour camera's.
     pub rotation: DMat3,
-    /// The depth camera's origin in the colour camera's frame [m].
+    /// The depth camera's origin in the colour camera's frame (m).
     pub translation: DVec3,
 }
 
 impl Registration {
-    /// Depth along the colour camera's axis on the colour camera's pixels [m]; 0 where the depth camera saw nothing.
+    /// Depth along the colour camera's axis on the colour camera's pixels (m); 0 where there is
+    /// none.
     ///
-    /// Four neighbouring depth pixels whose depths hang together are a piece of surface and are drawn as two triangles; a depth
-    /// pixel without such neighbours is drawn as the small square it covers. Where several pieces cover a pixel the nearest
-    /// wins, so that what only the depth camera sees behind an edge does not show through.
+    /// Four neighbouring depth pixels of one surface are drawn as two triangles; a depth pixel
+    /// without such neighbours is drawn as the small square it covers. Where several pieces cover a
+    /// pixel the nearest wins, so that a surface that only the depth camera sees behind an edge
+    /// does not show through.
     pub fn apply(&self, depth: &DepthImage) -> DepthImage {
         let (width, height) = (self.color.width, self.color.height);
         let mut out = DepthImage::new(width, height);
@@ -38,7 +41,7 @@ impl Registration {
                 *nearest = z as f32;
             }
         };
-        // (u, v, 1/z) in the colour camera of what the depth camera sees at (u, v) of its own.
+        // (u, v, 1/z) in the colour camera of the point that the depth camera sees at (u, v).
         let moved = |u: f64, v: f64, z: f64| {
             let p = self.rotation * (self.depth.ray(u, v) * z) + self.translation;
             Some(self.color.project(p)?.extend(1.0 / p.z))
@@ -56,7 +59,7 @@ impl Registration {
                 let [Some(a), Some(b), Some(c), Some(d)] = cell.map(|i| seen[i]) else { continue };
                 let depths = cell.map(|i| depth.depth[i]);
                 let [low, high] = [f32::min, f32::max].map(|f| depths.into_iter().fold(depths[0], f));
-                if high - low <= STEEPEST * low {
+                if high - low <= MAX_SLOPE * low {
                     draw_triangle([a, b, c], width, height, &mut draw);
                     draw_triangle([a, c, d], width, height, &mut draw);
                     cell.iter().for_each(|&i| drawn[i] = true);
@@ -85,7 +88,8 @@ mod tests {
         Camera { width, height, fx: f, fy: f, cx, cy, distortion: Distortion::default() }
     }
 
-    /// What `camera`, at `from` in the world and turned by `rotation` (camera to world), sees of a slanted plane.
+    /// The depth image that `camera`, at `from` in the world and with `rotation` (camera to world),
+    /// has of a slanted plane.
     fn plane(camera: &Camera, rotation: DMat3, from: DVec3) -> DepthImage {
         let mut image = DepthImage::new(camera.width, camera.height);
         let normal = DVec3::new(0.2, -0.1, 1.0);
@@ -98,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_plane_stays_a_plane_without_holes() {
-        // The colour camera is finer, so that a depth pixel covers several of its pixels.
+        // The colour camera has a finer resolution: a depth pixel covers several of its pixels.
         let mut color = camera(160, 120, 150.0);
         color.distortion = Distortion([0.1, -0.05, 1e-3, -1e-3, 0.0, 0.0, 0.0, 0.0]);
         let registration = Registration {
@@ -107,7 +111,7 @@ mod tests {
             rotation: DMat3::from_euler(glam::EulerRot::XYZ, 0.02, -0.03, 0.01),
             translation: DVec3::new(0.025, -0.004, 0.003),
         };
-        // World is the colour camera's frame.
+        // The world is the colour camera's frame.
         let seen = plane(&registration.depth, registration.rotation, registration.translation);
         let truth = plane(&color, DMat3::IDENTITY, DVec3::ZERO);
         let moved = registration.apply(&seen);
@@ -122,7 +126,7 @@ mod tests {
                 }
             }
         }
-        // One depth pixel is 7 mm across at half a metre, and the plane rises 22 mm on 100.
+        // One depth pixel is 7 mm wide at half a metre, and the plane rises 22 mm over 100.
         println!("worst {:.2} mm, {holes} holes", 1e3 * worst);
         assert!(worst < 1e-4, "{worst}");
         assert_eq!(holes, 0);
@@ -142,7 +146,8 @@ mod tests {
         for i in 0..40 * 30 {
             assert!((unmoved.depth[i] - depth.depth[i]).abs() < 1e-6, "pixel {i}: {}", unmoved.depth[i]);
         }
-        // 20 mm at 0.4 m and 40 px are 2 px, at 0.8 m 1 px: the near block covers what the far plane would show.
+        // 20 mm at 0.4 m and 40 px are 2 px, at 0.8 m 1 px: the near block covers what the far
+        // plane would show.
         let moved = Registration { translation: DVec3::new(0.02, 0.0, 0.0), ..still }.apply(&depth);
         let row = &moved.depth[15 * 40..16 * 40];
         assert!((row[18] - 0.4).abs() < 1e-6 && (row[26] - 0.4).abs() < 1e-6 && (row[27] - 0.8).abs() < 1e-6);

@@ -1,9 +1,9 @@
-//! What stands in for colour in a recording of depth alone.
+//! Replaces colour in a recording of depth alone.
 
 use glam::DVec3;
 use trocar_camera::{Camera, ColorImage, DepthImage};
 
-/// Grey by how much the surface faces the camera: what stands in for colour in a recording of depth alone.
+/// A grey image by how much the surface faces the camera.
 pub fn shade(depth: &DepthImage, camera: &Camera) -> ColorImage {
     let (width, height) = (depth.width, depth.height);
     let mut image = ColorImage::new(width, height, [0; 3]);
@@ -12,7 +12,8 @@ pub fn shade(depth: &DepthImage, camera: &Camera) -> ColorImage {
         let q = DVec3::new((u as f64 - camera.cx) / camera.fx, (v as f64 - camera.cy) / camera.fy, 1.0);
         (z > 0.0).then_some(z * q)
     };
-    // Two pixels on each side: a depth step of one unit would otherwise be shaded as a slope.
+    // Two pixels on each side, because a depth step of one unit would otherwise be shaded as a
+    // slope.
     const REACH: usize = 2;
     for v in 0..height {
         for u in 0..width {

@@ -1,15 +1,15 @@
-//! Where the frames of a recording come from: one trait over folders and log files.
+//! Sources of a recording's frames: one trait for folders and log files.
 
-use crate::Result;
+use crate::error::Result;
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use xxhash_rust::xxh3::Xxh3;
 
-/// One frame as it lies on disk.
+/// One undecoded frame.
 #[derive(Debug)]
 pub struct Packet {
     /// Index of the frame in the recording.
     pub frame: usize,
-    /// Its bytes, or why they cannot be read.
+    /// Its bytes, or the reason why they cannot be read.
     pub parts: Result<Parts>,
 }
 
@@ -29,9 +29,9 @@ pub struct Parts {
 pub struct Images {
     /// Colour.
     pub color: Option<ColorImage>,
-    /// Depth [m].
+    /// Depth (m).
     pub depth: DepthImage,
-    /// Pixels of the colour image covered by instruments.
+    /// Pixels of the colour image that instruments cover.
     pub instruments: Option<Mask>,
 }
 
@@ -40,25 +40,25 @@ pub trait FrameSource: Send + Sync + std::fmt::Debug {
     /// Number of frames.
     fn len(&self) -> usize;
 
-    /// The `wanted` frames (ascending indices), each exactly once, in the order they lie on disk.
+    /// The `wanted` frames (ascending indices), each exactly once, in the order of the file.
     fn packets<'a>(&'a self, wanted: &[usize]) -> Box<dyn Iterator<Item = Packet> + Send + 'a>;
 
-    /// Decodes what [`FrameSource::packets`] gave for `frame`; may be called from many threads.
+    /// Decodes the bytes of [`FrameSource::packets`] for `frame`. May be called from many threads.
     ///
     /// # Errors
-    /// Names the file or message that is broken.
+    /// Names the broken file or message.
     fn decode(&self, frame: usize, parts: &Parts) -> Result<Images>;
 
-    /// What to call frame `index` in a message: its depth file, or its number and time.
+    /// Name of frame `index` in messages: its depth file, or its number and time.
     fn name(&self, index: usize) -> String;
 
     /// Stem of the file name of frame `index`'s instrument mask in `masks/instruments`.
     fn mask_stem(&self, index: usize) -> String;
 
-    /// What was dropped or replaced while the frames were listed, a sentence each.
+    /// Notes on dropped or replaced frames, one sentence each.
     fn notes(&self) -> &[String];
 
-    /// What the source holds, a line each: the topics of a log.
+    /// The contents of the source, one line each: the topics of a log.
     fn describe(&self) -> Vec<String> {
         Vec::new()
     }

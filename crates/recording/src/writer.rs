@@ -1,14 +1,15 @@
 //! Writer of a recording folder.
 
-use super::{MARKER, RecordingInfo};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
+use crate::info::{MARKER, RecordingInfo};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_specimen::StagedFolder;
 
-/// Writes a recording folder: into a folder beside it first, moved into place by [`RecordingWriter::finish`].
+/// Writes a recording folder. Files go to a folder beside it, which [`RecordingWriter::finish`]
+/// moves into place.
 pub struct RecordingWriter {
     folder: StagedFolder,
     rate_hz: f64,
@@ -18,17 +19,18 @@ pub struct RecordingWriter {
 }
 
 impl RecordingWriter {
-    /// Starts a recording at `dir`, which must not exist or be an earlier recording (one with a `recording.toml`), which is
-    /// replaced at the end. Parents are created.
+    /// Starts a recording at `dir`, which must not exist or be an earlier recording (with a
+    /// `recording.toml`), which is replaced at the end. Creates missing parents.
     ///
     /// # Errors
-    /// When `info` would not be accepted by the reader, or `dir` is another kind of folder or cannot be written.
+    /// When the reader would refuse `info`, or when `dir` is another kind of folder or cannot be
+    /// written.
     pub fn create(dir: &Path, info: &RecordingInfo) -> Result<Self> {
         let mut info = info.clone();
         let marker = dir.join(MARKER);
         info.validate(&marker)?;
         let (Some(rate_hz), Some(depth_scale_m), None) = (info.rate_hz, info.depth_scale_m, &info.source) else {
-            let reason = "a recording is written with rate_hz and depth_scale_m, and without [source]";
+            let reason = "a written recording needs rate_hz and depth_scale_m, and must not have [source]";
             return Err(Error::wrong(&marker, reason));
         };
         let folder = StagedFolder::create(dir, MARKER)?;
@@ -42,7 +44,7 @@ impl RecordingWriter {
         Ok(Self { folder, rate_hz, depth_scale_m, frames: Mutex::new(BTreeMap::new()) })
     }
 
-    /// The folder being written, for files beyond the recording proper (the truth of a phantom).
+    /// The folder being written, for files beyond the recording itself (the truth of a phantom).
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
@@ -80,14 +82,15 @@ impl RecordingWriter {
         Ok(mask.write_png(&self.folder().join("masks").join(format!("{organ}.png")))?)
     }
 
-    /// Writes the index and moves the folder into place. Dropped unfinished, the writer removes what it wrote.
+    /// Writes the index and moves the folder into place. A writer that is dropped unfinished
+    /// removes its files.
     ///
     /// # Errors
-    /// When there is not a single frame, or the folder cannot be moved into place.
+    /// When there is no frame, or the folder cannot be moved into place.
     pub fn finish(self) -> Result<()> {
         let frames = self.frames.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if frames.is_empty() {
-            return Err(self.wrong("a recording without frames".into()));
+            return Err(self.wrong("the recording has no frames".into()));
         }
         let mut index = String::from("index,time_s,color,depth,instruments\n");
         for (i, instruments) in frames {

@@ -1,17 +1,19 @@
-//! Damaged recordings give frames or one-line errors: never a panic, a hang, or more memory than their size calls for.
+//! Damaged recordings give frames or one-line errors: never a panic, a hang, or more memory than
+//! their size calls for.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
 
 use common::{info, write};
 use std::fs;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_recording::Recording;
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// Images are decoded to at most about a thousand times their size (the most that deflate can pack), twice for the conversion.
+/// Images are decoded to at most about a thousand times their size (the most that deflate can
+/// pack), twice for the conversion.
 const ALLOWANCE: Allowance = Allowance { fixed: 16 << 20, per_byte: 3000 };
 
 #[test]

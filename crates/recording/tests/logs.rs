@@ -5,11 +5,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_recording::Recording;
 
-/// A fixture of the messages crate (16 x 12 pixels, 4 colour and 5 depth images; colour f has red 10 x + f, depth f has
-/// 400 + 3 x + 5 y + f units), copied into a folder of its own.
+/// A fixture of the messages crate (16 x 12 pixels, 4 colour and 5 depth images; colour f has red
+/// 10 x + f, depth f has 400 + 3 x + 5 y + f units), copied into a folder of its own.
 fn fixture(name: &str) -> (tempfile::TempDir, PathBuf) {
     let root = tempfile::tempdir().unwrap();
-    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("../messages/tests/fixtures").join(name);
+    let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
     let to = root.path().join(name);
     fs::copy(from, &to).unwrap();
     (root, to)
@@ -48,7 +48,8 @@ fn realsense_bags_register_depth_by_their_own_extrinsics() {
         let recording = Recording::open(&path).unwrap();
         assert_eq!((recording.len(), recording.depth_scale()), (4, 0.0001), "{name}");
         let registration = recording.registration().expect("its cameras stand apart");
-        // The colour stream's own transform turns by 0.28, 0.96 about z, the depth stream's by nothing.
+        // The colour stream's own transform turns by 0.28, 0.96 about z, the depth stream's by
+        // nothing.
         assert!(
             (registration.rotation.x_axis.x - 0.28).abs() < 1e-9
                 && (registration.rotation.x_axis.y - 0.96).abs() < 1e-9

@@ -140,7 +140,7 @@ fn mistakes_in_the_index_name_the_line() {
     for (from, to, expected) in [
         ("color/000001.png", "../color/000001.png", "line 3: color is '../color/000001.png'"),
         ("color/000001.png", "/etc/passwd", "line 3: color"),
-        ("1,0.0", "0,0.0", "indices ascend"),
+        ("1,0.0", "0,0.0", "indices must ascend"),
         ("index,time_s", "index,time", "time"),
         ("depth/000001.png", "", "depth is empty"),
         ("1,0.033333", "1,soon", "line 3: column 2: invalid float"),
@@ -189,7 +189,7 @@ fn missing_parts_are_named() {
     }
     assert!(failure(&dir).contains("no frames"));
     fs::remove_dir(dir.join("depth")).unwrap();
-    assert!(failure(&dir).contains("depth: no such folder"));
+    assert!(failure(&dir).contains("depth: the folder does not exist"));
 
     let (_root, dir) = recording();
     fs::write(dir.join("frames.csv"), "index,time_s,color,depth,instruments\n").unwrap();
@@ -268,7 +268,7 @@ fn depth_of_another_camera_is_registered() {
     assert!(failure(&dir).contains("depth_camera needs depth_to_color"));
     let skewed = motion.replace("[1, 0, 0]", "[1, 0.2, 0]");
     fs::write(&toml, format!("{head}{camera}{skewed}\n[[organ]]{organs}")).unwrap();
-    assert!(failure(&dir).contains("rotation is no rotation"));
+    assert!(failure(&dir).contains("rotation is not a rotation"));
 }
 
 #[test]

@@ -6,8 +6,8 @@ mod common;
 use common::{actions, after_request, array, endpoint, floats, linger, observation, text};
 use std::io::Write;
 use std::sync::Mutex;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_remote::{ActionLimits, Client, Error, Value, pack, unpack};
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

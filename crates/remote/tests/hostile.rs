@@ -263,7 +263,7 @@ fn damaged_streams_give_errors() {
     .concat();
     let seeds = [("stream".to_owned(), good)];
     for case in 0..300 {
-        let bytes = trocar_fuzz::damage(&seeds[0].1, &seeds, &mut Pcg64Mcg::new(case));
+        let bytes = trocar_testing::damage(&seeds[0].1, &seeds, &mut Pcg64Mcg::new(case));
         let server = web(move |mut socket| {
             // The client may be gone before all is written.
             let _ = socket.get_mut().write_all(&bytes);

@@ -5,8 +5,8 @@
 mod common;
 
 use common::files::{MJCF, URDF};
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_robot::chain::SerialArm;
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

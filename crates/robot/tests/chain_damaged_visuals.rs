@@ -5,8 +5,8 @@
 mod common;
 
 use common::files::{shown_mjcf, shown_urdf};
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_robot::chain::{mjcf_visuals, urdf_visuals};
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

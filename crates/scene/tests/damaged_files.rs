@@ -2,8 +2,8 @@
 //! their size calls for.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_scene::{BUILTINS, Scene};
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

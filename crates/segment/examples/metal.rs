@@ -1,6 +1,7 @@
-//! How well instruments are found in a recording whose instrument masks are known, such as a phantom's:
-//! `cargo run --release -p trocar-segment --example metal -- RECORDING [PICTURES]`. With a second folder it also writes
-//! pictures there: found in green, missed in red, too much in blue.
+//! Measures how well instruments are found in a recording with known instrument masks, such as a
+//! phantom's: `cargo run --release -p trocar-segment --example metal -- RECORDING [PICTURES]`. With
+//! a second folder it also writes pictures there: found in green, missed in red, wrongly included
+//! in blue.
 
 #![allow(clippy::print_stdout, reason = "it prints its figures")]
 

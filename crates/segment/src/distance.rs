@@ -1,15 +1,16 @@
-//! Distances in masks, and growing, shrinking and closing by them.
+//! Distances in masks, and dilation, erosion and closing by distance.
 //!
-//! Distances are chamfer distances with weights 5 and 7 (Borgefors 1986, "Distance transformations in digital images"):
-//! at most 8% too long and 1% too short, and two passes whatever the radius.
+//! Distances are chamfer distances with weights 5 and 7 (Borgefors 1986, "Distance transformations
+//! in digital images"): at most 8% too long and 1% too short. They take two passes for every
+//! radius.
 
-/// One pixel's step, in the unit of [`distances`].
+/// A step of one pixel, in the unit of [`distances`].
 pub(crate) const PIXEL: u16 = 5;
 const DIAGONAL: u16 = 7;
 const FAR: u16 = u16::MAX - 2 * DIAGONAL;
 
-/// Distance of every pixel to the nearest one of `set`, in fifths of a pixel; saturates at about 13,000 pixels. With
-/// `rim`, what lies outside the image counts as set.
+/// Distance of every pixel to the nearest one of `set`, in fifths of a pixel; saturates at about
+/// 13,000 pixels. With `rim`, the outside of the image counts as set.
 pub(crate) fn distances(set: &[bool], width: usize, height: usize, rim: bool) -> Vec<u16> {
     let mut d: Vec<u16> = set.iter().map(|s| if *s { 0 } else { FAR }).collect();
     if width == 0 || height == 0 {
@@ -31,8 +32,8 @@ pub(crate) fn distances(set: &[bool], width: usize, height: usize, rim: bool) ->
     d
 }
 
-/// Carries distances along `rows`, each from the one before it in the list, and along each row both ways. Row by row, so
-/// that the compiler can take many pixels at once.
+/// Propagates distances along `rows`, each from the row before it in the list, and along each row
+/// both ways. It works row by row so that the compiler can vectorise.
 fn sweep(d: &mut [u16], width: usize, rows: &[usize]) {
     let mut before = vec![FAR; width + 2]; // with a pixel more on both sides
     for &v in rows {
@@ -60,7 +61,7 @@ pub(crate) fn grow(set: &[bool], width: usize, height: usize, radius: f64) -> Ve
     distances(set, width, height, false).into_iter().map(|d| d <= reach).collect()
 }
 
-/// Grows and shrinks again: gaps narrower than twice `radius` close. The image's rim is no gap.
+/// Morphological closing: closes gaps narrower than twice `radius`. The image's rim is not a gap.
 pub(crate) fn close(set: &[bool], width: usize, height: usize, radius: f64) -> Vec<bool> {
     let reach = reach(radius);
     let gaps: Vec<bool> = distances(set, width, height, false).into_iter().map(|d| d > reach).collect();
@@ -72,7 +73,8 @@ fn reach(radius: f64) -> u16 {
     (radius * f64::from(PIXEL)).clamp(0.0, f64::from(FAR - 1)) as u16
 }
 
-/// The pixel of `set` farthest from everything else, the first of several; the image's rim counts as else.
+/// The pixel of `set` farthest from all other pixels, the first of several; the outside of the
+/// image counts as other pixels.
 pub(crate) fn innermost(set: &[bool], width: usize, height: usize) -> Option<usize> {
     let rest: Vec<bool> = set.iter().map(|s| !s).collect();
     let mut best: Option<(u16, usize)> = None;

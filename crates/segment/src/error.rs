@@ -1,30 +1,30 @@
-//! What can go wrong when something is looked for in a picture.
+//! Errors of segmentation.
 
 use std::path::PathBuf;
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A target that cannot be found, or a tool for it that cannot be used.
+/// A target that cannot be found, or a segmenter that cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// An image file is unusable.
     #[error(transparent)]
     Image(#[from] trocar_camera::Error),
-    /// What was pointed at is no usable prompt.
+    /// The target's points, box or outline are unusable.
     #[error("target '{target}': {reason}")]
     Target {
         /// Its name.
         target: String,
-        /// What is wrong and what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
-    /// A picture does not fit.
+    /// A picture has the wrong size.
     #[error("{picture}: {reason}")]
     Picture {
         /// Its name.
         picture: String,
-        /// What is wrong and what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
     /// A file or folder cannot be used.
@@ -32,7 +32,7 @@ pub enum Error {
     File {
         /// The file or folder.
         path: PathBuf,
-        /// What is wrong and what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
     /// ONNX Runtime's library is missing or unusable.
@@ -45,12 +45,8 @@ pub enum Error {
 
 impl Error {
     pub(crate) fn file(path: &std::path::Path, reason: impl std::fmt::Display) -> Self {
-        // Some libraries explain themselves over many lines; a message is one.
+        // Some libraries' messages have several lines; ours have one.
         let reason = reason.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
         Self::File { path: path.to_owned(), reason }
-    }
-
-    pub(crate) fn target(target: &crate::Target, reason: impl Into<String>) -> Self {
-        Self::Target { target: target.name.clone(), reason: reason.into() }
     }
 }

@@ -1,10 +1,11 @@
-//! Masks that lie on disk, drawn or computed elsewhere.
+//! Mask files, drawn or computed elsewhere.
 
 use crate::{Error, Picture, Result, Segmenter, Target};
 use std::path::PathBuf;
 use trocar_camera::Mask;
 
-/// Reads `<folder>/<target>.png`, whatever the picture shows; sizes must agree. For organs, which do not move.
+/// Reads `<folder>/<target>.png`, whatever the picture shows; the sizes must agree. For organs,
+/// which do not move.
 #[derive(Clone, Debug)]
 pub struct MaskFolder {
     /// The folder, usually a recording's `masks`.
@@ -15,19 +16,22 @@ impl Segmenter for MaskFolder {
     fn segment(&self, picture: &Picture<'_>, target: &Target) -> Result<Mask> {
         picture.check()?;
         let name = &target.name;
-        // A name is one file in the folder, never a way out of it.
+        // The name is one file in the folder, never a path out of it.
         if name.is_empty() || name.starts_with('.') || name.contains(['/', '\\', ':', '\0']) {
-            return Err(Error::target(target, "the name must be that of a file in the mask folder, without '.png'"));
+            return Err(target.error("the name must be that of a file in the mask folder, without '.png'"));
         }
         let path = self.folder.join(format!("{name}.png"));
         let mask = Mask::read(&path)?;
         let (width, height) = (picture.color.width, picture.color.height);
         if (mask.width, mask.height) != (width, height) {
-            let reason = format!("{} x {} pixels, but {} is {width} x {height}", mask.width, mask.height, picture.name);
+            let reason = format!(
+                "the mask has {} x {} pixels, but {} is {width} x {height}",
+                mask.width, mask.height, picture.name
+            );
             return Err(Error::file(&path, reason));
         }
         if mask.count() == 0 {
-            return Err(Error::file(&path, "no pixel is set; the target's pixels are white"));
+            return Err(Error::file(&path, "no pixel is set; the target's pixels must be white"));
         }
         Ok(mask)
     }

@@ -1,10 +1,11 @@
 //! Finds organs and instruments in pictures of a recording.
 //!
-//! One trait, [`Segmenter`], and four ways to fill it: masks on disk ([`MaskFolder`]), an outline drawn by hand
-//! ([`Polygon`]), instruments by the looks of metal ([`MetalDetector`], no weights), and SAM 2.1 from a few clicks
-//! ([`Sam2`], with weights the user points to, followed through a recording by [`Tracker`]).
+//! One trait, [`Segmenter`], has four implementations: mask files ([`MaskFolder`]), an outline
+//! drawn by hand ([`Polygon`]), instruments by the appearance of metal ([`MetalDetector`], no
+//! weights), and SAM 2.1 from a few clicks ([`Sam2`], with weights that the user provides).
+//! [`Tracker`] follows a target through a recording with SAM 2.1.
 //!
-//! Pixels as everywhere in Trocar: the centre of the first pixel is (0, 0), x right, y down.
+//! Pixel coordinates: the centre of the first pixel is (0, 0), x points right, y down.
 
 mod distance;
 mod error;

@@ -1,6 +1,6 @@
-//! What every segmenter is given, and the trait it fills.
+//! The inputs of a segmenter, and the trait.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 
 /// One picture of a recording.
@@ -8,53 +8,52 @@ use trocar_camera::{ColorImage, DepthImage, Mask};
 pub struct Picture<'a> {
     /// The colours.
     pub color: &'a ColorImage,
-    /// Depth of the same pixels [m], where there is any; other sizes than the colours' are ignored.
+    /// Depth of the same pixels (m), if any; ignored when its size differs from the colour's.
     pub depth: Option<&'a DepthImage>,
-    /// What messages call it: `frame 12`, `composite`.
+    /// Its name in messages: `frame 12`, `composite`.
     pub name: &'a str,
 }
 
-/// What to find: a name, and what the user pointed at, in pixels of the colour image. A segmenter uses what it can and
-/// says so when that is missing.
+/// The target: a name, and what the user marked, in pixels of the colour image. A segmenter uses
+/// what it can, and its error says what it needs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Target {
     /// Name, as in `masks/<name>.png`.
     pub name: String,
-    /// Outline [px]; empty if none was drawn.
+    /// Outline (px); empty if none was drawn.
     pub polygon: Vec<[f64; 2]>,
-    /// Points on the target [px].
+    /// Points on the target (px).
     pub points: Vec<[f64; 2]>,
-    /// Points that are not on it [px].
+    /// Points outside the target (px).
     pub points_outside: Vec<[f64; 2]>,
-    /// Box around it: left, top, right, bottom [px].
+    /// Box around it: left, top, right, bottom (px).
     pub box_px: Option<[f64; 4]>,
 }
 
 /// Finds a target in a picture.
 pub trait Segmenter: Sync {
-    /// The target's pixels; as large as the picture.
+    /// The target's pixels; the mask has the picture's size.
     ///
     /// # Errors
     /// When the target lacks what this segmenter needs, or its files cannot be used.
     fn segment(&self, picture: &Picture<'_>, target: &Target) -> Result<Mask>;
 
-    /// One line that says what this is and where its knowledge comes from, for reports.
+    /// One line for reports: what this is, and the source of its weights or masks.
     fn describe(&self) -> String;
 }
 
 impl Picture<'_> {
-    /// Refuses a picture without pixels, or with other pixels than its size says.
+    /// Refuses a picture without pixels, or whose pixel count differs from its size.
     pub(crate) fn check(&self) -> Result<()> {
         let ColorImage { width, height, pixels } = self.color;
         if *width == 0 || *height == 0 || width.checked_mul(*height) != Some(pixels.len()) {
-            let reason =
-                format!("{width} x {height} with {} pixels; an image has width x height of them", pixels.len());
+            let reason = format!("{width} x {height} with {} pixels; it must have width x height pixels", pixels.len());
             return Err(Error::Picture { picture: self.name.to_owned(), reason });
         }
         Ok(())
     }
 
-    /// The depth, if it is of this picture's size.
+    /// The depth, if it has this picture's size.
     pub(crate) fn matching_depth(&self) -> Option<&DepthImage> {
         let n = self.color.pixels.len();
         self.depth.filter(|d| (d.width, d.height) == (self.color.width, self.color.height) && d.depth.len() == n)
@@ -62,22 +61,30 @@ impl Picture<'_> {
 }
 
 impl Target {
-    /// Refuses coordinates that are not finite, an outline of one or two points, and a box inside out.
+    /// An error about this target.
+    pub(crate) fn error(&self, reason: impl Into<String>) -> Error {
+        Error::Target { target: self.name.clone(), reason: reason.into() }
+    }
+
+    /// Refuses coordinates that are not finite, an outline of one or two points, and an inverted
+    /// box.
     pub(crate) fn check(&self) -> Result<()> {
         let lists = [("polygon", &self.polygon), ("points", &self.points), ("points_outside", &self.points_outside)];
         for (name, list) in lists {
             if list.iter().flatten().any(|c| !c.is_finite()) {
-                return Err(Error::target(self, format!("{name} has a coordinate that is not a finite number")));
+                return Err(self.error(format!("{name} has a coordinate that is not a finite number")));
             }
         }
         if matches!(self.polygon.len(), 1 | 2) {
-            return Err(Error::target(self, "polygon has fewer than 3 points; an outline has at least 3"));
+            return Err(self.error("polygon has fewer than 3 points; it must have at least 3"));
         }
         if let Some([left, top, right, bottom]) = self.box_px
             && !(left < right && top < bottom && (right - left).is_finite() && (bottom - top).is_finite())
         {
-            let text = format!("box_px is [{left}, {top}, {right}, {bottom}]; left, top, right, bottom in this order");
-            return Err(Error::target(self, text));
+            let text = format!(
+                "box_px is [{left}, {top}, {right}, {bottom}]; it must be left, top, right, bottom with left < right and top < bottom"
+            );
+            return Err(self.error(text));
         }
         Ok(())
     }
@@ -88,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn nonsense_is_refused_with_the_fields_name() {
+    fn invalid_targets_are_refused_with_the_fields_name() {
         let whole = Target { name: "liver".into(), points: vec![[1.0, 2.0]], ..Target::default() };
         assert!(whole.check().is_ok());
         let wrong = [

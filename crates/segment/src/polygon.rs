@@ -1,9 +1,9 @@
-//! From an outline to a mask.
+//! Masks from outlines.
 
-use crate::{Error, Picture, Result, Segmenter, Target};
+use crate::{Picture, Result, Segmenter, Target};
 use trocar_camera::Mask;
 
-/// Fills the target's outline; the picture only gives the size.
+/// Fills the target's outline; the picture only provides the size.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Polygon;
 
@@ -12,7 +12,7 @@ impl Segmenter for Polygon {
         picture.check()?;
         target.check()?;
         if target.polygon.is_empty() {
-            return Err(Error::target(target, "no polygon; draw an outline of at least 3 points"));
+            return Err(target.error("it has no polygon; draw an outline of at least 3 points"));
         }
         Ok(fill_polygon(picture.color.width, picture.color.height, &target.polygon))
     }
@@ -22,7 +22,7 @@ impl Segmenter for Polygon {
     }
 }
 
-/// Pixels whose centre lies inside `outline` [px] by the even-odd rule.
+/// Pixels whose centre is inside `outline` (px), by the even-odd rule.
 pub fn fill_polygon(width: usize, height: usize, outline: &[[f64; 2]]) -> Mask {
     let mut mask = Mask::new(width, height);
     let mut crossings = Vec::new();

@@ -1,5 +1,5 @@
-//! Without ONNX Runtime nothing panics, and everything that does not need it works. A program of its own: a process that
-//! has the library open cannot show this.
+//! Without ONNX Runtime nothing panics, and everything that does not need it works. This is a
+//! program of its own, because a process with an open library cannot show it.
 
 #![allow(clippy::print_stdout, reason = "it says when it is skipped")]
 
@@ -18,7 +18,7 @@ fn a_missing_or_wrong_library_is_an_error_of_one_line() {
     let text = dir.path().join("libonnxruntime.so");
     std::fs::write(&text, "no library").unwrap();
     let mut runtimes = vec![None, Some(dir.path().join("none")), Some(text)];
-    // A library, but another one.
+    // A library, but not ONNX Runtime's.
     runtimes.extend(["/lib/x86_64-linux-gnu/libm.so.6"].map(|p| Some(p.into())).into_iter().filter(exists));
     for runtime in runtimes {
         let message = Sam2::open(&networks, runtime.as_deref()).unwrap_err().to_string();

@@ -1,5 +1,6 @@
-//! The SAM 2.1 path, run for real: ONNX Runtime on tiny networks with SAM's interface (`fixtures/make_tiny_sam.py`). They
-//! select by colour, so that every answer is known. Skipped, saying so, where the runtime's library is not.
+//! Runs the SAM 2.1 path: ONNX Runtime on tiny networks with SAM's interface
+//! (`fixtures/make_tiny_sam.py`). They select by colour, so every answer is known. Skipped with a
+//! message where the runtime's library is missing.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -17,10 +18,10 @@ fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
 }
 
-/// The networks, or why there are none.
+/// The networks, or `None` without the runtime.
 fn open(name: &str) -> Option<Sam2> {
     let tools = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools");
-    // Where pip puts it: lib/python3.11/site-packages/onnxruntime/capi.
+    // pip's path: lib/python3.11/site-packages/onnxruntime/capi.
     let versions = std::fs::read_dir(tools.join("lib")).into_iter().flatten().flatten();
     let installed = versions.map(|v| v.path().join("site-packages/onnxruntime/capi")).any(|capi| capi.is_dir());
     if std::env::var_os("ORT_DYLIB_PATH").is_none() && !installed {
@@ -41,7 +42,8 @@ fn paint(boxes: &[([usize; 4], [u8; 3])]) -> ColorImage {
     image
 }
 
-/// Intersection over union with a box. The networks' cells are 3.3 x 1.9 pixels, so that a rim is always lost.
+/// Intersection over union with a box. The networks' cells are 3.3 x 1.9 pixels, so a rim is always
+/// lost.
 fn iou(mask: &Mask, [left, top, right, bottom]: [usize; 4]) -> f64 {
     let inside = |i: usize| (left..right).contains(&(i % WIDTH)) && (top..bottom).contains(&(i / WIDTH));
     let both = (0..mask.set.len()).filter(|i| mask.set[*i] && inside(*i)).count();
@@ -70,7 +72,8 @@ fn points_boxes_and_outlines_select_what_they_point_at() {
         assert!(iou(&mask, left) > 0.9, "{name}: {}", iou(&mask, left));
         assert!(iou(&find(&target(&[[160.0, 60.0]], &[])), right) > 0.9, "{name}");
 
-        // Both clicked: both; the second clicked as outside, or with nothing left to be it: only the first.
+        // Both clicked: both. The second clicked as outside, or nothing left for it: only the
+        // first.
         let both = find(&target(&[[50.0, 50.0], [160.0, 60.0]], &[]));
         assert!(both.set[50 * WIDTH + 50] && both.set[60 * WIDTH + 160] && !both.set[60 * WIDTH + 110]);
         let first = find(&target(&[[50.0, 50.0]], &[[160.0, 60.0]]));
@@ -98,7 +101,8 @@ fn tracking_follows_one_square_and_not_its_double() {
         let message = tracker.next(&picture(&show(0))).unwrap_err().to_string();
         assert!(message.contains("frame 1") && message.contains("start"), "{message}");
 
-        // By colour alone both are taken; the box says which, and after that the mask prompt does.
+        // By colour alone both are included; the box selects one, and after that the mask prompt
+        // does.
         let both = sam.segment(&picture(&show(0)), &target(&[[30.0, 30.0]], &[])).unwrap();
         assert!(both.set[90 * WIDTH + 180]);
         let only = Target { box_px: Some([5.0, 5.0, 55.0, 55.0]), ..target(&[[30.0, 30.0]], &[]) };
@@ -122,7 +126,7 @@ fn the_same_prompt_gives_the_same_bits() {
     let (first, other) = (paint(&[([20, 20, 90, 100], RED)]), paint(&[([30, 20, 90, 90], PINK)]));
     let target = target(&[[50.0, 50.0]], &[]);
     let once = sam.segment(&picture(&first), &target).unwrap();
-    // Another picture in between: what is remembered of a picture must not be given for another.
+    // Another picture in between: the cached features of a picture must not serve another.
     assert_ne!(sam.segment(&picture(&other), &target).unwrap(), once);
     assert_eq!(sam.segment(&picture(&first), &target).unwrap(), once);
     assert!(sam.describe().contains("256 x 256"));
@@ -152,6 +156,6 @@ fn files_that_are_no_sam_are_named() {
         let message = attempt(&read(&encoder), broken).unwrap_err().to_string();
         assert!(message.contains("mask_decoder.onnx") && !message.contains('\n'), "{message}");
     }
-    // Outputs under the other exporter's names still fit by their parts.
+    // Outputs with the other exporter's names still match by their roles.
     assert!(attempt(&read(&sized), &whole).unwrap().is_ok());
 }

@@ -1,6 +1,7 @@
-//! `specimen.toml` as it stands in the file.
+//! The contents of `specimen.toml`.
 
-use crate::{Material, Organ, OrganFacts, Pins, Provenance, Specimen, check_name};
+use crate::organ::{Material, Organ, OrganFacts, Pins, check_name};
+use crate::specimen::{Provenance, Specimen};
 use glam::{DQuat, DVec3};
 use serde::{Deserialize, Serialize};
 use trocar_camera::Camera;
@@ -42,7 +43,7 @@ pub struct OrganEntry {
 }
 
 impl Document {
-    /// What `specimen` has to say beside its meshes and images.
+    /// The contents for `specimen`: everything but its meshes and images.
     pub fn of(specimen: &Specimen) -> Self {
         let Pose { rotation: q, translation } = specimen.placement;
         let entry = |o: &Organ| OrganEntry {
@@ -62,32 +63,35 @@ impl Document {
         }
     }
 
-    /// Checks every field and normalises directions. The error names the field, its value and what would be right.
+    /// Checks every field and normalises directions. The error names the field, its value, and what
+    /// would be right.
     pub fn validate(&mut self) -> Result<(), String> {
         let up = DVec3::from(self.up).try_normalize();
-        self.up = up.ok_or_else(|| format!("up is {:?}; a direction", self.up))?.into();
+        self.up = up.ok_or_else(|| format!("up is {:?}; it must be a direction", self.up))?.into();
         let [w, x, y, z] = self.placement.rotation_wxyz;
         let length = DQuat::from_xyzw(x, y, z, w).length();
         if !(1.0 - 1e-6..=1.0 + 1e-6).contains(&length) {
-            return Err(format!("placement.rotation_wxyz has length {length}; a unit quaternion, scalar first"));
+            return Err(format!(
+                "placement.rotation_wxyz has length {length}; it must be a unit quaternion, scalar first"
+            ));
         }
         if self.placement.translation_m.iter().any(|t| !t.is_finite()) {
-            return Err("placement.translation_m is not finite".into());
+            return Err("placement.translation_m is not finite; it must be metres".into());
         }
         if let Some(camera) = &self.camera {
             camera.validate().map_err(|e| e.to_string())?;
         }
         if self.organs.is_empty() {
-            return Err("no organ; a specimen has at least one".into());
+            return Err("there is no [[organ]]; a specimen has at least one".into());
         }
         for (i, organ) in self.organs.iter().enumerate() {
             check_name(&organ.name).map_err(|r| format!("organ[{i}].name: {r}"))?;
             let field = |r: String| format!("organ '{}': {r}", organ.name);
             if self.organs[..i].iter().any(|o| o.name == organ.name) {
-                return Err(field("its name is used twice; names are unique".into()));
+                return Err(field("its name is used twice; names must be unique".into()));
             }
             if organ.base_m.iter().any(|c| !c.is_finite()) {
-                return Err(field("base_m is not finite".into()));
+                return Err(field("base_m is not finite; it must be metres".into()));
             }
             organ.material.validate().map_err(|r| field(format!("material.{r}")))?;
             organ.pins.validate().map_err(|r| field(format!("pins.{r}")))?;
@@ -95,7 +99,7 @@ impl Document {
         Ok(())
     }
 
-    /// The specimen, once its organs are loaded.
+    /// The specimen with its loaded organs.
     pub fn into_specimen(self, organs: Vec<Organ>) -> Specimen {
         let [w, x, y, z] = self.placement.rotation_wxyz;
         Specimen {

@@ -1,4 +1,4 @@
-//! What can go wrong with a specimen folder.
+//! Errors of specimen folders.
 
 use std::path::PathBuf;
 
@@ -13,15 +13,15 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// `specimen.toml` does not say what it should.
+    /// A file of the specimen has wrong contents.
     #[error("{path}: {reason}", path = path.display())]
     Invalid {
         /// The file.
         path: PathBuf,
-        /// Field, what is wrong with it, what would be right.
+        /// The field, what is wrong with it, and what would be right.
         reason: String,
     },
     /// A mesh of the specimen is unusable.

@@ -1,15 +1,16 @@
-//! Organs on disk: the folder that reconstruction writes and the cell reads.
+//! Organs on disk: the folder that reconstruction writes and the simulation reads.
 //!
 //! ```text
 //! specimen.toml     organs, materials, pins, provenance
 //! <organ>.msh       tetrahedral mesh, Gmsh 4.1, metres
 //! <organ>.ply       closed coloured surface, metres
 //! background.png    the composite (recordings only)
-//! report.html       what a person looks at (written by the report)
+//! report.html       the page for people (written by `trocar reconstruct`)
 //! ```
 
 mod document;
 mod error;
+mod folder;
 mod organ;
 mod specimen;
 mod staged;

@@ -1,11 +1,11 @@
-//! A folder that appears whole or not at all.
+//! A folder that appears complete or not at all.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// A folder written beside its target under a hidden name and moved into place by [`StagedFolder::commit`]. Dropped
-/// uncommitted, it removes itself and the parents it created.
+/// A folder that is written beside its target under a hidden name, and moved into place by
+/// [`StagedFolder::commit`]. Dropped uncommitted, it removes itself and the parents it created.
 #[derive(Debug)]
 pub struct StagedFolder {
     target: PathBuf,
@@ -16,8 +16,8 @@ pub struct StagedFolder {
 }
 
 impl StagedFolder {
-    /// Stages `target`, which must not exist, be empty, or be an earlier folder of the same kind: one that holds a file
-    /// named `marker`. Nothing of an earlier folder is touched before the commit.
+    /// Stages `target`, which must not exist, be empty, or be an earlier folder of the same kind,
+    /// with a file named `marker`. An earlier folder stays untouched until the commit.
     ///
     /// # Errors
     /// When `target` is something else, or its parent cannot be created or written to.
@@ -27,15 +27,15 @@ impl StagedFolder {
             Err(_) => target.to_owned(),
         };
         let Some(name) = target.file_name().map(|n| n.to_string_lossy().into_owned()) else {
-            return Err(invalid(&target, "not the name of a folder that could be written"));
+            return Err(invalid(&target, "it is not the name of a folder that can be written"));
         };
         if target.exists() && !target.is_dir() {
-            return Err(invalid(&target, "a file of that name exists; name a new folder"));
+            return Err(invalid(&target, "a file of that name exists; choose a new folder"));
         }
         if target.is_dir() && !target.join(marker).is_file() && !is_empty(&target)? {
             return Err(invalid(
                 &target,
-                &format!("the folder exists and holds no {marker}, so it is not overwritten; name a new folder"),
+                &format!("the folder exists and holds no {marker}, so it is not overwritten; choose a new folder"),
             ));
         }
         let parent = match target.parent() {
@@ -48,7 +48,7 @@ impl StagedFolder {
         fs::create_dir_all(&parent).map_err(io(&parent))?;
         let base = format!(".{name}.partial-{}", std::process::id());
         let mut stage = parent.join(&base);
-        // Two writers of one target in one process differ by a number.
+        // Two writers of one target in one process get different numbers.
         for n in 1.. {
             match fs::create_dir(&stage) {
                 Ok(()) => break,
@@ -62,7 +62,8 @@ impl StagedFolder {
         Ok(Self { target, stage, created, committed: false })
     }
 
-    /// Finds out whether `target` could be written, and leaves nothing behind; for a clear error before long work.
+    /// Checks whether `target` can be written, and leaves nothing behind; for a clear error before
+    /// long work.
     ///
     /// # Errors
     /// Those of [`StagedFolder::create`].
@@ -75,8 +76,9 @@ impl StagedFolder {
         &self.stage
     }
 
-    /// Moves the folder into place. An earlier folder is moved aside first and deleted last, so that it survives a failure; what lies in it that the
-    /// new one has nothing of that name for (a user's notes, runs) is kept.
+    /// Moves the folder into place. An earlier folder is moved aside first and deleted last, so it
+    /// survives a failure. Its entries whose names the new folder does not have (a user's notes,
+    /// runs) are kept.
     ///
     /// # Errors
     /// When the system refuses to move.
@@ -85,7 +87,7 @@ impl StagedFolder {
             let aside = self.stage.with_extension("replaced");
             fs::rename(&self.target, &aside).map_err(io(&self.target))?;
             if let Err(e) = fs::rename(&self.stage, &self.target) {
-                // Put the earlier folder back; the first failure is the one to report.
+                // Restores the earlier folder; the first failure is the one to report.
                 let _ = fs::rename(&aside, &self.target);
                 return Err(io(&self.target)(e));
             }
@@ -103,14 +105,14 @@ impl StagedFolder {
 impl Drop for StagedFolder {
     fn drop(&mut self) {
         if !self.committed {
-            // A destructor cannot report; what stays is a hidden folder that says "partial".
+            // A destructor cannot report errors; a folder that stays is hidden and named "partial".
             let _ = fs::remove_dir_all(&self.stage);
             remove_empty(&self.created);
         }
     }
 }
 
-/// Moves what `old` holds and `new` does not into `new`.
+/// Moves the entries of `old` that `new` does not have into `new`.
 fn keep_foreign(old: &Path, new: &Path) -> Result<()> {
     for entry in fs::read_dir(old).map_err(io(old))? {
         let name = entry.map_err(io(old))?.file_name();
@@ -124,7 +126,7 @@ fn keep_foreign(old: &Path, new: &Path) -> Result<()> {
 
 fn remove_empty(created: &[PathBuf]) {
     for parent in created.iter().rev() {
-        // Refuses folders that are in use by now.
+        // Fails for folders that are in use by now.
         let _ = fs::remove_dir(parent);
     }
 }
@@ -153,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn appears_whole_or_not_at_all() {
+    fn appears_complete_or_not_at_all() {
         let root = tempfile::tempdir().unwrap();
         let target = root.path().join("a/b/out");
         let staged = StagedFolder::create(&target, "mark").unwrap();
@@ -172,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn refuses_what_is_not_its_own() {
+    fn refuses_other_folders() {
         let root = tempfile::tempdir().unwrap();
         let target = root.path().join("precious");
         fs::create_dir(&target).unwrap();

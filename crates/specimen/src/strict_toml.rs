@@ -1,22 +1,23 @@
-//! TOML files whose mistakes are explained: file, line, field, and the key that was probably meant.
+//! Strict TOML: errors name the file, line and field, and a known key that is similar.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 
-/// Reads a TOML file into `T`. Where `T` denies unknown fields, the error for one names the nearest known key.
+/// Reads a TOML file into `T`. Where `T` denies unknown fields, the error for one suggests a
+/// similar known key.
 ///
 /// # Errors
-/// Names the file, and for a mistake in it the line and the field.
+/// Names the file, and the line and field of a mistake in it.
 pub fn read_toml<T: DeserializeOwned>(path: &Path) -> Result<T> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
     parse_toml(&text).map_err(|reason| Error::Invalid { path: path.to_owned(), reason })
 }
 
-/// [`read_toml`] for text that is at hand.
+/// [`read_toml`] for text in memory.
 ///
 /// # Errors
-/// "line: field: what is wrong with it", one line, as far as they are known.
+/// One line "line: field: what is wrong", as far as these are known.
 pub fn parse_toml<T: DeserializeOwned>(text: &str) -> std::result::Result<T, String> {
     let line =
         |e: &toml::de::Error| e.span().map_or_else(String::new, |s| format!("line {}: ", line_at(text, s.start)));
@@ -33,7 +34,8 @@ fn line_at(text: &str, byte: usize) -> usize {
     1 + text.as_bytes()[..byte.min(text.len())].iter().filter(|b| **b == b'\n').count()
 }
 
-/// The line, from 1, of the field `path`, such as `organ[1].pins.share`; where it is not in the text, of the innermost part that is. `None` where not even the first is, or the text is no
+/// The line, from 1, of the field `path`, such as `organ[1].pins.share`. For a field that is not in
+/// the text, the line of its innermost part that is. `None` where there is none, or the text is not
 /// TOML.
 pub fn line_of(text: &str, path: &str) -> Option<usize> {
     let document = toml::de::DeTable::parse(text).ok()?;
@@ -47,7 +49,8 @@ pub fn line_of(text: &str, path: &str) -> Option<usize> {
                 None => break,
             },
             (None, Some(table), _) => match table.get_key_value(step) {
-                // A key stands where its value begins or above; a table's key is repeated in every header below it.
+                // A key's line is its own; a table's is its header's, because headers below repeat
+                // the key.
                 Some((key, value)) => {
                     (value, if value.get_ref().is_table() { value.span().start } else { key.span().start })
                 }
@@ -62,11 +65,11 @@ pub fn line_of(text: &str, path: &str) -> Option<usize> {
     line
 }
 
-/// What a parser said on one line, which is short: it may repeat a value, and that may be the whole file.
+/// A parser's message on one line. It is cut, because it may repeat a value as long as the file.
 fn one_line(message: &str) -> String {
-    const LONGEST: usize = 1000;
+    const MAX_MESSAGE_CHARS: usize = 1000;
     let line = message.split_whitespace().collect::<Vec<_>>().join(" ");
-    match line.char_indices().nth(LONGEST) {
+    match line.char_indices().nth(MAX_MESSAGE_CHARS) {
         Some((end, _)) => format!("{} ...", &line[..end]),
         None => line,
     }
@@ -85,12 +88,15 @@ fn suggestion(message: &str) -> String {
     }
 }
 
-/// The one of `known` most like `given`; the first of equals. `None` without any.
+/// Smallest Jaro-Winkler similarity, in [0, 1], of a name that is suggested.
+const MIN_SIMILARITY: f64 = 0.8;
+
+/// The name in `known` most similar to `given`; the first of equals. `None` where none is similar.
 pub fn nearest<'a>(given: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let mut best: Option<(f64, &str)> = None;
     for candidate in known {
         let score = strsim::jaro_winkler(given, candidate);
-        if best.is_none_or(|(s, _)| score > s) {
+        if score >= MIN_SIMILARITY && best.is_none_or(|(s, _)| score > s) {
             best = Some((score, candidate));
         }
     }
@@ -141,6 +147,23 @@ mod tests {
         }
         assert_eq!(line_of(text, "absent.a"), None);
         assert_eq!(line_of("= 1", "a"), None);
+    }
+
+    #[test]
+    fn only_similar_names_are_suggested() {
+        let similar = [
+            ("apendix", "appendix"),
+            ("lft", "left"),
+            ("colour_topic", "color_topic"),
+            ("depth_scale", "depth_scale_m"),
+            ("phantom-q", "phantom-a"),
+        ];
+        for (given, known) in similar {
+            assert_eq!(nearest(given, ["tube", known]), Some(known));
+        }
+        for (given, known) in [("appendix", "tube"), ("middle", "right"), ("scissors", "cutter"), ("fps", "rate_hz")] {
+            assert_eq!(nearest(given, [known]), None, "{given}");
+        }
     }
 
     #[test]

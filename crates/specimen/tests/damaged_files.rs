@@ -1,11 +1,12 @@
-//! Damaged specimens give a specimen or a one-line error: never a panic, a hang, or more memory than their size calls for.
+//! Damaged specimens give a specimen or a one-line error: never a panic, a hang, or more memory
+//! than their size calls for.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
 
 use std::fs;
-use trocar_fuzz::{Allowance, PEAK, Peak, assault};
 use trocar_specimen::Specimen;
+use trocar_testing::{Allowance, PEAK, Peak, assault};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;

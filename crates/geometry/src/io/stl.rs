@@ -43,12 +43,24 @@ fn collect(bytes: &[u8]) -> Parsed<TriMesh> {
     let facets = stl_io::create_stl_reader(&mut cursor).map_err(|e| e.to_string())?;
     let mut mesh = TriMesh::default();
     for (f, facet) in facets.enumerate() {
-        let facet = facet.map_err(|e| format!("facet {f}: {e}"))?;
+        let facet = facet.map_err(|e| format!("facet {f}: {}", plain(&e.to_string())))?;
         let first = u32::try_from(mesh.vertices.len()).map_err(|_| "too many facets".to_string())?;
         mesh.vertices.extend(facet.vertices.map(|v| DVec3::from_array(v.0.map(f64::from))));
         mesh.triangles.push([first, first + 1, first + 2]);
     }
     Ok(mesh)
+}
+
+/// The STL reader's message in plain words.
+fn plain(message: &str) -> String {
+    if let Some(rest) = message.strip_prefix("expected finite f32, got ") {
+        let value = rest.split_whitespace().next().unwrap_or_default();
+        return format!("a coordinate is {value}; it must be a finite number");
+    }
+    if let Some(found) = message.strip_prefix("vertex f32 f32 f32, got ") {
+        return format!("a corner must be `vertex X Y Z`; the line has the words {found}");
+    }
+    message.to_owned()
 }
 
 #[cfg(test)]
@@ -101,6 +113,10 @@ mod tests {
         assert!(parse(format!("solid\n{facet}facet normal 0").as_bytes()).unwrap_err().contains("facet 1"));
         assert!(parse(format!("solid\n{facet}").as_bytes()).is_err());
         let nan = facet.replace("vertex 1", "vertex nan");
-        assert!(parse(format!("solid\n{facet}{nan}endsolid").as_bytes()).unwrap_err().contains("facet 1"));
+        let reason = parse(format!("solid\n{facet}{nan}endsolid").as_bytes()).unwrap_err();
+        assert_eq!(reason, "facet 1: a coordinate is NaN; it must be a finite number");
+        let short = facet.replace("vertex 1 0 0", "vertex 1 0");
+        let reason = parse(format!("solid\n{facet}{short}endsolid").as_bytes()).unwrap_err();
+        assert!(reason.starts_with("facet 1: a corner must be `vertex X Y Z`"), "{reason}");
     }
 }

@@ -2,6 +2,8 @@
 #![allow(dead_code)]
 #![allow(clippy::unwrap_used, reason = "a test's helper")]
 
+pub mod messages;
+
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
@@ -49,6 +51,11 @@ pub fn info() -> RecordingInfo {
 
 /// The truth: exact depth, colour and the sphere's mask.
 pub fn scene(camera: &Camera) -> (ColorImage, DepthImage, Mask) {
+    scene_at(camera, CENTRE)
+}
+
+/// The truth with the sphere's centre at `centre` (m).
+pub fn scene_at(camera: &Camera, centre: DVec3) -> (ColorImage, DepthImage, Mask) {
     let (w, h) = (camera.width, camera.height);
     let mut color = ColorImage::new(w, h, [90, 90, 100]);
     let (mut depth, mut mask) = (DepthImage::new(w, h), Mask::new(w, h));
@@ -58,7 +65,7 @@ pub fn scene(camera: &Camera) -> (ColorImage, DepthImage, Mask) {
             let i = v * w + u;
             depth.depth[i] = BED as f32;
             // |t ray - c| = r
-            let (a, b, c) = (ray.length_squared(), ray.dot(CENTRE), CENTRE.length_squared() - RADIUS * RADIUS);
+            let (a, b, c) = (ray.length_squared(), ray.dot(centre), centre.length_squared() - RADIUS * RADIUS);
             let d = b * b - a * c;
             if d >= 0.0 {
                 depth.depth[i] = ((b - d.sqrt()) / a) as f32;
@@ -70,13 +77,20 @@ pub fn scene(camera: &Camera) -> (ColorImage, DepthImage, Mask) {
     (color, depth, mask)
 }
 
-/// Writes `frames` frames. The bar covers a third of the frames at each column it passes; depth under it is a hole.
+/// Writes `frames` frames. The bar covers a third of the frames at each column it passes; depth
+/// under it is a hole.
 pub fn write(dir: &Path, info: &RecordingInfo, frames: usize) {
-    let (color, depth, mask) = scene(&info.camera.unwrap());
+    write_moving(dir, info, frames, |_| CENTRE);
+}
+
+/// [`write`] with the sphere's centre at `centre(frame)` (m); its mask is that of `CENTRE`.
+pub fn write_moving(dir: &Path, info: &RecordingInfo, frames: usize, centre: impl Fn(usize) -> DVec3) {
+    let camera = info.camera.unwrap();
+    let mask = scene(&camera).2;
     let writer = RecordingWriter::create(dir, info).unwrap();
-    let w = color.width;
+    let w = camera.width;
     for f in (0..frames).rev() {
-        let (mut color, mut depth) = (color.clone(), depth.clone());
+        let (mut color, mut depth, _) = scene_at(&camera, centre(f));
         let mut instruments = Mask::new(w, color.height);
         for v in 0..color.height {
             for u in 0..w {

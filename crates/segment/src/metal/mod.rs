@@ -1,65 +1,75 @@
-//! Instruments by their looks: steel is grey, tissue is not. No weights, no prompts.
+//! Finds instruments by their appearance: steel is grey, tissue is not. No weights, no prompts.
 //!
-//! 1. Grey pixels: little chroma for their brightness; the clearest of them, neutral or bluish, are seeds.
-//! 2. Single pixels of noise go, narrow gaps (reflections of tissue on the shaft) close, and connected parts are formed.
-//! 3. A part stays if two things speak for it: it reaches the image's rim, is long, is darker than its surroundings in good
-//!    part, or stands nearer to the camera than they (where there is depth; farther speaks against it). Inside the picture
-//!    darkness is a must: wet highlights on tissue are grey, long and on ridges too, but never dark.
-//! 4. What stays loses its very thick parts (drapes, trays), has its small holes filled and grows by a margin.
+//! 1. Grey pixels have little chroma for their brightness. The clearest of them, neutral or bluish,
+//!    are seeds.
+//! 2. Single noisy pixels are removed, narrow gaps (reflections of tissue on the shaft) are closed,
+//!    and connected parts are formed.
+//! 3. A part is kept if two of these hold: it reaches the image's rim, it is long, a good share of
+//!    it is darker than its surroundings, it is nearer to the camera than its surroundings (where
+//!    there is depth; being farther counts against it). Away from the rim darkness is required: wet
+//!    highlights on tissue are grey, long and on ridges too, but never dark.
+//! 4. Kept parts lose their very thick regions (drapes, trays), their small holes are filled, and
+//!    they grow by a margin.
 //!
-//! What this misses: a bright jaw that shows without its shaft, and blades thinner than about 3 pixels. What it takes too:
-//! anything grey that reaches the rim and is not very thick, such as gloves and sutures.
+//! Missed: a bright jaw that shows without its shaft, and blades thinner than about 3 pixels.
+//! Wrongly included: anything grey that reaches the rim and is not very thick, such as gloves and
+//! sutures.
 //!
 //! Lengths are shares of the image's height, so that one set of parameters serves every camera.
 
+mod look;
 mod parts;
 
 use crate::distance::{PIXEL, close, distances, grow};
 use crate::{Error, Picture, Result, Segmenter, Target};
+use look::{Look, without_speckle};
 use parts::{Part, compare, find_parts};
 use trocar_camera::{ColorImage, Mask, pixel_neighbours};
 
-/// What counts as metal. Colours are sRGB, 0 to 255; lengths are shares of the image's height and areas shares of its
-/// pixels. The default is for all recordings.
+/// Parameters of metal. Colours are sRGB in [0, 255]; lengths are shares of the image's height and
+/// areas shares of its pixels. The default serves all recordings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MetalParameters {
-    /// A grey pixel's chroma (largest minus smallest channel) is at most `grey_chroma + grey_saturation` x brightness
-    /// (largest channel).
+    /// Largest chroma (largest minus smallest channel) of a grey pixel: `grey_chroma +
+    /// grey_saturation` x brightness (largest channel).
     pub grey_chroma: f64,
     /// See `grey_chroma`.
     pub grey_saturation: f64,
-    /// The same for seeds, of which a part needs some.
+    /// The same for seeds; a part needs some.
     pub seed_chroma: f64,
     /// See `seed_chroma`.
     pub seed_saturation: f64,
-    /// A seed's red is above the mean of green and blue, and its blue below that of red and green, by at most this and half
-    /// its chroma bound: shadows, pale tissue, fat and bile are warm, steel is not.
+    /// Largest warmth of a seed, beside half its chroma bound: how far its red is above the mean of
+    /// green and blue, or its blue below that of red and green. Shadows, pale tissue, fat and bile
+    /// are warm, steel is not.
     pub seed_warmth: f64,
-    /// Darker pixels (largest channel) are no seeds: in the dark everything is grey.
+    /// Least brightness (largest channel) of a seed: dark pixels are all grey.
     pub seed_brightness: u8,
-    /// Darker pixels (largest channel) are nothing: the black around an endoscope's round picture.
+    /// Least brightness (largest channel) of a grey pixel: around an endoscope's round picture
+    /// everything is black.
     pub black: u8,
-    /// Share of seeds among a part's grey pixels, at least.
+    /// Least share of seeds among a part's grey pixels.
     pub seed_share: f64,
     /// Pixels below this share of their surroundings' brightness (mean largest channel) are dark.
     pub dark: f64,
-    /// Share of dark pixels that speaks for a part.
+    /// Share of dark pixels from which a part counts as dark.
     pub dark_share: f64,
-    /// Gaps up to twice this close.
+    /// Half the width of the gaps that are closed.
     pub closing: f64,
-    /// Smaller parts are dropped (area).
+    /// Least area of a part.
     pub smallest: f64,
-    /// Length over width from which a part is long.
+    /// Length over width from which a part counts as long.
     pub elongation: f64,
-    /// Parts are cut where they are thicker than twice this.
+    /// Half the thickness above which parts are cut.
     pub half_thickness: f64,
-    /// Surroundings that are compared reach this far.
+    /// Width of the surroundings that a part is compared with.
     pub surroundings: f64,
-    /// A part stands out if it is nearer than its surroundings by this [m]; the same farther away speaks against it.
+    /// A part counts as near if it is nearer than its surroundings by this (m); being farther by
+    /// this counts against it.
     pub nearer: f64,
-    /// Smaller holes are filled (area).
+    /// Largest area of a hole that is filled.
     pub hole: f64,
-    /// The mask grows by this, so that no mixed rim stays.
+    /// The mask grows by this, so that no mixed rim stays outside it.
     pub margin: f64,
 }
 
@@ -88,20 +98,11 @@ impl Default for MetalParameters {
     }
 }
 
-/// Finds all metal instruments in a picture; the target only gives the name.
+/// Finds all metal instruments in a picture. The target is ignored.
 #[derive(Clone, Debug, Default)]
 pub struct MetalDetector {
-    /// What counts as metal.
+    /// Its parameters.
     pub parameters: MetalParameters,
-}
-
-/// What a pixel is by its colour alone.
-#[derive(Clone, Copy, Debug, Default)]
-struct Look {
-    grey: bool,
-    seed: bool,
-    /// Largest channel.
-    brightness: u8,
 }
 
 impl Segmenter for MetalDetector {
@@ -171,7 +172,7 @@ impl MetalParameters {
         ];
         for (name, value) in shares {
             if !(0.0..=1.0).contains(&value) {
-                return Err(Error::Setting(format!("{name} is {value}; a share from 0 to 1")));
+                return Err(Error::Setting(format!("{name} is {value}; it must be in [0, 1]")));
             }
         }
         let others = [
@@ -183,7 +184,7 @@ impl MetalParameters {
         ];
         for (name, value) in others {
             if !(0.0..=255.0).contains(&value) {
-                return Err(Error::Setting(format!("{name} is {value}; 0 to 255")));
+                return Err(Error::Setting(format!("{name} is {value}; it must be in [0, 255]")));
             }
         }
         Ok(())
@@ -212,26 +213,7 @@ impl MetalParameters {
     }
 }
 
-/// Grey where most of the 3 x 3 pixels around are; the image goes on beyond its rim as it ends there.
-fn without_speckle(looks: &[Look], width: usize, height: usize) -> Vec<bool> {
-    let mut rows = vec![0u8; width * height];
-    for (row, out) in looks.chunks_exact(width).zip(rows.chunks_exact_mut(width)) {
-        for u in 0..width {
-            let (left, right) = (u.saturating_sub(1), (u + 1).min(width - 1));
-            out[u] = u8::from(row[left].grey) + u8::from(row[u].grey) + u8::from(row[right].grey);
-        }
-    }
-    let mut set = vec![false; width * height];
-    for v in 0..height {
-        let (above, below) = (v.saturating_sub(1) * width, (v + 1).min(height - 1) * width);
-        for u in 0..width {
-            set[v * width + u] = rows[above + u] + rows[v * width + u] + rows[below + u] >= 5;
-        }
-    }
-    set
-}
-
-/// Takes away what a disc of `radius` fits into.
+/// Removes all discs of `radius` from the set.
 fn cut_thick(set: &mut [bool], width: usize, height: usize, radius: f64) {
     let rest: Vec<bool> = set.iter().map(|s| !s).collect();
     let limit = radius * f64::from(PIXEL);
@@ -247,7 +229,7 @@ fn cut_thick(set: &mut [bool], width: usize, height: usize, radius: f64) {
     }
 }
 
-/// Sets enclosed areas of at most `largest` pixels; what touches the rim is not enclosed.
+/// Fills enclosed areas of at most `largest` pixels; areas at the rim are not enclosed.
 fn fill_holes(set: &mut [bool], width: usize, height: usize, largest: usize) {
     let mut seen = set.to_vec();
     let mut hole = Vec::new();

@@ -1,6 +1,6 @@
-//! Connected parts of a mask and what is known of each.
+//! Connected parts of a mask and their properties.
 
-use super::Look;
+use super::look::Look;
 use crate::distance::{PIXEL, distances};
 use trocar_camera::{DepthImage, pixel_neighbours};
 
@@ -9,16 +9,17 @@ use trocar_camera::{DepthImage, pixel_neighbours};
 pub(super) struct Part {
     /// Pixels.
     pub area: usize,
-    /// Grey pixels in it; the counts below are among these.
+    /// Grey pixels in it; the counts below are of these.
     pub grey: usize,
     pub seeds: usize,
-    /// Darker than the surroundings by a given share; none where nothing surrounds it.
+    /// Grey pixels darker than a share of the surroundings' brightness; 0 without surroundings.
     pub dark: usize,
-    /// Reaches the image's rim.
+    /// Whether it reaches the image's rim.
     pub at_rim: bool,
-    /// Largest distance to what is outside [fifths of a pixel].
+    /// Largest distance to the outside (fifths of a pixel).
     pub thickness: u16,
-    /// How much nearer it is to the camera than its surroundings [m], median; `None` without enough depth.
+    /// How much nearer it is to the camera than its surroundings (m), median; `None` without enough
+    /// depth.
     pub nearer: Option<f64>,
 }
 
@@ -30,7 +31,7 @@ impl Part {
     }
 }
 
-/// Parts (4-connected) of `set`, with the part of every pixel.
+/// Parts (4-connected) of `set`, and the part of every pixel.
 pub(super) fn find_parts(set: &[bool], looks: &[Look], width: usize, height: usize) -> (Vec<Option<u32>>, Vec<Part>) {
     let rest: Vec<bool> = set.iter().map(|s| !s).collect();
     let inside = distances(&rest, width, height, false);
@@ -67,8 +68,9 @@ pub(super) fn find_parts(set: &[bool], looks: &[Look], width: usize, height: usi
     (labels, parts)
 }
 
-/// Compares parts with what lies up to `reach` pixels around them, on an image of `size` (width, height). Walks outwards
-/// from all parts at once; each pixel reached is compared with the part's pixel it was reached from.
+/// Compares parts with their surroundings up to `reach` pixels away, in an image of `size` (width,
+/// height). Walks outwards from all parts at once; each pixel is compared with the part's pixel
+/// from which it was reached.
 pub(super) fn compare(
     labels: &[Option<u32>],
     parts: &mut [Part],
@@ -78,7 +80,7 @@ pub(super) fn compare(
     reach: f64,
     dark: f64,
 ) {
-    // Pixels next to the edge mix both sides, and a stereo camera widens what is near.
+    // Pixels next to the edge mix both sides, and a stereo camera enlarges near objects.
     let (skip, steps) = ((0.25 * reach).ceil() as usize, reach.ceil() as usize);
     let mut origin: Vec<u32> = vec![u32::MAX; labels.len()];
     let at_edge = |i: &usize| labels[*i].is_some() && pixel_neighbours(*i, width, height).any(|n| labels[n].is_none());
@@ -130,7 +132,8 @@ fn valid(depth: f32) -> bool {
     depth.is_finite() && depth > 0.0
 }
 
-/// The nearest valid depth in the 5 x 5 pixels around `i`: the part's, not its background's.
+/// The nearest valid depth in the 5 x 5 pixels around `i`, which is the part's and not its
+/// background's.
 fn nearest_around(depth: &DepthImage, i: usize) -> Option<f32> {
     let (u, v) = (i % depth.width, i / depth.width);
     let mut nearest: Option<f32> = None;

@@ -1,4 +1,5 @@
-//! Painted pictures with everything that misleads: noise, wet highlights, fat, pale tissue, dark shadows, reflections.
+//! Painted pictures with misleading features: noise, wet highlights, fat, pale tissue, dark
+//! shadows, reflections.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -8,10 +9,10 @@ use trocar_camera::DepthImage;
 const WIDTH: usize = 424;
 const HEIGHT: usize = 240;
 
-/// A bar: both ends, half width [px], depth [m].
+/// A bar: both ends, half width (px), depth (m).
 type Bar = ([f64; 2], [f64; 2], f64);
 
-/// Uniform in -1..1, the same on every machine (splitmix64).
+/// Uniform in [-1, 1), the same on every machine (splitmix64).
 fn noise(key: u64) -> f64 {
     let mut z = key.wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -56,14 +57,15 @@ fn paint(bars: &[Bar], dark_room: f64) -> (ColorImage, DepthImage, Mask) {
         depth.depth[i] = (0.15 - 0.01 * wave) as f32;
         let ridge = ((x - 230.0) / 8.0).hypot((y - 215.0) / 22.0);
         if ridge < 1.0 {
-            // A gall bladder: green, near, with a long wet highlight that is nearly grey.
+            // A gall bladder: green, near, with a long wet highlight that is almost grey.
             let shine = (1.3 - ((x - 228.0) / 4.0).hypot((y - 215.0) / 18.0)).clamp(0.0, 0.7);
             rgb = [110.0, 120.0, 72.0].map(|c| c + (220.0 - c) * shine);
             depth.depth[i] -= (0.01 * (1.0 - ridge * ridge).sqrt()) as f32;
         }
         for bar in bars {
             if let Some(s) = across(bar, x, y) {
-                // Lit from one side: bright line, grey flank, dark edge; red glow of the tissue on the other flank.
+                // Lit from one side: bright line, grey flank, dark edge; red glow of the tissue on
+                // the other flank.
                 let shine = (-((s + 0.35) / 0.15).powi(2)).exp();
                 let flank = 150.0 * (1.0 - 0.75 * s.abs()) - 30.0 * s;
                 let glow = 22.0 * (-((s - 0.5) / 0.2).powi(2)).exp();
@@ -96,7 +98,7 @@ fn figures(found: &Mask, truth: &Mask) -> (f64, f64) {
 const SHAFTS: [Bar; 2] = [([-20.0, 130.0], [190.0, 100.0], 7.0), ([440.0, 200.0], [230.0, 130.0], 5.0)];
 
 #[test]
-fn shafts_are_found_among_all_that_misleads() {
+fn shafts_are_found_among_misleading_features() {
     for light in [1.0, 0.55] {
         let (color, depth, truth) = paint(&SHAFTS, light);
         for depth in [None, Some(&depth)] {
@@ -118,7 +120,8 @@ fn tissue_alone_has_no_metal() {
 
 #[test]
 fn depth_tells_a_loose_jaw_from_a_stain() {
-    // Short and away from the rim: a jaw whose shaft is hidden. The same patch lying in the tissue is none.
+    // Short and away from the rim: a jaw whose shaft is hidden. The same patch in the tissue is not
+    // one.
     let jaw: [Bar; 1] = [([200.0, 80.0], [228.0, 84.0], 8.0)];
     let (mut color, mut depth, truth) = paint(&jaw, 1.0);
     for (p, t) in color.pixels.iter_mut().zip(&truth.set) {
@@ -136,7 +139,7 @@ fn depth_tells_a_loose_jaw_from_a_stain() {
 }
 
 #[test]
-fn what_is_too_thick_is_no_instrument() {
+fn thick_regions_are_not_instruments() {
     let (mut color, _, _) = paint(&[], 1.0);
     for (i, p) in color.pixels.iter_mut().enumerate() {
         if i % WIDTH < 120 {
@@ -148,7 +151,7 @@ fn what_is_too_thick_is_no_instrument() {
 }
 
 #[test]
-fn any_picture_and_any_parameters_are_survived() {
+fn odd_pictures_and_parameters_do_not_panic() {
     for (width, height) in [(1, 1), (1, 50), (50, 1), (2, 3)] {
         for grey in [0, 90, 255] {
             let color = ColorImage::new(width, height, [grey; 3]);

@@ -1,4 +1,4 @@
-//! Which files SAM 2.1 needs, how they are recognised, and where they come from.
+//! The files that SAM 2.1 needs: how they are recognised, and their sources.
 
 use super::runtime::{self, names};
 use crate::{Error, Result};
@@ -9,11 +9,11 @@ use std::path::{Path, PathBuf};
 pub struct WantedFile {
     /// Its name, or how it is recognised.
     pub name: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub purpose: &'static str,
-    /// Where it was found.
+    /// Where it was found, if it was.
     pub found: Option<PathBuf>,
-    /// Where it can be had; facts, one line.
+    /// How to get it, in one line.
     pub how_to_get: &'static str,
 }
 
@@ -22,20 +22,20 @@ const EXPORTS: &str = "ready exports: huggingface.co/vietanhdev/segment-anything
      samexporter.export_sam2) or with onnxruntime's transformers/models/sam2/convert_to_onnx.py; Meta publishes the SAM 2.1 \
      checkpoints and code under Apache-2.0";
 
-/// The files for [`crate::Sam2`], and which of them are there. `folder` is where the networks should lie; the library is
-/// looked for in `ORT_DYLIB_PATH`.
+/// The files for [`crate::Sam2`], and which of them are present. `folder` is the networks' folder;
+/// the library is looked for in `ORT_DYLIB_PATH`.
 pub fn wanted_files(folder: Option<&Path>) -> Vec<WantedFile> {
     let variable = std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from);
     vec![
         WantedFile {
             name: "image_encoder.onnx (or one *encoder*.onnx)",
-            purpose: "turns a picture into features; about 100 MB for the tiny model",
+            purpose: "encodes a picture as features; about 100 MB for the tiny model",
             found: folder.and_then(|f| encoder(f).ok()),
             how_to_get: EXPORTS,
         },
         WantedFile {
             name: "mask_decoder.onnx (or one *decoder*.onnx)",
-            purpose: "turns features and clicks into a mask; about 17 MB; from the same export as the encoder",
+            purpose: "decodes features and clicks to a mask; about 17 MB; from the same export as the encoder",
             found: folder.and_then(|f| decoder(f).ok()),
             how_to_get: EXPORTS,
         },
@@ -48,7 +48,7 @@ pub fn wanted_files(folder: Option<&Path>) -> Vec<WantedFile> {
     ]
 }
 
-/// The image encoder. Exporters also write prompt and memory encoders, which are something else.
+/// The image encoder. Exporters also write prompt and memory encoders, which are other networks.
 pub(super) fn encoder(folder: &Path) -> Result<PathBuf> {
     pick(
         folder,
@@ -59,15 +59,18 @@ pub(super) fn encoder(folder: &Path) -> Result<PathBuf> {
     )
 }
 
-/// The prompt decoder: all from prompts to masks. ONNX Runtime's exporter calls that the image decoder and names a bare
-/// mask decoder beside it.
+/// The prompt decoder: the whole way from prompts to masks. ONNX Runtime's exporter calls it the
+/// image decoder and writes a bare mask decoder beside it.
 pub(super) fn decoder(folder: &Path) -> Result<PathBuf> {
     pick(folder, "mask_decoder.onnx", "decoder", &[], "image_decoder")
 }
 
 fn pick(folder: &Path, exact: &str, word: &str, not: &[&str], preferred: &str) -> Result<PathBuf> {
     if !folder.is_dir() {
-        return Err(Error::file(folder, "no such folder; name the one with image_encoder.onnx and mask_decoder.onnx"));
+        return Err(Error::file(
+            folder,
+            "the folder does not exist; it must hold image_encoder.onnx and mask_decoder.onnx",
+        ));
     }
     let fits = |name: &String| {
         let name = name.to_ascii_lowercase();
@@ -82,9 +85,12 @@ fn pick(folder: &Path, exact: &str, word: &str, not: &[&str], preferred: &str) -
         return Ok(folder.join(only));
     }
     match found.len() {
-        0 => Err(Error::file(folder, format!("no {exact} and no other *{word}*.onnx in it"))),
+        0 => Err(Error::file(folder, format!("it holds neither {exact} nor another *{word}*.onnx"))),
         1 => Ok(folder.join(found.remove(0))),
-        _ => Err(Error::file(folder, format!("several could be the {word}: {}; call one {exact}", found.join(", ")))),
+        _ => Err(Error::file(
+            folder,
+            format!("several files may be the {word}: {}; name one of them {exact}", found.join(", ")),
+        )),
     }
 }
 
@@ -124,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_missing_or_ambiguous_is_said() {
+    fn missing_and_ambiguous_files_are_named() {
         let dir = tempfile::tempdir().unwrap();
         assert!(encoder(dir.path()).unwrap_err().to_string().contains("image_encoder.onnx"));
         for name in ["a.decoder.onnx", "b.decoder.onnx"] {
@@ -132,6 +138,6 @@ mod tests {
         }
         let message = decoder(dir.path()).unwrap_err().to_string();
         assert!(message.contains("a.decoder.onnx, b.decoder.onnx"), "{message}");
-        assert!(decoder(&dir.path().join("none")).unwrap_err().to_string().contains("no such folder"));
+        assert!(decoder(&dir.path().join("none")).unwrap_err().to_string().contains("does not exist"));
     }
 }

@@ -1,8 +1,8 @@
 //! SAM 2.1 through ONNX Runtime: an organ from a few clicks.
 //!
-//! Two networks in one folder: an image encoder and a prompt decoder, as public exporters write them (see
-//! [`wanted_files`]). No weights come with Trocar. The runtime is a shared library found when it is first needed; all
-//! else in Trocar works without it.
+//! Two networks in one folder: an image encoder and a prompt decoder, as public exporters write
+//! them (see [`wanted_files`]). Trocar has no weights of its own. The runtime is a shared library
+//! that is opened when it is first needed; the rest of Trocar works without it.
 
 mod files;
 mod network;
@@ -21,29 +21,31 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 use trocar_camera::{ColorImage, Mask};
 
-/// SAM's mask logits are kept within this, as its own predictor does before it feeds them back.
+/// Limit of SAM's mask logits; SAM's own predictor clamps them to it before it feeds them back.
 const LOGIT_LIMIT: f32 = 32.0;
-/// Input side of SAM 2.1's encoder where the file leaves it open [px].
+/// Input side of SAM 2.1's encoder where the file does not fix it (px).
 const DEFAULT_SIDE: usize = 1024;
-/// No encoder input is larger than this on a side [px].
+/// Largest side of an encoder's input (px).
 const MAX_SIDE: usize = 4096;
 
-/// SAM 2.1 from two ONNX files. Prompts: points on and off the target and a box; or else the outline, as a box and its
-/// innermost point. The best mask by the network's own predicted IoU is taken.
+/// SAM 2.1 from two ONNX files. Prompts are points on and off the target and a box, or else the
+/// outline, as a box and its innermost point. Of several masks, the one with the best predicted IoU
+/// is used.
 #[derive(Debug)]
 pub struct Sam2 {
     folder: PathBuf,
     encoder: Network,
     decoder: Network,
-    /// Encoder input: width and height [px].
+    /// Encoder input: width and height (px).
     input: [usize; 2],
-    /// Each decoder input's part.
+    /// The role of each decoder input.
     parts: Vec<(String, Part)>,
-    /// The picture encoded last, so that several targets in one picture cost one encoding.
+    /// The picture that was encoded last, so that several targets in one picture cost one encoding.
     last: Mutex<Option<(ColorImage, std::sync::Arc<Features>)>>,
 }
 
-/// What a decoder input or encoder output is for. SAM's names are not standard; those of public exporters are known.
+/// The role of a decoder input or encoder output. SAM's names are not standard; those of public
+/// exporters are recognised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Part {
     Embedding,
@@ -64,8 +66,8 @@ struct Features {
     middle: Option<Tensor>,
 }
 
-/// What the decoder is asked: points [px of the picture] with SAM's labels (1 on, 0 off, 2 and 3 a box's corners), and
-/// mask logits to start from.
+/// The decoder's prompt: points (px of the picture) with SAM's labels (1 on, 0 off, 2 and 3 a box's
+/// corners), and initial mask logits.
 #[derive(Clone, Debug, Default)]
 struct Prompt {
     points: Vec<([f64; 2], f32)>,
@@ -97,13 +99,14 @@ impl Part {
 }
 
 impl Sam2 {
-    /// Opens the two networks in `folder`. ONNX Runtime's library is looked for in `ORT_DYLIB_PATH`, then at `runtime`: the
-    /// library itself, or a folder with a Python `onnxruntime` (a virtual environment, `site-packages`, the package). The
-    /// first library that is opened stays for the whole process.
+    /// Opens the two networks in `folder`. ONNX Runtime's library is looked for in
+    /// `ORT_DYLIB_PATH`, then at `runtime`: the library itself, or a folder with a Python
+    /// `onnxruntime` (a virtual environment, `site-packages`, the package). The first opened
+    /// library stays for the whole process.
     ///
     /// # Errors
-    /// Names the file that is missing, is no network, or has other inputs and outputs than SAM 2.1; says how to get the
-    /// library when there is none.
+    /// Names the file that is missing, is not a network, or has other inputs and outputs than SAM
+    /// 2.1; without a library the error says how to get it.
     pub fn open(folder: &Path, runtime: Option<&Path>) -> Result<Self> {
         let (encoder, decoder) = (files::encoder(folder)?, files::decoder(folder)?);
         let environment = runtime::load(runtime)?;
@@ -114,7 +117,7 @@ impl Sam2 {
         for port in &decoder.inputs {
             let Some(part) = Part::of(&port.name) else {
                 let text = format!(
-                    "input '{}' is not known; a SAM 2.1 decoder takes image_embed, high_res_feats_0, high_res_feats_1, \
+                    "input '{}' is unknown; a SAM 2.1 decoder takes image_embed, high_res_feats_0, high_res_feats_1, \
                      point_coords, point_labels, mask_input, has_mask_input",
                     port.name
                 );
@@ -127,7 +130,7 @@ impl Sam2 {
                 Part::HasMask | Part::Size => 1,
             };
             if port.shape.len() != rank {
-                let text = format!("input '{}' has shape {:?}; {rank} dimensions are expected", port.name, port.shape);
+                let text = format!("input '{}' has shape {:?}; it must have {rank} dimensions", port.name, port.shape);
                 return Err(Error::file(&decoder.path, text));
             }
             parts.push((port.name.clone(), part));
@@ -138,7 +141,7 @@ impl Sam2 {
             if !parts.iter().any(|(_, p)| *p == part) {
                 return Err(Error::file(
                     &decoder.path,
-                    format!("no input '{name}'; is this a SAM 2.1 prompt decoder?"),
+                    format!("it has no input '{name}'; is this a SAM 2.1 prompt decoder?"),
                 ));
             }
         }
@@ -147,7 +150,8 @@ impl Sam2 {
         Ok(sam)
     }
 
-    /// An encoder and a decoder of different sizes of SAM do not fit; better said here than by a failing product inside.
+    /// Refuses an encoder and a decoder of different SAM sizes, which would fail later with an
+    /// unclear message.
     fn check_pair(&self) -> Result<()> {
         for given in &self.encoder.outputs {
             let Some(part) = Part::of(&given.name) else { continue };
@@ -168,7 +172,7 @@ impl Sam2 {
         Ok(())
     }
 
-    /// The picture's features, computed or remembered.
+    /// The picture's features, computed or cached.
     fn features(&self, color: &ColorImage) -> Result<std::sync::Arc<Features>> {
         let mut last = self.last.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((known, features)) = &*last
@@ -187,14 +191,14 @@ impl Sam2 {
         };
         let (mut embedding, mut fine, mut middle) = (take(Part::Embedding), take(Part::Fine), take(Part::Middle));
         if embedding.is_none() && fine.is_none() && middle.is_none() {
-            // Unknown names: the three levels differ in size, whatever their order.
+            // Unknown names: the three levels differ in size, in whatever order they come.
             outputs.sort_by_key(|(_, t)| std::cmp::Reverse(t.shape[2] * t.shape[3]));
             let mut levels = outputs.into_iter().map(|(_, t)| t);
             (fine, middle, embedding) = (levels.next(), levels.next(), levels.next());
         }
         let embedding = embedding.ok_or_else(|| {
             let text =
-                format!("outputs are {names:?}; image_embed, high_res_feats_0 and high_res_feats_1 are expected");
+                format!("its outputs are {names:?}; they must be image_embed, high_res_feats_0 and high_res_feats_1");
             Error::file(&self.encoder.path, text)
         })?;
         let features = std::sync::Arc::new(Features { embedding, fine, middle });
@@ -202,12 +206,12 @@ impl Sam2 {
         Ok(features)
     }
 
-    /// The best mask for a prompt, as logits of the decoder's resolution.
+    /// The best mask for a prompt, as logits at the decoder's resolution.
     fn decode(&self, color: &ColorImage, prompt: &Prompt) -> Result<Logits> {
         let features = self.features(color)?;
         let [width, height] = self.input;
         let n = prompt.points.len();
-        // A pixel's centre stays its centre; SAM's prompt encoder adds the half pixel itself.
+        // A pixel's centre maps to a centre; SAM's prompt encoder adds the half pixel itself.
         let scaled = |x: f64, from: usize, to: usize| ((x + 0.5) * to as f64 / from as f64 - 0.5) as f32;
         let place = |[x, y]: [f64; 2]| [scaled(x, color.width, width), scaled(y, color.height, height)];
         let coordinates =
@@ -238,7 +242,7 @@ impl Sam2 {
             let tensor = tensor.ok_or_else(|| {
                 Error::file(
                     &self.encoder.path,
-                    format!("no output for the decoder's input '{name}'; export both again"),
+                    format!("it has no output for the decoder's input '{name}'; export both networks together"),
                 )
             })?;
             feeds.push((name.as_str(), tensor));
@@ -249,22 +253,22 @@ impl Sam2 {
     fn best_mask(&self, feeds: &[(&str, &Tensor)]) -> Result<Logits> {
         let bad = |text: String| Error::file(&self.decoder.path, text);
         let outputs = &self.decoder.outputs;
-        // Masks of low resolution are logits whatever the others are.
+        // Masks of low resolution are always logits.
         let masks = outputs
             .iter()
             .find(|o| o.name.contains("low_res"))
             .or_else(|| outputs.iter().find(|o| o.name.contains("mask")))
-            .ok_or_else(|| bad("no output 'masks'; is this a SAM 2.1 prompt decoder?".into()))?;
+            .ok_or_else(|| bad("it has no output 'masks'; is this a SAM 2.1 prompt decoder?".into()))?;
         let scores = outputs.iter().find(|o| o.name.contains("iou") || o.name.contains("score"));
         let names: Vec<&str> = [Some(masks), scores].into_iter().flatten().map(|o| o.name.as_str()).collect();
         let found = self.decoder.run(feeds, &names)?;
-        let [(name, masks), scores @ ..] = found.as_slice() else { return Err(bad("no output".into())) };
+        let [(name, masks), scores @ ..] = found.as_slice() else { return Err(bad("it has no output".into())) };
         let &[batch, count, height, width] = masks.shape.as_slice() else {
-            return Err(bad(format!("'{name}' has shape {:?}; [1, masks, height, width] is expected", masks.shape)));
+            return Err(bad(format!("'{name}' has shape {:?}; it must be [1, masks, height, width]", masks.shape)));
         };
         if batch != 1 || count == 0 || width == 0 || height == 0 {
             return Err(bad(format!(
-                "'{name}' has shape {:?}; one batch with at least one mask is expected",
+                "'{name}' has shape {:?}; it must be one batch with at least one mask",
                 masks.shape
             )));
         }
@@ -272,7 +276,7 @@ impl Sam2 {
         if count > 1 {
             let Some((_, scores)) = scores.first().filter(|(_, s)| s.data.len() == count) else {
                 return Err(bad(format!(
-                    "{count} masks without an 'iou_predictions' for each; one score a mask is expected"
+                    "it returns {count} masks without 'iou_predictions' for each; every mask needs a score"
                 )));
             };
             for (i, score) in scores.data.iter().enumerate() {
@@ -285,7 +289,7 @@ impl Sam2 {
         Ok(Logits { width, height, values })
     }
 
-    /// Size of the mask prompt: what the decoder says, or a quarter of the encoder's input.
+    /// Size of the mask prompt: the decoder's, or a quarter of the encoder's input.
     fn mask_size(&self) -> [usize; 2] {
         let [width, height] = self.input;
         let port = self.decoder.inputs.iter().find(|p| Part::of(&p.name) == Some(Part::Mask));
@@ -322,7 +326,7 @@ impl Prompt {
             for &[x, y] in list {
                 if !(-0.5..width as f64 - 0.5).contains(&x) || !(-0.5..height as f64 - 0.5).contains(&y) {
                     let text = format!("{field} has [{x}, {y}], outside {}'s {width} x {height} pixels", picture.name);
-                    return Err(Error::target(target, text));
+                    return Err(target.error(text));
                 }
                 points.push(([x, y], label));
             }
@@ -330,11 +334,11 @@ impl Prompt {
         let mut corners = target.box_px;
         if target.points.is_empty() && corners.is_none() {
             if target.polygon.is_empty() {
-                return Err(Error::target(target, "nothing to go by; give points on it, a box_px or a polygon"));
+                return Err(target.error("it has no prompt; give points on it, a box_px or a polygon"));
             }
             let filled = fill_polygon(width, height, &target.polygon);
             let Some(middle) = innermost(&filled.set, width, height) else {
-                return Err(Error::target(target, format!("polygon covers no pixel of {}", picture.name)));
+                return Err(target.error(format!("polygon covers no pixel of {}", picture.name)));
             };
             points.push(([(middle % width) as f64, (middle / width) as f64], 1.0));
             let extent = |axis: usize| {
@@ -365,11 +369,14 @@ impl Logits {
 fn encoder_size(encoder: &Network) -> Result<[usize; 2]> {
     let fits = |shape: &[i64]| matches!(shape, [b, c, _, _] if (*b == 1 || *b < 0) && (*c == 3 || *c < 0));
     let [port] = encoder.inputs.as_slice() else {
-        return Err(Error::file(&encoder.path, format!("{} inputs; an image encoder has one", encoder.inputs.len())));
+        return Err(Error::file(
+            &encoder.path,
+            format!("it has {} inputs; an image encoder has one", encoder.inputs.len()),
+        ));
     };
     if !fits(&port.shape) || port.kind != Kind::F32 {
         let text =
-            format!("input '{}' is {:?} {:?}; F32 [1, 3, height, width] is expected", port.name, port.kind, port.shape);
+            format!("input '{}' is {:?} {:?}; it must be F32 [1, 3, height, width]", port.name, port.kind, port.shape);
         return Err(Error::file(&encoder.path, text));
     }
     let mut size = [0; 2];
@@ -377,7 +384,12 @@ fn encoder_size(encoder: &Network) -> Result<[usize; 2]> {
         *side = match port.shape[axis] {
             open if open < 0 => DEFAULT_SIDE,
             s if (16..=MAX_SIDE as i64).contains(&s) => s as usize,
-            s => return Err(Error::file(&encoder.path, format!("input side is {s}; 16 to {MAX_SIDE} pixels"))),
+            s => {
+                return Err(Error::file(
+                    &encoder.path,
+                    format!("the input's side is {s} pixels; it must be in [16, {MAX_SIDE}]"),
+                ));
+            }
         };
     }
     Ok(size)

@@ -1,4 +1,4 @@
-//! One ONNX file, opened: names, shapes, and running it.
+//! An open ONNX network: names, shapes, and running it.
 
 use crate::{Error, Result};
 use ort::environment::Environment;
@@ -14,7 +14,7 @@ pub(super) struct Tensor {
     pub data: Vec<f32>,
 }
 
-/// What a tensor's elements are in the file.
+/// The element type of a tensor in the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Kind {
     F32,
@@ -24,7 +24,7 @@ pub(super) enum Kind {
     Other(String),
 }
 
-/// An input or output; -1 is a dimension left open.
+/// An input or output; -1 is an open dimension.
 #[derive(Clone, Debug)]
 pub(super) struct Port {
     pub name: String,
@@ -38,14 +38,14 @@ pub(super) struct Network {
     pub path: PathBuf,
     pub inputs: Vec<Port>,
     pub outputs: Vec<Port>,
-    /// The runtime's binding wants sole access for a run.
+    /// The runtime's binding needs exclusive access for a run.
     session: Mutex<Session>,
 }
 
 impl Network {
     pub fn open(environment: &Environment, path: &Path) -> Result<Self> {
-        let bad = |e: &dyn std::fmt::Display| Error::file(path, format!("no usable ONNX network ({e})"));
-        // The runtime's own message for an unreadable file leaves the reason out.
+        let bad = |e: &dyn std::fmt::Display| Error::file(path, format!("it is not a usable ONNX network ({e})"));
+        // The runtime's message for an unreadable file lacks the reason.
         std::fs::File::open(path).map_err(|e| Error::file(path, e))?;
         let session = Session::builder(environment)
             .map_err(|e| bad(&e))?
@@ -58,14 +58,14 @@ impl Network {
         Ok(Self { path: path.to_owned(), inputs, outputs, session: Mutex::new(session) })
     }
 
-    /// Runs it on named inputs, turned into the kinds the file wants; gives the `wanted` outputs of kinds that are numbers
-    /// or flags (1 and -1), in that order.
+    /// Runs the network on named inputs, converted to the file's types. Returns the `wanted`
+    /// outputs in order; flags become 1 and -1.
     pub fn run(&self, feeds: &[(&str, &Tensor)], wanted: &[&str]) -> Result<Vec<(String, Tensor)>> {
         let bad = |e: &dyn std::fmt::Display| Error::file(&self.path, format!("the network does not run ({e})"));
         let mut values: Vec<(String, SessionInputValue<'_>)> = Vec::new();
         for (name, tensor) in feeds {
             let port = self.inputs.iter().find(|p| p.name == *name);
-            let port = port.ok_or_else(|| bad(&format!("no input '{name}'")))?;
+            let port = port.ok_or_else(|| bad(&format!("it has no input '{name}'")))?;
             let shape: Vec<i64> = tensor.shape.iter().map(|s| *s as i64).collect();
             let value: SessionInputValue<'_> = match port.kind {
                 Kind::F32 => TensorRef::from_array_view((shape, tensor.data.as_slice())).map_err(|e| bad(&e))?.into(),
@@ -88,7 +88,7 @@ impl Network {
         let outputs = session.run(values).map_err(|e| bad(&e))?;
         let mut found = Vec::new();
         for name in wanted {
-            let value = outputs.get(*name).ok_or_else(|| bad(&format!("no output '{name}'")))?;
+            let value = outputs.get(*name).ok_or_else(|| bad(&format!("it has no output '{name}'")))?;
             let (shape, data) = if let Ok((shape, data)) = value.try_extract_tensor::<f32>() {
                 (shape, data.to_vec())
             } else if let Ok((shape, data)) = value.try_extract_tensor::<bool>() {

@@ -1,19 +1,20 @@
-//! Between a picture's size and a network's.
+//! Resamples between a picture's size and a network's.
 
 use crate::Result;
 use image::imageops::FilterType;
 use image::{ImageBuffer, Rgb};
 use trocar_camera::ColorImage;
 
-/// Mean and standard deviation of ImageNet's channels, by which SAM's input is normalised.
+/// Mean of ImageNet's channels, by which SAM's input is normalised.
 const MEAN: [f32; 3] = [0.485, 0.456, 0.406];
+/// Standard deviation of ImageNet's channels.
 const DEVIATION: [f32; 3] = [0.229, 0.224, 0.225];
 
-/// The picture as the encoder wants it: squeezed to width x height, normalised, one plane a channel.
+/// The encoder's input: the picture resized to width x height, normalised, one plane per channel.
 pub(super) fn encoder_input(color: &ColorImage, width: usize, height: usize) -> Result<Vec<f32>> {
     let bytes = color.pixels.as_flattened().to_vec();
     let image: ImageBuffer<Rgb<u8>, Vec<u8>> = ImageBuffer::from_raw(color.width as u32, color.height as u32, bytes)
-        .ok_or_else(|| crate::Error::Setting("the picture has fewer pixels than its size says".into()))?;
+        .ok_or_else(|| crate::Error::Setting("the picture has fewer pixels than width x height".into()))?;
     let small = image::imageops::resize(&image, width as u32, height as u32, FilterType::Triangle);
     let mut planes = vec![0.0; 3 * width * height];
     for (i, pixel) in small.pixels().enumerate() {
@@ -24,8 +25,8 @@ pub(super) fn encoder_input(color: &ColorImage, width: usize, height: usize) -> 
     Ok(planes)
 }
 
-/// Bilinear resampling between pixel centres, sizes as width and height; the image goes on beyond its rim as it ends
-/// there. (`image` clamps `f32` pixels to 0..1, which logits are not.)
+/// Bilinear resampling between pixel centres, sizes as width and height; the image continues beyond
+/// its rim with the rim's values. (`image` clamps `f32` pixels to [0, 1], which logits exceed.)
 pub(super) fn bilinear(values: &[f32], from: [usize; 2], to: [usize; 2]) -> Vec<f32> {
     if from == to {
         return values.to_vec();

@@ -1,4 +1,4 @@
-//! Finding and opening ONNX Runtime's shared library. Nothing here runs before a network is to be opened.
+//! Finds and opens ONNX Runtime's shared library. Nothing here runs before a network is opened.
 
 use crate::{Error, Result};
 use ort::environment::Environment;
@@ -12,14 +12,15 @@ pub(super) const HOW_TO_GET: &str = "pip install onnxruntime, and set ORT_DYLIB_
 /// The environment of the library opened first; a process holds only one.
 static OPENED: Mutex<Option<Environment>> = Mutex::new(None);
 
-/// Opens the library, or gives what is open already.
+/// Opens the library, or returns the one that is open.
 pub(super) fn load(given: Option<&Path>) -> Result<Environment> {
     let mut opened = OPENED.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some(environment) = &*opened {
         return Ok(environment.clone());
     }
     let path = find(std::env::var_os("ORT_DYLIB_PATH").map(PathBuf::from).as_deref(), given)?;
-    // The binding takes relative paths as beside the program; a user means the folder they are in.
+    // The binding resolves relative paths against the program's folder; a user means the working
+    // folder.
     let path = std::path::absolute(&path).map_err(|e| Error::file(&path, e))?;
     let unusable = |e: &dyn std::fmt::Display| {
         let text = format!("{}: {e}; {HOW_TO_GET}", path.display());
@@ -30,7 +31,8 @@ pub(super) fn load(given: Option<&Path>) -> Result<Environment> {
     Ok(environment)
 }
 
-/// The library's file: what the environment variable names, else what the user named or what lies in that folder.
+/// The library's file: the one that the environment variable names, else the user's, or the one in
+/// the user's folder.
 pub(super) fn find(variable: Option<&Path>, given: Option<&Path>) -> Result<PathBuf> {
     let variable = variable.filter(|p| !p.as_os_str().is_empty());
     let places = [(variable, "ORT_DYLIB_PATH"), (given, "the given runtime")];
@@ -40,14 +42,15 @@ pub(super) fn find(variable: Option<&Path>, given: Option<&Path>) -> Result<Path
             return Ok(place.to_owned());
         }
         return library_in(place).ok_or_else(|| {
-            let text = format!("{called} is {}, where no ONNX Runtime library is; {HOW_TO_GET}", place.display());
+            let text =
+                format!("{called} is {}, which is or holds no ONNX Runtime library; {HOW_TO_GET}", place.display());
             Error::Runtime(text)
         });
     }
-    Err(Error::Runtime(format!("its library is needed for SAM 2.1 and was not named; {HOW_TO_GET}")))
+    Err(Error::Runtime(format!("SAM 2.1 needs its library, and none is named; {HOW_TO_GET}")))
 }
 
-/// The library in a folder: beside, in a Python package, or in a virtual environment.
+/// The library in a folder: directly, in a Python package, or in a virtual environment.
 fn library_in(folder: &Path) -> Option<PathBuf> {
     let package = Path::new("onnxruntime").join("capi");
     let mut folders = vec![
@@ -93,7 +96,7 @@ mod tests {
         for given in [dir.path(), &dir.path().join("lib/python3.11/site-packages"), &capi, &library] {
             assert_eq!(find(None, Some(given)).unwrap(), library, "{}", given.display());
         }
-        // The variable comes first, and is not passed over when it is wrong.
+        // The variable has priority, also when it is wrong.
         assert_eq!(find(Some(&library), Some(Path::new("nowhere"))).unwrap(), library);
         let message = find(Some(Path::new("/no/lib.so")), Some(dir.path())).unwrap_err().to_string();
         assert!(message.contains("ORT_DYLIB_PATH is /no/lib.so"), "{message}");
@@ -101,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn a_missing_library_is_said_in_one_line_with_the_remedy() {
+    fn a_missing_library_is_one_line_with_the_remedy() {
         let message = find(None, None).unwrap_err().to_string();
         assert!(message.contains("pip install onnxruntime") && message.contains("ORT_DYLIB_PATH"), "{message}");
         assert!(!message.contains('\n'));

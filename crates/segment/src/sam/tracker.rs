@@ -1,24 +1,26 @@
-//! Following a target through a recording.
+//! Follows a target through a recording.
 
 use super::{Logits, Prompt, Sam2};
 use crate::distance::innermost;
 use crate::{Error, Picture, Result, Target};
 use trocar_camera::{ColorImage, Mask};
 
-/// Follows one target from picture to picture by mask prompts: each picture's decoder is given the mask logits of the
-/// picture before and a click on that mask's innermost pixel. This follows motion that is small against the target's
-/// size, which is what 30 pictures a second show. A decoder without a mask input is given the mask's box instead.
+/// Follows one target from picture to picture by mask prompts: each picture's decoder gets the mask
+/// logits of the picture before, and a click on that mask's innermost pixel. This follows motion
+/// that is small against the target's size, as at 30 pictures per second. A decoder without a mask
+/// input gets the mask's box instead.
 ///
-/// SAM 2's own video memory (memory encoder and memory attention) is *not* used: the public exports of those two networks
-/// agree neither on inputs nor on what is left to the caller, so code for them could not be checked. The price: a target
-/// that was fully hidden is found again only where it was seen last, and look-alikes that touch it may be taken in.
+/// SAM 2's video memory (memory encoder and memory attention) is *not* used: the public exports of
+/// these two networks differ in their inputs and in what they leave to the caller, so code for them
+/// could not be tested. The consequence: a target that was fully hidden is found again only where
+/// it was last seen, and similar objects that touch it may be included.
 #[derive(Debug)]
 pub struct Tracker<'a> {
     sam: &'a Sam2,
     state: Option<State>,
 }
 
-/// The last mask that was not empty.
+/// The last non-empty mask.
 #[derive(Debug)]
 struct State {
     target: Target,
@@ -27,29 +29,29 @@ struct State {
 }
 
 impl<'a> Tracker<'a> {
-    /// A tracker that has nothing to follow yet.
+    /// A tracker without a target.
     pub fn new(sam: &'a Sam2) -> Self {
         Self { sam, state: None }
     }
 
-    /// Finds the target in the first picture by what the user pointed at; forgets what was followed before.
+    /// Finds the target in the first picture from the user's marks; forgets an earlier target.
     ///
     /// # Errors
-    /// As [`crate::Segmenter::segment`], and when the mask is empty: there is nothing to follow then.
+    /// As [`crate::Segmenter::segment`], and when the mask is empty.
     pub fn start(&mut self, picture: &Picture<'_>, target: &Target) -> Result<Mask> {
         self.state = None;
         let logits = self.sam.decode(picture.color, &Prompt::new(picture, target)?)?;
         let mask = logits.mask(picture.color.width, picture.color.height);
         if mask.count() == 0 {
-            let text = format!("not found in {}; point at it more clearly", picture.name);
-            return Err(Error::target(target, text));
+            let text = format!("it is not found in {}; mark it with more points", picture.name);
+            return Err(target.error(text));
         }
         self.state = Some(State { target: target.clone(), logits, mask: mask.clone() });
         Ok(mask)
     }
 
-    /// Finds the target in the next picture. The mask is empty where it cannot be seen; the last one seen is then kept for
-    /// the pictures to come.
+    /// Finds the target in the next picture. The mask is empty where the target is not visible; the
+    /// last visible one is then kept for the following pictures.
     ///
     /// # Errors
     /// Before [`Tracker::start`], for a picture of another size, and when the network fails.
@@ -57,11 +59,11 @@ impl<'a> Tracker<'a> {
         picture.check()?;
         let ColorImage { width, height, .. } = *picture.color;
         let wrong = |reason: String| Error::Picture { picture: picture.name.to_owned(), reason };
-        let state = self.state.as_mut().ok_or_else(|| wrong("nothing to follow; start the tracker first".into()))?;
+        let state = self.state.as_mut().ok_or_else(|| wrong("there is no target; start the tracker first".into()))?;
         if (state.mask.width, state.mask.height) != (width, height) {
             let (w, h) = (state.mask.width, state.mask.height);
             return Err(wrong(format!(
-                "{width} x {height} pixels, but '{}' was found in {w} x {h}",
+                "it has {width} x {height} pixels, but '{}' was found in {w} x {h}",
                 state.target.name
             )));
         }
@@ -99,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn bounds_enclose_what_is_set() {
+    fn bounds_enclose_the_mask() {
         let mut mask = Mask::new(9, 7);
         assert_eq!(bounds(&mask), None);
         for i in [2 * 9 + 4, 5 * 9 + 3, 4 * 9 + 7] {

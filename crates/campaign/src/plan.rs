@@ -1,0 +1,211 @@
+//! What a campaign consists of: policies, seeds, and one job for each pair.
+
+use crate::remote;
+use crate::source::PolicySpec;
+use serde::{Deserialize, Serialize};
+use trocar_scene::Scene;
+use trocar_specimen::Specimen;
+use trocar_task::{scene_hash, specimen_hash};
+use trocar_workflow::{Error, Result};
+
+/// Most episodes of a policy.
+const MOST_EPISODES: usize = 100_000;
+
+/// One episode of a campaign.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Job {
+    /// The policy.
+    pub policy: PolicySpec,
+    /// Its place among the policy's episodes.
+    pub index: usize,
+    /// The seed.
+    pub seed: u64,
+}
+
+/// Version of this program, and hash of the sources that decide what an episode is.
+pub(super) fn program() -> String {
+    format!("{} {}", env!("CARGO_PKG_VERSION"), trocar_workflow::EPISODE_MAKERS)
+}
+
+/// Whether there can be such a campaign, as far as that can be said without its specimen. `most` is how many `experiment rollouts` was asked for.
+///
+/// # Errors
+/// Names the option and says what can be.
+pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, most: Option<usize>) -> Result<()> {
+    let wrong = |why: String| Err(Error::Mismatch(why));
+    if policies.is_empty() {
+        return wrong("a campaign needs a --policy".to_owned());
+    }
+    if !(1..=MOST_EPISODES).contains(&episodes) {
+        return wrong(match most {
+            Some(most) => {
+                format!("--rollouts {most}: 1 to {} can be run", MOST_EPISODES.saturating_mul(policies.len()))
+            }
+            None => format!("--episodes {episodes}: 1 to {MOST_EPISODES} can be run"),
+        });
+    }
+    for (k, policy) in policies.iter().enumerate() {
+        let name = &policy.name;
+        if policies[..k].iter().any(|p| p.name == *name) {
+            let source = policy.shown();
+            return wrong(format!("two policies are named '{name}'; name one, as in --policy b={source}"));
+        }
+        if policy.is_remote() {
+            remote::endpoint(policy)?;
+        }
+    }
+    let last = seed.checked_add(episodes as u64 - 1);
+    if last.is_none() {
+        return wrong(format!("--seed {seed}: the seeds of {episodes} episodes end beyond {}", u64::MAX));
+    }
+    if last.is_some_and(|s| i64::try_from(s).is_err()) && policies.iter().any(PolicySpec::is_remote) {
+        let most = i64::MAX;
+        return wrong(format!("--seed {seed}: policies of other processes are told seeds of up to {most} only"));
+    }
+    Ok(())
+}
+
+/// What a campaign is: its folder's `campaign.json`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Plan {
+    /// Version of the program, and hash of the sources that decide what an episode is: one table is not made by two programs.
+    pub program: String,
+    /// Name of the scene.
+    pub scene: String,
+    /// Its task.
+    pub task: String,
+    /// Hash of scene and arms' models, hexadecimal.
+    pub scene_hash: String,
+    /// Hash of what is simulated of the specimen.
+    pub specimen_hash: String,
+    /// RCM threshold of the scene [mm].
+    pub rcm_threshold_mm: f64,
+    /// The policies.
+    pub policies: Vec<PolicySpec>,
+    /// Episodes of each.
+    pub episodes: usize,
+    /// Seed of the first.
+    pub seed: u64,
+    /// Most episodes of all policies together; None for all. Policies take turns, so that the first have one more than the last.
+    #[serde(default)]
+    pub most: Option<usize>,
+}
+
+impl Plan {
+    /// # Errors
+    /// No policy, two of one name, a server that cannot be connected to as it is written, too many episodes, seeds that are none, an arm's model that cannot be read.
+    pub fn new(
+        scene: &Scene,
+        specimen: &Specimen,
+        policies: &[PolicySpec],
+        episodes: usize,
+        seed: u64,
+    ) -> Result<Self> {
+        check(policies, episodes, seed, None)?;
+        let hash = specimen_hash(specimen);
+        Ok(Self {
+            program: program(),
+            scene: scene.name.clone(),
+            task: scene.task.name.name().to_owned(),
+            scene_hash: format!("{:016x}", scene_hash(scene, hash)?),
+            specimen_hash: format!("{hash:016x}"),
+            rcm_threshold_mm: scene.safety.rcm_threshold_mm,
+            policies: policies.to_vec(),
+            episodes,
+            seed,
+            most: None,
+        })
+    }
+
+    /// The same with no more than `most` episodes of all policies together.
+    #[must_use]
+    pub fn at_most(self, most: usize) -> Self {
+        Self { most: Some(most), ..self }
+    }
+
+    /// How many episodes there are in all.
+    pub fn count(&self) -> usize {
+        let all = self.episodes.saturating_mul(self.policies.len());
+        self.most.map_or(all, |most| most.min(all))
+    }
+
+    /// All jobs; the policies take turns, so that a campaign that was stopped compares what it has.
+    pub fn jobs(&self) -> impl Iterator<Item = Job> + '_ {
+        let all = (0..self.episodes).flat_map(move |index| {
+            // Plans are checked: no seed is beyond the last.
+            let seed = self.seed.saturating_add(index as u64);
+            self.policies.iter().map(move |policy| Job { policy: policy.clone(), index, seed })
+        });
+        all.take(self.count())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trocar_task::policy::POLICIES;
+
+    #[test]
+    fn the_first_policies_have_one_episode_more() {
+        let policies = POLICIES.map(|p| PolicySpec::parse(p).unwrap()).to_vec();
+        let plan = Plan {
+            program: String::new(),
+            scene: String::new(),
+            task: String::new(),
+            scene_hash: String::new(),
+            specimen_hash: String::new(),
+            rcm_threshold_mm: 3.0,
+            policies,
+            episodes: 24,
+            seed: 7,
+            most: None,
+        };
+        assert_eq!((plan.count(), plan.jobs().count()), (144, 144));
+        let plan = plan.at_most(140);
+        let jobs: Vec<Job> = plan.jobs().collect();
+        let of = |name: &str| jobs.iter().filter(|j| j.policy.name == name).count();
+        assert_eq!(POLICIES.map(of), [24, 24, 23, 23, 23, 23]);
+        assert!(jobs.iter().all(|j| j.seed == 7 + j.index as u64));
+    }
+
+    #[test]
+    fn what_cannot_be_run_is_refused_by_its_option() {
+        let spec = |text: &str| PolicySpec::parse(text).unwrap();
+        let (scripted, server) = (vec![spec("scripted")], vec![spec("a=ws://127.0.0.1:1")]);
+        let said = |policies: &[PolicySpec], episodes, seed, most| {
+            check(policies, episodes, seed, most).map_err(|e| e.to_string()).err().unwrap_or_default()
+        };
+        assert_eq!(said(&scripted, 2, u64::MAX - 1, None), "");
+        assert_eq!(said(&server, 2, i64::MAX as u64 - 1, None), "");
+        assert!(said(&scripted, 0, 0, None).starts_with("--episodes 0"));
+        // What the user wrote is named, not what was made of it.
+        assert!(said(&scripted, 900_000, 0, Some(900_000)).starts_with("--rollouts 900000: "));
+        assert!(said(&scripted, 2, u64::MAX, None).starts_with("--seed 18446744073709551615: "));
+        assert!(said(&server, 2, i64::MAX as u64, None).starts_with("--seed 9223372036854775807: "));
+        assert!(said(&[&scripted[..], &scripted].concat(), 1, 0, None).contains("two policies"));
+        assert!(said(&[], 1, 0, None).contains("--policy"));
+        let made_by_hand = PolicySpec { name: "a".to_owned(), source: "ws://".to_owned() };
+        assert!(said(&[made_by_hand], 1, 0, None).contains("--policy a: "));
+    }
+
+    #[test]
+    fn the_program_is_all_that_decides_what_an_episode_is() {
+        let hashed: Vec<&str> = trocar_workflow::EPISODE_SOURCES.split(' ').collect();
+        for file in ["remote/src", "campaign/src/remote.rs", "../Cargo.lock"] {
+            assert!(hashed.contains(&file), "{file} is not among {hashed:?}");
+        }
+        // Whatever an episode, its policies or what they see is made of.
+        let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+        let mut open = vec!["task".to_owned(), "sensors".to_owned(), "remote".to_owned()];
+        let mut seen = Vec::new();
+        while let Some(name) = open.pop() {
+            let text = std::fs::read_to_string(crates.join(&name).join("Cargo.toml")).unwrap();
+            let table: toml::Table = text.parse().unwrap();
+            let own = table["dependencies"].as_table().unwrap().keys().filter_map(|k| k.strip_prefix("trocar-"));
+            open.extend(own.filter(|k| !seen.iter().any(|s| s == k)).map(str::to_owned));
+            // How far work is decides nothing.
+            assert!(name == "progress" || hashed.contains(&format!("{name}/src").as_str()), "{name} is not hashed");
+            seen.push(name);
+        }
+    }
+}

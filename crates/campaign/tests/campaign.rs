@@ -1,0 +1,275 @@
+//! Campaigns on this machine: names with dots, damaged files, an interruption, options that cannot be, and what the table holds.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+#[path = "../../task/tests/common/mod.rs"]
+mod common;
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Barrier, Mutex};
+use tempfile::TempDir;
+use trocar_campaign::{Campaign, Files, Job, Plan, PolicySpec, Store};
+use trocar_core::{Silent, StopAfter};
+use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
+use trocar_scene::{SpecimenSource, TaskName};
+use trocar_task::EpisodeFile;
+
+/// A coarse tube on disk and a scene around it, in which arms reach for half a second; the endoscope alone looks on.
+fn scene(folder: &Path) -> PathBuf {
+    common::two_tubes(common::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
+    let mut scene = common::resection();
+    scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
+    scene.task.name = TaskName::PortReach;
+    scene.task.episode_s = 0.5;
+    scene.cameras.retain(|c| c.name == "endoscope");
+    let file = folder.join("reach.toml");
+    std::fs::write(&file, scene.to_toml().unwrap()).unwrap();
+    file
+}
+
+fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
+    Campaign {
+        scene: folder.join("reach.toml").display().to_string(),
+        policies: policies.iter().map(|p| PolicySpec::parse(p).unwrap()).collect(),
+        episodes,
+        seed: 0,
+        jobs: 1,
+        retry_failed: false,
+        phantoms: folder.join("phantoms"),
+    }
+}
+
+#[test]
+fn episodes_of_names_with_dots_are_done_again_side_by_side() {
+    let dir = TempDir::new().unwrap();
+    let scene = trocar_scene::Scene::read(&scene(dir.path()).display().to_string()).unwrap();
+    let specimen = common::two_tubes(common::ONE_END, 4e-3);
+    let policies = ["v1.0=random", "v1.1=random"].map(|p| PolicySpec::parse(p).unwrap());
+    let plan = Plan::new(&scene, &specimen, &policies, 40, 0).unwrap();
+    let store = Store::open(&dir.path().join("campaign"), &plan).unwrap();
+    let jobs: Vec<Job> = plan.jobs().collect();
+    let next = AtomicUsize::new(0);
+    let together = Barrier::new(4);
+    // Twice: what is there goes aside the second time.
+    let work = || -> trocar_campaign::Result<()> {
+        together.wait();
+        loop {
+            let k = next.fetch_add(1, Ordering::SeqCst);
+            let Some(job) = jobs.get(k % jobs.len()).filter(|_| k < 6 * jobs.len()) else { return Ok(()) };
+            let text = format!("{k}").into_bytes();
+            store.put(job, &Files(vec![("result.json".to_owned(), text)]))?;
+        }
+    };
+    std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..4).map(|_| scope.spawn(work)).collect();
+        for worker in workers {
+            worker.join().unwrap().unwrap();
+        }
+    });
+    for job in &jobs {
+        assert!(store.episode(&job.policy.name, job.index).join("result.json").exists());
+    }
+    assert_eq!(std::fs::read_dir(store.folder().join("under-way")).unwrap().count(), 0, "something was left aside");
+}
+
+#[test]
+fn a_damaged_file_of_an_episode_is_named_with_the_remedy_and_nothing_is_half_new() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let folder = dir.path().join("campaign");
+    let outputs = || ["table.csv", "report.html", "result.json"].map(|n| std::fs::read(folder.join(n)).unwrap());
+    campaign(dir.path(), &["random"], 2).run(&folder, &Silent).unwrap();
+    let films = || std::fs::read_dir(folder.join("pictures")).unwrap().count();
+    assert_eq!(films(), 2, "both fail, and are filmed");
+    for file in ["channels.parquet", "episode.trocar", "result.json"] {
+        let before = outputs();
+        let episode = folder.join("episodes/random/000001");
+        let whole = std::fs::read(episode.join(file)).unwrap();
+        for damage in [Some(whole[..whole.len() / 2].to_vec()), Some(vec![0xff; 40]), None] {
+            match damage {
+                Some(bytes) => std::fs::write(episode.join(file), bytes).unwrap(),
+                // An episode without its result is none, and is run again.
+                None if file == "result.json" => continue,
+                None => std::fs::remove_file(episode.join(file)).unwrap(),
+            }
+            if file == "episode.trocar" {
+                // It is read to be filmed.
+                let _ = std::fs::remove_file(folder.join("pictures/random-000001.webp"));
+            }
+            // Another policy beside it would change the table.
+            let why = campaign(dir.path(), &["random", "scripted"], 2).run(&folder, &Silent).unwrap_err().to_string();
+            assert!(why.contains("000001 holds a damaged episode") && why.contains("remove it"), "{file}: {why}");
+            assert_eq!(before, outputs(), "{file}: some outputs are of now, some of before");
+        }
+        std::fs::remove_dir_all(&episode).unwrap();
+        campaign(dir.path(), &["random"], 2).run(&folder, &Silent).unwrap();
+        assert_eq!(before, outputs(), "{file}: what was run again is the same");
+    }
+}
+
+#[test]
+fn an_interrupted_campaign_has_a_table_of_what_is_kept_and_says_how_to_go_on() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let folder = dir.path().join("campaign");
+    let two = ["random", "scripted"];
+    let table = || std::fs::read_to_string(folder.join("table.csv")).unwrap();
+    for (most, kept) in [(0, 0), (1, 1), (2, 3)] {
+        let why = campaign(dir.path(), &two, 3).run(&folder, &StopAfter::new(most as u64)).unwrap_err();
+        let said = format!("{kept} of 6 episodes are kept");
+        assert!(why.to_string().contains(&said) && why.to_string().contains("goes on"), "{why}");
+        assert_eq!(table().lines().count(), 1 + kept);
+        let result: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(folder.join("result.json")).unwrap()).unwrap();
+        assert_eq!((&result["episodes"], &result["planned"]), (&kept.into(), &6.into()));
+        assert!(std::fs::read_to_string(folder.join("report.html")).unwrap().contains("</html>"));
+    }
+    assert!(!folder.join("pictures").exists(), "films take long");
+    let whole = campaign(dir.path(), &two, 3).run(&folder, &Silent).unwrap();
+    assert_eq!((whole.episodes, table().lines().count()), (6, 7));
+}
+
+#[test]
+fn an_episode_that_does_not_come_out_as_it_was_is_not_filmed() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let folder = dir.path().join("campaign");
+    campaign(dir.path(), &["random"], 2).run(&folder, &Silent).unwrap();
+    std::fs::remove_dir_all(folder.join("pictures")).unwrap();
+    // As another machine might have had it: the third state is another one.
+    let path = folder.join("episodes/random/000001/episode.trocar");
+    let mut file = EpisodeFile::read(&path).unwrap();
+    file.steps[2].1 ^= 1;
+    file.write(&path).unwrap();
+    campaign(dir.path(), &["random"], 2).run(&folder, &Silent).unwrap();
+    assert!(folder.join("pictures/random-000000.webp").exists());
+    assert!(!folder.join("pictures/random-000001.webp").exists());
+}
+
+#[test]
+fn what_cannot_be_is_refused_before_a_specimen_is_made() {
+    let dir = TempDir::new().unwrap();
+    // Whatever gets as far as the specimen says that this is no folder for phantoms.
+    std::fs::write(dir.path().join("phantoms"), "").unwrap();
+    let folder = dir.path().join("campaign");
+    let said = |change: &dyn Fn(&mut Campaign)| {
+        let mut made = campaign(dir.path(), &["random"], 1);
+        made.scene = "cell-a".to_owned();
+        change(&mut made);
+        made.run(&folder, &Silent).unwrap_err().to_string()
+    };
+    assert!(said(&|_| ()).contains("phantoms"));
+    assert!(said(&|c| c.episodes = 0).starts_with("--episodes 0: "));
+    assert!(said(&|c| c.jobs = 1_000_000).starts_with("--jobs 1000000: "));
+    assert!(said(&|c| c.policies.clear()).contains("--policy"));
+    assert!(said(&|c| c.policies = [&c.policies[..], &c.policies].concat()).contains("two policies"));
+    assert!(said(&|c| (c.seed, c.episodes) = (u64::MAX, 2)).starts_with("--seed 18446744073709551615: "));
+    assert!(!folder.exists(), "nothing was begun");
+    std::fs::create_dir(&folder).unwrap();
+    std::fs::write(folder.join("thesis.txt"), "mine").unwrap();
+    assert!(said(&|_| ()).contains("no campaign"));
+    // What is there and cannot be read is not missing.
+    std::fs::create_dir(folder.join("campaign.json")).unwrap();
+    let why = said(&|_| ());
+    assert!(why.contains("campaign.json") && !why.contains("missing") && !why.contains("new folder"), "{why}");
+}
+
+#[test]
+fn the_table_says_why_when_and_how_far_off() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let folder = dir.path().join("campaign");
+    let result = campaign(dir.path(), &["random", "scripted"], 1).run(&folder, &Silent).unwrap();
+    let text = std::fs::read_to_string(folder.join("table.csv")).unwrap();
+    let head: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+    let of = |line: &str, name: &str| {
+        line.split(',').nth(head.iter().position(|h| *h == name).expect(name)).unwrap().to_owned()
+    };
+    let (random, scripted) = (text.lines().nth(1).unwrap(), text.lines().nth(2).unwrap());
+    assert_eq!(of(random, "why"), "the time was up");
+    assert!(of(scripted, "lag_ms").parse::<f64>().unwrap() > 1.0, "a tip is behind its command: {scripted}");
+    for name in ["rcm_loaded_median_mm", "peak_jaw_n", "reach-1_time_s", "reach-2_time_s", "reach-3_time_s"] {
+        let value = of(random, name);
+        assert!(value.is_empty() || value.parse::<f64>().is_ok(), "{name}: {value}");
+    }
+    assert!(result.policies.iter().all(|p| p.lag_ms.is_some() && p.peak_jaw_n.is_some()));
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(page.contains("Tracking lag") && page.contains("Jaw force"));
+}
+
+#[test]
+fn an_address_has_no_secret_in_any_file_and_a_failure_is_told() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let folder = dir.path().join("campaign");
+    // Nobody listens there.
+    let address = "ws://127.0.0.1:1/policy?token=secret";
+    let result = campaign(dir.path(), &[address], 1).run(&folder, &Silent).unwrap();
+    assert_eq!(result.policies[0].policy, "ws---127.0.0.1-1");
+    assert!(result.policies[0].policy_error.as_ref().unwrap().contains("cannot connect"), "{result:?}");
+    let mut open = vec![folder.clone()];
+    while let Some(path) = open.pop() {
+        if path.is_dir() {
+            open.extend(std::fs::read_dir(&path).unwrap().map(|e| e.unwrap().path()));
+        } else {
+            let text = String::from_utf8_lossy(&std::fs::read(&path).unwrap()).into_owned();
+            assert!(!text.contains("secret") && !path.display().to_string().contains("secret"), "{}", path.display());
+        }
+    }
+    assert!(std::fs::read_to_string(folder.join("report.html")).unwrap().contains("--retry-failed"));
+    // The same address goes on; one with another query is another policy.
+    campaign(dir.path(), &[address], 1).run(&folder, &Silent).unwrap();
+    let other = campaign(dir.path(), &["ws://127.0.0.1:1/policy?token=other"], 1).run(&folder, &Silent);
+    assert!(other.unwrap_err().to_string().contains("another policy"));
+}
+
+/// What a server was asked: for a reset or not, with which step and which session.
+type Asked = Arc<Mutex<Vec<(bool, i64, String)>>>;
+
+#[test]
+fn a_roboarena_server_is_told_of_every_episode_by_its_name() {
+    let dir = TempDir::new().unwrap();
+    scene(dir.path());
+    let mut metadata = Map::from([("image_resolution".to_owned(), Value::Nil)]);
+    metadata.extend(["needs_wrist_camera", "needs_session_id"].map(|k| (k.to_owned(), Value::Bool(true))));
+    metadata.insert("n_external_cameras".to_owned(), Value::Int(0));
+    let options = LoopbackOptions { metadata, dialect: Dialect::RoboArena, ..LoopbackOptions::default() };
+    let asked = Asked::default();
+    let told = Arc::clone(&asked);
+    let server = Loopback::start(&options, move |call| {
+        let (reset, map) = match call {
+            Call::Reset(map) => (true, map),
+            Call::Infer(map) => (false, map),
+        };
+        let number = |name: &str| match map.get(name) {
+            Some(Value::Int(n)) => *n,
+            _ => -1,
+        };
+        let session = match map.get("session_id") {
+            Some(Value::Text(name)) => name.clone(),
+            _ => String::new(),
+        };
+        told.lock().unwrap().push((reset, number("episode/step"), session));
+        // Which ends the connection.
+        if number("episode/seed") == 1 && number("episode/step") > 0 {
+            return Err("out of memory".to_owned());
+        }
+        let array = Array::from_f64(&[8, 10], &[0.1; 80]).map_err(|e| e.to_string())?;
+        Ok(Map::from([("actions".to_owned(), Value::from(array))]))
+    })
+    .unwrap();
+    let policy = format!("mine={}", server.url());
+    campaign(dir.path(), &[&policy], 4).run(&dir.path().join("campaign"), &Silent).unwrap();
+    let asked = asked.lock().unwrap();
+    let shown: Vec<(bool, i64)> = asked.iter().map(|(reset, step, _)| (*reset, *step)).collect();
+    // Half a second is 15 periods: two chunks. The second episode ends at its second.
+    let episode = [(true, -1), (false, 0), (false, 8)];
+    assert_eq!(shown, [episode; 4].concat());
+    let mut sessions: Vec<&str> = asked.iter().map(|(.., session)| session.as_str()).collect();
+    sessions.dedup();
+    assert_eq!(sessions.len(), 4, "one an episode, in all its messages: {asked:?}");
+    sessions.sort_unstable();
+    sessions.dedup();
+    assert!(sessions.len() == 4 && !sessions.contains(&""), "{asked:?}");
+}

@@ -1,0 +1,37 @@
+//! `trocar demo`.
+
+use crate::cli;
+use crate::commands::{reconstruct, simulate};
+use crate::output;
+use std::path::Path;
+use trocar_core::Progress;
+use trocar_workflow::{Demo, DemoResult, Result};
+
+pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result<()> {
+    let demo = Demo { frames: arguments.frames, seed: arguments.seed, threads: arguments.threads };
+    let result = demo.run(&arguments.output, progress)?;
+    output::print(json, &result, |r: &DemoResult| {
+        format!(
+            "{}\n\n{}\n\nall of it in {:.0} s; report {}",
+            reconstruct::text(&r.reconstructed),
+            simulate::text(&r.summary),
+            r.seconds,
+            r.report
+        )
+    });
+    if !arguments.no_open && !json && std::env::var_os("CI").is_none() {
+        open(Path::new(&result.report));
+    }
+    Ok(())
+}
+
+/// Shows a file in the user's browser if there is a desktop; the path is printed anyway.
+fn open(path: &Path) {
+    let desktop = cfg!(target_os = "macos")
+        || cfg!(windows)
+        || std::env::var_os("DISPLAY").is_some()
+        || std::env::var_os("WAYLAND_DISPLAY").is_some();
+    if desktop && opener::open(path).is_err() {
+        eprintln!("no browser could be started; open the report by hand");
+    }
+}

@@ -1,0 +1,73 @@
+//! `trocar evaluate`.
+
+use crate::cli;
+use crate::output;
+use trocar_campaign::{Campaign, CampaignResult, PolicySpec};
+use trocar_core::Progress;
+use trocar_workflow::Result;
+
+pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Result<()> {
+    let policies = arguments.policies.iter().map(|p| PolicySpec::parse(p)).collect::<Result<_>>()?;
+    let campaign = Campaign {
+        scene: arguments.scene.clone(),
+        policies,
+        episodes: arguments.episodes,
+        seed: arguments.seed,
+        jobs: arguments.jobs,
+        retry_failed: arguments.retry_failed,
+        phantoms: arguments.phantoms.clone(),
+    };
+    let result = campaign.run(&arguments.output, progress)?;
+    output::print(json, &result, text);
+    Ok(())
+}
+
+fn text(r: &CampaignResult) -> String {
+    let or_dash = |v: Option<f64>, decimals: usize| v.map_or("-".to_owned(), |v| format!("{v:.decimals$}"));
+    let rows: Vec<Vec<String>> = r
+        .policies
+        .iter()
+        .map(|p| {
+            let stages = p.stages.iter().map(|s| s.passed.to_string()).collect::<Vec<_>>().join(" ");
+            vec![
+                p.policy.clone(),
+                format!("{}/{}", p.passed, p.episodes),
+                format!("{:.0}-{:.0}%", 1e2 * p.interval.low, 1e2 * p.interval.high),
+                stages,
+                format!("{:.2}", p.mean_score),
+                format!("{}/{}", p.held_to_end, p.attached),
+                or_dash(p.lift_median_mm, 1),
+                or_dash(p.rcm_median_mm, 3),
+                or_dash(p.rcm_max_mm, 3),
+                p.ends[3].to_string(),
+                p.ends[4].to_string(),
+            ]
+        })
+        .collect();
+    let stages = r
+        .policies
+        .first()
+        .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage).collect::<Vec<_>>().join(", "));
+    let header =
+        ["policy", "passed", "95%", "by stage", "score", "held", "lift mm", "RCM mm", "max", "diverged", "failed"];
+    let failed: String = r
+        .policies
+        .iter()
+        .filter_map(|p| Some((p, p.policy_error.as_ref()?)))
+        .map(|(p, why)| {
+            format!("{}: the policy failed in {} of {} episodes; the first: {why}\n", p.policy, p.ends[4], p.episodes)
+        })
+        .collect();
+    let again = if failed.is_empty() { "" } else { "--retry-failed does them again\n" };
+    format!(
+        "{}, {}: {} of {} episodes, seeds from {}; stages: {stages}\n{}\n{failed}{again}states {}\nreport {}",
+        r.scene,
+        r.task,
+        r.episodes,
+        r.planned,
+        r.seed,
+        output::table(&header, &rows),
+        r.hash,
+        r.report
+    )
+}

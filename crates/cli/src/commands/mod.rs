@@ -1,0 +1,39 @@
+//! One file a command.
+
+mod bench;
+mod demo;
+mod episode;
+mod evaluate;
+mod experiment;
+mod inspect;
+mod reconstruct;
+mod record;
+mod render;
+mod scene;
+mod segment;
+mod simulate;
+
+use crate::cli::{Cli, Command};
+use trocar_core::Progress;
+use trocar_studies::Result;
+
+/// Runs the command that was typed.
+pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
+    match &cli.command {
+        Command::Bench(arguments) => bench::run(arguments, cli.json, progress)?,
+        Command::Demo(arguments) => demo::run(arguments, cli.json, progress)?,
+        Command::Evaluate(arguments) => evaluate::run(arguments, cli.json, progress)?,
+        Command::Episode(arguments) => episode::run(arguments, cli.json, progress)?,
+        Command::Replay(arguments) => episode::replay_file(arguments, cli.json, progress)?,
+        Command::Sweep(arguments) => episode::sweep(arguments, cli.json, progress)?,
+        Command::Inspect(arguments) => inspect::run(arguments, cli.json)?,
+        Command::Record(arguments) => record::run(arguments, cli.json, progress)?,
+        Command::Render(arguments) => render::run(arguments, cli.json, progress)?,
+        Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress)?,
+        Command::Experiment(arguments) => experiment::run(arguments, cli.json, progress)?,
+        Command::Scene(arguments) => scene::run(arguments, cli.json)?,
+        Command::Segment(arguments) => segment::run(arguments, cli.json, progress)?,
+        Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress)?,
+    }
+    Ok(())
+}

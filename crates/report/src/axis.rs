@@ -1,0 +1,120 @@
+//! An axis of a plot: where its ticks are, and what is written at them.
+
+use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
+use plotters::coord::types::RangedCoordf64;
+use plotters::prelude::Ranged;
+use std::ops::Range;
+
+/// An axis with ticks of its own.
+pub struct Axis {
+    inner: RangedCoordf64,
+    ticks: Vec<f64>,
+}
+
+impl Axis {
+    /// From `low` to `high`, which are exponents of ten on a logarithmic axis, with about `most` ticks.
+    pub fn new(log: bool, low: f64, high: f64, most: usize) -> Self {
+        Self { inner: (low..high).into(), ticks: ticks(log, low, high, most) }
+    }
+}
+
+impl Ranged for Axis {
+    type FormatOption = DefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, value: &f64, limit: (i32, i32)) -> i32 {
+        self.inner.map(value, limit)
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        // No ticks between ticks.
+        if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.inner.range()
+    }
+}
+
+/// A tick's value with as many decimals as the axis' span needs.
+pub fn decimal(value: f64, span: f64) -> String {
+    let decimals = (1.0 - (span / 5.0).log10().floor()).clamp(0.0, 6.0) as usize;
+    let text = format!("{value:.decimals$}");
+    let text = if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.') } else { &text };
+    match text {
+        "-0" => "0".to_owned(),
+        text => text.replace('-', "\u{2212}"),
+    }
+}
+
+/// Where an axis from `low` to `high` has ticks, about `most` of them. A logarithmic axis, whose ends are exponents of ten, has them at 1, 2 and 5 times powers of ten; at the powers alone, or at
+/// every so many, where that is enough; and at every whole multiple where it is so short that fewer than three would be left.
+fn ticks(log: bool, low: f64, high: f64, most: usize) -> Vec<f64> {
+    if !log {
+        let axis: RangedCoordf64 = (low..high).into();
+        return axis.key_points(most);
+    }
+    // Ends that are a rounding short of a tick still show it.
+    let reached = |v: &f64| (low - 1e-9..=high + 1e-9).contains(v);
+    let decades = || (low.floor() as i64)..=(high.ceil() as i64);
+    let powers: Vec<f64> = decades().map(|d| d as f64).filter(reached).collect();
+    if powers.len() > 2 {
+        let step = (powers.len() - 1).div_ceil(6);
+        return powers.into_iter().step_by(step).collect();
+    }
+    let at = |multiples: &[f64]| -> Vec<f64> {
+        decades().flat_map(|d| multiples.iter().map(move |m| d as f64 + m.log10())).filter(reached).collect()
+    };
+    let steps = at(&[1.0, 2.0, 5.0]);
+    if steps.len() > 2 { steps } else { at(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]) }
+}
+
+/// The label of a tick at 10 to `exponent`, which is a small whole multiple of a power of ten: a plain number where that is short, else 10 to a power.
+pub fn log_label(exponent: f64) -> String {
+    let decade = (exponent + 1e-9).floor();
+    let multiple = 10f64.powf(exponent - decade).round();
+    if (-2.0..3.0).contains(&decade) {
+        return decimal(multiple * 10f64.powf(decade), 10f64.powf(decade));
+    }
+    let power = power_of_ten(decade);
+    if multiple == 1.0 { power } else { format!("{multiple}\u{b7}{power}") }
+}
+
+/// 10 to a whole power.
+fn power_of_ten(exponent: f64) -> String {
+    let digit = |c: char| match c {
+        '-' => '\u{207b}',
+        '1' => '\u{b9}',
+        '2' => '\u{b2}',
+        '3' => '\u{b3}',
+        c => char::from_u32(0x2070 + c.to_digit(10).unwrap_or(0)).unwrap_or(c),
+    };
+    format!("10{}", (exponent.round() as i64).to_string().chars().map(digit).collect::<String>())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ticks_read_well() {
+        assert_eq!(decimal(0.25, 1.0), "0.25");
+        assert_eq!(decimal(-0.0, 1.0), "0");
+        assert_eq!(decimal(-5.0, 20.0), "\u{2212}5");
+        assert_eq!(decimal(100.0, 400.0), "100");
+        assert_eq!(power_of_ten(-12.0), "10\u{207b}\u{b9}\u{b2}");
+        let labels = |low: f64, high: f64| -> Vec<String> {
+            ticks(true, low.log10(), high.log10(), 9).into_iter().map(log_label).collect()
+        };
+        assert_eq!(labels(2.7, 54.0), ["5", "10", "20", "50"]);
+        assert_eq!(labels(0.02, 0.3), ["0.02", "0.05", "0.1", "0.2"]);
+        assert_eq!(labels(3.5, 6.5), ["4", "5", "6"]);
+        assert_eq!(
+            labels(2e4, 5e5),
+            ["2\u{b7}10\u{2074}", "5\u{b7}10\u{2074}", "10\u{2075}", "2\u{b7}10\u{2075}", "5\u{b7}10\u{2075}"]
+        );
+        assert_eq!(labels(1e-3, 1.0), ["10\u{207b}\u{b3}", "0.01", "0.1", "1"]);
+        assert_eq!(ticks(true, -100.0, 100.0, 9).len(), 6);
+        assert_eq!(ticks(false, 0.0, 10.0, 6), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0]);
+    }
+}

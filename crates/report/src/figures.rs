@@ -1,0 +1,102 @@
+//! Pictures as data URIs.
+
+use crate::page;
+use crate::{Error, Result};
+use base64::{Engine, engine::general_purpose::STANDARD};
+use image::codecs::{
+    jpeg::JpegEncoder,
+    png::{CompressionType, FilterType, PngEncoder},
+};
+use image::{ExtendedColorType, ImageEncoder, RgbImage, imageops};
+use trocar_camera::ColorImage;
+
+/// Wider pictures are reduced: the page shows 1100 CSS pixels at most.
+const MAX_WIDTH: u32 = 1280;
+
+/// Quality of photographs (0 to 100): no visible blocks on a screen.
+const JPEG_QUALITY: u8 = 90;
+
+/// An `<img>` of `picture`; `alt` is plain text. Lossless where that costs little, else a JPEG.
+///
+/// # Errors
+/// When the pixels are not as many as the size says.
+pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
+    let rgb = to_rgb(picture)?;
+    let rgb = if rgb.width() > MAX_WIDTH {
+        let height = (f64::from(rgb.height()) * f64::from(MAX_WIDTH) / f64::from(rgb.width())).round().max(1.0);
+        imageops::thumbnail(&rgb, MAX_WIDTH, height as u32)
+    } else {
+        rgb
+    };
+    let (width, height) = rgb.dimensions();
+    let mut png = Vec::new();
+    PngEncoder::new_with_quality(&mut png, CompressionType::Default, FilterType::Adaptive).write_image(
+        &rgb,
+        width,
+        height,
+        ExtendedColorType::Rgb8,
+    )?;
+    let mut jpeg = Vec::new();
+    JpegEncoder::new_with_quality(&mut jpeg, JPEG_QUALITY).write_image(&rgb, width, height, ExtendedColorType::Rgb8)?;
+    let (kind, bytes) =
+        if 2 * png.len() <= 3 * jpeg.len() || png.len() < 40_000 { ("png", png) } else { ("jpeg", jpeg) };
+    Ok(img_of_bytes(kind, &bytes, width as usize, height as usize, alt))
+}
+
+/// An `<img>` of an encoded picture of the type `image/{kind}`.
+pub fn img_of_bytes(kind: &str, bytes: &[u8], width: usize, height: usize, alt: &str) -> String {
+    format!(
+        "<img src=\"data:image/{kind};base64,{}\" width=\"{width}\" height=\"{height}\" alt=\"{}\">",
+        STANDARD.encode(bytes),
+        page::escape(alt)
+    )
+}
+
+fn to_rgb(picture: &ColorImage) -> Result<RgbImage> {
+    let mismatch = || {
+        Error::Mismatch(format!("a {} x {} picture has {} pixels", picture.width, picture.height, picture.pixels.len()))
+    };
+    let (Ok(width), Ok(height)) = (u32::try_from(picture.width), u32::try_from(picture.height)) else {
+        return Err(mismatch());
+    };
+    if width == 0 || height == 0 {
+        return Err(mismatch());
+    }
+    RgbImage::from_raw(width, height, picture.pixels.as_flattened().to_vec()).ok_or_else(mismatch)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn decoded(html: &str) -> image::DynamicImage {
+        let base64 = html.split("base64,").nth(1).unwrap().split('"').next().unwrap();
+        image::load_from_memory(&STANDARD.decode(base64).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn flat_pictures_stay_lossless_and_noise_becomes_jpeg() {
+        let mut picture = ColorImage::new(300, 200, [10, 200, 30]);
+        let html = img(&picture, "a \"flat\" one").unwrap();
+        assert!(html.contains("image/png") && html.contains("a &quot;flat&quot; one"));
+        assert_eq!(decoded(&html).into_rgb8().get_pixel(17, 3).0, [10, 200, 30]);
+
+        let mut x = 1_u32;
+        for p in &mut picture.pixels {
+            x = x.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            *p = x.to_le_bytes()[1..].try_into().unwrap();
+        }
+        let html = img(&picture, "").unwrap();
+        assert!(html.contains("image/jpeg"));
+        assert_eq!(decoded(&html).width(), 300);
+    }
+
+    #[test]
+    fn large_pictures_are_reduced_and_wrong_ones_refused() {
+        let html = img(&ColorImage::new(2560, 1000, [9; 3]), "").unwrap();
+        assert_eq!((decoded(&html).width(), decoded(&html).height()), (1280, 500));
+        let broken = ColorImage { width: 4, height: 4, pixels: vec![[0; 3]; 5] };
+        assert!(img(&broken, "").is_err());
+        assert!(img(&ColorImage::new(0, 0, [0; 3]), "").is_err());
+    }
+}

@@ -1,0 +1,66 @@
+//! Tables of plain texts, and numbers as they stand in them.
+
+use crate::page;
+use std::fmt::Write;
+
+/// A count with thin spaces between thousands.
+pub fn count(n: usize) -> String {
+    let digits = n.to_string();
+    let mut out = String::new();
+    for (i, c) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i).is_multiple_of(3) {
+            out.push('\u{202f}');
+        }
+        out.push(c);
+    }
+    out
+}
+
+/// A number with fixed decimals and a true minus; a dash where it is not finite.
+pub fn fixed(value: f64, decimals: usize) -> String {
+    if !value.is_finite() {
+        return "\u{2013}".to_owned();
+    }
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_owned(),
+        Some(rest) => format!("\u{2212}{rest}"),
+        None => text,
+    }
+}
+
+/// A share as a percentage.
+pub fn percent(share: f64, decimals: usize) -> String {
+    format!("{}\u{202f}%", fixed(100.0 * share, decimals))
+}
+
+/// Rows of two or three plain texts under a head.
+pub fn plain(head: &[&str], rows: &[Vec<String>]) -> String {
+    let cells = |tag: &str, texts: &mut dyn Iterator<Item = &str>| {
+        texts.map(|t| format!("<{tag}>{}</{tag}>", page::escape(t))).collect::<String>()
+    };
+    let mut out = format!(
+        "<div class=\"wide\"><table class=\"plain\"><thead><tr>{}</tr></thead><tbody>\n",
+        cells("th", &mut head.iter().copied())
+    );
+    for row in rows {
+        let _ = writeln!(out, "<tr>{}</tr>", cells("td", &mut row.iter().map(String::as_str)));
+    }
+    out.push_str("</tbody></table></div>\n");
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");
+        assert_eq!(count(999), "999");
+        assert_eq!(fixed(-0.001, 2), "0.00");
+        assert_eq!(fixed(-1.234, 1), "\u{2212}1.2");
+        assert_eq!(fixed(f64::NAN, 1), "\u{2013}");
+        assert_eq!(percent(0.034, 1), "3.4\u{202f}%");
+    }
+}

@@ -1,0 +1,154 @@
+//! What a whole cell costs: two arms, two instruments, all organs, moving, no cameras.
+//!
+//! The left arm does the scripted grasp-lift while the right arm swings in its port. A second cell in which organs pass through each other gets the same actions, period beside period, so that the
+//! cost of contact between organs is the difference.
+
+use super::machine::Machine;
+use super::timing::median;
+use crate::{Error, Result};
+use serde::Serialize;
+use std::path::PathBuf;
+use trocar_cell::{Action, Cell, CellLift, CellLiftPolicy, Policy};
+use trocar_core::Progress;
+use trocar_robot::instrument::Coordinates;
+use trocar_scene::Scene;
+use trocar_specimen::Specimen;
+use trocar_workflow::scene_specimen;
+
+/// How the right arm swings: amplitude of its pivots [rad] and its frequency [Hz].
+const SWING: (f64, f64) = (0.1, 0.5);
+
+/// The benchmark's options.
+#[derive(Clone, Debug)]
+pub struct CellBench {
+    /// Scene file or name.
+    pub scene: String,
+    /// A specimen folder instead of the scene's specimen.
+    pub specimen: Option<PathBuf>,
+    /// Folder for a scene's phantom.
+    pub phantoms: PathBuf,
+    /// Worker threads, 0 for all.
+    pub threads: usize,
+}
+
+/// The benchmark's outcome. Times are means over control periods, in milliseconds of wall time.
+#[derive(Clone, Debug, Serialize)]
+pub struct CellBenchResult {
+    /// Simulated over wall time of the whole cell, from the settling on.
+    pub real_time_factor: f64,
+    /// The same if organs passed through each other.
+    pub real_time_factor_without_organ_contact: f64,
+    /// Controllers, ports and dynamics of the arms.
+    pub arms_ms: f64,
+    /// Contact of organs with each other: tissue with it less tissue without.
+    pub contact_ms: f64,
+    /// Tissue without that: elasticity, supports, contact with the instruments, grasp.
+    pub tissue_ms: f64,
+    /// All else: jaws, mouths, observations.
+    pub rest_ms: f64,
+    /// A control period, median.
+    pub median_ms: f64,
+    /// The slowest.
+    pub worst_ms: f64,
+    /// Length of a control period [ms].
+    pub period_ms: f64,
+    /// Control periods that were timed.
+    pub periods: usize,
+    /// The lift held.
+    pub attached: bool,
+    /// Organs.
+    pub organs: usize,
+    /// Nodes.
+    pub nodes: usize,
+    /// Elements.
+    pub tets: usize,
+    /// Worker threads.
+    pub threads: usize,
+    /// The machine.
+    pub machine: Machine,
+}
+
+impl CellBench {
+    /// Runs it.
+    ///
+    /// # Errors
+    /// A scene or specimen that cannot be had, an interruption.
+    pub fn run(&self, progress: &dyn Progress) -> Result<CellBenchResult> {
+        let scene = Scene::read(&self.scene)?;
+        let specimen = match &self.specimen {
+            Some(folder) => Specimen::read(folder)?,
+            None => scene_specimen(&scene, &self.phantoms, progress)?,
+        };
+        let machine = Machine::here();
+        let mut cell = Cell::new(&scene, &specimen, self.threads)?;
+        let mut apart = Cell::with_contact(&scene, &specimen, self.threads, false)?;
+        let mut policy = CellLiftPolicy::new(&CellLift::default(), &cell)?;
+        let right: Option<Coordinates> = cell.setpoint("right").ok();
+        let mut times = Vec::new();
+        let mut begun = None;
+        progress.begin("cell", 1);
+        loop {
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
+            }
+            let settled = policy.phase() != "settle";
+            if settled && begun.is_none() {
+                begun = Some((cell.timing(), apart.timing()));
+            }
+            let Some(mut action) = policy.act(&cell)? else { break };
+            if let Some(right) = right.filter(|_| settled) {
+                swing(&mut action, &right, cell.time());
+            }
+            let before = cell.timing().all;
+            // Each first in every second period, so that what disturbs the machine disturbs both.
+            if times.len().is_multiple_of(2) {
+                cell.step(&action)?;
+                apart.step(&action)?;
+            } else {
+                apart.step(&action)?;
+                cell.step(&action)?;
+            }
+            if settled {
+                times.push(1e3 * (cell.timing().all - before).as_secs_f64());
+            }
+        }
+        progress.end();
+        let Some((from, apart_from)) = begun else { return Err(Error::Mismatch("nothing was timed".into())) };
+        let n = times.len().max(1) as f64;
+        let (now, apart_now) = (cell.timing(), apart.timing());
+        let ms = |a: std::time::Duration, b: std::time::Duration| 1e3 * (a - b).as_secs_f64() / n;
+        let (all, arms) = (ms(now.all, from.all), ms(now.arms, from.arms));
+        let (tissue, without) = (ms(now.tissue, from.tissue), ms(apart_now.tissue, apart_from.tissue));
+        let period_ms = 1e3 * cell.period();
+        let bodies = cell.world().model.bodies();
+        let worst_ms = times.iter().copied().fold(0.0, f64::max);
+        Ok(CellBenchResult {
+            real_time_factor: period_ms / all,
+            real_time_factor_without_organ_contact: period_ms / ms(apart_now.all, apart_from.all),
+            arms_ms: arms,
+            contact_ms: tissue - without,
+            tissue_ms: without,
+            rest_ms: all - arms - tissue,
+            median_ms: median(&mut times),
+            worst_ms,
+            period_ms,
+            periods: times.len(),
+            attached: cell.observe().first().is_some_and(|a| a.attached),
+            organs: bodies.len(),
+            nodes: bodies.iter().map(|b| b.len()).sum(),
+            tets: bodies.iter().map(|b| b.tets().len()).sum(),
+            threads: if self.threads == 0 { machine.cores } else { self.threads },
+            machine,
+        })
+    }
+}
+
+/// The right arm's numbers of an action, which are the second five.
+fn swing(action: &mut Action, at: &Coordinates, time: f64) {
+    let phase = std::f64::consts::TAU * SWING.1 * time;
+    // It swings up from its start, away from the tissue and back.
+    let turned = [at.pivots[0] + SWING.0 * phase.sin(), at.pivots[1] + 0.5 * SWING.0 * (1.0 - phase.cos())];
+    if let Some(numbers) = action.numbers.get_mut(5..7) {
+        numbers.copy_from_slice(&turned);
+    }
+}

@@ -1,0 +1,245 @@
+//! How fast and how exact organs are stepped: one schedule on one mesh, speed and error from the same scenes.
+
+use super::machine::Machine;
+use super::timing::Timing;
+use crate::{Error, Result};
+use serde::Serialize;
+use std::path::PathBuf;
+use trocar_core::Progress;
+use trocar_testing::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
+use trocar_tissue::Material;
+use trocar_workflow::solver_named;
+
+/// The frames of the tube at which errors are taken.
+const TUBE_FRAMES: [usize; 3] = [15, 30, 60];
+
+/// Longest time to settle [s].
+const LONGEST: f64 = 3600.0;
+
+/// Where organs come from.
+#[derive(Clone, Debug)]
+pub enum OrganSource {
+    /// A Gmsh file in metres.
+    File(PathBuf),
+    /// Our own organs with about so many elements.
+    Analytic(usize),
+}
+
+impl OrganSource {
+    /// The organs.
+    ///
+    /// # Errors
+    /// As [`Organs::read`] and [`Organs::analytic`].
+    pub fn organs(&self) -> Result<Organs> {
+        match self {
+            Self::File(path) => Organs::read(path),
+            Self::Analytic(tets) => Organs::analytic(*tets),
+        }
+    }
+}
+
+/// The benchmark's options.
+#[derive(Clone, Debug)]
+pub struct OrgansBench {
+    /// The organs.
+    pub organs: OrganSource,
+    /// Name of the schedule, one of [`trocar_workflow::SOLVERS`].
+    pub schedule: String,
+    /// Worker threads; 0: as many as the machine has.
+    pub threads: usize,
+    /// Young's modulus [Pa].
+    pub young_modulus: f64,
+    /// Poisson's ratio.
+    pub poisson_ratio: f64,
+    /// Whether tissue is damped as in the cell while it is timed and judged; it always is while it settles. The peers have no damping.
+    pub damped: bool,
+    /// Frames before the timed ones.
+    pub warm_up: usize,
+    /// Timed frames.
+    pub frames: usize,
+    /// Simulated time for which the organs settle before their sag is measured [s].
+    pub settle: f64,
+}
+
+impl Default for OrgansBench {
+    fn default() -> Self {
+        Self {
+            organs: OrganSource::Analytic(44_000),
+            schedule: "fast".into(),
+            threads: 0,
+            young_modulus: 12e3,
+            poisson_ratio: 0.45,
+            damped: false,
+            warm_up: 30,
+            frames: 120,
+            settle: 3.0,
+        }
+    }
+}
+
+/// The benchmark's outcome.
+#[derive(Clone, Debug, Serialize)]
+pub struct OrgansResult {
+    /// 1/60 s over the median wall time of a frame while a patch of the appendix is dragged at 10 mm/s.
+    pub real_time_factor: f64,
+    /// The same with a patch of every organ shaken.
+    pub real_time_factor_moving: f64,
+    /// Median wall time of a frame while the appendix is dragged [ms].
+    pub frame_ms_median: f64,
+    /// Mean distance of the nodes at rest from their static equilibrium, over their mean displacement by gravity.
+    pub static_sag_error: f64,
+    /// RMS distance from the oracle at the same substep over RMS displacement, worst of frames 15, 30 and 60 of the tube.
+    pub step_error: f64,
+    /// Worker threads.
+    pub threads: usize,
+    /// Instruction set of the kernels.
+    pub isa: &'static str,
+    /// The schedule's name.
+    pub schedule: String,
+    /// Its substeps a frame.
+    pub substeps: usize,
+    /// Whether tissue was damped while it was timed and judged.
+    pub damped: bool,
+    /// Where the organs are from.
+    pub mesh: String,
+    /// Organs.
+    pub organs: usize,
+    /// The organ taken for the appendix.
+    pub appendix: String,
+    /// Nodes.
+    pub nodes: usize,
+    /// Elements.
+    pub tets: usize,
+    /// The tube's errors at frames 15, 30 and 60.
+    pub step_errors: [f64; 3],
+    /// Mean displacement of the free nodes by gravity in the static equilibrium [um].
+    pub static_sag_um: f64,
+    /// How long the organs had settled when their sag was measured [s].
+    pub settled_s: f64,
+    /// Largest node speed then [m/s].
+    pub settled_speed_m_s: f64,
+    /// The dragged scene's frames.
+    pub drag: Timing,
+    /// The frames with every organ shaken.
+    pub moving: Timing,
+    /// Most elements with volume at or below 0 in the tube.
+    pub tube_inverted: usize,
+    /// Substeps in which the tube's grasp yielded.
+    pub tube_yielded_substeps: usize,
+    /// The machine.
+    pub machine: Machine,
+}
+
+impl OrgansBench {
+    /// Runs the scenes.
+    ///
+    /// # Errors
+    /// Organs that cannot be read or simulated, a scene that diverges, an oracle that finds no minimum, an interruption.
+    pub fn run(&self, progress: &dyn Progress) -> Result<OrgansResult> {
+        if self.frames == 0 || !(self.settle > 0.0 && self.settle <= LONGEST) {
+            return Err(Error::Mismatch(format!(
+                "{} timed frames and {} s to settle; 1 or more frames and up to {LONGEST} s make sense",
+                self.frames, self.settle
+            )));
+        }
+        let machine = Machine::here();
+        let schedule = solver_named(&self.schedule)?;
+        let organs = self.organs.organs()?;
+        let damped = material(self.young_modulus, self.poisson_ratio);
+        let material = if self.damped { damped } else { Material { viscosity: 0.0, ..damped } };
+        let time = |scene: &Scene| {
+            progress.begin(scene.name, (self.warm_up + self.frames) as u64);
+            let mut run = Run::new(scene, schedule, self.threads)?;
+            let timing = Timing::of(&mut run, self.warm_up, self.frames, f64::INFINITY, progress);
+            progress.end();
+            timing
+        };
+        let drag = time(&Scene::drag(&organs, material)?)?;
+        let moving = time(&Scene::moving(&organs, material)?)?;
+
+        let sag = Scene::sag(&organs, damped)?;
+        let mut run = Run::new(&sag, schedule, self.threads)?;
+        let frames = (self.settle / FRAME).round().max(1.0) as usize;
+        progress.begin("sag", frames as u64 + 1);
+        let mut settled_speed_m_s = 0.0;
+        for _ in 0..frames {
+            stop_if(progress)?;
+            settled_speed_m_s = run.frame()?.max_speed;
+            progress.advance(1);
+        }
+        let mut oracle = OracleRun::new(&sag);
+        oracle.settle()?;
+        progress.end();
+        let (rest, truth) = (rest_positions(&sag.model), oracle.positions());
+        let static_sag_error = mean_error(&run.positions(), &truth, &rest);
+        let sags = rest.iter().zip(&truth).map(|(a, b)| a.distance(*b)).sum::<f64>();
+        let free = sag.model.bodies().iter().flat_map(|b| b.pinned()).filter(|p| !**p).count();
+
+        let tube = Tube::run(&Scene::tube(&organs, material)?, schedule, self.threads, progress)?;
+        Ok(OrgansResult {
+            real_time_factor: drag.real_time_factor,
+            real_time_factor_moving: moving.real_time_factor,
+            frame_ms_median: drag.frame_ms_median,
+            static_sag_error,
+            step_error: tube.errors.iter().copied().fold(0.0, f64::max),
+            threads: if self.threads == 0 { machine.cores } else { self.threads },
+            isa: schedule.isa(),
+            schedule: self.schedule.clone(),
+            damped: self.damped,
+            substeps: schedule.substeps(),
+            mesh: organs.source.clone(),
+            organs: organs.organs.len(),
+            appendix: organs.organs[organs.appendix].name.clone(),
+            nodes: organs.nodes(),
+            tets: organs.tets(),
+            step_errors: tube.errors,
+            static_sag_um: 1e6 * sags / free.max(1) as f64,
+            settled_s: frames as f64 * FRAME,
+            settled_speed_m_s,
+            drag,
+            moving,
+            tube_inverted: tube.inverted,
+            tube_yielded_substeps: tube.yielded,
+            machine,
+        })
+    }
+}
+
+/// The tube stepped beside the oracle.
+struct Tube {
+    errors: [f64; 3],
+    inverted: usize,
+    yielded: usize,
+}
+
+impl Tube {
+    fn run(scene: &Scene, schedule: trocar_tissue::Schedule, threads: usize, progress: &dyn Progress) -> Result<Self> {
+        let substeps = schedule.substeps();
+        let last = TUBE_FRAMES[TUBE_FRAMES.len() - 1];
+        progress.begin("tube, oracle", (last * substeps) as u64);
+        let mut run = Run::new(scene, schedule, threads)?;
+        let mut oracle = OracleRun::new(scene);
+        let rest = rest_positions(&scene.model);
+        let mut tube = Self { errors: [f64::NAN; 3], inverted: 0, yielded: 0 };
+        let h = FRAME / substeps as f64;
+        for frame in 0..last {
+            let report = run.frame()?;
+            tube.inverted = tube.inverted.max(report.inverted);
+            tube.yielded += report.grasp_limited;
+            for substep in 0..substeps {
+                stop_if(progress)?;
+                oracle.step(h, frame as f64 * FRAME + (substep + 1) as f64 * h)?;
+                progress.advance(1);
+            }
+            if let Some(k) = TUBE_FRAMES.iter().position(|f| *f == frame + 1) {
+                tube.errors[k] = rms_error(&run.positions(), &oracle.positions(), &rest);
+            }
+        }
+        progress.end();
+        Ok(tube)
+    }
+}
+
+fn stop_if(progress: &dyn Progress) -> Result<()> {
+    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+}

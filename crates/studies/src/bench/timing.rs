@@ -1,0 +1,78 @@
+//! How long frames of a scene take.
+
+use crate::{Error, Result};
+use serde::Serialize;
+use std::time::Instant;
+use trocar_core::Progress;
+use trocar_testing::scenes::{FRAME, Run};
+
+/// Timed frames.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Timing {
+    /// Median wall time of a frame [ms].
+    pub frame_ms_median: f64,
+    /// The slowest frame [ms].
+    pub frame_ms_worst: f64,
+    /// A frame's 1/60 s over the median wall time.
+    pub real_time_factor: f64,
+    /// Frames that were timed.
+    pub frames: usize,
+    /// Most elements with volume at or below 0 after any frame, warm-up included.
+    pub inverted: usize,
+    /// Substeps in which a grasp yielded.
+    pub yielded_substeps: usize,
+    /// Iterations a frame, of all bodies and substeps.
+    pub iterations_per_frame: f64,
+    /// Substeps in which a body was given up to sweeps.
+    pub fallbacks: usize,
+}
+
+impl Timing {
+    /// Steps `warm_up` frames and then times `frames`, fewer when `seconds` of wall time are over (at least 3).
+    ///
+    /// # Errors
+    /// A scene that diverges, or an interruption.
+    pub fn of(run: &mut Run<'_>, warm_up: usize, frames: usize, seconds: f64, progress: &dyn Progress) -> Result<Self> {
+        let mut timing = Self::default();
+        let mut times = Vec::with_capacity(frames);
+        let mut iterations = 0;
+        let whole = Instant::now();
+        for frame in 0..warm_up + frames {
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
+            }
+            let clock = Instant::now();
+            let report = run.frame()?;
+            let took = clock.elapsed().as_secs_f64();
+            progress.advance(1);
+            timing.inverted = timing.inverted.max(report.inverted);
+            timing.yielded_substeps += report.grasp_limited;
+            timing.fallbacks += report.fallbacks;
+            if frame >= warm_up {
+                times.push(took);
+                iterations += report.iterations;
+            }
+            if times.len() >= 3 && whole.elapsed().as_secs_f64() > seconds {
+                break;
+            }
+        }
+        let count = times.len().max(1) as f64;
+        let median = median(&mut times);
+        timing.frames = times.len();
+        timing.frame_ms_median = 1e3 * median;
+        timing.frame_ms_worst = 1e3 * times.last().copied().unwrap_or(f64::NAN);
+        timing.real_time_factor = FRAME / median;
+        timing.iterations_per_frame = iterations as f64 / count;
+        Ok(timing)
+    }
+}
+
+/// The median, and sorted values; not a number without values.
+pub(crate) fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    match values.len() {
+        0 => f64::NAN,
+        n if n % 2 == 1 => values[n / 2],
+        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
+    }
+}

@@ -1,0 +1,212 @@
+//! One substep of a scene, from the same state, with 1, 2, 4, ... iterations: how near to the oracle's minimum, and in what time.
+
+use crate::schedules::one_substep;
+use crate::{Error, Result};
+use glam::DVec3;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+use trocar_core::Progress;
+use trocar_testing::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
+use trocar_tissue::{OracleState, Schedule, State, Stepper, ToolMotion};
+use trocar_workflow::solver_named;
+
+/// Steps of the oracle a frame on the way to the state.
+const ORACLE_SUBSTEPS: usize = 4;
+
+/// Times that a step is repeated for its time.
+const REPEATS: usize = 5;
+
+/// The predictor's excess energy means something above this share of the kinetic energy that gravity gives in a substep.
+const LEAST_EXCESS: f64 = 1e-4;
+
+/// One schedule with one number of iterations.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepRow {
+    /// The schedule's name.
+    pub schedule: String,
+    /// Iterations of the substep.
+    pub iterations: usize,
+    /// Whether that is the schedule's own number.
+    pub own: bool,
+    /// The substep [ms].
+    pub substep_ms: f64,
+    /// Least wall time of the substep on one thread, of five [ms].
+    pub wall_ms: f64,
+    /// RMS distance of the nodes from the oracle's [um].
+    pub position_error_um: f64,
+    /// The same over the RMS displacement from the rest shape.
+    pub position_error: f64,
+    /// Incremental potential above the oracle's [J]; none where an element has no volume.
+    pub energy_error_j: Option<f64>,
+    /// The same over that of the inertial predictor; none where that is as good as none.
+    pub energy_error: Option<f64>,
+    /// Elements with volume at or below 0.
+    pub inverted: usize,
+}
+
+/// The state from which the substep is done: after how many frames of the scene; none for the static equilibrium.
+fn frames_before(scene: &str) -> Option<usize> {
+    match scene {
+        "sag" => None,
+        "drag" => Some(12),
+        // A quarter of a period into the second one.
+        "shake" => Some(10),
+        "tube" => Some(15),
+        _ => Some(6),
+    }
+}
+
+/// All rows of a scene.
+///
+/// # Errors
+/// A state that the oracle does not reach, a step that it cannot do, an interruption.
+pub(super) fn climb(scene: &Scene, solvers: &[&str], most: usize, progress: &dyn Progress) -> Result<Vec<StepRow>> {
+    let mut run = OracleRun::new(scene);
+    let h = FRAME / ORACLE_SUBSTEPS as f64;
+    let mut before = run.state.clone();
+    let frames = frames_before(scene.name);
+    match frames {
+        None => {
+            run.settle()?;
+            before = run.state.clone();
+        }
+        Some(frames) => {
+            for k in 0..frames * ORACLE_SUBSTEPS {
+                stop_if(progress)?;
+                before = run.state.clone();
+                run.step(h, (k + 1) as f64 * h)?;
+            }
+        }
+    }
+    let mut start = run.state.to_state(&scene.model, &before, h)?;
+    start.grasps = grasps(scene, &State::new(&scene.model));
+    let mut rows = Vec::new();
+    for name in solvers {
+        let schedule = solver_named(name)?;
+        let ladder = Ladder::new(scene, &mut run, &start, frames.unwrap_or(0) as f64 * FRAME, schedule)?;
+        for iterations in rungs(schedule, most) {
+            stop_if(progress)?;
+            rows.push(ladder.row(&mut run, name, schedule, iterations)?);
+        }
+    }
+    Ok(rows)
+}
+
+/// 1, 2, 4, ... and the schedule's own number.
+fn rungs(schedule: Schedule, most: usize) -> Vec<usize> {
+    let doubling = std::iter::successors(Some(1_usize), |k| k.checked_mul(2)).take_while(|k| *k <= most);
+    let mut all: Vec<usize> = doubling.chain([own_iterations(schedule)]).collect();
+    all.sort_unstable();
+    all.dedup();
+    all
+}
+
+fn own_iterations(schedule: Schedule) -> usize {
+    crate::schedules::iterations_of(schedule)
+}
+
+/// What the rows of a schedule share.
+struct Ladder<'a> {
+    scene: &'a Scene,
+    start: &'a State,
+    /// The start as the oracle sees it: rounded as the stepper's.
+    before: OracleState,
+    /// The minimum.
+    truth: OracleState,
+    energy: f64,
+    /// Energy of the inertial predictor above the minimum [J]; none where the predictor is as good as the minimum.
+    predictor_excess: Option<f64>,
+    /// RMS displacement from rest at the minimum [m].
+    displacement: f64,
+    tools: Vec<ToolMotion>,
+    /// Whether each node of each body is held.
+    held: Vec<(usize, usize)>,
+    h: f64,
+}
+
+impl<'a> Ladder<'a> {
+    fn new(scene: &'a Scene, run: &mut OracleRun<'_>, start: &'a State, time: f64, schedule: Schedule) -> Result<Self> {
+        let h = FRAME / schedule.substeps() as f64;
+        let before = OracleState::from_state(&scene.model, start);
+        let held = run.held_between_frames(time + h);
+        let mut truth = before.clone();
+        run.oracle().step(&scene.model, &mut truth, h, &held)?;
+        let mut predictor = before.clone();
+        for (b, body) in scene.model.bodies().iter().enumerate() {
+            for i in (0..body.len()).filter(|i| !body.pinned()[*i]) {
+                predictor.positions_mut(b)[i] += h * before.velocities(b)[i] + h * h * scene.model.gravity();
+            }
+        }
+        held.iter().for_each(|n| predictor.positions_mut(n.body)[n.node as usize] = n.target);
+        let total = |run: &mut OracleRun<'_>, state: &OracleState| -> Result<f64> {
+            Ok(run.oracle().energy(&scene.model, &before, state, h)?.iter().sum())
+        };
+        let energy = total(run, &truth)?;
+        let predictor_excess = total(run, &predictor)? - energy;
+        let bodies = scene.model.bodies().iter();
+        let mass: f64 = bodies.map(|b| (0..b.len()).map(|i| b.mass(i)).sum::<f64>()).sum();
+        let least = LEAST_EXCESS * 0.5 * mass * (h * scene.model.gravity()).length_squared();
+        let along = tools(scene, time, time + FRAME);
+        let share = h / FRAME;
+        let displacement = rms(&positions(scene, &truth), &rest_positions(&scene.model));
+        Ok(Self {
+            scene,
+            start,
+            energy,
+            predictor_excess: Some(predictor_excess).filter(|e| e.is_finite() && *e > least),
+            displacement,
+            tools: along.iter().map(|t| ToolMotion { from: t.from, to: t.at(share) }).collect(),
+            held: held.iter().map(|n| (n.body, n.node as usize)).collect(),
+            before,
+            truth,
+            h,
+        })
+    }
+
+    fn row(&self, run: &mut OracleRun<'_>, name: &str, schedule: Schedule, iterations: usize) -> Result<StepRow> {
+        let model = &self.scene.model;
+        let mut stepper = Stepper::new(model, one_substep(schedule, iterations), self.h, 1)?;
+        let mut state = self.start.clone();
+        let report = stepper.step(model, &mut state, &self.tools);
+        let mut times = Vec::with_capacity(REPEATS);
+        for _ in 0..REPEATS {
+            let mut again = self.start.clone();
+            let clock = Instant::now();
+            stepper.step(model, &mut again, &self.tools);
+            times.push(1e3 * clock.elapsed().as_secs_f64());
+        }
+        let mut reached = OracleState::from_state(model, &state);
+        let error = rms(&positions(self.scene, &reached), &positions(self.scene, &self.truth));
+        // A held node's rounding is no error of the solver, and the force on it makes much of it.
+        for (body, node) in &self.held {
+            reached.positions_mut(*body)[*node] = self.truth.positions(*body)[*node];
+        }
+        let energy: f64 = run.oracle().energy(model, &self.before, &reached, self.h)?.iter().sum();
+        let excess = Some(energy - self.energy).filter(|e| e.is_finite());
+        Ok(StepRow {
+            schedule: name.to_owned(),
+            iterations,
+            own: iterations == own_iterations(schedule),
+            substep_ms: 1e3 * self.h,
+            wall_ms: times.iter().copied().fold(f64::INFINITY, f64::min),
+            position_error_um: 1e6 * error,
+            position_error: error / self.displacement,
+            energy_error_j: excess,
+            energy_error: excess.zip(self.predictor_excess).map(|(e, all)| e / all),
+            inverted: report.inverted,
+        })
+    }
+}
+
+fn positions(scene: &Scene, state: &OracleState) -> Vec<DVec3> {
+    (0..scene.model.bodies().len()).flat_map(|b| state.positions(b).iter().copied()).collect()
+}
+
+fn rms(a: &[DVec3], b: &[DVec3]) -> f64 {
+    let sum: f64 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
+    (sum / a.len().max(1) as f64).sqrt()
+}
+
+fn stop_if(progress: &dyn Progress) -> Result<()> {
+    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+}

@@ -1,0 +1,154 @@
+//! The page of the similarity experiment: reconstructions beside the real pictures, in pictures and figures.
+
+use crate::Result;
+use crate::experiment::{SimilarityPictures, SimilarityResult, SimilarityRow};
+use trocar_camera::ColorImage;
+use trocar_camera::metrics::ImageMetrics;
+use trocar_report::colors::{self, SEQUENTIAL};
+use trocar_report::figures;
+use trocar_report::overlays;
+use trocar_report::page::{self, Card, Columns};
+use trocar_report::table::{self, fixed};
+
+/// What is asked of a phantom's silhouettes.
+const BAR: f64 = 0.95;
+/// Difference of 8-bit colour values that is drawn brightest.
+const SPAN: f64 = 80.0;
+/// Pixels of silhouettes that only the real and only the rendered picture has, and both.
+const ONLY_REAL: [u8; 3] = [70, 165, 225];
+const ONLY_RENDERED: [u8; 3] = [214, 64, 52];
+const BOTH: [u8; 3] = [0, 158, 115];
+
+pub(super) fn body(
+    r: &SimilarityResult,
+    shown: &[SimilarityPictures],
+    oblique: &[SimilarityPictures],
+) -> Result<String> {
+    let mut out = page::section("Together", "", &cards(r)) + &table(r);
+    for (row, pictures) in r.rows.iter().zip(shown) {
+        let lead = format!("Through the recovered recording camera. {}.", page::escape(&capital(&row.note)));
+        out += &page::section(&row.specimen, &lead, &(views(pictures)? + &organs(row)));
+    }
+    for (row, pictures) in r.in_vivo.iter().zip(oblique) {
+        let lead = format!(
+            "An oblique view through the thirty-degree endoscope (86.2 x 54.6 degrees), its lens where the recording camera stood, beside the real frame as that lens shows it. {}.",
+            page::escape(&capital(&row.note))
+        );
+        out += &page::section(&format!("In vivo: {}", row.specimen), &lead, &(views(pictures)? + &organs(row)));
+    }
+    if !r.skipped.is_empty() {
+        out += &page::section("Left out", "", &page::list(&r.skipped));
+    }
+    Ok(out)
+}
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
+}
+
+fn cards(r: &SimilarityResult) -> String {
+    let p = r.paper;
+    let least = |rows: &[SimilarityRow]| rows.iter().map(|row| row.iou).fold(f64::INFINITY, f64::min);
+    let mean = |f: &dyn Fn(&ImageMetrics) -> f64| {
+        r.rows.iter().map(|row| f(&row.rendered)).sum::<f64>() / r.rows.len().max(1) as f64
+    };
+    let pair = |[ssim, psnr]: [f64; 2]| format!("{} / {} dB", fixed(ssim, 2), fixed(psnr, 1));
+    page::cards(&[
+        Card::new(
+            "Silhouettes",
+            fixed(least(&r.rows), 3),
+            format!("the worst specimen's IoU; at least {BAR}; paper {}", p.iou),
+        )
+        .met(least(&r.rows) >= BAR),
+        Card::new(
+            "SSIM / PSNR",
+            pair([mean(&|l| l.ssim), mean(&|l| l.psnr_db)]),
+            format!("mean over specimens, as rendered; paper {}", pair(p.rendered)),
+        ),
+        Card::new(
+            "Exposure matched",
+            pair([mean(&|l| l.ssim_matched), mean(&|l| l.psnr_matched_db)]),
+            format!("mean over specimens; paper {}", pair(p.matched)),
+        ),
+        Card::new("Oblique views", fixed(least(&r.in_vivo), 3), "the worst IoU through the endoscope"),
+    ])
+}
+
+fn table(r: &SimilarityResult) -> String {
+    let head =
+        ["Specimen", "What beside the first frame", "IoU", "SSIM", "PSNR [dB]", "matched SSIM", "matched PSNR [dB]"];
+    let cells = |l: &ImageMetrics| [l.ssim, l.psnr_db, l.ssim_matched, l.psnr_matched_db];
+    let row = |name: &str, what: &str, iou: Option<f64>, [a, b, c, d]: [f64; 4]| {
+        let iou = iou.map_or(String::new(), |v| fixed(v, 3));
+        vec![name.to_owned(), what.to_owned(), iou, fixed(a, 3), fixed(b, 1), fixed(c, 3), fixed(d, 1)]
+    };
+    let mut rows = Vec::new();
+    for (s, place) in r.rows.iter().map(|s| (s, "rendered")).chain(r.in_vivo.iter().map(|s| (s, "endoscope"))) {
+        rows.push(row(&s.specimen, place, Some(s.iou), cells(&s.rendered)));
+        if let Some(second) = &s.second_frame {
+            rows.push(row("", "second frame", None, cells(second)));
+        }
+        rows.push(row("", "mean colour", None, cells(&s.mean_colour)));
+    }
+    let p = r.paper;
+    let both = |[a, b]: [f64; 2], [c, d]: [f64; 2]| [a, b, c, d];
+    let none = [f64::NAN; 2];
+    rows.push(row("paper", "rendered", Some(p.iou), both(p.rendered, p.matched)));
+    rows.push(row("", "second frame", None, both(none, p.second_frame)));
+    rows.push(row("", "mean colour", None, both(none, p.mean_colour)));
+    let lead = "Within the organs\u{2019} masks, less what instruments cover. SSIM is Wang and others\u{2019} (2004), 8-bit sRGB, the mean over the channels; matching scales each channel by least squares.";
+    page::section("Beside the paper", lead, &table::plain(&head, &rows))
+}
+
+fn organs(row: &SimilarityRow) -> String {
+    let all: Vec<String> = row.organ_iou.iter().map(|(name, iou)| format!("{name} {}", fixed(*iou, 3))).collect();
+    format!(
+        "<p class=\"lead\">Silhouettes: {}; all together {}.</p>\n",
+        page::escape(&all.join(", ")),
+        fixed(row.union_iou, 3)
+    )
+}
+
+fn views(p: &SimilarityPictures) -> Result<String> {
+    let part = overlays::crop_box(&p.silhouettes[0], 30, 1.5).unwrap_or([0, 0, p.real.width, p.real.height]);
+    let figure = |picture: &ColorImage, alt: &str, caption: &str| -> Result<String> {
+        Ok(page::figure(&figures::img(&overlays::crop(picture, part), alt)?, caption))
+    };
+    let bar = page::scale_bar(&SEQUENTIAL, "0", "mean difference of the channels, of 255", "80");
+    let legend = page::legend([("both", BOTH), ("real only", ONLY_REAL), ("rendered only", ONLY_RENDERED)]);
+    let mut all = vec![
+        figure(&p.real, "the real picture", "<b>Real.</b> The recording\u{2019}s first frame.")?,
+        figure(&p.rendered, "the rendered picture", "<b>Rendered.</b> Organs and surroundings, path traced.")?,
+        figure(&difference(p), "their difference", &format!("<b>Difference.</b>{bar}"))?,
+        figure(&silhouettes(p), "their silhouettes", &format!("<b>Silhouettes.</b>{legend}"))?,
+    ];
+    if let Some((what, picture)) = &p.other {
+        all.push(figure(picture, what, &format!("<b>Relit.</b> {}", page::escape(what)))?);
+    }
+    Ok(page::grid(Columns::Two, &all))
+}
+
+fn difference(p: &SimilarityPictures) -> ColorImage {
+    let mut out = overlays::dimmed(&p.real);
+    for i in (0..out.pixels.len()).filter(|i| p.compared.set[*i]) {
+        let (a, b) = (p.real.pixels[i], p.rendered.pixels[i]);
+        let mean = (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0;
+        out.pixels[i] = colors::map(&SEQUENTIAL, mean / SPAN);
+    }
+    out
+}
+
+fn silhouettes(p: &SimilarityPictures) -> ColorImage {
+    let mut out = overlays::dimmed(&p.real);
+    let [real, rendered] = &p.silhouettes;
+    for (i, pixel) in out.pixels.iter_mut().enumerate() {
+        match (real.set[i], rendered.set[i]) {
+            (true, true) => *pixel = colors::mix(*pixel, BOTH, 0.45),
+            (true, false) => *pixel = ONLY_REAL,
+            (false, true) => *pixel = ONLY_RENDERED,
+            (false, false) => {}
+        }
+    }
+    out
+}

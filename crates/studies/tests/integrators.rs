@@ -1,0 +1,45 @@
+//! The comparison of integrators on a tiny mesh: what diverges, what stays bounded, what is written.
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+use trocar_core::Silent;
+use trocar_phantom::RecordOptions;
+use trocar_studies::IntegratorsExperiment;
+use trocar_testing::scenes::Organs;
+
+#[test]
+fn the_papers_finding_is_one_of_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let mesh = folder.path().join("appendix.msh");
+    let organs = Organs::analytic_appendix(1200).unwrap();
+    trocar_geometry::io::write_msh(&mesh, &organs.organs[0].mesh).unwrap();
+    let experiment = IntegratorsExperiment {
+        mesh: Some(mesh),
+        record: RecordOptions::default(),
+        seconds: 0.2,
+        undamped: false,
+        threads: 1,
+    };
+    let output = folder.path().join("out");
+    let result = experiment.run(&output, &Silent).unwrap();
+    let row = |name: &str| result.integrators.iter().find(|r| r.name == name).unwrap();
+    assert!(!row("Semi-implicit Euler").bounded);
+    assert_eq!(row("XPBD as in Newton 1.8").ended_at_s, Some(1.0 / 60.0));
+    let stable = row("Semi-implicit Euler, stable steps");
+    assert!(stable.bounded && stable.sag_error.unwrap() < 0.02, "{:?}", stable.sag_error);
+    let small = row("XPBD, neo-Hookean, small steps");
+    assert!(small.bounded && small.sag_error.unwrap() < 0.1, "{:?}", small.sag_error);
+    assert!(row("Vertex Block Descent as in the paper").bounded);
+    assert!(result.findings.iter().any(|f| f.contains("XPBD: that it does not stay bounded is true of settings")));
+    let page = std::fs::read_to_string(output.join("report.html")).unwrap();
+    assert!(page.contains("<svg") && page.contains("six strains"));
+    let json: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(output.join("integrators.json")).unwrap()).unwrap();
+    assert_eq!(json["integrators"].as_array().unwrap().len(), result.integrators.len());
+
+    // A folder of something else is not written into.
+    let foreign = folder.path().join("foreign");
+    std::fs::create_dir(&foreign).unwrap();
+    std::fs::write(foreign.join("thesis.txt"), "mine").unwrap();
+    assert!(experiment.run(&foreign, &Silent).is_err());
+    assert!(IntegratorsExperiment { seconds: f64::NAN, ..experiment }.run(&output, &Silent).is_err());
+}

@@ -1,0 +1,28 @@
+//! The renderer's benchmark, and its rays against Embree's. The latter is skipped, saying so, where Embree is not.
+
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
+
+use std::path::Path;
+use trocar_core::Silent;
+use trocar_studies::RenderBench;
+
+#[test]
+fn rays_end_where_embrees_do() {
+    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
+    let (scene, phantoms) = (None, std::path::PathBuf::new());
+    let bench = RenderBench { triangles: 20_000, samples: 0, rays: 200, python, picture: None, scene, phantoms };
+    let result = bench.run(&Silent).unwrap();
+    assert!((result.triangles as f64 / 20_000.0 - 1.0).abs() < 0.1, "{} triangles", result.triangles);
+    assert!(result.preview_224_ms > 0.0 && result.refit_ms > 0.0 && result.path_720p_ms.is_none());
+    assert_eq!(result.rays.len(), 2);
+    if let Some(why) = result.embree_failure {
+        println!("skipped: {why}; `cargo xtask tools` fetches embreex");
+        return;
+    }
+    for row in result.rays {
+        assert!(row.compared.unwrap() > row.rays / 2, "{row:?}");
+        // One ray in ten thousand may graze an edge.
+        assert!(row.differing.unwrap() <= 4, "{row:?}");
+        assert!(row.largest_difference_m.unwrap() < 1e-5, "{row:?}");
+    }
+}

@@ -1,0 +1,74 @@
+//! The composite against the instrument-free truth of a phantom.
+
+use crate::Result;
+use crate::truth::{Part, Truth};
+use std::path::Path;
+use trocar_camera::{DepthImage, Mask};
+use trocar_reconstruct::Reconstruction;
+use trocar_report::overlays;
+use trocar_report::page::{self, Columns};
+use trocar_report::{colors::DIVERGING, figures, table};
+
+/// The section, empty when `dir` (the folder of the truth, or the recording that holds it as `truth/`) has neither
+/// `color.png` nor `depth.png`.
+///
+/// # Errors
+/// Names the file when it is unreadable or of another size than the composite.
+pub(super) fn section(r: &Reconstruction, dir: &Path) -> Result<String> {
+    let Some(truth) = Truth::read(r, dir)? else { return Ok(String::new()) };
+    let (color, depth) = (&truth.color, &truth.depth);
+    let parts = truth.parts(r);
+    let mut figures = Vec::new();
+    if let Some(truth) = color {
+        let img = figures::img(truth, "truth, seen without instruments")?;
+        figures.push(page::figure(&img, "<b>Truth.</b> The phantom without instruments and without noise."));
+    }
+    if let Some(truth) = depth {
+        figures.push(error_map(r, truth)?);
+    }
+    let rows: Vec<Vec<String>> = parts.iter().map(row).collect();
+    let head = [
+        "Part",
+        "Pixels with depth",
+        "Depth, median |error|",
+        "95th percentile",
+        "signed median",
+        "Colour, mean",
+        "95th percentile",
+    ];
+    Ok(page::section(
+        "Composite against the truth",
+        "The phantom is known exactly, so what the composite recovered, also under the instruments, can be checked. \
+         Colour differences are of 255 levels.",
+        &(page::grid(Columns::Two, &figures) + &table::plain(&head, &rows)),
+    ))
+}
+
+fn error_map(r: &Reconstruction, truth: &DepthImage) -> Result<String> {
+    let mut picture = overlays::dimmed(&r.background);
+    let pairs = || r.depth.depth.iter().zip(&truth.depth);
+    let compared =
+        Mask { width: truth.width, height: truth.height, set: pairs().map(|(a, b)| *a > 0.0 && *b > 0.0).collect() };
+    let error: Vec<f32> = pairs().map(|(a, b)| a - b).collect();
+    overlays::error(&mut picture, &error, &compared);
+    overlays::outline(&mut picture, &r.instruments, trocar_report::colors::INSTRUMENT);
+    let img = figures::img(&picture, "depth error of the composite")?;
+    let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "composite minus true depth [mm]", "+5");
+    let caption = "<b>Depth error of the composite.</b> Where the instruments stood in the centre frame is outlined.";
+    Ok(page::figure(&img, &format!("{caption}{bar}")))
+}
+
+fn row(part: &Part) -> Vec<String> {
+    let dash = || "\u{2013}".to_owned();
+    let mm = |v: f64| format!("{} mm", table::fixed(v, 2));
+    let mut row = vec![part.name.to_owned()];
+    match part.depth {
+        Some((n, median, p95, signed)) => row.extend([table::count(n), mm(median), mm(p95), mm(signed)]),
+        None => row.extend([dash(), dash(), dash(), dash()]),
+    }
+    match part.color {
+        Some((mean, p95)) => row.extend([table::fixed(mean, 1), table::fixed(p95, 1)]),
+        None => row.extend([dash(), dash()]),
+    }
+    row
+}

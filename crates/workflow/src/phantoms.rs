@@ -1,0 +1,79 @@
+//! The phantoms as specimens: recorded, unless an earlier run left the recording, and reconstructed.
+
+use crate::workflow::reconstruct_recording;
+use crate::{Error, Result};
+use std::fs::File;
+use std::io::ErrorKind;
+use std::path::Path;
+use trocar_core::Progress;
+use trocar_phantom::RecordOptions;
+use trocar_reconstruct::Settings;
+use trocar_recording::Recording;
+use trocar_scene::{Scene, Source};
+use trocar_specimen::Specimen;
+
+/// Frames of a phantom's recording: the composite's window.
+const FRAMES: usize = 181;
+
+/// Records `phantom` into `dir` unless a recording of the same options lies there.
+///
+/// # Errors
+/// A phantom that is not known, a folder that cannot be written.
+pub fn recorded(phantom: &str, options: &RecordOptions, dir: &Path, progress: &dyn Progress) -> Result<()> {
+    let described = trocar_phantom::describe(phantom, options)?;
+    if let Ok(earlier) = Recording::open(dir)
+        && earlier.info == described
+        && earlier.len() == options.frames
+    {
+        return Ok(());
+    }
+    Ok(trocar_phantom::record(phantom, options, dir, progress)?)
+}
+
+/// What a kept specimen must have been made by and with to be used again.
+const STAMP: &str = "made-by.txt";
+
+/// `phantom` recorded into `folder/recording` and reconstructed with the default settings into `folder/specimen`, or what lies there of an earlier time if the same program would make the same.
+/// Of several processes that want it at once, one makes it and the others wait.
+///
+/// # Errors
+/// A phantom that is not known, a folder that cannot be written.
+pub fn specimen(phantom: &str, options: &RecordOptions, folder: &Path, progress: &dyn Progress) -> Result<Specimen> {
+    let (settings, [recording, specimen]) = (Settings::default(), ["recording", "specimen"].map(|n| folder.join(n)));
+    let stamp = format!("{phantom}\n{options:?}\n{settings:?}\n{}\n", env!("TROCAR_SPECIMEN_MAKERS"));
+    let path = folder.join(STAMP);
+    let io = |source| Error::Io { path: path.clone(), source };
+    std::fs::create_dir_all(folder).map_err(io)?;
+    let lock = File::create(folder.join(".lock")).map_err(io)?;
+    lock.lock().map_err(io)?;
+    if std::fs::read_to_string(&path).is_ok_and(|kept| kept == stamp)
+        && let Ok(kept) = Specimen::read(&specimen)
+    {
+        return Ok(kept);
+    }
+    // Until all is made anew, what lies there is of nobody.
+    match std::fs::remove_file(&path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => return Err(io(e)),
+        _ => {}
+    }
+    recorded(phantom, options, &recording, progress)?;
+    reconstruct_recording(&recording, &settings, &specimen, progress)?;
+    std::fs::write(&path, &stamp).map_err(io)?;
+    // Read back, so that it is the same to the bit whoever made it.
+    Ok(Specimen::read(&specimen)?)
+}
+
+/// The specimen of a scene: its folder's, or its phantom's, recorded and reconstructed below the folder `phantoms`.
+///
+/// # Errors
+/// A specimen that cannot be read or made.
+pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -> Result<Specimen> {
+    match scene.specimen.source() {
+        Some(Source::Folder(path)) => Ok(Specimen::read(&scene.resolve(path))?),
+        Some(Source::Phantom(name, seed)) => {
+            let options = RecordOptions { frames: FRAMES, seed: u64::from(seed), ..RecordOptions::default() };
+            specimen(name, &options, &phantoms.join(format!("{name}-{seed}")), progress)
+        }
+        None => Err(Error::Mismatch(format!("scene '{}' names neither a specimen folder nor a phantom", scene.name))),
+    }
+}

@@ -1,0 +1,229 @@
+//! Masks of a recording, made and put where the reconstruction looks for them.
+
+use crate::{Error, Result};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use trocar_camera::{ColorImage, Mask};
+use trocar_core::Progress;
+use trocar_recording::{Recording, RgbdFrame};
+use trocar_report::overlays::overlay;
+use trocar_segment::{MetalDetector, Picture, Sam2, Segmenter, Target, Tracker, WantedFile, wanted_files};
+use trocar_specimen::StagedFolder;
+
+/// The file that makes a folder one of masks of ours.
+const MARKER: &str = "masks.json";
+
+/// How the masks of a recording are made.
+#[derive(Clone, Debug, Default)]
+pub struct Segment {
+    /// Folder with the networks of SAM 2.1: for organs that are pointed at, and to follow the recording's instruments.
+    pub sam: Option<PathBuf>,
+    /// ONNX Runtime's library; `ORT_DYLIB_PATH` by default.
+    pub onnxruntime: Option<PathBuf>,
+}
+
+/// What was found.
+#[derive(Clone, Debug, Serialize)]
+pub struct Segmented {
+    /// The folder of masks.
+    pub masks: String,
+    /// Organs, and the pixels of each.
+    pub organs: Vec<(String, usize)>,
+    /// What found the instruments.
+    pub instruments: String,
+    /// Frames.
+    pub frames: usize,
+    /// Mean share of a frame that instruments cover.
+    pub covered: f64,
+    /// Wall time [s].
+    pub seconds: f64,
+}
+
+/// A file that SAM 2.1 needs, for printing.
+#[derive(Clone, Debug, Serialize)]
+pub struct Wanted {
+    /// Its name, or how it is recognised.
+    pub name: &'static str,
+    /// What it is for.
+    pub purpose: &'static str,
+    /// Where it was found.
+    pub found: Option<String>,
+    /// Where it can be had.
+    pub how_to_get: &'static str,
+}
+
+/// The files that SAM 2.1 needs, and which of them are there.
+pub fn wanted_weights(folder: Option<&Path>) -> Vec<Wanted> {
+    let of = |w: WantedFile| Wanted {
+        name: w.name,
+        purpose: w.purpose,
+        found: w.found.map(|p| p.display().to_string()),
+        how_to_get: w.how_to_get,
+    };
+    wanted_files(folder).into_iter().map(of).collect()
+}
+
+impl Segment {
+    /// Writes masks of every organ that is pointed at and of the instruments of every frame into the folder `output`, with
+    /// pictures to judge them by. Instruments that the recording points at are followed by SAM 2.1; without, metal is looked for.
+    ///
+    /// # Errors
+    /// One line that names the file, organ or instrument; `output` is then left as it was.
+    pub fn run(&self, recording: &Path, output: &Path, progress: &dyn Progress) -> Result<Segmented> {
+        let clock = Instant::now();
+        let recording = Recording::open(recording)?;
+        if output.exists() {
+            let reason =
+                "is there already; masks may have been corrected by hand, so it is not overwritten; name a new folder";
+            return Err(Error::Exists { path: output.to_owned(), reason: reason.into() });
+        }
+        let staged = StagedFolder::create(output, MARKER)?;
+        let folder = staged.path();
+        let organs: Vec<_> = recording.info.organs.iter().filter(|o| !o.points.is_empty()).collect();
+        let follow = !recording.info.followed.is_empty();
+        let sam = match (&self.sam, organs.is_empty() && !follow) {
+            (Some(weights), false) => Some(Sam2::open(weights, self.onnxruntime.as_deref())?),
+            (None, false) => {
+                let reason =
+                    "points and [[instrument]] need SAM 2.1: --sam FOLDER; `trocar segment --weights` says which files";
+                return Err(Error::Mismatch(format!("{}: {reason}", recording.toml().display())));
+            }
+            (_, true) => None,
+        };
+        make(&folder.join("instruments"))?;
+        let middle = recording.frame(recording.len() / 2)?;
+        let mut found = Vec::new();
+        let mut shown = middle.color.clone();
+        for (index, organ) in organs.iter().enumerate() {
+            let Some(sam) = &sam else { break };
+            let target = Target {
+                name: organ.name.clone(),
+                points: organ.points.clone(),
+                points_outside: organ.points_outside.clone(),
+                ..Target::default()
+            };
+            let picture = Picture { color: &middle.color, depth: None, name: "the middle frame" };
+            let mask = sam.segment(&picture, &target)?;
+            mask.write_png(&folder.join(format!("{}.png", organ.name)))?;
+            overlay(&mut shown, &mask, index);
+            found.push((organ.name.clone(), mask.count()));
+        }
+        shown.write_png(&folder.join("organs-seen.png"))?;
+        progress.begin("frames", recording.len() as u64);
+        let covered = match (&sam, follow) {
+            (Some(sam), true) => followed(&recording, sam, folder, progress),
+            _ => by_metal(&recording, folder, progress),
+        }?;
+        progress.end();
+        let segmented = Segmented {
+            masks: output.display().to_string(),
+            organs: found,
+            instruments: match (&sam, follow) {
+                (Some(sam), true) => format!("followed by {}", sam.describe()),
+                _ => MetalDetector::default().describe(),
+            },
+            frames: recording.len(),
+            covered: covered.iter().sum::<f64>() / covered.len().max(1) as f64,
+            seconds: clock.elapsed().as_secs_f64(),
+        };
+        let json = serde_json::to_vec_pretty(&segmented).map_err(|e| Error::Format(e.to_string()))?;
+        let path = folder.join(MARKER);
+        std::fs::write(&path, json).map_err(|source| Error::Io { path, source })?;
+        staged.commit()?;
+        Ok(segmented)
+    }
+}
+
+/// Finds metal in every frame, many at a time.
+fn by_metal(recording: &Recording, folder: &Path, progress: &dyn Progress) -> Result<Vec<f64>> {
+    let all: Vec<usize> = (0..recording.len()).collect();
+    let detector = MetalDetector::default();
+    let target = Target { name: "instruments".into(), ..Target::default() };
+    let shares: Result<Vec<f64>> = recording
+        .packets(&all)
+        .par_bridge()
+        .map(|packet| {
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
+            }
+            // A broken frame has no mask and is left out of the composite too.
+            let Ok(frame) = packet.parts.and_then(|parts| recording.decode(packet.frame, &parts)) else {
+                return Ok(0.0);
+            };
+            let name = recording.frame_name(packet.frame);
+            let picture = Picture { color: &frame.color, depth: Some(&frame.depth), name: &name };
+            let mask = detector.segment(&picture, &target)?;
+            save(folder, recording, packet.frame, &frame, &mask)?;
+            progress.advance(1);
+            Ok(share(&mask))
+        })
+        .collect();
+    shares
+}
+
+/// Follows every instrument of the recording forward and backward from where it is pointed at.
+fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Progress) -> Result<Vec<f64>> {
+    let mut masks: Vec<Option<Mask>> = vec![None; recording.len()];
+    let frame_of = |index: usize| -> Result<Option<RgbdFrame>> {
+        if progress.interrupted() {
+            return Err(Error::Interrupted);
+        }
+        Ok(recording.frame(index).ok())
+    };
+    for instrument in &recording.info.followed {
+        let first = instrument.frame;
+        let target = Target {
+            name: instrument.name.clone(),
+            points: instrument.points.clone(),
+            points_outside: instrument.points_outside.clone(),
+            ..Target::default()
+        };
+        if first >= recording.len() {
+            let reason = format!("frame is {first}; the recording has {}", recording.len());
+            return Err(Error::Mismatch(format!("instrument '{}': {reason}", instrument.name)));
+        }
+        let ways: [Vec<usize>; 2] = [(first..recording.len()).collect(), (0..=first).rev().collect()];
+        for way in ways {
+            let mut tracker = Tracker::new(sam);
+            for (step, index) in way.into_iter().enumerate() {
+                let Some(frame) = frame_of(index)? else { continue };
+                let name = recording.frame_name(index);
+                let picture = Picture { color: &frame.color, depth: None, name: &name };
+                let mask = if step == 0 { tracker.start(&picture, &target)? } else { tracker.next(&picture)? };
+                let all = masks[index].get_or_insert_with(|| Mask::new(mask.width, mask.height));
+                all.set.iter_mut().zip(&mask.set).for_each(|(a, b)| *a |= *b);
+                progress.advance(u64::from(step > 0 && instrument == &recording.info.followed[0]));
+            }
+        }
+    }
+    let mut shares = Vec::new();
+    for (index, mask) in masks.iter().enumerate() {
+        if let (Some(mask), Some(frame)) = (mask, frame_of(index)?) {
+            save(folder, recording, index, &frame, mask)?;
+            shares.push(share(mask));
+        }
+    }
+    Ok(shares)
+}
+
+/// Writes the mask of a frame, and of a few frames spread over the recording a picture to judge it by.
+fn save(folder: &Path, recording: &Recording, index: usize, frame: &RgbdFrame, mask: &Mask) -> Result<()> {
+    const SHOWN: usize = 6;
+    mask.write_png(&folder.join("instruments").join(recording.mask_file_name(index)))?;
+    if index.is_multiple_of(recording.len().div_ceil(SHOWN).max(1)) {
+        let mut shown: ColorImage = frame.color.clone();
+        overlay(&mut shown, mask, 0);
+        shown.write_png(&folder.join(format!("instruments-seen-{index:06}.png")))?;
+    }
+    Ok(())
+}
+
+fn share(mask: &Mask) -> f64 {
+    mask.count() as f64 / mask.set.len().max(1) as f64
+}
+
+fn make(path: &Path) -> Result<()> {
+    std::fs::create_dir_all(path).map_err(|source| Error::Io { path: path.to_owned(), source })
+}

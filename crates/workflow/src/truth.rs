@@ -1,0 +1,139 @@
+//! The composite against the instrument-free truth of a phantom, in figures.
+
+use crate::{Error, Result};
+use serde::Serialize;
+use std::path::Path;
+use trocar_camera::{ColorImage, DepthImage};
+use trocar_reconstruct::Reconstruction;
+
+/// Unit of a phantom's truth depth [m].
+pub const DEPTH_UNIT: f64 = 1e-4;
+
+/// What the camera would see without instruments and noise.
+pub struct Truth {
+    /// Its colours.
+    pub color: Option<ColorImage>,
+    /// Its depth.
+    pub depth: Option<DepthImage>,
+}
+
+/// Errors of the pixels of one part of the image.
+pub struct Part {
+    /// Its name.
+    pub name: &'static str,
+    /// Depth: pixels, median and 95th percentile of the absolute error, median of the signed one [mm].
+    pub depth: Option<(usize, f64, f64, f64)>,
+    /// Colour: mean absolute difference over the three channels and its 95th percentile over pixels, of 255 levels.
+    pub color: Option<(f64, f64)>,
+}
+
+/// The composite against the truth (SPEC R2).
+#[derive(Clone, Copy, Debug, Default, Serialize)]
+pub struct TruthFigures {
+    /// Median absolute error of depth [mm].
+    pub depth_error_median_mm: f64,
+    /// 95th percentile of the absolute error of depth [mm].
+    pub depth_error_p95_mm: f64,
+    /// Median error of depth, composite minus truth [mm].
+    pub depth_error_signed_mm: f64,
+    /// Median absolute error of depth where an instrument stood in the window's centre frame [mm].
+    pub under_instruments_median_mm: Option<f64>,
+    /// Mean absolute difference of colour, of 255 levels.
+    pub color_error_mean: Option<f64>,
+}
+
+impl Truth {
+    /// Reads `color.png` and `depth.png` of the folder `dir` of the truth, or of the recording that holds it as `truth/`; `None`
+    /// where there is neither.
+    ///
+    /// # Errors
+    /// Names the file when it is unreadable or of another size than the composite.
+    pub fn read(r: &Reconstruction, dir: &Path) -> Result<Option<Self>> {
+        let find = |name: &str| [dir.join(name), dir.join("truth").join(name)].into_iter().find(|p| p.is_file());
+        let fits = |path: &Path, width: usize, height: usize| {
+            let size = (r.background.width, r.background.height);
+            if (width, height) == size {
+                return Ok(());
+            }
+            let reason = format!("{width} x {height} pixels; the composite has {} x {}", size.0, size.1);
+            Err(Error::Truth { path: path.to_owned(), reason })
+        };
+        let mut truth = Self { color: None, depth: None };
+        if let Some(path) = find("color.png") {
+            let image = ColorImage::read(&path)?;
+            fits(&path, image.width, image.height)?;
+            truth.color = Some(image);
+        }
+        if let Some(path) = find("depth.png") {
+            let image = DepthImage::read(&path, DEPTH_UNIT)?;
+            fits(&path, image.width, image.height)?;
+            truth.depth = Some(image);
+        }
+        Ok((truth.color.is_some() || truth.depth.is_some()).then_some(truth))
+    }
+
+    /// The whole image, what lies under the instruments, and the rest.
+    pub fn parts(&self, r: &Reconstruction) -> [Part; 3] {
+        let under = |i: usize| r.instruments.set[i];
+        [
+            self.part("whole image", r, &|_| true),
+            self.part("under the instruments", r, &under),
+            self.part("elsewhere", r, &|i| !under(i)),
+        ]
+    }
+
+    /// The figures; `None` without true depth.
+    pub fn figures(&self, r: &Reconstruction) -> Option<TruthFigures> {
+        let [whole, under, _] = self.parts(r);
+        let (_, depth_error_median_mm, depth_error_p95_mm, depth_error_signed_mm) = whole.depth?;
+        Some(TruthFigures {
+            depth_error_median_mm,
+            depth_error_p95_mm,
+            depth_error_signed_mm,
+            under_instruments_median_mm: under.depth.map(|d| d.1),
+            color_error_mean: whole.color.map(|c| c.0),
+        })
+    }
+
+    fn part(&self, name: &'static str, r: &Reconstruction, inside: &dyn Fn(usize) -> bool) -> Part {
+        let filled: Vec<usize> = (0..r.depth.depth.len()).filter(|&i| r.depth.depth[i] > 0.0 && inside(i)).collect();
+        let depth = self.depth.as_ref().and_then(|truth| {
+            let signed: Vec<f64> = filled
+                .iter()
+                .filter(|&&i| truth.depth[i] > 0.0)
+                .map(|&i| 1e3 * (f64::from(r.depth.depth[i]) - f64::from(truth.depth[i])))
+                .collect();
+            let size: Vec<f64> = signed.iter().map(|e| e.abs()).collect();
+            Some((size.len(), quantile(&size, 0.5)?, quantile(&size, 0.95)?, quantile(&signed, 0.5)?))
+        });
+        let color = self.color.as_ref().and_then(|truth| {
+            let difference = |&i: &usize| {
+                let (a, b) = (r.background.pixels[i], truth.pixels[i]);
+                (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0
+            };
+            let all: Vec<f64> = filled.iter().map(difference).collect();
+            Some((all.iter().sum::<f64>() / all.len().max(1) as f64, quantile(&all, 0.95)?))
+        });
+        Part { name, depth, color }
+    }
+}
+
+/// Value below which the share `q` of the finite values lies (nearest rank); `None` without any.
+pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
+    let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let rank = (q * (sorted.len().saturating_sub(1)) as f64).round() as usize;
+    sorted.get(rank).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_of_known_values() {
+        let values: Vec<f64> = (0..=100).rev().map(f64::from).collect();
+        assert_eq!((quantile(&values, 0.5), quantile(&values, 0.95)), (Some(50.0), Some(95.0)));
+        assert_eq!((quantile(&[], 0.5), quantile(&[f64::NAN], 0.5)), (None, None));
+    }
+}

@@ -1,0 +1,241 @@
+//! The commands' work from folder to folder: read, run, write the result and its report.
+
+use crate::truth::{Truth, TruthFigures};
+use crate::{Error, Result, pages};
+use serde::Serialize;
+use std::path::Path;
+use std::time::Instant;
+use trocar_cell::{GraspLift, GraspLiftRun, Summary};
+use trocar_core::Progress;
+use trocar_geometry::io::Unit;
+use trocar_reconstruct::{Reconstruction, Settings};
+use trocar_recording::Recording;
+use trocar_specimen::{OrganFacts, Specimen, StagedFolder};
+
+/// The report's name in every folder.
+pub const REPORT: &str = "report.html";
+
+/// The file that makes a folder a run.
+const RUN_MARKER: &str = "result.json";
+
+/// Frames between snapshots of a run's moving picture.
+const SNAPSHOT_EVERY: usize = 8;
+
+/// A specimen that was made, in figures.
+#[derive(Clone, Debug, Serialize)]
+pub struct Reconstructed {
+    /// The specimen's folder.
+    pub specimen: String,
+    /// Its organs.
+    pub organs: Vec<OrganRow>,
+    /// How the composite went; `None` for a ready surface.
+    pub composite: Option<CompositeFigures>,
+    /// What the user should know.
+    pub notes: Vec<String>,
+    /// Wall time [s].
+    pub seconds: f64,
+    /// The report's path.
+    pub report: String,
+}
+
+/// One organ in figures.
+#[derive(Clone, Debug, Serialize)]
+pub struct OrganRow {
+    /// Its name.
+    pub organ: String,
+    /// Its measurements.
+    #[serde(flatten)]
+    pub facts: OrganFacts,
+}
+
+/// The composite in figures (SPEC R2).
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct CompositeFigures {
+    /// Frames used.
+    pub frames_used: usize,
+    /// Share of the image recovered from under instruments.
+    pub recovered_share: f64,
+    /// Share of pixels with depth.
+    pub coverage: f64,
+    /// Median over pixels of the inter-percentile (10 to 90) range of depth [mm].
+    pub depth_range_median_mm: f64,
+    /// Wall time of reading and decoding the frames [s].
+    pub frames_s: f64,
+    /// Time that all threads together spent decoding images [s].
+    pub decoding_cpu_s: f64,
+    /// Wall time of the medians [s].
+    pub medians_s: f64,
+    /// Its errors against the truth, where the recording has one.
+    pub truth: Option<TruthFigures>,
+}
+
+impl CompositeFigures {
+    /// The figures of `r`, made from the recording in folder `recording`.
+    ///
+    /// # Errors
+    /// Names the file of the truth that is unreadable or of another size.
+    pub fn of(r: &Reconstruction, recording: &Path) -> Result<Self> {
+        let truth = Truth::read(r, &recording.join("truth"))?;
+        Ok(Self {
+            frames_used: r.frames_used,
+            recovered_share: r.recovered_share,
+            coverage: r.coverage,
+            depth_range_median_mm: r.depth_range_median * 1e3,
+            frames_s: r.times.frames,
+            decoding_cpu_s: r.times.decoding,
+            medians_s: r.times.medians,
+            truth: truth.and_then(|truth| truth.figures(r)),
+        })
+    }
+}
+
+/// A run that was made, in figures.
+#[derive(Clone, Debug, Serialize)]
+pub struct SimulatedRun {
+    /// The measurements.
+    #[serde(flatten)]
+    pub summary: Summary,
+    /// The report's path.
+    pub report: String,
+}
+
+/// Reconstructs the recording in folder `recording` into the specimen folder `output`, report included.
+///
+/// # Errors
+/// One line that names the file or field of a bad input; `output` is then left as it was.
+pub fn reconstruct_recording(
+    recording: &Path,
+    settings: &Settings,
+    output: &Path,
+    progress: &dyn Progress,
+) -> Result<(Reconstructed, Reconstruction)> {
+    let clock = Instant::now();
+    refuse_overlap(recording, output)?;
+    let staged = Specimen::stage(output)?;
+    let reconstruction = trocar_reconstruct::reconstruct(&Recording::open(recording)?, settings, progress)?;
+    let truth = recording.join("truth");
+    let html = pages::reconstruction(&reconstruction, truth.is_dir().then_some(truth.as_path()))?;
+    finish(staged, &reconstruction.specimen, &html, progress)?;
+    let composite = CompositeFigures::of(&reconstruction, recording)?;
+    let r = &reconstruction;
+    Ok((figures(&r.specimen, Some(composite), r.notes.clone(), output, clock), reconstruction))
+}
+
+/// Makes the specimen folder `output` of a ready surface, report included.
+///
+/// # Errors
+/// One line that names the file and what is wrong with it; `output` is then left as it was.
+pub fn reconstruct_surface(
+    surface: &Path,
+    unit: Unit,
+    settings: &Settings,
+    output: &Path,
+    progress: &dyn Progress,
+) -> Result<Reconstructed> {
+    let clock = Instant::now();
+    refuse_overlap(surface, output)?;
+    let staged = Specimen::stage(output)?;
+    let (specimen, repair) = trocar_reconstruct::from_surface(surface, unit, settings, progress)?;
+    finish(staged, &specimen, &pages::surface(&specimen, &repair)?, progress)?;
+    let mut notes = Vec::new();
+    if repair.rebuilt {
+        notes.push(format!(
+            "the surface was not watertight ({} open edges, {} components) and was rebuilt",
+            repair.open_edges, repair.components
+        ));
+    }
+    Ok(figures(&specimen, None, notes, output, clock))
+}
+
+/// Runs `task` on the specimen folder `specimen` into the run folder `output`: figures, channels and report.
+///
+/// # Errors
+/// One line that names the file, organ or option; `output` is then left as it was.
+pub fn simulate(specimen: &Path, task: &GraspLift, output: &Path, progress: &dyn Progress) -> Result<SimulatedRun> {
+    refuse_overlap(specimen, output)?;
+    let run = simulate_specimen(&Specimen::read(specimen)?, task, None, output, progress)?;
+    Ok(SimulatedRun { summary: run.summary, report: output.join(REPORT).display().to_string() })
+}
+
+/// Runs the grasp-lift with pictures and writes it to the folder `output`; `before` goes first in the report.
+pub fn simulate_specimen(
+    specimen: &Specimen,
+    task: &GraspLift,
+    before: Option<&str>,
+    output: &Path,
+    progress: &dyn Progress,
+) -> Result<GraspLiftRun> {
+    let staged = StagedFolder::create(output, RUN_MARKER)?;
+    let run = GraspLift { snapshot_every: SNAPSHOT_EVERY, ..task.clone() }.run(specimen, progress)?;
+    write_run(staged, specimen, &run, before, progress)?;
+    Ok(run)
+}
+
+fn write_run(
+    staged: StagedFolder,
+    specimen: &Specimen,
+    run: &GraspLiftRun,
+    before: Option<&str>,
+    progress: &dyn Progress,
+) -> Result<()> {
+    let folder = staged.path();
+    let write = |name: &str, bytes: &[u8]| {
+        let path = folder.join(name);
+        std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })
+    };
+    let summary = serde_json::to_vec_pretty(&run.summary).map_err(|e| Error::Format(e.to_string()))?;
+    write(RUN_MARKER, &summary)?;
+    let mut table = csv::Writer::from_writer(Vec::new());
+    for sample in &run.samples {
+        table.serialize(sample).map_err(|e| Error::Format(e.to_string()))?;
+    }
+    write("channels.csv", &table.into_inner().map_err(|e| Error::Format(e.to_string()))?)?;
+    write(REPORT, pages::grasp_lift(specimen, run, before)?.as_bytes())?;
+    stop_if_asked(progress)?;
+    Ok(staged.commit()?)
+}
+
+fn finish(staged: StagedFolder, specimen: &Specimen, html: &str, progress: &dyn Progress) -> Result<()> {
+    stop_if_asked(progress)?;
+    specimen.write_into(staged.path())?;
+    let path = staged.path().join(REPORT);
+    std::fs::write(&path, html).map_err(|source| Error::Io { path, source })?;
+    Ok(staged.commit()?)
+}
+
+/// A report is made without looking up; a request to stop that came meanwhile is honoured before anything is put in place.
+fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
+    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+}
+
+/// Refuses an output that holds the input, is it, or lies in it: the input would be replaced or changed.
+pub fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
+    // An output that is not there yet is where its nearest existing parent is.
+    let placed = |path: &Path| {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        let root = path.ancestors().find_map(|p| Some((p, p.canonicalize().ok()?)));
+        root.map_or_else(|| path.clone(), |(p, real)| real.join(path.strip_prefix(p).unwrap_or(Path::new(""))))
+    };
+    let (from, to) = (placed(input), placed(output));
+    if from.starts_with(&to) || (input.is_dir() && to.starts_with(&from)) {
+        return Err(Error::Overlap { input: input.to_owned(), output: output.to_owned() });
+    }
+    Ok(())
+}
+
+fn figures(
+    specimen: &Specimen,
+    composite: Option<CompositeFigures>,
+    notes: Vec<String>,
+    output: &Path,
+    clock: Instant,
+) -> Reconstructed {
+    Reconstructed {
+        specimen: output.display().to_string(),
+        organs: specimen.organs.iter().map(|o| OrganRow { organ: o.name.clone(), facts: o.facts }).collect(),
+        composite,
+        notes,
+        seconds: clock.elapsed().as_secs_f64(),
+        report: output.join(REPORT).display().to_string(),
+    }
+}

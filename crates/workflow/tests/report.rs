@@ -1,0 +1,431 @@
+//! Reports of made-up organs: what must hold for any page. The pages are left in the target's tmp folder to look at.
+#![allow(clippy::unwrap_used, clippy::expect_used)] // the helpers are test code too
+
+use base64::{Engine, engine::general_purpose::STANDARD};
+use glam::{DQuat, DVec3};
+use std::path::Path;
+use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
+use trocar_cell::{GraspLift, GraspLiftRun, Gripper, Phase, Sample, SeverAt, Snapshot, Summary};
+use trocar_core::Pose;
+use trocar_core::Silent;
+use trocar_geometry::{RepairReport, TetMesh, TetQuality, TriMesh};
+use trocar_reconstruct::{CompositeTimes, OrganView, Reconstruction};
+use trocar_render::phong::{Instance, PhongScene, Shading};
+use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
+use trocar_workflow::pages as report;
+
+/// A name that would break a page that does not escape it.
+const HOSTILE: &str = "<script>alert('x')</script>&\"";
+
+/// An ellipsoid as cubes of six tetrahedra each.
+fn body(centre: DVec3, radii: DVec3, cells: i32) -> TetMesh {
+    const CORNERS: [[[i32; 3]; 4]; 6] = [
+        [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 1, 1]],
+        [[0, 0, 0], [1, 1, 0], [0, 1, 0], [1, 1, 1]],
+        [[0, 0, 0], [0, 1, 0], [0, 1, 1], [1, 1, 1]],
+        [[0, 0, 0], [0, 1, 1], [0, 0, 1], [1, 1, 1]],
+        [[0, 0, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1]],
+        [[0, 0, 0], [1, 0, 1], [1, 0, 0], [1, 1, 1]],
+    ];
+    let mut mesh = TetMesh::default();
+    let mut index = std::collections::BTreeMap::new();
+    let at = |c: [i32; 3]| centre + radii * (2.0 * DVec3::from_array(c.map(f64::from)) / f64::from(cells) - 1.0);
+    for x in 0..cells {
+        for y in 0..cells {
+            for z in 0..cells {
+                let middle =
+                    (DVec3::new(f64::from(x), f64::from(y), f64::from(z)) + 0.5) * 2.0 / f64::from(cells) - 1.0;
+                if middle.length() > 1.0 {
+                    continue;
+                }
+                for tet in CORNERS {
+                    mesh.tets.push(tet.map(|[i, j, k]| {
+                        let corner = [x + i, y + j, z + k];
+                        *index.entry(corner).or_insert_with(|| {
+                            mesh.vertices.push(at(corner));
+                            mesh.vertices.len() as u32 - 1
+                        })
+                    }));
+                }
+            }
+        }
+    }
+    mesh
+}
+
+/// The ellipsoid itself, coloured.
+fn surface(centre: DVec3, radii: DVec3, color: [u8; 3]) -> TriMesh {
+    let (rings, spokes) = (40_u32, 64_u32);
+    let mut mesh = TriMesh::default();
+    for i in 0..=rings {
+        for j in 0..spokes {
+            let (a, b) = (
+                std::f64::consts::PI * f64::from(i) / f64::from(rings),
+                std::f64::consts::TAU * f64::from(j) / f64::from(spokes),
+            );
+            let n = DVec3::new(a.sin() * b.cos(), a.sin() * b.sin(), a.cos());
+            mesh.vertices.push(centre + radii * n);
+            let vein = 0.85 + 0.15 * (9.0 * a + 2.0 * (5.0 * b).sin()).sin();
+            mesh.colors.push(color.map(|c| (f64::from(c) * vein) as u8));
+        }
+    }
+    for i in 0..rings {
+        for j in 0..spokes {
+            let k = (j + 1) % spokes;
+            let [a, b, c, d] = [i * spokes + j, (i + 1) * spokes + j, (i + 1) * spokes + k, i * spokes + k];
+            mesh.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+    mesh
+}
+
+fn organ(name: &str, centre: DVec3, radii: DVec3, color: [u8; 3], cells: i32) -> Organ {
+    let body = body(centre, radii, cells);
+    let quality = TetQuality::of(&body);
+    let facts = OrganFacts {
+        nodes: body.vertices.len(),
+        tets: body.tets.len(),
+        watertight: true,
+        inverted: quality.inverted,
+        min_dihedral_deg: quality.min_dihedral_deg,
+        median_dihedral_deg: quality.median_min_dihedral_deg,
+        median_edge_mm: quality.median_edge * 1e3,
+        volume_cm3: quality.volume * 1e6,
+        depth_error_median_mm: Some(0.42),
+        depth_error_signed_mm: Some(-0.11),
+        covered: Some(0.97),
+    };
+    Organ {
+        name: name.to_owned(),
+        body,
+        surface: surface(centre, radii, color),
+        material: Material::default(),
+        pins: Pins::None,
+        base: centre,
+        facts,
+    }
+}
+
+fn specimen() -> Specimen {
+    let mm = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 1e-3;
+    Specimen {
+        name: format!("made-up {HOSTILE}"),
+        up: DVec3::new(0.0, -0.25, -1.0).normalize(),
+        placement: Pose::IDENTITY,
+        camera: Some(Camera {
+            width: 424,
+            height: 240,
+            fx: 223.0,
+            fy: 223.0,
+            cx: 211.5,
+            cy: 119.5,
+            distortion: Distortion::default(),
+        }),
+        organs: vec![
+            organ("cecum", mm(-35.0, 0.0, 190.0), mm(30.0, 26.0, 16.0), [214, 140, 128], 14),
+            organ("stomach", mm(45.0, -10.0, 195.0), mm(34.0, 22.0, 18.0), [198, 110, 104], 14),
+            organ("appendix", mm(5.0, 26.0, 178.0), mm(36.0, 7.0, 7.0), [226, 160, 140], 12),
+            organ(HOSTILE, mm(0.0, -32.0, 196.0), mm(22.0, 14.0, 10.0), [230, 190, 120], 8),
+        ],
+        background: None,
+        provenance: Provenance {
+            source: format!("recording {HOSTILE}"),
+            input_hash: "0123abcd".into(),
+            program: "trocar 0.1.0".into(),
+            settings: vec!["window = 90".into(), HOSTILE.into()],
+        },
+    }
+}
+
+fn reconstruction() -> Reconstruction {
+    let specimen = specimen();
+    let camera = specimen.camera.unwrap();
+    let instances = specimen.organs.iter().enumerate().map(|(i, o)| Instance {
+        mesh: o.surface.clone(),
+        label: i as u16 + 1,
+        shading: Shading { color: [200; 3], gloss: 0.3, wireframe: false },
+    });
+    let frame = PhongScene::new(instances.collect(), None, [120, 60, 50]).render(&camera, &Pose::IDENTITY, 2);
+    let mut depth = frame.depth.clone();
+    for (i, d) in depth.depth.iter_mut().enumerate() {
+        *d = if *d > 0.0 { *d + 0.002 * (i as f32 * 0.013).sin() } else { 0.21 };
+    }
+    let mask = |label: u16| Mask { width: 424, height: 240, set: frame.labels.iter().map(|l| *l == label).collect() };
+    let view = |i: usize, name: &str| OrganView {
+        name: name.to_owned(),
+        mask: mask(i as u16 + 1),
+        depth_error: frame
+            .depth
+            .depth
+            .iter()
+            .zip(&depth.depth)
+            .map(|(a, b)| if *a > 0.0 { a - b } else { 0.0 })
+            .collect(),
+        compared: mask(i as u16 + 1),
+    };
+    let organs = specimen.organs.iter().enumerate().map(|(i, o)| view(i, &o.name)).collect();
+    let mut input = frame.color.clone();
+    let mut instruments = Mask::new(424, 240);
+    for y in 90..150 {
+        for x in 0..(230 - y / 2) {
+            instruments.set[y * 424 + x] = true;
+            input.pixels[y * 424 + x] = [150, 155, 160];
+        }
+    }
+    Reconstruction {
+        specimen,
+        input,
+        instruments,
+        background: frame.color,
+        depth,
+        frames_used: 91,
+        recovered_share: 0.034,
+        coverage: 0.903,
+        depth_range_median: 0.0019,
+        times: CompositeTimes::default(),
+        organs,
+        notes: vec![format!("frame 12 of {HOSTILE} dropped")],
+    }
+}
+
+fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
+    let samples: Vec<Sample> = (0..480)
+        .map(|i| {
+            let t = f64::from(i) / 60.0;
+            let (phase, lift) = match t {
+                t if t < 2.0 => ("settle", 0.0),
+                t if t < 3.0 => ("approach", 0.0),
+                t if t < 3.5 => ("close", 0.0),
+                t if t < 4.5 => ("lift", 15.0 * (t - 3.5)),
+                t if t < 5.5 => ("hold", 15.0),
+                t if t < 6.5 => ("lower", 15.0 * (6.5 - t)),
+                t if t < 7.0 => ("open", 0.0),
+                _ => ("recover", 0.0),
+            };
+            Sample {
+                time_s: t,
+                phase,
+                jaw_lift_mm: lift,
+                tissue_lift_mm: 0.96 * lift,
+                slip_mm: 0.04 * lift,
+                jaw_angle_deg: 40.0,
+                jaw_force_n: 1.0,
+                contact_n: 0.5,
+                constraint_n: 0.2,
+                max_speed_m_s: 1e-5 + 0.02 * (-(t - 4.0) * (t - 4.0)).exp(),
+                inverted: 0,
+                min_volume_ratio: 1.0 - 0.01 * lift,
+            }
+        })
+        .collect();
+    let snapshot = |k: usize| {
+        let t = 8.0 * k as f64 / snapshots.max(2) as f64;
+        let lift = samples[(t * 60.0) as usize].tissue_lift_mm * 1e-3;
+        let bend = |p: &DVec3| *p + specimen.up * lift * (-((p.x - 0.005) / 0.02).powi(2)).exp();
+        let mut nodes: Vec<Vec<DVec3>> = specimen.organs.iter().map(|o| o.body.vertices.clone()).collect();
+        nodes[2] = nodes[2].iter().map(bend).collect();
+        let rotation = DQuat::from_rotation_arc(DVec3::X, -specimen.up);
+        let translation = DVec3::new(0.005, 0.026, 0.178) + specimen.up * (0.012 + lift);
+        Snapshot {
+            time_s: t,
+            phase: Phase::Lift,
+            nodes,
+            gripper: Gripper { pose: Pose { rotation, translation }, jaw_angle: 0.3 },
+            cutter: None,
+            cut: false,
+        }
+    };
+    GraspLiftRun {
+        summary: Summary {
+            organ: "appendix".into(),
+            at: 0.5,
+            design: "live-pose",
+            jaw_force_n: 1.0,
+            attached: true,
+            held_nodes: 23,
+            lift_mm: 14.4,
+            follow_ratio: 0.96,
+            slip_mm: 0.6,
+            snap_mm: 0.0,
+            activation_step_mm: 0.02,
+            held: true,
+            inverted_rest: 0,
+            inverted_peak: 0,
+            min_volume_ratio: 0.85,
+            peak_speed_m_s: 0.02,
+            settled_speed_m_s: 2e-5,
+            settled: true,
+            calmed_s: 0.0,
+            resting_speed_m_s: 1e-5,
+            yielded_substeps: 0,
+            pin_drift_mm: 0.0,
+            diverged: false,
+            divergence: Some(HOSTILE.into()),
+            simulated_s: 8.0,
+            wall_s: 2.0,
+            real_time_factor: 4.0,
+            state_hash: "0123456789abcdef".into(),
+            ..Summary::default()
+        },
+        samples: samples.clone(),
+        snapshots: (0..snapshots).map(snapshot).collect(),
+        cut: None,
+    }
+}
+
+fn keep(name: &str, html: &str) {
+    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name), html).unwrap();
+}
+
+/// What holds for every page; returns its number of pictures.
+fn check(html: &str) -> usize {
+    assert!(html.starts_with("<!DOCTYPE html>") && html.trim_end().ends_with("</html>"));
+    for forbidden in ["<script", "http://", "https://", "<link", "@import", "url(", "<iframe", "javascript:"] {
+        assert!(!html.contains(forbidden), "the page has {forbidden}");
+    }
+    assert!(html.len() < 8_000_000, "{} bytes", html.len());
+    let mut pictures = 0;
+    for source in html.split("src=\"").skip(1) {
+        let data = source.split('"').next().unwrap().strip_prefix("data:image/").expect("only data URIs");
+        let (kind, base64) = data.split_once(";base64,").unwrap();
+        let bytes = STANDARD.decode(base64).unwrap();
+        let signature: &[u8] = match kind {
+            "png" => b"\x89PNG\r\n\x1a\n",
+            "jpeg" => b"\xff\xd8\xff",
+            "gif" => b"GIF89a",
+            other => panic!("a picture of type {other}"),
+        };
+        assert!(bytes.starts_with(signature), "{kind}");
+        pictures += 1;
+    }
+    for tag in ["section", "figure", "figcaption", "table", "svg", "span", "div", "main", "dl", "ul", "p"] {
+        let open = html.matches(&format!("<{tag}>")).count() + html.matches(&format!("<{tag} ")).count();
+        assert_eq!(open, html.matches(&format!("</{tag}>")).count(), "<{tag}>");
+    }
+    pictures
+}
+
+#[test]
+fn a_reconstruction_is_shown_whole() {
+    let r = reconstruction();
+    let dir = tempfile::tempdir().unwrap();
+    let truth = dir.path().join("truth");
+    std::fs::create_dir(&truth).unwrap();
+    r.background.write_png(&truth.join("color.png")).unwrap();
+    r.depth.write_png(&truth.join("depth.png"), 1e-4).unwrap();
+
+    let html = report::reconstruction(&r, Some(dir.path())).unwrap();
+    keep("reconstruction.html", &html);
+    // 4 of the camera, 2 side by side, 2 of the truth, 4 of the bodies, 1 + 4 of the depth error.
+    assert_eq!(check(&html), 17);
+    for text in ["Composite against the truth", "mm]", "90.3", "&lt;script&gt;"] {
+        assert!(html.contains(text), "{text}");
+    }
+    let mut named = r.clone();
+    named.specimen.name = "phantom-a".into();
+    let beside_paper = report::reconstruction(&named, None).unwrap();
+    assert!(
+        beside_paper.contains("8\u{202f}072") && !html.contains("8\u{202f}072"),
+        "Table I stands beside its phantom"
+    );
+    let without = report::reconstruction(&r, None).unwrap();
+    assert!(!without.contains("Composite against the truth"));
+}
+
+#[test]
+fn a_truth_of_another_size_is_named() {
+    let r = reconstruction();
+    let dir = tempfile::tempdir().unwrap();
+    DepthImage::new(20, 10).write_png(&dir.path().join("depth.png"), 1e-4).unwrap();
+    let message = report::reconstruction(&r, Some(dir.path())).unwrap_err().to_string();
+    assert!(message.contains("depth.png") && message.contains("20 x 10"), "{message}");
+}
+
+#[test]
+fn images_that_do_not_fit_are_an_error() {
+    let mut r = reconstruction();
+    r.organs[1].depth_error.pop();
+    assert!(report::reconstruction(&r, None).unwrap_err().to_string().contains("stomach"));
+    r.background = ColorImage::new(3, 3, [0; 3]);
+    assert!(report::reconstruction_sections(&r).is_err());
+}
+
+#[test]
+fn a_surface_and_its_repair_are_shown() {
+    let mut s = specimen();
+    s.camera = None;
+    s.up = DVec3::Z;
+    s.organs.truncate(1);
+    let repair = RepairReport { components: 2, open_edges: 1234, rebuilt: true, ..RepairReport::default() };
+    let html = report::surface(&s, &repair).unwrap();
+    keep("surface.html", &html);
+    assert_eq!(check(&html), 4);
+    assert!(html.contains("1\u{202f}234 edges") && html.contains("rebuilt"));
+    assert!(!html.contains("14\u{202f}914"), "the paper's figures belong to recordings only");
+}
+
+#[test]
+fn a_run_is_shown_with_its_lift() {
+    let s = specimen();
+    let run = run(&s, 60);
+    let html = report::grasp_lift(&s, &run, Some("<section><h2>Before</h2></section>")).unwrap();
+    keep("run.html", &html);
+    assert_eq!(check(&html), 4);
+    for text in ["time [s]", "lift [mm]", "slip [mm]", "speed [m/s]", "volume ratio [1]", "Before", "0.960", "hold"] {
+        assert!(html.contains(text), "{text}");
+    }
+    let gif = report::lift_gif(&s, &run).unwrap();
+    let mut decoder = gif::DecodeOptions::new().read_info(gif.as_slice()).unwrap();
+    assert_eq!((decoder.width(), decoder.height(), decoder.repeat()), (480, 300, gif::Repeat::Infinite));
+    let mut frames = 0;
+    while let Some(frame) = decoder.read_next_frame().unwrap() {
+        assert_eq!(frame.buffer.len(), 480 * 300);
+        frames += 1;
+    }
+    assert_eq!(frames, 45);
+}
+
+#[test]
+fn a_cut_is_shown_with_its_pieces() {
+    let mut s = specimen();
+    s.name = "tube".into();
+    s.organs.swap(0, 2);
+    s.organs.truncate(1);
+    // Its base is at the far left.
+    s.organs[0].base -= 0.036 * DVec3::X;
+    s.organs[0].pins = Pins::End { end: End::Base, length: 0.2, band_length: 0.0, band_share: 0.0 };
+    let task = GraspLift { at: 0.8, sever: Some(SeverAt::Between), snapshot_every: 20, ..GraspLift::default() };
+    let run = task.run(&s, &Silent).unwrap();
+    let sever = run.summary.sever.as_ref().unwrap();
+    assert_eq!(sever.outcome, "severed", "{sever:?}");
+    let html = report::grasp_lift(&s, &run, None).unwrap();
+    keep("severed.html", &html);
+    // 4 of the organs, 4 of the lift, 4 of the cut.
+    assert_eq!(check(&html), 12);
+    for text in ["The cut", "appendix.1", "Dark red", "Close up", "lift and cut", "snip"] {
+        assert!(html.contains(text), "{text}");
+    }
+    let mut torn = run.clone();
+    torn.snapshots.last_mut().unwrap().nodes[0].pop();
+    assert!(report::grasp_lift(&s, &torn, None).unwrap_err().to_string().contains("not of specimen"));
+}
+
+#[test]
+fn a_run_without_samples_or_snapshots_is_still_a_page() {
+    let s = specimen();
+    let mut run = run(&s, 0);
+    run.samples.clear();
+    run.summary.follow_ratio = f64::NAN;
+    let html = report::grasp_lift(&s, &run, None).unwrap();
+    assert_eq!(check(&html), 4);
+    assert!(html.contains("Nothing to plot") && html.contains("no snapshots"));
+    assert!(report::lift_gif(&s, &run).is_err());
+}
+
+#[test]
+fn snapshots_of_another_specimen_are_refused() {
+    let s = specimen();
+    let mut run = run(&s, 2);
+    run.snapshots[1].nodes[0].pop();
+    assert!(report::grasp_lift(&s, &run, None).unwrap_err().to_string().contains("not of specimen"));
+}

@@ -1,0 +1,84 @@
+//! `trocar segment`'s work from recording to masks, and from these to a specimen.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
+
+#[path = "../../recording/tests/common/mod.rs"]
+mod common;
+
+use common::{info, write};
+use std::path::{Path, PathBuf};
+use trocar_camera::Mask;
+use trocar_core::Silent;
+use trocar_reconstruct::{Settings, reconstruct};
+use trocar_recording::{InstrumentInfo, Recording, RecordingInfo};
+use trocar_workflow::{Segment, wanted_weights};
+
+/// Networks of SAM's interface that select by colour; `None`, saying so, without ONNX Runtime.
+fn sam() -> Option<Segment> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let tools = root.join("../../target/tools");
+    let versions = std::fs::read_dir(tools.join("lib")).into_iter().flatten().flatten();
+    let installed = versions.map(|v| v.path().join("site-packages/onnxruntime/capi")).any(|capi| capi.is_dir());
+    if std::env::var_os("ORT_DYLIB_PATH").is_none() && !installed {
+        println!("skipped: no ONNX Runtime; set ORT_DYLIB_PATH, or run `cargo xtask tools`");
+        return None;
+    }
+    Some(Segment { sam: Some(root.join("../segment/tests/fixtures/plain")), onnxruntime: Some(tools) })
+}
+
+fn recording(info: &RecordingInfo) -> (tempfile::TempDir, PathBuf) {
+    let root = tempfile::tempdir().unwrap();
+    let dir = root.path().join("recording");
+    write(&dir, info, 6);
+    (root, dir)
+}
+
+fn iou(a: &Mask, b: &Mask) -> f64 {
+    let count = |f: &dyn Fn(bool, bool) -> bool| a.set.iter().zip(&b.set).filter(|(a, b)| f(**a, **b)).count() as f64;
+    count(&|a, b| a && b) / count(&|a, b| a || b)
+}
+
+#[test]
+fn an_organ_that_is_pointed_at_is_found_and_reconstructed() {
+    let Some(segment) = sam() else { return };
+    let mut info = info();
+    info.organs[0].points = vec![[82.0, 58.0]];
+    // Before frame 2 the bar comes from the image's other side, where nothing can follow it.
+    info.followed =
+        vec![InstrumentInfo { name: "bar".into(), frame: 2, points: vec![[152.0, 30.0]], points_outside: vec![] }];
+    let (root, dir) = recording(&info);
+    let truth = Mask::read(&dir.join("masks/ball.png")).unwrap();
+    let bar = Mask::read(&dir.join("masks/instruments/000004.png")).unwrap();
+
+    let masks = root.path().join("masks");
+    let made = segment.run(&dir, &masks, &Silent).unwrap();
+    assert_eq!((made.frames, made.organs.len()), (6, 1));
+    let found = Mask::read(&masks.join("ball.png")).unwrap();
+    assert!(iou(&found, &truth) > 0.8, "{}", iou(&found, &truth));
+    let followed = Mask::read(&masks.join("instruments/000004.png")).unwrap();
+    assert!(iou(&followed, &bar) > 0.8, "{}", iou(&followed, &bar));
+
+    std::fs::remove_file(dir.join("masks/ball.png")).unwrap();
+    let settings = Settings { sam: segment.sam, onnxruntime: segment.onnxruntime, stride: 1, ..Settings::default() };
+    let specimen = reconstruct(&Recording::open(&dir).unwrap(), &settings, &Silent).unwrap().specimen;
+    let ratio = specimen.organs[0].surface.volume() / (4.0 / 3.0 * std::f64::consts::PI * common::RADIUS.powi(3));
+    assert!((0.75..1.1).contains(&ratio), "{ratio}");
+}
+
+#[test]
+fn without_sam_metal_is_looked_for_and_points_are_refused() {
+    let (root, dir) = recording(&info());
+    let masks = root.path().join("masks");
+    let made = Segment::default().run(&dir, &masks, &Silent).unwrap();
+    assert!(
+        made.frames == 6 && masks.join("instruments/000005.png").is_file() && masks.join("organs-seen.png").is_file()
+    );
+
+    let mut info = info();
+    info.organs[0].points = vec![[82.0, 58.0]];
+    let (_root, dir) = recording(&info);
+    let error = Segment::default().run(&dir, &masks, &Silent).unwrap_err().to_string();
+    assert!(error.contains("corrected by hand"), "{error}");
+    let error = Segment::default().run(&dir, &root.path().join("other"), &Silent).unwrap_err().to_string();
+    assert!(error.contains("recording.toml") && error.contains("--sam FOLDER"), "{error}");
+    assert!(wanted_weights(None).iter().all(|w| w.found.is_none() || w.name.contains("ONNX Runtime")));
+}
