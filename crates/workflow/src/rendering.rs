@@ -7,7 +7,7 @@ mod script;
 
 pub(crate) use colors::{averaged, label_color, shown};
 pub use rendered::{Rendered, Seen};
-pub use script::Script;
+pub use script::ScriptedLift;
 
 use play::Play;
 use rendered::seen;
@@ -19,7 +19,6 @@ use crate::{Error, Result};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use trocar_camera::ColorImage;
-use trocar_cell::Cell;
 use trocar_core::Progress;
 use trocar_render::{Picture, RenderSettings};
 use trocar_scene::Scene;
@@ -117,9 +116,9 @@ impl Rendering {
         let scene = Scene::read(&self.source)?;
         let film = begin()?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
-        let cell = Cell::new(&scene, &specimen, self.threads)?;
-        let sight = CameraRig::new(&scene, &specimen, &cell)?;
-        self.play(&mut Script::new(&scene, cell)?, sight, (self.at.or(Some(0.0)), film), output, progress)
+        let mut lift = ScriptedLift::new(&scene, &specimen, self.threads)?;
+        let sight = CameraRig::new(&scene, &specimen, lift.cell())?;
+        self.play(&mut lift, sight, (self.at.or(Some(0.0)), film), output, progress)
     }
 
     /// An episode, done again from its file.
