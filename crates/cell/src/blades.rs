@@ -6,7 +6,7 @@
 //! thick, and an inner face that is flat to 0.07 mm. A cutter's blade is a single capsule.
 
 use crate::Gripper;
-use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MAX_ANGLE, JAW_REGION_BEGIN, SHAFT_LENGTH, SHAFT_RADIUS};
+use crate::gripper::{BLADE_TIP, BLADE_WIDTH, JAW_REGION_BEGIN, MAX_ANGLE, SHAFT_LENGTH, SHAFT_RADIUS};
 use glam::DVec3;
 use trocar_tissue::{Collider, Shape, ToolForce};
 
@@ -107,7 +107,8 @@ impl Blades {
             }
         }
         // The shaft ends so that it does not fill the mouth.
-        let ends = [DVec3::new(-self.shaft_length, 0.0, 0.0), DVec3::new(JAW_REGION_BEGIN - self.shaft_radius, 0.0, 0.0)];
+        let ends =
+            [DVec3::new(-self.shaft_length, 0.0, 0.0), DVec3::new(JAW_REGION_BEGIN - self.shaft_radius, 0.0, 0.0)];
         let shape = Shape::Capsule { ends, radius: self.shaft_radius };
         let (tool, friction) = (tools.gripper, self.friction);
         all.push(Collider { name: "shaft".into(), tool, shape, rest_offset: 0.0, friction });

@@ -16,7 +16,7 @@ use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STA
 const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 
 /// Names of the ends, by their number in `figures`.
-const ENDS: [&str; 5] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error"];
+const ENDS: [&str; 6] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error", "finished"];
 
 /// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
 #[pyclass(frozen, module = "trocar._native")]

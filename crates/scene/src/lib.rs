@@ -29,7 +29,9 @@ pub use anatomy::{
 };
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
-pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Port, Side};
+pub use cell::{
+    Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Port, Side,
+};
 pub use error::{Error, Result};
 pub use phantoms::{PHANTOMS, Phantom};
 pub use scene::{Rates, Scene, Tool};

@@ -1,11 +1,11 @@
 //! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is
 //! scored and what happened.
 
+use crate::facts::Facts;
 use crate::measure::Subject;
 use crate::random::Random;
 use crate::stages::Tracker;
 use crate::start::{Arrangement, starts, targets};
-use crate::facts::Facts;
 use crate::{Channels, Error, Observation, Progress, Result, Summary, specimen_hash};
 use serde::{Deserialize, Serialize};
 use trocar_cell::{Action, Cell, CellEvent, CellState, Settling};
@@ -418,7 +418,8 @@ impl Episode {
             return Err(Error::Option("state: is of another scene or specimen than this episode".to_owned()));
         }
         if state.arrangement != self.arrangement {
-            (self.cell, self.settled, self.settling) = build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
+            (self.cell, self.settled, self.settling) =
+                build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
             self.arrangement = state.arrangement;
         }
         self.cell.restore(&state.cell)?;
@@ -449,12 +450,7 @@ fn key(scene: &Scene, specimen: u64) -> Result<u64> {
 }
 
 /// The cell with the specimen as arranged, its state once the organs have settled, and how they did.
-fn build(
-    scene: &Scene,
-    specimen: &Specimen,
-    threads: usize,
-    at: &Arrangement,
-) -> Result<(Cell, CellState, Settling)> {
+fn build(scene: &Scene, specimen: &Specimen, threads: usize, at: &Arrangement) -> Result<(Cell, CellState, Settling)> {
     let mut cell = Cell::new(&at.scene(scene, specimen), specimen, threads)?;
     let settling = cell.settle(SETTLE_S)?;
     let settled = cell.save();

@@ -98,9 +98,12 @@ impl Facts<'_> {
             sever: self.severed(),
             ..Details::default()
         };
-        let attached = |(_, e): &&(f64, CellEvent)| matches!(e, CellEvent::Attached { arm, .. } if Some(*arm) == self.grasper);
-        if let Some((time, CellEvent::Attached { nodes, snap_mm, snap_mean_mm, displaced_mm, gap_mm, closing_force_n, .. })) =
-            self.events.iter().rfind(attached)
+        let attached =
+            |(_, e): &&(f64, CellEvent)| matches!(e, CellEvent::Attached { arm, .. } if Some(*arm) == self.grasper);
+        if let Some((
+            time,
+            CellEvent::Attached { nodes, snap_mm, snap_mean_mm, displaced_mm, gap_mm, closing_force_n, .. },
+        )) = self.events.iter().rfind(attached)
         {
             details.held_nodes = *nodes;
             (details.snap_mm, details.snap_mean_mm, details.displaced_mm) = (*snap_mm, *snap_mean_mm, *displaced_mm);
@@ -130,8 +133,8 @@ impl Facts<'_> {
             let (a, b) = (&first.task, &last.task);
             severed.jaw_rise_mm = b.jaw_lift_mm - a.jaw_lift_mm;
             severed.held_rise_mm = b.lift_mm - a.lift_mm;
-            let follows = severed.jaw_rise_mm <= 0.0
-                || severed.held_rise_mm >= crate::stages::HELD_FOLLOW * severed.jaw_rise_mm;
+            let follows =
+                severed.jaw_rise_mm <= 0.0 || severed.held_rise_mm >= crate::stages::HELD_FOLLOW * severed.jaw_rise_mm;
             let slips = b.slip_mm - a.slip_mm >= crate::stages::HELD_SLIP_MM;
             severed.held = cut.outcome == "severed" && b.grasped > 0.0 && follows && !slips;
         }

@@ -41,7 +41,11 @@ impl Reason<'_, '_> {
                 task.lift_mm,
                 task.lift_s
             ),
-            Stage::Held => format!("slipped: tissue followed {:.0}% of the jaws' lift and slid {:.1} mm in them", 1e2 * last.follow, last.slip_mm),
+            Stage::Held => format!(
+                "slipped: tissue followed {:.0}% of the jaws' lift and slid {:.1} mm in them",
+                1e2 * last.follow,
+                last.slip_mm
+            ),
             Stage::Positioning | Stage::JawOnTissue | Stage::Cut if last.grasped == 0.0 => self.lost_grasp(),
             Stage::Positioning => format!(
                 "out of reach: the cutter came no nearer than {:.1} mm to the {organ} between grasp and base; {} mm are needed",
@@ -49,10 +53,18 @@ impl Reason<'_, '_> {
                 task.positioning_mm
             ),
             Stage::JawOnTissue => format!("empty jaws: nothing of the {organ} came between the cutter's blades"),
-            Stage::Cut => format!("not cut: the blades did not open and then close with the {organ} between them all the while"),
-            Stage::Reach1 => format!("out of reach: the first target stayed {:.1} mm away", least(|c| c.task.reach_1_mm)),
-            Stage::Reach2 => format!("out of reach: the second target stayed {:.1} mm away", least(|c| c.task.reach_2_mm)),
-            Stage::Reach3 => format!("out of reach: the third target stayed {:.1} mm away", least(|c| c.task.reach_3_mm)),
+            Stage::Cut => {
+                format!("not cut: the blades did not open and then close with the {organ} between them all the while")
+            }
+            Stage::Reach1 => {
+                format!("out of reach: the first target stayed {:.1} mm away", least(|c| c.task.reach_1_mm))
+            }
+            Stage::Reach2 => {
+                format!("out of reach: the second target stayed {:.1} mm away", least(|c| c.task.reach_2_mm))
+            }
+            Stage::Reach3 => {
+                format!("out of reach: the third target stayed {:.1} mm away", least(|c| c.task.reach_3_mm))
+            }
         }
     }
 

@@ -27,12 +27,9 @@ pub enum Error {
         /// Why it stays.
         reason: String,
     },
-    /// A moving picture was asked of a run that kept no snapshots.
-    #[error("the run kept no snapshots, so there is nothing to animate; set `snapshot_every` to 4 or so")]
-    NoSnapshots,
-    /// The moving picture could not be encoded.
-    #[error("the moving picture cannot be encoded: {0}")]
-    Gif(#[from] gif::EncodingError),
+    /// A moving picture has no frames.
+    #[error("the moving picture has no frames")]
+    NoFrames,
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),

@@ -253,7 +253,7 @@ impl Rendering {
         let even = |n: usize| n & !1;
         let size = self.size.unwrap_or([even(small(width)), even(small(height))]);
         let hz = frame_rate(play.cell().period(), most);
-        let (mut frames, mut render_s) = (0, 0.0);
+        let (mut frames, mut render_s) = (0_u32, 0.0);
         let mut picture = Picture::new(size[0], size[1]);
         play::stage(progress, "film", play.periods().unwrap_or(1) as u64, || {
             loop {

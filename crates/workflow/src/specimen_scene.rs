@@ -36,9 +36,12 @@ pub fn task_organ<'a>(specimen: &'a Specimen, name: Option<&'a str>) -> Result<&
             let known = names.join(", ");
             Err(Error::Mismatch(format!("no organ '{name}' in the specimen; it has {known}")))
         }
-        None => names.iter().find(|n| **n == "appendix").or(names.first()).copied().ok_or_else(|| {
-            Error::Mismatch("the specimen has no organ".to_owned())
-        }),
+        None => names
+            .iter()
+            .find(|n| **n == "appendix")
+            .or(names.first())
+            .copied()
+            .ok_or_else(|| Error::Mismatch("the specimen has no organ".to_owned())),
     }
 }
 

@@ -1,8 +1,8 @@
 //! Actions: what the arms are asked for in one control period.
 
 use super::arm::{ArmModel, ArmState, Wanted};
-use super::speeds::{ROLL_SPEED, TIP_SPEED};
 use super::setpoint::{NUMBERS, Setpoint, in_range};
+use super::speeds::{ROLL_SPEED, TIP_SPEED};
 use super::workspace::Workspace;
 use crate::{Error, Result};
 use glam::DVec3;

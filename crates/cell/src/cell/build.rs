@@ -51,7 +51,9 @@ pub(super) fn schedule(name: ScheduleName) -> Schedule {
     match name {
         ScheduleName::Fast => Schedule::FAST,
         ScheduleName::Paper => Schedule::PAPER,
-        ScheduleName::Adaptive => Schedule::Descent(Descent { substeps: 8, iterations: 10, start: SolverStart::Adaptive }),
+        ScheduleName::Adaptive => {
+            Schedule::Descent(Descent { substeps: 8, iterations: 10, start: SolverStart::Adaptive })
+        }
     }
 }
 
@@ -269,8 +271,8 @@ fn roll_of(
     }
     // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now
     // and then.
-    let ends = [0, 1]
-        .map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - ROLL_MARGIN.copysign(range[k]) });
+    let ends =
+        [0, 1].map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - ROLL_MARGIN.copysign(range[k]) });
     Ok([ends[0].min(start.roll), ends[1].max(start.roll)])
 }
 

@@ -9,8 +9,8 @@ use super::workspace::{Reached, Workspace};
 use crate::{Error, Gripper, Result};
 use glam::DVec3;
 use trocar_core::Pose;
-use trocar_robot::manipulator::JointReadings;
 use trocar_core::Wrench;
+use trocar_robot::manipulator::JointReadings;
 
 impl Cell {
     fn index_of(&self, arm: &str) -> Result<usize> {

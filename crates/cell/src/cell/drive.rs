@@ -4,8 +4,8 @@ use super::setpoint::Setpoint;
 use super::workspace::Workspace;
 use crate::{Error, Result};
 use trocar_core::Pose;
-use trocar_robot::manipulator::{JointReadings, Manipulator, ManipulatorState};
 use trocar_core::Wrench;
+use trocar_robot::manipulator::{JointReadings, Manipulator, ManipulatorState};
 
 /// What moves an instrument.
 #[derive(Clone, Debug)]

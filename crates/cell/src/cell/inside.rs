@@ -5,7 +5,11 @@ use glam::DVec3;
 
 /// The first organ, but for `spared`, in which one of `segments` lies in part, and where [m].
 /// Elements that are pinned all round do not count: nothing feels them.
-pub(super) fn first_organ_around(world: &World, segments: &[[DVec3; 2]], spared: Option<usize>) -> Option<(usize, DVec3)> {
+pub(super) fn first_organ_around(
+    world: &World,
+    segments: &[[DVec3; 2]],
+    spared: Option<usize>,
+) -> Option<(usize, DVec3)> {
     let ends = segments.iter().flatten();
     let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
     let mut places = Vec::new();

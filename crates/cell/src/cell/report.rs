@@ -1,9 +1,9 @@
 //! What a step of the cell reports: the observation of each arm, of the tissue, and what happened.
 
-use glam::DVec3;
 use super::rules::RuleCounts;
 use super::setpoint::Setpoint;
 use crate::severance::Severance;
+use glam::DVec3;
 use serde::Serialize;
 use trocar_core::Pose;
 use trocar_core::Wrench;
@@ -256,7 +256,10 @@ impl std::fmt::Display for CellEvent {
             ),
             Self::Relaxed { organ, stretch, volume } => {
                 let volume = 1e2 * volume;
-                write!(f, "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was relaxed outside of time")
+                write!(
+                    f,
+                    "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was relaxed outside of time"
+                )
             }
             Self::InstrumentsTouch { depth_mm } => write!(f, "the instruments are {depth_mm:.2} mm inside each other"),
             Self::ForceLimit { arm, force_n } => {

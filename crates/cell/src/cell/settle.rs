@@ -41,8 +41,7 @@ impl Cell {
             speed = self.advance()?.tissue.max_speed;
         }
         let settled = speed < SETTLED_SPEED;
-        let mut settling =
-            Settling { settled_speed_m_s: speed, settled, calmed_s: 0.0, resting_speed_m_s: speed };
+        let mut settling = Settling { settled_speed_m_s: speed, settled, calmed_s: 0.0, resting_speed_m_s: speed };
         let (mut slow_s, mut energy) = (0.0, self.world.state.kinetic_energy(&self.world.model));
         while !settled && slow_s < SLOW_S && settling.calmed_s < MAX_DAMPING_S {
             settling.resting_speed_m_s = self.advance()?.tissue.max_speed;

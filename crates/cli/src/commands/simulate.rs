@@ -77,7 +77,11 @@ pub fn text(r: &LiftResult) -> String {
         s.inverted_peak,
         100.0 * s.min_volume_ratio,
         d.pin_drift_mm,
-        if s.diverged { format!("DIVERGED: {}", s.end.as_ref().map_or(String::new(), ToString::to_string)) } else { "no divergence".to_owned() },
+        if s.diverged {
+            format!("DIVERGED: {}", s.end.as_ref().map_or(String::new(), ToString::to_string))
+        } else {
+            "no divergence".to_owned()
+        },
     );
     for arm in s.arms.iter().filter(|a| a.rcm_peak_mm > 0.0) {
         text += &format!(

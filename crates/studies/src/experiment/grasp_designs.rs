@@ -1,7 +1,9 @@
 //! Table II and Fig. 7(a) to (c): four ways to hold the appendix, at five places and from three sides, and
 //! once more after it was dragged. Measured in the whole cell and with the appendix alone.
 
-use super::lift_trials::{AppendixSource, Condition, LiftTrial, Whole, appendix, design_name, divergence, peak_constraint};
+use super::lift_trials::{
+    AppendixSource, Condition, LiftTrial, Whole, appendix, design_name, divergence, peak_constraint,
+};
 use super::trials::{Outcomes, Resumed, Trials};
 use crate::{Error, Result, pages};
 use serde::{Deserialize, Serialize};
@@ -266,14 +268,7 @@ impl GraspDesignsExperiment {
     fn tasks(&self, ready: &Ready) -> Vec<LiftTrial> {
         let task = |design, at: f64, approach_offset, regrasp| LiftTrial {
             condition: ready.condition,
-            script: Script {
-                at,
-                approach_offset,
-                lift: self.lift,
-                regrasp,
-                retries: 0,
-                after: AfterHold::Finish,
-            },
+            script: Script { at, approach_offset, lift: self.lift, regrasp, retries: 0, after: AfterHold::Finish },
             design,
             jaw_force: self.jaw_force,
         };
@@ -363,12 +358,7 @@ fn rows(condition: Condition, trials: &[GraspTrial]) -> Vec<GraspDesignRow> {
     first.chain(again).filter_map(|(design, regrasp)| row(condition, design, regrasp, trials)).collect()
 }
 
-fn row(
-    condition: Condition,
-    design: GraspDesignName,
-    regrasp: bool,
-    trials: &[GraspTrial],
-) -> Option<GraspDesignRow> {
+fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[GraspTrial]) -> Option<GraspDesignRow> {
     let name = design_name(design);
     let is = |t: &&GraspTrial| t.condition == condition && t.design == name && t.drag_mm.is_some() == regrasp;
     let of: Vec<&GraspTrial> = trials.iter().filter(is).collect();

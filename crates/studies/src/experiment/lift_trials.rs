@@ -144,12 +144,8 @@ impl LiftTrial {
     /// # Errors
     /// An option out of range, a scene that cannot be built, an interruption.
     pub fn run(&self, scene: &Scene, specimen: &Specimen, progress: &dyn Progress) -> Result<Recording> {
-        let lift = Lift {
-            script: self.script,
-            design: Some(self.design),
-            jaw_force: Some(self.jaw_force),
-            ..Lift::default()
-        };
+        let lift =
+            Lift { script: self.script, design: Some(self.design), jaw_force: Some(self.jaw_force), ..Lift::default() };
         let scene = lift.arrange(scene.clone())?;
         let mut episode = Episode::new(&scene, specimen, 1)?;
         let mut policy = Scripted::following(self.script);

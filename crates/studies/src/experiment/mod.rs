@@ -29,9 +29,9 @@ pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult}
 #[cfg(test)]
 pub(crate) use element_quality::tests::made_up_result as made_up_element_quality;
 pub use element_quality::{ElementQualityExperiment, ElementQualityResult, ElementQualityRow};
+pub(crate) use grasp_designs::DESIGNS;
 #[cfg(test)]
 pub(crate) use grasp_designs::tests::made_up_result as made_up_grasp_designs;
-pub(crate) use grasp_designs::DESIGNS;
 pub use grasp_designs::{GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial, PaperGrasp};
 pub(crate) use integrators::SPEED_LIMIT;
 pub use integrators::{IntegratorRow, IntegratorsExperiment, IntegratorsResult};

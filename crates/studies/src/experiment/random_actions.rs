@@ -2,7 +2,6 @@
 
 use super::trials::{Resumed, Trials};
 use crate::{Error, Result, pages};
-use trocar_workflow::{REPORT, scene_specimen};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -12,6 +11,7 @@ use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::policy::RandomActions;
 use trocar_task::{ArmChannels, End, Episode, Policy};
+use trocar_workflow::{REPORT, scene_specimen};
 
 /// The file that makes a folder one of this experiment's.
 const MARKER: &str = "random-actions.json";

@@ -27,9 +27,7 @@ fn title(condition: Condition) -> &'static str {
 
 fn lead(r: &GraspDesignsResult, condition: Condition) -> String {
     let what = match condition {
-        Condition::Cell => {
-            "The paper\u{2019}s cell: all organs, which touch each other, and a dynamic arm in its port"
-        }
+        Condition::Cell => "The paper\u{2019}s cell: all organs, which touch each other, and a dynamic arm in its port",
         Condition::Appendix => "The appendix alone, lifted by an ideal arm without a port",
     };
     format!(

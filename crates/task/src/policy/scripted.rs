@@ -117,14 +117,7 @@ pub struct Script {
 
 impl Default for Script {
     fn default() -> Self {
-        Self {
-            at: 0.5,
-            approach_offset: 0.0,
-            lift: 0.015,
-            regrasp: None,
-            retries: 0,
-            after: AfterHold::default(),
-        }
+        Self { at: 0.5, approach_offset: 0.0, lift: 0.015, regrasp: None, retries: 0, after: AfterHold::default() }
     }
 }
 

@@ -113,7 +113,13 @@ fn bands(lifted: &Lifted) -> Vec<Band> {
     bands
 }
 
-fn plot(lifted: &Lifted, (title, y): (&str, &str), curves: &[Curve<'_>], caption: &str, limits: Vec<f64>) -> Result<String> {
+fn plot(
+    lifted: &Lifted,
+    (title, y): (&str, &str),
+    curves: &[Curve<'_>],
+    caption: &str,
+    limits: Vec<f64>,
+) -> Result<String> {
     let line = |(_, value, color): &Curve<'_>| Line {
         points: lifted.recording.channels.iter().map(|c| (c.time_s, value(c))).collect(),
         color: colors::organ(*color),

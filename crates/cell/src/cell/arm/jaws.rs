@@ -28,8 +28,8 @@ impl ArmUnit {
         let (wanted, opening) = (self.state.wanted.jaw(), self.opening());
         if let Some(held) = &self.state.held {
             let opens = wanted > held.opening + LEAST_COMMANDED_MOTION;
-            let lost = self.state.design == GraspDesign::Friction
-                && self.jaw_region().tissue_of(world, held.organ).is_none();
+            let lost =
+                self.state.design == GraspDesign::Friction && self.jaw_region().tissue_of(world, held.organ).is_none();
             if opens || lost {
                 self.let_go(world, events);
             }

@@ -166,8 +166,15 @@ impl ArmState {
             }
             all.extend([*pressing, *touching as f64]);
         }
-        let flags =
-            [*contact_disabled, *blades_disabled, *held_back, *guarded, rcm_reported[0], rcm_reported[1], held.is_some()];
+        let flags = [
+            *contact_disabled,
+            *blades_disabled,
+            *held_back,
+            *guarded,
+            rcm_reported[0],
+            rcm_reported[1],
+            held.is_some(),
+        ];
         all.extend(flags.map(|b| f64::from(u8::from(b))));
         all.push(GraspDesign::ALL.iter().position(|d| d == design).unwrap_or(0) as f64);
         if let Some(Held { organ, s, hold, opening }) = held {

@@ -1,7 +1,7 @@
 //! An instrument without a port: the place of its jaw's pivot and its roll, in a box.
 
-use super::super::speeds::{ROLL_SPEED, TIP_SPEED};
 use super::super::setpoint::{NUMBERS, Setpoint, in_range};
+use super::super::speeds::{ROLL_SPEED, TIP_SPEED};
 use super::Reached;
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};

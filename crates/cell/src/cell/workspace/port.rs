@@ -1,7 +1,7 @@
 //! An instrument in the hole of a port: two pivots, insertion and roll.
 
-use super::super::speeds::{ROLL_SPEED, SWING_SPEED, TIP_SPEED};
 use super::super::setpoint::{NUMBERS, Setpoint, in_range};
+use super::super::speeds::{ROLL_SPEED, SWING_SPEED, TIP_SPEED};
 use super::Reached;
 use crate::Result;
 use glam::DVec3;

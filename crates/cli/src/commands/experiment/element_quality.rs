@@ -65,8 +65,7 @@ fn text(r: &ElementQualityResult) -> String {
         if rows.is_empty() { String::new() } else { output::table(&header, &rows) + "\n" }
     };
     let scaled = table(true);
-    let scaled =
-        if scaled.is_empty() { scaled } else { format!("jaw force in proportion to the modulus:\n{scaled}") };
+    let scaled = if scaled.is_empty() { scaled } else { format!("jaw force in proportion to the modulus:\n{scaled}") };
     format!(
         "{}{scaled}the appendix: {} nodes, {} tets; jaws of {} N; {:.0} s{}; report {}",
         table(false),

@@ -5,7 +5,7 @@ mod common;
 
 use common::{HALF_LENGTH, ONE_END, RADIUS, specimen};
 use glam::DVec3;
-use trocar_cell::{CONTACT_SKIN, Gripper, MAX_ANGLE, Mouth, World, attached, clusters};
+use trocar_cell::{CONTACT_SKIN, Gripper, JawRegion, MAX_ANGLE, World, attached, clusters};
 use trocar_tissue::Schedule;
 
 const REACH: f64 = 0.009;
@@ -29,7 +29,8 @@ fn fifteen_placements_of_a_tube() {
         let x = (2.0 * s - 1.0) * HALF_LENGTH;
         for aside in [-0.003, 0.0, 0.003] {
             let gripper = jaws(x, aside, 0.0, MAX_ANGLE);
-            let tissue = Mouth::of(&gripper).tissue_of(&world, 0).unwrap_or_else(|| panic!("nothing at {x}, {aside}"));
+            let tissue =
+                JawRegion::of(&gripper).tissue_of(&world, 0).unwrap_or_else(|| panic!("nothing at {x}, {aside}"));
             assert!((tissue.centroid.x - x).abs() < 0.001 && tissue.gap > CONTACT_SKIN, "{tissue:?}");
             let cluster = attached(&world, 0, tissue.centroid, REACH).unwrap();
             let nearest = all
@@ -48,8 +49,8 @@ fn fifteen_placements_of_a_tube() {
 #[test]
 fn a_tube_outside_the_mouth_is_not_grasped() {
     let world = World::new(&specimen(ONE_END), Schedule::default(), 1).unwrap();
-    let none = |gripper: Gripper| assert!(Mouth::of(&gripper).tissue_of(&world, 0).is_none(), "{gripper:?}");
-    let some = |gripper: Gripper| assert!(Mouth::of(&gripper).tissue_of(&world, 0).is_some(), "{gripper:?}");
+    let none = |gripper: Gripper| assert!(JawRegion::of(&gripper).tissue_of(&world, 0).is_none(), "{gripper:?}");
+    let some = |gripper: Gripper| assert!(JawRegion::of(&gripper).tissue_of(&world, 0).is_some(), "{gripper:?}");
     // Beside it: all on one side of the closing plane.
     some(jaws(0.0, RADIUS - 0.0005, 0.0, MAX_ANGLE));
     none(jaws(0.0, RADIUS + 0.0005, 0.0, MAX_ANGLE));
