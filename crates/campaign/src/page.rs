@@ -227,7 +227,8 @@ fn failures(plan: &Plan, kept: &[Kept], store: &Store) -> Result<String> {
 }
 
 fn why(k: &Kept) -> String {
-    k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string)
+    let end = || k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
+    k.summary.why.clone().unwrap_or_else(end)
 }
 
 /// When stages passed.

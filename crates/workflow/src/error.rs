@@ -100,11 +100,30 @@ pub enum Error {
     Tissue(#[from] trocar_tissue::Error),
     /// An episode cannot be run, or its files are unusable.
     #[error(transparent)]
-    Task(#[from] trocar_task::Error),
+    Task(trocar_task::Error),
     /// A camera of the cell cannot see.
     #[error(transparent)]
     Sensors(#[from] trocar_sensors::Error),
     /// A task cannot be run.
     #[error(transparent)]
-    Cell(#[from] trocar_cell::Error),
+    Cell(trocar_cell::Error),
+}
+
+/// What was interrupted inside is interrupted outside.
+impl From<trocar_cell::Error> for Error {
+    fn from(error: trocar_cell::Error) -> Self {
+        match error {
+            trocar_cell::Error::Interrupted => Self::Interrupted,
+            other => Self::Cell(other),
+        }
+    }
+}
+
+impl From<trocar_task::Error> for Error {
+    fn from(error: trocar_task::Error) -> Self {
+        match error {
+            trocar_task::Error::Cell(inner) => inner.into(),
+            other => Self::Task(other),
+        }
+    }
 }

@@ -14,6 +14,7 @@ mod wrench;
 
 use crate::cli::{Experiment, ExperimentName, ReconstructionExperiment};
 use crate::output;
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_reconstruct::Settings;
 use trocar_studies::{ReconstructionResult, Result, Resumed};

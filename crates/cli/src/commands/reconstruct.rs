@@ -2,6 +2,7 @@
 
 use crate::cli::Reconstruct;
 use crate::output;
+use trocar_core::Progress;
 use trocar_geometry::io::Unit;
 use trocar_reconstruct::{Settings, SurfaceRule};
 use trocar_workflow::{Reconstructed, Result, reconstruct_recording, reconstruct_surface};

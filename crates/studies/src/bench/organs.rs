@@ -31,10 +31,10 @@ impl OrganSource {
     /// # Errors
     /// As [`Organs::read`] and [`Organs::analytic`].
     pub fn organs(&self) -> Result<Organs> {
-        match self {
-            Self::File(path) => Organs::read(path),
-            Self::Analytic(tets) => Organs::analytic(*tets),
-        }
+        Ok(match self {
+            Self::File(path) => Organs::read(path)?,
+            Self::Analytic(tets) => Organs::analytic(*tets)?,
+        })
     }
 }
 

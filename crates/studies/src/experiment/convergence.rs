@@ -156,6 +156,7 @@ impl ConvergenceExperiment {
         progress: &dyn Progress,
     ) -> Result<ConvergenceCase> {
         let made = Scene::named(scene, organs, material(young, poisson))
+            .map_err(Error::from)
             .and_then(|scene| step_ladder::climb(&scene, &SOLVERS, self.most_iterations, progress));
         let (rows, failure) = match made {
             Ok(rows) => (rows, None),
@@ -167,7 +168,8 @@ impl ConvergenceExperiment {
 
     /// What rows depend on besides scene and material.
     fn settings(&self, organs: &Organs) -> Result<String> {
-        let schedules = SOLVERS.iter().map(|s| trocar_workflow::solver_named(s)).collect::<Result<Vec<_>>>()?;
+        let schedules =
+            SOLVERS.iter().map(|s| trocar_workflow::solver_named(s)).collect::<std::result::Result<Vec<_>, _>>()?;
         Ok(format!(
             "{} with {} nodes and {} tets, to {} iterations, {schedules:?}, version {}",
             organs.source,
