@@ -10,7 +10,8 @@ use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::{
-    CHANNELS_FILE, EPISODE_FILE, Episode, EpisodeFile, EpisodeResult, GateRange, RESULT_FILE, Sweep, Verdict, policy, read_channels, run, sweep,
+    CHANNELS_FILE, EPISODE_FILE, Episode, EpisodeFile, EpisodeResult, GateRange, RESULT_FILE, Sweep, Verdict, policy,
+    read_channels, run, sweep,
 };
 
 /// One episode of a scene by a policy.

@@ -6,7 +6,7 @@ use crate::specimen_scene::{free_scene, grasp_lift, task_organ};
 use crate::workflow::{REPORT, refuse_overlap};
 use crate::{Error, Result, pages};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_scene::{GraspDesignName, InstrumentKind, Scene, ScheduleName};
@@ -118,7 +118,7 @@ impl Lift {
     pub fn run_scene(
         &self,
         scene: &str,
-        phantoms: &PathBuf,
+        phantoms: &Path,
         output: &Path,
         progress: &dyn Progress,
     ) -> Result<LiftResult> {

@@ -3,6 +3,7 @@
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use std::path::Path;
+use trocar_cell::{ToolReach, tool_reach};
 use trocar_core::Pose;
 use trocar_scene::{
     Arm, CellCamera, Frame, Gates, Instrument, InstrumentKind, Lens, Safety, Scene, Side, SpecimenSource, Task,
@@ -12,6 +13,12 @@ use trocar_specimen::Specimen;
 
 /// Height at which the lowest tissue lies in the cell (m), as in the paper's cell.
 const BED_HEIGHT: f64 = 0.02;
+
+/// The organ's middle lies no higher than this in the cell (m); thick specimens lie lower for it.
+const MAX_MIDDLE_HEIGHT: f64 = 0.055;
+
+/// Turns about the vertical that are tried.
+const TURNS: i32 = 24;
 
 /// Where the organ's middle lies in the cell (m): below the ports' midpoint of the paper's cell.
 const MIDDLE: [f64; 2] = [0.0, 0.46];
@@ -73,6 +80,37 @@ pub fn free_scene(specimen: &Specimen, folder: &Path, organ: &str, sever: bool) 
     Ok(scene)
 }
 
+/// The paper's cell with the specimen in `folder` placed so that both tools reach `organ`: its middle below
+/// the ports' midpoint, turned about the vertical to where the tools miss it by least. And how near they
+/// come.
+///
+/// # Errors
+/// A specimen without that organ.
+pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -> Result<(Scene, Vec<ToolReach>)> {
+    let mut scene = Scene::new(name, source(folder));
+    scene.description = format!("The paper's two-arm cell around {}", specimen.name);
+    organ.clone_into(&mut scene.task.organ);
+    if specimen.camera.is_none() {
+        scene.cameras.retain(|c| !matches!(c.lens, Lens::Recording {}));
+    }
+    let missed = |reach: &[ToolReach]| reach.iter().map(|r| r.missed_mm).fold(0.0, f64::max);
+    let mut best: Option<(Scene, Vec<ToolReach>)> = None;
+    for k in 0..TURNS {
+        // Small turns to either side first, so that of equals the least is taken.
+        let turn = if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 };
+        let turn = std::f64::consts::TAU * f64::from(turn) / f64::from(TURNS);
+        scene.placement = frame(&placed(specimen, organ, turn)?);
+        let reach = tool_reach(&scene, specimen)?;
+        if best.as_ref().is_none_or(|(_, b)| missed(&reach) < missed(b) - 0.1) {
+            best = Some((scene.clone(), reach));
+        }
+        if best.as_ref().is_some_and(|(_, reach)| missed(reach) < 0.1) {
+            break;
+        }
+    }
+    best.ok_or_else(|| Error::Mismatch("the specimen cannot be placed".to_owned()))
+}
+
 /// A grasp-lift of `organ` anywhere along it that goes on until its policy has finished, from the same
 /// start every time.
 pub fn grasp_lift(organ: &str) -> Task {
@@ -107,7 +145,8 @@ pub(crate) fn placed(specimen: &Specimen, organ: &str, turn: f64) -> Result<Pose
     let middle = sum / f64::max(count, 1.0);
     let all = specimen.organs.iter().flat_map(|o| &o.body.vertices);
     let lowest = all.map(|p| turned(p).z).fold(f64::INFINITY, f64::min);
-    let translation = DVec3::new(MIDDLE[0] - middle.x, MIDDLE[1] - middle.y, BED_HEIGHT - lowest);
+    let bed = BED_HEIGHT.min(MAX_MIDDLE_HEIGHT - (middle.z - lowest));
+    let translation = DVec3::new(MIDDLE[0] - middle.x, MIDDLE[1] - middle.y, bed - lowest);
     Ok(Pose { rotation, translation })
 }
 

@@ -1,6 +1,7 @@
 //! A real organ model becomes a body, settles, and is lifted.
 
 use std::path::Path;
+use trocar_core::Silent;
 use trocar_geometry::io::Unit;
 use trocar_reconstruct::Settings;
 use trocar_scene::GraspDesignName;

@@ -2,15 +2,14 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // the helpers are test code too
 
 use base64::{Engine, engine::general_purpose::STANDARD};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
 use trocar_core::Pose;
-use trocar_core::Silent;
 use trocar_geometry::{RepairReport, TetMesh, TetQuality, TriMesh};
 use trocar_reconstruct::{CompositeTimes, OrganView, Reconstruction};
 use trocar_render::phong::{Instance, PhongScene, Shading};
-use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
+use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 use trocar_workflow::pages as report;
 
 /// A name that would break a page that does not escape it.
@@ -161,6 +160,7 @@ fn reconstruction() -> Reconstruction {
             .map(|(a, b)| if *a > 0.0 { a - b } else { 0.0 })
             .collect(),
         compared: mask(i as u16 + 1),
+        moving_share: 0.0,
     };
     let organs = specimen.organs.iter().enumerate().map(|(i, o)| view(i, &o.name)).collect();
     let mut input = frame.color.clone();
@@ -181,6 +181,7 @@ fn reconstruction() -> Reconstruction {
         recovered_share: 0.034,
         coverage: 0.903,
         depth_range_median: 0.0019,
+        warnings: Vec::new(),
         times: CompositeTimes::default(),
         organs,
         notes: vec![format!("frame 12 of {HOSTILE} dropped")],

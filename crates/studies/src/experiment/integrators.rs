@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_cell::World;
 use trocar_core::Progress;
-use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_testing::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
 use trocar_tissue::{Model, Oracle, OracleState, Schedule, State, Stepper, stable_explicit_step};

@@ -6,7 +6,6 @@ use std::path::Path;
 use std::time::Instant;
 use trocar_cell::{FRAME, World};
 use trocar_core::Progress;
-use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_workflow::REPORT;
 use trocar_workflow::phantoms;
