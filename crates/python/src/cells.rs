@@ -208,7 +208,8 @@ impl Cells {
         color: Vec<Bound<'_, PyArrayDyn<u8>>>,
         depth: Vec<Bound<'_, PyArrayDyn<f32>>>,
     ) -> PyResult<()> {
-        self.look(py, &cameras, &size, &active, &color, &depth)
+        self.here()?;
+        self.eyes.look(py, (&self.episodes, &self.pool), &cameras, &size, &active, &color, &depth)
     }
 
     /// A picture (height, width, 3) of cell `k` through `camera`.
@@ -220,7 +221,8 @@ impl Cells {
         height: usize,
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        self.photograph(py, k, camera, height, width)
+        self.at(k)?;
+        self.eyes.photograph(py, (&self.episodes[k], &self.pool), k, camera, height, width)
     }
 
     /// Least and greatest numbers of an action.

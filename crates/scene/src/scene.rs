@@ -108,7 +108,7 @@ fn arms() -> Vec<Arm> {
 }
 
 fn ports() -> Vec<Port> {
-    vec![Port::paper(Side::Left, [-0.045, 0.46, 0.16]), Port::paper(Side::Right, [0.045, 0.46, 0.16])]
+    vec![Port::paper(Side::Left.name(), [-0.045, 0.46, 0.16]), Port::paper(Side::Right.name(), [0.045, 0.46, 0.16])]
 }
 
 fn instruments() -> Vec<Instrument> {

@@ -60,8 +60,8 @@ pub struct Task {
     pub first_grasp: Option<GraspDesignName>,
     /// A cut parts the tissue.
     pub sever: bool,
-    /// The episode ends when its last stage has passed. Without, it runs until its time is up or the
-    /// policy has finished.
+    /// The episode ends when its last stage has passed. Without, it runs until its time is up or
+    /// the policy has finished.
     #[serde(skip_serializing_if = "is_true")]
     pub stop_when_passed: bool,
     /// When stages count as done.

@@ -170,7 +170,8 @@ row! {
         disabled_blades,
         /// Times that an organ was relaxed outside of time.
         relaxed,
-        /// Largest motion of any node in the first frame after jaws took hold [mm]; 0 where none did.
+        /// Largest motion of any node in the first frame after jaws took hold [mm]; 0 where none
+        /// did.
         activation_step_mm,
     }
 }

@@ -59,12 +59,12 @@ pub struct TimedEvent {
     pub event: CellEvent,
 }
 
-/// Resets `episode` to `seed` and lets `policy` go through it. `watch` sees every step and returns false
-/// to stop.
+/// Resets `episode` to `seed` and lets `policy` go through it. `watch` sees every step and returns
+/// false to stop.
 ///
 /// # Errors
-/// A reset or a first look that fails, or [`trocar_cell::Error::Interrupted`] when `watch` stops it. A
-/// policy that fails on the way ends the episode, which is a result.
+/// A reset or a first look that fails, or [`trocar_cell::Error::Interrupted`] when `watch` stops
+/// it. A policy that fails on the way ends the episode, which is a result.
 pub fn run(
     episode: &mut Episode,
     policy: &mut dyn Policy,

@@ -22,8 +22,8 @@ const KEY: &str = "trocar";
 const FORMAT: &str = "trocar-channels";
 const VERSION: u32 = 2;
 
-/// What a column of this version was called in files of version 1. `None` for one that they do not have,
-/// which is read as zeros.
+/// What a column of this version was called in files of version 1. `None` for one that they do not
+/// have, which is read as zeros.
 fn name_in_version_1(name: &str) -> Option<String> {
     let new = ["_blades_disabled", "_guarded"];
     let task = ["disabled_contacts", "disabled_blades", "relaxed", "activation_step_mm"];

@@ -1,4 +1,5 @@
-//! An episode in figures, computed from its channels and, where these do not say it, from its events.
+//! An episode in figures, computed from its channels and, where these do not say it, from its
+//! events.
 
 use crate::channels::{ArmChannels, TaskChannels};
 use crate::facts::{Details, Facts};
@@ -83,11 +84,13 @@ pub struct Summary {
     pub held_to_end: bool,
     /// Greatest rise of held tissue [mm].
     pub lift_mm: f64,
-    /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest lift.
+    /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest
+    /// lift.
     pub slip_mm: f64,
     /// Follow ratio (tissue lift over jaw lift) then.
     pub follow_ratio: f64,
-    /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than 3 mm.
+    /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than
+    /// 3 mm.
     #[serde(default)]
     pub held: bool,
     /// Times that tissue tore out of jaws.
@@ -181,7 +184,8 @@ impl Summary {
     pub(crate) fn add_facts(&mut self, facts: &Facts<'_>) {
         self.details = facts.details();
         self.why = why(facts.rows, facts, &self.progress, self.end.as_ref());
-        self.advice = facts.advice(self);
+        let slipped = self.attached && !self.held && !self.diverged && self.torn == 0;
+        self.advice = if slipped { facts.advice() } else { None };
     }
 
     /// Suspensions of physics in a few words; `None` without any.
@@ -206,8 +210,8 @@ impl Summary {
     }
 }
 
-/// The task's channels at the top of the last grasp: the last row in which the jaws were within 5% of
-/// the greatest lift that they had with it.
+/// The task's channels at the top of the last grasp: the last row in which the jaws were within 5%
+/// of the greatest lift that they had with it.
 fn top_of_last_grasp(rows: &[Channels]) -> Option<TaskChannels> {
     let end = rows.iter().rposition(|c| c.task.grasped > 0.0)?;
     let start = rows[..end].iter().rposition(|c| c.task.grasped == 0.0).map_or(0, |k| k + 1);

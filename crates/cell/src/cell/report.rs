@@ -1,6 +1,6 @@
 //! What a step of the cell reports: the observation of each arm, of the tissue, and what happened.
 
-use super::rules::RuleCounts;
+use super::rule_counts::RuleCounts;
 use super::setpoint::Setpoint;
 use crate::severance::Severance;
 use glam::DVec3;
@@ -163,8 +163,8 @@ pub enum CellEvent {
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
     },
-    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears. It lets go, and
-    /// its contact is disabled until it is out and the tissue has come back.
+    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears. It lets go,
+    /// and its contact is disabled until it is out and the tissue has come back.
     ContactDisabled {
         /// The arm.
         arm: Side,
@@ -175,8 +175,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// Jaws that hold tissue had strained it beyond what it bears. They keep their hold, but contact of
-    /// their blades is disabled until they let go.
+    /// Jaws that hold tissue had strained it beyond what it bears. They keep their hold, but
+    /// contact of their blades is disabled until they let go.
     BladesDisabled {
         /// The arm.
         arm: Side,
@@ -187,7 +187,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// An organ stayed folded with no instrument at it: it was relaxed without regard to time and forces.
+    /// An organ stayed folded with no instrument at it: it was relaxed without regard to time and
+    /// forces.
     Relaxed {
         /// Name of the organ.
         organ: String,

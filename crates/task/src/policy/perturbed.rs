@@ -22,8 +22,8 @@ pub const OFFSET_MM: f64 = 5.0;
 /// Distance from port to organ that turns millimetres into pivots [m].
 const ARM: f64 = 0.12;
 
-/// Changes each arm's targets and keeps them within the limits; other action spaces are left as they
-/// are. `change` gets the arm's place, and its first three numbers and roll.
+/// Changes each arm's targets and keeps them within the limits; other action spaces are left as
+/// they are. `change` gets the arm's place, and its first three numbers and roll.
 fn changed(episode: &Episode, action: Action, mut change: impl FnMut(usize, &Workspace, &mut [f64])) -> Result<Action> {
     if action.space != ActionSpace::Pivots {
         return Ok(action);

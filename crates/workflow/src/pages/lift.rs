@@ -2,7 +2,7 @@
 
 use super::severed;
 use crate::Result;
-use crate::lift::Lifted;
+use crate::lifted::Lifted;
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::{Band, Line, Plot};
 use trocar_report::table::{self, fixed};

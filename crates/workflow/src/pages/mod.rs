@@ -12,7 +12,7 @@ mod severed;
 mod truth;
 
 use crate::Result;
-use crate::lift::Lifted;
+use crate::lifted::Lifted;
 use std::path::Path;
 use trocar_geometry::RepairReport;
 use trocar_reconstruct::Reconstruction;
