@@ -8,14 +8,14 @@
 //! with a sparse direct solve. It is slow and meant for tests and studies. The function contains:
 //!
 //! - energies, stresses and their derivatives of [`trocar_tissue::Hyperelastic`]; masses, dashpots
-//! and contact stiffness as the model holds them (rounded to `f32`);
+//!   and contact stiffness as the model holds them (rounded to `f32`);
 //! - dashpots as the sweeps have them: quadratic in the change of an edge's squared length since
-//! the beginning of the step, so that no rigid motion meets them;
+//!   the beginning of the step, so that no rigid motion meets them;
 //! - the supports' one-sided quadratic penalty. Their friction has no potential, because its limit
-//! grows with the depth: the function is minimised with the limits held, which are then updated,
-//! until the forces of the true law are in balance;
+//!   grows with the depth: the function is minimised with the limits held, which are then updated,
+//!   until the forces of the true law are in balance;
 //! - pinned nodes stay; held nodes are prescribed. The stepper's rules for nodes that cannot follow
-//! a tool are left out: a motion that cannot be followed is an error.
+//!   a tool are left out: a motion that cannot be followed is an error.
 //!
 //! The minimum is that of the steps of `SolverSettings::PAPER`. The default solver steps a body in
 //! free flight exactly, the oracle by implicit Euler.

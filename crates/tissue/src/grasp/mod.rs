@@ -1,9 +1,9 @@
 //! The live-pose grasp: a tool carries nodes rigidly from where they were when it closed.
 //!
 //! Paper, equation (4): o_i = R(t_a)' (x_i(t_a) - p(t_a)), then x_i = R o_i + p, v_i = 0 until the
-//! jaws open. Stored are x_i(t_a) and the tool's pose at t_a. The position is evaluated as
-//! `x_i(t_a) + (R R(t_a)' - I)(x_i(t_a) - p(t_a)) + (p - p(t_a))`: the same map, exact to the bit at
-//! activation (no snap).
+//! jaws open. Stored are x_i(t_a) and the tool's pose at t_a. The position is evaluated as the same
+//! map in a form that is exact to the bit at activation (no snap):
+//! `x_i(t_a) + (R R(t_a)' - I)(x_i(t_a) - p(t_a)) + (p - p(t_a))`.
 
 mod capture;
 mod hash;
