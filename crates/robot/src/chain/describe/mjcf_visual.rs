@@ -1,8 +1,9 @@
-//! What an MJCF file's bodies look like: the geoms of groups 0 to 2, which MuJoCo's viewer shows, of each body from the world to the tip and of what is welded to them.
+//! Visual shapes in MJCF: the geoms of groups 0 to 2, which MuJoCo's viewer shows, of each body
+//! from the world to the tip and of bodies welded to them.
 
-use super::super::visual::{PLAIN, Visual, VisualShape, opaque};
-use super::super::xml::{Source, children, place, shown};
-use super::{Compiler, Reader};
+use super::mjcf::{Compiler, Reader};
+use super::visual::{DEFAULT_COLOR, Visual, VisualShape, opaque};
+use super::xml::{Source, children, place, shown};
 use crate::Result;
 use crate::chain::frames::compose;
 use glam::{DQuat, DVec3};
@@ -10,14 +11,16 @@ use roxmltree::Node;
 use std::path::{Path, PathBuf};
 use trocar_core::Pose;
 
-/// Groups of geoms up to this one are seen.
-const SEEN: f64 = 2.0;
+/// Last group of visible geoms.
+const MAX_VISIBLE_GROUP: f64 = 2.0;
 
-/// What the arm that ends in `tip` looks like, as [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf) reads it: of the base first, then of each link that a joint moves. Without `tip` it ends at
-/// the last body of the file that a joint moves.
+/// The visual shapes of the arm that ends in `tip`, as
+/// [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf) reads it: first those of the base,
+/// then those of each moving link. Without `tip` it ends at the last moving body of the file.
 ///
 /// # Errors
-/// As [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf); a mesh that no asset is, a geom whose size is missing.
+/// As [`SerialArm::from_mjcf`](crate::chain::SerialArm::from_mjcf); a mesh without an asset, a geom
+/// without a size.
 pub fn mjcf_visuals(path: &Path, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> {
     let (source, text) = Source::read(path)?;
     let document = source.parse(&text, "mujoco")?;
@@ -26,7 +29,7 @@ pub fn mjcf_visuals(path: &Path, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> 
     let reader = Reader { source, root, compiler };
     let moved = |n: &Node<'_, '_>| n.has_tag_name("body") && children(*n, "joint").next().is_some();
     let last = || root.descendants().filter(moved).filter_map(|n| n.attribute("name")).next_back();
-    let tip = tip.or_else(last).ok_or_else(|| source.fail("no joint moves a body that has a name"))?;
+    let tip = tip.or_else(last).ok_or_else(|| source.fail("there is no moving body with a name"))?;
     reader.visuals(tip)
 }
 
@@ -43,7 +46,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
                 links.push(Vec::new());
             }
             let Some(of) = links.last_mut() else { continue };
-            // Bodies that are still to be looked at, with their poses. What hangs on the tip's body is left out.
+            // Open bodies, with their poses. Children of the tip's body are ignored.
             let mut open = vec![(body, here)];
             while let Some((node, pose)) = open.pop() {
                 for geom in children(node, "geom") {
@@ -62,20 +65,20 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(links)
     }
 
-    /// What a geom of a body at `here` shows; `None` for one that is not seen.
+    /// The shape of a geom of a body at `here`; `None` for an invisible one.
     fn visual(&self, body: Node<'a, 'i>, geom: Node<'a, 'i>, here: &Pose) -> Result<Option<Visual>> {
-        if self.number(geom, "group")? > SEEN {
+        if self.number(geom, "group")? > MAX_VISIBLE_GROUP {
             return Ok(None);
         }
         let mesh = self.attribute(geom, "mesh")?;
         let kind = self.attribute(geom, "type")?.unwrap_or(if mesh.is_some() { "mesh" } else { "sphere" });
-        // Numbers that a shape has no use for may follow, as MuJoCo lets them.
+        // Unused numbers may follow, as in MuJoCo.
         let size = |count: usize| -> Result<Vec<f64>> {
             let text = self.attribute(geom, "size")?.unwrap_or_default();
             let number = |word| self.source.parse_numbers::<1>(word, &place(geom), "size").map(|[v]| v);
             let all = text.split_whitespace().map(number).collect::<Result<Vec<_>>>()?;
             if !(count..=3).contains(&all.len()) || all[..count].iter().any(|v| *v <= 0.0) {
-                return Err(self.at(geom, &format!("needs a size of {count} positive numbers, 3 with unused ones")));
+                return Err(self.at(geom, &format!("needs a size of {count} positive numbers; up to 3 are allowed")));
             }
             Ok(all)
         };
@@ -84,12 +87,12 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
             turns.extend(self.attribute(geom, key)?.map(|_| key));
         }
         if turns.len() > 1 {
-            // Which of them counts is not plain where one is of a default class.
+            // Their precedence is unclear if one comes from a default class.
             let turns = turns.join(" and ");
-            return Err(self.at(geom, &format!("has {turns}, of its own or of its default classes; must have one")));
+            return Err(self.at(geom, &format!("has {turns}, of its own or of its default classes; it must have one")));
         }
         let mut pose = self.pose(geom)?;
-        // The length of what is told by its ends.
+        // Half the length of a shape that is given by its ends.
         let mut between = None;
         if let Some([a, b, c, d, e, f]) = self.numbers::<6>(geom, "fromto")? {
             let (from, to) = (DVec3::new(a, b, c), DVec3::new(d, e, f));
@@ -116,7 +119,7 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
                 let (radius, half) = long(between)?;
                 VisualShape::Capsule { radius, half }
             }
-            // Ellipsoids, planes and fields of height are no part of any arm that is known.
+            // Ellipsoids, planes and height fields are ignored: known arms have none.
             _ => return Ok(None),
         };
         let Some(color) = self.color(geom)? else { return Ok(None) };
@@ -124,18 +127,18 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(Some(Visual { link, shape, pose: compose(here, &pose), color }))
     }
 
-    /// A geom's colour: its own, or its material's; `None` if it cannot be seen.
+    /// A geom's colour: its own, or its material's; `None` if it is fully transparent.
     fn color(&self, geom: Node<'a, 'i>) -> Result<Option<[f64; 3]>> {
         if let Some(own) = self.numbers::<4>(geom, "rgba")? {
             return Ok(opaque(own));
         }
-        let Some(name) = self.attribute(geom, "material")? else { return Ok(Some(PLAIN)) };
+        let Some(name) = self.attribute(geom, "material")? else { return Ok(Some(DEFAULT_COLOR)) };
         let material = self.asset("material", name);
         let rgba = material.map(|m| self.numbers::<4>(m, "rgba")).transpose()?.flatten();
-        Ok(rgba.map_or(Some(PLAIN), opaque))
+        Ok(rgba.map_or(Some(DEFAULT_COLOR), opaque))
     }
 
-    /// The asset of a kind by its name, which is its file's stem where it has none.
+    /// The asset of a kind by its name, by default the stem of its file.
     fn asset(&self, kind: &str, name: &str) -> Option<Node<'a, 'i>> {
         let stem = |n: Node<'a, 'i>| Path::new(n.attribute("file")?).file_stem()?.to_str().map(str::to_owned);
         let own = |n: Node<'a, 'i>| n.attribute("name").map(str::to_owned).or_else(|| stem(n));
@@ -144,20 +147,20 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
     }
 
     fn mesh(&self, geom: Node<'a, 'i>, name: Option<&str>) -> Result<VisualShape> {
-        let name = name.ok_or_else(|| self.at(geom, "is a mesh and does not say which"))?;
-        let unknown = || self.at(geom, &format!("shows the mesh '{}', which no <asset> has", shown(name)));
+        let name = name.ok_or_else(|| self.at(geom, "has the type mesh and names no mesh"))?;
+        let unknown = || self.at(geom, &format!("has the mesh '{}', which is in no <asset>", shown(name)));
         let asset = self.asset("mesh", name).ok_or_else(unknown)?;
-        let file = asset.attribute("file").ok_or_else(|| self.at(asset, "has no file, which is not understood"))?;
+        let file = asset.attribute("file").ok_or_else(|| self.at(asset, "has no file, which is not supported"))?;
         for unknown in ["refpos", "refquat"] {
             if self.attribute(asset, unknown)?.is_some() {
-                return Err(self.at(asset, &format!("has {unknown}, which is not understood")));
+                return Err(self.at(asset, &format!("has {unknown}, which is not supported")));
             }
         }
         let scale = self.numbers::<3>(asset, "scale")?.map_or(DVec3::ONE, DVec3::from_array);
         Ok(VisualShape::Mesh { file: self.folder().join(file), scale })
     }
 
-    /// Where mesh files are.
+    /// The folder of mesh files.
     fn folder(&self) -> PathBuf {
         let said = |key: &str| children(self.root, "compiler").filter_map(|c| c.attribute(key)).last();
         let folder = self.source.path.parent().unwrap_or(Path::new(""));

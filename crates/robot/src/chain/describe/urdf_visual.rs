@@ -1,8 +1,8 @@
-//! What a URDF file's links look like: `<visual>` of each link from the base to the tip, and of what is fixed to them.
+//! Visual shapes in URDF: `<visual>` of each link from base to tip, and of links fixed to them.
 
-use super::super::visual::{PLAIN, Visual, VisualShape, opaque};
-use super::super::xml::{Source, children, place, shown};
-use super::Reader;
+use super::urdf::Reader;
+use super::visual::{DEFAULT_COLOR, Visual, VisualShape, opaque};
+use super::xml::{Source, children, place, shown};
 use crate::Result;
 use crate::chain::frames::compose;
 use glam::DVec3;
@@ -10,11 +10,14 @@ use roxmltree::Node;
 use std::path::{Component, Path, PathBuf};
 use trocar_core::Pose;
 
-/// What the arm between `base` and `tip` of a URDF file looks like, as [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf) reads it: of the base first, then of each link that a joint moves.
-/// `package://NAME/...` is looked for where a folder NAME lies beside the file or above it.
+/// The visual shapes of the arm between `base` and `tip` of a URDF file, as
+/// [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf) reads it: first those of the base,
+/// then those of each moving link. `package://NAME/...` is searched in folders NAME beside the file
+/// or above it.
 ///
 /// # Errors
-/// As [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf); a shape that is not understood, a package that is nowhere, a path that leaves its package.
+/// As [`SerialArm::from_urdf`](crate::chain::SerialArm::from_urdf); an unsupported shape, a missing
+/// package, a path outside its package.
 pub fn urdf_visuals(path: &Path, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Vec<Visual>>> {
     let (source, text) = Source::read(path)?;
     let document = source.parse(&text, "robot")?;
@@ -23,7 +26,7 @@ pub fn urdf_visuals(path: &Path, base: Option<&str>, tip: Option<&str>) -> Resul
     let mut links = vec![Vec::new()];
     let mut here = Pose::IDENTITY;
     if let Some(first) = joints.first() {
-        reader.seen(reader.end(*first, "parent")?, Some(*first), &here, &mut links[0])?;
+        reader.fixed_visuals(reader.end(*first, "parent")?, Some(*first), &here, &mut links[0])?;
     }
     for (k, &node) in joints.iter().enumerate() {
         here = compose(&here, &reader.origin(node)?);
@@ -34,7 +37,7 @@ pub fn urdf_visuals(path: &Path, base: Option<&str>, tip: Option<&str>) -> Resul
         let child = reader.end(node, "child")?;
         let Some(of) = links.last_mut() else { continue };
         match joints.get(k + 1) {
-            Some(next) => reader.seen(child, Some(*next), &here, of)?,
+            Some(next) => reader.fixed_visuals(child, Some(*next), &here, of)?,
             None => reader.visuals(child, &here, of)?,
         }
     }
@@ -42,14 +45,20 @@ pub fn urdf_visuals(path: &Path, base: Option<&str>, tip: Option<&str>) -> Resul
 }
 
 impl<'a, 'i> Reader<'_, 'a, 'i> {
-    /// Of a link and of what is fixed to it beside the joint `next`.
-    fn seen(&self, link: &'a str, next: Option<Node<'a, 'i>>, here: &Pose, into: &mut Vec<Visual>) -> Result<()> {
+    /// Adds the shapes of a link, and of links fixed to it except by the joint `next`.
+    fn fixed_visuals(
+        &self,
+        link: &'a str,
+        next: Option<Node<'a, 'i>>,
+        here: &Pose,
+        into: &mut Vec<Visual>,
+    ) -> Result<()> {
         let mut open = vec![(link, *here)];
         let mut count = 0;
         while let Some((link, pose)) = open.pop() {
             self.visuals(link, &pose, into)?;
             for &joint in self.by_parent.get(link).into_iter().flatten().filter(|j| Some(**j) != next) {
-                // More than there are links would be a loop.
+                // More joints than links are a loop.
                 count += 1;
                 if joint.attribute("type") == Some("fixed") && count <= self.links.len() {
                     open.push((self.end(joint, "child")?, compose(&pose, &self.origin(joint)?)));
@@ -80,7 +89,12 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
                 }
                 "cylinder" => VisualShape::Cylinder { radius: number("radius")?, half: 0.5 * number("length")? },
                 "sphere" => VisualShape::Ball(number("radius")?),
-                other => return Err(at(format!("a <visual> is a <{}>; mesh, box, cylinder or sphere", shown(other)))),
+                other => {
+                    return Err(at(format!(
+                        "a <visual> has a <{}>; it must have a mesh, box, cylinder or sphere",
+                        shown(other)
+                    )));
+                }
             };
             let Some(color) = self.color(visual)? else { continue };
             into.push(Visual { link: shown(name), shape, pose: compose(here, &self.origin(visual)?), color });
@@ -88,36 +102,34 @@ impl<'a, 'i> Reader<'_, 'a, 'i> {
         Ok(())
     }
 
-    /// The colour of a visual, its own or that of the material that it names; `None` if it cannot be seen.
+    /// The colour of a visual: its own, or that of its named material; `None` if it is fully
+    /// transparent.
     fn color(&self, visual: Node<'a, 'i>) -> Result<Option<[f64; 3]>> {
-        let Some(own) = children(visual, "material").next() else { return Ok(Some(PLAIN)) };
+        let Some(own) = children(visual, "material").next() else { return Ok(Some(DEFAULT_COLOR)) };
         let of = |material: Node<'a, 'i>| children(material, "color").next();
         let name = own.attribute("name");
         let named = || children(self.root, "material").find(|m| name.is_some() && m.attribute("name") == name);
-        let Some(node) = of(own).or_else(|| named().and_then(of)) else { return Ok(Some(PLAIN)) };
-        Ok(self.source.numbers::<4>(node, "rgba")?.map_or(Some(PLAIN), opaque))
+        let Some(node) = of(own).or_else(|| named().and_then(of)) else { return Ok(Some(DEFAULT_COLOR)) };
+        Ok(self.source.numbers::<4>(node, "rgba")?.map_or(Some(DEFAULT_COLOR), opaque))
     }
 
-    /// The file that a mesh's name stands for.
+    /// The path of a mesh file.
     fn file(&self, name: &str) -> std::result::Result<PathBuf, String> {
         let folder = self.source.path.parent().unwrap_or(Path::new(""));
         let Some(inside) = name.strip_prefix("package://") else {
             return Ok(folder.join(name.strip_prefix("file://").unwrap_or(name)));
         };
         let (package, rest) = inside.split_once('/').unwrap_or((inside, ""));
-        // What is not inside the package is not looked for.
+        // Only paths inside the package are allowed.
         let plain = Path::new(inside).components().all(|c| matches!(c, Component::Normal(_)));
         if package.is_empty() || rest.starts_with('/') || !plain {
-            let right = "must be package://NAME/PATH with a PATH inside the package, without '..'";
-            return Err(format!("its mesh is '{}', {right}", shown(name)));
+            let right = "it must be package://NAME/PATH with a PATH inside the package, without '..'";
+            return Err(format!("its mesh is '{}'; {right}", shown(name)));
         }
         let full = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
         let found = full.ancestors().find(|f| f.join(package).is_dir());
         found.map(|f| f.join(inside)).ok_or_else(|| {
-            format!(
-                "its mesh is in the package '{}', of which no folder lies beside the file or above it",
-                shown(package)
-            )
+            format!("its mesh is in the package '{}', which has no folder beside the file or above it", shown(package))
         })
     }
 }

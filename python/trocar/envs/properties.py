@@ -1,4 +1,4 @@
-"""What environments say of their cells, whether they are one or many."""
+"""Properties that all environments share, whether they hold one cell or many."""
 
 from __future__ import annotations
 
@@ -8,21 +8,22 @@ from .cells import Cells
 from .options import Options
 
 
-class OfCells:
-    """What is asked of an environment by name."""
+class CellsMixin:
+    """Attributes of an environment of one or many cells."""
 
     cells: Cells
-    #: Number of its cell among `cells`, the first where it has many.
+    #: Index of this environment's (first) cell among `cells`.
     cell: int = 0
+    metadata: dict[str, Any]
 
-    def _begin(self, count: int, scene: str, render_mode: str | None, options: Options) -> None:
-        """Builds the cells; what is wrong with an option is told by its name."""
+    def _build(self, count: int, scene: str, render_mode: str | None, options: Options) -> None:
+        """Builds the cells. A wrong option is a ValueError that names it."""
         if render_mode not in (None, "rgb_array"):
-            raise ValueError(f"render_mode: '{render_mode}' is unknown; rgb_array is known")
+            raise ValueError(f"render_mode: '{render_mode}' is unknown; it must be rgb_array")
         self.render_mode = render_mode
         self.cells = Cells(count, scene, **options)
-        # The class knows no scene; films and datasets take the rate from here.
-        self.metadata: dict[str, Any] = type(self).metadata | {"render_fps": self.cells.fps}
+        # The class does not know the scene's rate. Videos and datasets read it from here.
+        self.metadata = self.metadata | {"render_fps": self.cells.fps}
 
     @property
     def task(self) -> str:
@@ -31,7 +32,7 @@ class OfCells:
 
     @property
     def task_description(self) -> str:
-        """What is asked for, in words: the `prompt` of policies."""
+        """The task in words: the `prompt` of policies."""
         return self.cells.prompt
 
     @property
@@ -54,12 +55,15 @@ class OfCells:
         return self.cells.max_steps
 
 
-class OfOneCell(OfCells):
-    """What is asked of one cell."""
+class OneCellMixin(CellsMixin):
+    """Attributes of one cell."""
 
     @property
     def privileged_channels(self) -> dict[str, float]:
-        """Channels of the last step by name: tissue and all, for rewards of one's own and for scripts, not for policies."""
+        """Channels of the last step by name, tissue included.
+
+        For rewards and scripts, not for policies.
+        """
         return dict(zip(self.channel_names, self.cells.channels[self.cell].tolist()))
 
     @property
@@ -69,5 +73,7 @@ class OfOneCell(OfCells):
 
 
 def row_of(value: Any, k: int) -> Any:
-    """What cell `k` sees, as a copy: users keep observations."""
-    return {key: row_of(part, k) for key, part in value.items()} if isinstance(value, dict) else value[k].copy()
+    """A copy of the observation of cell `k`. Copied because users keep observations."""
+    if isinstance(value, dict):
+        return {key: row_of(part, k) for key, part in value.items()}
+    return value[k].copy()
