@@ -11,15 +11,10 @@ use trocar_robot::chain::{InverseOptions, Joints, MassProperties, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument, Jaw as JawDrive, Limits};
 use trocar_robot::manipulator::{ControllerSettings, Manipulator, ModelError};
 use trocar_robot::port::Port;
-<<<<<<< HEAD
 use trocar_scene::{
     ArmModel as Source, Drive as DriveKind, GraspDesignName, InstrumentKind, Scene, ScheduleName, Start, Tool,
 };
-use trocar_tissue::{Descent, Schedule, Start as SolverStart};
-=======
-use trocar_scene::{ArmModel, GraspDesignName, InstrumentKind, Scene, ScheduleName};
-use trocar_tissue::{Descent, SolverSettings, Start};
->>>>>>> main
+use trocar_tissue::{Descent, SolverSettings, Start as SolverStart};
 
 /// Clearance that a tilt at the limit leaves (m).
 const MIN_CLEARANCE: f64 = 2e-5;
@@ -54,17 +49,10 @@ const MAX_TOUCHED_SHAFT: f64 = 0.2;
 /// The schedule of that name.
 pub(super) fn schedule(name: ScheduleName) -> SolverSettings {
     match name {
-<<<<<<< HEAD
-        ScheduleName::Fast => Schedule::FAST,
-        ScheduleName::Paper => Schedule::PAPER,
-        ScheduleName::Adaptive => {
-            Schedule::Descent(Descent { substeps: 8, iterations: 10, start: SolverStart::Adaptive })
-=======
         ScheduleName::Fast => SolverSettings::FAST,
         ScheduleName::Paper => SolverSettings::PAPER,
         ScheduleName::Adaptive => {
-            SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
->>>>>>> main
+            SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: SolverStart::Adaptive })
         }
     }
 }
@@ -159,13 +147,8 @@ fn checked_start(scene: &Scene, tool: &Tool<'_>, workspace: &Workspace) -> Resul
 fn dynamic(scene: &Scene, arm: &trocar_scene::Arm, space: &mut PortSpace, start: &Setpoint) -> Result<Drive> {
     let start = start.in_port();
     let chain = chain(scene, arm)?;
-<<<<<<< HEAD
     space.limits.roll = roll_of(&chain, &space.port, &space.instrument, &space.limits, &start)?;
-    let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
-=======
-    limits.roll = roll_of(&chain, &hole, &instrument, &limits, &start)?;
     let mut settings = ControllerSettings::named(&arm.controller.name, &arm.controller.gains)?;
->>>>>>> main
     let error = scene.gravity_error;
     settings.error = ModelError {
         links: error.link_mass_share,
