@@ -73,7 +73,7 @@ fn awake<'a>(
     Ok(sight)
 }
 
-/// A camera as Python is told of it: name, height and width [px] of what policies see, whether it
+/// A camera as Python is told of it: name, height and width (px) of what policies see, whether it
 /// measures depth.
 pub type Described = (String, usize, usize, bool);
 

@@ -17,7 +17,7 @@ pub(crate) const SIMPLE: &str = "simple";
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
-    /// Origin [m].
+    /// Origin (m).
     pub position_m: [f64; 3],
     /// Unit quaternion, scalar first.
     #[serde(default = "no_rotation")]
@@ -87,7 +87,7 @@ pub struct Arm {
     /// Pose of the base in the cell frame. An ideal arm has none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub base: Option<Frame>,
-    /// Joint angles towards which the elbow is drawn [degrees], as many as the arm has joints; the
+    /// Joint angles towards which the elbow is drawn (degrees), as many as the arm has joints; the
     /// model's own if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub posture_deg: Vec<f64>,
@@ -240,26 +240,26 @@ pub struct Instrument {
     pub name: String,
     /// grasper or cutter.
     pub kind: InstrumentKind,
-    /// Diameter of the shaft [mm].
+    /// Diameter of the shaft (mm).
     #[serde(default = "shaft_diameter")]
     pub shaft_diameter_mm: f64,
-    /// Length from the mount to the pivot of the jaw [mm].
+    /// Length from the mount to the pivot of the jaw (mm).
     #[serde(default = "shaft_length")]
     pub shaft_length_mm: f64,
-    /// Length of the blades beyond the pivot [mm].
+    /// Length of the blades beyond the pivot (mm).
     #[serde(default = "blade_length")]
     pub blade_length_mm: f64,
-    /// Mass with its motor [kg]; the paper's weighs 4.7 N.
+    /// Mass with its motor (kg); the paper's weighs 4.7 N.
     #[serde(default = "instrument_mass")]
     pub mass_kg: f64,
     /// Centre of mass from the mount, along the instrument's axes; z runs along the shaft towards
-    /// the tip [mm].
+    /// the tip (mm).
     #[serde(default = "centre_of_mass")]
     pub centre_of_mass_mm: [f64; 3],
-    /// Full angle between the open blades [degrees].
+    /// Full angle between the open blades (degrees).
     #[serde(default = "jaw_max_angle")]
     pub jaw_max_angle_deg: f64,
-    /// Force with which the jaws close [N]; 0.5 if left out, for a cutter too. The paper's cutter
+    /// Force with which the jaws close (N); 0.5 if left out, for a cutter too. The paper's cutter
     /// has 20.
     #[serde(default = "jaw_force")]
     pub jaw_force_n: f64,
@@ -296,7 +296,7 @@ fn jaw_force() -> f64 {
     0.5
 }
 
-/// Force of the paper's cutter [N]. Tissue between blades stiffens without end as they close, so a
+/// Force of the paper's cutter (N). Tissue between blades stiffens without end as they close, so a
 /// grasper's half a newton stops short of closed in thick or stiff tissue; laparoscopic scissors
 /// close with tens.
 const CUTTER_FORCE_N: f64 = 20.0;
@@ -325,7 +325,7 @@ impl Instrument {
         }
     }
 
-    /// From the mount to the tip of the closed blades [m].
+    /// From the mount to the tip of the closed blades (m).
     pub fn length(&self) -> f64 {
         1e-3 * (self.shaft_length_mm + self.blade_length_mm)
     }
@@ -339,7 +339,7 @@ pub struct GravityError {
     pub link_mass_share: f64,
     /// Share by which the instrument is believed lighter than it is.
     pub instrument_mass_share: f64,
-    /// Coulomb friction in each joint that the controller knows nothing of [N m].
+    /// Coulomb friction in each joint that the controller knows nothing of (N m).
     pub joint_friction_nm: f64,
 }
 

@@ -11,19 +11,19 @@ use trocar_core::Pose;
 pub struct Port {
     /// Name.
     pub name: String,
-    /// Centre in the cell frame [m].
+    /// Centre in the cell frame (m).
     pub centre_m: [f64; 3],
     /// Unit vector out of the body, towards the arm.
     #[serde(default = "upwards")]
     pub normal: [f64; 3],
-    /// Diameter of the hole [mm].
+    /// Diameter of the hole (mm).
     #[serde(default = "hole")]
     pub hole_diameter_mm: f64,
-    /// Thickness of the wall [mm]; of a wall of 0 the hole is one edge, as in the paper's formula
+    /// Thickness of the wall (mm); of a wall of 0 the hole is one edge, as in the paper's formula
     /// of the clearance (SPEC K3). One of 2 mm leaves a shaft of 5 mm in 6 mm 19 degrees of tilt.
     #[serde(default = "sheet")]
     pub sheet_thickness_mm: f64,
-    /// Diameter of the piece of abdominal wall that pictures show round the hole [mm]; of 0 they
+    /// Diameter of the piece of abdominal wall that pictures show round the hole (mm); of 0 they
     /// show a ring on a holder alone. Nothing but pictures knows of it.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub sheet_diameter_mm: f64,
@@ -70,7 +70,7 @@ impl Port {
         Pose { rotation, translation: self.centre_m.into() }
     }
 
-    /// Largest tilt of a shaft of `diameter_mm` [rad]: acos(d/D), where it fills the hole (SPEC
+    /// Largest tilt of a shaft of `diameter_mm` (rad): acos(d/D), where it fills the hole (SPEC
     /// K3); `None` for a shaft that does not fit.
     pub fn tilt_limit(&self, diameter_mm: f64) -> Option<f64> {
         let share = diameter_mm / self.hole_diameter_mm;

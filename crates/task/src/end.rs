@@ -14,7 +14,7 @@ pub enum End {
     RcmAbort {
         /// The arm.
         arm: String,
-        /// The deviation [mm].
+        /// The deviation (mm).
         deviation_mm: f64,
     },
     /// Tissue or an arm is lost.

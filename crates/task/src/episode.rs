@@ -12,7 +12,7 @@ use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
 
-/// How long organs settle under gravity before any episode begins [s]: all phantoms are at rest
+/// How long organs settle under gravity before any episode begins (s): all phantoms are at rest
 /// within it (SPEC, settled).
 pub const SETTLE_S: f64 = 1.0;
 
@@ -236,12 +236,12 @@ impl Episode {
         &self.now.rows
     }
 
-    /// What happened so far, with times [s].
+    /// What happened so far, with times (s).
     pub fn events(&self) -> &[(f64, CellEvent)] {
         &self.now.events
     }
 
-    /// Simulated time since the start [s].
+    /// Simulated time since the start (s).
     pub fn time(&self) -> f64 {
         self.cell.time()
     }
@@ -287,7 +287,7 @@ impl Episode {
         self.now.subject.bodies(&self.cell)
     }
 
-    /// Targets of port-reach in the cell [m], three an arm; empty for other tasks.
+    /// Targets of port-reach in the cell (m), three an arm; empty for other tasks.
     pub fn targets(&self) -> &[[glam::DVec3; 3]] {
         &self.now.subject.targets
     }

@@ -23,7 +23,7 @@ pub struct Recording {
     pub info: ChannelsInfo,
     /// The rows.
     pub channels: Vec<Channels>,
-    /// What happened, with times [s].
+    /// What happened, with times (s).
     pub events: Vec<(f64, CellEvent)>,
     /// The figures.
     pub summary: Summary,
@@ -52,7 +52,7 @@ pub struct EpisodeResult {
 /// Something that happened, and when.
 #[derive(Clone, Debug, Serialize)]
 pub struct TimedEvent {
-    /// Time at the end of its control period [s].
+    /// Time at the end of its control period (s).
     pub time_s: f64,
     /// What.
     #[serde(flatten)]

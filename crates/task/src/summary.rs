@@ -8,13 +8,13 @@ use crate::why::why;
 use crate::{Channels, End, Progress, Stage};
 use serde::{Deserialize, Serialize};
 
-/// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument [N].
+/// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument (N).
 pub const LOADED_N: f64 = 0.05;
 
 /// Jaws are at the top of their lift within this share of it.
 const TOP_SHARE: f64 = 0.05;
 
-/// The greatest lag that is looked for [s], and the step of the search.
+/// The greatest lag that is looked for (s), and the step of the search.
 const MAX_LAG: f64 = 0.3;
 const LAG_STEP: f64 = 1e-3;
 
@@ -23,30 +23,30 @@ const LAG_STEP: f64 = 1e-3;
 pub struct ArmSummary {
     /// left or right.
     pub arm: String,
-    /// Time under load [s]; the next three are over it, and 0 without any.
+    /// Time under load (s); the next three are over it, and 0 without any.
     pub loaded_s: f64,
-    /// RCM deviation under load, median over periods [mm].
+    /// RCM deviation under load, median over periods (mm).
     pub rcm_median_mm: f64,
-    /// Its 95th percentile [mm].
+    /// Its 95th percentile (mm).
     pub rcm_p95_mm: f64,
-    /// The largest in any physics step under load [mm].
+    /// The largest in any physics step under load (mm).
     pub rcm_max_mm: f64,
-    /// The largest of the whole episode [mm].
+    /// The largest of the whole episode (mm).
     pub rcm_peak_mm: f64,
     /// Root mean square distance between commanded and measured tip at the same time, without load
-    /// [mm].
+    /// (mm).
     pub tracking_rms_mm: f64,
-    /// The delay of the measured tip behind the commanded one that makes that distance least [ms].
+    /// The delay of the measured tip behind the commanded one that makes that distance least (ms).
     pub lag_ms: f64,
-    /// The distance that is left then [mm].
+    /// The distance that is left then (mm).
     pub lagged_rms_mm: f64,
-    /// Peak contact force [N].
+    /// Peak contact force (N).
     pub peak_contact_n: f64,
-    /// Peak constraint force [N]: the pull of what is held, no contact.
+    /// Peak constraint force (N): the pull of what is held, no contact.
     pub peak_constraint_n: f64,
-    /// Peak force with which tissue pushed the blades apart [N].
+    /// Peak force with which tissue pushed the blades apart (N).
     pub peak_jaw_n: f64,
-    /// Largest tilt [degrees].
+    /// Largest tilt (degrees).
     pub tilt_max_deg: f64,
     /// Periods in which contact of the instrument with tissue was disabled.
     #[serde(default, alias = "unhooked")]
@@ -74,7 +74,7 @@ pub struct Summary {
     pub progress: Progress,
     /// How it ended; None while it goes on.
     pub end: Option<End>,
-    /// Simulated time [s].
+    /// Simulated time (s).
     pub duration_s: f64,
     /// The grasper has held the organ at some time.
     pub attached: bool,
@@ -82,7 +82,7 @@ pub struct Summary {
     pub grasp_at: Option<f64>,
     /// It held it at the end too.
     pub held_to_end: bool,
-    /// Greatest rise of held tissue [mm].
+    /// Greatest rise of held tissue (mm).
     pub lift_mm: f64,
     /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest
     /// lift.
@@ -105,9 +105,9 @@ pub struct Summary {
     pub yielded_substeps: usize,
     /// The tissue diverged.
     pub diverged: bool,
-    /// Largest node speed at any period's end [m/s].
+    /// Largest node speed at any period's end (m/s).
     pub max_speed_m_s: f64,
-    /// Largest RCM deviation of any arm [mm].
+    /// Largest RCM deviation of any arm (mm).
     pub rcm_peak_mm: f64,
     /// It never went beyond the scene's threshold (3 mm).
     pub rcm_within: bool,
@@ -204,7 +204,7 @@ impl Summary {
         (!all.is_empty()).then(|| all.join(", "))
     }
 
-    /// When `stage` passed [s].
+    /// When `stage` passed (s).
     pub fn passed_at(&self, stage: Stage) -> Option<f64> {
         self.progress.stages.iter().find(|s| s.stage == stage).and_then(|s| s.time_s)
     }
@@ -266,7 +266,7 @@ pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[k] + (at - k as f64) * (sorted[next] - sorted[k])
 }
 
-/// Root mean square distance [m] of the measured tips from those commanded `lag` [s] before, over
+/// Root mean square distance (m) of the measured tips from those commanded `lag` (s) before, over
 /// the rows `of`.
 fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool) -> f64 {
     let tip = |a: &ArmChannels| glam::DVec3::new(a.tip_x_m, a.tip_y_m, a.tip_z_m);
@@ -285,7 +285,7 @@ fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
-/// The lag [s] with the least distance, and that distance [m].
+/// The lag (s) with the least distance, and that distance (m).
 fn lag(all: &[ArmChannels], period: f64, of: &dyn Fn(usize) -> bool) -> (f64, f64) {
     let steps = (MAX_LAG / LAG_STEP) as usize;
     let tried = (0..=steps).map(|k| k as f64 * LAG_STEP).map(|lag| (lag, off_by(all, lag, period, of)));

@@ -11,7 +11,7 @@ const SLICE: f64 = 0.04;
 /// How far to either side the direction of the organ is taken from.
 const CHORD: f64 = 0.08;
 
-/// Jaws hold nodes within this distance of the middle of what they pinch [m].
+/// Jaws hold nodes within this distance of the middle of what they pinch (m).
 const REACH: f64 = 0.009;
 
 /// A cluster clear of pins is preferred to one that is not, even if it is this much farther along
@@ -26,13 +26,13 @@ const FEWEST: usize = 8;
 pub(super) struct Aim {
     pub pose: Pose,
     pub setpoint: Setpoint,
-    /// How far the tip stays from where it should be [m].
+    /// How far the tip stays from where it should be (m).
     pub missed: f64,
     /// Organ coordinate.
     pub s: f64,
 }
 
-/// Middle of the organ at organ coordinate `s` as it is now [m]: of its nodes there.
+/// Middle of the organ at organ coordinate `s` as it is now (m): of its nodes there.
 pub(super) fn middle(cell: &Cell, body: usize, s: f64) -> Option<DVec3> {
     let (world, mut wide) = (cell.world(), SLICE);
     // A coarse mesh may have no node in a thin slice.
@@ -111,7 +111,7 @@ pub(super) fn beside(cell: &Cell, arm: &str, aim: &Aim, by: DVec3) -> Result<Aim
 }
 
 /// The aim of `arm` at a point of `body` near `s`: shaft through the port, jaws across the organ,
-/// the point `depth` [m] from the pivot.
+/// the point `depth` (m) from the pivot.
 pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, depth: f64) -> Result<Aim> {
     let along = along(cell, body, s);
     let workspace = cell.workspace(arm)?;
