@@ -68,7 +68,7 @@ impl<S: Solver> BodySlot<S> {
             island: index,
             reaction: Reaction::new(body),
             untangler: Untangler::new(&rest),
-            measured: Measured::nothing(body.len()),
+            measured: Measured::new(body.len()),
             before: rest.clone(),
             state: rest,
         }

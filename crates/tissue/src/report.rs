@@ -94,14 +94,14 @@ impl Default for StepReport {
 pub(crate) struct Measured {
     x: Vec<Vec3A>,
     v: Vec<Vec3A>,
-    seen: StepReport,
+    report: StepReport,
 }
 
 impl Measured {
     /// Nothing yet, of a body of so many vertices.
-    pub fn nothing(vertices: usize) -> Self {
+    pub fn new(vertices: usize) -> Self {
         let nowhere = vec![Vec3A::NAN; vertices];
-        Self { x: nowhere.clone(), v: nowhere, seen: StepReport::default() }
+        Self { x: nowhere.clone(), v: nowhere, report: StepReport::default() }
     }
 }
 
@@ -126,18 +126,19 @@ impl StepReport {
     /// Fills in what is measured of a body at the end of the frame. `last` keeps it for a body that
     /// stays where it is.
     pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState, last: &mut Measured) {
-        if last.seen.divergence.is_some() || state.x != last.x || state.v != last.v {
-            let mut seen = Self::default();
-            seen.look(index, body, state);
+        if last.report.divergence.is_some() || state.x != last.x || state.v != last.v {
+            let mut now = Self::default();
+            now.measure_body(index, body, state);
             last.x.clone_from(&state.x);
             last.v.clone_from(&state.v);
-            last.seen = seen;
+            last.report = now;
         }
-        let Self { max_speed, inverted, min_volume_ratio, divergence, .. } = last.seen;
+        let Self { max_speed, inverted, min_volume_ratio, divergence, .. } = last.report;
         *self = Self { max_speed, inverted, min_volume_ratio, divergence: divergence.or(self.divergence), ..*self };
     }
 
-    fn look(&mut self, index: usize, body: &Body, state: &BodyState) {
+    /// Measures a body: speed, volumes, and what ends a run.
+    fn measure_body(&mut self, index: usize, body: &Body, state: &BodyState) {
         let finite = state.x.iter().chain(&state.v).all(|p| p.is_finite());
         if !finite {
             self.divergence = Some(Divergence::NonFinite { body: index });

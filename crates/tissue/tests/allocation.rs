@@ -36,7 +36,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// One test at a time: the count is everybody's.
+/// One test at a time: all share the count.
 static ALONE: Mutex<()> = Mutex::new(());
 
 #[test]

@@ -1,7 +1,7 @@
 //! Bodies that touch each other: how deep, with what force, and that nothing is gained or lost by
 //! it.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
 mod common;
 
@@ -284,7 +284,7 @@ fn two_blocks_press_as_one() {
 }
 
 /// A soft flap that hangs over another part of its own body sinks onto it, and through it if folds
-/// are not looked for.
+/// are not sought.
 #[test]
 fn folded_tissue_touches_itself() {
     let edge = 2.5e-3;
@@ -325,7 +325,7 @@ fn folded_tissue_touches_itself() {
     }
 }
 
-/// A body of which every node is pinned is an obstacle like any other.
+/// A body whose nodes are all pinned is an obstacle like any other.
 #[test]
 fn a_rigid_body_is_an_obstacle() {
     let low = block([6, 6, 2], 2.5e-3);

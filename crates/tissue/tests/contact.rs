@@ -1,7 +1,7 @@
 //! Contact with tools and supports: Hertz, Coulomb, nothing creeps, nothing is passed through,
 //! whatever the speed and the stiffness.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
 mod common;
 
@@ -239,7 +239,7 @@ fn contact_holds_at_any_stiffness() {
     }
 }
 
-/// Contact is the same for any number of threads, run again, and gone on with from the middle.
+/// Contact is the same for any number of threads, when run again, and when continued from the middle.
 #[test]
 fn contact_repeats_to_the_bit() {
     let mesh = block([6, 4, 3], 2e-3);

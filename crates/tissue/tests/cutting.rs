@@ -123,7 +123,7 @@ fn a_partial_cut_leaves_one_piece_that_opens_under_load() {
     assert_eq!((cut.faces, cut.pieces.len()), (16, 1));
     let body = &cut.model.bodies()[0];
     assert_eq!((body.len(), body.parts(), body.name()), (mesh.vertices.len() + 10, 1, "appendix"));
-    // What was numbered keeps its number.
+    // Old nodes keep their numbers.
     assert_eq!(cut.pieces[0].nodes[..mesh.vertices.len()], (0..mesh.vertices.len() as u32).collect::<Vec<_>>());
     let copies = |k: usize| (cut.pieces[0].nodes[mesh.vertices.len() + k] as usize, mesh.vertices.len() + k);
     for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
@@ -217,7 +217,7 @@ fn a_grasp_across_a_cut_holds_both_parts() {
     let forces: Vec<f64> = cut.state.grasps.iter().map(|g| g.compliance.unwrap().jaw_force).collect();
     assert!((forces[0] + forces[1] - 6.0).abs() < 1e-12 && forces[4] == 6.0, "{forces:?}");
     assert!((forces[0] - 6.0 * grasps[0].1 as f64 / 125.0).abs() < 1e-12, "{forces:?}");
-    // They pull at nothing: every node is where its grasp wants it.
+    // They do not pull: every node is at its target.
     for grasp in &cut.state.grasps {
         for (node, x) in grasp.prescribed(&Pose::IDENTITY) {
             assert!(cut.state.position(&cut.model, grasp.body, node as usize).distance(x) < 1e-12);

@@ -1,6 +1,6 @@
 //! The same bits over 600 frames, whatever the threads, runs and interruptions.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
 mod common;
 

@@ -1,7 +1,7 @@
 //! The compliant grasp: held tissue stays held, slips at Coulomb's limit, tears once, and is free
 //! after release.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
 mod common;
 
@@ -90,7 +90,7 @@ fn what_hangs_on_a_tool_without_motion_stays() {
     let fallen = held.iter().map(|i| state.position(&model, 0, *i as usize).distance(mesh.vertices[*i as usize]));
     // Positions are rounded to single precision.
     assert!(fallen.fold(0.0, f64::max) < 1e-8);
-    // Nodes that no body has are no reason to panic.
+    // Nodes that no body has do not panic.
     state.grasps[0].nodes[0] = 100_000;
     let report = stepper.step(&model, &mut state, &[still(Pose::IDENTITY)]);
     assert_eq!(report.divergence, Some(Divergence::OtherModel));

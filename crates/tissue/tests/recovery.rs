@@ -1,6 +1,6 @@
 //! Tissue from the worst of starts: every node thrown to a random place.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
 mod common;
 

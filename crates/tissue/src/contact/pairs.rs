@@ -258,7 +258,7 @@ impl Pairs {
     }
 
     /// Lists which vertices of which bodies take part, for the sweeps of a substep.
-    pub fn assign(&mut self) {
+    pub fn list_roles(&mut self) {
         self.roles.clear();
         for (k, pair) in self.list.iter().enumerate() {
             for (corner, (member, vertex, share)) in pair.shares().into_iter().enumerate() {
@@ -275,7 +275,7 @@ impl Pairs {
 
     /// Contacts of a body with the others, by vertex: each as it is for one vertex while the other
     /// three of its pair stay where they are.
-    pub fn on(&mut self, island: &(impl Members + ?Sized), member: usize) -> &[Contact] {
+    pub fn contacts_of(&mut self, island: &(impl Members + ?Sized), member: usize) -> &[Contact] {
         let x = |m: usize, vertex: u32| island.x(m, vertex);
         self.pressed.clear();
         let first = self.roles.partition_point(|role| (role.member as usize) < member);

@@ -95,11 +95,11 @@ pub(crate) fn sweep_substep<S: Sweeps>(slots: &mut [BodySlot<S>], pairs: &mut Pa
         contacts.press(&[]);
         descent.start(&frame.of(*index), share, body, contacts, state, report);
     }
-    pairs.assign();
+    pairs.list_roles();
     for _ in 0..iterations {
         for member in 0..slots.len() {
             if !pairs.is_empty() {
-                let pressed = pairs.on(slots, member);
+                let pressed = pairs.contacts_of(slots, member);
                 slots[member].solver.sweeps().1.press(pressed);
             }
             let BodySlot { body, solver, state, .. } = &mut slots[member];
