@@ -1,6 +1,7 @@
 //! Follows a target through a recording.
 
-use super::{Logits, Prompt, Sam2};
+use super::Sam2;
+use super::prompt::{Logits, Prompt};
 use crate::distance::innermost;
 use crate::{Error, Picture, Result, Target};
 use trocar_camera::{ColorImage, Mask};
