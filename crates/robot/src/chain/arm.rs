@@ -77,6 +77,18 @@ pub struct Segment {
 
 /// A robot arm: a chain of links, each moved by one joint, with a payload at its flange. It is
 /// immutable; `with_*` return a changed copy.
+///
+/// ```
+/// use trocar_robot::chain::{InverseOptions, SerialArm};
+///
+/// let arm = SerialArm::franka_fr3()?;
+/// // The posture that moves the flange up by 50 mm.
+/// let mut target = arm.frames(&arm.home()).flange();
+/// target.translation.z += 0.05;
+/// let found = arm.inverse(&target, &arm.home(), &InverseOptions::default())?;
+/// assert!(arm.frames(&found.q).flange().translation.distance(target.translation) < 1e-6);
+/// # Ok::<(), trocar_robot::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SerialArm {
     name: String,

@@ -21,6 +21,32 @@ const REACH_BISECTIONS: usize = 6;
 pub(super) const START_SEARCHES: usize = 24;
 
 /// A controlled arm with its instrument in its port.
+///
+/// ```
+/// use glam::{DQuat, DVec3};
+/// use trocar_core::{Pose, Wrench};
+/// use trocar_robot::chain::SerialArm;
+/// use trocar_robot::instrument::{Coordinates, Instrument};
+/// use trocar_robot::manipulator::{ControllerSettings, Manipulator};
+/// use trocar_robot::port::Port;
+///
+/// let rotation = DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2);
+/// let base = Pose { rotation, translation: DVec3::new(-0.45, 0.0, 0.0) };
+/// let arm = SerialArm::franka_fr3()?.with_base(base)?;
+/// let port = Port::new(DVec3::new(-0.045, 0.46, 0.16), -DVec3::Z, DVec3::X)?;
+/// let start = Coordinates { pivots: [0.0, 0.23], insertion: 0.1, roll: 0.0, jaw: 0.5 };
+/// let settings = ControllerSettings::default();
+/// let mut arm = Manipulator::new(arm, Instrument::grasper(), port, settings, start)?;
+///
+/// // Inserts the instrument by 5 mm within half a second.
+/// arm.servo_cp(&Coordinates { insertion: 0.105, ..start })?;
+/// for _ in 0..240 {
+///     arm.step(Wrench::default(), 1.0 / 480.0)?;
+/// }
+/// assert!((arm.coordinates().0.insertion - 0.105).abs() < 1e-3);
+/// assert!(arm.rcm_deviation() < 1e-3);
+/// # Ok::<(), trocar_robot::Error>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manipulator {
     /// The actual arm, with the instrument as its payload.

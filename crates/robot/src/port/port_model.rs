@@ -8,6 +8,17 @@ use serde::{Deserialize, Serialize};
 use trocar_core::Pose;
 
 /// A round hole in a sheet.
+///
+/// ```
+/// use glam::DVec3;
+/// use trocar_robot::port::Port;
+///
+/// // The paper's 6 mm hole: a 5 mm shaft tilted by 13.3 degrees has a clearance of 0.43 mm.
+/// let port = Port::new(DVec3::ZERO, -DVec3::Z, DVec3::X)?;
+/// let clearance = port.clearance(2.5e-3, 13.3_f64.to_radians());
+/// assert!((clearance - 0.43e-3).abs() < 5e-6);
+/// # Ok::<(), trocar_robot::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Port {
     /// Pose of the port frame in the cell: the hole's centre, z into the body.
