@@ -6,7 +6,7 @@ use crate::{Error, GraspDesign, Jaw, Result, Scissors};
 use glam::DVec3;
 use trocar_robot::chain::{InverseOptions, Joints, MassProperties, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument, Jaw as JawDrive, Limits};
-use trocar_robot::manipulator::{Manipulator, ModelError, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Manipulator, ModelError};
 use trocar_robot::port::Port;
 use trocar_scene::{ArmModel, GraspDesignName, InstrumentKind, Scene, ScheduleName};
 use trocar_tissue::{Descent, SolverSettings, Start};
@@ -105,7 +105,7 @@ fn station(
     }
     let chain = chain(scene, arm)?;
     limits.roll = roll_of(&chain, &hole, &instrument, &limits, &start)?;
-    let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
+    let mut settings = ControllerSettings::named(&arm.controller.name, &arm.controller.gains)?;
     let error = scene.gravity_error;
     settings.error = ModelError {
         links: error.link_mass_share,
