@@ -121,7 +121,7 @@ def main(arguments: list[str] | None = None) -> int:
         for row in result["policies"]:
             print(f"{row['policy']}: {row['passed']} of {row['episodes']} passed, mean score {row['mean_score']:.2f}")
             if row["policy_error"]:
-                print(f"{row['policy']} failed in {row['ends'][4]} episodes, first: {row['policy_error']}; --retry-failed does them again")
+                print(f"{row['policy']} failed in {row['ends']['policy-error']} episodes, first: {row['policy_error']}; --retry-failed does them again")
         print(f"states {result['hash']}\nreport {result['report']}")
     return 0
 

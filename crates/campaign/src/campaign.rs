@@ -53,7 +53,7 @@ impl Campaign {
         store.finish(&plan)
     }
 
-    /// Runs what is missing, no more than `most` episodes in all, and films failures: what is kept, and of what.
+    /// Runs what is missing, no more than `most` episodes in all, and films some failures and successes: what is kept, and of what.
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -158,7 +158,7 @@ impl Drop for Leaves<'_> {
 }
 
 impl Store {
-    /// Films the first failures that have no moving picture yet, for the report.
+    /// Films the first failures and successes that have no moving picture yet, for the report.
     ///
     /// # Errors
     /// A kept episode that is damaged, a picture that cannot be written, an interruption.

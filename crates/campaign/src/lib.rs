@@ -20,6 +20,6 @@ pub use page::{lift_and_rcm, lifts};
 pub use plan::{Job, Plan};
 pub use source::PolicySpec;
 pub use store::{Files, Kept, Store};
-pub use table::{CampaignResult, Comparison, Interval, PolicyRow, StageCount, median};
+pub use table::{CampaignResult, Comparison, EndCounts, Interval, PolicyRow, StageCount, median};
 pub use trocar_workflow::{Error, Result};
 pub use worker::Worker;

@@ -57,16 +57,17 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Median RCM deviation under load of the arm that was longest under load [mm]; None where none was.
+    /// Median RCM deviation under load of the arm that was longest under load (mm). `None` if none was.
     pub fn loaded_rcm_mm(&self) -> Option<f64> {
         let arms = self.summary.arms.iter().filter(|a| a.loaded_s > 0.0);
-        arms.max_by(|a, b| a.loaded_s.total_cmp(&b.loaded_s)).map(|a| a.rcm_median_mm)
+        arms.max_by(|a, b| a.loaded_s.total_cmp(&b.loaded_s)).and_then(|a| a.rcm_median_mm)
     }
 
-    /// Delay of the measured tip behind the commanded one [ms], of the arm that was farthest off its command without load: one that stands still has none. None where neither was off.
+    /// Delay of the measured tip behind the commanded one (ms), of the arm that was farthest off its
+    /// command without load. An arm that stands still has none. `None` if no arm was off its command.
     pub fn lag_ms(&self) -> Option<f64> {
-        let arms = self.summary.arms.iter().filter(|a| a.tracking_rms_mm > 0.0);
-        arms.max_by(|a, b| a.tracking_rms_mm.total_cmp(&b.tracking_rms_mm)).map(|a| a.lag_ms)
+        let arms = self.summary.arms.iter().filter_map(|a| Some((a.tracking_rms_mm.filter(|mm| *mm > 0.0)?, a.lag_ms?)));
+        arms.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, lag)| lag)
     }
 
     /// The larger of both arms of what `of` says.

@@ -49,7 +49,7 @@ pub enum Error {
     Interrupted,
     /// The user asked a campaign to stop.
     #[error(
-        "interrupted; {kept} of {planned} episodes are kept, with their table and report; the same command goes on"
+        "interrupted; {kept} of {planned} episodes are kept, with their table and report; the same command continues"
     )]
     Stopped {
         /// Episodes that are kept.

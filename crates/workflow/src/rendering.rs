@@ -114,6 +114,7 @@ impl Rendering {
             return self.specimen(folder, output, progress);
         }
         let scene = Scene::read(&self.source)?;
+        self.check_camera(&scene)?;
         let film = begin()?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let mut lift = ScriptedLift::new(&scene, &specimen, self.threads)?;
@@ -131,6 +132,7 @@ impl Rendering {
     ) -> Result<Rendered> {
         let episode = EpisodeFile::read(file)?;
         let scene = episode.scene(self.specimen.as_deref())?;
+        self.check_camera(&scene)?;
         let specimen = match &self.specimen {
             Some(folder) => Specimen::read(folder)?,
             None => scene_specimen(&scene, &self.phantoms, progress)?,
@@ -163,6 +165,26 @@ impl Rendering {
         }
     }
 
+    /// Checks that `scene` has the camera, before its specimen and cell are built.
+    fn check_camera(&self, scene: &Scene) -> Result<()> {
+        let mut known: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+        if !known.contains(&OUTSIDE) {
+            known.push(OUTSIDE);
+        }
+        self.check_known(known)
+    }
+
+    fn check_known(&self, known: Vec<&str>) -> Result<()> {
+        match &self.camera {
+            Some(name) if !known.contains(&name.as_str()) => Err(trocar_sensors::Error::UnknownCamera {
+                name: name.chars().take(60).collect(),
+                known: known.join(", "),
+            }
+            .into()),
+            _ => Ok(()),
+        }
+    }
+
     fn ready(&self, mut sight: CameraRig) -> CameraRig {
         if self.noise {
             sight.noise = SensorNoise { color: Some([0.015, 0.003]), depth: Some(DepthNoise::default()), seed: 1 };
@@ -181,6 +203,7 @@ impl Rendering {
 
     fn specimen(&self, folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Rendered> {
         let specimen = Specimen::read(folder)?;
+        self.check_known(specimen.camera.map(|_| "recording").into_iter().chain([OUTSIDE]).collect())?;
         let mut sight = self.ready(CameraRig::from_specimen(&specimen)?);
         let camera = self.camera.clone().or_else(|| sight.cameras().first().map(|c| (*c).to_owned()));
         let camera = camera.unwrap_or_else(|| OUTSIDE.to_owned());

@@ -4,9 +4,11 @@
 //! the organs behaved when they were lifted.
 
 mod bodies;
+mod episode;
 mod lift;
 mod organ_table;
 pub mod organ_views;
+mod over_time;
 mod seen;
 mod severed;
 mod truth;
@@ -19,6 +21,7 @@ use trocar_reconstruct::Reconstruction;
 use trocar_report::{page, table};
 use trocar_specimen::Specimen;
 
+pub(crate) use episode::episode;
 pub use seen::check_sizes;
 
 /// The page of a specimen reconstructed from a recording. `truth_dir` is the phantom's `truth` folder or the recording that
