@@ -9,12 +9,12 @@ use crate::{Error, GraspDesign, Jaw, Result, Scissors};
 use glam::DVec3;
 use trocar_robot::chain::{InverseOptions, Joints, MassProperties, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument, Jaw as JawDrive, Limits};
-use trocar_robot::manipulator::{Manipulator, ModelError, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Manipulator, ModelError};
 use trocar_robot::port::Port;
 use trocar_scene::{
     ArmModel as Source, Drive as DriveKind, GraspDesignName, InstrumentKind, Scene, ScheduleName, Start, Tool,
 };
-use trocar_tissue::{Descent, Schedule, Start as SolverStart};
+use trocar_tissue::{Descent, SolverSettings, Start as SolverStart};
 
 /// Clearance that a tilt at the limit leaves (m).
 const MIN_CLEARANCE: f64 = 2e-5;
@@ -47,12 +47,12 @@ const WALK_STEPS: u32 = 24;
 const MAX_TOUCHED_SHAFT: f64 = 0.2;
 
 /// The schedule of that name.
-pub(super) fn schedule(name: ScheduleName) -> Schedule {
+pub(super) fn schedule(name: ScheduleName) -> SolverSettings {
     match name {
-        ScheduleName::Fast => Schedule::FAST,
-        ScheduleName::Paper => Schedule::PAPER,
+        ScheduleName::Fast => SolverSettings::FAST,
+        ScheduleName::Paper => SolverSettings::PAPER,
         ScheduleName::Adaptive => {
-            Schedule::Descent(Descent { substeps: 8, iterations: 10, start: SolverStart::Adaptive })
+            SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: SolverStart::Adaptive })
         }
     }
 }
@@ -148,7 +148,7 @@ fn dynamic(scene: &Scene, arm: &trocar_scene::Arm, space: &mut PortSpace, start:
     let start = start.in_port();
     let chain = chain(scene, arm)?;
     space.limits.roll = roll_of(&chain, &space.port, &space.instrument, &space.limits, &start)?;
-    let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
+    let mut settings = ControllerSettings::named(&arm.controller.name, &arm.controller.gains)?;
     let error = scene.gravity_error;
     settings.error = ModelError {
         links: error.link_mass_share,

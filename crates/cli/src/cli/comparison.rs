@@ -68,8 +68,9 @@ pub struct RandomActionsExperiment {
     /// Actions a seed.
     #[arg(long, default_value_t = 500)]
     pub actions: usize,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Seeds that are run at once; as many as there are threads by default.
     #[arg(long, default_value_t = 0)]

@@ -10,7 +10,8 @@ use trocar_cell::World;
 use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_testing::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
-use trocar_tissue::{Model, Oracle, OracleState, Schedule, State, Stepper, stable_explicit_step};
+use trocar_tissue::{Model, SolverSettings, State};
+use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
 use trocar_workflow::REPORT;
 use trocar_workflow::phantoms;
 
@@ -158,7 +159,7 @@ impl IntegratorsExperiment {
             return Err(Error::Mismatch("the cell's organs are damped; name a mesh for undamped ones".to_owned()));
         }
         let specimen = phantoms::specimen("phantom-a", &self.record, &output.join("phantom-a"), progress)?;
-        Ok(World::new(&specimen, Schedule::default(), 1)?.model)
+        Ok(World::new(&specimen, SolverSettings::default(), 1)?.model)
     }
 }
 
@@ -190,7 +191,7 @@ fn measured(
     threads: usize,
     progress: &dyn Progress,
 ) -> Result<IntegratorRow> {
-    let mut stepper = Stepper::new(model, form.schedule, FRAME, threads)?;
+    let mut stepper = form.scheme.stepper(model, FRAME, threads)?;
     let mut state = State::new(model);
     let mut mean = vec![DVec3::ZERO; truth.rest.len()];
     let first_measured = frames - ((MEASURED_SHARE * frames as f64) as usize).max(1);
