@@ -65,8 +65,7 @@ pub(super) fn film(
     progress: &dyn Progress,
 ) -> Result<()> {
     let failed = failures(plan, kept).into_iter().take(FILMED_FAILURES);
-    let chosen: Vec<&Kept> =
-        failed.chain(successes(plan, kept)).filter(|k| !path(store, k).exists()).collect();
+    let chosen: Vec<&Kept> = failed.chain(successes(plan, kept)).filter(|k| !path(store, k).exists()).collect();
     if chosen.is_empty() || !scene.cameras.iter().any(|c| c.name == "endoscope") {
         return Ok(());
     }

@@ -66,7 +66,8 @@ impl Kept {
     /// Delay of the measured tip behind the commanded one (ms), of the arm that was farthest off its
     /// command without load. An arm that stands still has none. `None` if no arm was off its command.
     pub fn lag_ms(&self) -> Option<f64> {
-        let arms = self.summary.arms.iter().filter_map(|a| Some((a.tracking_rms_mm.filter(|mm| *mm > 0.0)?, a.lag_ms?)));
+        let arms =
+            self.summary.arms.iter().filter_map(|a| Some((a.tracking_rms_mm.filter(|mm| *mm > 0.0)?, a.lag_ms?)));
         arms.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, lag)| lag)
     }
 

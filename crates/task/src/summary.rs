@@ -324,7 +324,8 @@ mod tests {
         let loaded = arm("left", &loaded);
         assert_eq!((loaded.rcm_median_mm, loaded.rcm_max_mm), (Some(0.0), Some(0.0)));
         assert_eq!((loaded.tracking_rms_mm, loaded.lag_ms, loaded.lagged_rms_mm), (None, None, None));
-        let progress = crate::Tracker::new(trocar_scene::TaskName::GraspLift, &trocar_scene::Gates::default()).progress().clone();
+        let progress =
+            crate::Tracker::new(trocar_scene::TaskName::GraspLift, &trocar_scene::Gates::default()).progress().clone();
         let summary = Summary::of(&rows, &progress, None, &["left"], 3.0);
         assert_eq!((summary.slip_mm, summary.follow_ratio), (None, None));
         let json = serde_json::to_value(&summary).unwrap();

@@ -58,6 +58,18 @@ impl EpisodeRun {
         self.run_policy(output, progress, |_, _| Ok(chosen))
     }
 
+    /// Checks the scene and the folder `output`, before anything is built.
+    ///
+    /// # Errors
+    /// A scene that cannot be read; a folder of something else.
+    pub fn check(&self, output: &Path) -> Result<Scene> {
+        let scene = Scene::read(&self.scene)?;
+        refuse_overlap(Path::new(&self.scene), output)?;
+        // It removes itself.
+        StagedFolder::create(output, RESULT_FILE)?;
+        Ok(scene)
+    }
+
     /// The same by the policy that `make` gives for the episode.
     ///
     /// # Errors
@@ -68,8 +80,7 @@ impl EpisodeRun {
         progress: &dyn Progress,
         make: impl FnOnce(&Specimen, &Episode) -> Result<Box<dyn Policy + Send>>,
     ) -> Result<EpisodeMade> {
-        let scene = Scene::read(&self.scene)?;
-        refuse_overlap(Path::new(&self.scene), output)?;
+        let scene = self.check(output)?;
         let staged = StagedFolder::create(output, RESULT_FILE)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let mut episode = Episode::new(&scene, &specimen, self.threads)?;

@@ -93,7 +93,9 @@ impl Recorder {
             self.still(cell, "Lifted")?;
         }
         if self.films
-            && cell.time() >= FRAME_INTERVAL * self.frames.len() as f64 - 1e-9 && self.frames.len() < MAX_FRAMES {
+            && cell.time() >= FRAME_INTERVAL * self.frames.len() as f64 - 1e-9
+            && self.frames.len() < MAX_FRAMES
+        {
             let picture = self.rig.render(cell, &self.camera, FILM.map(|n| 2 * n), &RenderSettings::preview())?;
             self.frames.push((averaged(&picture.color, 2), (1e3 * cell.time()).round() as i32));
         }

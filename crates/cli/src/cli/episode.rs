@@ -8,7 +8,8 @@ use std::path::PathBuf;
 pub struct Episode {
     /// Scene file, or a built-in scene such as cell-a.
     pub scene: String,
-    /// The controller: scripted, noise, delay, offset, greedy, random.
+    /// The policy: scripted, noise, delay, offset, greedy, random; ws://HOST:PORT for an openpi server;
+    /// python:FILE.py:NAME or python:MODULE:NAME for a Python callable. NAME=... names it.
     #[arg(long, default_value = "scripted")]
     pub policy: String,
     /// Seed of the start and of the controller's chance.
@@ -21,7 +22,7 @@ pub struct Episode {
     /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
-    /// Episode folder to write: episode.trocar, channels.parquet, result.json.
+    /// Episode folder to write: episode.trocar, channels.parquet, result.json, report.html.
     #[arg(short, long)]
     pub output: PathBuf,
 }

@@ -3,6 +3,7 @@
 use crate::cli;
 use crate::output;
 use serde::Serialize;
+use trocar_campaign::run_episode;
 use trocar_core::Progress;
 use trocar_task::ArmSummary;
 use trocar_workflow::{
@@ -17,7 +18,7 @@ pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Res
         threads: arguments.threads,
         phantoms: arguments.phantoms.clone(),
     };
-    let made = run.run(&arguments.output, progress)?;
+    let made = run_episode(&run, &arguments.output, progress)?;
     output::print(json, &made, text);
     Ok(())
 }
@@ -39,7 +40,12 @@ pub fn replay_file(arguments: &cli::Replay, json: bool, progress: &dyn Progress)
             let h = told.header;
             format!(
                 "{} by {} with seed {}, recorded by trocar {}; scene {}, specimen {}; --verify replays and compares every step",
-                counted(told.steps, "step"), h.policy, h.seed, h.program, h.scene_hash, h.specimen_hash
+                counted(told.steps, "step"),
+                h.policy,
+                h.seed,
+                h.program,
+                h.scene_hash,
+                h.specimen_hash
             )
         });
         return Ok(());

@@ -26,7 +26,11 @@ pub fn run(arguments: &Record, json: bool, progress: &dyn Progress) -> Result<()
     output::print(json, &recorded, |r| {
         format!(
             "{} of {} in {} ({:.1} s); next: trocar reconstruct {} -o SPECIMEN",
-            counted(r.frames, "frame"), arguments.phantom, r.recording, r.seconds, r.recording
+            counted(r.frames, "frame"),
+            arguments.phantom,
+            r.recording,
+            r.seconds,
+            r.recording
         )
     });
     Ok(())

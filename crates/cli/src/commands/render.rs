@@ -29,7 +29,11 @@ pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()
 
 fn text(r: &Rendered) -> String {
     let seen: Vec<String> = r.seen.iter().map(|s| format!("{} {:.1}%", s.name, 1e2 * s.share)).collect();
-    let how = if r.samples > 0 { format!("{} a pixel", counted(r.samples as usize, "path")) } else { "direct light".to_owned() };
+    let how = if r.samples > 0 {
+        format!("{} a pixel", counted(r.samples as usize, "path"))
+    } else {
+        "direct light".to_owned()
+    };
     let note = r.differs.as_ref().map_or(String::new(), |why| format!("\nnot the recorded episode: {why}"));
     format!(
         "{}: {} x {}, {}, {how}, {} triangles, {:.1} s; at {:.2} s\n{}\n{}{note}",

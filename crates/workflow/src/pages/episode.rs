@@ -49,7 +49,11 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
     let mut cards = vec![
         Card::new("Passed", if s.passed { "yes" } else { "no" }, format!("score {}", fixed(s.score, 2))).met(s.passed),
         Card::new("Stages", format!("{} of {}", s.stage, s.progress.stages.len()), format!("next: {}", s.next)),
-        Card::new("Simulated", format!("{} s", fixed(s.duration_s, 1)), format!("{}\u{d7} real time", fixed(real_time_factor, 2))),
+        Card::new(
+            "Simulated",
+            format!("{} s", fixed(s.duration_s, 1)),
+            format!("{}\u{d7} real time", fixed(real_time_factor, 2)),
+        ),
     ];
     if recording.info.task != TaskName::PortReach {
         let at = s.grasp_at.map_or("nothing grasped".to_owned(), |at| {
@@ -65,7 +69,8 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
     let threshold = recording.info.rcm_threshold_mm;
     let within = Card::new("RCM deviation", mm(s.rcm_peak_mm), format!("at most; the threshold is {threshold} mm"));
     cards.push(within.met(s.rcm_within));
-    let contact = format!("contact on an instrument; pull of held tissue {} N", fixed(peak(|a| a.peak_constraint_n), 2));
+    let contact =
+        format!("contact on an instrument; pull of held tissue {} N", fixed(peak(|a| a.peak_constraint_n), 2));
     cards.push(Card::new("Peak force", format!("{} N", fixed(peak(|a| a.peak_contact_n), 2)), contact));
     cards.push(Card::new("Inverted elements", s.inverted_peak.to_string(), "at worst").met(s.inverted_peak == 0));
     let suspended = s.suspensions();
@@ -159,7 +164,8 @@ fn plots(recording: &Recording) -> Result<String> {
                 (*name, of, *color)
             })
             .collect();
-        let curves: Vec<over_time::Curve<'_>> = of.iter().map(|(name, of, color)| (*name, of.as_ref(), *color)).collect();
+        let curves: Vec<over_time::Curve<'_>> =
+            of.iter().map(|(name, of, color)| (*name, of.as_ref(), *color)).collect();
         TimePlot { title, y, curves: &curves, caption, limits }.figure(channels, bands(&recording.summary))
     };
     let task: Vec<over_time::Curve<'_>> = if recording.info.task == TaskName::PortReach {
@@ -169,11 +175,7 @@ fn plots(recording: &Recording) -> Result<String> {
             ("third", &|c| c.task.reach_3_mm, 4),
         ]
     } else {
-        vec![
-            ("jaws", &|c| c.task.jaw_lift_mm, 1),
-            ("tissue", &|c| c.task.lift_mm, 4),
-            ("slip", &|c| c.task.slip_mm, 2),
-        ]
+        vec![("jaws", &|c| c.task.jaw_lift_mm, 1), ("tissue", &|c| c.task.lift_mm, 4), ("slip", &|c| c.task.slip_mm, 2)]
     };
     let (title, caption) = match recording.info.task {
         TaskName::PortReach => ("Distance to the targets", "largest distance of a blade tip from its target."),
@@ -186,9 +188,27 @@ fn plots(recording: &Recording) -> Result<String> {
             .figure(channels, bands(&recording.summary))?,
         both("Jaw", "opening [1]", |a| a.jaw, "0 closed, 1 wide open.", vec![])?,
         both("Contact force", "force [N]", ArmChannels::contact_n, "of tissue on the instrument.", vec![])?,
-        both("Constraint force", "force [N]", ArmChannels::constraint_n, "pull of the tissue that the jaws hold.", vec![])?,
-        both("RCM deviation", "deviation [mm]", |a| a.rcm_peak_mm, "from the port\u{2019}s centre to the shaft\u{2019}s axis, largest of a period; dashed the threshold, where it is near.", limits)?,
-        both("Behind the command", "[mm]", |a| a.tracking_mm, "distance of the tip from what was commanded at that time.", vec![])?,
+        both(
+            "Constraint force",
+            "force [N]",
+            ArmChannels::constraint_n,
+            "pull of the tissue that the jaws hold.",
+            vec![],
+        )?,
+        both(
+            "RCM deviation",
+            "deviation [mm]",
+            |a| a.rcm_peak_mm,
+            "from the port\u{2019}s centre to the shaft\u{2019}s axis, largest of a period; dashed the threshold, where it is near.",
+            limits,
+        )?,
+        both(
+            "Behind the command",
+            "[mm]",
+            |a| a.tracking_mm,
+            "distance of the tip from what was commanded at that time.",
+            vec![],
+        )?,
         TimePlot {
             title: "Smallest volume ratio",
             y: "volume ratio [1]",

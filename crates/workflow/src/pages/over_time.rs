@@ -73,8 +73,7 @@ pub(super) fn pictures(pictures: &Pictures) -> Result<String> {
 
 /// The section of events.
 pub(super) fn events(events: &[(f64, CellEvent)]) -> String {
-    let rows: Vec<Vec<String>> =
-        events.iter().map(|(time, event)| vec![fixed(*time, 2), event.to_string()]).collect();
+    let rows: Vec<Vec<String>> = events.iter().map(|(time, event)| vec![fixed(*time, 2), event.to_string()]).collect();
     let body = if rows.is_empty() { String::new() } else { table::plain(&["Time [s]", "Event"], &rows) };
     let lead = if rows.is_empty() { "The jaws took hold of nothing and cut nothing." } else { "" };
     page::section("What happened", lead, &body)
