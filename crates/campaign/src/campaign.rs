@@ -67,8 +67,7 @@ impl Campaign {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let allowed = JOBS_PER_CORE.saturating_mul(cores).max(LEAST_JOBS);
         if self.jobs > allowed {
-            let reason =
-                format!("--jobs {}: at most {allowed} on {cores} cores; each has a cell of its own", self.jobs);
+            let reason = format!("--jobs {}: it must be at most {allowed} on {cores} cores", self.jobs);
             return Err(Error::Mismatch(reason));
         }
         store::look(output, &self.policies, self.seed)?;

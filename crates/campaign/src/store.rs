@@ -114,7 +114,9 @@ fn begun(folder: &Path) -> Result<Option<Plan>> {
         let own = |name: &std::ffi::OsStr| [EPISODES, UNDER_WAY, LOCK].iter().any(|own| name == *own);
         for entry in fs::read_dir(folder).map_err(io(folder))? {
             if !own(&entry.map_err(io(folder))?.file_name()) {
-                return Err(exists(format!("is not empty and is no campaign ({PLAN} is missing); name a new folder")));
+                return Err(exists(format!(
+                    "is not empty and is no campaign ({PLAN} is missing); choose a new folder"
+                )));
             }
         }
     }
@@ -130,7 +132,7 @@ pub(super) fn look(folder: &Path, policies: &[PolicySpec], seed: u64) -> Result<
     let exists = |reason: String| Err(Error::Exists { path: folder.to_owned(), reason });
     let other = [("seed", old.seed != seed), ("program", old.program != plan::program())];
     if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
-        return exists(format!("is a campaign of another {what}; write into another folder"));
+        return exists(format!("is a campaign of another {what}; choose another folder"));
     }
     let changed = |p: &&PolicySpec| old.policies.iter().any(|o| o.name == p.name && !p.is(o));
     if let Some(policy) = policies.iter().find(changed) {
@@ -168,7 +170,7 @@ impl Store {
             let other =
                 [("scene", old.scene_hash != plan.scene_hash), ("specimen", old.specimen_hash != plan.specimen_hash)];
             if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
-                return Err(exists(format!("is a campaign of another {what}; write into another folder")));
+                return Err(exists(format!("is a campaign of another {what}; choose another folder")));
             }
             look(folder, &plan.policies, plan.seed)?;
             // Episodes of policies that are not asked for now stay theirs.
@@ -277,7 +279,7 @@ impl Store {
 
     /// That an episode cannot be used, and what is to be done about it.
     pub(super) fn damaged(&self, policy: &str, index: usize, why: &str) -> Error {
-        let reason = format!("holds a damaged episode ({why}); remove it to have it run again");
+        let reason = format!("holds a damaged episode ({why}); remove it and it is run again");
         Error::Exists { path: self.episode(policy, index), reason }
     }
 

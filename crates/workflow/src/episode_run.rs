@@ -115,8 +115,15 @@ impl EpisodeRun {
 }
 
 /// `name` in the folder `path`, or `path` itself where it is no folder.
-fn inside(path: &Path, name: &str) -> PathBuf {
-    if path.is_dir() { path.join(name) } else { path.to_owned() }
+fn inside(path: &Path, name: &str) -> Result<PathBuf> {
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let file = path.join(name);
+    if file.is_file() {
+        return Ok(file);
+    }
+    Err(Error::Mismatch(format!("{}: the folder has no {name}; an episode's folder has one", path.display())))
 }
 
 /// The episode in a file, or in an episode's folder.
@@ -124,7 +131,7 @@ fn inside(path: &Path, name: &str) -> PathBuf {
 /// # Errors
 /// A file that is missing or damaged.
 pub fn read_episode(path: &Path) -> Result<EpisodeFile> {
-    Ok(EpisodeFile::read(&inside(path, EPISODE_FILE))?)
+    Ok(EpisodeFile::read(&inside(path, EPISODE_FILE)?)?)
 }
 
 /// Does the episode in `file` again and compares every step. The specimen is the scene's, or that in the folder `specimen`.
@@ -160,9 +167,9 @@ pub fn replay(
 pub fn sweep_files(files: &[PathBuf], ranges: &[String], progress: &dyn Progress) -> Result<Sweep> {
     let ranges: Vec<GateRange> = ranges.iter().map(|r| GateRange::parse(r)).collect::<std::result::Result<_, _>>()?;
     if let Some((_, twice)) = files.iter().enumerate().find(|(k, f)| files[..*k].contains(f)) {
-        return Err(Error::Mismatch(format!("{}: named twice; it would count twice", twice.display())));
+        return Err(Error::Mismatch(format!("{}: given twice; it would count twice", twice.display())));
     }
-    let files: Vec<PathBuf> = files.iter().map(|f| inside(f, CHANNELS_FILE)).collect();
+    let files: Vec<PathBuf> = files.iter().map(|f| inside(f, CHANNELS_FILE)).collect::<Result<_>>()?;
     progress.begin("channels", files.len() as u64);
     let mut episodes = Vec::with_capacity(files.len());
     for file in &files {

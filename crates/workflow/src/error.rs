@@ -34,7 +34,7 @@ pub enum Error {
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),
     /// The output would replace or change the input.
-    #[error("the output {output} and the input {input} lie in one another; name a folder beside it", output = output.display(), input = input.display())]
+    #[error("the output folder {output} overlaps the input {input}; choose another output folder", output = output.display(), input = input.display())]
     Overlap {
         /// The input.
         input: PathBuf,

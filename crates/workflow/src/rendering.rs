@@ -77,19 +77,22 @@ impl Rendering {
             "png" => None,
             "webp" => Some(WEBP_HZ),
             "mp4" => Some(MP4_HZ),
-            _ => return wrong("pictures end in .png, moving ones in .webp or .mp4"),
+            _ => return wrong("a picture must end in .png, a video in .webp or .mp4"),
         };
         if moving.is_some() && (self.depth || self.labels || self.at.is_some() || self.cut_away) {
-            return wrong("--depth, --labels, --at and --cut-away are for pictures (.png)");
+            return wrong("--depth, --labels, --at and --cut-away are only for pictures (.png)");
         }
         if let Some(at) = self.at.filter(|at| !(0.0..=600.0).contains(at)) {
-            return Err(Error::Mismatch(format!("--at is {at}; 0 to 600 s")));
+            return Err(Error::Mismatch(format!("--at is {at} s; it must be in [0, 600]")));
         }
         if let Some(samples) = self.samples.filter(|n| !(1..=65_536).contains(n)) {
-            return Err(Error::Mismatch(format!("--samples is {samples}; 1 to 65536")));
+            return Err(Error::Mismatch(format!("--samples is {samples}; it must be in [1, 65536]")));
         }
         if let Some(size) = self.size.filter(|size| moving.is_some() && size.iter().any(|n| n % 2 == 1)) {
-            return Err(Error::Mismatch(format!("--size is {}x{}; moving pictures have even sides", size[0], size[1])));
+            return Err(Error::Mismatch(format!(
+                "--size is {}x{}; width and height of a video must be even",
+                size[0], size[1]
+            )));
         }
         let folder = Path::new(&self.source);
         let begin = || moving.map(|most| Ok::<_, Error>((most, Moving::begin(output, &extension)?))).transpose();
@@ -97,17 +100,17 @@ impl Rendering {
             return self.episode(&file, begin()?, output, progress);
         }
         if self.specimen.is_some() {
-            let reason = "--specimen is for episodes, whose specimen may have moved";
+            let reason = "--specimen is only for episodes";
             return Err(Error::Mismatch(format!("{}: {reason}", self.source)));
         }
         if folder.join("result.json").is_file() {
-            let reason = "a run keeps figures, no shapes; render its scene instead: trocar render SCENE --at SECONDS";
+            let reason = "this run has no episode file; render its scene instead: trocar render SCENE --at SECONDS";
             return Err(Error::Mismatch(format!("{}: {reason}", self.source)));
         }
         if folder.is_dir() {
             if moving.is_some() || self.at.is_some() {
                 return Err(Error::Mismatch(format!(
-                    "{}: a specimen does not move; moving pictures and --at are for scenes and episodes",
+                    "{}: a specimen does not move; videos and --at are only for scenes and episodes",
                     self.source
                 )));
             }
@@ -171,10 +174,10 @@ impl Rendering {
         if !known.contains(&OUTSIDE) {
             known.push(OUTSIDE);
         }
-        self.check_known(known)
+        self.check_known(&known)
     }
 
-    fn check_known(&self, known: Vec<&str>) -> Result<()> {
+    fn check_known(&self, known: &[&str]) -> Result<()> {
         match &self.camera {
             Some(name) if !known.contains(&name.as_str()) => Err(trocar_sensors::Error::UnknownCamera {
                 name: name.chars().take(60).collect(),
@@ -203,7 +206,8 @@ impl Rendering {
 
     fn specimen(&self, folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Rendered> {
         let specimen = Specimen::read(folder)?;
-        self.check_known(specimen.camera.map(|_| "recording").into_iter().chain([OUTSIDE]).collect())?;
+        let known: Vec<&str> = specimen.camera.map(|_| "recording").into_iter().chain([OUTSIDE]).collect();
+        self.check_known(&known)?;
         let mut sight = self.ready(CameraRig::from_specimen(&specimen)?);
         let camera = self.camera.clone().or_else(|| sight.cameras().first().map(|c| (*c).to_owned()));
         let camera = camera.unwrap_or_else(|| OUTSIDE.to_owned());

@@ -1,6 +1,7 @@
 //! `trocar episode`, `trocar replay` and `trocar sweep`.
 
 use crate::cli;
+use crate::commands::scene::note_reach;
 use crate::output;
 use serde::Serialize;
 use trocar_campaign::run_episode;
@@ -18,6 +19,7 @@ pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Res
         threads: arguments.threads,
         phantoms: arguments.phantoms.clone(),
     };
+    note_reach(&arguments.scene);
     let made = run_episode(&run, &arguments.output, progress)?;
     output::print(json, &made, text);
     Ok(())

@@ -1,6 +1,7 @@
 //! `trocar evaluate`.
 
 use crate::cli;
+use crate::commands::scene::note_reach;
 use crate::output;
 use trocar_campaign::{Campaign, CampaignResult, PolicySpec};
 use trocar_core::Progress;
@@ -17,6 +18,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         retry_failed: arguments.retry_failed,
         phantoms: arguments.phantoms.clone(),
     };
+    note_reach(&arguments.scene);
     let result = campaign.run(&arguments.output, progress)?;
     output::print(json, &result, text);
     Ok(())

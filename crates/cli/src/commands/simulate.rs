@@ -18,7 +18,8 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
     let Task::GraspLift = arguments.task;
     // A specimen is a folder; what is none is a scene.
     let name = arguments.specimen.to_string_lossy();
-    let scene = !arguments.specimen.is_dir() && (arguments.specimen.is_file() || Builtin::named(&name).is_some());
+    let is_file = arguments.specimen.is_file() || arguments.specimen.extension().is_some_and(|e| e == "toml");
+    let scene = !arguments.specimen.is_dir() && (is_file || Builtin::named(&name).is_some());
     let after = match arguments.sever {
         Some(at) => AfterHold::Cut(at.map_or(CutAt::Between, CutAt::S)),
         None if scene => AfterHold::Finish,

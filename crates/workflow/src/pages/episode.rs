@@ -9,6 +9,10 @@ use trocar_report::table::{self, fixed};
 use trocar_scene::TaskName;
 use trocar_task::{ArmChannels, ArmSummary, Channels, Recording, Summary};
 
+/// The channels of one arm in a row, and one value of a row.
+type ArmOf = fn(&Channels) -> &ArmChannels;
+type Value = Box<dyn Fn(&Channels) -> f64>;
+
 /// The page of the episode `recording` with its `pictures`; `real_time_factor` is simulated over wall
 /// time.
 ///
@@ -150,17 +154,16 @@ fn plots(recording: &Recording) -> Result<String> {
         return Ok(String::new());
     }
     let has = |side: &str| recording.info.arms.iter().any(|arm| arm == side);
-    let sides: Vec<(&str, fn(&Channels) -> &ArmChannels, usize)> =
-        [("left", (|c| &c.left) as fn(&Channels) -> &ArmChannels, 1), ("right", |c| &c.right, 2)]
-            .into_iter()
-            .filter(|(name, ..)| has(name))
-            .collect();
+    let sides: Vec<(&str, ArmOf, usize)> = [("left", (|c| &c.left) as ArmOf, 1), ("right", |c| &c.right, 2)]
+        .into_iter()
+        .filter(|(name, ..)| has(name))
+        .collect();
     let both = |title: &str, y: &str, value: fn(&ArmChannels) -> f64, caption: &str, limits: Vec<f64>| {
-        let of: Vec<(&str, Box<dyn Fn(&Channels) -> f64>, usize)> = sides
+        let of: Vec<(&str, Value, usize)> = sides
             .iter()
             .map(|(name, arm, color)| {
                 let arm = *arm;
-                let of: Box<dyn Fn(&Channels) -> f64> = Box::new(move |c| value(arm(c)));
+                let of: Value = Box::new(move |c| value(arm(c)));
                 (*name, of, *color)
             })
             .collect();
