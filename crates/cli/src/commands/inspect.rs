@@ -3,7 +3,7 @@
 use crate::cli::Inspect;
 use crate::output;
 use trocar_camera::Camera;
-use trocar_workflow::{Inspection, Result, inspect};
+use trocar_workflow::{Inspection, Result, counted, inspect};
 
 pub fn run(arguments: &Inspect, json: bool) -> Result<()> {
     let inspection = inspect(&arguments.recording, arguments.template)?;
@@ -15,8 +15,10 @@ fn text(i: &Inspection) -> String {
     let camera = |c: &Camera| {
         format!("{} x {}, f {:.1} {:.1}, centre {:.1} {:.1} px", c.width, c.height, c.fx, c.fy, c.cx, c.cy)
     };
-    let mut lines =
-        vec![format!("{}: {} frames", i.recording, i.frames), format!("camera        {}", camera(&i.camera))];
+    let mut lines = vec![
+        format!("{}: {}", i.recording, counted(i.frames, "frame")),
+        format!("camera        {}", camera(&i.camera)),
+    ];
     if let Some(depth) = &i.depth_camera {
         lines.push(format!("depth camera  {}; registered to colour", camera(depth)));
     }

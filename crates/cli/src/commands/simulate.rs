@@ -7,7 +7,7 @@ use trocar_core::Progress;
 use trocar_scene::Builtin;
 use trocar_task::Severed;
 use trocar_task::policy::{AfterHold, CutAt, Script};
-use trocar_workflow::{Lift, LiftResult, Result};
+use trocar_workflow::{Lift, LiftResult, Result, counted};
 
 /// Organ coordinate of the grasp unless the user says otherwise, and where a cut needs room on the base's
 /// side.
@@ -55,9 +55,9 @@ pub fn text(r: &LiftResult) -> String {
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
     let grasp = match (s.follow_ratio, s.slip_mm) {
         (Some(follow), Some(slip)) => format!(
-            "{} grasp, {} nodes held, jaws closed on {:.1} mm with {:.2} N: lift {:.2} mm (follows {:.0}%), slip {slip:.3} mm, snap {:.3} mm, activation step {:.3} mm: {}",
+            "{} grasp, {} held, jaws closed on {:.1} mm with {:.2} N: lift {:.2} mm (follows {:.0}%), slip {slip:.3} mm, snap {:.3} mm, activation step {:.3} mm: {}",
             d.design,
-            d.held_nodes,
+            counted(d.held_nodes, "node"),
             d.gap_mm,
             d.closing_force_n,
             s.lift_mm,

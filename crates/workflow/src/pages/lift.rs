@@ -2,8 +2,8 @@
 
 use super::over_time::{self, Curve, TimePlot};
 use super::severed;
-use crate::Result;
 use crate::lift::Lifted;
+use crate::{Result, counted};
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::Band;
 use trocar_report::table::fixed;
@@ -44,7 +44,7 @@ fn cards(lifted: &Lifted) -> String {
     let (d, mm) = (&s.details, |v: f64| format!("{} mm", fixed(v, 2)));
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
     let grasp = s.grasp_at.map_or("nothing grasped".to_owned(), |at| {
-        format!("{} grasp of {} nodes of the {} at s = {}", d.design, d.held_nodes, d.organ, fixed(at, 2))
+        format!("{} grasp of {} of the {} at s = {}", d.design, counted(d.held_nodes, "node"), d.organ, fixed(at, 2))
     });
     let mut cards = vec![Card::new("Held", if s.held { "yes" } else { "no" }, grasp).met(s.held)];
     // Without a grasp there is nothing to measure.

@@ -13,8 +13,8 @@ mod seen;
 mod severed;
 mod truth;
 
-use crate::Result;
 use crate::lift::Lifted;
+use crate::{Result, counted};
 use std::path::Path;
 use trocar_geometry::RepairReport;
 use trocar_reconstruct::Reconstruction;
@@ -105,10 +105,7 @@ pub(crate) fn lift(s: &Specimen, lifted: &Lifted, before: Option<&str>) -> Resul
 }
 
 fn made_from(s: &Specimen, what: &str) -> String {
-    let organs = match s.organs.len() {
-        1 => "1 organ".to_owned(),
-        n => format!("{n} organs"),
-    };
+    let organs = counted(s.organs.len(), "organ");
     if s.provenance.source.is_empty() {
         return format!("{what}, {organs}");
     }
