@@ -119,13 +119,17 @@ fn cards(plan: &Plan, r: &CampaignResult) -> String {
     }
     let attached: usize = r.policies.iter().map(|p| p.attached).sum();
     let held: usize = r.policies.iter().map(|p| p.held_to_end).sum();
-    all.push(Card::new("Held to the end", format!("{held} of {attached}"), "of the episodes that attached the organ"));
-    let within: usize = r.policies.iter().map(|p| p.rcm_within).sum();
-    all.push(Card::new(
-        "RCM within the threshold",
-        format!("{within} of {attached}"),
-        format!("{} mm, the largest of the whole episode, of the attached", plan.rcm_threshold_mm),
-    ));
+    // Without a grasp there is nothing to count.
+    if attached > 0 {
+        let note = "of the episodes that attached the organ";
+        all.push(Card::new("Held to the end", format!("{held} of {attached}"), note));
+        let within: usize = r.policies.iter().map(|p| p.rcm_within).sum();
+        all.push(Card::new(
+            "RCM within the threshold",
+            format!("{within} of {attached}"),
+            format!("{} mm, the largest of the whole episode, of the attached", plan.rcm_threshold_mm),
+        ));
+    }
     let inverted = r.policies.iter().map(|p| p.inverted_peak).max().unwrap_or(0);
     let diverged: usize = r.policies.iter().map(|p| p.ends.diverged).sum();
     all.push(Card::new("Inverted elements", inverted.to_string(), "at worst, in any frame").met(inverted == 0));
@@ -168,7 +172,7 @@ fn outcome(r: &CampaignResult) -> String {
             p.ends.diverged.to_string(),
             p.ends.policy_error.to_string(),
             p.attached.to_string(),
-            p.held_to_end.to_string(),
+            if p.attached > 0 { p.held_to_end.to_string() } else { "\u{2013}".to_owned() },
             or_dash(p.lift_median_mm, 1),
             or_dash(p.rcm_median_mm, 3),
             or_dash(p.rcm_max_mm, 3),

@@ -37,7 +37,7 @@ fn text(r: &CampaignResult) -> String {
                 format!("{:.0}-{:.0}%", 1e2 * p.interval.low, 1e2 * p.interval.high),
                 stages,
                 format!("{:.2}", p.mean_score),
-                format!("{}/{}", p.held_to_end, p.attached),
+                if p.attached > 0 { format!("{}/{}", p.held_to_end, p.attached) } else { "-".to_owned() },
                 or_dash(p.lift_median_mm, 1),
                 or_dash(p.rcm_median_mm, 3),
                 or_dash(p.rcm_max_mm, 3),

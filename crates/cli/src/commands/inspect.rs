@@ -22,13 +22,15 @@ fn text(i: &Inspection) -> String {
     if let Some(depth) = &i.depth_camera {
         lines.push(format!("depth camera  {}; registered to colour", camera(depth)));
     }
-    lines.push(format!(
-        "depth         unit {} mm; the middle frame has depth on {:.0}% of its pixels, from {:.0} to {:.0} mm",
-        1e3 * i.depth_scale_m,
-        100.0 * i.coverage,
-        1e3 * i.depth_range_m[0],
-        1e3 * i.depth_range_m[1]
-    ));
+    let unit = 1e3 * i.depth_scale_m;
+    lines.push(if i.coverage > 0.0 {
+        let (share, [near, far]) = (100.0 * i.coverage, i.depth_range_m.map(|m| 1e3 * m));
+        format!(
+            "depth         unit {unit} mm; the middle frame has depth on {share:.0}% of its pixels, from {near:.0} to {far:.0} mm"
+        )
+    } else {
+        format!("depth         unit {unit} mm; the middle frame has no depth")
+    });
     let organs = match (i.organs.is_empty(), i.missing.is_empty()) {
         (false, _) => i.organs.join(", "),
         (true, true) => "none described yet".to_owned(),
