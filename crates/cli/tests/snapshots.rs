@@ -113,7 +113,8 @@ fn errors_of_wrong_inputs() {
         ("simulate-lift-nan", &["simulate", "tube", "--lift", "NaN", "-o", "out"]),
         ("simulate-jaw-force", &["simulate", "tube", "--jaw-force", "-1", "-o", "out"]),
         ("simulate-output", &["simulate", "tube", "-o", "mine"]),
-        ("render-camera", &["render", "reach.toml", "--camera", "endoskop", "-o", "out.png"]),
+        // Before its phantom is made.
+        ("render-camera", &["render", "cell-a", "--camera", "endoskop", "--phantoms", "phantoms", "-o", "out.png"]),
         ("render-specimen-camera", &["render", "tube", "--camera", "endoscope", "-o", "out.png"]),
         ("render-ending", &["render", "tube", "-o", "out.gif"]),
         ("render-size", &["render", "tube", "--size", "big", "-o", "out.png"]),
