@@ -173,19 +173,39 @@ fn texts(html: &str) -> String {
     lines.map(|line| if is_hash(line) { "HASH".to_owned() } else { without_numbers(line) } + "\n").collect()
 }
 
+/// The line with `#` for every number, whatever its sign, decimals and exponent.
 fn without_numbers(line: &str) -> String {
+    let chars: Vec<char> = line.chars().collect();
+    let digit = |k: usize| chars.get(k).is_some_and(char::is_ascii_digit);
     let mut out = String::new();
-    let mut chars = line.chars().peekable();
-    while let Some(c) = chars.next() {
-        if c.is_ascii_digit() {
-            let more = |c: &char| c.is_ascii_digit() || *c == '.';
-            while chars.next_if(more).is_some() {}
-            out.push('#');
-        } else {
+    let mut k = 0;
+    while let Some(c) = chars.get(k).copied() {
+        let signed =
+            matches!(c, '-' | '\u{2212}') && digit(k + 1) && !out.ends_with(|p: char| p.is_alphanumeric() || p == '#');
+        if !signed && !digit(k) {
             out.push(c);
+            k += 1;
+            continue;
         }
+        k += usize::from(signed);
+        while digit(k) || (chars.get(k) == Some(&'.') && digit(k + 1)) {
+            k += 1;
+        }
+        if chars.get(k) == Some(&'e') && (digit(k + 1) || (chars.get(k + 1) == Some(&'-') && digit(k + 2))) {
+            k += 2;
+            while digit(k) {
+                k += 1;
+            }
+        }
+        out.push('#');
     }
     out
+}
+
+#[test]
+fn numbers_are_left_out() {
+    assert_eq!(without_numbers("RCM 0.12 mm, \u{2212}3.5e-17 N, s = 1."), "RCM # mm, # N, s = #.");
+    assert_eq!(without_numbers("reach-1 in cell-a, 12\u{2013}50 %"), "reach-# in cell-a, #\u{2013}# %");
 }
 
 #[test]
