@@ -221,7 +221,7 @@ def test_python_policies_are_served_by_this_interpreter_and_nothing_stays_set(
         str(short_scene), [f"w=python:{tmp_path}/who.py:act"], tmp_path / "out", episodes=1
     )
     assert (
-        result["policies"][0]["ends"][4] == 0
+        result["policies"][0]["ends"]["policy-error"] == 0
         and (tmp_path / "who.txt").read_text() == sys.executable
     )
     assert dict(os.environ) == before

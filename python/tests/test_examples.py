@@ -91,4 +91,4 @@ def test_the_policy_of_the_guide_runs(short_scene, tmp_path):
     result = campaign.run(str(short_scene), [policy], tmp_path / "out", episodes=1)
     (row,) = result["policies"]
     kept = json.loads((tmp_path / "out/episodes/still/000000/result.json").read_text())
-    assert row["ends"][4] == 0, kept["end"]
+    assert row["ends"]["policy-error"] == 0, kept["end"]

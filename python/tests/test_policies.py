@@ -248,14 +248,14 @@ def test_the_program_evaluates_a_python_policy_and_survives_one_that_raises(
         ["still=python:mine:Still", "raises=python:mine:raises", "reads=python:mine:reads"],
     )
     still, raises, reads = result["policies"]
-    assert (still["episodes"], still["ends"][4]) == (2, 0), still
-    assert (raises["episodes"], raises["ends"][4]) == (2, 2), raises
+    assert (still["episodes"], still["ends"]["policy-error"]) == (2, 0), still
+    assert (raises["episodes"], raises["ends"]["policy-error"]) == (2, 2), raises
     for episode in range(2):
         kept = json.loads((tmp_path / f"out/episodes/raises/{episode:06}/result.json").read_text())
         # No address, whose port is random.
         why = kept["end"]["why"]
         assert why.startswith("python:mine:raises: RuntimeError: no idea what to do"), why
-    assert reads["ends"][4] == 2
+    assert reads["ends"]["policy-error"] == 2
     kept = json.loads((tmp_path / "out/episodes/reads/000000/result.json").read_text())
     asked = trocar.TrocarEnv(scene=str(short_scene)).task_description
     assert f"asked to {asked}" in kept["end"]["why"], (
@@ -284,7 +284,7 @@ def test_a_policy_whose_process_ends_after_an_episode_is_served_again(
         **command | {"args": [*command["args"], "--jobs", "1"]}, capture_output=True, text=True
     )
     assert done.returncode == 0, done.stderr
-    assert [row["ends"][4] for row in json.loads(done.stdout)["policies"]] == [0] * (
+    assert [row["ends"]["policy-error"] for row in json.loads(done.stdout)["policies"]] == [0] * (
         1 + len(beside)
     ), done.stdout
 
@@ -415,4 +415,4 @@ def test_the_program_serves_a_file(program, short_scene, tmp_path):
     (still,) = evaluated(
         program, short_scene, tmp_path, [f"still=python:{tmp_path}/mine.py:Still"]
     )["policies"]
-    assert (still["episodes"], still["ends"][4]) == (2, 0), still
+    assert (still["episodes"], still["ends"]["policy-error"]) == (2, 0), still

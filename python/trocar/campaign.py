@@ -36,9 +36,6 @@ from .envs.cells import phantoms_folder
 #: Called with the numbers of finished and of missing episodes: before the first and after each.
 Progress = Callable[[int, int], None]
 
-#: Index of `policy failed` in a policy's `ends`.
-POLICY_FAILED = 4
-
 
 def run(
     scene: str,
@@ -182,9 +179,9 @@ def main(arguments: list[str] | None = None) -> int:
             passed = f"{row['passed']} of {row['episodes']} passed"
             print(f"{row['policy']}: {passed}, mean score {row['mean_score']:.2f}")
             if row["policy_error"]:
-                failed = row["ends"][POLICY_FAILED]
+                failed = row["ends"]["policy-error"]
                 print(
-                    f"{row['policy']}: the policy failed in {failed} episodes, "
+                    f"{row['policy']}: the policy failed in {failed} of {row['episodes']}, "
                     f"first: {row['policy_error']}; --retry-failed runs them again"
                 )
         print(f"states {result['hash']}\nreport {result['report']}")

@@ -55,7 +55,7 @@ impl Campaign {
         store.finish(&plan)
     }
 
-    /// Runs what is missing, no more than `most` episodes in all, and films failures: what is kept, and of what.
+    /// Runs what is missing, no more than `most` episodes in all, and films some failures and successes: what is kept, and of what.
     ///
     /// # Errors
     /// As [`run`](Self::run).
@@ -67,8 +67,7 @@ impl Campaign {
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
         let allowed = JOBS_PER_CORE.saturating_mul(cores).max(LEAST_JOBS);
         if self.jobs > allowed {
-            let reason =
-                format!("--jobs {}: at most {allowed} on {cores} cores; each has a cell of its own", self.jobs);
+            let reason = format!("--jobs {}: it must be at most {allowed} on {cores} cores", self.jobs);
             return Err(Error::Mismatch(reason));
         }
         store::look(output, &self.policies, self.seed)?;
@@ -169,7 +168,7 @@ impl Drop for Leaves<'_> {
 }
 
 impl Store {
-    /// Films the first failures that have no moving picture yet, for the report.
+    /// Films the first failures and successes that have no moving picture yet, for the report.
     ///
     /// # Errors
     /// A kept episode that is damaged, a picture that cannot be written, an interruption.

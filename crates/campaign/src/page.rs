@@ -12,7 +12,7 @@ use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{self, fixed, percent};
 use trocar_task::{CHANNELS_FILE, GateRange, read_channels, sweep};
-use trocar_workflow::Result;
+use trocar_workflow::{Result, counted};
 
 /// Failures that the page lists.
 const LISTED: usize = 40;
@@ -29,13 +29,13 @@ const ABORT_MM: f64 = 5.0;
 /// A plot that cannot be drawn, channels that cannot be read.
 pub(crate) fn campaign(plan: &Plan, result: &CampaignResult, kept: &[Kept], store: &Store) -> Result<String> {
     let title = format!("{}: {}", plan.scene, plan.task);
-    let failed: usize = result.policies.iter().map(|p| p.ends[4]).sum();
+    let failed: usize = result.policies.iter().map(|p| p.ends.policy_error).sum();
     let again = match failed {
         0 => String::new(),
-        1 => "; in one the policy failed, and --retry-failed does it again".to_owned(),
-        n => format!("; in {n} the policy failed, and --retry-failed does them again"),
+        1 => "; in one the policy failed, and --retry-failed runs it again".to_owned(),
+        n => format!("; in {n} the policy failed, and --retry-failed runs them again"),
     };
-    let subtitle = format!("Campaign of {} episodes, seeds from {}{again}", result.episodes, plan.seed);
+    let subtitle = format!("Campaign of {}, seeds from {}{again}", counted(result.episodes, "episode"), plan.seed);
     Ok(page::page(&title, &subtitle, &body(plan, result, kept, store)?))
 }
 
@@ -45,11 +45,12 @@ fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store) -> Result
     }
     let failed = failures(plan, kept, store)?;
     let lead = format!(
-        "{} of {} episodes of {} by {}. Policies had the same seeds. Intervals are Wilson\u{2019}s, 95%.",
+        "{} of {} of {} by {}. {}Intervals are Wilson\u{2019}s, 95%.",
         r.episodes,
-        r.planned,
+        counted(r.planned, "episode"),
         plan.task,
-        r.policies.iter().map(|p| p.policy.as_str()).collect::<Vec<_>>().join(", ")
+        r.policies.iter().map(|p| page::escape(&p.policy)).collect::<Vec<_>>().join(", "),
+        if r.policies.len() > 1 { "Policies had the same seeds. " } else { "" }
     );
     let overview = page::section("Outcome", &lead, &cards(plan, r));
     let policies = page::section("Policies", "", &outcome(r));
@@ -88,7 +89,7 @@ fn body(plan: &Plan, r: &CampaignResult, kept: &[Kept], store: &Store) -> Result
         "Stored channels judged anew at other thresholds, without simulating. An episode ends when it has passed at the scene\u{2019}s gates, so a stricter gate sees no more of it than there was.",
         &page::grid(Columns::Two, &sweeps(plan, kept, store)?),
     );
-    Ok(overview + &failed + &policies + &stages + &spread + &gates + &pairs(r))
+    Ok(overview + &failed + &successes(plan, kept, store) + &policies + &stages + &spread + &gates + &pairs(r))
 }
 
 fn color(plan: &Plan, name: &str) -> [u8; 3] {
@@ -118,15 +119,19 @@ fn cards(plan: &Plan, r: &CampaignResult) -> String {
     }
     let attached: usize = r.policies.iter().map(|p| p.attached).sum();
     let held: usize = r.policies.iter().map(|p| p.held_to_end).sum();
-    all.push(Card::new("Held to the end", format!("{held} of {attached}"), "of the episodes that attached the organ"));
-    let within: usize = r.policies.iter().map(|p| p.rcm_within).sum();
-    all.push(Card::new(
-        "RCM within the threshold",
-        format!("{within} of {attached}"),
-        format!("{} mm, the largest of the whole episode, of the attached", plan.rcm_threshold_mm),
-    ));
+    // Without a grasp there is nothing to count.
+    if attached > 0 {
+        let note = "of the episodes that attached the organ";
+        all.push(Card::new("Held to the end", format!("{held} of {attached}"), note));
+        let within: usize = r.policies.iter().map(|p| p.rcm_within).sum();
+        all.push(Card::new(
+            "RCM within the threshold",
+            format!("{within} of {attached}"),
+            format!("{} mm, the largest of the whole episode, of the attached", plan.rcm_threshold_mm),
+        ));
+    }
     let inverted = r.policies.iter().map(|p| p.inverted_peak).max().unwrap_or(0);
-    let diverged: usize = r.policies.iter().map(|p| p.ends[3]).sum();
+    let diverged: usize = r.policies.iter().map(|p| p.ends.diverged).sum();
     all.push(Card::new("Inverted elements", inverted.to_string(), "at worst, in any frame").met(inverted == 0));
     all.push(Card::new("Diverged", diverged.to_string(), "episodes").met(diverged == 0));
     let suspended: usize = r.policies.iter().map(|p| p.disabled_contacts + p.disabled_blades + p.relaxed).sum();
@@ -141,7 +146,7 @@ fn outcome(r: &CampaignResult) -> String {
         "episodes",
         "passed",
         "mean score",
-        "time-out",
+        "not passed in time",
         "RCM abort",
         "diverged",
         "policy failed",
@@ -162,12 +167,12 @@ fn outcome(r: &CampaignResult) -> String {
             p.episodes.to_string(),
             format!("{}, {}", p.passed, share(&p.interval)),
             fixed(p.mean_score, 2),
-            p.ends[1].to_string(),
-            p.ends[2].to_string(),
-            p.ends[3].to_string(),
-            p.ends[4].to_string(),
+            (p.ends.time_out + p.ends.finished).to_string(),
+            p.ends.rcm_abort.to_string(),
+            p.ends.diverged.to_string(),
+            p.ends.policy_error.to_string(),
             p.attached.to_string(),
-            p.held_to_end.to_string(),
+            if p.attached > 0 { p.held_to_end.to_string() } else { "\u{2013}".to_owned() },
             or_dash(p.lift_median_mm, 1),
             or_dash(p.rcm_median_mm, 3),
             or_dash(p.rcm_max_mm, 3),
@@ -185,21 +190,8 @@ fn failures(plan: &Plan, kept: &[Kept], store: &Store) -> Result<String> {
     if failed.is_empty() {
         return Ok(page::section("Failures", "There were none.", ""));
     }
-    let mut films = Vec::new();
-    for k in &failed {
-        if let Ok(bytes) = std::fs::read(pictures::path(store, k)) {
-            let [width, height] = pictures::SIZE;
-            let name = format!("{} with seed {}", k.name, k.seed);
-            let img = figures::img_of_bytes("webp", &bytes, width, height, &name);
-            let text = format!(
-                "<b>{}</b> stopped at {}: {}",
-                page::escape(&name),
-                page::escape(&k.summary.next),
-                page::escape(&why(k))
-            );
-            films.push(page::figure(&img, &text));
-        }
-    }
+    let stopped = |k: &Kept| format!("stopped at {}: {}", k.summary.next, why(k));
+    let films: Vec<String> = failed.iter().filter_map(|k| film(store, k, &stopped(k))).collect();
     let rows: Vec<Vec<String>> = failed
         .iter()
         .take(LISTED)
@@ -218,12 +210,36 @@ fn failures(plan: &Plan, kept: &[Kept], store: &Store) -> Result<String> {
         })
         .collect();
     let lead = format!(
-        "{} episodes did not pass{}; those that came least far first, the policies in turn. trocar replay FOLDER/episode.trocar does one again.",
-        failed.len(),
+        "{} did not pass{}; those that came least far first, the policies in turn. <code>trocar render FOLDER</code> \
+         shows one, <code>trocar replay FOLDER --verify</code> replays and compares it.",
+        counted(failed.len(), "episode"),
         if failed.len() > LISTED { format!(", {LISTED} are listed") } else { String::new() }
     );
     let table = table::plain(&["policy", "seed", "stages", "stopped at", "score", "why", "folder"], &rows);
     Ok(page::section("Failures", &lead, &(page::grid(Columns::Two, &films) + &table)))
+}
+
+/// The section of successes; nothing without any moving picture of one.
+fn successes(plan: &Plan, kept: &[Kept], store: &Store) -> String {
+    let passed = |k: &Kept| {
+        let held = k.summary.slip_mm.map_or(String::new(), |mm| format!(", slip {} mm", fixed(mm, 1)));
+        format!("passed after {} s{held}", fixed(k.summary.duration_s, 1))
+    };
+    let films: Vec<String> =
+        pictures::successes(plan, kept).into_iter().filter_map(|k| film(store, k, &passed(k))).collect();
+    if films.is_empty() {
+        return String::new();
+    }
+    page::section("Successes", "The first seeds that passed, the policies in turn.", &page::grid(Columns::Two, &films))
+}
+
+/// The moving picture of an episode, where there is one, with what is `said` of it.
+fn film(store: &Store, k: &Kept, said: &str) -> Option<String> {
+    let bytes = std::fs::read(pictures::path(store, k)).ok()?;
+    let [width, height] = pictures::SIZE;
+    let name = format!("{} with seed {}", k.name, k.seed);
+    let img = figures::img_of_bytes("webp", &bytes, width, height, &name);
+    Some(page::figure(&img, &format!("<b>{}</b> {}", page::escape(&name), page::escape(said))))
 }
 
 fn why(k: &Kept) -> String {

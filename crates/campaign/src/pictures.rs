@@ -1,4 +1,5 @@
-//! Moving pictures of episodes that failed: done again from their files and filmed through the endoscope.
+//! Moving pictures of some failures and successes: the episodes are replayed from their files and
+//! filmed through the endoscope.
 
 use crate::plan::Plan;
 use crate::store::{Kept, Store, film_name};
@@ -12,8 +13,9 @@ use trocar_workflow::moving::webp;
 use trocar_workflow::replayed::Replayed;
 use trocar_workflow::{Error, Result};
 
-/// Episodes that are filmed, at most; those of each policy take turns.
-const FILMED: usize = 4;
+/// Maximum numbers of failures and of successes that are filmed. The policies take turns.
+const FILMED_FAILURES: usize = 4;
+const FILMED_SUCCESSES: usize = 2;
 /// Size of a picture [px].
 pub(crate) const SIZE: [usize; 2] = [320, 180];
 /// Pictures of an episode, at most.
@@ -24,22 +26,33 @@ pub(crate) fn path(store: &Store, kept: &Kept) -> PathBuf {
     store.folder().join(film_name(&kept.name, kept.index))
 }
 
-/// The failures that come first in a report: of each policy in turn, those that came least far.
+/// The failures in the order of the report: of each policy in turn, those that came least far first.
 pub(crate) fn failures<'a>(plan: &Plan, kept: &'a [Kept]) -> Vec<&'a Kept> {
-    let mut by_policy: Vec<Vec<&Kept>> = plan
+    in_turn(plan, kept, false)
+}
+
+/// The successes that are filmed: of each policy in turn, the first seeds.
+pub(crate) fn successes<'a>(plan: &Plan, kept: &'a [Kept]) -> Vec<&'a Kept> {
+    in_turn(plan, kept, true).into_iter().take(FILMED_SUCCESSES).collect()
+}
+
+/// The episodes that passed or did not, of each policy in turn, by score and then by seed.
+fn in_turn<'a>(plan: &Plan, kept: &'a [Kept], passed: bool) -> Vec<&'a Kept> {
+    let by_policy: Vec<Vec<&Kept>> = plan
         .policies
         .iter()
         .map(|p| {
-            let mut own: Vec<&Kept> = kept.iter().filter(|k| k.name == p.name && !k.summary.passed).collect();
+            let mut own: Vec<&Kept> = kept.iter().filter(|k| k.name == p.name && k.summary.passed == passed).collect();
             own.sort_by(|a, b| a.summary.score.total_cmp(&b.summary.score).then(a.index.cmp(&b.index)));
             own
         })
         .collect();
     let longest = by_policy.iter().map(Vec::len).max().unwrap_or(0);
-    (0..longest).flat_map(|k| by_policy.iter_mut().filter_map(|own| own.get(k).copied()).collect::<Vec<_>>()).collect()
+    (0..longest).flat_map(|k| by_policy.iter().filter_map(|own| own.get(k).copied()).collect::<Vec<_>>()).collect()
 }
 
-/// Films the first failures that have no moving picture yet. One that does not come out as it was, as on another machine, is left out.
+/// Films the first failures and successes that have no moving picture yet. An episode whose replay differs
+/// from its file, as on another machine, is left out.
 ///
 /// # Errors
 /// A kept episode that is damaged, a picture that cannot be written, an interruption.
@@ -51,8 +64,8 @@ pub(super) fn film(
     specimen: &Specimen,
     progress: &dyn Progress,
 ) -> Result<()> {
-    let chosen: Vec<&Kept> =
-        failures(plan, kept).into_iter().take(FILMED).filter(|k| !path(store, k).exists()).collect();
+    let failed = failures(plan, kept).into_iter().take(FILMED_FAILURES);
+    let chosen: Vec<&Kept> = failed.chain(successes(plan, kept)).filter(|k| !path(store, k).exists()).collect();
     if chosen.is_empty() || !scene.cameras.iter().any(|c| c.name == "endoscope") {
         return Ok(());
     }

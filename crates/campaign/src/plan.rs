@@ -39,9 +39,9 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, most: O
     if !(1..=MOST_EPISODES).contains(&episodes) {
         return wrong(match most {
             Some(most) => {
-                format!("--rollouts {most}: 1 to {} can be run", MOST_EPISODES.saturating_mul(policies.len()))
+                format!("--rollouts {most}: it must be in [1, {}]", MOST_EPISODES.saturating_mul(policies.len()))
             }
-            None => format!("--episodes {episodes}: 1 to {MOST_EPISODES} can be run"),
+            None => format!("--episodes {episodes}: it must be in [1, {MOST_EPISODES}]"),
         });
     }
     for (k, policy) in policies.iter().enumerate() {
@@ -56,11 +56,11 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, most: O
     }
     let last = seed.checked_add(episodes as u64 - 1);
     if last.is_none() {
-        return wrong(format!("--seed {seed}: the seeds of {episodes} episodes end beyond {}", u64::MAX));
+        return wrong(format!("--seed {seed}: the last of {episodes} seeds would be greater than {}", u64::MAX));
     }
     if last.is_some_and(|s| i64::try_from(s).is_err()) && policies.iter().any(PolicySpec::is_remote) {
         let most = i64::MAX;
-        return wrong(format!("--seed {seed}: policies of other processes are told seeds of up to {most} only"));
+        return wrong(format!("--seed {seed}: seeds for servers and Python policies must be at most {most}"));
     }
     Ok(())
 }

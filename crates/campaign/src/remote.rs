@@ -212,8 +212,8 @@ pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
     endpoint.api_key = std::env::var(KEY).ok();
     if let Ok(text) = std::env::var(TIMEOUT) {
         let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);
-        let seconds =
-            seconds.ok_or_else(|| Error::Mismatch(format!("${TIMEOUT} is '{text:.40}'; seconds are wanted")))?;
+        let seconds = seconds
+            .ok_or_else(|| Error::Mismatch(format!("${TIMEOUT} is '{text:.40}'; it must be a number of seconds")))?;
         endpoint.timeouts.infer = Duration::from_secs_f64(seconds);
     }
     endpoint.check().map_err(|why| Error::Mismatch(format!("--policy {}: {why}", spec.name)))?;

@@ -49,14 +49,14 @@ impl PolicySpec {
             return wrong(
                 shown,
                 &format!(
-                    "is none of {names}, ws://HOST:PORT, python:FILE.py:NAME, python:MODULE:NAME; or NAME= and one of those"
+                    "it must be one of {names}, ws://HOST:PORT, python:FILE.py:NAME or python:MODULE:NAME, or NAME= and one of those"
                 ),
             );
         }
         let plain = |c: char| if c.is_ascii_alphanumeric() || "-_.".contains(c) { c } else { '-' };
         let name: String = name.unwrap_or(&unnamed).chars().map(plain).collect();
         if name.is_empty() || name.len() > 80 || name.starts_with('.') {
-            return wrong(shown, "its name must have 1 to 80 letters, not a dot first");
+            return wrong(shown, "its name must have 1 to 80 characters and must not begin with a dot");
         }
         Ok(Self { name, source: source.to_owned() })
     }

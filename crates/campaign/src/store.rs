@@ -57,16 +57,18 @@ pub struct Kept {
 }
 
 impl Kept {
-    /// Median RCM deviation under load of the arm that was longest under load [mm]; None where none was.
+    /// Median RCM deviation under load of the arm that was longest under load (mm). `None` if none was.
     pub fn loaded_rcm_mm(&self) -> Option<f64> {
         let arms = self.summary.arms.iter().filter(|a| a.loaded_s > 0.0);
-        arms.max_by(|a, b| a.loaded_s.total_cmp(&b.loaded_s)).map(|a| a.rcm_median_mm)
+        arms.max_by(|a, b| a.loaded_s.total_cmp(&b.loaded_s)).and_then(|a| a.rcm_median_mm)
     }
 
-    /// Delay of the measured tip behind the commanded one [ms], of the arm that was farthest off its command without load: one that stands still has none. None where neither was off.
+    /// Delay of the measured tip behind the commanded one (ms), of the arm that was farthest off its
+    /// command without load. An arm that stands still has none. `None` if no arm was off its command.
     pub fn lag_ms(&self) -> Option<f64> {
-        let arms = self.summary.arms.iter().filter(|a| a.tracking_rms_mm > 0.0);
-        arms.max_by(|a, b| a.tracking_rms_mm.total_cmp(&b.tracking_rms_mm)).map(|a| a.lag_ms)
+        let arms =
+            self.summary.arms.iter().filter_map(|a| Some((a.tracking_rms_mm.filter(|mm| *mm > 0.0)?, a.lag_ms?)));
+        arms.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, lag)| lag)
     }
 
     /// The larger of both arms of what `of` says.
@@ -112,7 +114,9 @@ fn begun(folder: &Path) -> Result<Option<Plan>> {
         let own = |name: &std::ffi::OsStr| [EPISODES, UNDER_WAY, LOCK].iter().any(|own| name == *own);
         for entry in fs::read_dir(folder).map_err(io(folder))? {
             if !own(&entry.map_err(io(folder))?.file_name()) {
-                return Err(exists(format!("is not empty and is no campaign ({PLAN} is missing); name a new folder")));
+                return Err(exists(format!(
+                    "is not empty and is no campaign ({PLAN} is missing); choose a new folder"
+                )));
             }
         }
     }
@@ -128,7 +132,7 @@ pub(super) fn look(folder: &Path, policies: &[PolicySpec], seed: u64) -> Result<
     let exists = |reason: String| Err(Error::Exists { path: folder.to_owned(), reason });
     let other = [("seed", old.seed != seed), ("program", old.program != plan::program())];
     if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
-        return exists(format!("is a campaign of another {what}; write into another folder"));
+        return exists(format!("is a campaign of another {what}; choose another folder"));
     }
     let changed = |p: &&PolicySpec| old.policies.iter().any(|o| o.name == p.name && !p.is(o));
     if let Some(policy) = policies.iter().find(changed) {
@@ -166,7 +170,7 @@ impl Store {
             let other =
                 [("scene", old.scene_hash != plan.scene_hash), ("specimen", old.specimen_hash != plan.specimen_hash)];
             if let Some((what, _)) = other.iter().find(|(_, differs)| *differs) {
-                return Err(exists(format!("is a campaign of another {what}; write into another folder")));
+                return Err(exists(format!("is a campaign of another {what}; choose another folder")));
             }
             look(folder, &plan.policies, plan.seed)?;
             // Episodes of policies that are not asked for now stay theirs.
@@ -275,7 +279,7 @@ impl Store {
 
     /// That an episode cannot be used, and what is to be done about it.
     pub(super) fn damaged(&self, policy: &str, index: usize, why: &str) -> Error {
-        let reason = format!("holds a damaged episode ({why}); remove it to have it run again");
+        let reason = format!("holds a damaged episode ({why}); remove it and it is run again");
         Error::Exists { path: self.episode(policy, index), reason }
     }
 

@@ -51,6 +51,42 @@ pub struct StageCount {
     pub median_s: Option<f64>,
 }
 
+/// Episodes by how they ended; the names are those of an episode's `end`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub struct EndCounts {
+    /// All stages passed.
+    pub passed: usize,
+    /// The scene's time was up.
+    pub time_out: usize,
+    /// The RCM deviation reached the limit at which hardware stops.
+    pub rcm_abort: usize,
+    /// Tissue or an arm diverged.
+    pub diverged: usize,
+    /// The policy failed.
+    pub policy_error: usize,
+    /// The policy had nothing left to do before all stages passed.
+    pub finished: usize,
+}
+
+impl EndCounts {
+    /// Counts episodes. One without an end counts as a time-out.
+    fn of<'a>(ends: impl Iterator<Item = Option<&'a End>>) -> Self {
+        let mut counts = Self::default();
+        for end in ends {
+            *match end {
+                Some(End::Passed) => &mut counts.passed,
+                Some(End::TimeOut) | None => &mut counts.time_out,
+                Some(End::RcmAbort { .. }) => &mut counts.rcm_abort,
+                Some(End::Diverged { .. }) => &mut counts.diverged,
+                Some(End::PolicyError { .. }) => &mut counts.policy_error,
+                Some(End::Finished) => &mut counts.finished,
+            } += 1;
+        }
+        counts
+    }
+}
+
 /// A policy in figures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PolicyRow {
@@ -66,8 +102,8 @@ pub struct PolicyRow {
     pub stages: Vec<StageCount>,
     /// Mean score, 0 to 1.
     pub mean_score: f64,
-    /// Episodes that ended for each reason, in the order of passed, time-out, rcm-abort, diverged, policy-error.
-    pub ends: [usize; 5],
+    /// Episodes by how they ended.
+    pub ends: EndCounts,
     /// Episodes in which the organ was attached, and those that held it to the end.
     pub attached: usize,
     /// See there.
@@ -198,16 +234,7 @@ fn row(name: &str, kept: &[&Kept], names: &[&'static str], plan: &Plan) -> Polic
     });
     let passed = kept.iter().filter(|k| k.summary.passed).count();
     let attached: Vec<&&Kept> = kept.iter().filter(|k| k.summary.attached).collect();
-    let mut ends = [0; 5];
-    for k in kept {
-        match &k.summary.end {
-            Some(End::Passed) => ends[0] += 1,
-            Some(End::TimeOut | End::Finished) | None => ends[1] += 1,
-            Some(End::RcmAbort { .. }) => ends[2] += 1,
-            Some(End::Diverged { .. }) => ends[3] += 1,
-            Some(End::PolicyError { .. }) => ends[4] += 1,
-        }
-    }
+    let ends = EndCounts::of(kept.iter().map(|k| k.summary.end.as_ref()));
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| median(kept.iter().map(|k| k.peak(of)).collect());
     let policy_error = kept.iter().find_map(|k| match &k.summary.end {
         Some(End::PolicyError { why }) => Some(why.clone()),
@@ -336,7 +363,7 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
             or_nothing(s.grasp_at),
             s.held_to_end.to_string(),
             s.lift_mm.to_string(),
-            s.slip_mm.to_string(),
+            or_nothing(s.slip_mm),
             s.rcm_peak_mm.to_string(),
             or_nothing(k.loaded_rcm_mm()),
             or_nothing(k.lag_ms()),
@@ -381,6 +408,22 @@ mod tests {
         assert!((mcnemar(10, 0) - 2.0 / 1024.0).abs() < 1e-12);
         assert!((mcnemar(1, 9) - 2.0 * 11.0 / 1024.0).abs() < 1e-12);
         assert!(mcnemar(2000, 1000) < 1e-9);
+    }
+
+    #[test]
+    fn ends_have_the_names_of_episodes_ends() {
+        let why = || String::new();
+        let ends = [
+            End::Passed,
+            End::TimeOut,
+            End::RcmAbort { arm: why(), deviation_mm: 6.0 },
+            End::Diverged { why: why() },
+            End::PolicyError { why: why() },
+            End::Finished,
+        ];
+        let json = serde_json::to_value(EndCounts::of(ends.iter().map(Some))).unwrap();
+        assert_eq!(json.as_object().unwrap().len(), ends.len());
+        assert!(ends.iter().all(|end| json[end.name()] == 1), "{json}");
     }
 
     #[test]

@@ -9,11 +9,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
 use tempfile::TempDir;
-use trocar_campaign::{Campaign, Files, Job, Plan, PolicySpec, Store};
+use trocar_campaign::{Campaign, Files, Job, Plan, PolicySpec, Store, run_episode};
 use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::{SpecimenSource, TaskName};
 use trocar_task::EpisodeFile;
+use trocar_workflow::EpisodeRun;
 
 /// A coarse tube on disk and a scene around it, in which arms reach for half a second; the endoscope alone looks on.
 fn scene(folder: &Path) -> PathBuf {
@@ -118,7 +119,7 @@ fn an_interrupted_campaign_has_a_table_of_what_is_kept_and_says_how_to_go_on() {
     for (most, kept) in [(0, 0), (1, 1), (2, 3)] {
         let why = campaign(dir.path(), &two, 3).run(&folder, &StopAfter::new(most as u64)).unwrap_err();
         let said = format!("{kept} of 6 episodes are kept");
-        assert!(why.to_string().contains(&said) && why.to_string().contains("goes on"), "{why}");
+        assert!(why.to_string().contains(&said) && why.to_string().contains("continues"), "{why}");
         assert_eq!(table().lines().count(), 1 + kept);
         let result: serde_json::Value =
             serde_json::from_slice(&std::fs::read(folder.join("result.json")).unwrap()).unwrap();
@@ -222,6 +223,84 @@ fn an_address_has_no_secret_in_any_file_and_a_failure_is_told() {
     campaign(dir.path(), &[address], 1).run(&folder, &Silent).unwrap();
     let other = campaign(dir.path(), &["ws://127.0.0.1:1/policy?token=other"], 1).run(&folder, &Silent);
     assert!(other.unwrap_err().to_string().contains("another policy"));
+}
+
+/// A server whose arms stand still.
+fn still() -> Loopback {
+    Loopback::start(&LoopbackOptions::default(), |_| {
+        let array = Array::from_f64(&[8, 10], &[0.1; 80]).map_err(|e| e.to_string())?;
+        Ok(Map::from([("actions".to_owned(), Value::from(array))]))
+    })
+    .unwrap()
+}
+
+#[test]
+fn one_episode_of_a_server_has_the_same_files_as_any_other_and_a_page() {
+    let dir = TempDir::new().unwrap();
+    let server = still();
+    let run = EpisodeRun {
+        scene: scene(dir.path()).display().to_string(),
+        policy: format!("mine={}", server.url()),
+        seed: 3,
+        threads: 1,
+        phantoms: dir.path().join("phantoms"),
+    };
+    let output = dir.path().join("episode");
+    let made = run_episode(&run, &output, &Silent).unwrap();
+    assert_eq!((made.result.policy.as_str(), made.result.seed), ("mine", 3));
+    assert!((made.result.summary.duration_s - 0.5).abs() < 1e-9);
+    for name in ["episode.trocar", "channels.parquet", "result.json"] {
+        assert!(output.join(name).is_file(), "{name}");
+    }
+    let page = std::fs::read_to_string(&made.report).unwrap();
+    for text in
+        ["Episode of the policy mine, seed 3", "the time was up", "reach-1", "Distance to the targets", "At the end"]
+    {
+        assert!(page.contains(text), "{text}");
+    }
+    // The same server in a campaign gives the same episode.
+    let policy = format!("mine={}", server.url());
+    let mut same = campaign(dir.path(), &[&policy], 1);
+    same.seed = 3;
+    same.run(&dir.path().join("campaign"), &Silent).unwrap();
+    let kept = std::fs::read(dir.path().join("campaign/episodes/mine/000000/episode.trocar")).unwrap();
+    assert_eq!(kept, std::fs::read(output.join("episode.trocar")).unwrap());
+}
+
+#[test]
+fn an_episode_without_its_policy_leaves_nothing() {
+    let dir = TempDir::new().unwrap();
+    let scene = scene(dir.path()).display().to_string();
+    let run = |policy: &str, progress: &dyn trocar_core::Progress| {
+        let run = EpisodeRun {
+            scene: scene.clone(),
+            policy: policy.to_owned(),
+            seed: 0,
+            threads: 1,
+            phantoms: dir.path().into(),
+        };
+        let said = run_episode(&run, &dir.path().join("out"), progress).unwrap_err().to_string();
+        assert!(!dir.path().join("out").exists(), "{said}");
+        said
+    };
+    assert!(run("genius", &Silent).contains("--policy genius"));
+    assert!(run("python:nothing", &Silent).contains("python:FILE.py:NAME"));
+    let server = still();
+    assert!(run(server.url().as_str(), &StopAfter::new(2)).contains("interrupted"));
+}
+
+#[test]
+fn successes_are_filmed_too() {
+    let dir = TempDir::new().unwrap();
+    let text = std::fs::read_to_string(scene(dir.path())).unwrap().replace("episode_s = 0.5", "episode_s = 20.0");
+    std::fs::write(dir.path().join("reach.toml"), text).unwrap();
+    let folder = dir.path().join("campaign");
+    let result = campaign(dir.path(), &["scripted"], 1).run(&folder, &Silent).unwrap();
+    assert_eq!((result.passed, result.policies[0].ends.passed), (1, 1), "{result:?}");
+    assert!(folder.join("pictures/scripted-000000.webp").is_file());
+    let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
+    assert!(page.contains("Campaign of 1 episode,") && page.contains("There were none."));
+    assert!(page.contains("Successes") && page.contains("image/webp"));
 }
 
 /// What a server was asked: for a reset or not, with which step and which session.

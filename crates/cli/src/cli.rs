@@ -1,4 +1,4 @@
-//! What a user may type.
+//! The arguments of the command line.
 
 mod comparison;
 mod episode;
@@ -25,13 +25,13 @@ use std::path::PathBuf;
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 110)]
 pub struct Cli {
-    /// What to do.
+    /// The command.
     #[command(subcommand)]
     pub command: Command,
-    /// Print one JSON object for machines instead of text for people.
+    /// Print one JSON object instead of text.
     #[arg(long, global = true)]
     pub json: bool,
-    /// No progress bars.
+    /// Show no progress.
     #[arg(long, short, global = true)]
     pub quiet: bool,
 }
@@ -41,7 +41,7 @@ pub struct Cli {
 pub enum Command {
     /// Record a phantom, reconstruct it, lift its appendix, and open the report: no downloads, no GPU.
     Demo(Demo),
-    /// Make a recording with known truth: a procedural anatomy filmed by a simulated depth camera.
+    /// Make a recording with known ground truth: a procedural anatomy filmed by a simulated depth camera.
     Record(Record),
     /// Describe a recording: frames, cameras, depth, organs, and what is missing.
     Inspect(Inspect),
@@ -50,30 +50,32 @@ pub enum Command {
     Segment(Segment),
     /// Reconstruct watertight tetrahedral organs from an RGB-D recording or a surface file.
     Reconstruct(Reconstruct),
-    /// List, print and check scene files: the whole two-arm cell in one TOML file.
+    /// List, print, write and check scene files. A scene file describes the whole two-arm cell in TOML.
     Scene(Scene),
-    /// Make a picture of a specimen, a scene or an episode through one of its cameras, or a moving one of the scene's grasp-lift or of the episode.
+    /// Render a picture of a specimen, a scene or an episode through one of its cameras, or a video of
+    /// a scene's scripted grasp-lift or of an episode.
     Render(Render),
-    /// Run a scripted task on a specimen without a window.
+    /// Run a scripted grasp-lift on a specimen or in a scene, and write a report.
     Simulate(Simulate),
-    /// Scores policies over many episodes: a table with intervals and a report; killed at any moment and gone on with.
+    /// Score policies over many episodes: a table with confidence intervals and a report. Safe to kill at
+    /// any time; the same command continues.
     Evaluate(Evaluate),
-    /// Run one episode of a scene's task by a policy, into a folder.
+    /// Run one episode of a scene's task by a policy: actions, channels, figures and a report in a folder.
     Episode(Episode),
-    /// Do a recorded episode again and compare every step.
+    /// Replay a recorded episode and verify every step.
     Replay(Replay),
-    /// Judge stored episodes at other gates, without simulating.
+    /// Score stored episodes at other gates, without simulation.
     Sweep(Sweep),
-    /// Make a table or figure of the paper anew, beside the paper's numbers.
+    /// Reproduce a table or figure of the paper, beside the paper's numbers.
     Experiment(Experiment),
-    /// Measure what something costs.
+    /// Measure speed.
     Bench(Bench),
 }
 
 /// Arguments of `demo`.
 #[derive(Debug, Args)]
 pub struct Demo {
-    /// Folder for everything the demo makes.
+    /// Folder for all results of the demo.
     #[arg(short, long, default_value = "trocar-demo")]
     pub output: PathBuf,
     /// Frames of the recording.
@@ -85,7 +87,7 @@ pub struct Demo {
     /// Worker threads; all by default.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Only print the report's path, do not open it.
+    /// Do not open the report, only print its path.
     #[arg(long)]
     pub no_open: bool,
 }
@@ -105,7 +107,7 @@ pub struct Record {
     /// Seed of the anatomy and of the camera's noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// What kind of noise depth has.
+    /// Kind of depth noise.
     #[arg(long, value_enum, default_value_t = SensorName::Plain)]
     pub sensor: SensorName,
 }
@@ -115,7 +117,7 @@ pub struct Record {
 pub enum SensorName {
     /// Independent from pixel to pixel and frame to frame.
     Plain,
-    /// Like stereo matching's too: smooth over several pixels, slow to change, silhouettes fattened.
+    /// Also that of stereo matching: smooth over several pixels, changing slowly, with fattened silhouettes.
     Stereo,
 }
 
@@ -473,36 +475,39 @@ impl From<Units> for trocar_geometry::io::Unit {
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub struct Simulate {
-    /// Specimen folder; or a scene file or built-in scene such as cell-a, for the same task by the left arm of the two-arm cell.
+    /// Specimen folder; or a scene file or built-in scene such as cell-a, where the left arm of the cell
+    /// does the same task.
     pub specimen: PathBuf,
     /// The task.
     #[arg(long, value_enum, default_value_t = Task::GraspLift)]
     pub task: Task,
-    /// Organ to grasp; the appendix, or else the first, by default.
+    /// Organ to grasp; by default the appendix, or the first organ without one.
     #[arg(long)]
     pub organ: Option<String>,
-    /// Where along the organ, 0 (base) to 1 (tip); 0.5 by default, and 0.7 with --sever, which needs room on the base's side.
+    /// Place of the grasp along the organ, from 0 (base) to 1 (tip); by default 0.5, or 0.7 with --sever,
+    /// which needs room on the base's side.
     #[arg(long, allow_negative_numbers = true)]
     pub at: Option<f64>,
-    /// Lift of the jaws [mm].
+    /// Lift of the jaws (mm).
     #[arg(long, default_value_t = 15.0, allow_negative_numbers = true)]
     pub lift: f64,
-    /// How the jaws hold; compliant, or as the scene says.
+    /// How the jaws hold tissue; by default compliant, or the scene's design.
     #[arg(long, value_enum)]
     pub design: Option<DesignName>,
-    /// Force with which the jaws close [N]; 0.5, or as the scene says.
+    /// Closing force of the jaws (N); by default 0.5, or the scene's force.
     #[arg(long, allow_negative_numbers = true)]
     pub jaw_force: Option<f64>,
-    /// How far beside the organ's middle the gripper comes [mm], across the organ.
+    /// Distance of the grasp from the organ's axis, across the organ (mm).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub approach_offset: f64,
-    /// First drag the tissue sideways by this much [mm], let go, and grasp again.
+    /// First grasp, drag the tissue sideways by this distance (mm), let go, and grasp again.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub regrasp: Option<f64>,
-    /// After the hold, cut the organ between the grasp and its pins with a second instrument and lift on what comes loose; --sever=S cuts at organ coordinate S.
+    /// After the hold, cut the organ between the grasp and its pins with a second instrument and lift the
+    /// loose piece further; --sever=S cuts at organ coordinate S.
     #[arg(long, value_name = "S", num_args = 0..=1, require_equals = true, allow_negative_numbers = true)]
     pub sever: Option<Option<f64>>,
-    /// What steps the organs; fast by default. A scene says it itself.
+    /// Solver settings of the tissue; by default fast, or the scene's.
     #[arg(long, value_enum)]
     pub schedule: Option<SolverName>,
     /// Worker threads; all by default. The result does not depend on them.
@@ -520,6 +525,6 @@ pub struct Simulate {
 /// Tasks by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Task {
-    /// Settle, grasp, lift, hold, lower, open; with --sever cut and lift on after the hold.
+    /// Settle, grasp, lift, hold, lower, open; with --sever cut after the hold and lift further.
     GraspLift,
 }

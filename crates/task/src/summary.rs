@@ -23,23 +23,23 @@ const LAG_STEP: f64 = 1e-3;
 pub struct ArmSummary {
     /// left or right.
     pub arm: String,
-    /// Time under load (s); the next three are over it, and 0 without any.
+    /// Time under load (s). The next three are over this time; they are `None` without any.
     pub loaded_s: f64,
     /// RCM deviation under load, median over periods (mm).
-    pub rcm_median_mm: f64,
+    pub rcm_median_mm: Option<f64>,
     /// Its 95th percentile (mm).
-    pub rcm_p95_mm: f64,
+    pub rcm_p95_mm: Option<f64>,
     /// The largest in any physics step under load (mm).
-    pub rcm_max_mm: f64,
+    pub rcm_max_mm: Option<f64>,
     /// The largest of the whole episode (mm).
     pub rcm_peak_mm: f64,
     /// Root mean square distance between commanded and measured tip at the same time, without load
-    /// (mm).
-    pub tracking_rms_mm: f64,
+    /// (mm). This and the next two are `None` if the arm was never without load.
+    pub tracking_rms_mm: Option<f64>,
     /// The delay of the measured tip behind the commanded one that makes that distance least (ms).
-    pub lag_ms: f64,
+    pub lag_ms: Option<f64>,
     /// The distance that is left then (mm).
-    pub lagged_rms_mm: f64,
+    pub lagged_rms_mm: Option<f64>,
     /// Peak contact force (N).
     pub peak_contact_n: f64,
     /// Peak constraint force (N): the pull of what is held, no contact.
@@ -85,10 +85,10 @@ pub struct Summary {
     /// Greatest rise of held tissue (mm).
     pub lift_mm: f64,
     /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest
-    /// lift.
-    pub slip_mm: f64,
+    /// lift. `None` without any grasp, like the next.
+    pub slip_mm: Option<f64>,
     /// Follow ratio (tissue lift over jaw lift) then.
-    pub follow_ratio: f64,
+    pub follow_ratio: Option<f64>,
     /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than
     /// 3 mm.
     #[serde(default)]
@@ -158,8 +158,8 @@ impl Summary {
             grasp_at: tasks().find(|t| t.grasped > 0.0).map(|t| t.grasp_s),
             held_to_end: rows.last().is_some_and(|c| c.task.grasped > 0.0),
             lift_mm: most(|c| c.task.lift_mm),
-            slip_mm: top.map_or(0.0, |t| finite(t.slip_mm)),
-            follow_ratio: top.map_or(0.0, |t| finite(t.follow)),
+            slip_mm: top.map(|t| finite(t.slip_mm)),
+            follow_ratio: top.map(|t| finite(t.follow)),
             held: top.is_some_and(|t| t.follow >= HELD_FOLLOW && t.slip_mm < HELD_SLIP_MM),
             torn: count(|t| t.torn),
             cuts: count(|t| t.cuts),
@@ -236,17 +236,19 @@ fn arm(name: &str, rows: &[Channels]) -> ArmSummary {
     let most = |f: fn(&ArmChannels) -> f64| all.iter().map(f).fold(0.0, f64::max).min(f64::MAX);
     let period = rows.first().map_or(0.0, |c| c.time_s);
     let free = |k: usize| !is_loaded(&all[k]);
-    let (lag, lagged) = lag(&all, period, &free);
+    let tracked = off_by(&all, 0.0, period, &free);
+    let lag = tracked.map(|_| lag(&all, period, &free));
+    let under_load = |value: f64| (!loaded.is_empty()).then(|| finite(value));
     ArmSummary {
         arm: name.to_owned(),
         loaded_s: loaded.len() as f64 * period,
-        rcm_median_mm: finite(quantile(&rcm, 0.5)),
-        rcm_p95_mm: finite(quantile(&rcm, 0.95)),
-        rcm_max_mm: loaded.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max).min(f64::MAX),
+        rcm_median_mm: under_load(quantile(&rcm, 0.5)),
+        rcm_p95_mm: under_load(quantile(&rcm, 0.95)),
+        rcm_max_mm: under_load(loaded.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max)),
         rcm_peak_mm: most(|a| a.rcm_peak_mm),
-        tracking_rms_mm: finite(1e3 * off_by(&all, 0.0, period, &free)),
-        lag_ms: 1e3 * lag,
-        lagged_rms_mm: finite(1e3 * lagged),
+        tracking_rms_mm: tracked.map(|m| finite(1e3 * m)),
+        lag_ms: lag.map(|(lag, _)| 1e3 * lag),
+        lagged_rms_mm: lag.map(|(_, rest)| finite(1e3 * rest)),
         peak_contact_n: most(ArmChannels::contact_n),
         peak_constraint_n: most(ArmChannels::constraint_n),
         peak_jaw_n: most(|a| a.jaw_force_n),
@@ -267,8 +269,8 @@ pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
 }
 
 /// Root mean square distance (m) of the measured tips from those commanded `lag` (s) before, over
-/// the rows `of`.
-fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool) -> f64 {
+/// the rows `of`; `None` without any row.
+fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool) -> Option<f64> {
     let tip = |a: &ArmChannels| glam::DVec3::new(a.tip_x_m, a.tip_y_m, a.tip_z_m);
     let commanded = |a: &ArmChannels| glam::DVec3::new(a.commanded_x_m, a.commanded_y_m, a.commanded_z_m);
     let back = if period > 0.0 { lag / period } else { 0.0 };
@@ -282,13 +284,13 @@ fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool
         sum += tip(&all[k]).distance_squared(then);
         count += 1;
     }
-    if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
+    (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
 /// The lag (s) with the least distance, and that distance (m).
 fn lag(all: &[ArmChannels], period: f64, of: &dyn Fn(usize) -> bool) -> (f64, f64) {
     let steps = (MAX_LAG / LAG_STEP) as usize;
-    let tried = (0..=steps).map(|k| k as f64 * LAG_STEP).map(|lag| (lag, off_by(all, lag, period, of)));
+    let tried = (0..=steps).map(|k| k as f64 * LAG_STEP).filter_map(|lag| Some((lag, off_by(all, lag, period, of)?)));
     tried.fold((0.0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best })
 }
 
@@ -308,9 +310,29 @@ mod tests {
             })
             .collect();
         let found = arm("left", &rows);
-        assert!((found.lag_ms - 80.0).abs() <= 2.0, "{found:?}");
-        assert!(found.lagged_rms_mm < 0.02 && found.tracking_rms_mm > 1.0);
+        assert!((found.lag_ms.unwrap() - 80.0).abs() <= 2.0, "{found:?}");
+        assert!(found.lagged_rms_mm.unwrap() < 0.02 && found.tracking_rms_mm.unwrap() > 1.0);
         assert_eq!(found.loaded_s, 0.0);
+    }
+
+    #[test]
+    fn what_was_not_measured_is_null() {
+        let row = |k: u32| Channels { time_s: f64::from(k) / 30.0, ..Channels::default() };
+        let rows: Vec<Channels> = (1..60).map(row).collect();
+        let free = arm("left", &rows);
+        assert_eq!((free.rcm_median_mm, free.rcm_p95_mm, free.rcm_max_mm), (None, None, None));
+        assert_eq!(free.tracking_rms_mm, Some(0.0));
+        let mut loaded = rows.clone();
+        loaded.iter_mut().for_each(|c| c.left.attached = 1.0);
+        let loaded = arm("left", &loaded);
+        assert_eq!((loaded.rcm_median_mm, loaded.rcm_max_mm), (Some(0.0), Some(0.0)));
+        assert_eq!((loaded.tracking_rms_mm, loaded.lag_ms, loaded.lagged_rms_mm), (None, None, None));
+        let progress =
+            crate::Tracker::new(trocar_scene::TaskName::GraspLift, &trocar_scene::Gates::default()).progress().clone();
+        let summary = Summary::of(&rows, &progress, None, &["left"], 3.0);
+        assert_eq!((summary.slip_mm, summary.follow_ratio), (None, None));
+        let json = serde_json::to_value(&summary).unwrap();
+        assert!(json["slip_mm"].is_null() && json["arms"][0]["rcm_median_mm"].is_null(), "{json}");
     }
 
     #[test]

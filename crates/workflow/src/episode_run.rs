@@ -1,17 +1,20 @@
 //! `trocar episode`, `trocar replay` and `trocar sweep`: from scenes and files to folders and verdicts.
 
+use crate::pages;
 use crate::phantoms::scene_specimen;
-use crate::workflow::refuse_overlap;
+use crate::recorder::Recorder;
+use crate::workflow::{REPORT, refuse_overlap};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_scene::Scene;
+use trocar_sensors::CameraRig;
 use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::{
-    CHANNELS_FILE, EPISODE_FILE, Episode, EpisodeFile, EpisodeResult, GateRange, RESULT_FILE, Sweep, Verdict, policy,
-    read_channels, run, sweep,
+    CHANNELS_FILE, EPISODE_FILE, Episode, EpisodeFile, EpisodeResult, GateRange, Policy, RESULT_FILE, Sweep, Verdict,
+    policy, read_channels, run_watched, sweep,
 };
 
 /// One episode of a scene by a policy.
@@ -19,7 +22,7 @@ use trocar_task::{
 pub struct EpisodeRun {
     /// Scene file or name of a built-in scene.
     pub scene: String,
-    /// Name of the policy; see [`policy::POLICIES`].
+    /// Name of the policy: one of [`policy::POLICIES`]. [`run_policy`](Self::run_policy) takes any other.
     pub policy: String,
     /// The episode's seed.
     pub seed: u64,
@@ -35,49 +38,92 @@ pub struct EpisodeMade {
     /// The figures.
     #[serde(flatten)]
     pub result: EpisodeResult,
-    /// Wall time of the episode [s], its reset included.
+    /// Wall time of the episode (s), its reset included and pictures left out.
     pub wall_s: f64,
     /// Simulated over wall time.
     pub real_time_factor: f64,
     /// Its folder.
     pub folder: String,
+    /// The page's path.
+    pub report: String,
 }
 
 impl EpisodeRun {
-    /// Runs it into the folder `output`: episode file, channels and result.
+    /// Runs it into the folder `output`: episode file, channels, result and page.
     ///
     /// # Errors
     /// One line that names the file, field or option; `output` is then left as it was.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<EpisodeMade> {
-        let mut chosen = policy::named(&self.policy)?;
+        let chosen = policy::named(&self.policy)?;
+        self.run_policy(output, progress, |_, _| Ok(chosen))
+    }
+
+    /// Checks the scene and the folder `output`, before anything is built.
+    ///
+    /// # Errors
+    /// A scene that cannot be read; a folder of something else.
+    pub fn check(&self, output: &Path) -> Result<Scene> {
         let scene = Scene::read(&self.scene)?;
         refuse_overlap(Path::new(&self.scene), output)?;
+        // It removes itself.
+        StagedFolder::create(output, RESULT_FILE)?;
+        Ok(scene)
+    }
+
+    /// The same by the policy that `make` gives for the episode.
+    ///
+    /// # Errors
+    /// As [`run`](Self::run); what `make` says.
+    pub fn run_policy(
+        &self,
+        output: &Path,
+        progress: &dyn Progress,
+        make: impl FnOnce(&Specimen, &Episode) -> Result<Box<dyn Policy + Send>>,
+    ) -> Result<EpisodeMade> {
+        let scene = self.check(output)?;
         let staged = StagedFolder::create(output, RESULT_FILE)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let mut episode = Episode::new(&scene, &specimen, self.threads)?;
+        let mut chosen = make(&specimen, &episode)?;
+        // The page shows the specimen where the seed has it.
+        episode.reset(self.seed)?;
+        let rig = CameraRig::new(&episode.arranged_scene(), &specimen, episode.cell())?;
+        let mut recorder = Recorder::new(rig).stills_only();
         let periods = scene.task.episode_s / episode.cell().period();
         progress.begin("episode", periods.round() as u64);
         let clock = Instant::now();
-        let recording = run(&mut episode, chosen.as_mut(), self.seed, &mut |_| {
-            progress.advance(1);
+        let recording = run_watched(&mut episode, chosen.as_mut(), self.seed, &mut |episode, step| {
+            recorder.record(episode, step);
+            progress.advance(u64::from(step.is_some()));
             !progress.interrupted()
         })?;
-        let wall_s = clock.elapsed().as_secs_f64();
+        let wall_s = (clock.elapsed() - recorder.spent()).as_secs_f64();
         progress.end();
+        let pictures = recorder.finish(episode.cell())?;
         recording.write_into(staged.path())?;
+        let real_time_factor = recording.summary.duration_s / wall_s.max(1e-9);
+        let page = pages::episode(&recording, &pictures, real_time_factor)?;
+        let path = staged.path().join(REPORT);
+        std::fs::write(&path, page).map_err(|source| Error::Io { path, source })?;
         if progress.interrupted() {
             return Err(Error::Interrupted);
         }
         staged.commit()?;
-        let real_time_factor = recording.summary.duration_s / wall_s.max(1e-9);
-        let folder = output.display().to_string();
-        Ok(EpisodeMade { result: recording.result(), wall_s, real_time_factor, folder })
+        let (folder, report) = (output.display().to_string(), output.join(REPORT).display().to_string());
+        Ok(EpisodeMade { result: recording.result(), wall_s, real_time_factor, folder, report })
     }
 }
 
 /// `name` in the folder `path`, or `path` itself where it is no folder.
-fn inside(path: &Path, name: &str) -> PathBuf {
-    if path.is_dir() { path.join(name) } else { path.to_owned() }
+fn inside(path: &Path, name: &str) -> Result<PathBuf> {
+    if !path.is_dir() {
+        return Ok(path.to_owned());
+    }
+    let file = path.join(name);
+    if file.is_file() {
+        return Ok(file);
+    }
+    Err(Error::Mismatch(format!("{}: the folder has no {name}; an episode's folder has one", path.display())))
 }
 
 /// The episode in a file, or in an episode's folder.
@@ -85,7 +131,7 @@ fn inside(path: &Path, name: &str) -> PathBuf {
 /// # Errors
 /// A file that is missing or damaged.
 pub fn read_episode(path: &Path) -> Result<EpisodeFile> {
-    Ok(EpisodeFile::read(&inside(path, EPISODE_FILE))?)
+    Ok(EpisodeFile::read(&inside(path, EPISODE_FILE)?)?)
 }
 
 /// Does the episode in `file` again and compares every step. The specimen is the scene's, or that in the folder `specimen`.
@@ -121,9 +167,9 @@ pub fn replay(
 pub fn sweep_files(files: &[PathBuf], ranges: &[String], progress: &dyn Progress) -> Result<Sweep> {
     let ranges: Vec<GateRange> = ranges.iter().map(|r| GateRange::parse(r)).collect::<std::result::Result<_, _>>()?;
     if let Some((_, twice)) = files.iter().enumerate().find(|(k, f)| files[..*k].contains(f)) {
-        return Err(Error::Mismatch(format!("{}: named twice; it would count twice", twice.display())));
+        return Err(Error::Mismatch(format!("{}: given twice; it would count twice", twice.display())));
     }
-    let files: Vec<PathBuf> = files.iter().map(|f| inside(f, CHANNELS_FILE)).collect();
+    let files: Vec<PathBuf> = files.iter().map(|f| inside(f, CHANNELS_FILE)).collect::<Result<_>>()?;
     progress.begin("channels", files.len() as u64);
     let mut episodes = Vec::with_capacity(files.len());
     for file in &files {

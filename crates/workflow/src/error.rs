@@ -34,7 +34,7 @@ pub enum Error {
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),
     /// The output would replace or change the input.
-    #[error("the output {output} and the input {input} lie in one another; name a folder beside it", output = output.display(), input = input.display())]
+    #[error("the output folder {output} overlaps the input {input}; choose another output folder", output = output.display(), input = input.display())]
     Overlap {
         /// The input.
         input: PathBuf,
@@ -49,7 +49,7 @@ pub enum Error {
     Interrupted,
     /// The user asked a campaign to stop.
     #[error(
-        "interrupted; {kept} of {planned} episodes are kept, with their table and report; the same command goes on"
+        "interrupted; {kept} of {planned} episodes are kept, with their table and report; the same command continues"
     )]
     Stopped {
         /// Episodes that are kept.

@@ -1,5 +1,6 @@
 //! The product's work from folder to folder: read, run, write the result and its page.
 
+mod counted;
 mod demo;
 mod episode_run;
 mod error;
@@ -19,6 +20,7 @@ pub mod specimen_scene;
 pub mod truth;
 mod workflow;
 
+pub use counted::counted;
 pub use demo::{Demo, DemoResult};
 pub use episode_run::{EpisodeMade, EpisodeRun, read_episode, replay, sweep_files};
 pub use error::{Error, Result};

@@ -15,6 +15,9 @@ use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::policy::{AfterHold, Script, Scripted};
 use trocar_task::{Channels, Episode, Policy, RESULT_FILE, run_watched};
 
+/// Forces that jaws can close with (N), as in scenes.
+const JAW_FORCE_RANGE_N: std::ops::RangeInclusive<f64> = 0.01..=40.0;
+
 /// Share of the jaws' lift that the lift gate asks of the tissue.
 const FOLLOWED: f64 = 0.8;
 
@@ -132,6 +135,10 @@ impl Lift {
     /// A cut without a cutter, an option out of range.
     pub fn arrange(&self, mut scene: Scene) -> Result<Scene> {
         if let Some(force) = self.jaw_force {
+            if !JAW_FORCE_RANGE_N.contains(&force) {
+                let (low, high) = (JAW_FORCE_RANGE_N.start(), JAW_FORCE_RANGE_N.end());
+                return Err(Error::Mismatch(format!("--jaw-force is {force} N; it must be in [{low}, {high}]")));
+            }
             let grasper = scene.grasping_arm().map(|arm| arm.instrument.clone());
             scene.instruments.iter_mut().filter(|i| Some(&i.name) == grasper.as_ref()).for_each(|i| {
                 i.jaw_force_n = force;

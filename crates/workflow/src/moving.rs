@@ -29,14 +29,18 @@ impl Moving {
     pub fn begin(output: &Path, extension: &str) -> Result<Self> {
         let folder = output.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
-            return Err(Error::Mismatch(format!("{}: there is no folder {}", output.display(), folder.display())));
+            return Err(Error::Mismatch(format!(
+                "{}: the folder {} does not exist",
+                output.display(),
+                folder.display()
+            )));
         }
         if extension != "mp4" {
             return Ok(Self::Webp(Vec::new()));
         }
         let there = Command::new("ffmpeg").arg("-version").stdout(Stdio::null()).stderr(Stdio::null()).status();
         if !there.is_ok_and(|status| status.success()) {
-            let reason = "the program ffmpeg makes .mp4 and is not installed; install it, or write a .webp";
+            let reason = ".mp4 needs the program ffmpeg, which is not installed; install it, or write a .webp";
             return Err(Error::Mismatch(format!("{}: {reason}", output.display())));
         }
         Ok(Self::Mp4 { part: beside(output), encoder: None })
@@ -93,7 +97,7 @@ impl Moving {
                     child.wait()
                 });
                 if !status.is_some_and(|s| s.is_ok_and(|s| s.success())) {
-                    return Err(Error::Mismatch(format!("{}: ffmpeg could not make it", output.display())));
+                    return Err(Error::Mismatch(format!("{}: ffmpeg failed", output.display())));
                 }
                 std::fs::rename(&*part, output).map_err(|source| Error::Io { path: output.to_owned(), source })
             }

@@ -14,7 +14,10 @@ use trocar_task::{Episode, Step};
 const STILL: [usize; 2] = [640, 360];
 const FILM: [usize; 2] = [448, 252];
 
-/// Time between frames of the moving picture (s), and most of them.
+/// Maximum number of stills of an episode, without that of its end: jaws may close many times.
+const MAX_STILLS: usize = 7;
+
+/// Time between frames of the moving picture (s), and maximum number of them.
 const FRAME_INTERVAL: f64 = 0.1;
 const MAX_FRAMES: usize = 150;
 
@@ -35,20 +38,29 @@ pub(crate) struct Recorder {
     depth: Option<String>,
     stills: Vec<(String, ColorImage)>,
     frames: Vec<(ColorImage, i32)>,
+    /// Whether a moving picture is recorded, too.
+    films: bool,
     lifted: bool,
     spent: Duration,
     failed: Option<Error>,
 }
 
 impl Recorder {
-    /// Through the camera `endoscope` or else the first one.
+    /// Stills and a moving picture through the camera `endoscope` or else the first one, and the depth of
+    /// `d405` at the end.
     pub fn new(rig: CameraRig) -> Self {
         let name = |wanted: &str| rig.cameras().iter().find(|c| **c == wanted).map(|c| (*c).to_owned());
         let camera = name("endoscope").or_else(|| rig.cameras().first().map(|c| (*c).to_owned()));
         let depth = name("d405");
         let (stills, frames) = (Vec::new(), Vec::new());
         let camera = camera.unwrap_or_default();
-        Self { rig, camera, depth, stills, frames, lifted: false, spent: Duration::ZERO, failed: None }
+        Self { rig, camera, depth, stills, frames, films: true, lifted: false, spent: Duration::ZERO, failed: None }
+    }
+
+    /// Stills alone.
+    #[must_use]
+    pub fn stills_only(self) -> Self {
+        Self { films: false, depth: None, ..self }
     }
 
     /// Sees the episode at its start or after a step.
@@ -80,7 +92,10 @@ impl Recorder {
             self.lifted = true;
             self.still(cell, "Lifted")?;
         }
-        if cell.time() >= FRAME_INTERVAL * self.frames.len() as f64 - 1e-9 && self.frames.len() < MAX_FRAMES {
+        if self.films
+            && cell.time() >= FRAME_INTERVAL * self.frames.len() as f64 - 1e-9
+            && self.frames.len() < MAX_FRAMES
+        {
             let picture = self.rig.render(cell, &self.camera, FILM.map(|n| 2 * n), &RenderSettings::preview())?;
             self.frames.push((averaged(&picture.color, 2), (1e3 * cell.time()).round() as i32));
         }
@@ -88,6 +103,10 @@ impl Recorder {
     }
 
     fn still(&mut self, cell: &Cell, what: &str) -> Result<()> {
+        if self.stills.len() < MAX_STILLS { self.see(cell, what) } else { Ok(()) }
+    }
+
+    fn see(&mut self, cell: &Cell, what: &str) -> Result<()> {
         let picture = self.rig.render(cell, &self.camera, STILL.map(|n| 2 * n), &RenderSettings::preview())?;
         let caption = format!("{what}, {:.2} s; {}", cell.time(), self.camera);
         self.stills.push((caption, averaged(&picture.color, 2)));
@@ -102,7 +121,7 @@ impl Recorder {
         if let Some(error) = self.failed {
             return Err(error);
         }
-        self.still(cell, "At the end")?;
+        self.see(cell, "At the end")?;
         if let Some(depth) = self.depth.clone() {
             let picture = self.rig.render(cell, &depth, STILL.map(|n| 2 * n), &RenderSettings::preview())?;
             self.stills.push((format!("{depth} at the end"), averaged(&picture.color, 2)));

@@ -77,19 +77,22 @@ impl Rendering {
             "png" => None,
             "webp" => Some(WEBP_HZ),
             "mp4" => Some(MP4_HZ),
-            _ => return wrong("pictures end in .png, moving ones in .webp or .mp4"),
+            _ => return wrong("a picture must end in .png, a video in .webp or .mp4"),
         };
         if moving.is_some() && (self.depth || self.labels || self.at.is_some() || self.cut_away) {
-            return wrong("--depth, --labels, --at and --cut-away are for pictures (.png)");
+            return wrong("--depth, --labels, --at and --cut-away are only for pictures (.png)");
         }
         if let Some(at) = self.at.filter(|at| !(0.0..=600.0).contains(at)) {
-            return Err(Error::Mismatch(format!("--at is {at}; 0 to 600 s")));
+            return Err(Error::Mismatch(format!("--at is {at} s; it must be in [0, 600]")));
         }
         if let Some(samples) = self.samples.filter(|n| !(1..=65_536).contains(n)) {
-            return Err(Error::Mismatch(format!("--samples is {samples}; 1 to 65536")));
+            return Err(Error::Mismatch(format!("--samples is {samples}; it must be in [1, 65536]")));
         }
         if let Some(size) = self.size.filter(|size| moving.is_some() && size.iter().any(|n| n % 2 == 1)) {
-            return Err(Error::Mismatch(format!("--size is {}x{}; moving pictures have even sides", size[0], size[1])));
+            return Err(Error::Mismatch(format!(
+                "--size is {}x{}; width and height of a video must be even",
+                size[0], size[1]
+            )));
         }
         let folder = Path::new(&self.source);
         let begin = || moving.map(|most| Ok::<_, Error>((most, Moving::begin(output, &extension)?))).transpose();
@@ -97,23 +100,24 @@ impl Rendering {
             return self.episode(&file, begin()?, output, progress);
         }
         if self.specimen.is_some() {
-            let reason = "--specimen is for episodes, whose specimen may have moved";
+            let reason = "--specimen is only for episodes";
             return Err(Error::Mismatch(format!("{}: {reason}", self.source)));
         }
         if folder.join("result.json").is_file() {
-            let reason = "a run keeps figures, no shapes; render its scene instead: trocar render SCENE --at SECONDS";
+            let reason = "this run has no episode file; render its scene instead: trocar render SCENE --at SECONDS";
             return Err(Error::Mismatch(format!("{}: {reason}", self.source)));
         }
         if folder.is_dir() {
             if moving.is_some() || self.at.is_some() {
                 return Err(Error::Mismatch(format!(
-                    "{}: a specimen does not move; moving pictures and --at are for scenes and episodes",
+                    "{}: a specimen does not move; videos and --at are only for scenes and episodes",
                     self.source
                 )));
             }
             return self.specimen(folder, output, progress);
         }
         let scene = Scene::read(&self.source)?;
+        self.check_camera(&scene)?;
         let film = begin()?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let mut lift = ScriptedLift::new(&scene, &specimen, self.threads)?;
@@ -131,6 +135,7 @@ impl Rendering {
     ) -> Result<Rendered> {
         let episode = EpisodeFile::read(file)?;
         let scene = episode.scene(self.specimen.as_deref())?;
+        self.check_camera(&scene)?;
         let specimen = match &self.specimen {
             Some(folder) => Specimen::read(folder)?,
             None => scene_specimen(&scene, &self.phantoms, progress)?,
@@ -163,6 +168,26 @@ impl Rendering {
         }
     }
 
+    /// Checks that `scene` has the camera, before its specimen and cell are built.
+    fn check_camera(&self, scene: &Scene) -> Result<()> {
+        let mut known: Vec<&str> = scene.cameras.iter().map(|c| c.name.as_str()).collect();
+        if !known.contains(&OUTSIDE) {
+            known.push(OUTSIDE);
+        }
+        self.check_known(&known)
+    }
+
+    fn check_known(&self, known: &[&str]) -> Result<()> {
+        match &self.camera {
+            Some(name) if !known.contains(&name.as_str()) => Err(trocar_sensors::Error::UnknownCamera {
+                name: name.chars().take(60).collect(),
+                known: known.join(", "),
+            }
+            .into()),
+            _ => Ok(()),
+        }
+    }
+
     fn ready(&self, mut sight: CameraRig) -> CameraRig {
         if self.noise {
             sight.noise = SensorNoise { color: Some([0.015, 0.003]), depth: Some(DepthNoise::default()), seed: 1 };
@@ -181,6 +206,8 @@ impl Rendering {
 
     fn specimen(&self, folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Rendered> {
         let specimen = Specimen::read(folder)?;
+        let known: Vec<&str> = specimen.camera.map(|_| "recording").into_iter().chain([OUTSIDE]).collect();
+        self.check_known(&known)?;
         let mut sight = self.ready(CameraRig::from_specimen(&specimen)?);
         let camera = self.camera.clone().or_else(|| sight.cameras().first().map(|c| (*c).to_owned()));
         let camera = camera.unwrap_or_else(|| OUTSIDE.to_owned());

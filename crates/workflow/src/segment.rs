@@ -1,6 +1,6 @@
 //! Makes the masks of a recording in the folder structure that the reconstruction reads.
 
-use crate::{Error, Result};
+use crate::{Error, Result, counted};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -193,7 +193,7 @@ fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Pro
             ..Target::default()
         };
         if first >= recording.len() {
-            let reason = format!("frame is {first}; the recording has {} frames", recording.len());
+            let reason = format!("frame is {first}; the recording has {}", counted(recording.len(), "frame"));
             return Err(Error::Mismatch(format!("instrument '{}': {reason}", instrument.name)));
         }
         let ways: [Vec<usize>; 2] = [(first..recording.len()).collect(), (0..=first).rev().collect()];

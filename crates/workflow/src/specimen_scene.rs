@@ -99,7 +99,7 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
         // Small turns to either side first, so that of equals the least is taken.
         let turn = if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 };
         let turn = std::f64::consts::TAU * f64::from(turn) / f64::from(TURNS);
-        scene.placement = frame(&placed(specimen, organ, turn)?);
+        scene.placement = rounded(frame(&placed(specimen, organ, turn)?));
         let reach = tool_reach(&scene, specimen)?;
         if best.as_ref().is_none_or(|(_, b)| missed(&reach) < missed(b) - 0.1) {
             best = Some((scene.clone(), reach));
@@ -153,6 +153,13 @@ pub(crate) fn placed(specimen: &Specimen, organ: &str, turn: f64) -> Result<Pose
 pub(crate) fn frame(pose: &Pose) -> Frame {
     let q = pose.rotation;
     Frame { position_m: pose.translation.to_array(), rotation_wxyz: [q.w, q.x, q.y, q.z] }
+}
+
+/// The frame with nine decimals, for people to read and change.
+fn rounded(frame: Frame) -> Frame {
+    // Adding zero makes a negative zero positive.
+    let round = |x: f64| (x * 1e9).round() / 1e9 + 0.0;
+    Frame { position_m: frame.position_m.map(round), rotation_wxyz: frame.rotation_wxyz.map(round) }
 }
 
 pub(crate) fn source(folder: &Path) -> SpecimenSource {

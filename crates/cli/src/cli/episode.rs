@@ -8,10 +8,11 @@ use std::path::PathBuf;
 pub struct Episode {
     /// Scene file, or a built-in scene such as cell-a.
     pub scene: String,
-    /// The controller: scripted, noise, delay, offset, greedy, random.
+    /// The policy: scripted, noise, delay, offset, greedy, random; ws://HOST:PORT for an openpi server;
+    /// python:FILE.py:NAME or python:MODULE:NAME for a Python callable. NAME=... names it.
     #[arg(long, default_value = "scripted")]
     pub policy: String,
-    /// Seed of the start and of the controller's chance.
+    /// Seed of the start and of the policy's random numbers.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
     /// Worker threads; all by default. The result does not depend on them.
@@ -21,7 +22,7 @@ pub struct Episode {
     /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
-    /// Episode folder to write: episode.trocar, channels.parquet, result.json.
+    /// Episode folder to write: episode.trocar, channels.parquet, result.json, report.html.
     #[arg(short, long)]
     pub output: PathBuf,
 }
@@ -31,10 +32,10 @@ pub struct Episode {
 pub struct Replay {
     /// Episode folder, or the episode file in it.
     pub file: PathBuf,
-    /// Do the episode again and compare the state after every step.
+    /// Replay the episode and compare the state after every step.
     #[arg(long)]
     pub verify: bool,
-    /// Specimen folder, where it is no longer where the scene says.
+    /// Specimen folder, if it was moved from its place in the scene.
     #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,
     /// Worker threads; all by default. The result does not depend on them.
@@ -52,7 +53,8 @@ pub struct Sweep {
     /// Episode folders, or their channels.parquet files.
     #[arg(required = true)]
     pub channels: Vec<PathBuf>,
-    /// A gate and its values: lift_mm=4..12 (nine values), lift_mm=4..12:0.5 or cut_closed=0.15,0.3; several for every combination.
+    /// A gate and its values: lift_mm=4..12 (nine values), lift_mm=4..12:0.5 or cut_closed=0.15,0.3.
+    /// Several gates give every combination.
     #[arg(long = "gate", value_name = "NAME=VALUES", required = true)]
     pub gates: Vec<String>,
 }

@@ -5,36 +5,38 @@ use clap::{Args, Subcommand};
 /// Arguments of `scene`.
 #[derive(Debug, Args)]
 pub struct Scene {
-    /// What to do.
+    /// The action.
     #[command(subcommand)]
     pub action: SceneAction,
 }
 
-/// What can be done with scenes.
+/// Actions on scenes.
 #[derive(Debug, Subcommand)]
 pub enum SceneAction {
-    /// The scenes that come with the program.
+    /// List the built-in scenes.
     List,
-    /// Print a scene: a built-in one with its comments, to start from, or a file with every value that it leaves out.
+    /// Print a scene: a built-in one with its comments, or a file completed with all default values.
     Show {
         /// A built-in scene, or a scene file.
         name: String,
-        /// Print a built-in scene, too, in the form in which replays know it: every value, a fixed order, no comments.
+        /// Print a built-in scene in the form that replays use: every value, fixed order, no comments.
         #[arg(long)]
         canonical: bool,
     },
-    /// Write a scene file for a specimen: the paper's cell with the specimen placed so that both tools reach its organ.
+    /// Write a scene file for a specimen: the paper's cell, with the specimen placed within reach of both
+    /// tools.
     New {
         /// Specimen folder.
         specimen: std::path::PathBuf,
-        /// Organ of the task; the appendix, or else the first, by default.
+        /// Organ of the task; by default the appendix, or the first organ without one.
         #[arg(long)]
         organ: Option<String>,
-        /// Scene file to write; printed by default.
+        /// Scene file to write; by default the scene is printed.
         #[arg(short, long)]
         output: Option<std::path::PathBuf>,
     },
-    /// Say whether a scene file is in order, or else what is wrong, where, and what would be right.
+    /// Check a scene file: what is wrong, where, and what would be right; and whether the tools reach the
+    /// task's organ.
     Check {
         /// A scene file, or a built-in scene.
         file: String,

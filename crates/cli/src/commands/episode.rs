@@ -1,10 +1,15 @@
 //! `trocar episode`, `trocar replay` and `trocar sweep`.
 
 use crate::cli;
+use crate::commands::scene::note_reach;
 use crate::output;
 use serde::Serialize;
+use trocar_campaign::run_episode;
 use trocar_core::Progress;
-use trocar_workflow::{EpisodeHeader, EpisodeMade, EpisodeRun, Error, Result, read_episode, replay, sweep_files};
+use trocar_task::ArmSummary;
+use trocar_workflow::{
+    EpisodeHeader, EpisodeMade, EpisodeRun, Error, Result, counted, read_episode, replay, sweep_files,
+};
 
 pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Result<()> {
     let run = EpisodeRun {
@@ -14,7 +19,8 @@ pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Res
         threads: arguments.threads,
         phantoms: arguments.phantoms.clone(),
     };
-    let made = run.run(&arguments.output, progress)?;
+    note_reach(&arguments.scene);
+    let made = run_episode(&run, &arguments.output, progress)?;
     output::print(json, &made, text);
     Ok(())
 }
@@ -27,15 +33,21 @@ struct Told<'a> {
     header: &'a EpisodeHeader,
 }
 
-/// Does again, or tells what the file says of itself. What differs is told and then an error, so that scripts hear of it.
+/// Replays and verifies an episode, or prints its header. A difference is printed and is an error, so
+/// that scripts notice it.
 pub fn replay_file(arguments: &cli::Replay, json: bool, progress: &dyn Progress) -> Result<()> {
     if !arguments.verify {
         let file = read_episode(&arguments.file)?;
         output::print(json, &Told { steps: file.steps.len(), header: &file.header }, |told| {
             let h = told.header;
             format!(
-                "{} steps by {} with seed {}, recorded by trocar {}; scene {}, specimen {}; --verify does them again",
-                told.steps, h.policy, h.seed, h.program, h.scene_hash, h.specimen_hash
+                "{} by {} with seed {}, recorded by trocar {}; scene {}, specimen {}; --verify replays and compares every step",
+                counted(told.steps, "step"),
+                h.policy,
+                h.seed,
+                h.program,
+                h.scene_hash,
+                h.specimen_hash
             )
         });
         return Ok(());
@@ -59,7 +71,8 @@ pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Res
             values.chain(r.by_stage.iter().map(ToString::to_string)).collect::<Vec<_>>()
         };
         let rows: Vec<Vec<String>> = s.rows.iter().map(row).collect();
-        format!("{} episodes; how many pass each stage:\n{}", s.episodes, output::table(&header, &rows))
+        let episodes = counted(s.episodes, "episode");
+        format!("{episodes}; how many pass each stage:\n{}", output::table(&header, &rows))
     });
     Ok(())
 }
@@ -70,12 +83,6 @@ fn text(made: &EpisodeMade) -> String {
         Some(time) => format!("{} at {time:.2} s", p.stage.name()),
         None => format!("{} {:.0}%", p.stage.name(), 100.0 * p.share),
     });
-    let arms = s.arms.iter().map(|a| {
-        format!(
-            "{}: RCM deviation under load {:.3} mm median, {:.3} mm p95, {:.3} mm at most; lag {:.0} ms; peaks of {:.2} N contact, {:.2} N constraint",
-            a.arm, a.rcm_median_mm, a.rcm_p95_mm, a.rcm_max_mm, a.lag_ms, a.peak_contact_n, a.peak_constraint_n
-        )
-    });
     let mut remarks = String::new();
     for said in [&s.why, &s.advice].into_iter().flatten() {
         remarks += &format!("\n{said}");
@@ -83,9 +90,16 @@ fn text(made: &EpisodeMade) -> String {
     if let Some(said) = s.suspensions() {
         remarks += &format!("\nsuspensions of physics: {said}");
     }
-    let grasp = s.grasp_at.map_or("no grasp".to_owned(), |at| format!("grasp at s = {at:.2}"));
+    let grasp = match (s.grasp_at, s.slip_mm) {
+        (Some(at), Some(slip)) => {
+            let held = if s.held_to_end { "held to the end" } else { "not held to the end" };
+            format!("grasp at s = {at:.2}, lift {:.1} mm, slip {slip:.2} mm, {held}", s.lift_mm)
+        }
+        _ if r.task == "port-reach" => "no grasp in this task".to_owned(),
+        _ => "no grasp".to_owned(),
+    };
     format!(
-        "{}, {} by {} with seed {}: {} ({} of {} stages)\n{}\n{grasp}, lift {:.1} mm, slip {:.2} mm, {}; {} inverted at worst{remarks}\n{}\n{:.1} s simulated in {:.1} s ({:.2}x real time), state {}\nfolder {}",
+        "{}, {} by {} with seed {}: {} ({} of {} stages)\n{}\n{grasp}; {} inverted at worst{remarks}\n{}\n{:.1} s simulated in {:.1} s ({:.2}x real time), state {}\nfolder {}; report {}",
         r.scene,
         r.task,
         r.policy,
@@ -94,15 +108,36 @@ fn text(made: &EpisodeMade) -> String {
         s.stage,
         s.progress.stages.len(),
         stages.collect::<Vec<_>>().join(", "),
-        s.lift_mm,
-        s.slip_mm,
-        if s.held_to_end { "held to the end" } else { "not held to the end" },
         s.inverted_peak,
-        arms.collect::<Vec<_>>().join("\n"),
+        s.arms.iter().map(arm).collect::<Vec<_>>().join("\n"),
         s.duration_s,
         made.wall_s,
         made.real_time_factor,
         r.state_hash,
-        made.folder
+        made.folder,
+        made.report
     )
+}
+
+/// An arm in one line.
+fn arm(a: &ArmSummary) -> String {
+    let lag = a.lag_ms.map_or("lag not measured".to_owned(), |lag| format!("lag {lag:.0} ms"));
+    format!(
+        "{}: {}; {lag}; peaks of {:.2} N contact, {:.2} N constraint",
+        a.arm,
+        rcm(a),
+        a.peak_contact_n,
+        a.peak_constraint_n
+    )
+}
+
+/// The RCM deviation of an arm, or why there is none.
+pub fn rcm(a: &ArmSummary) -> String {
+    match (a.rcm_median_mm, a.rcm_p95_mm, a.rcm_max_mm) {
+        (Some(median), Some(p95), Some(max)) => {
+            format!("RCM deviation under load {median:.3} mm median, {p95:.3} mm p95, {max:.3} mm at most")
+        }
+        _ if a.rcm_peak_mm == 0.0 => "RCM deviation not measured".to_owned(),
+        _ => format!("never under load; RCM deviation {:.3} mm at most", a.rcm_peak_mm),
+    }
 }

@@ -1,10 +1,11 @@
 //! `trocar evaluate`.
 
 use crate::cli;
+use crate::commands::scene::note_reach;
 use crate::output;
 use trocar_campaign::{Campaign, CampaignResult, PolicySpec};
 use trocar_core::Progress;
-use trocar_workflow::Result;
+use trocar_workflow::{Result, counted};
 
 pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Result<()> {
     let policies = arguments.policies.iter().map(|p| PolicySpec::parse(p)).collect::<Result<_>>()?;
@@ -17,6 +18,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         retry_failed: arguments.retry_failed,
         phantoms: arguments.phantoms.clone(),
     };
+    note_reach(&arguments.scene);
     let result = campaign.run(&arguments.output, progress)?;
     output::print(json, &result, text);
     Ok(())
@@ -35,12 +37,12 @@ fn text(r: &CampaignResult) -> String {
                 format!("{:.0}-{:.0}%", 1e2 * p.interval.low, 1e2 * p.interval.high),
                 stages,
                 format!("{:.2}", p.mean_score),
-                format!("{}/{}", p.held_to_end, p.attached),
+                if p.attached > 0 { format!("{}/{}", p.held_to_end, p.attached) } else { "-".to_owned() },
                 or_dash(p.lift_median_mm, 1),
                 or_dash(p.rcm_median_mm, 3),
                 or_dash(p.rcm_max_mm, 3),
-                p.ends[3].to_string(),
-                p.ends[4].to_string(),
+                p.ends.diverged.to_string(),
+                p.ends.policy_error.to_string(),
                 p.suspensions(),
             ]
         })
@@ -68,16 +70,17 @@ fn text(r: &CampaignResult) -> String {
         .iter()
         .filter_map(|p| Some((p, p.policy_error.as_ref()?)))
         .map(|(p, why)| {
-            format!("{}: the policy failed in {} of {} episodes; the first: {why}\n", p.policy, p.ends[4], p.episodes)
+            let episodes = counted(p.episodes, "episode");
+            format!("{}: the policy failed in {} of {episodes}; the first: {why}\n", p.policy, p.ends.policy_error)
         })
         .collect();
-    let again = if failed.is_empty() { "" } else { "--retry-failed does them again\n" };
+    let again = if failed.is_empty() { "" } else { "--retry-failed runs them again\n" };
     format!(
-        "{}, {}: {} of {} episodes, seeds from {}; stages: {stages}\n{}\n{failed}{again}states {}\nreport {}",
+        "{}, {}: {} of {}, seeds from {}; stages: {stages}\n{}\n{failed}{again}states {}\nreport {}",
         r.scene,
         r.task,
         r.episodes,
-        r.planned,
+        counted(r.planned, "episode"),
         r.seed,
         output::table(&header, &rows),
         r.hash,

@@ -3,7 +3,7 @@
 use crate::cli::Inspect;
 use crate::output;
 use trocar_camera::Camera;
-use trocar_workflow::{Inspection, Result, inspect};
+use trocar_workflow::{Inspection, Result, counted, inspect};
 
 pub fn run(arguments: &Inspect, json: bool) -> Result<()> {
     let inspection = inspect(&arguments.recording, arguments.template)?;
@@ -15,18 +15,22 @@ fn text(i: &Inspection) -> String {
     let camera = |c: &Camera| {
         format!("{} x {}, f {:.1} {:.1}, centre {:.1} {:.1} px", c.width, c.height, c.fx, c.fy, c.cx, c.cy)
     };
-    let mut lines =
-        vec![format!("{}: {} frames", i.recording, i.frames), format!("camera        {}", camera(&i.camera))];
+    let mut lines = vec![
+        format!("{}: {}", i.recording, counted(i.frames, "frame")),
+        format!("camera        {}", camera(&i.camera)),
+    ];
     if let Some(depth) = &i.depth_camera {
         lines.push(format!("depth camera  {}; registered to colour", camera(depth)));
     }
-    lines.push(format!(
-        "depth         unit {} mm; the middle frame has depth on {:.0}% of its pixels, from {:.0} to {:.0} mm",
-        1e3 * i.depth_scale_m,
-        100.0 * i.coverage,
-        1e3 * i.depth_range_m[0],
-        1e3 * i.depth_range_m[1]
-    ));
+    let unit = 1e3 * i.depth_scale_m;
+    lines.push(if i.coverage > 0.0 {
+        let (share, [near, far]) = (100.0 * i.coverage, i.depth_range_m.map(|m| 1e3 * m));
+        format!(
+            "depth         unit {unit} mm; the middle frame has depth on {share:.0}% of its pixels, from {near:.0} to {far:.0} mm"
+        )
+    } else {
+        format!("depth         unit {unit} mm; the middle frame has no depth")
+    });
     let organs = match (i.organs.is_empty(), i.missing.is_empty()) {
         (false, _) => i.organs.join(", "),
         (true, true) => "none described yet".to_owned(),

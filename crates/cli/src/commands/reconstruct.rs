@@ -5,7 +5,7 @@ use crate::output;
 use trocar_core::Progress;
 use trocar_geometry::io::Unit;
 use trocar_reconstruct::{Settings, SurfaceRule};
-use trocar_workflow::{Reconstructed, Result, reconstruct_recording, reconstruct_surface};
+use trocar_workflow::{Reconstructed, Result, counted, reconstruct_recording, reconstruct_surface};
 
 pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Result<()> {
     let settings = Settings {
@@ -71,8 +71,8 @@ pub fn text(r: &Reconstructed) -> String {
     let mut out = output::table(&header, &rows);
     if let Some(c) = &r.composite {
         out += &format!(
-            "\ncomposite of {} frames: {:.1}% of the image recovered from under instruments, depth on {:.1}%, median depth range {:.2} mm",
-            c.frames_used,
+            "\ncomposite of {}: {:.1}% of the image recovered from under instruments, depth on {:.1}%, median depth range {:.2} mm",
+            counted(c.frames_used, "frame"),
             100.0 * c.recovered_share,
             100.0 * c.coverage,
             c.depth_range_median_mm

@@ -5,7 +5,7 @@ use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_workflow::Result;
+use trocar_workflow::{Result, counted};
 
 #[derive(Serialize)]
 struct Recorded {
@@ -25,8 +25,12 @@ pub fn run(arguments: &Record, json: bool, progress: &dyn Progress) -> Result<()
     };
     output::print(json, &recorded, |r| {
         format!(
-            "{} frames of {} in {} ({:.1} s); next: trocar reconstruct {} -o SPECIMEN",
-            r.frames, arguments.phantom, r.recording, r.seconds, r.recording
+            "{} of {} in {} ({:.1} s); next: trocar reconstruct {} -o SPECIMEN",
+            counted(r.frames, "frame"),
+            arguments.phantom,
+            r.recording,
+            r.seconds,
+            r.recording
         )
     });
     Ok(())

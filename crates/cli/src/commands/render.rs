@@ -3,7 +3,7 @@
 use crate::cli::Render;
 use crate::output;
 use trocar_core::Progress;
-use trocar_workflow::{Rendered, Rendering, Result};
+use trocar_workflow::{Rendered, Rendering, Result, counted};
 
 /// Paths a pixel unless the user says otherwise.
 const SAMPLES: u32 = 64;
@@ -29,15 +29,18 @@ pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()
 
 fn text(r: &Rendered) -> String {
     let seen: Vec<String> = r.seen.iter().map(|s| format!("{} {:.1}%", s.name, 1e2 * s.share)).collect();
-    let how = if r.samples > 0 { format!("{} paths a pixel", r.samples) } else { "direct light".to_owned() };
+    let how = if r.samples > 0 {
+        format!("{} a pixel", counted(r.samples as usize, "path"))
+    } else {
+        "direct light".to_owned()
+    };
     let note = r.differs.as_ref().map_or(String::new(), |why| format!("\nnot the recorded episode: {why}"));
     format!(
-        "{}: {} x {}, {} frame{}, {how}, {} triangles, {:.1} s; at {:.2} s\n{}\n{}{note}",
+        "{}: {} x {}, {}, {how}, {} triangles, {:.1} s; at {:.2} s\n{}\n{}{note}",
         r.camera,
         r.width,
         r.height,
-        r.frames,
-        if r.frames == 1 { "" } else { "s" },
+        counted(r.frames, "frame"),
         r.triangles,
         r.render_s,
         r.time_s,

@@ -73,7 +73,10 @@ fn new(folder: &Path, organ: Option<&str>, output: Option<&Path>, json: bool) ->
     let text = scene.to_toml()?;
     if let Some(path) = output {
         if path.exists() {
-            return Err(Error::Mismatch(format!("{}: is there already; name another file", path.display())));
+            return Err(Error::Mismatch(format!("{}: the file exists; choose another name", path.display())));
+        }
+        if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty() && !f.is_dir()) {
+            return Err(Error::Mismatch(format!("{}: the folder {} does not exist", path.display(), folder.display())));
         }
         std::fs::write(path, &text).map_err(|source| Error::Io { path: path.to_owned(), source })?;
     }
@@ -97,6 +100,18 @@ fn reach_lines(reach: &[ToolReach], organ: &str) -> Vec<String> {
     reach.iter().map(line).collect()
 }
 
+/// Prints a note where a tool does not reach the organ of the scene's task: an episode would fail after its
+/// whole time. Says nothing of scenes whose specimen has to be made first.
+pub fn note_reach(name: &str) {
+    let Ok(scene) = Scene::read(name) else { return };
+    let Some(Source::Folder(path)) = scene.specimen.source().filter(|_| scene.task.needs_organ()) else { return };
+    let Ok(specimen) = Specimen::read(&scene.resolve(path)) else { return };
+    for missed in tool_reach(&scene, &specimen).unwrap_or_default().iter().filter(|r| !r.reaches()) {
+        let (arm, organ, mm) = (missed.arm.name(), &scene.task.organ, missed.missed_mm);
+        eprintln!("note: the {arm} arm misses the {organ} by {mm:.0} mm; see `trocar scene check {name}`");
+    }
+}
+
 fn check(file: &str, json: bool) -> Result<()> {
     let scene = Scene::read(file)?;
     let reach = match scene.specimen.source() {
@@ -116,7 +131,10 @@ fn check(file: &str, json: bool) -> Result<()> {
     };
     output::print(json, &checked, |c| {
         let mut rows = vec![
-            format!("{file} is in order: scene '{}', task {}", c.name, c.task),
+            match c.reach.iter().all(ToolReach::reaches) {
+                true => format!("{file} is in order: scene '{}', task {}", c.name, c.task),
+                false => format!("{file}: scene '{}', task {}", c.name, c.task),
+            },
             format!("organs   {}", c.organs.join(", ")),
             format!("arms     {}", c.arms.join(", ")),
             format!("cameras  {}", c.cameras.join(", ")),

@@ -2,7 +2,7 @@
 
 use crate::{cli, output};
 use trocar_core::Progress;
-use trocar_workflow::{Result, Segment, Segmented, Wanted, wanted_weights};
+use trocar_workflow::{Result, Segment, Segmented, Wanted, counted, wanted_weights};
 
 pub fn run(arguments: &cli::Segment, json: bool, progress: &dyn Progress) -> Result<()> {
     // clap requires both unless --weights is given.
@@ -25,13 +25,14 @@ fn list(files: &[Wanted]) -> String {
 }
 
 fn text(s: &Segmented) -> String {
-    let mut lines: Vec<String> = s.organs.iter().map(|(name, pixels)| format!("{name}: {pixels} pixels")).collect();
+    let mut lines: Vec<String> =
+        s.organs.iter().map(|(name, pixels)| format!("{name}: {}", counted(*pixels, "pixel"))).collect();
     if s.frames == 0 {
         lines.push(format!("instruments: {}", s.instruments));
     } else {
         let covered = 100.0 * s.covered;
         lines.push(format!("instruments: {}; they cover {covered:.1}% of the image on average", s.instruments));
-        lines.push(format!("masks of {} frames", s.frames));
+        lines.push(format!("masks of {}", counted(s.frames, "frame")));
     }
     lines.push(format!("written to {} in {:.1} s; check the pictures beside the masks", s.masks, s.seconds));
     lines.join("\n")

@@ -1,12 +1,13 @@
 //! `trocar simulate`.
 
 use crate::cli::{Simulate, Task};
+use crate::commands::episode::rcm;
 use crate::output;
 use trocar_core::Progress;
 use trocar_scene::Builtin;
 use trocar_task::Severed;
 use trocar_task::policy::{AfterHold, CutAt, Script};
-use trocar_workflow::{Lift, LiftResult, Result};
+use trocar_workflow::{Lift, LiftResult, Result, counted};
 
 /// Organ coordinate of the grasp unless the user says otherwise, and where a cut needs room on the base's
 /// side.
@@ -17,7 +18,8 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
     let Task::GraspLift = arguments.task;
     // A specimen is a folder; what is none is a scene.
     let name = arguments.specimen.to_string_lossy();
-    let scene = !arguments.specimen.is_dir() && (arguments.specimen.is_file() || Builtin::named(&name).is_some());
+    let is_file = arguments.specimen.is_file() || arguments.specimen.extension().is_some_and(|e| e == "toml");
+    let scene = !arguments.specimen.is_dir() && (is_file || Builtin::named(&name).is_some());
     let after = match arguments.sever {
         Some(at) => AfterHold::Cut(at.map_or(CutAt::Between, CutAt::S)),
         None if scene => AfterHold::Finish,
@@ -51,23 +53,27 @@ pub fn text(r: &LiftResult) -> String {
     let s = &r.episode.summary;
     let d = &s.details;
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
+    let grasp = match (s.follow_ratio, s.slip_mm) {
+        (Some(follow), Some(slip)) => format!(
+            "{} grasp, {} held, jaws closed on {:.1} mm with {:.2} N: lift {:.2} mm (follows {:.0}%), slip {slip:.3} mm, snap {:.3} mm, activation step {:.3} mm: {}",
+            d.design,
+            counted(d.held_nodes, "node"),
+            d.gap_mm,
+            d.closing_force_n,
+            s.lift_mm,
+            100.0 * follow,
+            d.snap_mm,
+            d.activation_step_mm,
+            if s.held { "held" } else { "NOT held" },
+        ),
+        _ => "nothing grasped: NOT held".to_owned(),
+    };
     let mut text = format!(
-        "{}: {} at s = {:.2}, {} grasp, {} nodes held, jaws closed on {:.1} mm with {:.2} N{}: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm, activation step {:.3} mm: {}\n\
+        "{}: {} at s = {:.2}, {grasp}\n\
          peaks of {:.2} N contact, {:.2} N constraint; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}",
         r.episode.scene,
         d.organ,
         r.at,
-        d.design,
-        d.held_nodes,
-        d.gap_mm,
-        d.closing_force_n,
-        if s.attached { "" } else { " (nothing between them)" },
-        s.lift_mm,
-        100.0 * s.follow_ratio,
-        s.slip_mm,
-        d.snap_mm,
-        d.activation_step_mm,
-        if s.held { "held" } else { "NOT held" },
         peak(|a| a.peak_contact_n),
         peak(|a| a.peak_constraint_n),
         d.settling.settled_speed_m_s,
@@ -84,10 +90,7 @@ pub fn text(r: &LiftResult) -> String {
         },
     );
     for arm in s.arms.iter().filter(|a| a.rcm_peak_mm > 0.0) {
-        text += &format!(
-            "\n{}: RCM deviation under load {:.3} mm median, {:.3} mm at most, {:.3} mm in the whole run",
-            arm.arm, arm.rcm_median_mm, arm.rcm_max_mm, arm.rcm_peak_mm
-        );
+        text += &format!("\n{}: {}", arm.arm, rcm(arm));
     }
     if let Some(said) = s.suspensions() {
         text += &format!("\nsuspensions of physics: {said}");

@@ -80,7 +80,7 @@ fn controllers(rows: &[PolicyRow]) -> String {
             or_dash(p.lift_median_mm, 1),
             or_dash(p.rcm_median_mm, 4),
             or_dash(p.rcm_max_mm, 3),
-            count(p.ends[3]),
+            count(p.ends.diverged),
         ]
     };
     table::plain(&head, &rows.iter().map(row).collect::<Vec<_>>())

@@ -1,21 +1,18 @@
 //! The page of a lift: figures of merit, what the cameras saw, and what arms and tissue did over time.
 
+use super::over_time::{self, Curve, TimePlot};
 use super::severed;
-use crate::Result;
 use crate::lifted::Lifted;
+use crate::{Result, counted};
 use trocar_report::page::{self, Card, Columns};
-use trocar_report::plots::{Band, Line, Plot};
-use trocar_report::table::{self, fixed};
-use trocar_report::{colors, figures};
+use trocar_report::plots::Band;
+use trocar_report::table::fixed;
 use trocar_scene::Side;
 use trocar_task::{ArmChannels, Channels};
 
 /// RCM deviation of the paper's rollouts, median (mm), and its threshold (mm).
 const PAPER_RCM_MM: f64 = 0.12;
 const THRESHOLD_MM: f64 = 3.0;
-
-/// What of a row is plotted, by name and colour.
-type Curve<'a> = (&'a str, &'a dyn Fn(&Channels) -> f64, usize);
 
 /// The sections that come first, and those with details.
 pub(super) fn sections(lifted: &Lifted) -> Result<(String, String)> {
@@ -31,14 +28,14 @@ pub(super) fn sections(lifted: &Lifted) -> Result<(String, String)> {
         lead += &format!(" <b>Suspensions of physics:</b> {}.", page::escape(&said));
     }
     let title = if s.diverged { "The lift (diverged)" } else { "The lift" };
-    let mut first = page::section(title, &lead, &cards(lifted)) + &seen(lifted)?;
+    let mut first = page::section(title, &lead, &cards(lifted)) + &over_time::pictures(&lifted.pictures)?;
     if let Some(cut) = &s.details.sever {
         first += &severed::section(cut);
     }
     let plots = page::grid(Columns::Two, &plots(lifted)?);
     let details = page::section("Over time", "Shaded: the phases of the script.", &plots)
-        + &events(lifted)
-        + &page::section("All figures of the run", "", &table::plain(&["Figure", "Value"], &all_figures(lifted)));
+        + &over_time::events(&lifted.recording.events)
+        + &over_time::all_figures(&lifted.result);
     Ok((first, details))
 }
 
@@ -47,20 +44,25 @@ fn cards(lifted: &Lifted) -> String {
     let (d, mm) = (&s.details, |v: f64| format!("{} mm", fixed(v, 2)));
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
     let grasp = s.grasp_at.map_or("nothing grasped".to_owned(), |at| {
-        format!("{} grasp of {} nodes of the {} at s = {}", d.design, d.held_nodes, d.organ, fixed(at, 2))
+        format!("{} grasp of {} of the {} at s = {}", d.design, counted(d.held_nodes, "node"), d.organ, fixed(at, 2))
     });
-    let mut cards = vec![
-        Card::new("Held", if s.held { "yes" } else { "no" }, grasp).met(s.held),
-        Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * s.follow_ratio, 0)))
-            .met(s.follow_ratio >= 0.8),
-        Card::new("Slip", mm(s.slip_mm), "less than 3 mm counts as held").met(s.slip_mm < 3.0),
-        Card::new("Snap", mm(d.snap_mm), "what the grasp prescribes when the jaws take hold"),
-        Card::new("Activation step", mm(d.activation_step_mm), "what moves in its first frame"),
-        Card::new(
-            "Jaws",
-            format!("{} N", fixed(d.closing_force_n, 2)),
-            format!("of {} N; closed on {} mm", fixed(d.jaw_force_n, 2), fixed(d.gap_mm, 1)),
-        ),
+    let mut cards = vec![Card::new("Held", if s.held { "yes" } else { "no" }, grasp).met(s.held)];
+    // Without a grasp there is nothing to measure.
+    if let (Some(slip), Some(follow)) = (s.slip_mm, s.follow_ratio) {
+        cards.extend([
+            Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * follow, 0)))
+                .met(follow >= 0.8),
+            Card::new("Slip", mm(slip), "less than 3 mm counts as held").met(slip < 3.0),
+            Card::new("Snap", mm(d.snap_mm), "what the grasp prescribes when the jaws take hold"),
+            Card::new("Activation step", mm(d.activation_step_mm), "what moves in its first frame"),
+            Card::new(
+                "Jaws",
+                format!("{} N", fixed(d.closing_force_n, 2)),
+                format!("of {} N; closed on {} mm", fixed(d.jaw_force_n, 2), fixed(d.gap_mm, 1)),
+            ),
+        ]);
+    }
+    cards.extend([
         Card::new(
             "Peak force",
             format!("{} N", fixed(peak(|a| a.peak_constraint_n), 2)),
@@ -74,7 +76,7 @@ fn cards(lifted: &Lifted) -> String {
         )
         .met(s.suspensions().is_none()),
         Card::new("Speed", format!("{}\u{d7}", fixed(r.real_time_factor, 2)), "of real time, arms and tissue"),
-    ];
+    ]);
     if s.arms.iter().any(|a| a.rcm_peak_mm > 0.0) {
         let note = format!("at most; the paper: {PAPER_RCM_MM} mm, median of 84; the threshold is 3 mm");
         cards.push(Card::new("RCM deviation", mm(s.rcm_peak_mm), note).met(s.rcm_peak_mm < THRESHOLD_MM));
@@ -83,20 +85,6 @@ fn cards(lifted: &Lifted) -> String {
         cards.insert(0, Card::new("Diverged", "yes", why.to_string()).met(false));
     }
     page::cards(&cards)
-}
-
-/// What the cameras saw.
-fn seen(lifted: &Lifted) -> Result<String> {
-    let mut all = Vec::new();
-    if let Some((bytes, size)) = &lifted.pictures.film {
-        let img = figures::img_of_bytes("webp", bytes, size[0], size[1], "the lift through a camera of the scene");
-        all.push(page::figure(&img, "<b>The lift</b> in real time."));
-    }
-    for (caption, picture) in &lifted.pictures.stills {
-        all.push(page::figure(&figures::img(picture, caption)?, &format!("<b>{}</b>", page::escape(caption))));
-    }
-    let lead = "Direct light; instruments and organs are where the simulation has them.";
-    Ok(page::section("What the cameras saw", lead, &page::grid(Columns::Two, &all)))
 }
 
 fn bands(lifted: &Lifted) -> Vec<Band> {
@@ -120,24 +108,7 @@ fn plot(
     caption: &str,
     limits: Vec<f64>,
 ) -> Result<String> {
-    let line = |(_, value, color): &Curve<'_>| Line {
-        points: lifted.recording.channels.iter().map(|c| (c.time_s, value(c))).collect(),
-        color: colors::organ(*color),
-        filled: false,
-    };
-    let plot = Plot {
-        title,
-        x: "time [s]",
-        y,
-        lines: curves.iter().map(line).collect(),
-        bands: bands(lifted),
-        show: vec![0.0],
-        limits,
-        log_x: false,
-        log_y: false,
-    };
-    let legend = page::legend(curves.iter().map(|(name, _, color)| (*name, colors::organ(*color))));
-    Ok(page::figure(&plot.svg()?, &format!("<b>{title}</b>: {caption}{legend}")))
+    TimePlot { title, y, curves, caption, limits }.figure(&lifted.recording.channels, bands(lifted))
 }
 
 fn plots(lifted: &Lifted) -> Result<Vec<String>> {
@@ -209,18 +180,4 @@ fn plots(lifted: &Lifted) -> Result<Vec<String>> {
         )?);
     }
     Ok(all)
-}
-
-fn events(lifted: &Lifted) -> String {
-    let events = lifted.recording.events.iter();
-    let rows: Vec<Vec<String>> = events.map(|(time, event)| vec![fixed(*time, 2), event.to_string()]).collect();
-    page::section("What happened", "", &table::plain(&["Time [s]", "Event"], &rows))
-}
-
-/// Every number, word and flag of the result by its key.
-fn all_figures(lifted: &Lifted) -> Vec<Vec<String>> {
-    let Ok(serde_json::Value::Object(all)) = serde_json::to_value(&lifted.result) else { return Vec::new() };
-    let simple = all.into_iter().filter(|(_, v)| v.is_number() || v.is_string() || v.is_boolean());
-    let text = |v: serde_json::Value| v.as_str().map_or_else(|| v.to_string(), str::to_owned);
-    simple.map(|(key, value)| vec![key, text(value)]).collect()
 }

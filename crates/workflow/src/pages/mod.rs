@@ -4,21 +4,24 @@
 //! the organs behaved when they were lifted.
 
 mod bodies;
+mod episode;
 mod lift;
 mod organ_table;
 pub mod organ_views;
+mod over_time;
 mod seen;
 mod severed;
 mod truth;
 
-use crate::Result;
 use crate::lifted::Lifted;
+use crate::{Result, counted};
 use std::path::Path;
 use trocar_geometry::RepairReport;
 use trocar_reconstruct::Reconstruction;
 use trocar_report::{page, table};
 use trocar_specimen::Specimen;
 
+pub(crate) use episode::episode;
 pub use seen::check_sizes;
 
 /// The page of a specimen reconstructed from a recording. `truth_dir` is the phantom's `truth` folder or the recording that
@@ -102,10 +105,7 @@ pub(crate) fn lift(s: &Specimen, lifted: &Lifted, before: Option<&str>) -> Resul
 }
 
 fn made_from(s: &Specimen, what: &str) -> String {
-    let organs = match s.organs.len() {
-        1 => "1 organ".to_owned(),
-        n => format!("{n} organs"),
-    };
+    let organs = counted(s.organs.len(), "organ");
     if s.provenance.source.is_empty() {
         return format!("{what}, {organs}");
     }

@@ -41,7 +41,7 @@ fn text(r: &RolloutsResult) -> String {
                 of(p.held_to_end, p.attached),
                 or_dash(p.lift_median_mm, 1),
                 or_dash(p.rcm_max_mm, 3),
-                p.ends[3].to_string(),
+                p.ends.diverged.to_string(),
             ]
         })
         .collect();

@@ -1,0 +1,225 @@
+//! The page of an episode: how it ended and why, its stages, figures, pictures, and channels over time.
+
+use super::over_time::{self, TimePlot};
+use crate::Result;
+use crate::recorder::Pictures;
+use trocar_report::page::{self, Card, Columns};
+use trocar_report::plots::Band;
+use trocar_report::table::{self, fixed};
+use trocar_scene::TaskName;
+use trocar_task::{ArmChannels, ArmSummary, Channels, Recording, Summary};
+
+/// The channels of one arm in a row, and one value of a row.
+type ArmOf = fn(&Channels) -> &ArmChannels;
+type Value = Box<dyn Fn(&Channels) -> f64>;
+
+/// The page of the episode `recording` with its `pictures`; `real_time_factor` is simulated over wall
+/// time.
+///
+/// # Errors
+/// A plot or picture that cannot be drawn.
+pub(crate) fn episode(recording: &Recording, pictures: &Pictures, real_time_factor: f64) -> Result<String> {
+    let (info, s) = (&recording.info, &recording.summary);
+    let title = format!("{}: {}", info.scene, info.task.name());
+    let subtitle = format!("Episode of the policy {}, seed {}", info.policy, info.seed);
+    let body = page::section("Outcome", &lead(s), &cards(recording, real_time_factor))
+        + &stages(s)
+        + &over_time::pictures(pictures)?
+        + &plots(recording)?
+        + &arms(recording)
+        + &over_time::events(&recording.events)
+        + &over_time::all_figures(&recording.result());
+    Ok(page::page(&title, &subtitle, &body))
+}
+
+/// How the episode ended, why, and which physics was suspended: HTML.
+fn lead(s: &Summary) -> String {
+    let end = s.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
+    let why = s.why.clone().filter(|why| *why != end);
+    let said = [
+        ("Ended", Some(end)),
+        ("Not passed", why),
+        ("Note", s.advice.clone()),
+        ("Suspensions of physics", s.suspensions()),
+    ];
+    let said = said.into_iter().filter_map(|(what, text)| Some(format!("<b>{what}:</b> {}.", page::escape(&text?))));
+    said.collect::<Vec<_>>().join(" ")
+}
+
+fn cards(recording: &Recording, real_time_factor: f64) -> String {
+    let s = &recording.summary;
+    let mm = |v: f64| format!("{} mm", fixed(v, 2));
+    let peak = |of: fn(&ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
+    let mut cards = vec![
+        Card::new("Passed", if s.passed { "yes" } else { "no" }, format!("score {}", fixed(s.score, 2))).met(s.passed),
+        Card::new("Stages", format!("{} of {}", s.stage, s.progress.stages.len()), format!("next: {}", s.next)),
+        Card::new(
+            "Simulated",
+            format!("{} s", fixed(s.duration_s, 1)),
+            format!("{}\u{d7} real time", fixed(real_time_factor, 2)),
+        ),
+    ];
+    if recording.info.task != TaskName::PortReach {
+        let at = s.grasp_at.map_or("nothing grasped".to_owned(), |at| {
+            let organ = &s.details.organ;
+            format!("{} grasp of the {organ} at s = {}", s.details.design, fixed(at, 2))
+        });
+        cards.push(Card::new("Held to the end", if s.held_to_end { "yes" } else { "no" }, at).met(s.held_to_end));
+        if let (Some(slip), Some(follow)) = (s.slip_mm, s.follow_ratio) {
+            cards.push(Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * follow, 0))));
+            cards.push(Card::new("Slip", mm(slip), "of held tissue in the jaws"));
+        }
+    }
+    let threshold = recording.info.rcm_threshold_mm;
+    let within = Card::new("RCM deviation", mm(s.rcm_peak_mm), format!("at most; the threshold is {threshold} mm"));
+    cards.push(within.met(s.rcm_within));
+    let contact =
+        format!("contact on an instrument; pull of held tissue {} N", fixed(peak(|a| a.peak_constraint_n), 2));
+    cards.push(Card::new("Peak force", format!("{} N", fixed(peak(|a| a.peak_contact_n), 2)), contact));
+    cards.push(Card::new("Inverted elements", s.inverted_peak.to_string(), "at worst").met(s.inverted_peak == 0));
+    let suspended = s.suspensions();
+    let count = (s.disabled_contacts + s.disabled_blades + s.relaxed).to_string();
+    let note = suspended.clone().unwrap_or_else(|| "of physics by safety rules".to_owned());
+    cards.push(Card::new("Suspensions", count, note).met(suspended.is_none()));
+    page::cards(&cards)
+}
+
+fn stages(s: &Summary) -> String {
+    let row = |p: &trocar_task::StageProgress| {
+        let time = p.time_s.map_or("\u{2013}".to_owned(), |t| fixed(t, 2));
+        vec![p.stage.name().to_owned(), if p.passed { "yes" } else { "no" }.to_owned(), time, fixed(100.0 * p.share, 0)]
+    };
+    let rows: Vec<Vec<String>> = s.progress.stages.iter().map(row).collect();
+    let lead = "Stages pass in their order; a stage that did not pass shows how near it came.";
+    page::section("Stages", lead, &table::plain(&["Stage", "Passed", "Time [s]", "Share [%]"], &rows))
+}
+
+fn arms(recording: &Recording) -> String {
+    let head = [
+        "Arm",
+        "Under load [s]",
+        "RCM under load, median [mm]",
+        "95% [mm]",
+        "Largest [mm]",
+        "Whole episode [mm]",
+        "Lag [ms]",
+        "Contact [N]",
+        "Pull [N]",
+        "Jaw [N]",
+        "Tilt [\u{b0}]",
+        "Periods without contact",
+        "Commands shortened",
+    ];
+    let or_dash = |v: Option<f64>, decimals: usize| v.map_or("\u{2013}".to_owned(), |v| fixed(v, decimals));
+    let row = |a: &ArmSummary| {
+        vec![
+            a.arm.clone(),
+            fixed(a.loaded_s, 1),
+            or_dash(a.rcm_median_mm, 3),
+            or_dash(a.rcm_p95_mm, 3),
+            or_dash(a.rcm_max_mm, 3),
+            fixed(a.rcm_peak_mm, 3),
+            or_dash(a.lag_ms, 0),
+            fixed(a.peak_contact_n, 2),
+            fixed(a.peak_constraint_n, 2),
+            fixed(a.peak_jaw_n, 2),
+            fixed(a.tilt_max_deg, 1),
+            (a.contact_disabled + a.blades_disabled).to_string(),
+            a.guarded.to_string(),
+        ]
+    };
+    let rows: Vec<Vec<String>> = recording.summary.arms.iter().map(row).collect();
+    let lead = "Forces are peaks. A dash means that the arm was never under load, or never without.";
+    page::section("Arms", lead, &table::plain(&head, &rows))
+}
+
+/// Spans between the times at which stages passed, named by the stage that was next.
+fn bands(s: &Summary) -> Vec<Band> {
+    let mut from = 0.0;
+    let mut bands = Vec::new();
+    for stage in &s.progress.stages {
+        let to = stage.time_s.unwrap_or(s.duration_s);
+        bands.push(Band { name: stage.stage.name().to_owned(), from, to });
+        from = to;
+        if stage.time_s.is_none() {
+            break;
+        }
+    }
+    bands
+}
+
+fn plots(recording: &Recording) -> Result<String> {
+    let channels = &recording.channels;
+    if channels.is_empty() {
+        return Ok(String::new());
+    }
+    let has = |side: &str| recording.info.arms.iter().any(|arm| arm == side);
+    let sides: Vec<(&str, ArmOf, usize)> = [("left", (|c| &c.left) as ArmOf, 1), ("right", |c| &c.right, 2)]
+        .into_iter()
+        .filter(|(name, ..)| has(name))
+        .collect();
+    let both = |title: &str, y: &str, value: fn(&ArmChannels) -> f64, caption: &str, limits: Vec<f64>| {
+        let of: Vec<(&str, Value, usize)> = sides
+            .iter()
+            .map(|(name, arm, color)| {
+                let arm = *arm;
+                let of: Value = Box::new(move |c| value(arm(c)));
+                (*name, of, *color)
+            })
+            .collect();
+        let curves: Vec<over_time::Curve<'_>> =
+            of.iter().map(|(name, of, color)| (*name, of.as_ref(), *color)).collect();
+        TimePlot { title, y, curves: &curves, caption, limits }.figure(channels, bands(&recording.summary))
+    };
+    let task: Vec<over_time::Curve<'_>> = if recording.info.task == TaskName::PortReach {
+        vec![
+            ("first target", &|c| c.task.reach_1_mm, 1),
+            ("second", &|c| c.task.reach_2_mm, 2),
+            ("third", &|c| c.task.reach_3_mm, 4),
+        ]
+    } else {
+        vec![("jaws", &|c| c.task.jaw_lift_mm, 1), ("tissue", &|c| c.task.lift_mm, 4), ("slip", &|c| c.task.slip_mm, 2)]
+    };
+    let (title, caption) = match recording.info.task {
+        TaskName::PortReach => ("Distance to the targets", "largest distance of a blade tip from its target."),
+        _ => ("Lift", "rise since the jaws took hold, and how far tissue moved in them; zero while they hold nothing."),
+    };
+    let near = recording.summary.rcm_peak_mm > 0.5 * recording.info.rcm_threshold_mm;
+    let limits = if near { vec![recording.info.rcm_threshold_mm] } else { vec![] };
+    let all = [
+        TimePlot { title, y: "[mm]", curves: &task, caption, limits: vec![] }
+            .figure(channels, bands(&recording.summary))?,
+        both("Jaw", "opening [1]", |a| a.jaw, "0 closed, 1 wide open.", vec![])?,
+        both("Contact force", "force [N]", ArmChannels::contact_n, "of tissue on the instrument.", vec![])?,
+        both(
+            "Constraint force",
+            "force [N]",
+            ArmChannels::constraint_n,
+            "pull of the tissue that the jaws hold.",
+            vec![],
+        )?,
+        both(
+            "RCM deviation",
+            "deviation [mm]",
+            |a| a.rcm_peak_mm,
+            "from the port\u{2019}s centre to the shaft\u{2019}s axis, largest of a period; dashed the threshold, where it is near.",
+            limits,
+        )?,
+        both(
+            "Behind the command",
+            "[mm]",
+            |a| a.tracking_mm,
+            "distance of the tip from what was commanded at that time.",
+            vec![],
+        )?,
+        TimePlot {
+            title: "Smallest volume ratio",
+            y: "volume ratio [1]",
+            curves: &[("tissue", &|c| c.task.min_volume, 4)],
+            caption: "volume of the most compressed element over its volume at rest; at 0 an element is inverted.",
+            limits: vec![],
+        }
+        .figure(channels, bands(&recording.summary))?,
+    ];
+    Ok(page::section("Over time", "Shaded: the stage that was next.", &page::grid(Columns::Two, &all)))
+}
