@@ -1,5 +1,7 @@
 //! The scripted policy grasps the appendix of phantom A in the two-arm cell and lifts it.
 
+#![allow(clippy::print_stdout, reason = "an example prints its result")]
+
 use trocar::prelude::*;
 use trocar::task;
 

@@ -1,5 +1,7 @@
 //! A soft rod, held at one end, sags under gravity.
 
+#![allow(clippy::print_stdout, reason = "an example prints its result")]
+
 use trocar::prelude::*;
 
 /// A rod along x, 60 mm long and 10 mm thick, with round ends.

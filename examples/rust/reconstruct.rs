@@ -1,5 +1,7 @@
 //! A phantom is filmed by a simulated depth camera, and the recording becomes tetrahedral organs.
 
+#![allow(clippy::print_stdout, reason = "an example prints its result")]
+
 use trocar::phantom::RecordOptions;
 use trocar::reconstruct::{Settings, reconstruct};
 use trocar::recording::Recording;

@@ -1,5 +1,7 @@
 //! A policy of one's own in two episodes of the resection task, scored by stages.
 
+#![allow(clippy::print_stdout, reason = "an example prints its result")]
+
 use trocar::prelude::*;
 use trocar::task;
 
@@ -17,7 +19,7 @@ impl Policy for Wait {
 
     fn act(&mut self, episode: &Episode) -> task::Result<Vec<Action>> {
         let targets: Vec<_> = episode.cell().observe().iter().map(|arm| arm.commanded).collect();
-        Ok(vec![Action::pivots(&targets); 8])
+        Ok(vec![Action::targets(&targets); 8])
     }
 }
 
