@@ -16,7 +16,7 @@ pub(crate) struct GraspCandidate {
 impl GraspCandidate {
     /// What is held of the `tissue` of organ `organ` in the `mouth`: the attached cluster (SPEC
     /// C3), or for friction the tissue between the blades. None where no cluster is near. `reach`
-    /// is how far jaws hold from the middle of what they pinch [m].
+    /// is how far jaws hold from the middle of what they pinch (m).
     pub fn on(
         world: &World,
         organ: usize,
@@ -46,9 +46,9 @@ impl GraspCandidate {
 /// How far a grasp's nodes were from where it first prescribes them (SPEC, snap).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Snap {
-    /// The largest distance [m].
+    /// The largest distance (m).
     pub most: f64,
-    /// Their mean [m].
+    /// Their mean (m).
     pub mean: f64,
     /// Nodes held.
     pub nodes: usize,

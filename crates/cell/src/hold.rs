@@ -55,7 +55,8 @@ impl Hold {
         self.centroid_in_jaw += pose.rotation.inverse() * shift;
     }
 
-    /// Whether nothing has moved since the jaws closed, so that the next frame is the grasp's first.
+    /// Whether nothing has moved since the jaws closed, so that the next frame is the grasp's
+    /// first.
     pub fn is_new(&self, world: &World) -> bool {
         self.now(world) == self.centroid
     }

@@ -10,11 +10,11 @@ use crate::{Cluster, Gripper, World, clusters};
 use glam::DVec3;
 use trocar_core::Pose;
 
-/// Blades whose inner faces are no farther apart than this [m], where tissue is, hold nothing but
+/// Blades whose inner faces are no farther apart than this (m), where tissue is, hold nothing but
 /// each other's skin (the contact offset of SPEC C1).
 pub const CONTACT_SKIN: f64 = 0.0015;
 
-/// A cluster farther than this [m] from the middle of the tissue between the blades is not what
+/// A cluster farther than this (m) from the middle of the tissue between the blades is not what
 /// they hold.
 const ATTACH_WITHIN: f64 = 0.012;
 
@@ -27,18 +27,18 @@ const TOWARDS_CORNER: f64 = 0.5;
 pub struct JawRegion {
     gripper: Gripper,
     to_gripper: Pose,
-    /// Length of the blades [m].
+    /// Length of the blades (m).
     length: f64,
 }
 
 /// Tissue between the blades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TissueInJaws {
-    /// Its centroid in the world [m].
+    /// Its centroid in the world (m).
     pub centroid: DVec3,
-    /// Its volume [m3].
+    /// Its volume (m3).
     pub volume: f64,
-    /// Gap between the blades' inner faces there [m].
+    /// Gap between the blades' inner faces there (m).
     pub gap: f64,
 }
 
@@ -48,7 +48,7 @@ impl JawRegion {
         Self::sized(gripper, BLADE_TIP)
     }
 
-    /// The mouth of a gripper whose blades are `length` [m] long.
+    /// The mouth of a gripper whose blades are `length` (m) long.
     pub fn sized(gripper: &Gripper, length: f64) -> Self {
         Self { gripper: *gripper, to_gripper: gripper.pose.inverse(), length }
     }
@@ -58,7 +58,7 @@ impl JawRegion {
         self.holds(self.to_gripper.transform(p), 0.0)
     }
 
-    /// The same in the gripper's frame, with the blades farther apart by `beyond` [m] on each side.
+    /// The same in the gripper's frame, with the blades farther apart by `beyond` (m) on each side.
     fn holds(&self, q: DVec3, beyond: f64) -> bool {
         let r = q.x.hypot(q.y);
         let along = q.x > 0.0 && (JAW_REGION_BEGIN..=self.length).contains(&r);
@@ -135,8 +135,8 @@ impl JawRegion {
     }
 }
 
-/// The cluster of organ `organ` that is attached when jaws close on tissue around `centroid` [m]:
-/// the nearest, within 12 mm. Of thick organs, clusters are what jaws can reach (`reach` [m], see
+/// The cluster of organ `organ` that is attached when jaws close on tissue around `centroid` (m):
+/// the nearest, within 12 mm. Of thick organs, clusters are what jaws can reach (`reach` (m), see
 /// [`Cluster::within_reach`]).
 pub fn attached(world: &World, organ: usize, centroid: DVec3, reach: f64) -> Option<Cluster> {
     let mut all: Vec<Cluster> = clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
@@ -153,7 +153,7 @@ mod tests {
     use super::*;
     use crate::MAX_ANGLE;
 
-    /// A cube of edge 2 mm about `at` [m], in five elements.
+    /// A cube of edge 2 mm about `at` (m), in five elements.
     fn cube(at: DVec3) -> (Vec<[u32; 4]>, Vec<DVec3>) {
         let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2 & 1)) * 2.0 - 1.0;
         let tets = vec![[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]];

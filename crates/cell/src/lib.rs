@@ -1,7 +1,7 @@
 //! Specimen and instruments in one stepped world: the cell.
 //!
-//! A [`World`] is a specimen made ready to be stepped. A [`Cell`] is the whole of a scene file in the
-//! cell frame: it takes actions and reports observations. Its arms are driven by their dynamics
+//! A [`World`] is a specimen made ready to be stepped. A [`Cell`] is the whole of a scene file in
+//! the cell frame: it takes actions and reports observations. Its arms are driven by their dynamics
 //! through ports, in which tissue feels and loads them, or go where they are commanded.
 
 pub mod blades;

@@ -16,7 +16,8 @@ pub struct Severance {
     pub outcome: String,
     /// The same in a sentence.
     pub said: String,
-    /// Organ coordinate of the cut: the mean over the nodes that fell apart; 0 where nothing was cut.
+    /// Organ coordinate of the cut: the mean over the nodes that fell apart; 0 where nothing was
+    /// cut.
     pub at: f64,
     /// The least of these organ coordinates: elements' faces are no plane.
     pub at_least: f64,
@@ -34,8 +35,8 @@ pub struct Severance {
     pub area_mm2: f64,
     /// Nodes that are new, as copies of those on the cut.
     pub copies: usize,
-    /// The pieces: the one that stays the organ, then those that came loose. Empty where nothing was
-    /// cut.
+    /// The pieces: the one that stays the organ, then those that came loose. Empty where nothing
+    /// was cut.
     pub pieces: Vec<SeveredPiece>,
     /// Volume of the organ just before the cut (mm3).
     pub volume_before_mm3: f64,
@@ -113,8 +114,8 @@ impl Severance {
 }
 
 impl BeforeCut {
-    /// The figures once the organ is in `pieces`; `held` are bodies and numbers of nodes in jaws, and
-    /// `closed` (rad) is the angle at which the blades cut.
+    /// The figures once the organ is in `pieces`; `held` are bodies and numbers of nodes in jaws,
+    /// and `closed` (rad) is the angle at which the blades cut.
     pub(crate) fn after(self, world: &World, pieces: &[Piece], held: &[(usize, usize)], closed: f64) -> Severance {
         let (volume, inverted) = (1e9 * self.mesh.volume(), self.mesh.inverted());
         let mut figures = Severance {

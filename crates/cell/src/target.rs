@@ -2,8 +2,8 @@
 
 use crate::World;
 
-/// Jaws hold nodes within this distance of the middle of what they pinch (m): half a cluster and the
-/// blades' reach.
+/// Jaws hold nodes within this distance of the middle of what they pinch (m): half a cluster and
+/// the blades' reach.
 const REACH: f64 = 0.009;
 
 /// On a coarse mesh they hold nodes within this many median edges.

@@ -51,7 +51,8 @@ fn illegal_actions_are_refused_by_name_and_change_nothing() {
     cell.step(&tip).unwrap();
 }
 
-/// Moves `arm` to a pose of its tip with the jaw at `jaw`, in `periods`, by actions; the actions that it took.
+/// Moves `arm` to a pose of its tip with the jaw at `jaw`, in `periods`, by actions; the actions
+/// that it took.
 fn send(cell: &mut Cell, arm: &str, pose: &Pose, jaw: f64, periods: usize) -> (Vec<Action>, Vec<CellReport>) {
     let k = cell.arm_index(arm).unwrap();
     let from: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded).collect();

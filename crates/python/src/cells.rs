@@ -12,7 +12,7 @@ use trocar_cell::{Action, ActionSpace};
 use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it
-/// goes on), time [s].
+/// goes on), time (s).
 const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 
 /// Names of the ends, by their number in `figures`.
@@ -197,7 +197,7 @@ impl Cells {
     }
 
     /// Writes what `cameras` see of the cells that `active` says: `color` has an array (cells,
-    /// height, width, 3) of bytes a camera, `depth` one (cells, height, width, 1) of z [m], 0 where
+    /// height, width, 3) of bytes a camera, `depth` one (cells, height, width, 1) of z (m), 0 where
     /// nothing is; either list may be empty. Cells go in parallel, without the interpreter's lock.
     fn see(
         &mut self,
@@ -208,7 +208,8 @@ impl Cells {
         color: Vec<Bound<'_, PyArrayDyn<u8>>>,
         depth: Vec<Bound<'_, PyArrayDyn<f32>>>,
     ) -> PyResult<()> {
-        self.look(py, &cameras, &size, &active, &color, &depth)
+        self.here()?;
+        self.eyes.look(py, (&self.episodes, &self.pool), &cameras, &size, &active, &color, &depth)
     }
 
     /// A picture (height, width, 3) of cell `k` through `camera`.
@@ -220,7 +221,8 @@ impl Cells {
         height: usize,
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        self.photograph(py, k, camera, height, width)
+        self.at(k)?;
+        self.eyes.photograph(py, (&self.episodes[k], &self.pool), k, camera, height, width)
     }
 
     /// Least and greatest numbers of an action.

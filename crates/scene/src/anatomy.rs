@@ -73,13 +73,13 @@ pub struct MaterialOverride {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "material_models")]
     pub model: Option<MaterialModel>,
-    /// Young's modulus [Pa]; soft tissue has about 12000.
+    /// Young's modulus (Pa); soft tissue has about 12000.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub young_modulus_pa: Option<f64>,
     /// Poisson's ratio, 0 to 0.4999.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poisson_ratio: Option<f64>,
-    /// Density [kg/m3]; the paper's cell has 1200.
+    /// Density (kg/m3); the paper's cell has 1200.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_kg_m3: Option<f64>,
 }
@@ -178,9 +178,9 @@ pub enum ScheduleName {
 pub struct Tissue {
     /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
     pub schedule: ScheduleName,
-    /// Distance at which contact between organs is looked for [mm].
+    /// Distance at which contact between organs is looked for (mm).
     pub contact_offset_mm: f64,
-    /// Distance at which tissue rests on the tips of instruments [mm].
+    /// Distance at which tissue rests on the tips of instruments (mm).
     pub tip_rest_offset_mm: f64,
     /// Coulomb friction of tissue on tissue and of instruments on tissue.
     pub friction: f64,

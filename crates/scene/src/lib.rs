@@ -17,6 +17,7 @@ mod cell;
 mod check;
 mod error;
 mod phantoms;
+mod port;
 mod read;
 mod scene;
 mod schema;
@@ -29,11 +30,10 @@ pub use anatomy::{
 };
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
-pub use cell::{
-    Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Port, Side,
-};
+pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Side};
 pub use error::{Error, Result};
 pub use phantoms::{PHANTOMS, Phantom};
+pub use port::Port;
 pub use scene::{Rates, Scene, Tool};
 pub use start::Start;
 pub use task::{Gates, GraspDesignName, Safety, Task, TaskName, Variation};

@@ -6,7 +6,7 @@ use std::io::Read;
 use std::path::Path;
 use trocar_specimen::{Specimen, line_of, nearest, parse_toml};
 
-/// Largest scene file [bytes]; the paper's has about 8,000.
+/// Largest scene file (bytes); the paper's has about 8,000.
 const MOST_BYTES: u64 = 1 << 20;
 
 impl Scene {

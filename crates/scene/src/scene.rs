@@ -76,9 +76,9 @@ pub struct Tool<'a> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rates {
-    /// Actions and observations a second [Hz].
+    /// Actions and observations a second (Hz).
     pub control_hz: u32,
-    /// Steps of the arms a second [Hz]; a multiple of `control_hz`.
+    /// Steps of the arms a second (Hz); a multiple of `control_hz`.
     pub physics_hz: u32,
 }
 
@@ -108,7 +108,7 @@ fn arms() -> Vec<Arm> {
 }
 
 fn ports() -> Vec<Port> {
-    vec![Port::paper(Side::Left, [-0.045, 0.46, 0.16]), Port::paper(Side::Right, [0.045, 0.46, 0.16])]
+    vec![Port::paper(Side::Left.name(), [-0.045, 0.46, 0.16]), Port::paper(Side::Right.name(), [0.045, 0.46, 0.16])]
 }
 
 fn instruments() -> Vec<Instrument> {

@@ -50,7 +50,7 @@ pub struct Task {
     pub name: TaskName,
     /// The organ it is about.
     pub organ: String,
-    /// Longest episode [s].
+    /// Longest episode (s).
     pub episode_s: f64,
     /// How the grasper holds: friction, rest-pose, live-pose or compliant.
     pub grasp: GraspDesignName,
@@ -60,8 +60,8 @@ pub struct Task {
     pub first_grasp: Option<GraspDesignName>,
     /// A cut parts the tissue.
     pub sever: bool,
-    /// The episode ends when its last stage has passed. Without, it runs until its time is up or the
-    /// policy has finished.
+    /// The episode ends when its last stage has passed. Without, it runs until its time is up or
+    /// the policy has finished.
     #[serde(skip_serializing_if = "is_true")]
     pub stop_when_passed: bool,
     /// When stages count as done.
@@ -106,11 +106,11 @@ pub struct Gates {
     pub grasp_from: f64,
     /// Grasp: and at this one or before.
     pub grasp_to: f64,
-    /// Lift: the held cluster's centroid rises by this much [mm] ...
+    /// Lift: the held cluster's centroid rises by this much (mm) ...
     pub lift_mm: f64,
-    /// ... for this long [s].
+    /// ... for this long (s).
     pub lift_s: f64,
-    /// Positioning: the cutter's tip is this near to the tissue between grasp and base [mm].
+    /// Positioning: the cutter's tip is this near to the tissue between grasp and base (mm).
     pub positioning_mm: f64,
     /// Cut: the jaw first opens beyond this (0 closed to 1) ...
     pub cut_open: f64,
@@ -137,17 +137,17 @@ impl Default for Gates {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Variation {
-    /// Tilt of the instruments [degrees].
+    /// Tilt of the instruments (degrees).
     pub tilt_deg: f64,
-    /// Azimuth of the instruments [degrees].
+    /// Azimuth of the instruments (degrees).
     pub azimuth_deg: f64,
-    /// Insertion of the instruments [mm].
+    /// Insertion of the instruments (mm).
     pub insertion_mm: f64,
-    /// Roll of the instruments [degrees].
+    /// Roll of the instruments (degrees).
     pub roll_deg: f64,
-    /// Shift of the specimen along the cell's x and along its y [mm].
+    /// Shift of the specimen along the cell's x and along its y (mm).
     pub specimen_shift_mm: f64,
-    /// Turn of the specimen about the vertical [degrees].
+    /// Turn of the specimen about the vertical (degrees).
     pub specimen_turn_deg: f64,
 }
 
@@ -168,11 +168,11 @@ impl Default for Variation {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Safety {
-    /// RCM deviation that episodes are scored against [mm].
+    /// RCM deviation that episodes are scored against (mm).
     pub rcm_threshold_mm: f64,
-    /// RCM deviation at which the hardware stops [mm].
+    /// RCM deviation at which the hardware stops (mm).
     pub rcm_abort_mm: f64,
-    /// Force of tissue on an instrument against which no command pushes it on [N].
+    /// Force of tissue on an instrument against which no command pushes it on (N).
     pub force_limit_n: f64,
 }
 

@@ -44,8 +44,8 @@ impl Bounds {
     }
 
     /// The action of these numbers. What lies outside is brought back to the edge, as a robot's own
-    /// limits do; the box of two pivots has corners that no shaft reaches, and those are brought back
-    /// too.
+    /// limits do; the box of two pivots has corners that no shaft reaches, and those are brought
+    /// back too.
     ///
     /// # Errors
     /// Too few or too many numbers, or one that is not finite, by its name.

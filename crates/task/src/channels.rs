@@ -28,27 +28,27 @@ macro_rules! row {
 row! {
     /// One arm in a period; all zero where the scene has no such arm. Flags are 0 or 1.
     ArmChannels {
-        /// First pivot, measured [rad]; 0 without a port, as the next two.
+        /// First pivot, measured (rad); 0 without a port, as the next two.
         pivot_1_rad,
-        /// Second pivot [rad].
+        /// Second pivot (rad).
         pivot_2_rad,
-        /// Port's centre to the jaw's pivot [m].
+        /// Port's centre to the jaw's pivot (m).
         insertion_m,
-        /// Turn about the shaft [rad].
+        /// Turn about the shaft (rad).
         roll_rad,
         /// Jaw opening, 0 closed to 1.
         jaw,
-        /// Rate of the first pivot [rad/s].
+        /// Rate of the first pivot (rad/s).
         pivot_1_rad_s,
-        /// Rate of the second pivot [rad/s].
+        /// Rate of the second pivot (rad/s).
         pivot_2_rad_s,
-        /// Rate of the insertion [m/s].
+        /// Rate of the insertion (m/s).
         insertion_m_s,
-        /// Rate of the roll [rad/s].
+        /// Rate of the roll (rad/s).
         roll_rad_s,
-        /// Rate of the jaw's opening [1/s].
+        /// Rate of the jaw's opening (1/s).
         jaw_1_s,
-        /// Measured tip frame (at the jaw's pivot) in the cell [m].
+        /// Measured tip frame (at the jaw's pivot) in the cell (m).
         tip_x_m,
         /// See [`tip_x_m`](Self::tip_x_m).
         tip_y_m,
@@ -62,33 +62,33 @@ row! {
         tip_qy,
         /// See [`tip_qw`](Self::tip_qw).
         tip_qz,
-        /// Commanded place of the tip frame [m].
+        /// Commanded place of the tip frame (m).
         commanded_x_m,
         /// See [`commanded_x_m`](Self::commanded_x_m).
         commanded_y_m,
         /// See [`commanded_x_m`](Self::commanded_x_m).
         commanded_z_m,
-        /// Distance between the two at the same time: error and lag together [mm].
+        /// Distance between the two at the same time: error and lag together (mm).
         tracking_mm,
-        /// RCM deviation at the period's end [mm].
+        /// RCM deviation at the period's end (mm).
         rcm_mm,
-        /// The largest in the period [mm].
+        /// The largest in the period (mm).
         rcm_peak_mm,
-        /// Angle between shaft and port normal [degrees].
+        /// Angle between shaft and port normal (degrees).
         tilt_deg,
-        /// Contact force on the instrument along the cell's axes [N].
+        /// Contact force on the instrument along the cell's axes (N).
         contact_x_n,
         /// See [`contact_x_n`](Self::contact_x_n).
         contact_y_n,
         /// See [`contact_x_n`](Self::contact_x_n).
         contact_z_n,
-        /// Constraint force of a latched grasp [N].
+        /// Constraint force of a latched grasp (N).
         constraint_x_n,
         /// See [`constraint_x_n`](Self::constraint_x_n).
         constraint_y_n,
         /// See [`constraint_x_n`](Self::constraint_x_n).
         constraint_z_n,
-        /// Force with which tissue pushes the blades apart [N].
+        /// Force with which tissue pushes the blades apart (N).
         jaw_force_n,
         /// The jaws hold tissue of any organ.
         attached,
@@ -96,7 +96,7 @@ row! {
         in_mouth,
         /// Share of the wedge between the blades that it fills.
         mouth_share,
-        /// Rotation that was asked for and that four degrees of freedom cannot do [degrees].
+        /// Rotation that was asked for and that four degrees of freedom cannot do (degrees).
         rejected_deg,
         /// The command stops short of what was asked.
         held_back,
@@ -116,22 +116,22 @@ row! {
     /// the task's organ. Flags are 0 or 1.
     TaskChannels {
         /// Distance from the middle of the grasper's mouth to the organ's axis where the grasp gate
-        /// wants it [mm].
+        /// wants it (mm).
         grasp_distance_mm,
         /// The grasper holds the task's organ.
         grasped,
         /// Organ coordinate of what it holds.
         grasp_s,
-        /// Rise of the held tissue's centroid since [mm].
+        /// Rise of the held tissue's centroid since (mm).
         lift_mm,
-        /// Rise of the jaws since [mm].
+        /// Rise of the jaws since (mm).
         jaw_lift_mm,
         /// Follow ratio: tissue lift over jaw lift; 0 below 0.1 mm of jaw lift.
         follow,
-        /// Slip [mm].
+        /// Slip (mm).
         slip_mm,
         /// Distance from the cutter's tip to the nearest tissue between grasp (the gate's upper end
-        /// while nothing is held) and base [mm].
+        /// while nothing is held) and base (mm).
         position_mm,
         /// Jaw opening of the cutter.
         cut_jaw,
@@ -141,7 +141,7 @@ row! {
         cut_share,
         /// Cuts in the period.
         cuts,
-        /// Largest distance of any arm's blade tip from its first target [mm]; port-reach only, as
+        /// Largest distance of any arm's blade tip from its first target (mm); port-reach only, as
         /// the next two.
         reach_1_mm,
         /// From its second.
@@ -152,7 +152,7 @@ row! {
         torn,
         /// Times that it began to slide.
         slipped,
-        /// Largest node speed [m/s].
+        /// Largest node speed (m/s).
         max_speed_m_s,
         /// Most inverted elements in any frame of the period.
         inverted,
@@ -170,7 +170,8 @@ row! {
         disabled_blades,
         /// Times that an organ was relaxed outside of time.
         relaxed,
-        /// Largest motion of any node in the first frame after jaws took hold [mm]; 0 where none did.
+        /// Largest motion of any node in the first frame after jaws took hold (mm); 0 where none
+        /// did.
         activation_step_mm,
     }
 }
@@ -178,7 +179,7 @@ row! {
 /// A row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Channels {
-    /// Time at the period's end since the episode's start [s].
+    /// Time at the period's end since the episode's start (s).
     pub time_s: f64,
     /// The left arm.
     pub left: ArmChannels,
@@ -232,12 +233,12 @@ impl Channels {
 }
 
 impl ArmChannels {
-    /// Magnitude of the contact force [N].
+    /// Magnitude of the contact force (N).
     pub fn contact_n(&self) -> f64 {
         glam::DVec3::new(self.contact_x_n, self.contact_y_n, self.contact_z_n).length()
     }
 
-    /// Magnitude of the constraint force [N].
+    /// Magnitude of the constraint force (N).
     pub fn constraint_n(&self) -> f64 {
         glam::DVec3::new(self.constraint_x_n, self.constraint_y_n, self.constraint_z_n).length()
     }

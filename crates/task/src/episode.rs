@@ -6,74 +6,15 @@ use crate::measure::Subject;
 use crate::random::Random;
 use crate::stages::Tracker;
 use crate::start::{Arrangement, starts, targets};
-use crate::{Channels, Error, Observation, Progress, Result, Summary, specimen_hash};
-use serde::{Deserialize, Serialize};
+use crate::{Channels, End, Error, Observation, Progress, Result, Summary, specimen_hash};
 use trocar_cell::{Action, Cell, CellEvent, CellState, Settling};
 use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
 
-/// How long organs settle under gravity before any episode begins [s]: all phantoms are at rest
+/// How long organs settle under gravity before any episode begins (s): all phantoms are at rest
 /// within it (SPEC, settled).
 pub const SETTLE_S: f64 = 1.0;
-
-/// How an episode ended.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "end", rename_all = "kebab-case")]
-pub enum End {
-    /// All stages are passed.
-    Passed,
-    /// The scene's time is up.
-    TimeOut,
-    /// The RCM deviation went beyond that at which hardware stops.
-    RcmAbort {
-        /// The arm.
-        arm: String,
-        /// The deviation [mm].
-        deviation_mm: f64,
-    },
-    /// Tissue or an arm is lost.
-    Diverged {
-        /// Why.
-        why: String,
-    },
-    /// The policy had nothing left to do, and not all stages are passed.
-    Finished,
-    /// The policy gave no action that could be done.
-    PolicyError {
-        /// What was wrong with it.
-        why: String,
-    },
-}
-
-impl End {
-    /// Its name in files.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Passed => "passed",
-            Self::TimeOut => "time-out",
-            Self::RcmAbort { .. } => "rcm-abort",
-            Self::Diverged { .. } => "diverged",
-            Self::Finished => "finished",
-            Self::PolicyError { .. } => "policy-error",
-        }
-    }
-}
-
-impl std::fmt::Display for End {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Passed => write!(f, "all stages passed"),
-            Self::TimeOut => write!(f, "the time was up"),
-            Self::RcmAbort { arm, deviation_mm } => {
-                write!(f, "the {arm} RCM deviation of {deviation_mm:.2} mm is where hardware stops")
-            }
-            Self::Diverged { why } => write!(f, "diverged: {why}"),
-            Self::Finished => write!(f, "the policy had finished"),
-            Self::PolicyError { why } => write!(f, "the policy failed: {why}"),
-        }
-    }
-}
 
 /// What a step gives.
 #[derive(Clone, Debug, PartialEq)]
@@ -295,12 +236,12 @@ impl Episode {
         &self.now.rows
     }
 
-    /// What happened so far, with times [s].
+    /// What happened so far, with times (s).
     pub fn events(&self) -> &[(f64, CellEvent)] {
         &self.now.events
     }
 
-    /// Simulated time since the start [s].
+    /// Simulated time since the start (s).
     pub fn time(&self) -> f64 {
         self.cell.time()
     }
@@ -330,8 +271,8 @@ impl Episode {
         &self.cell
     }
 
-    /// Length of the most stretched edge of any organ now over that at rest: privileged. Takes a pass over
-    /// all edges.
+    /// Length of the most stretched edge of any organ now over that at rest: privileged. Takes a
+    /// pass over all edges.
     pub fn max_stretch(&mut self) -> f64 {
         self.cell.max_stretch()
     }
@@ -346,7 +287,7 @@ impl Episode {
         self.now.subject.bodies(&self.cell)
     }
 
-    /// Targets of port-reach in the cell [m], three an arm; empty for other tasks.
+    /// Targets of port-reach in the cell (m), three an arm; empty for other tasks.
     pub fn targets(&self) -> &[[glam::DVec3; 3]] {
         &self.now.subject.targets
     }
@@ -449,7 +390,8 @@ fn key(scene: &Scene, specimen: u64) -> Result<u64> {
     Ok(scene.hash(&[specimen])?)
 }
 
-/// The cell with the specimen as arranged, its state once the organs have settled, and how they did.
+/// The cell with the specimen as arranged, its state once the organs have settled, and how they
+/// did.
 fn build(scene: &Scene, specimen: &Specimen, threads: usize, at: &Arrangement) -> Result<(Cell, CellState, Settling)> {
     let mut cell = Cell::new(&at.scene(scene, specimen), specimen, threads)?;
     let settling = cell.settle(SETTLE_S)?;

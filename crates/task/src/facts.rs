@@ -1,7 +1,7 @@
-//! Figures of an episode that its channels do not have: what was grasped and how, how organs came to
-//! rest, what a cut left.
+//! Figures of an episode that its channels do not have: what was grasped and how, how organs came
+//! to rest, what a cut left.
 
-use crate::{Channels, Summary};
+use crate::Channels;
 use serde::{Deserialize, Serialize};
 use trocar_cell::blades::FRICTION;
 use trocar_cell::{CellEvent, Settling, Severance};
@@ -23,8 +23,8 @@ pub struct Details {
     pub gap_mm: f64,
     /// Force with which tissue pushed the blades apart then (N).
     pub closing_force_n: f64,
-    /// Largest distance between where the last grasp first prescribes a node and where it was (mm). Zero
-    /// by construction for designs that capture nodes where they are.
+    /// Largest distance between where the last grasp first prescribes a node and where it was (mm).
+    /// Zero by construction for designs that capture nodes where they are.
     pub snap_mm: f64,
     /// Mean of that distance over the nodes (mm).
     pub snap_mean_mm: f64,
@@ -63,8 +63,8 @@ pub struct Severed {
     pub jaw_rise_mm: f64,
     /// Rise of the tissue in the jaws since (mm).
     pub held_rise_mm: f64,
-    /// The organ was cut through, and the jaws still hold their piece: it followed at least 0.80 of their
-    /// rise, and slipped less than 3 mm since.
+    /// The organ was cut through, and the jaws still hold their piece: it followed at least 0.80 of
+    /// their rise, and slipped less than 3 mm since.
     pub held: bool,
 }
 
@@ -108,7 +108,8 @@ impl Facts<'_> {
             details.held_nodes = *nodes;
             (details.snap_mm, details.snap_mean_mm, details.displaced_mm) = (*snap_mm, *snap_mean_mm, *displaced_mm);
             (details.gap_mm, details.closing_force_n) = (*gap_mm, *closing_force_n);
-            // The first frame of the grasp lies in the period in which the jaws closed, or in the next.
+            // The first frame of the grasp lies in the period in which the jaws closed, or in the
+            // next.
             let first = self.rows.iter().position(|c| c.time_s >= time - 1e-9).unwrap_or(self.rows.len());
             let steps = self.rows[first..].iter().take(2).map(|c| c.task.activation_step_mm);
             details.activation_step_mm = steps.fold(0.0, f64::max);
@@ -142,11 +143,11 @@ impl Facts<'_> {
         Some(severed)
     }
 
-    /// For a grasp that presses and slipped, a sentence on the jaw force that would bear the organ's
-    /// weight. None for designs that tie nodes, which no force of the jaws makes hold.
-    pub fn advice(&self, summary: &Summary) -> Option<String> {
+    /// For a grasp that slipped and whose design presses, a sentence on the jaw force that would bear the
+    /// organ's weight. None for designs that tie nodes, which no force of the jaws makes hold.
+    pub fn advice(&self) -> Option<String> {
         let presses = matches!(self.task.grasp, GraspDesignName::Friction | GraspDesignName::Compliant);
-        if summary.held || summary.diverged || !summary.attached || summary.torn > 0 || !presses {
+        if !presses {
             return None;
         }
         let (force, weight, organ) = (self.jaw_force_n, self.organ_weight_n, &self.task.organ);

@@ -6,6 +6,7 @@
 
 mod bounds;
 mod channels;
+mod end;
 mod episode;
 mod error;
 mod facts;
@@ -26,7 +27,8 @@ mod why;
 
 pub use bounds::Bounds;
 pub use channels::{ArmChannels, Channels, TaskChannels};
-pub use episode::{End, Episode, EpisodeState, SETTLE_S, Step};
+pub use end::End;
+pub use episode::{Episode, EpisodeState, SETTLE_S, Step};
 pub use error::{Error, Result};
 pub use facts::{Details, Severed};
 pub use observation::{ArmState, Observation, STATE_NAMES, STATE_SIZE, privileged};

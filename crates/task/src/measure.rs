@@ -9,7 +9,7 @@ use trocar_scene::{Gates, InstrumentKind, Side};
 /// Middle of the region between the blades from the pivot (m).
 const MID_JAWS: f64 = 0.0115;
 
-/// Jaw lift below which no follow ratio is told [m].
+/// Jaw lift below which no follow ratio is told (m).
 const MIN_JAW_LIFT: f64 = 1e-4;
 
 /// What of a cell the channels are about.
@@ -21,7 +21,7 @@ pub(crate) struct Subject {
     /// Places of the first grasper and the first cutter among the arms.
     pub grasper: Option<usize>,
     pub cutter: Option<usize>,
-    /// Targets of port-reach: blade tips in the cell [m], three an arm; empty for other tasks.
+    /// Targets of port-reach: blade tips in the cell (m), three an arm; empty for other tasks.
     pub targets: Vec<[DVec3; 3]>,
 }
 
@@ -139,7 +139,7 @@ pub(crate) fn upright(q: DQuat) -> DQuat {
     if q.w < 0.0 { -q } else { q }
 }
 
-/// Distance from `p` to the nearest node of a body among those `of` [m]; infinite without any.
+/// Distance from `p` to the nearest node of a body among those `of` (m); infinite without any.
 fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f64 {
     let world = cell.world();
     let count = world.model.bodies()[body].len();

@@ -15,13 +15,13 @@ pub struct ArmState {
     pub coordinates: [f64; 5],
     /// Their rates a second.
     pub rates: [f64; 5],
-    /// Tip frame (at the jaw's pivot) in the cell [m].
+    /// Tip frame (at the jaw's pivot) in the cell (m).
     pub tip_m: [f64; 3],
     /// Its rotation, a unit quaternion, scalar first and not negative.
     pub tip_wxyz: [f64; 4],
-    /// RCM deviation [m].
+    /// RCM deviation (m).
     pub rcm_m: f64,
-    /// Force of the tissue on the instrument along the cell's axes [N].
+    /// Force of the tissue on the instrument along the cell's axes (N).
     pub force_n: [f64; 3],
     /// What that force is: 0 contact, 1 the constraint of a latched grasp.
     pub force_kind: f64,
@@ -32,7 +32,7 @@ pub struct ArmState {
 /// What a policy sees at the end of a period. No tissue value is in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Observation {
-    /// Time since the episode's start [s].
+    /// Time since the episode's start (s).
     pub time_s: f64,
     /// The left arm.
     pub left: ArmState,

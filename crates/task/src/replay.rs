@@ -16,9 +16,9 @@ use xxhash_rust::xxh3::xxh3_64;
 const FORMAT: &str = "trocar-episode";
 const VERSION: u32 = 1;
 
-/// Largest file [bytes]: a million steps.
+/// Largest file (bytes): a million steps.
 const MOST_BYTES: u64 = 100 << 20;
-/// Longest header line [bytes].
+/// Longest header line (bytes).
 const MOST_HEADER: usize = 4 << 20;
 /// Numbers of an arm in an action.
 const NUMBERS: usize = 5;

@@ -23,7 +23,7 @@ pub struct Recording {
     pub info: ChannelsInfo,
     /// The rows.
     pub channels: Vec<Channels>,
-    /// What happened, with times [s].
+    /// What happened, with times (s).
     pub events: Vec<(f64, CellEvent)>,
     /// The figures.
     pub summary: Summary,
@@ -52,19 +52,19 @@ pub struct EpisodeResult {
 /// Something that happened, and when.
 #[derive(Clone, Debug, Serialize)]
 pub struct TimedEvent {
-    /// Time at the end of its control period [s].
+    /// Time at the end of its control period (s).
     pub time_s: f64,
     /// What.
     #[serde(flatten)]
     pub event: CellEvent,
 }
 
-/// Resets `episode` to `seed` and lets `policy` go through it. `watch` sees every step and returns false
-/// to stop.
+/// Resets `episode` to `seed` and lets `policy` go through it. `watch` sees every step and returns
+/// false to stop.
 ///
 /// # Errors
-/// A reset or a first look that fails, or [`trocar_cell::Error::Interrupted`] when `watch` stops it. A
-/// policy that fails on the way ends the episode, which is a result.
+/// A reset or a first look that fails, or [`trocar_cell::Error::Interrupted`] when `watch` stops
+/// it. A policy that fails on the way ends the episode, which is a result.
 pub fn run(
     episode: &mut Episode,
     policy: &mut dyn Policy,

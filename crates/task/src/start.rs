@@ -12,9 +12,9 @@ use trocar_specimen::Specimen;
 /// How far a specimen lies from where the scene has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Arrangement {
-    /// Along the cell's x and y [m].
+    /// Along the cell's x and y (m).
     shift: [f64; 2],
-    /// About the vertical through the middle of the specimen [rad].
+    /// About the vertical through the middle of the specimen (rad).
     turn: f64,
 }
 
@@ -68,14 +68,14 @@ pub(crate) fn starts(scene: &Scene, cell: &Cell, seed: u64) -> Vec<Setpoint> {
     scene.tools().iter().enumerate().map(one).collect()
 }
 
-/// Greatest tilt of port-reach's targets [rad].
+/// Greatest tilt of port-reach's targets (rad).
 const TARGET_TILT: f64 = 0.35;
-/// They are this much above the deepest insertion with which the blades stay above the floor [m],
+/// They are this much above the deepest insertion with which the blades stay above the floor (m),
 /// over this length.
 const TARGET_ABOVE: f64 = 0.015;
 const TARGET_RANGE: f64 = 0.03;
 
-/// Three targets an arm for port-reach, where its blade tips can be, above the tissue [m].
+/// Three targets an arm for port-reach, where its blade tips can be, above the tissue (m).
 pub(crate) fn targets(cell: &Cell, seed: u64) -> Result<Vec<[DVec3; 3]>> {
     let random = Random::new(seed, "targets");
     let mut all = Vec::new();

@@ -22,8 +22,8 @@ const KEY: &str = "trocar";
 const FORMAT: &str = "trocar-channels";
 const VERSION: u32 = 2;
 
-/// What a column of this version was called in files of version 1. `None` for one that they do not have,
-/// which is read as zeros.
+/// What a column of this version was called in files of version 1. `None` for one that they do not
+/// have, which is read as zeros.
 fn name_in_version_1(name: &str) -> Option<String> {
     let new = ["_blades_disabled", "_guarded"];
     let task = ["disabled_contacts", "disabled_blades", "relaxed", "activation_step_mm"];
@@ -35,7 +35,7 @@ fn name_in_version_1(name: &str) -> Option<String> {
 
 /// Most rows of a file: nine hours.
 const MOST_ROWS: usize = 1_000_000;
-/// Largest file [bytes].
+/// Largest file (bytes).
 const MOST_BYTES: u64 = 1 << 31;
 
 /// What a file of channels says of itself.
@@ -47,9 +47,9 @@ pub struct ChannelsInfo {
     pub task: TaskName,
     /// Its gates.
     pub gates: Gates,
-    /// RCM deviation that episodes are scored against [mm].
+    /// RCM deviation that episodes are scored against (mm).
     pub rcm_threshold_mm: f64,
-    /// RCM deviation beyond which an episode is lost [mm]; None in files that were written before
+    /// RCM deviation beyond which an episode is lost (mm); None in files that were written before
     /// it was.
     #[serde(default)]
     pub rcm_abort_mm: Option<f64>,

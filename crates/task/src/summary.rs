@@ -1,4 +1,5 @@
-//! An episode in figures, computed from its channels and, where these do not say it, from its events.
+//! An episode in figures, computed from its channels and, where these do not say it, from its
+//! events.
 
 use crate::channels::{ArmChannels, TaskChannels};
 use crate::facts::{Details, Facts};
@@ -7,13 +8,13 @@ use crate::why::why;
 use crate::{Channels, End, Progress, Stage};
 use serde::{Deserialize, Serialize};
 
-/// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument [N].
+/// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument (N).
 pub const LOADED_N: f64 = 0.05;
 
 /// Jaws are at the top of their lift within this share of it.
 const TOP_SHARE: f64 = 0.05;
 
-/// The greatest lag that is looked for [s], and the step of the search.
+/// The greatest lag that is looked for (s), and the step of the search.
 const MAX_LAG: f64 = 0.3;
 const LAG_STEP: f64 = 1e-3;
 
@@ -30,7 +31,7 @@ pub struct ArmSummary {
     pub rcm_p95_mm: Option<f64>,
     /// The largest in any physics step under load (mm).
     pub rcm_max_mm: Option<f64>,
-    /// The largest of the whole episode [mm].
+    /// The largest of the whole episode (mm).
     pub rcm_peak_mm: f64,
     /// Root mean square distance between commanded and measured tip at the same time, without load
     /// (mm). This and the next two are `None` if the arm was never without load.
@@ -39,13 +40,13 @@ pub struct ArmSummary {
     pub lag_ms: Option<f64>,
     /// The distance that is left then (mm).
     pub lagged_rms_mm: Option<f64>,
-    /// Peak contact force [N].
+    /// Peak contact force (N).
     pub peak_contact_n: f64,
-    /// Peak constraint force [N]: the pull of what is held, no contact.
+    /// Peak constraint force (N): the pull of what is held, no contact.
     pub peak_constraint_n: f64,
-    /// Peak force with which tissue pushed the blades apart [N].
+    /// Peak force with which tissue pushed the blades apart (N).
     pub peak_jaw_n: f64,
-    /// Largest tilt [degrees].
+    /// Largest tilt (degrees).
     pub tilt_max_deg: f64,
     /// Periods in which contact of the instrument with tissue was disabled.
     #[serde(default, alias = "unhooked")]
@@ -73,7 +74,7 @@ pub struct Summary {
     pub progress: Progress,
     /// How it ended; None while it goes on.
     pub end: Option<End>,
-    /// Simulated time [s].
+    /// Simulated time (s).
     pub duration_s: f64,
     /// The grasper has held the organ at some time.
     pub attached: bool,
@@ -81,14 +82,15 @@ pub struct Summary {
     pub grasp_at: Option<f64>,
     /// It held it at the end too.
     pub held_to_end: bool,
-    /// Greatest rise of held tissue [mm].
+    /// Greatest rise of held tissue (mm).
     pub lift_mm: f64,
     /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest
     /// lift. `None` without any grasp, like the next.
     pub slip_mm: Option<f64>,
     /// Follow ratio (tissue lift over jaw lift) then.
     pub follow_ratio: Option<f64>,
-    /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than 3 mm.
+    /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than
+    /// 3 mm.
     #[serde(default)]
     pub held: bool,
     /// Times that tissue tore out of jaws.
@@ -103,9 +105,9 @@ pub struct Summary {
     pub yielded_substeps: usize,
     /// The tissue diverged.
     pub diverged: bool,
-    /// Largest node speed at any period's end [m/s].
+    /// Largest node speed at any period's end (m/s).
     pub max_speed_m_s: f64,
-    /// Largest RCM deviation of any arm [mm].
+    /// Largest RCM deviation of any arm (mm).
     pub rcm_peak_mm: f64,
     /// It never went beyond the scene's threshold (3 mm).
     pub rcm_within: bool,
@@ -182,7 +184,8 @@ impl Summary {
     pub(crate) fn add_facts(&mut self, facts: &Facts<'_>) {
         self.details = facts.details();
         self.why = why(facts.rows, facts, &self.progress, self.end.as_ref());
-        self.advice = facts.advice(self);
+        let slipped = self.attached && !self.held && !self.diverged && self.torn == 0;
+        self.advice = if slipped { facts.advice() } else { None };
     }
 
     /// Suspensions of physics in a few words; `None` without any.
@@ -201,14 +204,14 @@ impl Summary {
         (!all.is_empty()).then(|| all.join(", "))
     }
 
-    /// When `stage` passed [s].
+    /// When `stage` passed (s).
     pub fn passed_at(&self, stage: Stage) -> Option<f64> {
         self.progress.stages.iter().find(|s| s.stage == stage).and_then(|s| s.time_s)
     }
 }
 
-/// The task's channels at the top of the last grasp: the last row in which the jaws were within 5% of
-/// the greatest lift that they had with it.
+/// The task's channels at the top of the last grasp: the last row in which the jaws were within 5%
+/// of the greatest lift that they had with it.
 fn top_of_last_grasp(rows: &[Channels]) -> Option<TaskChannels> {
     let end = rows.iter().rposition(|c| c.task.grasped > 0.0)?;
     let start = rows[..end].iter().rposition(|c| c.task.grasped == 0.0).map_or(0, |k| k + 1);
@@ -284,7 +287,7 @@ fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool
     (count > 0).then(|| (sum / count as f64).sqrt())
 }
 
-/// The lag [s] with the least distance, and that distance [m].
+/// The lag (s) with the least distance, and that distance (m).
 fn lag(all: &[ArmChannels], period: f64, of: &dyn Fn(usize) -> bool) -> (f64, f64) {
     let steps = (MAX_LAG / LAG_STEP) as usize;
     let tried = (0..=steps).map(|k| k as f64 * LAG_STEP).filter_map(|lag| Some((lag, off_by(all, lag, period, of)?)));

@@ -1,6 +1,7 @@
 //! The demonstration: record, reconstruct, grasp-lift and report in a row.
 
-use crate::lift::{Lift, LiftResult};
+use crate::lift::Lift;
+use crate::lifted::LiftResult;
 use crate::workflow::{Reconstructed, reconstruct_recording};
 use crate::{Result, pages};
 use serde::Serialize;

@@ -1,11 +1,11 @@
 //! `trocar simulate`: a scripted grasp-lift as an episode, of a specimen alone or in a scene's cell.
 
+use crate::lifted::{LiftResult, Lifted};
 use crate::phantoms::scene_specimen;
-use crate::recorder::{Pictures, Recorder};
+use crate::recorder::Recorder;
 use crate::specimen_scene::{free_scene, grasp_lift, task_organ};
 use crate::workflow::{REPORT, refuse_overlap};
 use crate::{Error, Result, pages};
-use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
 use trocar_core::Progress;
@@ -13,7 +13,7 @@ use trocar_scene::{GraspDesignName, InstrumentKind, Scene, ScheduleName};
 use trocar_sensors::CameraRig;
 use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::policy::{AfterHold, Script, Scripted};
-use trocar_task::{Channels, Episode, EpisodeResult, Policy, RESULT_FILE, Recording, run_watched};
+use trocar_task::{Channels, Episode, Policy, RESULT_FILE, run_watched};
 
 /// Forces that jaws can close with (N), as in scenes.
 const JAW_FORCE_RANGE_N: std::ops::RangeInclusive<f64> = 0.01..=40.0;
@@ -43,35 +43,6 @@ impl Default for Lift {
         let script = Script { after: AfterHold::Lower, ..Script::default() };
         Self { script, organ: None, design: None, jaw_force: None, schedule: None, threads: 0 }
     }
-}
-
-/// A run that was made, in figures.
-#[derive(Clone, Debug, Serialize)]
-pub struct LiftResult {
-    /// The episode's figures and events.
-    #[serde(flatten)]
-    pub episode: EpisodeResult,
-    /// Organ coordinate of the grasp; that asked for where nothing was grasped.
-    pub at: f64,
-    /// How far beside the tissue's middle the jaws came (mm).
-    pub approach_offset_mm: f64,
-    /// Simulated time (s).
-    pub simulated_s: f64,
-    /// Wall time of the episode (s), pictures left out.
-    pub wall_s: f64,
-    /// Simulated over wall time.
-    pub real_time_factor: f64,
-    /// The page's path.
-    pub report: String,
-}
-
-/// A finished lift.
-pub(crate) struct Lifted {
-    pub result: LiftResult,
-    pub recording: Recording,
-    /// Phase of the script in each row.
-    pub phases: Vec<&'static str>,
-    pub pictures: Pictures,
 }
 
 /// A policy that notes in which phase each of its actions was made.

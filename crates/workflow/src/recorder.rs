@@ -1,7 +1,7 @@
 //! Pictures of an episode while it runs, for its page.
 
 use crate::moving::webp;
-use crate::rendering::{averaged, shown};
+use crate::rendering::colors::{averaged, shown};
 use crate::{Error, Result};
 use std::time::{Duration, Instant};
 use trocar_camera::ColorImage;

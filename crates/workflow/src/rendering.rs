@@ -1,6 +1,6 @@
 //! `trocar render`: what a camera sees of a specimen, of a scene or of an episode, as a picture or as a moving picture of the scripted grasp-lift or of the episode.
 
-mod colors;
+pub(crate) mod colors;
 mod play;
 mod rendered;
 mod script;

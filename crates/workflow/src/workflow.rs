@@ -14,7 +14,7 @@ use trocar_specimen::{OrganFacts, Specimen, StagedFolder};
 /// The report's name in every folder.
 pub const REPORT: &str = "report.html";
 
-/// A specimen that was made, in figures.
+/// A reconstructed specimen in figures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reconstructed {
     /// The specimen's folder.

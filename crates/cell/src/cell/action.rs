@@ -10,11 +10,11 @@ use glam::DVec3;
 /// What the numbers of an action are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActionSpace {
-    /// Absolute targets. Per arm in a port: two pivots (rad), insertion (m), roll (rad), jaw opening 0
-    /// to 1. Per arm without a port: place of the jaw's pivot in the cell (m), roll, jaw.
+    /// Absolute targets. Per arm in a port: two pivots (rad), insertion (m), roll (rad), jaw
+    /// opening 0 to 1. Per arm without a port: place of the jaw's pivot in the cell (m), roll, jaw.
     Pivots,
-    /// Per arm: motion of the tip along the cell's x, y and z (m), change of the roll (rad), both from
-    /// what was commanded last; jaw opening 0 to 1.
+    /// Per arm: motion of the tip along the cell's x, y and z (m), change of the roll (rad), both
+    /// from what was commanded last; jaw opening 0 to 1.
     Tip,
 }
 

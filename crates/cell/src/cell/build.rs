@@ -205,7 +205,8 @@ pub(super) fn start(start: &Start, port: Option<&trocar_scene::Port>, workspace:
         Workspace::Port(space) => {
             let direction = port.map_or(-DVec3::Z, |port| start.direction(port));
             let u = space.port.pose.rotation.inverse() * direction;
-            // The pivots turn the port's z first about x, then about the y that the first has turned.
+            // The pivots turn the port's z first about x, then about the y that the first has
+            // turned.
             let pivots = [(-u.y).atan2(u.z), u.x.atan2(u.y.hypot(u.z))];
             let insertion = 1e-3 * start.insertion_mm - space.blade_length;
             Coordinates { pivots, insertion, roll, jaw: start.jaw }.into()

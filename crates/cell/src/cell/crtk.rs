@@ -1,5 +1,5 @@
-//! Reads and commands of one arm, in the words of the Collaborative Robotics Toolkit (CRTK). Commands
-//! are taken at once and carried out by [`Cell::advance`] or the next [`Cell::step`].
+//! Reads and commands of one arm, in the words of the Collaborative Robotics Toolkit (CRTK).
+//! Commands are taken at once and carried out by [`Cell::advance`] or the next [`Cell::step`].
 
 use super::Cell;
 use super::arm::{ArmUnit, Wanted};
@@ -113,8 +113,8 @@ impl Cell {
         self.arm(arm)?.model.workspace.solve(tip, near)
     }
 
-    /// Moves the tip to a pose in the cell as near as its workspace lets it; the jaw stays as it was
-    /// commanded. The result has the rotation that was rejected.
+    /// Moves the tip to a pose in the cell as near as its workspace lets it; the jaw stays as it
+    /// was commanded. The result has the rotation that was rejected.
     ///
     /// # Errors
     /// An arm that the cell does not have, a pose that is not one.
@@ -129,8 +129,8 @@ impl Cell {
     /// Moves the joints, whatever the port says to it; the jaw stays as it was commanded.
     ///
     /// # Errors
-    /// An arm that the cell does not have or that has no joints, not a number a joint, one that is not
-    /// finite. Nothing has changed then.
+    /// An arm that the cell does not have or that has no joints, not a number a joint, one that is
+    /// not finite. Nothing has changed then.
     pub fn servo_jp(&mut self, arm: &str, joints: &[f64]) -> Result<()> {
         let unit = self.arm_mut(arm)?;
         if !unit.drive.command_joints(joints)? {
@@ -140,8 +140,8 @@ impl Cell {
         Ok(())
     }
 
-    /// Moves the jaw towards an opening, 0 closed to 1. Closing, it stops where tissue pushes back with
-    /// its force.
+    /// Moves the jaw towards an opening, 0 closed to 1. Closing, it stops where tissue pushes back
+    /// with its force.
     ///
     /// # Errors
     /// An arm that the cell does not have, an opening out of range.

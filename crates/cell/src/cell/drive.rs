@@ -210,7 +210,8 @@ impl DriveState {
     /// Feeds every bit to a hash.
     pub fn hash_into(&self, hash: &mut xxhash_rust::xxh3::Xxh3) {
         match self {
-            // Printed numbers are as exact as their bits: the shortest text that reads back as the same.
+            // Printed numbers are as exact as their bits: the shortest text that reads back as the
+            // same.
             Self::Dynamic(state) => hash.update(format!("{state:?}").as_bytes()),
             Self::Ideal(state) => state.numbers().iter().for_each(|n| hash.update(&n.to_bits().to_le_bytes())),
         }

@@ -15,38 +15,38 @@ use glam::DVec3;
 use trocar_core::Wrench;
 use trocar_tissue::ToolForce;
 
-/// The most that tissue is taken to push or pull [N]: beyond, a joint of the wrist would give way.
+/// The most that tissue is taken to push or pull (N): beyond, a joint of the wrist would give way.
 pub const MAX_LOAD: f64 = 40.0;
 
-/// Stiffest that tissue is taken to be [N/m].
+/// Stiffest that tissue is taken to be (N/m).
 const MAX_STIFFNESS: f64 = 2e4;
 
 /// What is left of the stiffness seen from one frame to the next.
 const FORGETTING: f64 = 0.8;
 
-/// Least motion that gives a secant [m]; with less, creep would be taken for stiffness.
+/// Least motion that gives a secant (m); with less, creep would be taken for stiffness.
 const LEAST_MOTION: f64 = 2e-5;
 
 /// The last frame's force on an instrument, and how it goes on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Exchange {
-    /// Force [N] and torque about the tip [N m] in the cell frame at the end of the last frame.
+    /// Force (N) and torque about the tip (N m) in the cell frame at the end of the last frame.
     load: Wrench,
-    /// Where the tip was then [m].
+    /// Where the tip was then (m).
     at: DVec3,
-    /// Force gained a way gone [N/m].
+    /// Force gained a way gone (N/m).
     stiffness: f64,
     /// The last frame's force was more than [`MAX_LOAD`].
     pub limited: bool,
 }
 
 impl Exchange {
-    /// Nothing touches a tip at `at` [m].
+    /// Nothing touches a tip at `at` (m).
     pub fn new(at: DVec3) -> Self {
         Self { at, ..Self::default() }
     }
 
-    /// A frame is over: the tip is at `at` [m] and its tools feel `forces`.
+    /// A frame is over: the tip is at `at` (m) and its tools feel `forces`.
     pub fn end_frame(&mut self, at: DVec3, forces: &[ToolForce; 3]) {
         let mut load = Wrench::default();
         for force in forces {
@@ -68,12 +68,12 @@ impl Exchange {
         (self.load, self.at) = (load, at);
     }
 
-    /// The force at the end of the last frame [N].
+    /// The force at the end of the last frame (N).
     pub fn force(&self) -> DVec3 {
         self.load.force
     }
 
-    /// What a tip that has come to `at` [m] feels.
+    /// What a tip that has come to `at` (m) feels.
     pub fn load(&self, at: DVec3) -> Wrench {
         let force = self.load.force - self.stiffness * (at - self.at);
         Wrench { force: force.clamp_length_max(MAX_LOAD), torque: self.load.torque }
@@ -91,9 +91,9 @@ impl Exchange {
 mod tests {
     use super::*;
 
-    /// A tip of `mass` [kg] with `damping` [N s/m], held at x = 0 by a spring of 3000 N/m and let
-    /// go 1 mm inside a wall of `stiffness` [N/m] that answers 60 times a second: the greatest
-    /// distance from the balance in the last of three seconds [m].
+    /// A tip of `mass` (kg) with `damping` (N s/m), held at x = 0 by a spring of 3000 N/m and let
+    /// go 1 mm inside a wall of `stiffness` (N/m) that answers 60 times a second: the greatest
+    /// distance from the balance in the last of three seconds (m).
     fn swing(mass: f64, damping: f64, stiffness: f64, carried_on: bool) -> f64 {
         let (mut x, mut v, dt) = (0.001, 0.0, 1.0 / 480.0);
         let mut exchange = Exchange::new(DVec3::ZERO);

@@ -1,4 +1,5 @@
-//! What tasks measure of a cell besides its observations: what jaws carry and what is between blades.
+//! What tasks measure of a cell besides its observations: what jaws carry and what is between
+//! blades.
 
 use super::Cell;
 use crate::gripper::{BLADE_WIDTH, JAW_REGION_BEGIN};
@@ -36,8 +37,8 @@ impl Cell {
         Some(Carried { organ, s, jaw_lift: moved.jaw_lift, tissue_lift: moved.tissue_lift, slip: moved.slip })
     }
 
-    /// Organ coordinates of the nodes that the arm at place `k` holds or follows; empty where it holds
-    /// nothing.
+    /// Organ coordinates of the nodes that the arm at place `k` holds or follows; empty where it
+    /// holds nothing.
     pub fn carried_coordinates(&self, k: usize) -> Vec<f64> {
         let held = self.arms.get(k).and_then(|arm| arm.state.held.as_ref());
         held.map_or_else(Vec::new, |held| {
@@ -46,8 +47,8 @@ impl Cell {
         })
     }
 
-    /// Tissue of body `organ` between the blades of the arm at place `k`, and its share of the region
-    /// between them; None where there is none.
+    /// Tissue of body `organ` between the blades of the arm at place `k`, and its share of the
+    /// region between them; None where there is none.
     pub fn between_blades(&self, k: usize, organ: usize) -> Option<(TissueInJaws, f64)> {
         let arm = self.arms.get(k)?;
         let tissue = arm.jaw_region().tissue_of(&self.world, organ)?;
@@ -66,8 +67,8 @@ impl Cell {
         Ok(arm.drive.tip().transform(arm.model.blades.length * DVec3::X))
     }
 
-    /// Whether contact of an arm's instrument with tissue is disabled, and whether that of its blades
-    /// is.
+    /// Whether contact of an arm's instrument with tissue is disabled, and whether that of its
+    /// blades is.
     ///
     /// # Errors
     /// An arm that the cell does not have.

@@ -3,7 +3,7 @@
 use crate::World;
 use glam::DVec3;
 
-/// The first organ, but for `spared`, in which one of `segments` lies in part, and where [m].
+/// The first organ, but for `spared`, in which one of `segments` lies in part, and where (m).
 /// Elements that are pinned all round do not count: nothing feels them.
 pub(super) fn first_organ_around(
     world: &World,

@@ -6,8 +6,8 @@ use trocar_core::Pose;
 use trocar_robot::manipulator::Manipulator;
 
 impl Cell {
-    /// Poses in the cell of an arm's base, of each of its links from the first that moves, and of its
-    /// flange, as they are now. Empty for an ideal arm.
+    /// Poses in the cell of an arm's base, of each of its links from the first that moves, and of
+    /// its flange, as they are now. Empty for an ideal arm.
     ///
     /// # Errors
     /// An arm that the cell does not have.

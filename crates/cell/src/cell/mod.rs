@@ -1,8 +1,8 @@
 //! The cell of a scene: tissue, and one or two arms with instruments, stepped by actions.
 //!
-//! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of physics
-//! steps of the arms (1/480 s); [`period`] has its stages. Instruments do not push each other: their
-//! clearance is measured, and an event says where they would have touched.
+//! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of
+//! physics steps of the arms (1/480 s); [`period`] has its stages. Instruments do not push each
+//! other: their clearance is measured, and an event says where they would have touched.
 
 mod action;
 mod arm;
@@ -19,6 +19,7 @@ mod placed;
 mod reach;
 mod report;
 mod restart;
+mod rule_counts;
 mod rules;
 mod setpoint;
 mod settle;
@@ -33,7 +34,7 @@ pub use figures::Carried;
 pub use placed::Placed;
 pub use reach::{REACH_TOLERANCE, ToolReach, tool_reach};
 pub use report::{ArmObservation, CellEvent, CellReport, TaggedForce, TissueObservation};
-pub use rules::RuleCounts;
+pub use rule_counts::RuleCounts;
 pub use setpoint::Setpoint;
 pub use settle::Settling;
 pub use shadow::Moment;
@@ -105,8 +106,8 @@ pub struct Cell {
 
 impl Cell {
     /// The cell of `scene` around `specimen`, whose tissue is stepped by `threads` threads (0: as
-    /// many as the machine has). The arms are in their start poses, the organs as they were recorded.
-    /// Results do not depend on the threads.
+    /// many as the machine has). The arms are in their start poses, the organs as they were
+    /// recorded. Results do not depend on the threads.
     ///
     /// # Errors
     /// Names the field of the scene, or the organ, arm or instrument that cannot be used.
@@ -191,8 +192,8 @@ impl Cell {
         &self.world
     }
 
-    /// Length of the most stretched edge of any organ now over that at rest: privileged, too. Takes a
-    /// pass over all edges.
+    /// Length of the most stretched edge of any organ now over that at rest: privileged, too. Takes
+    /// a pass over all edges.
     pub fn max_stretch(&mut self) -> f64 {
         self.edges.strains(&self.world, 1.0).iter().fold(1.0, |most, s| s.stretch.max(most))
     }

@@ -15,7 +15,7 @@ pub struct Placed {
     pub specimen: Specimen,
     /// Contact, filtered pairs and the bed.
     pub surroundings: Surroundings,
-    /// Height of the lowest node [m].
+    /// Height of the lowest node (m).
     pub floor: f64,
 }
 

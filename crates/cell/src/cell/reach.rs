@@ -11,8 +11,8 @@ use trocar_geometry::OrganAxis;
 use trocar_scene::{InstrumentKind, Scene, Side};
 use trocar_specimen::Specimen;
 
-/// Jaws that miss a place by less still close on it (m): on flat organs the tips of the blades reach the
-/// cell's floor first.
+/// Jaws that miss a place by less still close on it (m): on flat organs the tips of the blades
+/// reach the cell's floor first.
 pub const REACH_TOLERANCE: f64 = 8e-3;
 
 /// Places along the organ that are tried.
@@ -38,9 +38,9 @@ impl ToolReach {
     }
 }
 
-/// How near each instrument of `scene` comes to the organ of its task in `specimen`: a grasper to where the
-/// grasp gate wants it, a cutter to between there and the base. Empty where the specimen does not have the
-/// organ.
+/// How near each instrument of `scene` comes to the organ of its task in `specimen`: a grasper to
+/// where the grasp gate wants it, a cutter to between there and the base. Empty where the specimen
+/// does not have the organ.
 ///
 /// # Errors
 /// A scene whose arms cannot be built.

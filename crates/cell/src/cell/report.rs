@@ -1,6 +1,6 @@
 //! What a step of the cell reports: the observation of each arm, of the tissue, and what happened.
 
-use super::rules::RuleCounts;
+use super::rule_counts::RuleCounts;
 use super::setpoint::Setpoint;
 use crate::severance::Severance;
 use glam::DVec3;
@@ -31,19 +31,19 @@ pub struct ArmObservation {
     pub rates: [f64; 5],
     /// Measured pose of the tip frame in the cell.
     pub tip: Pose,
-    /// RCM deviation [m]: from the port's centre to the shaft's axis, in the port's plane.
+    /// RCM deviation (m): from the port's centre to the shaft's axis, in the port's plane.
     pub rcm_deviation: f64,
-    /// Largest RCM deviation over the period's physics steps [m].
+    /// Largest RCM deviation over the period's physics steps (m).
     pub rcm_peak: f64,
     /// The peak is beyond the scene's threshold (3 mm).
     pub rcm_over_threshold: bool,
     /// The peak is beyond the deviation at which hardware stops (5 mm).
     pub rcm_over_abort: bool,
-    /// Angle between shaft and port normal [rad].
+    /// Angle between shaft and port normal (rad).
     pub tilt: f64,
     /// What was commanded for the end of the period.
     pub commanded: Setpoint,
-    /// What is left of the wanted orientation: axis times angle [rad] in the cell of the turn from
+    /// What is left of the wanted orientation: axis times angle (rad) in the cell of the turn from
     /// the commanded to the wanted one.
     pub rejected_rotation: DVec3,
     /// The command stops short of what was asked: it was too far for one period, below the cell's
@@ -55,11 +55,11 @@ pub struct ArmObservation {
     /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is
     /// latched its constraint force, otherwise contact.
     pub force: TaggedForce,
-    /// Contact force on shaft and blades [N], whether a grasp is latched or not.
+    /// Contact force on shaft and blades (N), whether a grasp is latched or not.
     pub contact: DVec3,
-    /// Constraint force of a latched grasp [N].
+    /// Constraint force of a latched grasp (N).
     pub constraint: DVec3,
-    /// Force with which tissue pushes the blades apart [N].
+    /// Force with which tissue pushes the blades apart (N).
     pub jaw_force: f64,
     /// Tissue pushed with more than an arm bears, and the arm felt only so much.
     pub load_limited: bool,
@@ -70,7 +70,7 @@ pub struct ArmObservation {
 /// What is measured of the tissue: privileged, no policy sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TissueObservation {
-    /// Largest node speed at the end [m/s].
+    /// Largest node speed at the end (m/s).
     pub max_speed: f64,
     /// Most inverted elements in any frame.
     pub inverted: usize,
@@ -123,15 +123,15 @@ pub enum CellEvent {
         s: f64,
         /// Nodes that the grasp holds; 0 for friction.
         nodes: usize,
-        /// Largest distance between where the grasp first prescribes a node and where it was [mm].
+        /// Largest distance between where the grasp first prescribes a node and where it was (mm).
         snap_mm: f64,
-        /// Mean of that distance over the nodes [mm].
+        /// Mean of that distance over the nodes (mm).
         snap_mean_mm: f64,
-        /// Mean distance of the nodes from their places at rest [mm].
+        /// Mean distance of the nodes from their places at rest (mm).
         displaced_mm: f64,
-        /// Gap between the blades in the middle of that tissue [mm].
+        /// Gap between the blades in the middle of that tissue (mm).
         gap_mm: f64,
-        /// Force with which tissue pushed the blades apart [N].
+        /// Force with which tissue pushed the blades apart (N).
         closing_force_n: f64,
     },
     /// Jaws opened, or what was between them is no longer.
@@ -148,7 +148,7 @@ pub enum CellEvent {
     Torn {
         /// The arm.
         arm: Side,
-        /// Pull at which it tore [N].
+        /// Pull at which it tore (N).
         force_n: f64,
     },
     /// A cutter closed through tissue.
@@ -163,8 +163,8 @@ pub enum CellEvent {
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
     },
-    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears. It lets go, and
-    /// its contact is disabled until it is out and the tissue has come back.
+    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears. It lets go,
+    /// and its contact is disabled until it is out and the tissue has come back.
     ContactDisabled {
         /// The arm.
         arm: Side,
@@ -175,8 +175,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// Jaws that hold tissue had strained it beyond what it bears. They keep their hold, but contact of
-    /// their blades is disabled until they let go.
+    /// Jaws that hold tissue had strained it beyond what it bears. They keep their hold, but
+    /// contact of their blades is disabled until they let go.
     BladesDisabled {
         /// The arm.
         arm: Side,
@@ -187,7 +187,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// An organ stayed folded with no instrument at it: it was relaxed without regard to time and forces.
+    /// An organ stayed folded with no instrument at it: it was relaxed without regard to time and
+    /// forces.
     Relaxed {
         /// Name of the organ.
         organ: String,
@@ -200,27 +201,27 @@ pub enum CellEvent {
     ForceLimit {
         /// The arm.
         arm: Side,
-        /// The force [N].
+        /// The force (N).
         force_n: f64,
     },
     /// The instruments came into each other, which real ones would not: they do not push each other
     /// here.
     InstrumentsTouch {
-        /// How deep [mm].
+        /// How deep (mm).
         depth_mm: f64,
     },
     /// The RCM deviation went beyond the scene's threshold.
     RcmThreshold {
         /// The arm.
         arm: Side,
-        /// The deviation [mm].
+        /// The deviation (mm).
         deviation_mm: f64,
     },
     /// The RCM deviation went beyond that at which the hardware stops.
     RcmAbort {
         /// The arm.
         arm: Side,
-        /// The deviation [mm].
+        /// The deviation (mm).
         deviation_mm: f64,
     },
 }
@@ -288,11 +289,11 @@ pub(super) struct PeriodLog {
 /// What a control period reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellReport {
-    /// Time at its end [s].
+    /// Time at its end (s).
     pub time: f64,
     /// The arms, the left one first.
     pub arms: Vec<ArmObservation>,
-    /// Gap between the two instruments at its end [m]: negative where they are inside each other,
+    /// Gap between the two instruments at its end (m): negative where they are inside each other,
     /// for they do not push each other.
     pub clearance: f64,
     /// The tissue.

@@ -1,4 +1,5 @@
-//! Another start for a cell that is there already: arms elsewhere, tissue as it was saved, time zero.
+//! Another start for a cell that is there already: arms elsewhere, tissue as it was saved, time
+//! zero.
 
 use super::arm::ArmState;
 use super::setpoint::Setpoint;
@@ -14,12 +15,13 @@ impl Cell {
         space.clamp(&build::start(start, port, space))
     }
 
-    /// Takes the tissue of `state`, lets go of all, puts the arms at rest at `starts`, one an arm, and
-    /// begins at time zero. The same state and starts give the same bits whatever the cell did before.
+    /// Takes the tissue of `state`, lets go of all, puts the arms at rest at `starts`, one an arm,
+    /// and begins at time zero. The same state and starts give the same bits whatever the cell did
+    /// before.
     ///
     /// # Errors
-    /// A state of another cell, or a start that an arm does not reach: the cell has then to be restored
-    /// or restarted.
+    /// A state of another cell, or a start that an arm does not reach: the cell has then to be
+    /// restored or restarted.
     pub fn restart(&mut self, state: &CellState, starts: &[Setpoint]) -> Result<()> {
         if starts.len() != self.arms.len() {
             let (given, here) = (starts.len(), self.arms.len());

@@ -7,9 +7,9 @@ pub const NUMBERS: usize = 5;
 
 /// Five numbers of an arm, in the order of an action.
 ///
-/// The fourth is the turn about the shaft (rad), the fifth the opening of the jaw, 0 closed to 1. The
-/// arm's [`Workspace`](crate::Workspace) says what the first three are: two pivots (rad) and the
-/// insertion (m) in a port, or the place of the jaw's pivot in the cell (m).
+/// The fourth is the turn about the shaft (rad), the fifth the opening of the jaw, 0 closed to 1.
+/// The arm's [`Workspace`](crate::Workspace) says what the first three are: two pivots (rad) and
+/// the insertion (m) in a port, or the place of the jaw's pivot in the cell (m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Setpoint(pub [f64; NUMBERS]);
 

@@ -1,8 +1,8 @@
 //! Organs come to rest before an episode begins.
 //!
-//! They settle under gravity for a time. A large soft organ swings for many seconds; the swing is then
-//! taken out by kinetic damping (Cundall 1976): everything is stopped whenever the kinetic energy has
-//! passed a peak, until nothing moves fast for a while by itself.
+//! They settle under gravity for a time. A large soft organ swings for many seconds; the swing is
+//! then taken out by kinetic damping (Cundall 1976): everything is stopped whenever the kinetic
+//! energy has passed a peak, until nothing moves fast for a while by itself.
 
 use super::Cell;
 use crate::Result;

@@ -15,9 +15,9 @@ impl Cell {
     }
 
     /// Does the last tissue frame of `other` from the moment `before` it: from the same places and
-    /// velocities, with the same motions of the tools, under the forces that contact did to nodes at
-    /// its end. So a cell without contact moves, frame by frame, as one that has it. For cells of one
-    /// specimen, neither of them cut, with one tissue frame a control period.
+    /// velocities, with the same motions of the tools, under the forces that contact did to nodes
+    /// at its end. So a cell without contact moves, frame by frame, as one that has it. For cells
+    /// of one specimen, neither of them cut, with one tissue frame a control period.
     ///
     /// Returns the report and the wall time of the step.
     pub fn shadow(&mut self, other: &Self, before: &Moment) -> (StepReport, Duration) {

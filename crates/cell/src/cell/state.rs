@@ -65,8 +65,8 @@ impl Cell {
         }
     }
 
-    /// Puts back a state that this cell, or another of the same scene and specimen, gave. What comes
-    /// after is the same to the bit.
+    /// Puts back a state that this cell, or another of the same scene and specimen, gave. What
+    /// comes after is the same to the bit.
     ///
     /// # Errors
     /// A state of a cell with other arms or organs.

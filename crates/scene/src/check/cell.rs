@@ -6,12 +6,12 @@ use crate::cell::SIMPLE;
 use crate::{Arm, ArmModel, Drive, Frame, Instrument, Port, Scene, Start};
 use glam::DVec3;
 
-/// Height of the FR3's shoulder above its base, and how far its flange gets from there [m]
+/// Height of the FR3's shoulder above its base, and how far its flange gets from there (m)
 /// (Franka's data sheet: reach 855 mm).
 const FR3_SHOULDER: f64 = 0.333;
 const FR3_REACH: f64 = 0.855;
 
-/// Limits of the FR3's joints [rad] (Franka's data sheet).
+/// Limits of the FR3's joints (rad) (Franka's data sheet).
 const FR3_LIMITS: [(f64, f64); 7] = [
     (-2.7437, 2.7437),
     (-1.7837, 1.7837),
@@ -22,10 +22,10 @@ const FR3_LIMITS: [(f64, f64); 7] = [
     (-3.0159, 3.0159),
 ];
 
-/// Bases nearer to each other than this are in the same place [m]: the FR3's is 0.2 m wide.
+/// Bases nearer to each other than this are in the same place (m): the FR3's is 0.2 m wide.
 const BASE_WIDTH: f64 = 0.2;
 
-/// A tilt below this that is not 0 was meant in radians [degrees].
+/// A tilt below this that is not 0 was meant in radians (degrees).
 const LEAST_TILT: f64 = 1.0;
 
 /// Most joints of an arm.

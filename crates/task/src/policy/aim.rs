@@ -11,11 +11,11 @@ const SLICE: f64 = 0.04;
 /// How far to either side the direction of the organ is taken from.
 const CHORD: f64 = 0.08;
 
-/// Jaws hold nodes within this distance of the middle of what they pinch [m].
+/// Jaws hold nodes within this distance of the middle of what they pinch (m).
 const REACH: f64 = 0.009;
 
-/// A cluster clear of pins is preferred to one that is not, even if it is this much farther along the
-/// organ.
+/// A cluster clear of pins is preferred to one that is not, even if it is this much farther along
+/// the organ.
 const CLEAR_WORTH: f64 = 0.1;
 
 /// Fewest nodes that are worth a grasp.
@@ -26,13 +26,13 @@ const FEWEST: usize = 8;
 pub(super) struct Aim {
     pub pose: Pose,
     pub setpoint: Setpoint,
-    /// How far the tip stays from where it should be [m].
+    /// How far the tip stays from where it should be (m).
     pub missed: f64,
     /// Organ coordinate.
     pub s: f64,
 }
 
-/// Middle of the organ at organ coordinate `s` as it is now [m]: of its nodes there.
+/// Middle of the organ at organ coordinate `s` as it is now (m): of its nodes there.
 pub(super) fn middle(cell: &Cell, body: usize, s: f64) -> Option<DVec3> {
     let (world, mut wide) = (cell.world(), SLICE);
     // A coarse mesh may have no node in a thin slice.
@@ -53,8 +53,8 @@ fn along(cell: &Cell, body: usize, s: f64) -> DVec3 {
     at(s + CHORD) - at(s - CHORD)
 }
 
-/// The cluster of `body` nearest to `s` that may be grasped. Clusters that are clear of pins and lie in
-/// `range` come first, if there are any.
+/// The cluster of `body` nearest to `s` that may be grasped. Clusters that are clear of pins and
+/// lie in `range` come first, if there are any.
 fn cluster_in_range(cell: &Cell, body: usize, s: f64, range: [f64; 2]) -> Option<Cluster> {
     let world = cell.world();
     let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, REACH)).collect();
@@ -65,8 +65,8 @@ fn cluster_in_range(cell: &Cell, body: usize, s: f64, range: [f64; 2]) -> Option
     all.into_iter().min_by(|a, b| (a.s - s).abs().total_cmp(&(b.s - s).abs()))
 }
 
-/// The cluster of `body` nearest to `s` that jaws from above reach enough nodes of. One that is clear of
-/// pins is preferred even if it is a little farther along the organ.
+/// The cluster of `body` nearest to `s` that jaws from above reach enough nodes of. One that is
+/// clear of pins is preferred even if it is a little farther along the organ.
 fn cluster_at(cell: &Cell, body: usize, s: f64) -> Option<Cluster> {
     let world = cell.world();
     let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, REACH)).collect();
@@ -85,8 +85,8 @@ pub(super) enum Place {
     At(f64),
 }
 
-/// The aim of `arm` at the cluster of `body` at `place`, `depth` (m) from the pivot between its blades and
-/// `aside` (m) of their closing plane.
+/// The aim of `arm` at the cluster of `body` at `place`, `depth` (m) from the pivot between its
+/// blades and `aside` (m) of their closing plane.
 pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, place: Place, depth: f64, aside: f64) -> Result<Aim> {
     let cluster = match place {
         Place::InRange(range) => cluster_in_range(cell, body, 0.5 * (range[0] + range[1]), range),
@@ -111,7 +111,7 @@ pub(super) fn beside(cell: &Cell, arm: &str, aim: &Aim, by: DVec3) -> Result<Aim
 }
 
 /// The aim of `arm` at a point of `body` near `s`: shaft through the port, jaws across the organ,
-/// the point `depth` [m] from the pivot.
+/// the point `depth` (m) from the pivot.
 pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, depth: f64) -> Result<Aim> {
     let along = along(cell, body, s);
     let workspace = cell.workspace(arm)?;
@@ -121,7 +121,8 @@ pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, dept
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
         Pose { rotation, translation: point - depth * x }
     };
-    // The blades are alike: of the two ways round, the one that the wrist reaches with less of a turn.
+    // The blades are alike: of the two ways round, the one that the wrist reaches with less of a
+    // turn.
     let near = cell.setpoint(arm)?.with_jaw(1.0);
     let turn = |s: &Reached| (s.setpoint.roll() - near.roll()).abs() + 10.0 * s.roll_excess.abs();
     let (a, b) = (workspace.solve(&pose(hinge), &near)?, workspace.solve(&pose(-hinge), &near)?);

@@ -2,15 +2,16 @@
 
 use crate::{Episode, Error, Result};
 
-/// Least room between the tissue in the jaws and the cut (m): half of the grasper's blades stands out
-/// beside that tissue's middle, and a cutter's edge beside them.
+/// Least room between the tissue in the jaws and the cut (m): half of the grasper's blades stands
+/// out beside that tissue's middle, and a cutter's edge beside them.
 const MIN_ROOM: f64 = 0.003;
 
-/// With pins on both sides of the grasp there is no end to cut off; the cut is then this far from the
-/// grasp (m).
+/// With pins on both sides of the grasp there is no end to cut off; the cut is then this far from
+/// the grasp (m).
 const BESIDE: f64 = 0.008;
 
-/// The organ coordinate half way between the tissue in the jaws and the part of `body` that is pinned.
+/// The organ coordinate half way between the tissue in the jaws and the part of `body` that is
+/// pinned.
 ///
 /// # Errors
 /// When the jaws hold nothing, or there is no room.
@@ -34,8 +35,8 @@ pub(super) fn cut_place(episode: &Episode, body: usize) -> Result<f64> {
     })
 }
 
-/// The same for organ coordinates of held and pinned nodes and the organ's length (m). Where there is
-/// too little room, the room there is (m).
+/// The same for organ coordinates of held and pinned nodes and the organ's length (m). Where there
+/// is too little room, the room there is (m).
 fn between(held: &[f64], pins: &[f64], length: f64) -> std::result::Result<f64, f64> {
     let middle = mean(held);
     let towards_base = pins.iter().filter(|s| **s < middle).count();

@@ -37,8 +37,9 @@ pub trait Policy {
     /// Ends the episode as [`crate::End::PolicyError`].
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>>;
 
-    /// Whether it has nothing left to do. An episode whose policy gives no action and has finished ends
-    /// as [`crate::End::Finished`]; one whose policy gives none and has not, as a failure of the policy.
+    /// Whether it has nothing left to do. An episode whose policy gives no action and has finished
+    /// ends as [`crate::End::Finished`]; one whose policy gives none and has not, as a failure of
+    /// the policy.
     fn finished(&self) -> bool {
         false
     }

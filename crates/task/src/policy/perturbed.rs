@@ -6,24 +6,24 @@ use crate::{Episode, Result};
 use std::collections::VecDeque;
 use trocar_cell::{Action, ActionSpace, Setpoint, Workspace};
 
-/// Standard deviation of the noise on pivots [rad]: about 3 mm at the tip. On roll ten times as
+/// Standard deviation of the noise on pivots (rad): about 3 mm at the tip. On roll ten times as
 /// much.
 pub const NOISE_RAD: f64 = 0.03;
-/// And on the insertion [m].
+/// And on the insertion (m).
 pub const NOISE_M: f64 = 0.003;
-/// The noise is drawn so often a second [Hz] and goes straight in between: a hand's tremor and
+/// The noise is drawn so often a second (Hz) and goes straight in between: a hand's tremor and
 /// drift, not a buzz that arms filter out.
 const NOISE_HZ: f64 = 2.0;
-/// How late actions come [s].
+/// How late actions come (s).
 pub const DELAY_S: f64 = 0.5;
-/// How far each arm goes astray [mm] at the organ, to a side of the seed's choice.
+/// How far each arm goes astray (mm) at the organ, to a side of the seed's choice.
 pub const OFFSET_MM: f64 = 5.0;
 
-/// Distance from port to organ that turns millimetres into pivots [m].
+/// Distance from port to organ that turns millimetres into pivots (m).
 const ARM: f64 = 0.12;
 
-/// Changes each arm's targets and keeps them within the limits; other action spaces are left as they
-/// are. `change` gets the arm's place, and its first three numbers and roll.
+/// Changes each arm's targets and keeps them within the limits; other action spaces are left as
+/// they are. `change` gets the arm's place, and its first three numbers and roll.
 fn changed(episode: &Episode, action: Action, mut change: impl FnMut(usize, &Workspace, &mut [f64])) -> Result<Action> {
     if action.space != ActionSpace::Pivots {
         return Ok(action);
@@ -135,7 +135,7 @@ impl<P: Policy> Policy for Delay<P> {
 #[derive(Clone, Debug)]
 pub struct Offset<P> {
     inner: P,
-    /// Pivots [rad] and insertion [m] of each arm.
+    /// Pivots (rad) and insertion (m) of each arm.
     by: [[f64; 3]; 2],
 }
 

@@ -11,8 +11,8 @@ const DEEP: f64 = 0.09;
 /// An action is kept for up to this many periods.
 const MAX_KEPT: f64 = 20.0;
 
-/// A policy that asks for anything an action may ask for: targets in all of the workspaces, or steps of
-/// the tips of any size, each kept for 1 to 20 periods. The same seed does the same.
+/// A policy that asks for anything an action may ask for: targets in all of the workspaces, or
+/// steps of the tips of any size, each kept for 1 to 20 periods. The same seed does the same.
 #[derive(Clone, Debug)]
 pub struct RandomActions {
     random: Random,

@@ -7,7 +7,7 @@ use crate::{Episode, Result};
 use trocar_cell::{Action, Setpoint, Workspace};
 use trocar_robot::instrument::Coordinates;
 
-/// Time from one random place to the next [s].
+/// Time from one random place to the next (s).
 const HOP_S: f64 = 2.0;
 
 /// Goes from one random place within the arms' limits to the next, jaws included; half of the time

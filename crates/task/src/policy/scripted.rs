@@ -1,6 +1,6 @@
 //! The scripted finite-state baseline: grasp at the organ's middle, lift, bring the cutter to the
-//! tissue between grasp and base, open, engage, close. With a [`Script`] it lifts as far as it is asked
-//! to, where it is asked to, and lowers or cuts what it lifted.
+//! tissue between grasp and base, open, engage, close. With a [`Script`] it lifts as far as it is
+//! asked to, where it is asked to, and lowers or cuts what it lifted.
 //!
 //! It looks at where the tissue is, which no policy that is scored may. All it does goes through
 //! actions, and so through controllers, arms and ports where there are any.
@@ -31,12 +31,12 @@ const SLOW: f64 = 0.025;
 
 /// Tissue is taken this far from the pivot by the grasper (m): in the middle of its jaws.
 const GRASP_DEPTH: f64 = 0.0115;
-/// The cutter takes it farther out (m), where the gap of nearly closed blades is still wider than their
-/// contact skin.
+/// The cutter takes it farther out (m), where the gap of nearly closed blades is still wider than
+/// their contact skin.
 const CUT_DEPTH: f64 = 0.0140;
 
-/// Way along the organ from the middle of the grasp to the cut (m): half of a grasper's blade and half
-/// of a cutter's, and as much between them as either jaw's aim may be off.
+/// Way along the organ from the middle of the grasp to the cut (m): half of a grasper's blade and
+/// half of a cutter's, and as much between them as either jaw's aim may be off.
 const BESIDE: f64 = 0.0060;
 
 /// Lift of the jaws (m) above what the gate asks for.
@@ -50,13 +50,14 @@ const CLOSE_S: f64 = 1.5;
 const SCRIPT_LIFT_S: f64 = 1.0;
 const SCRIPT_HOLD_S: f64 = 1.0;
 
-/// Time of dragging, letting go and opening (s), and how wide jaws open to let go of dragged tissue.
+/// Time of dragging, letting go and opening (s), and how wide jaws open to let go of dragged
+/// tissue.
 const DRAG_S: f64 = 0.6;
 const OPEN_S: f64 = 0.5;
 const RELEASE_JAW: f64 = 0.6;
 
-/// Speed of the greedy one over that of the careful one, and the time that it gives jaws to close (s):
-/// what they take on nothing and a little more.
+/// Speed of the greedy one over that of the careful one, and the time that it gives jaws to close
+/// (s): what they take on nothing and a little more.
 const HASTE: f64 = 3.0;
 const SNATCH_S: f64 = 0.4;
 
@@ -72,8 +73,8 @@ pub enum Style {
     /// Comes along the shaft, waits for what it has begun, tries again.
     #[default]
     Careful,
-    /// Straight to everything at three times the speed, open loop: no way round, no looking whether jaws
-    /// have taken hold or the lift has lasted, no second try.
+    /// Straight to everything at three times the speed, open loop: no way round, no looking whether
+    /// jaws have taken hold or the lift has lasted, no second try.
     Greedy,
 }
 
@@ -94,7 +95,8 @@ pub enum AfterHold {
     Finish,
     /// Lowers what was lifted, lets go of it and is finished.
     Lower,
-    /// Cuts the organ between the grasp and what holds it, carries on what came loose and is finished.
+    /// Cuts the organ between the grasp and what holds it, carries on what came loose and is
+    /// finished.
     Cut(CutAt),
 }
 
@@ -107,7 +109,8 @@ pub struct Script {
     pub approach_offset: f64,
     /// Lift of the jaws (m), in one second and held for another.
     pub lift: f64,
-    /// The jaws first drag the tissue sideways by this much (m), let go of it there and close again.
+    /// The jaws first drag the tissue sideways by this much (m), let go of it there and close
+    /// again.
     pub regrasp: Option<f64>,
     /// Times that it tries again where the jaws took hold of nothing.
     pub retries: usize,
@@ -180,8 +183,9 @@ pub struct Scripted {
     /// Where each arm goes from and to in this phase.
     from: Vec<Setpoint>,
     to: Vec<Setpoint>,
-    /// What it asked of each arm last. Not what the cell was commanded: who changes its actions on the
-    /// way must not shift where its next phase begins, or a constant offset grows with every phase.
+    /// What it asked of each arm last. Not what the cell was commanded: who changes its actions on
+    /// the way must not shift where its next phase begins, or a constant offset grows with every
+    /// phase.
     last: Vec<Setpoint>,
     /// The grasp, as it was aimed at.
     grasp: Option<Aim>,
@@ -243,8 +247,8 @@ impl Scripted {
         }
     }
 
-    /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on, an
-    /// appendix whose base is held is pinned, and pinned tissue feels no blade.
+    /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on,
+    /// an appendix whose base is held is pinned, and pinned tissue feels no blade.
     fn cut_at(&self, episode: &Episode, body: usize) -> Result<f64> {
         match self.script.map(|script| script.after) {
             Some(AfterHold::Cut(CutAt::S(s))) => Ok(s),

@@ -2,7 +2,7 @@
 
 use super::over_time::{self, Curve, TimePlot};
 use super::severed;
-use crate::lift::Lifted;
+use crate::lifted::Lifted;
 use crate::{Result, counted};
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::Band;

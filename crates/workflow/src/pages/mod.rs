@@ -13,7 +13,7 @@ mod seen;
 mod severed;
 mod truth;
 
-use crate::lift::Lifted;
+use crate::lifted::Lifted;
 use crate::{Result, counted};
 use std::path::Path;
 use trocar_geometry::RepairReport;

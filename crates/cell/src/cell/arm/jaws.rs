@@ -13,8 +13,8 @@ use trocar_tissue::Piece;
 /// Jaws that press with this share of their force have closed on what is between them.
 const PRESSING: f64 = 0.95;
 
-/// Jaws are commanded to close, or to open, when the opening asked for is beyond the one they have by
-/// this much.
+/// Jaws are commanded to close, or to open, when the opening asked for is beyond the one they have
+/// by this much.
 const LEAST_COMMANDED_MOTION: f64 = 0.02;
 
 impl ArmUnit {
@@ -80,8 +80,8 @@ impl ArmUnit {
         }
     }
 
-    /// Blades that close through tissue cut it, after they were open with tissue between them all the
-    /// while: the organ, and the cutter as wide as it was open.
+    /// Blades that close through tissue cut it, after they were open with tissue between them all
+    /// the while: the organ, and the cutter as wide as it was open.
     ///
     /// What closes past each other with edges shears: it goes through what lies between instead of
     /// pressing it flat. So from the closing on tissue does not feel the blades, until none is left

@@ -51,8 +51,8 @@ pub(in crate::cell) struct ArmState {
     pub exchange: Exchange,
     pub forces: [ToolForce; 3],
     pub scissors: Scissors,
-    /// A cutter's blades are closing, or have closed, through tissue: how wide they were (rad). They
-    /// shear it then and press none of it.
+    /// A cutter's blades are closing, or have closed, through tissue: how wide they were (rad).
+    /// They shear it then and press none of it.
     pub shears: Option<f64>,
     pub held: Option<Held>,
     /// Contact of the whole instrument with tissue is disabled.

@@ -26,8 +26,8 @@ impl ArmUnit {
         self.state.held.as_ref().is_some_and(|held| held.organ == organ)
     }
 
-    /// Its convex parts where they are now, as far as they are round. The rest offset is the blades'
-    /// thickness.
+    /// Its convex parts where they are now, as far as they are round. The rest offset is the
+    /// blades' thickness.
     pub fn rods(&self) -> Vec<Rod> {
         let rods = self.frames().into_iter().flat_map(|(tool, frame)| {
             let parts = self.model.parts.iter().filter(move |part| part.tool == tool);
@@ -48,8 +48,8 @@ impl ArmUnit {
         [(self.model.tools.gripper, self.state.gripper.pose), one, two]
     }
 
-    /// The organ that a part of the instrument that tissue feels has gone into, except what the jaws
-    /// hold and what blades shear.
+    /// The organ that a part of the instrument that tissue feels has gone into, except what the
+    /// jaws hold and what blades shear.
     pub fn pierces(&self, world: &World) -> Option<usize> {
         let felt = if self.state.shears.is_some() || self.state.blades_disabled { 1 } else { 3 };
         self.inside_organ(world, felt)

@@ -1,11 +1,12 @@
 //! Rule: no command pushes an instrument harder into tissue than the scene's force limit.
 //!
-//! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N for
-//! a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a stop
-//! is not enough, because what is pressed stays pressed. So the part of a command's way that goes
-//! against the force gets shorter as the force nears the limit, and beyond the limit the instrument
-//! draws back. What a step may cost is known from the stiffness seen so far, as in [`crate::Jaw`]: a
-//! fixed gain would swing on stiff tissue or creep on soft. The rest of the way is the command's.
+//! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N
+//! for a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a
+//! stop is not enough, because what is pressed stays pressed. So the part of a command's way that
+//! goes against the force gets shorter as the force nears the limit, and beyond the limit the
+//! instrument draws back. What a step may cost is known from the stiffness seen so far, as in
+//! [`crate::Jaw`]: a fixed gain would swing on stiff tissue or creep on soft. The rest of the way
+//! is the command's.
 
 use glam::DVec3;
 

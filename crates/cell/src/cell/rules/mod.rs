@@ -26,28 +26,8 @@ use super::Cell;
 use super::arm::ArmUnit;
 use super::report::{CellEvent, PeriodLog};
 use crate::World;
-use serde::Serialize;
 use strain::{SQUEEZED, Strain};
 use trocar_robot::wrench::ForceKind;
-
-/// How often each rule acted.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct RuleCounts {
-    /// Arms and periods in which the force guard shortened a command.
-    pub guarded: usize,
-    /// Instruments that had pierced an organ.
-    pub pierced: usize,
-    /// Instruments that had hooked or crushed tissue beyond what it bears.
-    pub overstretched: usize,
-    /// Of both, how often contact of a whole instrument was disabled.
-    pub disabled_contacts: usize,
-    /// Of both, how often contact of blades alone was disabled.
-    pub disabled_blades: usize,
-    /// Instruments whose contact was enabled again.
-    pub reconnected: usize,
-    /// Organs that were relaxed outside of time.
-    pub relaxed: usize,
-}
 
 /// What rules look at and change after a tissue frame.
 struct Scope<'a> {
@@ -61,8 +41,8 @@ struct Scope<'a> {
 }
 
 impl Cell {
-    /// Applies the rules on tissue after a frame whose smallest element has the share `least` of its
-    /// rest volume.
+    /// Applies the rules on tissue after a frame whose smallest element has the share `least` of
+    /// its rest volume.
     pub(super) fn enforce_tissue_limits(&mut self, least: f64, log: &mut PeriodLog) {
         let waiting = self.waits.iter().any(|w| *w > 0);
         if least > SQUEEZED && !waiting && !self.arms.iter().any(ArmUnit::meets_tissue) {

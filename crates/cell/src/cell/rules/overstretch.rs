@@ -13,7 +13,8 @@
 use super::Scope;
 use super::strain::{MAX_LATCHED_STRETCH, MAX_WAIT_FRAMES};
 
-/// An instrument farther than this from where tissue is strained most has nothing to do with it (m).
+/// An instrument farther than this from where tissue is strained most has nothing to do with it
+/// (m).
 const NEAR: f64 = 0.03;
 
 /// The arm whose instrument tissue feels at the strained place of `organ`. What only presses comes

@@ -6,21 +6,22 @@ use glam::DVec3;
 /// Stretch of an edge at which contact of the nearest instrument is disabled.
 pub(super) const MAX_STRETCH: f64 = 5.0;
 
-/// Stretch at which a latch lets go and nothing is waited for: at ten the solver reports divergence.
+/// Stretch at which a latch lets go and nothing is waited for: at ten the solver reports
+/// divergence.
 pub(super) const MAX_LATCHED_STRETCH: f64 = 6.5;
 
 /// Stretch of all edges below which an instrument is felt again.
 const RESTED_STRETCH: f64 = 3.0;
 
-/// Share of its rest volume below which an element is crushed: less than the strongest grasps of the
-/// lifts leave. Below a thousandth the solvers make no progress.
+/// Share of its rest volume below which an element is crushed: less than the strongest grasps of
+/// the lifts leave. Below a thousandth the solvers make no progress.
 pub(super) const MIN_VOLUME_SHARE: f64 = 0.01;
 
 /// Share of its rest volume that every element needs for an instrument to be felt again.
 const RESTED_VOLUME_SHARE: f64 = 0.05;
 
-/// Tissue that no instrument meets is examined where an element has less than this share of its rest
-/// volume.
+/// Tissue that no instrument meets is examined where an element has less than this share of its
+/// rest volume.
 pub(super) const SQUEEZED: f64 = 0.2;
 
 /// Frames for which an organ may stay strained after the last instrument has let go of it: what is
@@ -44,9 +45,9 @@ impl Strain {
         self.is_beyond(false)
     }
 
-    /// Beyond what an instrument keeps its contact at. `latched`: its latch alone holds the organ, and its
-    /// blades press on nothing. How hard that may pull is for the tearing force to say; the stretch
-    /// only ends what solvers bear.
+    /// Beyond what an instrument keeps its contact at. `latched`: its latch alone holds the organ,
+    /// and its blades press on nothing. How hard that may pull is for the tearing force to say; the
+    /// stretch only ends what solvers bear.
     pub fn is_beyond(&self, latched: bool) -> bool {
         self.stretch > if latched { MAX_LATCHED_STRETCH } else { MAX_STRETCH } || self.volume < MIN_VOLUME_SHARE
     }

@@ -77,8 +77,8 @@ impl Workspace {
         }
     }
 
-    /// The nearest that the instrument comes to a wanted pose of its tip frame. Of two rolls the one
-    /// nearer to that of `near` is taken, and the jaw is that of `near`.
+    /// The nearest that the instrument comes to a wanted pose of its tip frame. Of two rolls the
+    /// one nearer to that of `near` is taken, and the jaw is that of `near`.
     ///
     /// # Errors
     /// A pose that is not finite or whose rotation has not length 1.

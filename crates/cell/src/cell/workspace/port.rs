@@ -74,8 +74,8 @@ impl PortSpace {
         Coordinates { insertion: (at.insertion - by).max(self.limits.insertion[0]), ..at }.into()
     }
 
-    /// The deepest insertion (m) at these pivots with which the tips of the closed blades stay above
-    /// the floor.
+    /// The deepest insertion (m) at these pivots with which the tips of the closed blades stay
+    /// above the floor.
     fn deepest(&self, at: &Coordinates) -> f64 {
         let tip = self.port.tip(at);
         let along = tip.rotation * DVec3::X;
@@ -85,9 +85,9 @@ impl PortSpace {
     }
 }
 
-/// See [`Workspace::paced`](super::Workspace::paced). The tip goes no faster than [`TIP_SPEED`], the
-/// shaft swings no faster than [`SWING_SPEED`] and rolls no faster than [`ROLL_SPEED`]. The jaw has a
-/// drive of its own.
+/// See [`Workspace::paced`](super::Workspace::paced). The tip goes no faster than [`TIP_SPEED`],
+/// the shaft swings no faster than [`SWING_SPEED`] and rolls no faster than [`ROLL_SPEED`]. The jaw
+/// has a drive of its own.
 pub(super) fn paced(from: &Setpoint, to: &Setpoint, period: f64) -> (Setpoint, bool) {
     let (from, to) = (from.in_port(), to.in_port());
     let swing = [0, 1].map(|k| to.pivots[k] - from.pivots[k]);
