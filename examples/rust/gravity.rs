@@ -17,11 +17,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let bounds = (DVec3::new(-0.005, -0.005, -0.005), DVec3::new(0.065, 0.005, 0.005));
     let mesh = LatticeMesher::uniform(0.003).mesh_shape(&Rod, bounds)?;
     let pinned = (0..mesh.vertices.len() as u32).filter(|i| mesh.vertices[*i as usize].x < 0.005);
+    let tissue = Material {
+        model: ConstitutiveModel::StableNeoHookean,
+        young_modulus: 30e3,
+        poisson_ratio: 0.45,
+        density: 1050.0,
+        viscosity: 180.0,
+    };
     let mut builder = ModelBuilder::new().gravity(DVec3::new(0.0, 0.0, -9.81));
     builder.body(BodyDescription {
         name: "rod".to_owned(),
         mesh: &mesh,
-        material: Material { young_modulus: 30e3, density: 1050.0, ..Material::default() },
+        material: tissue,
         pinned: pinned.collect(),
         supports: Vec::new(),
     })?;

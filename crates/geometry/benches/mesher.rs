@@ -30,21 +30,21 @@ fn surface() -> TriMesh {
 
 /// The surface of the tube from a grid of 1.5 mm.
 #[divan::bench]
-fn extract_isosurface(bencher: Bencher) {
+fn extract_isosurface(bencher: Bencher<'_, '_>) {
     let grid = sample_distance(&Tube, BOUNDS, 0.0015);
     bencher.bench_local(|| isosurface(divan::black_box(&grid), 0.0));
 }
 
 /// One signed distance to a surface of some thousand triangles.
 #[divan::bench]
-fn distance_to_surface(bencher: Bencher) {
+fn distance_to_surface(bencher: Bencher<'_, '_>) {
     let distance = MeshDistance::new(&surface()).unwrap();
     bencher.bench_local(|| distance.distance(divan::black_box(DVec3::new(0.03, 0.02, 0.004))));
 }
 
 /// The tetrahedral body of the tube, with cells of the given size (mm).
 #[divan::bench(args = [4.0, 3.0, 2.2])]
-fn mesh_tube(bencher: Bencher, cell_mm: f64) {
+fn mesh_tube(bencher: Bencher<'_, '_>, cell_mm: f64) {
     let mesher = LatticeMesher::uniform(1e-3 * cell_mm);
     bencher.bench_local(|| mesher.mesh_shape(&Tube, BOUNDS).unwrap());
 }

@@ -14,7 +14,7 @@ fn main() {
 
 /// One step of 1/480 s with two substeps, near the home posture, under gravity compensation.
 #[divan::bench]
-fn step(bencher: Bencher) {
+fn step(bencher: Bencher<'_, '_>) {
     let arm = SerialArm::franka_fr3().unwrap();
     let mut state = ArmState::at_rest(arm.home());
     let drive = Drive { torque: arm.gravity_torque(&arm.home()), external: arm.zeros() };
@@ -23,7 +23,7 @@ fn step(bencher: Bencher) {
 
 /// The pose of every link.
 #[divan::bench]
-fn forward_kinematics(bencher: Bencher) {
+fn forward_kinematics(bencher: Bencher<'_, '_>) {
     let arm = SerialArm::franka_fr3().unwrap();
     let home = arm.home();
     bencher.bench_local(|| arm.frames(divan::black_box(&home)).flange());
@@ -31,7 +31,7 @@ fn forward_kinematics(bencher: Bencher) {
 
 /// The joints for a flange pose 5 mm away, as in one control period.
 #[divan::bench]
-fn inverse_kinematics(bencher: Bencher) {
+fn inverse_kinematics(bencher: Bencher<'_, '_>) {
     let arm = SerialArm::franka_fr3().unwrap();
     let home = arm.home();
     let flange = arm.frames(&home).flange();

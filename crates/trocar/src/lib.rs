@@ -18,11 +18,18 @@
 //!
 //! let bounds = (DVec3::splat(-0.01), DVec3::splat(0.01));
 //! let mesh = LatticeMesher::uniform(0.005).mesh_shape(&Sphere, bounds)?;
+//! let tissue = Material {
+//!     model: ConstitutiveModel::StableNeoHookean,
+//!     young_modulus: 12e3,
+//!     poisson_ratio: 0.45,
+//!     density: 1050.0,
+//!     viscosity: 70.0,
+//! };
 //! let mut builder = ModelBuilder::new().gravity(DVec3::new(0.0, 0.0, -9.81));
 //! builder.body(BodyDescription {
 //!     name: "sphere".to_owned(),
 //!     mesh: &mesh,
-//!     material: Material::default(),
+//!     material: tissue,
 //!     pinned: Vec::new(),
 //!     supports: Vec::new(),
 //! })?;
@@ -76,6 +83,6 @@ pub mod prelude {
     pub use trocar_task::policy::{Script, Scripted};
     pub use trocar_task::{Episode, Policy, Recording, Summary};
     pub use trocar_tissue::{
-        BodyDescription, Material, Model, ModelBuilder, SolverSettings, State, StepReport, Stepper,
+        BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, SolverSettings, State, StepReport, Stepper,
     };
 }
