@@ -75,7 +75,7 @@ fn usage() -> ExitCode {
 }
 
 fn test() -> ExitCode {
-    if TEST.iter().all(check) && EXAMPLES.iter().all(|name| example(name)) && docs() {
+    if TEST.iter().all(check) && EXAMPLES.iter().all(example) && docs() {
         eprintln!("\nformatting, lints, tests, examples and docs are in order");
         return check_python(python::Build::Workspace);
     }
