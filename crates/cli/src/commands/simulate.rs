@@ -53,7 +53,7 @@ pub fn text(r: &LiftResult) -> String {
     let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
     let mut text = format!(
         "{}: {} at s = {:.2}, {} grasp, {} nodes held, jaws closed on {:.1} mm with {:.2} N{}: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm, activation step {:.3} mm: {}\n\
-         peaks of {:.2} N contact, {:.2} N constraint; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}",
+         peaks of {:.2} N contact, {:.2} N constraint; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {:.6} mm; {}",
         r.episode.scene,
         d.organ,
         r.at,
