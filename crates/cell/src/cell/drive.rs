@@ -210,8 +210,8 @@ impl DriveState {
     /// Feeds every bit to a hash.
     pub fn hash_into(&self, hash: &mut xxhash_rust::xxh3::Xxh3) {
         match self {
-            // Printed numbers are as exact as their bits: the shortest text that reads back as the
-            // same.
+            // A printed number is the shortest text that reads back as the same bits. The names of
+            // fields in the text are part of the hash: see `Debug` of the controller's memory.
             Self::Dynamic(state) => hash.update(format!("{state:?}").as_bytes()),
             Self::Ideal(state) => state.numbers().iter().for_each(|n| hash.update(&n.to_bits().to_le_bytes())),
         }

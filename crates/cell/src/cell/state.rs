@@ -1,5 +1,8 @@
 //! Saving, restoring and hashing a cell.
 
+#[cfg(test)]
+mod tests;
+
 use super::Cell;
 use super::arm::ArmState;
 use super::drive::DriveState;

@@ -70,7 +70,7 @@ pub fn text(r: &LiftResult) -> String {
     };
     let mut text = format!(
         "{}: {} at s = {:.2}, {grasp}\n\
-         peaks of {:.2} N contact, {:.2} N constraint; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}",
+         peaks of {:.2} N contact, {:.2} N constraint; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {:.6} mm; {}",
         r.episode.scene,
         d.organ,
         r.at,

@@ -1,0 +1,110 @@
+//! Hash and restore carry every field of an arm and of the cell.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+use super::*;
+use crate::GraspDesign;
+use crate::cell::arm::{ArmState, Held, Wanted};
+use crate::hold::Hold;
+use glam::DVec3;
+use tube::{ONE_END, specimen};
+
+#[path = "../../../tests/common/mod.rs"]
+mod tube;
+
+fn cell() -> Cell {
+    let mut scene = tube::scene();
+    scene.instruments.truncate(1);
+    scene.arms = vec![trocar_scene::Arm::free(trocar_scene::Side::Left, "grasper", [0.0, 0.46, 0.12])];
+    scene.task.name = trocar_scene::TaskName::GraspLift;
+    scene.task.organ = "tube".to_owned();
+    Cell::new(&scene, &specimen(ONE_END), 1).unwrap()
+}
+
+/// One change for each field. A new field does not compile until it is named here.
+fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
+    let ArmState {
+        wanted: _,
+        commanded: _,
+        held_back: _,
+        guard: _,
+        guarded: _,
+        gripper: _,
+        design: _,
+        jaw: _,
+        jaw_rate: _,
+        exchange: _,
+        forces: _,
+        scissors: _,
+        shears: _,
+        held: _,
+        contact_disabled: _,
+        blades_disabled: _,
+        rcm_peak: _,
+        rcm_reported: _,
+    } = state;
+    let changed = |change: &dyn Fn(&mut ArmState)| {
+        let mut other = state.clone();
+        change(&mut other);
+        other
+    };
+    vec![
+        ("wanted", changed(&|s| s.wanted = Wanted::Joints(0.25))),
+        ("commanded", changed(&|s| s.commanded.0[2] += 1e-9)),
+        ("held_back", changed(&|s| s.held_back ^= true)),
+        ("guard", changed(&|s| s.guard.begin_period(DVec3::X, DVec3::Y))),
+        ("guarded", changed(&|s| s.guarded ^= true)),
+        ("gripper", changed(&|s| s.gripper.pose.translation.x += 1e-9)),
+        ("jaw angle", changed(&|s| s.gripper.jaw_angle += 1e-9)),
+        ("design", changed(&|s| s.design = GraspDesign::RestPose)),
+        ("jaw", changed(&|s| s.jaw.budget += 0.1)),
+        ("jaw_rate", changed(&|s| s.jaw_rate += 1e-9)),
+        ("exchange", changed(&|s| s.exchange.limited ^= true)),
+        ("forces", changed(&|s| s.forces[1].pressing += 1e-9)),
+        ("scissors", changed(&|s| s.scissors = crate::Scissors::new(0.9, 0.1))),
+        ("shears", changed(&|s| s.shears = Some(0.5))),
+        ("held", changed(&|s| s.held = Some(Held { organ: 0, s: 0.5, hold: hold.clone(), opening: 0.1 }))),
+        ("contact_disabled", changed(&|s| s.contact_disabled ^= true)),
+        ("blades_disabled", changed(&|s| s.blades_disabled ^= true)),
+        ("rcm_peak", changed(&|s| s.rcm_peak += 1e-9)),
+        ("rcm_reported", changed(&|s| s.rcm_reported[1] ^= true)),
+    ]
+}
+
+#[test]
+fn hash_and_restore_carry_every_field() {
+    let mut cell = cell();
+    let saved = cell.save();
+    let start = saved.hash();
+    assert_eq!(cell.hash(), start);
+    let mut seen = vec![start];
+    let hold = Hold::new(cell.world(), 0, vec![1, 2], &saved.arms[0].0.gripper.pose);
+    let mut others: Vec<(&str, CellState)> = changes(&saved.arms[0].0, &hold)
+        .into_iter()
+        .map(|(field, arm)| {
+            let mut other = saved.clone();
+            other.arms[0].0 = arm;
+            (field, other)
+        })
+        .collect();
+    let changed = |change: &dyn Fn(&mut CellState)| {
+        let mut other = saved.clone();
+        change(&mut other);
+        other
+    };
+    let CellState { world: _, arms: _, waits: _, touch: _, periods: _ } = &saved;
+    others.push(("waits", changed(&|s| s.waits.push(3))));
+    others.push(("touch", changed(&|s| s.touch ^= true)));
+    others.push(("periods", changed(&|s| s.periods += 1)));
+    cell.advance().unwrap();
+    others.push(("world and drive", cell.save()));
+    for (field, other) in &others {
+        let hash = other.hash();
+        assert!(!seen.contains(&hash), "the hash misses {field}");
+        seen.push(hash);
+        cell.restore(other).unwrap();
+        assert_eq!(cell.hash(), hash, "restore misses {field}");
+        cell.restore(&saved).unwrap();
+        assert_eq!(cell.hash(), start, "{field} stays after restore");
+    }
+}
