@@ -29,7 +29,7 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
         approach_offset: arguments.approach_offset * 1e-3,
         regrasp: arguments.regrasp.map(|drag| drag * 1e-3),
         sever: arguments.sever.map(|at| at.map_or(SeverAt::Between, SeverAt::S)),
-        schedule: solver_named(&schedule.name())?,
+        schedule: solver_named(schedule.name())?,
         threads: arguments.threads,
         ..GraspLift::default()
     };
