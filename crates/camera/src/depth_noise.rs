@@ -94,7 +94,7 @@ impl DepthNoise {
         frame: u64,
     ) -> Result<DepthImage> {
         let mut image = depth.clone();
-        self.spoil(&mut image, color, camera, camera.fx, [seed, frame])?;
+        self.apply_resampled(&mut image, color, camera, camera.fx, [seed, frame])?;
         Ok(image)
     }
 
@@ -104,7 +104,7 @@ impl DepthNoise {
     ///
     /// # Errors
     /// As [`Self::apply`]. Then `depth` is unchanged.
-    pub fn spoil(
+    pub fn apply_resampled(
         &self,
         depth: &mut DepthImage,
         color: Option<&ColorImage>,
@@ -328,7 +328,7 @@ mod tests {
         let spread = |z: f32| {
             let mut image = DepthImage::new(200, 200);
             image.depth.fill(z);
-            model.spoil(&mut image, None, &camera, 445.0, [1, 2]).unwrap();
+            model.apply_resampled(&mut image, None, &camera, 445.0, [1, 2]).unwrap();
             let all: Vec<f64> = image.depth.iter().map(|d| f64::from(d - z)).collect();
             (all.iter().map(|d| d * d).sum::<f64>() / all.len() as f64).sqrt()
         };
@@ -343,13 +343,13 @@ mod tests {
         }
         let mut shadowed = image.clone();
         shadowed.depth.iter_mut().for_each(|d| *d = 0.5 - *d);
-        model.spoil(&mut image, None, &camera, 445.0, [1, 2]).unwrap();
+        model.apply_resampled(&mut image, None, &camera, 445.0, [1, 2]).unwrap();
         let lost = |column: usize| (0..64).filter(|r| image.depth[r * 64 + column] == 0.0).count();
         assert!((25..55).contains(&lost(31)) && (25..55).contains(&lost(32)) && lost(10) == 0 && lost(33) == 0);
         assert!(image.depth.iter().all(|d| (f64::from(*d) / 1e-4 - (f64::from(*d) / 1e-4).round()).abs() < 1e-3));
         // 445 * 0.018 / 0.2 - 445 * 0.018 / 0.3 = 13.4 px of the imagers, 6.2 px of the image, are
         // hidden beside the closer surface on the right.
-        model.spoil(&mut shadowed, None, &camera, 445.0, [1, 2]).unwrap();
+        model.apply_resampled(&mut shadowed, None, &camera, 445.0, [1, 2]).unwrap();
         let lost = |column: usize| (0..64).filter(|r| shadowed.depth[r * 64 + column] == 0.0).count();
         assert!(lost(26) == 64 && lost(24) == 0, "{} {}", lost(26), lost(24));
     }

@@ -35,3 +35,7 @@ pub use lens::{CameraModel, UndistortionMap};
 pub use model::Camera;
 pub use raster::draw_triangle;
 pub use trocar_core::Pose;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

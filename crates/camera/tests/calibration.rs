@@ -1,6 +1,6 @@
-//! Calibration files: round trips, other programs' habits, and errors of one line.
+//! Calibration files: round trips, files of other programs, and errors of one line.
 
-#![allow(clippy::unwrap_used, reason = "helper functions of tests")]
+#![allow(clippy::unwrap_used, reason = "tests may panic")]
 
 mod common;
 
@@ -12,7 +12,7 @@ fn parse(text: &str) -> Result<CameraModel, String> {
 }
 
 #[test]
-fn what_others_write_is_read() {
+fn files_of_other_programs_are_read() {
     let CameraModel::Pinhole(camera) = parse(SAMPLE).unwrap() else { panic!("a pinhole") };
     assert_eq!((camera.width, camera.fx, camera.cy), (1280, 683.91, 359.5));
     assert_eq!(camera.distortion, Distortion([-0.12, 0.034, 1e-3, -2e-4, 0.0, 0.0, 0.0, 0.0]));
@@ -21,7 +21,7 @@ fn what_others_write_is_read() {
 }
 
 #[test]
-fn files_come_back_to_the_bit() {
+fn files_are_read_back_exactly() {
     let folder = tempfile::tempdir().unwrap();
     let rational =
         Camera { distortion: Distortion([0.1, 0.2, 1e-17, -0.3, 0.0, 1e300, 0.1 + 0.2, 7.0]), ..Camera::d405() };
@@ -37,7 +37,7 @@ fn files_come_back_to_the_bit() {
 }
 
 #[test]
-fn what_is_wrong_is_said_in_one_line() {
+fn errors_have_one_line() {
     let cases = [
         (SAMPLE.replace("camera_matrix", "camera"), "camera_matrix"),
         (SAMPLE.replace("3.595e+02, 0.,", "3.595e+02,"), "3 x 3, but has 8"),
@@ -46,18 +46,18 @@ fn what_is_wrong_is_said_in_one_line() {
         (SAMPLE.replace("1280", "0"), "width"),
         (SAMPLE.replace("1280", "wide"), "line"),
         (ROS.replace("equidistant", "omnidirectional"), "omnidirectional"),
-        (ROS.replace("cols: 4", "cols: 2").replace(", 0.0, 0.0]\nrect", "]\nrect"), "a fisheye has 4"),
+        (ROS.replace("cols: 4", "cols: 2").replace(", 0.0, 0.0]\nrect", "]\nrect"), "a fisheye lens must have 4"),
         (
             SAMPLE.replace("rows: 5", "rows: 3").replace("-2.0e-04, 0. ]", "]").replace("1.0e-03, ", "1.0e-03 "),
             "4, 5 or 8",
         ),
         ("{\"image_width\": 3}".into(), "image_height"),
-        (String::new(), "no OpenCV calibration"),
-        ("%YAML:1.0".into(), "no OpenCV calibration"),
+        (String::new(), "not an OpenCV calibration"),
+        ("%YAML:1.0".into(), "not an OpenCV calibration"),
     ];
     for (text, part) in cases {
         let error = parse(&text).unwrap_err();
-        assert!(error.contains(part) && !error.contains('\n'), "'{error}' should say '{part}'");
+        assert!(error.contains(part) && !error.contains('\n'), "'{error}' must contain '{part}'");
     }
     let error = CameraModel::read_calibration("no/such.yml".as_ref()).unwrap_err().to_string();
     assert!(error.starts_with("no/such.yml: "), "{error}");
@@ -65,7 +65,7 @@ fn what_is_wrong_is_said_in_one_line() {
 
 #[test]
 fn an_undistorted_picture_is_straight() {
-    // A line of white pixels that the lens bends: straight again to a pixel.
+    // A line of white pixels that the lens bends is straight again to one pixel.
     let lens = Camera { distortion: Distortion([-0.25, 0.05, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), ..Camera::d405() };
     let plain = Camera::d405();
     let mut image = trocar_camera::ColorImage::new(848, 480, [0; 3]);

@@ -1,4 +1,4 @@
-//! Damaged calibration files give errors: no panic, no hang, no huge allocation.
+//! Damaged calibration files give errors, without panics, hangs or large allocations.
 
 mod common;
 
@@ -25,7 +25,7 @@ fn damaged_files_are_errors() {
     seeds.iter().for_each(|(name, bytes)| assert!(CameraModel::parse_calibration(bytes).is_ok(), "{name}"));
     assault(&seeds, Allowance { fixed: 4 << 20, per_byte: 1000 }, |_, bytes| {
         if let Ok(model) = CameraModel::parse_calibration(bytes) {
-            // Whatever is taken can be used.
+            // Every accepted file gives a usable model.
             for (u, v) in [(0.0, 0.0), (1e5, -3.0), (320.0, 200.0)] {
                 let _ = model.unproject(u, v).and_then(|ray| model.project(ray));
             }

@@ -1,5 +1,5 @@
-//! Camera models and calibration files against OpenCV, in whose pixels they must agree to 1e-4.
-//! Skipped, saying so, without it.
+//! Camera models and calibration files agree with OpenCV to 1e-4 px. Skipped with a message without
+//! OpenCV.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -8,10 +8,10 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::{Camera, CameraModel, Distortion, Fisheye};
 
-/// Agreement asked for (px).
-const CLOSE: f64 = 1e-4;
+/// Tolerance (px).
+const TOLERANCE: f64 = 1e-4;
 
-/// The Python with OpenCV, or why there is none.
+/// The Python interpreter with OpenCV; prints a message if there is none.
 fn python() -> Option<PathBuf> {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
     let imports = Command::new(&python).args(["-c", "import cv2"]).output();
@@ -86,12 +86,12 @@ fn every_model_agrees_with_opencv() {
         let theirs = read(&file("map"));
         assert_eq!(map.from.len(), theirs.len());
         for (ours, theirs) in map.from.iter().zip(theirs) {
-            // OpenCV keeps its maps in single precision: half a unit in the last place of 639 is
+            // OpenCV stores its maps in single precision: half a unit in the last place of 639 is
             // 3e-5.
             worst[2] = worst[2].max((*ours - glam::DVec2::from(theirs)).length());
         }
         println!("{name}: projected {:.1e}, undistorted {:.1e}, maps {:.1e} px", worst[0], worst[1], worst[2]);
-        assert!(worst.iter().all(|w| *w < CLOSE), "{name}: {worst:?}");
+        assert!(worst.iter().all(|w| *w < TOLERANCE), "{name}: {worst:?}");
         for ending in ["yml", "json"] {
             let back = CameraModel::read_calibration(&file(&format!("back.{ending}"))).unwrap();
             assert_eq!(back, model, "{name} through OpenCV's {ending}");

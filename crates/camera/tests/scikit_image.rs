@@ -1,4 +1,4 @@
-//! SSIM and PSNR against scikit-image's, to 1e-6. Skipped, saying so, without it.
+//! SSIM and PSNR agree with scikit-image to 1e-6. Skipped with a message without scikit-image.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -6,13 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::Mask;
 use trocar_camera::metrics::{psnr_db, ssim};
+use trocar_core::Random;
 
 const WIDTH: usize = 120;
 const HEIGHT: usize = 80;
-/// Half the window: nearer to the border the two treat what lies beyond differently.
+/// Half the window. Nearer to the border the two differ in the treatment of pixels beyond it.
 const REACH: usize = 5;
 
-/// The Python with scikit-image, or why there is none.
+/// The Python interpreter with scikit-image; prints a message if there is none.
 fn python() -> Option<PathBuf> {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
     let imports = Command::new(&python).args(["-c", "import skimage.metrics"]).output();
@@ -23,26 +24,22 @@ fn python() -> Option<PathBuf> {
     None
 }
 
-/// Blobs, and the same under noise and another exposure.
+/// A picture of blobs, and the same picture with noise and another exposure.
 fn pictures(strength: f64) -> [Vec<[f64; 3]>; 2] {
-    let mut bits = 7_u64;
-    let mut noise = move || {
-        bits = bits.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (bits >> 40) as f64 / (1_u64 << 24) as f64 - 0.5
-    };
+    let mut numbers = Random::new(7).sequence();
     let mut all = [Vec::new(), Vec::new()];
     for i in 0..WIDTH * HEIGHT {
         let (x, y) = ((i % WIDTH) as f64, (i / WIDTH) as f64);
         let clean: [f64; 3] = [0.0, 1.0, 2.0]
             .map(|c| 120.0 + 60.0 * (0.11 * x + c).sin() * (0.17 * y - c).cos() + 20.0 * (0.9 * x * y / 40.0).sin());
         all[0].push(clean.map(|v| v.round().clamp(0.0, 255.0)));
-        all[1].push(clean.map(|v| (0.9 * v + strength * noise()).round().clamp(0.0, 255.0)));
+        all[1].push(clean.map(|v| (0.9 * v + strength * (numbers.uniform() - 0.5)).round().clamp(0.0, 255.0)));
     }
     all
 }
 
 #[test]
-fn ssim_and_psnr_are_scikit_images() {
+fn ssim_and_psnr_agree_with_scikit_image() {
     let Some(python) = python() else { return };
     for strength in [3.0, 40.0, 200.0] {
         let folder = tempfile::tempdir().unwrap();
@@ -67,7 +64,7 @@ fn ssim_and_psnr_are_scikit_images() {
         };
         let inside: Vec<usize> = (0..WIDTH * HEIGHT).filter(inner).collect();
         let worst = inside.iter().map(|i| (ours.map[*i] - map[*i]).abs()).fold(0.0, f64::max);
-        // scikit-image's mean leaves the border out, ours does not.
+        // The mean of scikit-image excludes the border, ours includes it.
         let our_mean = inside.iter().map(|i| ours.map[*i]).sum::<f64>() / inside.len() as f64;
         let our_psnr = psnr_db(&a, &b, &whole).unwrap();
         println!(
@@ -76,6 +73,6 @@ fn ssim_and_psnr_are_scikit_images() {
             our_psnr - psnr
         );
         assert!((our_mean - mean).abs() < 1e-6 && worst < 1e-6 && (our_psnr - psnr).abs() < 1e-6);
-        assert!((0.0..0.99).contains(&mean), "pictures that say nothing: {mean}");
+        assert!((0.0..0.99).contains(&mean), "the pictures are too similar or unrelated: {mean}");
     }
 }

@@ -94,7 +94,7 @@ impl World {
         if severed.faces == 0 {
             return Ok(Vec::new());
         }
-        self.stepper.follow(&severed.model)?;
+        self.stepper.set_model(&severed.model)?;
         let whole = self.axes[cut.body].clone();
         for piece in &severed.pieces {
             let mut axis = whole.clone();

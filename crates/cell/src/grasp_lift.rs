@@ -8,7 +8,7 @@ use crate::{CutOrgan, Error, GraspDesign, Gripper, Phase, Result, Sample, Sessio
 use glam::DVec3;
 use trocar_core::Progress;
 use trocar_specimen::Specimen;
-use trocar_tissue::Schedule;
+use trocar_tissue::SolverSettings;
 
 /// More worker threads than any machine has cores.
 const MOST_THREADS: usize = 1024;
@@ -43,7 +43,7 @@ pub struct GraspLift {
     /// Blades and shaft touch the tissue, and organs each other. Without, jaws stop where they would touch it.
     pub contact: bool,
     /// How a frame is stepped.
-    pub schedule: Schedule,
+    pub schedule: SolverSettings,
     /// Worker threads, 0 for all.
     pub threads: usize,
     /// Keep a snapshot every this many frames, for the moving picture; 0 for none.
@@ -63,7 +63,7 @@ impl Default for GraspLift {
             lower: true,
             sever: None,
             contact: true,
-            schedule: Schedule::default(),
+            schedule: SolverSettings::default(),
             threads: 0,
             snapshot_every: 0,
         }

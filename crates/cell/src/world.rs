@@ -5,8 +5,8 @@ use glam::DVec3;
 use trocar_geometry::{OrganAxis, TetQuality};
 use trocar_specimen::{End, MaterialModel, Organ, Pins, Specimen};
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder, Schedule,
-    State, Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
+    BodyContact, BodyDescription, Collider, ConstitutiveModel, Event, Load, Material, Model, ModelBuilder,
+    SolverSettings, State, Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
 };
 
 /// Length of a frame [s].
@@ -92,7 +92,7 @@ impl World {
     ///
     /// # Errors
     /// When a mesh, a material or the pins of an organ cannot be simulated.
-    pub fn new(specimen: &Specimen, schedule: Schedule, threads: usize) -> Result<Self> {
+    pub fn new(specimen: &Specimen, schedule: SolverSettings, threads: usize) -> Result<Self> {
         Self::with_tools(specimen, Vec::new(), schedule, threads)
     }
 
@@ -103,7 +103,7 @@ impl World {
     pub fn with_tools(
         specimen: &Specimen,
         colliders: Vec<Collider>,
-        schedule: Schedule,
+        schedule: SolverSettings,
         threads: usize,
     ) -> Result<Self> {
         Self::surrounded(specimen, &Surroundings::default(), colliders, schedule, threads)
@@ -117,7 +117,7 @@ impl World {
         specimen: &Specimen,
         surroundings: &Surroundings,
         colliders: Vec<Collider>,
-        schedule: Schedule,
+        schedule: SolverSettings,
         threads: usize,
     ) -> Result<Self> {
         let up = specimen.up.normalize();
@@ -176,7 +176,7 @@ impl World {
             return Err(Error::Option("the state is of another specimen: its organs have other nodes".to_owned()));
         }
         if self.cuts > 0 || saved.cuts > 0 {
-            self.stepper.follow(&saved.model)?;
+            self.stepper.set_model(&saved.model)?;
         }
         self.model = saved.model.clone();
         self.state = saved.state.clone();
@@ -192,7 +192,7 @@ impl World {
 
     /// The same under `loads` on nodes.
     pub fn step_under(&mut self, tools: &[ToolMotion], loads: &[Load]) -> trocar_tissue::StepReport {
-        self.stepper.step_under(&self.model, &mut self.state, tools, loads)
+        self.stepper.step_with_loads(&self.model, &mut self.state, tools, loads)
     }
 
     /// What tools and other organs did to nodes at the end of the last frame.

@@ -7,7 +7,7 @@ mod common;
 use common::{HALF_LENGTH, ONE_END, specimen};
 use glam::DVec3;
 use trocar_cell::{Gripper, MAX_ANGLE, World};
-use trocar_tissue::{Compliance, Grasp, Schedule, ToolMotion};
+use trocar_tissue::{Compliance, Grasp, SolverSettings, ToolMotion};
 
 /// Volume of all bodies as they are now [m3].
 fn volume(world: &World) -> f64 {
@@ -21,7 +21,7 @@ fn volume(world: &World) -> f64 {
 
 /// Lifts the tube by its free end, cuts it in the middle, goes on; the hash at the end.
 fn resect(opening: f64) -> (World, usize, f64, f64) {
-    let mut world = World::new(&specimen(ONE_END), Schedule::default(), 1).unwrap();
+    let mut world = World::new(&specimen(ONE_END), SolverSettings::default(), 1).unwrap();
     let up = world.up;
     let over = |x: f64| Gripper::over(x * DVec3::X, up, DVec3::X, opening);
     let (holder, cutter) = (over(0.7 * HALF_LENGTH), over(0.0));

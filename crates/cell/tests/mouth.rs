@@ -5,7 +5,7 @@ mod common;
 use common::{HALF_LENGTH, ONE_END, RADIUS, specimen};
 use glam::DVec3;
 use trocar_cell::{CONTACT_SKIN, Gripper, MAX_ANGLE, Mouth, World, attached, clusters};
-use trocar_tissue::Schedule;
+use trocar_tissue::SolverSettings;
 
 const REACH: f64 = 0.009;
 
@@ -19,7 +19,7 @@ fn jaws(x: f64, aside: f64, above: f64, angle: f64) -> Gripper {
 
 #[test]
 fn fifteen_placements_of_a_tube() {
-    let world = World::new(&specimen(ONE_END), Schedule::default(), 1).unwrap();
+    let world = World::new(&specimen(ONE_END), SolverSettings::default(), 1).unwrap();
     let all = clusters(&world, 0);
     let free = all[0].s..=all[all.len() - 1].s;
     for place in 0..5 {
@@ -45,7 +45,7 @@ fn fifteen_placements_of_a_tube() {
 
 #[test]
 fn a_tube_outside_the_mouth_is_not_grasped() {
-    let world = World::new(&specimen(ONE_END), Schedule::default(), 1).unwrap();
+    let world = World::new(&specimen(ONE_END), SolverSettings::default(), 1).unwrap();
     let none = |gripper: Gripper| assert!(Mouth::of(&gripper).tissue_of(&world, 0).is_none(), "{gripper:?}");
     let some = |gripper: Gripper| assert!(Mouth::of(&gripper).tissue_of(&world, 0).is_some(), "{gripper:?}");
     // Beside it: all on one side of the closing plane.
@@ -65,7 +65,7 @@ fn a_tube_outside_the_mouth_is_not_grasped() {
 
 #[test]
 fn tissue_too_far_from_every_cluster_is_not_attached() {
-    let world = World::new(&specimen(ONE_END), Schedule::default(), 1).unwrap();
+    let world = World::new(&specimen(ONE_END), SolverSettings::default(), 1).unwrap();
     let tip = clusters(&world, 0).pop().unwrap().centroid(&world, 0);
     assert!(attached(&world, 0, tip + 0.0119 * DVec3::Y, REACH).is_some());
     assert!(attached(&world, 0, tip + 0.0121 * DVec3::Y, REACH).is_none());

@@ -38,11 +38,12 @@ pub enum Command {
     Demo(Demo),
     /// Make a recording with known truth: a procedural anatomy filmed by a simulated depth camera.
     Record(Record),
-    /// Say what a recording holds, and write the file in which to say more of it.
+    /// Describe a recording: frames, cameras, depth, organs, and what is missing.
     Inspect(Inspect),
-    /// Make masks of a recording: organs pointed at by SAM 2.1, instruments by the looks of metal or followed by SAM 2.1.
+    /// Make masks of a recording: organs by SAM 2.1 from points, instruments by the appearance of
+    /// metal or followed by SAM 2.1.
     Segment(Segment),
-    /// Turn an RGB-D recording, or a ready surface, into watertight tetrahedral organs.
+    /// Reconstruct watertight tetrahedral organs from an RGB-D recording or a surface file.
     Reconstruct(Reconstruct),
     /// List, print and check scene files: the whole two-arm cell in one TOML file.
     Scene(Scene),
@@ -109,7 +110,7 @@ pub struct Record {
 pub struct Inspect {
     /// Recording: a folder with a recording.toml, a .bag or an .mcap file.
     pub recording: PathBuf,
-    /// Write a .toml to fill in, and a still, beside a .bag or .mcap file.
+    /// Write a template .toml and an image of the middle frame beside a .bag or .mcap file.
     #[arg(long)]
     pub template: bool,
 }
@@ -117,26 +118,27 @@ pub struct Inspect {
 /// Arguments of `segment`.
 #[derive(Debug, Args)]
 pub struct Segment {
-    /// Recording; its .toml points at organs (`points`) and instruments (`[[instrument]]`).
+    /// Recording; its .toml marks organs by `points` and instruments by `[[instrument]]`.
     #[arg(required_unless_present = "weights")]
     pub recording: Option<PathBuf>,
-    /// Folder to write: put it into the recording as masks/ and `reconstruct` uses it.
+    /// Folder to write. `reconstruct` reads it as masks/ in the recording.
     #[arg(short, long, required_unless_present = "weights")]
     pub output: Option<PathBuf>,
-    /// Say which files SAM 2.1 needs, which are there, and where the others can be had.
+    /// List the files that SAM 2.1 needs, whether they are present, and how to get the others.
     #[arg(long)]
     pub weights: bool,
     #[command(flatten)]
     pub sam: Sam,
 }
 
-/// Where SAM 2.1 is.
+/// The files of SAM 2.1.
 #[derive(Debug, Args)]
 pub struct Sam {
-    /// Folder with the ONNX networks of SAM 2.1 (`trocar segment --weights` says which).
+    /// Folder with the ONNX networks of SAM 2.1 (`trocar segment --weights` lists them).
     #[arg(long = "sam", value_name = "FOLDER")]
     pub folder: Option<PathBuf>,
-    /// ONNX Runtime's library, or a folder with a Python onnxruntime; the variable ORT_DYLIB_PATH goes before it.
+    /// ONNX Runtime's library, or a folder with a Python onnxruntime; the variable ORT_DYLIB_PATH
+    /// has priority.
     #[arg(long, value_name = "PATH")]
     pub onnxruntime: Option<PathBuf>,
 }
@@ -144,10 +146,11 @@ pub struct Sam {
 /// Arguments of `reconstruct`.
 #[derive(Debug, Args)]
 pub struct Reconstruct {
-    /// Recording: a folder with a recording.toml, or a .bag or .mcap file with a .toml of the same name beside it.
+    /// Recording: a folder with a recording.toml, or a .bag or .mcap file with an optional .toml of
+    /// the same name.
     #[arg(required_unless_present = "surface", conflicts_with = "surface")]
     pub recording: Option<PathBuf>,
-    /// A ready surface instead of a recording: .stl, .ply or .obj.
+    /// A surface file instead of a recording: .stl, .ply or .obj.
     #[arg(long, requires = "units")]
     pub surface: Option<PathBuf>,
     /// Unit of the surface file.
@@ -156,16 +159,16 @@ pub struct Reconstruct {
     /// Specimen folder to write.
     #[arg(short, long)]
     pub output: PathBuf,
-    /// Frame at the middle of the composite's window; the middle of the recording by default.
+    /// Frame at the centre of the composite's window; by default the middle of the recording.
     #[arg(long)]
     pub centre: Option<usize>,
-    /// Frames on each side of the window's centre.
+    /// Frames on each side of the window's centre; choose fewer where tissue moves.
     #[arg(long, default_value_t = 90)]
     pub window: usize,
-    /// Every how many frames of the window are used.
+    /// Step between the used frames of the window.
     #[arg(long, default_value_t = 2)]
     pub stride: usize,
-    /// SAM 2.1, for organs that are only pointed at.
+    /// SAM 2.1, for organs that have only points.
     #[command(flatten)]
     pub sam: Sam,
     /// How thick organs are taken to be behind their fronts.
@@ -174,10 +177,11 @@ pub struct Reconstruct {
     /// Make the surface from a binary grid of 1.5 mm, as the paper does, for comparison.
     #[arg(long)]
     pub binary_grid: bool,
-    /// What fills the surface with tetrahedra.
+    /// The mesher that fills the surface with tetrahedra.
     #[arg(long, value_enum, default_value_t = MesherName::Lattice)]
     pub mesher: MesherName,
-    /// Edge of the elements at the surface [mm]; by default 2.2, or larger where an organ would get more than 50,000.
+    /// Edge of the elements at the surface (mm); by default 2.2, or larger where an organ would get
+    /// more than 50,000.
     #[arg(long, allow_negative_numbers = true)]
     pub element_size: Option<f64>,
 }
@@ -220,8 +224,9 @@ pub struct Simulate {
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Run folder to write.
     #[arg(short, long)]

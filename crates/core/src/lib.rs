@@ -15,3 +15,7 @@ pub use pose::Pose;
 pub use progress::{Progress, Silent, StopAfter};
 pub use random::{Random, RandomSequence, mix, standard_normal, unit};
 pub use wrench::Wrench;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -12,7 +12,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 ///
 /// let progress = StopAfter::new(3);
 /// progress.begin("meshing", 10);
-/// let done = (0..10).take_while(|_| { let stop = progress.interrupted(); progress.advance(1); !stop }).count();
+/// let mut done = 0;
+/// while done < 10 && !progress.interrupted() {
+///     done += 1;
+///     progress.advance(1);
+/// }
 /// progress.end();
 /// assert_eq!(done, 3);
 /// ```

@@ -136,6 +136,16 @@ mod tests {
         assert_eq!(outputs, [6_457_827_717_110_365_317, 3_203_168_211_198_807_973]);
     }
 
+    /// Recorded phantoms depend on these bits.
+    #[test]
+    fn keys_and_sequences_keep_their_bits() {
+        let random = Random::from_keys(&[1, 2, 3]);
+        assert_eq!((random.key(), random.bits(4)), (0xd073_4750_fde3_62b3, 0xd55c_cd4a_eb3c_cafb));
+        let mut sequence = random.sequence();
+        assert_eq!(sequence.uniform(), 0.071_663_707_638_260_13);
+        assert!((sequence.normal() - 0.729_763_283_218_560_4).abs() < 1e-14);
+    }
+
     #[test]
     fn uniform_and_normal_numbers_have_their_moments() {
         const COUNT: u64 = 40_000;

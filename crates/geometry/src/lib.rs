@@ -55,3 +55,7 @@ pub use smooth::taubin;
 pub use tet_mesh::{CutAway, TetMesh};
 pub use tri_mesh::TriMesh;
 pub use trocar_core::Pose;
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

@@ -2,6 +2,7 @@
 
 use crate::{SignedDistance, TriMesh};
 use glam::DVec3;
+use trocar_core::Random;
 
 /// An axis-aligned cube of `edge` (m) about `centre`, outward.
 pub(crate) fn cube(centre: DVec3, edge: f64) -> TriMesh {
@@ -57,10 +58,6 @@ impl SignedDistance for Torus {
 
 /// `count` reproducible points in [-1, 1]^3.
 pub(crate) fn scattered(count: usize) -> Vec<DVec3> {
-    let mut state = 0x9e37_79b9_7f4a_7c15_u64;
-    let mut next = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    (0..count).map(|_| DVec3::new(next(), next(), next())).collect()
+    let random = Random::new(1);
+    (0..count as u64).map(|i| DVec3::from([0, 1, 2].map(|axis| random.symmetric(3 * i + axis)))).collect()
 }

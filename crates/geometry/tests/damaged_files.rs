@@ -1,4 +1,4 @@
-//! Damaged files of every format give an answer or an error, never a panic.
+//! Damaged files of every format give a mesh or an error, never a panic.
 
 #![allow(clippy::unwrap_used)]
 
@@ -10,14 +10,14 @@ use trocar_testing::{Allowance, PEAK, Peak, assault};
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// The file, its text, and the mesh of it, some of them twice while vectors grow.
+/// The file, its text and its mesh, some of them twice while vectors grow.
 const ALLOWANCE: Allowance = Allowance { fixed: 1 << 20, per_byte: 200 };
 
 const CORNERS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 const FACES: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]];
 
-/// A small good file of each kind: extension and content.
-fn good_files() -> Vec<(&'static str, Vec<u8>)> {
+/// A small valid file of each kind: extension and content.
+fn valid_files() -> Vec<(&'static str, Vec<u8>)> {
     let folder = tempfile::tempdir().unwrap();
     let vertices: Vec<glam::DVec3> = CORNERS.map(glam::DVec3::from_array).to_vec();
     let surface = TriMesh { vertices: vertices.clone(), triangles: FACES.to_vec(), colors: vec![[200, 100, 50]; 4] };
@@ -81,9 +81,9 @@ fn read(path: &Path) -> Result<(), String> {
 }
 
 #[test]
-fn the_good_files_are_good() {
+fn valid_files_are_read() {
     let folder = tempfile::tempdir().unwrap();
-    for (extension, bytes) in good_files() {
+    for (extension, bytes) in valid_files() {
         let path = folder.path().join(format!("a.{extension}"));
         std::fs::write(&path, bytes).unwrap();
         read(&path).unwrap();
@@ -95,12 +95,12 @@ fn the_good_files_are_good() {
 }
 
 #[test]
-fn nan_is_named() {
+fn coordinates_that_are_not_finite_are_reported() {
     let folder = tempfile::tempdir().unwrap();
-    let files = good_files();
+    let files = valid_files();
     let (mut stl, mut ply) = (files[0].1.clone(), files[4].1.clone());
     stl[84 + 50 + 12..84 + 50 + 16].copy_from_slice(&f32::NAN.to_le_bytes());
-    // A vertex is three doubles and a colour.
+    // A vertex has three doubles and a colour.
     let body = ply.windows(11).position(|w| w == b"end_header\n").unwrap() + 11;
     ply[body + 2 * 27..body + 2 * 27 + 8].copy_from_slice(&f64::INFINITY.to_le_bytes());
     for (name, bytes, vertex) in [("a.stl", stl, "vertex 3"), ("a.ply", ply, "vertex 2")] {
@@ -114,14 +114,14 @@ fn nan_is_named() {
 #[test]
 fn damage_never_panics() {
     let seeds: Vec<(String, Vec<u8>)> =
-        good_files().into_iter().enumerate().map(|(i, (ext, bytes))| (format!("{i}.{ext}"), bytes)).collect();
+        valid_files().into_iter().enumerate().map(|(i, (ext, bytes))| (format!("{i}.{ext}"), bytes)).collect();
     let folder = tempfile::tempdir().unwrap();
     assault(&seeds, ALLOWANCE, |name, bytes| {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
         if let Err(message) = read(&path) {
-            assert!(message.contains(name), "the file is not named: {message}");
-            assert!(!message.contains('\n'), "more than a line: {message}");
+            assert!(message.contains(name), "the file is not in the message: {message}");
+            assert!(!message.contains('\n'), "more than one line: {message}");
         }
     });
 }

@@ -1,5 +1,5 @@
-//! The graded lattice: the same surface as a uniform one, sound, and far fewer elements in a large
-//! body.
+//! The graded lattice: valid meshes with the surface of a uniform lattice and far fewer elements in
+//! a large body.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
@@ -9,6 +9,7 @@ use common::{Shape, check_conforming};
 use glam::{DQuat, DVec3};
 use std::path::PathBuf;
 use std::time::Instant;
+use trocar_core::Random;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{LatticeMesher, Mesher, SignedDistance, TetMesh, TetQuality, TriMesh, repair};
 
@@ -23,26 +24,24 @@ fn box_distance(p: DVec3, half: DVec3) -> f64 {
     q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
 }
 
-/// A ball with waves of random direction, length and phase, as steep as the mesher bears.
+/// A ball with waves of random direction, length and phase, with the largest slope the mesher
+/// accepts.
 fn blob(seed: u64) -> Named {
-    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-    let mut next = move || {
-        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
+    let mut numbers = Random::new(seed).sequence();
+    let mut next = || 2.0 * numbers.uniform() - 1.0;
     let waves: Vec<(DVec3, f64)> = (0..6).map(|_| (150.0 * DVec3::new(next(), next(), next()), 3.0 * next())).collect();
     named(&format!("blob {seed}"), DVec3::splat(0.05), move |p| {
-        // Six waves of at most 260 rad/m and 0.6 mm are at most 0.94 steep together; the ball's
-        // share is scaled to match.
+        // Six waves of at most 260 rad/m and 0.6 mm have a total slope of at most 0.94. The slope
+        // of the ball is reduced accordingly.
         let rough: f64 = waves.iter().map(|(k, phase)| 6e-4 * (k.dot(p) + phase).sin()).sum();
         0.3 * (p.length() - 0.03) + rough
     })
 }
 
-/// Shapes with half the extent of their bounds (m), to be meshed with cells of 2.5 mm.
-fn zoo() -> Vec<Named> {
+/// Shapes with half the extent of their bounds (m), for cells of 2.5 mm.
+fn shapes() -> Vec<Named> {
     let turn = DQuat::from_euler(glam::EulerRot::XYZ, 0.3, 0.7, 0.2);
-    let mut zoo = vec![
+    let mut shapes = vec![
         named("ball", DVec3::splat(0.045), |p| p.length() - 0.045),
         named("small ball", DVec3::splat(0.005), |p| p.length() - 0.005),
         named("shifted ball", DVec3::splat(0.031), |p| (p - DVec3::new(3e-4, 7e-4, -4e-4)).length() - 0.03),
@@ -54,14 +53,15 @@ fn zoo() -> Vec<Named> {
             (p - DVec3::X * 0.02).length().min((p + DVec3::X * 0.02).length()) - 0.02
         }),
         named("torus", DVec3::new(0.05, 0.05, 0.016), |p| (p.x.hypot(p.y) - 0.034).hypot(p.z) - 0.016),
-        named("turned box", DVec3::splat(0.05), move |p| box_distance(turn * p, DVec3::new(0.03, 0.025, 0.02))),
+        named("rotated box", DVec3::splat(0.05), move |p| box_distance(turn * p, DVec3::new(0.03, 0.025, 0.02))),
         named("hollow ball", DVec3::splat(0.04), |p| (p.length() - 0.04).max(0.015 - p.length())),
     ];
-    zoo.extend((1..=4).map(blob));
-    zoo
+    shapes.extend((1..=4).map(blob));
+    shapes
 }
 
-/// The triangles of the surface by their corners' bits, each from its smallest corner on, sorted.
+/// The sorted triangles of the surface, as bits of their corners, each starting with its smallest
+/// corner.
 fn surface_of(mesh: &TetMesh) -> Vec<[[u64; 3]; 3]> {
     let (surface, _) = mesh.boundary();
     let mut triangles: Vec<[[u64; 3]; 3]> = (0..surface.triangles.len())
@@ -76,7 +76,7 @@ fn surface_of(mesh: &TetMesh) -> Vec<[[u64; 3]; 3]> {
     triangles
 }
 
-/// Checks everything that holds for every mesh; gives its quality.
+/// Checks the properties of every mesh and returns its quality.
 fn check(name: &str, mesh: &TetMesh) -> TetQuality {
     check_conforming(mesh);
     let quality = TetQuality::of(mesh);
@@ -88,9 +88,9 @@ fn check(name: &str, mesh: &TetMesh) -> TetQuality {
 }
 
 #[test]
-fn every_shape_is_sound_and_keeps_its_surface() {
+fn every_shape_gives_a_valid_mesh_and_keeps_its_surface() {
     let mut most = 1.0f64;
-    for (name, half, shape) in zoo() {
+    for (name, half, shape) in shapes() {
         let mesh =
             |coarsest| LatticeMesher { cell: 0.0025, coarsest }.mesh_shape(shape.as_ref(), (-half, half)).unwrap();
         let uniform = mesh(1);
@@ -108,11 +108,11 @@ fn every_shape_is_sound_and_keeps_its_surface() {
         println!("{name:>16}: tets with leaves of at most 1, 2 and 64 cells {counts:?}");
         most = most.max(counts[0] as f64 / counts[2] as f64);
     }
-    assert!(most > 2.5, "no shape became much lighter: {most}");
+    assert!(most > 2.5, "no shape has far fewer elements: {most}");
 }
 
 #[test]
-fn the_same_mesh_whatever_the_threads() {
+fn the_mesh_does_not_depend_on_threads() {
     let (_, half, shape) = blob(7);
     let mesh = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -121,10 +121,10 @@ fn the_same_mesh_whatever_the_threads() {
     assert!(mesh(1) == mesh(3));
 }
 
-/// The inside of a graded body is neither sampled nor stored: twice as fine costs four times, not
-/// eight.
+/// The inside of a graded body is neither sampled nor stored. Halving the cell multiplies the cost
+/// by four, not eight.
 #[test]
-fn the_cost_follows_the_surface() {
+fn the_cost_is_proportional_to_the_surface() {
     let cost = |cell: f64| {
         let evaluations = std::sync::atomic::AtomicUsize::new(0);
         let ball = Shape(|p: DVec3| {
@@ -141,15 +141,15 @@ fn the_cost_follows_the_surface() {
 }
 
 #[test]
-fn a_cell_too_small_is_refused_before_it_fills_the_memory() {
+fn a_cell_that_is_too_small_is_rejected_before_allocation() {
     let half = DVec3::splat(0.05);
     let ball = Shape(|p: DVec3| p.length() - 0.05);
-    let words = LatticeMesher::uniform(0.0005).mesh_shape(&ball, (-half, half)).unwrap_err().to_string();
-    assert!(words.contains("30 million"), "{words}");
+    let message = LatticeMesher::uniform(0.0005).mesh_shape(&ball, (-half, half)).unwrap_err().to_string();
+    assert!(message.contains("30 million"), "{message}");
     assert!(LatticeMesher::graded(1e-6).mesh_shape(&ball, (-half, half)).unwrap_err().to_string().contains("too fine"));
 }
 
-/// A ball as triangles: latitudes and longitudes.
+/// A ball as triangles between circles of latitude and longitude.
 fn ball(radius: f64) -> TriMesh {
     let (rings, spokes) = (40u32, 60u32);
     let mut mesh = TriMesh { vertices: vec![DVec3::Z * radius], triangles: Vec::new(), colors: Vec::new() };
@@ -175,7 +175,7 @@ fn ball(radius: f64) -> TriMesh {
 }
 
 #[test]
-fn the_cell_follows_the_budget() {
+fn the_cell_matches_the_budget() {
     let ball = ball(0.05);
     assert_eq!(LatticeMesher::for_body(&ball, 0.01, 1_000_000).cell, 0.01);
     for budget in [5_000, 50_000, 100_000] {
@@ -185,17 +185,17 @@ fn the_cell_follows_the_budget() {
         assert!((0.8..1.1).contains(&part));
         assert!(mesher.mesh(&ball).unwrap() == mesh);
     }
-    // A long thin wire of 0.3 mm: no cell gives that few, so the budget is missed, not the body.
+    // A long wire of 0.3 mm: no cell size gives so few elements, so the budget is exceeded.
     let wire = TriMesh { vertices: ball.vertices.iter().map(|v| *v * DVec3::new(1.0, 0.01, 0.01)).collect(), ..ball };
     let (mesher, mesh) = LatticeMesher::fit(&wire, 1e-4, 10).unwrap();
     assert!(!mesh.tets.is_empty() && mesher.cell > 1e-4);
-    // Nothing to divide by.
+    // No volume to divide by.
     assert_eq!(LatticeMesher::for_body(&TriMesh::default(), 0.003, 10).cell, 0.003);
     assert!(LatticeMesher::fit(&TriMesh::default(), 0.003, 10).is_err());
 }
 
 #[test]
-fn organs_are_sound() {
+fn organs_give_valid_meshes() {
     for file in
         ["openhelp/Liver.stl", "openhelp/Duodenum.stl", "lapgym_organs/grasp_lift_touch__gallbladder_visual.stl"]
     {

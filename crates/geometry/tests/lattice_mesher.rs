@@ -1,4 +1,4 @@
-//! The lattice mesher on shapes whose distance is known in closed form.
+//! The lattice mesher on shapes with a closed-form distance.
 
 mod common;
 
@@ -52,7 +52,7 @@ fn shapes() -> Vec<(&'static str, DVec3, Box<dyn SignedDistance>)> {
             let q = p * 400.0;
             0.7 * (p.length() - 0.03) + 0.001 * (q.x.sin() * q.y.cos() + (1.7 * q.z + 0.6).sin() * (1.3 * q.x).cos())
         }),
-        // A field rough at the lattice's own scale: pinches, crumbs and bubbles everywhere.
+        // A field with details of the size of the lattice: pinches, fragments and bubbles.
         boxed("foam", DVec3::splat(0.04), |p| {
             let q = p * 1500.0;
             let gyroid = q.x.sin() * q.y.cos() + q.y.sin() * q.z.cos() + q.z.sin() * q.x.cos();
@@ -62,7 +62,7 @@ fn shapes() -> Vec<(&'static str, DVec3, Box<dyn SignedDistance>)> {
 }
 
 #[test]
-fn every_shape_gives_a_sound_body() {
+fn every_shape_gives_a_valid_body() {
     for (name, half, shape) in shapes() {
         for cell in [0.0031, 0.0019] {
             let mesher = LatticeMesher::uniform(cell);
@@ -112,7 +112,7 @@ fn the_volume_of_a_sphere_converges_at_second_order() {
 }
 
 #[test]
-fn the_same_mesh_whatever_the_threads() {
+fn the_mesh_does_not_depend_on_threads() {
     let half = DVec3::splat(0.03);
     let mesh = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -122,7 +122,7 @@ fn the_same_mesh_whatever_the_threads() {
 }
 
 #[test]
-fn only_the_largest_part_stays() {
+fn only_the_largest_part_is_kept() {
     let two = Shape(|p| (p.length() - 0.02).min((p - DVec3::X * 0.05).length() - 0.01));
     let mesh =
         LatticeMesher::uniform(0.002).mesh_shape(&two, (DVec3::splat(-0.02), DVec3::new(0.06, 0.02, 0.02))).unwrap();
@@ -131,22 +131,22 @@ fn only_the_largest_part_stays() {
 }
 
 #[test]
-fn unusable_input_is_refused_in_words() {
+fn unusable_input_is_rejected_with_a_reason() {
     let ball = |r: f64| Shape(move |p: DVec3| p.length() - r);
-    let refusal =
+    let rejection =
         |shape: &dyn SignedDistance, bounds, cell| match LatticeMesher::uniform(cell).mesh_shape(shape, bounds) {
-            Err(Error::Mesh(words)) => words,
+            Err(Error::Mesh(message)) => message,
             other => panic!("accepted: {other:?}"),
         };
     let unit = cube(1.0);
-    assert!(refusal(&ball(1.0), unit, 0.0).contains("positive length"));
-    assert!(refusal(&ball(1.0), unit, f64::NAN).contains("positive length"));
-    assert!(refusal(&ball(1.0), (DVec3::ONE, DVec3::ZERO), 0.1).contains("not a box"));
-    assert!(refusal(&ball(1.0), unit, 1e-5).contains("too fine"));
-    assert!(refusal(&ball(-1.0), unit, 0.1).contains("empty"));
-    assert!(refusal(&ball(1e-4), unit, 0.1).contains("finer cell"));
-    assert!(refusal(&ball(2.0), cube(0.5), 0.1).contains("beyond its bounds"));
-    assert!(refusal(&Shape(|_| f64::NAN), unit, 0.1).contains("must be finite"));
+    assert!(rejection(&ball(1.0), unit, 0.0).contains("positive length"));
+    assert!(rejection(&ball(1.0), unit, f64::NAN).contains("positive length"));
+    assert!(rejection(&ball(1.0), (DVec3::ONE, DVec3::ZERO), 0.1).contains("not a box"));
+    assert!(rejection(&ball(1.0), unit, 1e-5).contains("too fine"));
+    assert!(rejection(&ball(-1.0), unit, 0.1).contains("empty"));
+    assert!(rejection(&ball(1e-4), unit, 0.1).contains("finer cell"));
+    assert!(rejection(&ball(2.0), cube(0.5), 0.1).contains("beyond its bounds"));
+    assert!(rejection(&Shape(|_| f64::NAN), unit, 0.1).contains("must be finite"));
 }
 
 fn cube(half: f64) -> (DVec3, DVec3) {

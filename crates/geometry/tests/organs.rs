@@ -1,4 +1,4 @@
-//! Real organ surfaces, as published: each must come out watertight and with its volume.
+//! Published surfaces of real organs: each must become watertight and keep its volume.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout)]
 
@@ -15,7 +15,7 @@ fn shared(path: &str) -> Option<PathBuf> {
     Some(full)
 }
 
-/// File, volume (cm3) as another library sums it, tolerance (part of it), whether it has to be
+/// File, volume by another library (cm3), relative tolerance, and whether the surface must be
 /// rebuilt.
 const ORGANS: [(&str, f64, f64, bool); 9] = [
     ("openhelp/Liver.stl", 1817.66, 1e-4, false),
@@ -46,7 +46,7 @@ fn every_organ_becomes_watertight_and_keeps_its_volume() {
 }
 
 #[test]
-fn a_liver_survives_the_way_through_a_grid() {
+fn a_liver_keeps_its_shape_through_a_grid() {
     let Some(path) = shared("data/openhelp/Liver.stl") else { return };
     let (liver, _) = repair(&read_surface(&path, Unit::Millimetre).unwrap()).unwrap();
     let start = std::time::Instant::now();
@@ -68,7 +68,7 @@ fn a_liver_survives_the_way_through_a_grid() {
     assert!((surface.largest_component().volume() / liver.volume() - 1.0).abs() < 0.005);
     let worst = surface.vertices.iter().map(|&v| field.distance(v).abs()).fold(0.0, f64::max);
     assert!(worst < 1.0e-3, "{worst}");
-    // The blocks that were skipped are right as well.
+    // The skipped blocks are correct too.
     for n in (0..grid.values.len()).step_by(997) {
         let [nx, ny, _] = grid.dims;
         let truth = field.distance(grid.point([n % nx, n / nx % ny, n / (nx * ny)]));
@@ -78,7 +78,7 @@ fn a_liver_survives_the_way_through_a_grid() {
 }
 
 #[test]
-fn meshes_that_meshio_wrote_are_read() {
+fn meshes_written_by_meshio_are_read() {
     for organ in ["appendix", "bowel1", "bowel2", "bowel3", "cecum", "stomach", "specimen_a"] {
         let Some(path) = shared(&format!("peers/meshes/{organ}.msh")) else { return };
         let mesh = read_msh(&path).unwrap();
@@ -89,7 +89,7 @@ fn meshes_that_meshio_wrote_are_read() {
 }
 
 #[test]
-fn a_repaired_organ_comes_back_from_its_file() {
+fn a_repaired_organ_is_read_back_from_its_file() {
     let Some(path) = shared("data/openhelp/Kidney_left.stl") else { return };
     let (kidney, _) = repair(&read_surface(&path, Unit::Millimetre).unwrap()).unwrap();
     let folder = tempfile::tempdir().unwrap();

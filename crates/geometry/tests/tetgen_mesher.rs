@@ -1,5 +1,5 @@
-//! TetGen as a mesher: with the program where it is installed, and with scripts that stand in for
-//! it and misbehave.
+//! The TetGen mesher: with the program where it is installed, and with scripts that replace it and
+//! fail.
 
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
@@ -15,11 +15,11 @@ use std::time::{Duration, Instant};
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_geometry::{Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, repair};
 
-/// One test at a time: a script that another thread's child still has open for writing cannot be
-/// run.
+/// Runs one test at a time: a script that a child process of another thread has open for writing
+/// cannot be executed.
 static ONE: Mutex<()> = Mutex::new(());
 
-/// Whether the program is there; says so if not.
+/// Whether the program is installed; prints a message if not.
 fn installed() -> bool {
     let found = std::process::Command::new("tetgen").arg("-h").output().is_ok();
     if !found {
@@ -50,18 +50,18 @@ fn brick() -> TriMesh {
     cuboid(DVec3::ZERO, DVec3::new(0.03, 0.02, 0.01))
 }
 
-fn sound(mesh: &TetMesh) -> TetQuality {
+fn check(mesh: &TetMesh) -> TetQuality {
     check_conforming(mesh);
     let quality = TetQuality::of(mesh);
     assert_eq!(quality.inverted, 0);
     quality
 }
 
-fn refusal(mesher: &TetgenMesher, surface: &TriMesh) -> String {
-    let words = mesher.mesh(surface).unwrap_err().to_string();
-    println!("{words}");
-    assert!(!words.contains('\n') && words.len() < 600);
-    words
+fn rejection(mesher: &TetgenMesher, surface: &TriMesh) -> String {
+    let message = mesher.mesh(surface).unwrap_err().to_string();
+    println!("{message}");
+    assert!(!message.contains('\n') && message.len() < 600);
+    message
 }
 
 #[test]
@@ -73,33 +73,33 @@ fn a_brick_is_filled() {
     let mesher = TetgenMesher::default();
     println!("{}", mesher.describe());
     let mesh = mesher.mesh(&brick()).unwrap();
-    let quality = sound(&mesh);
+    let quality = check(&mesh);
     println!("{} tets, {quality:?}", mesh.tets.len());
     assert!((quality.volume / 6e-6 - 1.0).abs() < 1e-9);
     assert!(quality.min_dihedral_deg > 9.9);
     assert!(mesher.mesh(&brick()).unwrap() == mesh);
-    // Finer where the settings ask for it.
+    // Stricter settings give a finer mesh.
     let finer = TetgenMesher { radius_edge: 1.2, ..mesher }.mesh(&brick()).unwrap();
     assert!(finer.tets.len() > mesh.tets.len());
 }
 
 #[test]
-fn unfit_surfaces_are_refused() {
+fn unusable_surfaces_are_rejected() {
     let _one = ONE.lock();
     let mesher = TetgenMesher::default();
     let mut open = brick();
     open.triangles.pop();
-    assert!(refusal(&mesher, &open).contains("3 open edges"));
-    assert!(refusal(&mesher, &TriMesh::default()).contains("no triangles"));
-    assert!(refusal(&TetgenMesher { radius_edge: f64::NAN, ..mesher.clone() }, &brick()).contains("[1, 100]"));
+    assert!(rejection(&mesher, &open).contains("3 open edges"));
+    assert!(rejection(&mesher, &TriMesh::default()).contains("no triangles"));
+    assert!(rejection(&TetgenMesher { radius_edge: f64::NAN, ..mesher.clone() }, &brick()).contains("[1, 100]"));
     if !installed() {
         return;
     }
     let crossing = join(brick(), &cuboid(DVec3::splat(0.004), DVec3::splat(0.015)));
-    assert!(refusal(&mesher, &crossing).contains("intersects itself"));
+    assert!(rejection(&mesher, &crossing).contains("intersects itself"));
     let mut hollow = cuboid(DVec3::ZERO, DVec3::splat(0.005));
     hollow.flip();
-    assert!(refusal(&mesher, &join(brick(), &hollow)).contains("without cavities"));
+    assert!(rejection(&mesher, &join(brick(), &hollow)).contains("without cavities"));
 }
 
 #[test]
@@ -116,13 +116,13 @@ fn organs_are_filled() {
     let (kidney, _) = repair(&read_surface(&path, Unit::Millimetre).unwrap()).unwrap();
     let started = Instant::now();
     let mesh = TetgenMesher::default().mesh(&kidney).unwrap();
-    let quality = sound(&mesh);
+    let quality = check(&mesh);
     println!("kidney: {} tets in {:.2} s, {quality:?}", mesh.tets.len(), started.elapsed().as_secs_f64());
     assert!((quality.volume / kidney.volume() - 1.0).abs() < 1e-6);
 }
 
 #[test]
-fn a_program_that_misbehaves_gives_one_line() {
+fn a_program_that_fails_gives_one_line() {
     let _one = ONE.lock();
     let folder = tempfile::tempdir().unwrap();
     let script = |body: &str| {
@@ -132,23 +132,25 @@ fn a_program_that_misbehaves_gives_one_line() {
         TetgenMesher { program, ..TetgenMesher::default() }
     };
     let absent = TetgenMesher { program: "no-such-program-as-this".into(), ..TetgenMesher::default() };
-    assert!(refusal(&absent, &brick()).contains("apt install tetgen"));
-    assert!(refusal(&script("echo 'Error: out of luck'; echo more; exit 3"), &brick()).contains("out of luck"));
+    assert!(rejection(&absent, &brick()).contains("apt install tetgen"));
+    assert!(rejection(&script("echo 'Error: out of luck'; echo more; exit 3"), &brick()).contains("out of luck"));
     assert!(
-        refusal(&script("echo 'Facet #1 intersects facet #2'; kill -9 $$"), &brick()).contains("intersects itself")
+        rejection(&script("echo 'Facet #1 intersects facet #2'; kill -9 $$"), &brick()).contains("intersects itself")
     );
-    assert!(refusal(&script("exit 1"), &brick()).contains("without a message"));
-    assert!(refusal(&script("true"), &brick()).contains("without a message"));
-    assert!(refusal(&script("yes 'error: 0123456789' | head -c 1000000; exit 1"), &brick()).contains("0123456789"));
-    assert!(refusal(&script("echo 5 3 0 0 > body.1.node; echo 1 4 0 > body.1.ele"), &brick()).contains("ends before"));
+    assert!(rejection(&script("exit 1"), &brick()).contains("without a message"));
+    assert!(rejection(&script("true"), &brick()).contains("without a message"));
+    assert!(rejection(&script("yes 'error: 0123456789' | head -c 1000000; exit 1"), &brick()).contains("0123456789"));
+    assert!(
+        rejection(&script("echo 5 3 0 0 > body.1.node; echo 1 4 0 > body.1.ele"), &brick()).contains("ends before")
+    );
     let nodes = "printf '5 3 0 0\\n1 0 0 0\\n2 1 0 0\\n3 0 1 0\\n4 0 0 1\\n5 1 1 0\\n' > body.1.node";
     let with = |elements: &str| script(&format!("{nodes}; printf '{elements}' > body.1.ele"));
-    assert!(refusal(&with("1 4 0\\n1 1 2 3 4\\n"), &brick()).contains("filled 166666.667 cm3"));
-    assert!(refusal(&with("1 4 0\\n1 1 2 3 5\\n"), &brick()).contains("without volume"));
-    assert!(refusal(&with("0 4 0\\n"), &brick()).contains("no elements"));
+    assert!(rejection(&with("1 4 0\\n1 1 2 3 4\\n"), &brick()).contains("filled 166666.667 cm3"));
+    assert!(rejection(&with("1 4 0\\n1 1 2 3 5\\n"), &brick()).contains("without volume"));
+    assert!(rejection(&with("0 4 0\\n"), &brick()).contains("no elements"));
 
-    // The right answer, turned inside out and with a node too many, is made sound. Switches and
-    // input are as documented.
+    // A correct result with an inverted element and an unused node is corrected. Switches and input
+    // are as documented.
     let tet = TriMesh {
         vertices: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z],
         triangles: vec![[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]],
@@ -162,6 +164,6 @@ fn a_program_that_misbehaves_gives_one_line() {
 
     let started = Instant::now();
     let slow = TetgenMesher { time_limit: Duration::from_millis(300), ..script("exec sleep 30") };
-    assert!(refusal(&slow, &brick()).contains("was stopped after"));
+    assert!(rejection(&slow, &brick()).contains("was stopped after"));
     assert!(started.elapsed() < Duration::from_secs(5));
 }

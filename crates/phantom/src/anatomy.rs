@@ -23,7 +23,7 @@ impl Anatomy {
 
 #[cfg(test)]
 mod tests {
-    #![allow(clippy::unwrap_used, reason = "a failed test is a failed test")]
+    #![allow(clippy::unwrap_used, reason = "tests may panic")]
 
     use super::*;
     use crate::body::{Body, gap};
@@ -134,7 +134,7 @@ mod tests {
                     assert!(close, "{} sample {i}: {}", organ.name, gradient.length());
                     assert!(body.distance(p).abs() < 0.4e-3, "{} sample {i}: {}", organ.name, body.distance(p));
                 }
-                assert!(far * 20 <= points, "{}: {far} of {points} slopes are off", organ.name);
+                assert!(far * 20 <= points, "{}: {far} of {points} gradients differ from 1", organ.name);
             }
         }
     }

@@ -20,6 +20,7 @@ mod blend;
 mod body;
 mod catalog;
 mod error;
+mod folder;
 mod frame;
 mod instruments;
 mod noise;
@@ -40,5 +41,6 @@ mod tests;
 
 pub use catalog::NAMES;
 pub use error::{Error, Result};
+pub use folder::phantoms_folder;
 pub use record::{RecordOptions, describe, record};
 pub use sensor::Sensor;

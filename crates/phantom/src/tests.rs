@@ -36,7 +36,7 @@ fn small() -> Camera {
 /// Writes pictures for inspection to `$LOOK`: `cargo test --release -p trocar-phantom -- --ignored
 /// look`, with optional `$SEED` and `$STEREO`.
 #[test]
-#[ignore = "for people"]
+#[ignore = "writes pictures for inspection"]
 fn look() {
     let Some(dir) = std::env::var_os("LOOK").map(std::path::PathBuf::from) else { return };
     let seed = std::env::var("SEED").ok().and_then(|s| s.parse().ok()).unwrap_or(0);

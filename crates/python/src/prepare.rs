@@ -3,7 +3,7 @@
 use crate::error::{evaluate, wrong};
 use crate::progress::Signals;
 use pyo3::prelude::*;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use trocar_scene::{BUILTINS, Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_workflow::scene_specimen;
@@ -30,6 +30,13 @@ pub fn scene(name: &str, task: Option<&str>, episode_s: Option<f64>) -> PyResult
         scene.task.episode_s = seconds;
     }
     Ok(scene)
+}
+
+/// The folder in which phantoms are kept once they are made: `$TROCAR_PHANTOMS`, or
+/// `trocar/phantoms` in the user's cache.
+#[pyfunction]
+pub fn phantoms_folder() -> PathBuf {
+    trocar_phantom::phantoms_folder()
 }
 
 /// The specimen of `scene`; a phantom's is made in the folder `phantoms` the first time, which takes seconds.

@@ -69,6 +69,19 @@ pub(crate) fn program() -> String {
 /// # Errors
 /// A setting out of range, a broken recording, an organ that cannot be closed or filled, or an
 /// interruption.
+///
+/// ```no_run
+/// use trocar_core::Silent;
+/// use trocar_reconstruct::{Settings, reconstruct};
+/// use trocar_recording::Recording;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let recording = Recording::open("recording".as_ref())?;
+/// let made = reconstruct(&recording, &Settings::default(), &Silent)?;
+/// made.specimen.write("specimen".as_ref())?;
+/// # Ok(())
+/// # }
+/// ```
 pub fn reconstruct(recording: &Recording, settings: &Settings, progress: &dyn Progress) -> Result<Reconstruction> {
     settings.validate()?;
     if recording.info.organs.is_empty() {

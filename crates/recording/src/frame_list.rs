@@ -306,7 +306,7 @@ mod tests {
         assert!(notes[0].contains("by name"));
         let frames = pair(&files(&["c0.jpg", "c1.jpg"]), &files(&["d0.png", "d1.png", "d2.png"]), &mut notes);
         assert_eq!(frames.iter().map(|f| stem(&f.depth)).collect::<Vec<_>>(), ["d0", "d1"]);
-        assert!(notes[1].contains("by order"));
+        assert!(notes[1].contains("in order"));
         let frames = pair(
             &files(&["c_7.01.jpg", "c_7.04.jpg"]),
             &files(&["d_7.03.png", "d_7.06.png", "d_7.00.png"]),

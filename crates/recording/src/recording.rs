@@ -16,6 +16,20 @@ use trocar_specimen::read_toml;
 const BROKEN_AT_START: usize = 10;
 
 /// A recording opened for reading.
+///
+/// ```no_run
+/// # fn main() -> trocar_recording::Result<()> {
+/// use std::path::Path;
+/// use trocar_recording::Recording;
+///
+/// let recording = Recording::open(Path::new("session.bag"))?;
+/// for packet in recording.packets(&[0, 1, 2]) {
+///     let frame = recording.decode(packet.frame, &packet.parts?)?;
+///     println!("{}: {} x {}", recording.frame_name(packet.frame), frame.color.width, frame.color.height);
+/// }
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct Recording {
     /// Contents of `recording.toml`.
@@ -154,6 +168,11 @@ impl Recording {
     /// True without frames; an opened recording has at least one.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
+    }
+
+    /// The file of an organ's mask, whether it exists or not.
+    pub fn organ_mask_file(&self, organ: &str) -> PathBuf {
+        self.dir().join("masks").join(format!("{organ}.png"))
     }
 
     /// File name of frame `index`'s instrument mask in `masks/instruments`.

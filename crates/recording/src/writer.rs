@@ -10,6 +10,30 @@ use trocar_specimen::StagedFolder;
 
 /// Writes a recording folder. Files go to a folder beside it, which [`RecordingWriter::finish`]
 /// moves into place.
+///
+/// ```
+/// use trocar_camera::{Camera, ColorImage, DepthImage};
+/// use trocar_recording::{Recording, RecordingInfo, RecordingWriter};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("recording");
+/// let info = RecordingInfo {
+///     rate_hz: Some(30.0),
+///     depth_scale_m: Some(0.001),
+///     camera: Some(Camera::centred(64, 48, 1.0)),
+///     source: None,
+///     ..RecordingInfo::of_log("still".as_ref())
+/// };
+/// let writer = RecordingWriter::create(&path, &info)?;
+/// let mut depth = DepthImage::new(64, 48);
+/// depth.depth.fill(0.3);
+/// writer.frame(0, &ColorImage::new(64, 48, [170, 60, 50]), &depth, None)?;
+/// writer.finish()?;
+/// assert_eq!(Recording::open(&path)?.frame(0)?.depth.depth[0], 0.3);
+/// # Ok(())
+/// # }
+/// ```
 pub struct RecordingWriter {
     folder: StagedFolder,
     rate_hz: f64,

@@ -1,5 +1,5 @@
-//! Damaged recordings give frames or one-line errors: never a panic, a hang, or more memory than
-//! their size calls for.
+//! Damaged recordings give frames or one-line errors: no panic, no hang, no memory beyond what
+//! their size needs.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -12,8 +12,8 @@ use trocar_testing::{Allowance, PEAK, Peak, assault};
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// Images are decoded to at most about a thousand times their size (the most that deflate can
-/// pack), twice for the conversion.
+/// Images decode to at most about a thousand times their size (the most that deflate can pack),
+/// twice for the conversion.
 const ALLOWANCE: Allowance = Allowance { fixed: 16 << 20, per_byte: 3000 };
 
 #[test]
@@ -23,7 +23,7 @@ fn damage_never_panics() {
     let mut info = info();
     info.organs[0].polygon = vec![[60.0, 40.0], [100.0, 40.0], [80.0, 80.0]];
     write(&dir, &info, 2);
-    // A photograph as a JPEG too.
+    // One image as a JPEG too.
     let jpeg = dir.join("color/000001.jpg");
     let picture = image::open(dir.join("color/000001.png")).unwrap();
     picture.save(&jpeg).unwrap();

@@ -1,8 +1,8 @@
 //! Damaged files of every kind give messages or errors: no panic, no hang, no memory beyond what
 //! the file holds.
 //!
-//! Half of the cases damage a file; the others damage a message, which goes past checksums and
-//! compression straight to the decoders.
+//! Half of the cases damage a file; the others damage a message, which bypasses checksums and
+//! compression.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 
@@ -17,9 +17,9 @@ use trocar_testing::{Allowance, PEAK, Peak, assault, cases};
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// Whatever the size: the buffers of LZ4 (two blocks of 4 MiB and a window), a small image's free
-/// growth, Zstandard's window of 8 MiB and its tables. For each byte: an image of one colour, and
-/// compressed chunks.
+/// Fixed: the buffers of LZ4 (two blocks of 4 MiB and a window), a small image's free growth,
+/// Zstandard's window of 8 MiB and its tables. Per byte: an image of one colour, and compressed
+/// chunks.
 const ALLOWANCE: Allowance = Allowance { fixed: 24 << 20, per_byte: 600 };
 
 /// The first three messages of every topic of every fixture.
@@ -37,7 +37,7 @@ fn messages() -> Vec<(Topic, Vec<u8>)> {
 #[test]
 fn damage_never_panics() {
     let messages = messages();
-    // As many files as messages, so that each gets half of the cases.
+    // As many files as messages, so that each kind gets half of the cases.
     let file = |i: usize| (ALL[i % ALL.len()].to_owned(), std::fs::read(fixture(ALL[i % ALL.len()])).unwrap());
     let seeds: Vec<(String, Vec<u8>)> =
         (0..messages.len()).flat_map(|i| [file(i), (format!("message {i}"), messages[i].1.clone())]).collect();
@@ -55,6 +55,6 @@ fn damage_never_panics() {
     println!(
         "{cases} cases: {opened} files opened, {decoded} of their messages decoded; {direct} damaged messages decoded"
     );
-    // The damage leaves enough alive to reach the decoders.
+    // The damage leaves enough intact to reach the decoders.
     assert!(opened > cases / 4 && decoded > cases && direct > cases / 20, "{opened}, {decoded}, {direct} of {cases}");
 }

@@ -1,6 +1,6 @@
-//! Only what is wanted of a large file is read.
+//! Only the wanted parts of a large file are read.
 //!
-//! The measurement needs a bag that `make_fixtures.py --large` wrote:
+//! The measurement needs a bag written by `make_fixtures.py --large`:
 //! `TROCAR_LARGE_BAG=/tmp/large.bag cargo test --release -p trocar-recording --test large_bag --
 //! --ignored --nocapture`.
 
@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::Instant;
 use trocar_recording::messages::{decode_image, open_reader, realsense};
 
-/// A file that counts what is read of it.
+/// A file that counts the bytes read.
 struct Counted(File, Arc<AtomicU64>);
 
 impl Read for Counted {

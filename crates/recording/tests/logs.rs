@@ -1,12 +1,12 @@
-//! Bags and MCAP files, written by others, open as recordings.
+//! Bags and MCAP files of other writers open as recordings.
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "tests")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_recording::Recording;
 
-/// A fixture of the messages crate (16 x 12 pixels, 4 colour and 5 depth images; colour f has red
-/// 10 x + f, depth f has 400 + 3 x + 5 y + f units), copied into a folder of its own.
+/// A fixture (16 x 12 pixels, 4 colour and 5 depth images; colour f has red 10 x + f, depth f has
+/// 400 + 3 x + 5 y + f units), copied into a folder of its own.
 fn fixture(name: &str) -> (tempfile::TempDir, PathBuf) {
     let root = tempfile::tempdir().unwrap();
     let from = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name);
@@ -48,15 +48,15 @@ fn realsense_bags_register_depth_by_their_own_extrinsics() {
         let recording = Recording::open(&path).unwrap();
         assert_eq!((recording.len(), recording.depth_scale()), (4, 0.0001), "{name}");
         let registration = recording.registration().expect("its cameras stand apart");
-        // The colour stream's own transform turns by 0.28, 0.96 about z, the depth stream's by
-        // nothing.
+        // The colour stream's transform rotates by sine 0.28, cosine 0.96 about z, the depth
+        // stream's by nothing.
         assert!(
             (registration.rotation.x_axis.x - 0.28).abs() < 1e-9
                 && (registration.rotation.x_axis.y - 0.96).abs() < 1e-9
         );
         assert!((registration.translation.x - 0.015).abs() < 1e-9);
         assert!(recording.frame(2).is_ok());
-        // Naming its own topics changes nothing.
+        // Naming the log's own topics changes nothing.
         let topics = "color_topic = \"/device_0/sensor_1/Color_0/image/data\"\ndepth_topic = \"/device_0/sensor_0/Depth_0/image/data\"";
         let said = format!("name = \"x\"\nup = [0, 0, -1]\n[source]\nfile = \"{name}\"\n{topics}\n");
         fs::write(path.with_extension("toml"), said).unwrap();
@@ -67,7 +67,7 @@ fn realsense_bags_register_depth_by_their_own_extrinsics() {
 }
 
 #[test]
-fn what_the_user_says_overrules_the_log() {
+fn the_users_facts_override_the_log() {
     let (_root, path) = fixture("ros2_none.mcap");
     let toml = path.with_extension("toml");
     let said = "name = \"x\"\nup = [0, 0, -1]\ndepth_scale_m = 0.0005\n";
@@ -94,7 +94,7 @@ fn what_the_user_says_overrules_the_log() {
         assert!(error.contains(expected) && !error.contains('\n'), "{topics}: {error}");
     }
     fs::write(&toml, format!("{said}[source]\nfile = \"other.mcap\"\n")).unwrap();
-    assert!(Recording::open(&path).unwrap_err().to_string().contains("stands beside ros2_none.mcap"));
+    assert!(Recording::open(&path).unwrap_err().to_string().contains("it must be 'ros2_none.mcap', the log beside it"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Cut, unfinished and damaged files are used as far as they are whole.
+//! Cut, unfinished and damaged files are used as far as they are intact.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 
@@ -17,7 +17,7 @@ fn log_of(bytes: Vec<u8>) -> Box<dyn MessageLog> {
     open_reader(Path::new("damaged"), Box::new(Cursor::new(bytes))).unwrap()
 }
 
-/// Where the bag's index section begins, by its header.
+/// The start of the bag's index section, by its header.
 fn index_at(bag: &[u8]) -> (usize, usize) {
     let field = bag.windows(10).position(|w| w == b"index_pos=").unwrap() + 10;
     (field, u64::from_le_bytes(bag[field..field + 8].try_into().unwrap()) as usize)
@@ -27,7 +27,7 @@ fn all(log: &dyn MessageLog) -> usize {
     log.topics().iter().map(|t| t.count).sum()
 }
 
-/// All messages of a whole file.
+/// Number of messages of an intact file.
 fn whole(name: &str) -> usize {
     all(&*log(name))
 }
@@ -38,7 +38,7 @@ fn a_bag_without_its_end_is_whole() {
         let mut bag = bytes(name);
         let (field, at) = index_at(&bag);
         bag.truncate(at);
-        // The header still points behind the end; and as an unfinished bag has it, nowhere.
+        // The header still points to the missing index; then, as in an unfinished bag, nowhere.
         for _ in 0..2 {
             let log = log_of(bag.clone());
             assert_eq!(all(&*log), whole(name), "{name}");
@@ -49,7 +49,7 @@ fn a_bag_without_its_end_is_whole() {
     }
 }
 
-/// A recorder that never got a message leaves the header alone, and nothing is wrong with that.
+/// A recorder without any message writes the header alone, which is valid.
 #[test]
 fn an_empty_bag_is_whole() {
     let mut bag = bytes("realsense.bag");
@@ -89,7 +89,7 @@ fn a_bag_without_any_index_is_read_through() {
     }
 }
 
-/// A recorder that was killed leaves a chunk header of zeros and the chunk's records behind it.
+/// A killed recorder leaves a chunk header of zeros, followed by the chunk's records.
 #[test]
 fn the_open_chunk_of_a_killed_recorder_is_used() {
     let mut bag = bytes("realsense.bag");
@@ -136,7 +136,7 @@ fn every_cut_keeps_what_is_before_it() {
             let (had, decoded) = read_all(&*log);
             assert!(had >= before, "{name}: {had} messages at {percent} %, {before} before");
             assert!(percent == 100 || !log.problems().is_empty(), "{name} at {percent} %");
-            // What is given out is right.
+            // The messages that are returned are correct.
             if let Some(t) = log.topics().iter().position(|t| t.name.ends_with("Color_0/image/data")) {
                 for (f, image) in images(&*log, t).iter().enumerate() {
                     assert_eq!(pixels(image), color(f));
@@ -149,7 +149,7 @@ fn every_cut_keeps_what_is_before_it() {
     }
 }
 
-/// A damaged chunk costs its own messages, one error each, and no other.
+/// A damaged chunk costs its own messages, one error each, and no others.
 #[test]
 fn a_damaged_chunk_costs_its_messages() {
     for (name, magic) in [
@@ -171,8 +171,7 @@ fn a_damaged_chunk_costs_its_messages() {
     }
 }
 
-/// A length that is wrong ends the walk from chunk to chunk; the end of the file says where it goes
-/// on.
+/// A wrong length ends the walk from chunk to chunk; the end of the file says where to continue.
 #[test]
 fn a_damaged_length_costs_a_chunk() {
     for (name, op) in [("realsense.bag", &b"op=\x05"[..]), ("realsense_lz4.bag", b"op=\x05")] {
@@ -211,7 +210,7 @@ fn a_damaged_length_costs_a_chunk() {
     assert!(!log.problems().is_empty());
 }
 
-/// Zstandard frames of 600 bytes that grow to 16 MiB each: opening gives up, and says so.
+/// Zstandard frames of 600 bytes that decompress to 16 MiB each: opening stops and reports it.
 #[test]
 fn chunks_that_grow_without_end_are_not_followed() {
     const BLOCKS: u32 = 128;

@@ -1,4 +1,4 @@
-//! Files of other writers are read as they wrote them.
+//! Files of other writers are read as they were written.
 
 #![allow(clippy::unwrap_used, reason = "a test")]
 
@@ -68,7 +68,7 @@ fn realsense_bags() {
         assert_eq!((color.translation, color.rotation), ([0.015, -0.001, 0.002], [0.0, 0.0, 0.6, 0.8]));
         let pose = realsense::color_from_depth(&color, &depth);
         let moved = pose.transform(glam::DVec3::new(1.0, 0.0, 0.0));
-        // A turn about z with cosine 0.28 and sine 0.96.
+        // A rotation about z with cosine 0.28 and sine 0.96.
         assert!((moved - glam::DVec3::new(0.295, 0.959, 0.002)).length() < 1e-12, "{moved}");
         let undone = realsense::color_from_depth(&color, &color);
         assert!((undone.transform(moved) - moved).length() < 1e-12);
@@ -144,7 +144,7 @@ fn compressed_images() {
             assert!((d - m).abs() < 5e-5, "{d} for {m}");
         }
     }
-    // Two colour topics, one called so; two depth topics, both called so.
+    // Two colour topics, one named so; two depth topics, both named so.
     let message = find_rgbd_topics(&*log, None, None).unwrap_err().to_string();
     assert!(
         message.contains("several topics have depth") && message.contains("/float/depth/compressedDepth"),
@@ -181,7 +181,7 @@ fn every_pixel_encoding() {
     }
 }
 
-/// A PNG of 70 bytes that says it is 16000 x 16000 pixels, and one that is too large on a side.
+/// A PNG of 70 bytes that claims 16000 x 16000 pixels, and one that is too large on a side.
 #[test]
 fn images_larger_than_their_file_are_refused() {
     let log = log("compressed.bag");

@@ -1,4 +1,4 @@
-//! Recordings come back as written, and every bad input is one clear error.
+//! Recordings are read as written, and every wrong input is one clear error.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod common;
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_recording::{Recording, RecordingWriter};
 
-/// A fresh recording of three frames for a test to spoil.
+/// A new recording of three frames for a test to damage.
 fn recording() -> (tempfile::TempDir, PathBuf) {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("recording");
@@ -17,7 +17,7 @@ fn recording() -> (tempfile::TempDir, PathBuf) {
     (root, dir)
 }
 
-/// Opens and decodes everything; the error's text.
+/// Opens and decodes everything; returns the error's text.
 fn failure(dir: &Path) -> String {
     let everything = || -> trocar_recording::Result<()> {
         let recording = Recording::open(dir)?;
@@ -36,7 +36,7 @@ fn replace(path: &Path, from: &str, to: &str) {
 }
 
 #[test]
-fn comes_back_as_written() {
+fn is_read_as_written() {
     let (_root, dir) = recording();
     let recording = Recording::open(&dir).unwrap();
     assert_eq!(recording.info, info());
@@ -158,7 +158,7 @@ fn mistakes_in_the_index_name_the_line() {
 }
 
 #[test]
-fn spoiled_images_are_named() {
+fn damaged_images_are_named() {
     let (_root, dir) = recording();
     let path = dir.join("depth/000002.png");
     let png = fs::read(&path).unwrap();

@@ -1,7 +1,7 @@
 //! Renders a ChArUco board and calibrates the camera from the pictures with OpenCV. The result must
 //! be the camera that rendered them. Prints that it is skipped if OpenCV is missing.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "test helpers may panic")]
 
 use glam::{DQuat, DVec3};
 use std::path::{Path, PathBuf};

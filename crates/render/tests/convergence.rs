@@ -1,7 +1,7 @@
 //! The error of path tracing falls with the square root of the number of samples, in a box lit from
 //! its ceiling.
 
-#![allow(clippy::unwrap_used, reason = "helper functions of tests")]
+#![allow(clippy::unwrap_used, reason = "test helpers may panic")]
 
 mod common;
 

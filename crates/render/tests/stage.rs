@@ -1,6 +1,6 @@
 //! The ray tracer on stages with known pictures.
 
-#![allow(clippy::unwrap_used, reason = "helper functions of tests")]
+#![allow(clippy::unwrap_used, reason = "test helpers may panic")]
 
 mod common;
 
@@ -128,9 +128,9 @@ fn deformed_shape_equals_rebuilt_shape() {
     let (shape, _) = deformed.add_mesh(&rest, 1, &Appearance::tissue([180, 80, 70])).unwrap();
     preview(&mut deformed, &eye, &Pose::IDENTITY);
     deformed.deform(shape, &bent).unwrap();
-    let mut anew = lit(lights, 0.0);
-    anew.add_mesh(&TriMesh { vertices: bent, ..rest }, 1, &Appearance::tissue([180, 80, 70])).unwrap();
-    assert_eq!(preview(&mut deformed, &eye, &Pose::IDENTITY), preview(&mut anew, &eye, &Pose::IDENTITY));
+    let mut rebuilt = lit(lights, 0.0);
+    rebuilt.add_mesh(&TriMesh { vertices: bent, ..rest }, 1, &Appearance::tissue([180, 80, 70])).unwrap();
+    assert_eq!(preview(&mut deformed, &eye, &Pose::IDENTITY), preview(&mut rebuilt, &eye, &Pose::IDENTITY));
 }
 
 #[test]

@@ -115,6 +115,11 @@ pub fn cards(cards: &[Card]) -> String {
     out
 }
 
+/// A warning (plain text) that stands out in red.
+pub fn warning(text: &str) -> String {
+    format!("<p class=\"warning\"><b>Warning.</b> {}</p>\n", escape(text))
+}
+
 /// Colours and what they mean.
 pub fn legend<'a>(entries: impl IntoIterator<Item = (&'a str, [u8; 3])>) -> String {
     let mut out = String::from("<span class=\"legend\">");
@@ -169,6 +174,7 @@ h1{margin:.15em 0 .1em;font-size:2.1rem;line-height:1.2;font-weight:680;letter-s
 section{margin-top:44px}
 h2{margin:0 0 6px;font-size:1.3rem;font-weight:650;letter-spacing:-.01em}
 .lead{margin:0 0 16px;color:var(--soft);max-width:78ch}
+.warning{margin:0 0 16px;max-width:78ch;color:var(--bad);border-left:4px solid var(--bad);padding:2px 0 2px 12px}
 .grid{display:grid;gap:22px 20px;margin:0 0 22px}
 .g2{grid-template-columns:repeat(2,minmax(0,1fr))}
 .g3{grid-template-columns:repeat(3,minmax(0,1fr))}

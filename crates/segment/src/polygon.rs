@@ -23,6 +23,11 @@ impl Segmenter for Polygon {
 }
 
 /// Pixels whose centre is inside `outline` (px), by the even-odd rule.
+///
+/// ```
+/// let square = [[1.0, 1.0], [3.0, 1.0], [3.0, 3.0], [1.0, 3.0]];
+/// assert_eq!(trocar_segment::fill_polygon(8, 8, &square).count(), 4);
+/// ```
 pub fn fill_polygon(width: usize, height: usize, outline: &[[f64; 2]]) -> Mask {
     let mut mask = Mask::new(width, height);
     let mut crossings = Vec::new();

@@ -217,7 +217,7 @@ impl CameraRig {
         if let Some(noise) = sensor.depth.filter(|_| depth) {
             let camera = own.sized(size);
             let seeds = [u64::from(sensor.seed), u64::from(frame)];
-            noise.spoil(&mut picture.depth, Some(&picture.color), &camera, focal, seeds)?;
+            noise.apply_resampled(&mut picture.depth, Some(&picture.color), &camera, focal, seeds)?;
         }
         Ok(&self.picture)
     }

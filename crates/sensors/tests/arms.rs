@@ -1,7 +1,7 @@
 //! Arms drawn from their descriptions, and the abdominal wall around the ports. Tests that need the
 //! FR3's files print that they are skipped if the files are missing.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "what tests share may panic")]
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "shared test helpers may panic")]
 
 use glam::DVec3;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Pictures of a small cell: bit-identical on any number of threads, moving parts at the right
 //! place, cuts, sections, noise.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+#![allow(clippy::unwrap_used, reason = "test helpers may panic")]
 
 use glam::{DQuat, DVec3};
 use trocar_camera::{Camera, ColorImage};

@@ -22,6 +22,18 @@ pub struct Provenance {
 }
 
 /// Organs in their recorded arrangement.
+///
+/// ```no_run
+/// # fn main() -> trocar_specimen::Result<()> {
+/// use std::path::Path;
+/// use trocar_specimen::Specimen;
+///
+/// let mut specimen = Specimen::read(Path::new("specimen"))?;
+/// specimen.organs[0].material.young_modulus_pa = 6e3;
+/// specimen.write(Path::new("softer"))?;
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Clone, Debug)]
 pub struct Specimen {
     /// Name.

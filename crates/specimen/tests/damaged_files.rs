@@ -1,5 +1,5 @@
-//! Damaged specimens give a specimen or a one-line error: never a panic, a hang, or more memory
-//! than their size calls for.
+//! Damaged specimens give a specimen or a one-line error: no panic, no hang, no memory beyond what
+//! their size needs.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;

@@ -1,4 +1,4 @@
-//! A specimen comes back as written, and a spoiled one is one clear error.
+//! A specimen is read as written, and a damaged one is one clear error.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod common;
@@ -13,7 +13,7 @@ fn failure(dir: &Path) -> String {
 }
 
 #[test]
-fn comes_back_as_written() {
+fn is_read_as_written() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("specimen");
     drop(Specimen::stage(&dir).unwrap());
@@ -40,7 +40,7 @@ fn comes_back_as_written() {
 fn mistakes_are_named() {
     let root = tempfile::tempdir().unwrap();
     let dir = root.path().join("specimen");
-    assert!(failure(&dir).contains("specimen.toml: no such file"));
+    assert!(failure(&dir).contains("specimen.toml: the file does not exist"));
     specimen().write(&dir).unwrap();
     let toml = dir.join("specimen.toml");
     let text = fs::read_to_string(&toml).unwrap();
@@ -63,6 +63,6 @@ fn mistakes_are_named() {
 
     let mut no_organs = specimen();
     no_organs.organs.clear();
-    assert!(no_organs.write(&root.path().join("other")).unwrap_err().to_string().contains("no organ"));
+    assert!(no_organs.write(&root.path().join("other")).unwrap_err().to_string().contains("no [[organ]]"));
     assert!(!root.path().join("other").exists());
 }

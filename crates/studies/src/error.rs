@@ -39,6 +39,9 @@ pub enum Error {
     /// A scene of tissue cannot be made or stepped.
     #[error(transparent)]
     TissueScene(#[from] trocar_testing::scenes::Error),
+    /// The oracle or a comparator failed.
+    #[error(transparent)]
+    Reference(#[from] trocar_tissue_reference::Error),
     /// Two pictures cannot be compared.
     #[error(transparent)]
     Similarity(#[from] trocar_camera::metrics::Error),

@@ -58,8 +58,9 @@ pub struct SceneChoice {
     /// Scene file or built-in scene.
     #[arg(default_value = "cell-a")]
     pub scene: String,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }
 
@@ -112,7 +113,7 @@ impl From<DesignName> for GraspDesign {
 /// Models of the unseen back by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum BackName {
-    /// As round as the silhouette is wide: the paper's. Flat organs come out too thick.
+    /// As round as the silhouette is wide, as in the paper. Flat organs become too thick.
     Rounded,
     /// As high as the front rises above its rim, and the same below.
     Fitted,

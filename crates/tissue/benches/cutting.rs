@@ -1,6 +1,8 @@
-//! What a cut costs: severing a tube, and the stepper's way over to the new model. `cargo bench -p trocar-tissue --bench cutting`.
+//! Cost of a cut: severing a tube, and changing the stepper to the new model.
+//!
+//! `cargo bench -p trocar-tissue --bench cutting`
 
-#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program that tells its figures")]
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a benchmark prints")]
 
 #[path = "../tests/common/mod.rs"]
 mod common;
@@ -8,7 +10,7 @@ mod common;
 use common::{FRAME, GRAVITY, appendix, nodes, tissue};
 use glam::DVec3;
 use std::time::{Duration, Instant};
-use trocar_tissue::{Cut, Schedule, State, Stepper, sever};
+use trocar_tissue::{Cut, SolverSettings, State, Stepper, sever};
 
 /// Repetitions; the fastest counts.
 const TIMES: usize = 30;
@@ -24,8 +26,8 @@ fn main() {
         let mesh = appendix(cell);
         let model = common::model(&mesh, tissue(12e3), nodes(&mesh, |p| p.x < 6e-3), GRAVITY);
         let state = State::new(&model);
-        let mut fast = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
-        let mut sweeps = Stepper::new(&model, Schedule::PAPER, FRAME, 1).unwrap();
+        let mut fast = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
+        let mut sweeps = Stepper::new(&model, SolverSettings::PAPER, FRAME, 1).unwrap();
         let cut = Cut::through(0, DVec3::X * 0.04, DVec3::X);
         let mut moving = state.clone();
         let mut times = [const { Vec::new() }; 4];
@@ -39,9 +41,9 @@ fn main() {
             assert_eq!(severed.pieces.len(), 2);
             for (k, stepper) in [&mut fast, &mut sweeps].into_iter().enumerate() {
                 let start = Instant::now();
-                stepper.follow(&severed.model).unwrap();
+                stepper.set_model(&severed.model).unwrap();
                 times[1 + k].push(start.elapsed());
-                stepper.follow(&model).unwrap();
+                stepper.set_model(&model).unwrap();
             }
         }
         let [sever, fast, sweeps, frame] = times.map(|times| least(&times));

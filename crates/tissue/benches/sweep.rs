@@ -1,4 +1,5 @@
-//! What a sweep of Vertex Block Descent costs on a specimen of six organs: one table, minima over many repetitions.
+//! Cost of a sweep of Vertex Block Descent on a specimen of six organs: one table, minima over many
+//! repetitions.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark stops where it cannot go on, and prints")]
 
 use glam::DVec3;
@@ -7,7 +8,8 @@ use std::time::Instant;
 use trocar_geometry::TetMesh;
 use trocar_geometry::io::read_msh;
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Descent, Isa, Material, Model, ModelBuilder, Schedule, Start, State, Stepper,
+    BodyDescription, ConstitutiveModel, Descent, Isa, Material, Model, ModelBuilder, SolverSettings, Start, State,
+    Stepper,
 };
 
 /// Six organs in one file, beside the repository.
@@ -48,7 +50,7 @@ fn main() {
 /// Least times of a frame with the paper's sweeps, and with twice as many [ms].
 fn times(model: &Model, threads: usize, repetitions: usize) -> [f64; 2] {
     let mut runs = [SWEEPS, 2 * SWEEPS].map(|iterations| {
-        let schedule = Schedule::Descent(Descent { substeps: SUBSTEPS, iterations, start: Start::Adaptive });
+        let schedule = SolverSettings::Descent(Descent { substeps: SUBSTEPS, iterations, start: Start::Adaptive });
         (State::new(model), Stepper::new(model, schedule, FRAME, threads).unwrap(), f64::INFINITY)
     });
     for _ in 0..repetitions {

@@ -1,9 +1,9 @@
-//! What can go wrong while a model is built, or its minimum is sought. A built model cannot be wrong.
+//! What can go wrong while a model is built. A built model cannot be wrong.
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A model that cannot be built, or a minimum that was not found.
+/// A model or a stepper that cannot be built.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A body is unusable; names the body and the element, node or parameter.
@@ -17,12 +17,4 @@ pub enum Error {
     /// A parameter of the whole model is unusable.
     #[error("{0}")]
     Model(String),
-    /// A step or an equilibrium that the oracle did not find.
-    #[error("body '{body}': {failure}")]
-    Unsolved {
-        /// Its name.
-        body: String,
-        /// Why.
-        failure: crate::oracle::Failure,
-    },
 }

@@ -9,8 +9,8 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_core::Pose;
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, Compliance, Grasp, Load, Material, ModelBuilder, Schedule, Shape, State,
-    Stepper, ToolMotion,
+    BodyContact, BodyDescription, Collider, Compliance, Grasp, Load, Material, ModelBuilder, Shape, SolverSettings,
+    State, Stepper, ToolMotion,
 };
 
 /// The system's allocator, counting.
@@ -53,10 +53,10 @@ fn stepping_bodies_that_touch_allocates_nothing() {
         builder.body(BodyDescription { name: "block".into(), mesh, material, pinned, supports: vec![] }).unwrap();
     }
     let model = builder.build().unwrap();
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
-        // Lists grow to what they hold at most.
+        // Lists grow to their greatest length.
         (0..30).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         (0..FRAMES).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
@@ -94,15 +94,16 @@ fn stepping_allocates_nothing() {
         Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY),
         Grasp::capture(&model, &state, 0, &hanging, 0, &Pose::IDENTITY).compliant(compliance),
     ];
-    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 2).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 2).unwrap();
     let still = ToolMotion { from: Pose::IDENTITY, to: Pose::IDENTITY };
     stepper.step(&model, &mut state, &[still]);
     let before = ALLOCATIONS.load(Ordering::Relaxed);
     let load = Load { body: 0, node: mesh.vertices.len() - 1, force: DVec3::Z * 1e-3 };
     for _ in 0..FRAMES {
-        stepper.step_under(&model, &mut state, &[still], &[load]);
+        stepper.step_with_loads(&model, &mut state, &[still], &[load]);
     }
     let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
-    // The thread pool's queue takes a new block now and then, once in dozens of frames; our own code would show in every frame.
+    // The thread pool's queue takes a new block now and then, once in dozens of frames; our own
+    // code would show in every frame.
     assert!(during < FRAMES / 4, "{during} allocations in {FRAMES} frames");
 }

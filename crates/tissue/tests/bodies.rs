@@ -1,4 +1,5 @@
-//! Bodies that touch each other: how deep, with what force, and that nothing is gained or lost by it.
+//! Bodies that touch each other: how deep, with what force, and that nothing is gained or lost by
+//! it.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -9,11 +10,11 @@ use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_tissue::{
-    Body, BodyContact, BodyDescription, Divergence, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper,
-    ToolMotion,
+    Body, BodyContact, BodyDescription, Divergence, Grasp, Material, Model, ModelBuilder, SolverSettings, State,
+    Stepper, ToolMotion,
 };
 
-/// A ball of `cells` cubes across, of radius `radius` [m], round `centre`.
+/// A ball of `cells` cubes across, of radius `radius` (m), round `centre`.
 fn ball(cells: usize, radius: f64, centre: DVec3) -> TetMesh {
     let mut mesh = block([cells; 3], 2.0 / cells as f64);
     for p in &mut mesh.vertices {
@@ -58,7 +59,8 @@ fn momentum(model: &Model, state: &State) -> DVec3 {
     model.bodies().iter().enumerate().map(|(b, body)| of(b, body)).sum()
 }
 
-/// How deep the deepest node of a body is inside another: brute force over all elements and boundary triangles, in double precision.
+/// How deep the deepest node of a body is inside another: brute force over all elements and
+/// boundary triangles, in double precision.
 fn depth(model: &Model, state: &State, [a, b]: [usize; 2], meshes: [&TetMesh; 2]) -> f64 {
     let x = state.positions(model, b);
     let (boundary, at) = meshes[1].boundary();
@@ -91,7 +93,9 @@ fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     edge(a, b).min(edge(b, c)).min(edge(c, a))
 }
 
-/// One organ falls 20 mm onto another that lies on pins: neither enters the other by more than the contact offset, ever. The fast solver's comes to rest on it; the paper's sweeps lose momentum, and it slides off.
+/// One organ falls 20 mm onto another that lies on pins: neither enters the other by more than the
+/// contact offset, ever. The fast solver's comes to rest on it; the paper's sweeps lose momentum,
+/// and it slides off.
 #[test]
 fn dropped_on_each_other_they_stay_outside() {
     let (radius, contact) = (12e-3, BodyContact::default());
@@ -138,7 +142,8 @@ fn dropped_on_each_other_they_stay_outside() {
     }
 }
 
-/// Two that fly into each other, off centre, keep their momentum, and gain no energy: by the fast solver. Ten sweeps a substep do neither; 150 lose 4% of the momentum.
+/// Two that fly into each other, off centre, keep their momentum, and gain no energy: by the fast
+/// solver. Ten sweeps a substep do neither; 150 lose 4% of the momentum.
 #[test]
 fn momentum_is_kept() {
     for judged in schedules() {
@@ -195,7 +200,7 @@ fn coulomb_holds_between_bodies() {
         let parts = [Part { mesh: ground, material, pinned }, Part { mesh: above, material, pinned: vec![] }];
         let model = scene(&parts, contact, GRAVITY);
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         let mut run = |frames: usize| {
             let (mut fallbacks, mut iterations) = (0, 0);
             for _ in 0..frames {
@@ -240,7 +245,7 @@ fn two_blocks_press_as_one() {
     ];
     let model = scene(&parts, contact, DVec3::ZERO);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     let pressed = 1e-3;
     for k in 1..=30 {
         for i in &pinned_high {
@@ -278,7 +283,8 @@ fn two_blocks_press_as_one() {
     assert!((below - expected).abs() < 0.02 * pressed, "{below} m, {expected} m expected");
 }
 
-/// A soft flap that hangs over another part of its own body sinks onto it, and through it if folds are not looked for.
+/// A soft flap that hangs over another part of its own body sinks onto it, and through it if folds
+/// are not looked for.
 #[test]
 fn folded_tissue_touches_itself() {
     let edge = 2.5e-3;
@@ -296,7 +302,7 @@ fn folded_tissue_touches_itself() {
     };
     let pinned = nodes(&mesh, |p| p.z < 2.1 * edge || p.x < 1.1 * edge);
     let [top, bottom] = [2.0, 6.0].map(|z| nodes(&mesh, |p| p.x > 3.0 * edge && (p.z / edge - z).abs() < 1e-6));
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let gap = |folds: bool| {
             let contact = BodyContact { folds, ..BodyContact::default() };
             let material = Material { viscosity: 10.0, ..tissue(800.0) };
@@ -329,7 +335,7 @@ fn a_rigid_body_is_an_obstacle() {
     let parts = [Part { mesh: low, material, pinned: all }, Part { mesh: high, material, pinned: vec![] }];
     let contact = BodyContact::default();
     let model = scene(&parts, contact, GRAVITY);
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
         for _ in 0..60 {
@@ -342,7 +348,8 @@ fn a_rigid_body_is_an_obstacle() {
     }
 }
 
-/// In a row of bodies at rest that touch, a blow to the first is felt by the last, and no momentum is lost on the way.
+/// In a row of bodies at rest that touch, a blow to the first is felt by the last, and no momentum
+/// is lost on the way.
 #[test]
 fn a_blow_goes_through_a_row() {
     let contact = BodyContact::default();
@@ -354,7 +361,7 @@ fn a_blow_goes_through_a_row() {
     let mut state = State::new(&model);
     (0..model.bodies()[0].len()).for_each(|i| state.set_velocity(&model, 0, i, DVec3::X * 0.4));
     let before = momentum(&model, &state);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 2).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 2).unwrap();
     for _ in 0..20 {
         let report = stepper.step(&model, &mut state, &[]);
         assert_eq!((report.inverted, report.divergence, report.fallbacks), (0, None, 0));
@@ -367,7 +374,8 @@ fn a_blow_goes_through_a_row() {
     assert!(last > 0.05, "the last goes at {last} m/s");
 }
 
-/// At 30 frames a second a block that is just out of reach falls through the whole offset in one: it is found all the same.
+/// At 30 frames a second a block that is just out of reach falls through the whole offset in one:
+/// it is found all the same.
 #[test]
 fn long_frames_find_what_falls() {
     let low = block([6, 6, 4], 2.5e-3);
@@ -377,7 +385,7 @@ fn long_frames_find_what_falls() {
     let parts = [Part { mesh: low, material, pinned }, Part { mesh: high, material, pinned: vec![] }];
     let model = scene(&parts, BodyContact::default(), GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, 1.0 / 30.0, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, 1.0 / 30.0, 1).unwrap();
     for _ in 0..30 {
         let report = stepper.step(&model, &mut state, &[]);
         assert_eq!((report.inverted, report.divergence), (0, None));
@@ -386,7 +394,7 @@ fn long_frames_find_what_falls() {
     }
 }
 
-/// A tool that holds one body rigidly bears what another lays on it: the weight of both, and no more.
+/// A tool that holds one body rigidly feels the weight of a body that lies on it, too, and no more.
 #[test]
 fn tools_feel_what_presses_what_they_hold() {
     let low = block([4, 4, 2], 2.5e-3);
@@ -397,7 +405,7 @@ fn tools_feel_what_presses_what_they_hold() {
     let model = scene(&parts, BodyContact::default(), GRAVITY);
     let weight: f64 =
         model.bodies().iter().map(|body| (0..body.len()).map(|i| body.mass(i)).sum::<f64>()).sum::<f64>() * 9.81;
-    for schedule in [Schedule::FAST, many_sweeps()] {
+    for schedule in [SolverSettings::FAST, many_sweeps()] {
         let mut state = State::new(&model);
         state.grasps = vec![Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY)];
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
@@ -427,14 +435,15 @@ fn another_contact_is_another_model() {
         builder.build().unwrap()
     };
     let model = build(0.6, false);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     for (other, refused) in [(build(0.6, false), false), (build(0.1, false), true), (build(0.6, true), true)] {
         let mut state = State::new(&other);
         assert_eq!(stepper.step(&other, &mut state, &[]).divergence == Some(Divergence::OtherModel), refused);
     }
 }
 
-/// Bodies of a filtered pair, and bodies of a model without contact between them, pass through each other.
+/// Bodies of a filtered pair, and bodies of a model without contact between them, pass through each
+/// other.
 #[test]
 fn only_pairs_that_collide_touch() {
     let parts = [ball(5, 8e-3, DVec3::ZERO), ball(5, 8e-3, DVec3::Z * 20e-3)];
@@ -451,7 +460,7 @@ fn only_pairs_that_collide_touch() {
         let model = builder.build().unwrap();
         let mut state = State::new(&model);
         (0..model.bodies()[1].len()).for_each(|i| state.set_velocity(&model, 1, i, DVec3::Z * -0.3));
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         (0..12).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
         let moved = centroid(&model, &state, 0).length();
         assert_eq!(moved < 1e-9, filtered || !contact, "the other went {moved} m");
@@ -466,11 +475,12 @@ fn only_pairs_that_collide_touch() {
         let (name, mesh, material) = ("part".to_owned(), &parts[0], tissue(8e3));
         builder.body(BodyDescription { name, mesh, material, pinned: vec![], supports: vec![] }).unwrap();
         let said = builder.build().unwrap_err().to_string();
-        assert!(said.starts_with("contact between bodies: ") && said.contains("make"), "{said}");
+        assert!(said.starts_with("contact between bodies: ") && said.contains("must be"), "{said}");
     }
 }
 
-/// The same bits on one thread and on two, and after a state was put back, in the same stepper and in another.
+/// The same bits on one thread and on two, and after a state was put back, in the same stepper and
+/// in another.
 #[test]
 fn bits_repeat() {
     let meshes = [
@@ -483,7 +493,7 @@ fn bits_repeat() {
     let material = Material { viscosity: 20.0, ..tissue(8e3) };
     let parts = meshes.map(|mesh| Part { pinned: pins(&mesh), mesh, material });
     let model = scene(&parts, BodyContact::default(), GRAVITY);
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let run = |threads: usize| {
             let mut state = State::new(&model);
             let mut stepper = Stepper::new(&model, schedule, FRAME, threads).unwrap();
@@ -507,7 +517,8 @@ fn bits_repeat() {
     }
 }
 
-/// Bodies that rest and are woken by a push go on as if the stepper had never seen them before: what they had learnt when they last moved is of another time.
+/// Bodies at rest that a push wakes continue as if the stepper had never seen them before: steps
+/// that they recorded when they last moved are of another time.
 #[test]
 fn bodies_that_wake_remember_nothing() {
     let gap = 10e-3 + 1.2e-3;
@@ -529,7 +540,7 @@ fn bodies_that_wake_remember_nothing() {
         }
         hashes
     };
-    let stepper = || Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let stepper = || Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     go(&mut stepper(), &mut settled, &|_| 0.0, 60);
     // Pushed into the second, which is pushed into the third; they rest in between.
     let push = |k: usize| if k < 10 { 0.0 } else { 4e-3 * ((k - 10) as f64 / 20.0).min(1.0) };

@@ -1,4 +1,4 @@
-//! What the builder refuses, and what a built model tells.
+//! Errors of the builder, and properties of a built model.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -8,7 +8,7 @@ use common::{FRAME, GRAVITY, block, model, tissue};
 use glam::DVec3;
 use trocar_geometry::TetMesh;
 use trocar_tissue::{
-    BodyDescription, Descent, MassFloor, Material, ModelBuilder, Schedule, Start, Stepper, SupportPlane,
+    BodyDescription, Descent, MassFloor, Material, ModelBuilder, SolverSettings, Start, Stepper, SupportPlane,
 };
 
 #[test]
@@ -122,15 +122,16 @@ fn unusable_supports_schedules_and_frames_are_refused() {
         assert!(ModelBuilder::new().body(body).is_err());
     }
     let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
-    let descent = |substeps, iterations| Schedule::Descent(Descent { substeps, iterations, start: Start::Adaptive });
+    let descent =
+        |substeps, iterations| SolverSettings::Descent(Descent { substeps, iterations, start: Start::Adaptive });
     for (schedule, dt, word) in [
         (descent(0, 10), FRAME, "substeps"),
         (descent(8, 0), FRAME, "iterations"),
         (descent(usize::MAX, 10), FRAME, "substeps"),
-        (Schedule::PAPER, 0.0, "frame"),
-        (Schedule::PAPER, -1.0, "frame"),
-        (Schedule::PAPER, f64::NAN, "frame"),
-        (Schedule::PAPER, f64::INFINITY, "frame"),
+        (SolverSettings::PAPER, 0.0, "frame"),
+        (SolverSettings::PAPER, -1.0, "frame"),
+        (SolverSettings::PAPER, f64::NAN, "frame"),
+        (SolverSettings::PAPER, f64::INFINITY, "frame"),
     ] {
         let Err(said) = Stepper::new(&model, schedule, dt, 1) else { panic!("{schedule:?}, {dt} s is taken") };
         assert!(said.to_string().contains(word), "{said}");

@@ -1,4 +1,5 @@
-//! Contact with tools and supports: Hertz, Coulomb, nothing creeps, nothing is passed through, whatever the speed and the stiffness.
+//! Contact with tools and supports: Hertz, Coulomb, nothing creeps, nothing is passed through,
+//! whatever the speed and the stiffness.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -9,8 +10,8 @@ use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_tissue::{
-    BodyDescription, Collider, Material, Model, ModelBuilder, Schedule, Shape, State, Stepper, Support, SupportPlane,
-    ToolMotion,
+    BodyDescription, Collider, Material, Model, ModelBuilder, Shape, SolverSettings, State, Stepper, Support,
+    SupportPlane, ToolMotion,
 };
 
 fn at(translation: DVec3) -> Pose {
@@ -46,8 +47,9 @@ fn centroid(model: &Model, state: &State) -> DVec3 {
     x.iter().sum::<DVec3>() / x.len() as f64
 }
 
-/// A rigid sphere pressed into soft tissue: Hertz's force, with what a layer of finite thickness bonded to its ground adds (Dimitriadis and others 2002, Determination of elastic moduli of thin layers of soft
-/// material using the atomic force microscope, equation 3).
+/// A rigid sphere pressed into soft tissue: Hertz's force, with what a layer of finite thickness
+/// bonded to its ground adds (Dimitriadis and others 2002, Determination of elastic moduli of thin
+/// layers of soft material using the atomic force microscope, equation 3).
 #[test]
 fn a_sphere_is_pushed_back_as_hertz_says() {
     // Finer towards the place of contact.
@@ -58,14 +60,15 @@ fn a_sphere_is_pushed_back_as_hertz_says() {
     for p in &mut mesh.vertices {
         *p = DVec3::new(graded(p.x / middle - 1.0), graded(p.y / middle - 1.0), graded(p.z / (middle + 3.0) - 1.0));
     }
-    // Linear tetrahedra of nearly incompressible tissue are too stiff where they are long and thin: that is not what is tested.
+    // Linear tetrahedra of nearly incompressible tissue are too stiff where they are long and thin:
+    // that is not what is tested.
     let nu: f64 = 0.3;
     let material = Material { viscosity: 40.0, poisson_ratio: nu, ..tissue(12e3) };
     let pinned = nodes(&mesh, |p| p.z < -0.99 * half);
     let radius: f64 = 0.03;
     let sphere = collider(Shape::Sphere { centre: DVec3::ZERO, radius }, 0.0, 0.0);
     let model = scene(&mesh, material, pinned, vec![], vec![sphere], DVec3::ZERO);
-    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
+    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
     for depth in [0.3e-3, 0.6e-3] {
         for _ in 0..60 {
             let report = stepper.step(&model, &mut state, &[still(at(DVec3::Z * (radius - depth)))]);
@@ -84,7 +87,8 @@ fn a_sphere_is_pushed_back_as_hertz_says() {
     }
 }
 
-/// A block on an incline stays where it is below the angle of friction, for a minute and to the micrometre, and slides as it should above.
+/// A block on an incline stays where it is below the angle of friction, for a minute and to the
+/// micrometre, and slides as it should above.
 #[test]
 fn a_block_on_an_incline_sticks_and_slides_at_the_right_angle() {
     let mesh = block([4, 4, 2], 3e-3);
@@ -97,7 +101,7 @@ fn a_block_on_an_incline_sticks_and_slides_at_the_right_angle() {
             let angle = (share * friction).atan();
             let gravity = 9.81 * DVec3::new(angle.sin(), 0.0, -angle.cos());
             let model = scene(&mesh, material, vec![], supports.clone(), colliders.clone(), gravity);
-            let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+            let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
             let mut state = State::new(&model);
             let mut walk = |frames: usize| {
                 for _ in 0..frames {
@@ -122,14 +126,15 @@ fn a_block_on_an_incline_sticks_and_slides_at_the_right_angle() {
     }
 }
 
-/// A bar at half a metre a second through a column: the column gives way, no point of it is ever inside the bar, and it comes back.
+/// A bar at half a metre a second through a column: the column gives way, no point of it is ever
+/// inside the bar, and it comes back.
 #[test]
 fn nothing_is_passed_through_at_half_a_metre_a_second() {
     let mesh = block([4, 4, 10], 2e-3);
     let material = Material { viscosity: 60.0, ..tissue(12e3) };
     let radius = 2e-3;
     let ends = [DVec3::new(0.0, -0.02, 0.012), DVec3::new(0.0, 0.03, 0.012)];
-    for (schedule, speed) in [(Schedule::FAST, 0.5), (Schedule::FAST, 0.1), (Schedule::PAPER, 0.5)] {
+    for (schedule, speed) in [(SolverSettings::FAST, 0.5), (SolverSettings::FAST, 0.1), (SolverSettings::PAPER, 0.5)] {
         let bar = collider(Shape::Capsule { ends, radius }, 1.5e-3, 0.3);
         let model = scene(&mesh, material, nodes(&mesh, |p| p.z == 0.0), vec![], vec![bar], DVec3::ZERO);
         let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, schedule, FRAME, 1).unwrap());
@@ -161,17 +166,18 @@ fn nothing_is_passed_through_at_half_a_metre_a_second() {
         }
         let off =
             state.positions(&model, 0).iter().zip(&mesh.vertices).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max);
-        assert!(off < 1e-3 || schedule == Schedule::PAPER, "{schedule:?}: still {off} m off");
+        assert!(off < 1e-3 || schedule == SolverSettings::PAPER, "{schedule:?}: still {off} m off");
     }
 }
 
-/// A capsule pressed deep into tissue that is pinned right below: no blow-up, no inverted element, and a force that only grows.
+/// A capsule pressed deep into tissue that is pinned right below: no blow-up, no inverted element,
+/// and a force that only grows.
 #[test]
 fn a_capsule_pressed_into_pinned_tissue_is_held_back() {
     let mesh = block([12, 8, 4], 2e-3);
     let material = Material { viscosity: 60.0, ..tissue(12e3) };
     let ends = [DVec3::new(0.008, 0.008, 0.0), DVec3::new(0.016, 0.008, 0.0)];
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let tool = collider(Shape::Capsule { ends, radius: 2.5e-3 }, 1.5e-3, 0.6);
         let pinned = nodes(&mesh, |p| p.z < 3e-3);
         let model = scene(&mesh, material, pinned, vec![], vec![tool], GRAVITY);
@@ -209,7 +215,8 @@ fn contact_holds_at_any_stiffness() {
             .unwrap();
         builder.collider(collider(Shape::Sphere { centre: DVec3::ZERO, radius: 4e-3 }, 1.5e-3, 0.6)).unwrap();
         let model = builder.build().unwrap();
-        let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
+        let (mut state, mut stepper) =
+            (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
         let height = |frame: usize| 0.0115 + 1.2e-3 * (frame as f64 * 0.7).cos() - 1.0e-3;
         let (mut iterations, mut fallbacks, mut fastest) = (0, 0, 0.0f64);
         for frame in 0..180 {
@@ -253,7 +260,7 @@ fn contact_repeats_to_the_bit() {
         let rotation = DQuat::from_rotation_x(0.05 * (0.1 * f).sin());
         Pose { rotation, translation: DVec3::new(4e-4 * f - 0.005, 0.0, 7e-3 + 2e-3 * (0.2 * f).cos()) }
     };
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut hashes = Vec::new();
         for (threads, pause) in [(1, 0), (2, 0), (3, 0), (1, 37)] {
             let (mut state, mut stepper) =

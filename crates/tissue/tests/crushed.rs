@@ -7,7 +7,7 @@ mod common;
 use common::{FRAME, block, tissue};
 use glam::DVec3;
 use trocar_geometry::TetMesh;
-use trocar_tissue::{BodyDescription, Model, ModelBuilder, Schedule, State, Stepper};
+use trocar_tissue::{BodyDescription, Model, ModelBuilder, SolverSettings, State, Stepper};
 
 /// Length of the most stretched edge over that at rest.
 fn stretch(mesh: &TetMesh, now: &[DVec3]) -> f64 {
@@ -34,13 +34,14 @@ fn pinned_block(mesh: &TetMesh) -> Model {
     builder.build().unwrap()
 }
 
-/// A node of the top is pressed inwards until an element is nearly flat, and goes on inwards when it is let go: it cannot go where it goes by itself, and the flat element's barrier presses on it a thousand times
-/// harder than the stiffness at rest explains.
+/// A node of the top is pressed inwards until an element is nearly flat, and goes on inwards when
+/// it is let go: it cannot go where it goes by itself, and the flat element's barrier presses on it
+/// a thousand times harder than the stiffness at rest explains.
 #[test]
 fn nodes_of_crushed_elements_are_not_thrown_out() {
     let mesh = block([4, 4, 3], 2e-3);
     let model = pinned_block(&mesh);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     let middle = DVec3::new(4e-3, 4e-3, 1e-3);
     for node in (0..mesh.vertices.len()).filter(|i| mesh.vertices[*i].z > 5.9e-3) {
         for volume in [0.2, 0.02, 0.005] {

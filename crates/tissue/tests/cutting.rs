@@ -1,4 +1,4 @@
-//! Bodies that are cut: what falls off falls, what is held stays, and nothing else changes.
+//! Cut bodies: what falls off falls, held parts stay, and nothing else changes.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -9,7 +9,7 @@ use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_tissue::{
-    BodyDescription, Compliance, Cut, Grasp, MassFloor, Material, Model, ModelBuilder, Schedule, Severed, State,
+    BodyDescription, Compliance, Cut, Grasp, MassFloor, Material, Model, ModelBuilder, Severed, SolverSettings, State,
     Stepper, sever,
 };
 
@@ -31,7 +31,7 @@ fn run(stepper: &mut Stepper, model: &Model, state: &mut State, frames: usize) {
     }
 }
 
-/// Volume of a body as it lies [m3], its mass [kg].
+/// Volume of a body as it lies (m3), its mass (kg).
 fn volume_and_mass(model: &Model, state: &State, body: usize) -> (f64, f64) {
     let b = &model.bodies()[body];
     let mesh = TetMesh { vertices: state.positions(model, body), tets: b.tets().to_vec() };
@@ -53,8 +53,8 @@ fn organs() -> [(&'static str, TetMesh, f64); 2] {
     [("beam", block([24, 4, 4], 2e-3), 24e-3), ("tube", appendix(2.6e-3), 40e-3)]
 }
 
-/// Lets an organ hang for a while, cuts it through where its middle is, and lets the parts go on.
-fn cut_through(mesh: &TetMesh, at: f64, schedule: Schedule, threads: usize) -> (Severed, State) {
+/// Lets an organ hang for a while, cuts it through its middle, and steps the parts.
+fn cut_through(mesh: &TetMesh, at: f64, schedule: SolverSettings, threads: usize) -> (Severed, State) {
     let model = one_body(mesh, nodes(mesh, |p| p.x < 6e-3));
     let mut state = State::new(&model);
     let mut stepper = Stepper::new(&model, schedule, FRAME, threads).unwrap();
@@ -74,7 +74,7 @@ fn cut_through(mesh: &TetMesh, at: f64, schedule: Schedule, threads: usize) -> (
     );
 
     let mut parted = cut.state.clone();
-    stepper.follow(&cut.model).unwrap();
+    stepper.set_model(&cut.model).unwrap();
     run(&mut stepper, &cut.model, &mut parted, 60);
     (cut, parted)
 }
@@ -82,7 +82,7 @@ fn cut_through(mesh: &TetMesh, at: f64, schedule: Schedule, threads: usize) -> (
 #[test]
 fn an_organ_that_is_cut_through_is_two_bodies() {
     for (name, mesh, at) in organs() {
-        for schedule in [Schedule::FAST, Schedule::PAPER] {
+        for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
             let (cut, parted) = cut_through(&mesh, at, schedule, 1);
             assert!(mesh.tets.len() > 2000 && mesh.tets.len() < 5000, "{name}: {} elements", mesh.tets.len());
             let names: Vec<&str> = cut.model.bodies().iter().map(|b| b.name()).collect();
@@ -126,7 +126,7 @@ fn a_partial_cut_leaves_one_piece_that_opens_under_load() {
     // What was numbered keeps its number.
     assert_eq!(cut.pieces[0].nodes[..mesh.vertices.len()], (0..mesh.vertices.len() as u32).collect::<Vec<_>>());
     let copies = |k: usize| (cut.pieces[0].nodes[mesh.vertices.len() + k] as usize, mesh.vertices.len() + k);
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut state = cut.state.clone();
         let gap = |state: &State, k: usize| {
             let (one, other) = copies(k);
@@ -156,7 +156,7 @@ fn a_body_may_be_cut_again_and_again() {
     let (before, after) = (total(&model, &state), total(&third.model, &third.state));
     assert!(off(after.0, before.0) < 1e-12 && off(after.1, before.1) < 1e-6, "{before:?} {after:?}");
     let mut state = third.state;
-    run(&mut Stepper::new(&third.model, Schedule::FAST, FRAME, 2).unwrap(), &third.model, &mut state, 30);
+    run(&mut Stepper::new(&third.model, SolverSettings::FAST, FRAME, 2).unwrap(), &third.model, &mut state, 30);
     // A notch, and then the rest of it.
     let beam = block([12, 4, 4], 2e-3);
     let model = one_body(&beam, vec![]);
@@ -179,7 +179,7 @@ fn the_held_part_stays_and_the_other_falls() {
     let was = |i: &u32| cut.pieces[1].nodes[*i as usize];
     assert_eq!(cut.state.grasps[0].nodes.iter().map(was).collect::<Vec<_>>(), held);
     let mut after = cut.state.clone();
-    run(&mut Stepper::new(&cut.model, Schedule::FAST, FRAME, 1).unwrap(), &cut.model, &mut after, 60);
+    run(&mut Stepper::new(&cut.model, SolverSettings::FAST, FRAME, 1).unwrap(), &cut.model, &mut after, 60);
     for node in &cut.state.grasps[0].nodes {
         let move_of = after.position(&cut.model, 1, *node as usize) - cut.state.position(&cut.model, 1, *node as usize);
         assert_eq!(move_of, DVec3::ZERO);
@@ -195,7 +195,8 @@ fn a_grasp_across_a_cut_holds_both_parts() {
     let compliance =
         Compliance { stiffness: 50.0, closing: DVec3::Z, jaw_force: 6.0, friction: 0.5, tear_force: 3.0, blades: None };
     let capture = |state: &State, held: &[u32]| Grasp::capture(&model, state, 0, held, 0, &Pose::IDENTITY);
-    // Across the cut, more of it on the right; only on the cut; off it to the right, and one layer on it.
+    // Across the cut, more of it on the right; only on the cut; off it to the right, and one layer
+    // on it.
     let across = nodes(&mesh, |p| p.x > 21e-3 && p.x < 29e-3);
     let on_it = nodes(&mesh, |p| p.x == 24e-3);
     let beside = nodes(&mesh, |p| p.x > 23e-3 && p.x < 29e-3);
@@ -206,7 +207,8 @@ fn a_grasp_across_a_cut_holds_both_parts() {
     let cut = sever(&model, &state, &Cut::through(0, DVec3::X * 24e-3, DVec3::X)).unwrap();
     let grasps: Vec<(usize, usize)> = cut.state.grasps.iter().map(|g| (g.body, g.nodes.len())).collect();
     let beside_is = cut.pieces.iter().position(|p| p.nodes.contains(&beside[2])).unwrap();
-    // Layers of 25: one and the copies of the one on the cut to the left, three and the copies to the right.
+    // Layers of 25: one and the copies of the one on the cut to the left, three and the copies to
+    // the right.
     let mut expected = vec![(0, 50), (1, 75), (0, 25), (1, 25), (beside_is, 75)];
     if grasps[0].1 == 75 {
         expected[..2].copy_from_slice(&[(0, 75), (1, 50)]);
@@ -233,7 +235,7 @@ fn what_was_before_a_cut_is_restored_to_the_bit() {
         builder.body(body).unwrap();
     }
     let model = builder.build().unwrap();
-    for schedule in [Schedule::FAST, Schedule::PAPER] {
+    for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
         let mut state = State::new(&model);
         run(&mut stepper, &model, &mut state, 10);
@@ -247,7 +249,7 @@ fn what_was_before_a_cut_is_restored_to_the_bit() {
         let cut = sever(&model, &saved, &cut).unwrap();
         assert!(cut.faces > 4 && cut.pieces.len() == 1);
         let mut after = cut.state.clone();
-        stepper.follow(&cut.model).unwrap();
+        stepper.set_model(&cut.model).unwrap();
         run(&mut stepper, &cut.model, &mut after, 30);
         let mut fresh = cut.state.clone();
         run(&mut Stepper::new(&cut.model, schedule, FRAME, 1).unwrap(), &cut.model, &mut fresh, 30);
@@ -255,7 +257,7 @@ fn what_was_before_a_cut_is_restored_to_the_bit() {
         assert_ne!(after.hash(), never_cut);
 
         let mut restored = saved.clone();
-        stepper.follow(&model).unwrap();
+        stepper.set_model(&model).unwrap();
         run(&mut stepper, &model, &mut restored, 30);
         assert_eq!(restored.hash(), never_cut);
         // The cube knows nothing of the cut.

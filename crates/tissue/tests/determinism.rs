@@ -8,13 +8,14 @@ use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper, SupportField,
-    SupportPlane, ToolMotion,
+    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
+    SupportField, SupportPlane, ToolMotion,
 };
 
 const FRAMES: usize = 600;
 
-/// Three small bodies: one grasped, one dropped on a plane, one on a field. (A body that several threads sweep at once is in robustness.rs.)
+/// Three small bodies: one grasped, one dropped on a plane, one on a field. (A body that several
+/// threads sweep at once is in robustness.rs.)
 fn scene() -> (Model, Vec<u32>) {
     let (large, small) = (block([2, 2, 4], 2e-3), block([2, 1, 1], 2e-3));
     let mut builder = ModelBuilder::new().gravity(GRAVITY);
@@ -56,7 +57,7 @@ fn start(model: &Model, held: &[u32]) -> State {
     state
 }
 
-fn same_bits(schedule: Schedule, name: &str) -> u64 {
+fn same_bits(schedule: SolverSettings, name: &str) -> u64 {
     let (model, held) = scene();
     let whole = |threads: usize| {
         let mut state = start(&model, &held);
@@ -67,7 +68,8 @@ fn same_bits(schedule: Schedule, name: &str) -> u64 {
     for threads in [1, 2, 3, 4] {
         assert_eq!(one, whole(threads), "{name}: {threads} threads");
     }
-    // Saved in the middle; the stepper goes astray, and what was saved goes on in it and in a new one.
+    // Saved in the middle: the stepper continues elsewhere, and the saved state continues in it and
+    // in a new stepper.
     let mut state = start(&model, &held);
     let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
     run(&model, &mut stepper, &mut state, 0..FRAMES / 2);
@@ -85,12 +87,12 @@ fn same_bits(schedule: Schedule, name: &str) -> u64 {
 
 #[test]
 fn six_hundred_frames_of_sweeps_have_the_same_bits() {
-    for (name, schedule) in [("paper", Schedule::PAPER), ("adaptive sweeps", common::adaptive())] {
+    for (name, schedule) in [("paper", SolverSettings::PAPER), ("adaptive sweeps", common::adaptive())] {
         println!("{name}: {:#018x}", same_bits(schedule, name));
     }
 }
 
 #[test]
 fn six_hundred_frames_of_the_fast_schedule_have_the_same_bits() {
-    println!("fast: {:#018x}", same_bits(Schedule::FAST, "fast"));
+    println!("fast: {:#018x}", same_bits(SolverSettings::FAST, "fast"));
 }

@@ -1,4 +1,5 @@
-//! The compliant grasp: what is held stays held, slips where Coulomb says so, tears once, and is free when it is let go.
+//! The compliant grasp: held tissue stays held, slips at Coulomb's limit, tears once, and is free
+//! after release.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -8,7 +9,9 @@ use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
-use trocar_tissue::{Compliance, Divergence, Event, Grasp, Material, Model, Schedule, State, Stepper, ToolMotion};
+use trocar_tissue::{
+    Compliance, Divergence, Event, Grasp, Material, Model, SolverSettings, State, Stepper, ToolMotion,
+};
 
 fn at(translation: DVec3) -> Pose {
     Pose { translation, ..Pose::IDENTITY }
@@ -35,14 +38,15 @@ fn viscous(young_modulus: f64) -> Material {
     Material { viscosity: 0.006 * young_modulus, ..tissue(young_modulus) }
 }
 
-/// A pull below 2 mu N is borne without creep, one above is not: the threshold is within 5% of Coulomb's law.
+/// A pull below 2 mu N is held without creep, one above is not: the threshold is within 5% of
+/// Coulomb's law.
 #[test]
 fn the_grasp_slips_at_twice_mu_times_the_jaw_force() {
     let mesh = strip();
     let model = model(&mesh, viscous(12e3), vec![], GRAVITY);
     let held = nodes(&mesh, |p| p.x < 7e-3);
     // The paper's ten sweeps do not carry a weight: they are no judge of friction.
-    for schedule in [Schedule::FAST] {
+    for schedule in [SolverSettings::FAST] {
         for share in [0.96, 1.04] {
             let compliance = jaws(share * weight(&model) / (2.0 * 0.6));
             let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, schedule, FRAME, 1).unwrap());
@@ -72,13 +76,13 @@ fn the_grasp_slips_at_twice_mu_times_the_jaw_force() {
     }
 }
 
-/// A tool that does not say where it is stays where it is, and so does what hangs on it.
+/// A tool without a motion stays where it is, and so do its nodes.
 #[test]
 fn what_hangs_on_a_tool_without_motion_stays() {
     let mesh = strip();
     let model = model(&mesh, viscous(12e3), vec![], GRAVITY);
     let held = nodes(&mesh, |p| p.x < 7e-3);
-    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap());
+    let (mut state, mut stepper) = (State::new(&model), Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap());
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(jaws(1.0)));
     for _ in 0..60 {
         stepper.step(&model, &mut state, &[]);
@@ -92,7 +96,7 @@ fn what_hangs_on_a_tool_without_motion_stays() {
     assert_eq!(report.divergence, Some(Divergence::OtherModel));
 }
 
-/// The wrench that is reported is what hangs on the tool.
+/// The reported wrench is the weight that hangs on the tool.
 #[test]
 fn the_tool_feels_the_weight() {
     let mesh = strip();
@@ -100,7 +104,7 @@ fn the_tool_feels_the_weight() {
     let held = nodes(&mesh, |p| p.x < 7e-3);
     for rigid in [false, true] {
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         let grasp = Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY);
         state.grasps.push(if rigid { grasp } else { grasp.compliant(jaws(1.0)) });
         for _ in 0..240 {
@@ -117,14 +121,15 @@ fn the_tool_feels_the_weight() {
     }
 }
 
-/// Pulled beyond what it bears, tissue tears out of the jaws; that is told once, and the nodes are free.
+/// Tissue that is pulled too hard tears out of the jaws. That is reported once, and the nodes are
+/// free.
 #[test]
 fn a_tear_is_told_once() {
     let mesh = strip();
     let model = model(&mesh, viscous(12e3), nodes(&mesh, |p| p.x > 23e-3), GRAVITY);
     let held = nodes(&mesh, |p| p.x < 5e-3);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     let compliance = Compliance { tear_force: 0.3, ..jaws(10.0) };
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(compliance));
     let mut torn = Vec::new();
@@ -149,7 +154,7 @@ fn what_is_held_does_not_drift() {
         let model = model(&mesh, viscous(young_modulus), nodes(&mesh, |p| p.x > 23e-3), GRAVITY);
         let held = nodes(&mesh, |p| p.x < 5e-3);
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(jaws(0.2)));
         let place = |f: i32| at(DVec3::Z * 8e-3 * (f64::from(f) / 60.0).min(1.0));
         for frame in 0..180 {
@@ -171,7 +176,7 @@ fn nodes_are_free_again_after_every_grasp() {
     let mesh = strip();
     let model = model(&mesh, viscous(12e3), nodes(&mesh, |p| p.x > 23e-3), DVec3::ZERO);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     for cycle in 0..200 {
         let first = f64::from(cycle % 8) * 2e-3;
         let held = nodes(&mesh, |p| p.x >= first && p.x < first + 5e-3);
@@ -206,14 +211,14 @@ fn holding_repeats_to_the_bit() {
     let mut hashes = Vec::new();
     for pause in [None, None, Some(40)] {
         let mut state = State::new(&model);
-        let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
         state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY).compliant(jaws(0.02)));
         for frame in 0..80 {
             if pause == Some(frame) {
                 let saved = state.clone();
                 stepper.step(&model, &mut state, &[]);
                 state = saved;
-                stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+                stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
             }
             stepper.step(&model, &mut state, &[ToolMotion { from: place(frame), to: place(frame + 1) }]);
         }

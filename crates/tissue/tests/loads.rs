@@ -1,4 +1,5 @@
-//! Forces on nodes: Newton's second law, a pulled column against its analytic length, and contact that is done over again by its own forces.
+//! Forces on nodes: Newton's second law, a pulled column against its analytic length, and contact
+//! that is repeated by its own forces.
 
 mod common;
 
@@ -6,20 +7,12 @@ use common::{FRAME, GRAVITY, block, model, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_tissue::{
-    BodyContact, BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Newton, Schedule,
-    SemiImplicit, Shape, State, Stepper, ToolMotion, Xpbd,
+    BodyContact, BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Shape, SolverSettings,
+    State, Stepper, ToolMotion,
 };
 
-/// Every solver that there is.
-fn solvers(model: &Model) -> Vec<(&'static str, Schedule)> {
-    let mut all: Vec<_> = schedules().into_iter().map(|judged| (judged.name, judged.schedule)).collect();
-    all.push(("Newton", Schedule::Newton(Newton { substeps: 2 })));
-    all.push(("semi-implicit", Schedule::SemiImplicit(SemiImplicit::stable(model, FRAME))));
-    all.push(("XPBD", Schedule::Xpbd(Xpbd::default())));
-    all
-}
-
-/// A free block whose nodes are pushed by their mass times an acceleration has that acceleration, in every solver.
+/// A free block whose nodes are pushed by their mass times an acceleration has that acceleration,
+/// in every solver.
 #[test]
 fn a_load_accelerates() {
     let mesh = block([2, 2, 2], 2e-3);
@@ -28,11 +21,11 @@ fn a_load_accelerates() {
     let body = &model.bodies()[0];
     let loads: Vec<Load> =
         (0..body.len()).map(|node| Load { body: 0, node, force: body.mass(node) * acceleration }).collect();
-    for (name, schedule) in solvers(&model) {
+    for common::Judged { name, schedule, .. } in schedules() {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
         for _ in 0..30 {
-            assert_eq!(stepper.step_under(&model, &mut state, &[], &loads).divergence, None);
+            assert_eq!(stepper.step_with_loads(&model, &mut state, &[], &loads).divergence, None);
         }
         for node in 0..body.len() {
             let off = state.velocity(&model, 0, node) - 0.5 * acceleration;
@@ -60,11 +53,11 @@ fn a_pulled_column_stretches() {
     assert!((total - 1.0).abs() < 1e-12);
     let loads: Vec<Load> =
         top.iter().map(|i| Load { body: 0, node: *i as usize, force: DVec3::Z * (pull * share(*i)) }).collect();
-    for schedule in [Schedule::FAST, common::many_sweeps()] {
+    for schedule in [SolverSettings::FAST, common::many_sweeps()] {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
         for _ in 0..120 {
-            stepper.step_under(&model, &mut state, &[], &loads);
+            stepper.step_with_loads(&model, &mut state, &[], &loads);
         }
         let longer = state.centroid(&model, 0, &top).z - length;
         assert!((longer / (0.02 * length) - 1.0).abs() < 0.03, "{schedule:?}: {:.4} mm longer", longer * 1e3);
@@ -77,7 +70,8 @@ fn a_pulled_column_stretches() {
     }
 }
 
-/// A ball pressed slowly into a pinned block, and the same block under the forces that the ball did: both come to the same dent.
+/// A ball pressed slowly into a pinned block, and the same block under the forces that the ball
+/// did: both come to the same dent.
 #[test]
 fn contact_is_done_over_by_its_forces() {
     let mesh = block([8, 8, 4], 2e-3);
@@ -102,8 +96,8 @@ fn contact_is_done_over_by_its_forces() {
     };
     let (touched, loaded) = (build(true), build(false));
     let (mut a, mut b) = (State::new(&touched), State::new(&loaded));
-    let mut with = Stepper::new(&touched, Schedule::FAST, FRAME, 1).unwrap();
-    let mut under = Stepper::new(&loaded, Schedule::FAST, FRAME, 1).unwrap();
+    let mut with = Stepper::new(&touched, SolverSettings::FAST, FRAME, 1).unwrap();
+    let mut under = Stepper::new(&loaded, SolverSettings::FAST, FRAME, 1).unwrap();
     let at = |frame: usize| {
         let depth = 1.5e-3 * (frame as f64 / 60.0).min(1.0);
         Pose { translation: DVec3::new(8e-3, 8e-3, 13e-3 - depth), rotation: DQuat::IDENTITY }
@@ -111,7 +105,7 @@ fn contact_is_done_over_by_its_forces() {
     for frame in 0..90 {
         with.step(&touched, &mut a, &[ToolMotion { from: at(frame), to: at(frame + 1) }]);
         let loads = with.contact_loads(&touched, &a);
-        under.step_under(&loaded, &mut b, &[], &loads);
+        under.step_with_loads(&loaded, &mut b, &[], &loads);
     }
     let loads = with.contact_loads(&touched, &a);
     let sum: DVec3 = loads.iter().map(|load| load.force).sum();
@@ -124,22 +118,23 @@ fn contact_is_done_over_by_its_forces() {
     assert!(dent > 1e-3 && off < 0.01 * dent, "{:.4} mm off in a dent of {:.4} mm", off * 1e3, dent * 1e3);
 }
 
-/// A load on what is not there, or that is no force, stops the step, and nothing has moved.
+/// A load on a missing node, or with a force that is not finite, stops the step, and nothing moves.
 #[test]
 fn a_load_on_no_node_is_refused() {
     let mesh = block([1, 1, 1], 2e-3);
     let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::FAST, FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::FAST, FRAME, 1).unwrap();
     let before = state.hash();
     for (body, node, force) in [(1, 0, DVec3::X), (0, 8, DVec3::X), (0, 0, DVec3::NAN)] {
-        let report = stepper.step_under(&model, &mut state, &[], &[Load { body, node, force }]);
+        let report = stepper.step_with_loads(&model, &mut state, &[], &[Load { body, node, force }]);
         assert_eq!(report.divergence, Some(Divergence::WrongLoad));
     }
     assert_eq!(state.hash(), before);
 }
 
-/// A block that falls on a pinned one: what they do to each other adds up to nothing, bears the block, and moves both alike as loads.
+/// A block that falls on a pinned one: what they do to each other adds up to nothing, bears the
+/// block, and moves both alike as loads.
 #[test]
 fn what_bodies_do_to_each_other_is_equal_and_opposite() {
     let low = block([6, 6, 3], 2.5e-3);
@@ -158,8 +153,8 @@ fn what_bodies_do_to_each_other_is_equal_and_opposite() {
     };
     let (touching, apart) = (build(Some(BodyContact::default())), build(None));
     let mut a = State::new(&touching);
-    let mut with = Stepper::new(&touching, Schedule::FAST, FRAME, 1).unwrap();
-    let mut under = Stepper::new(&apart, Schedule::FAST, FRAME, 1).unwrap();
+    let mut with = Stepper::new(&touching, SolverSettings::FAST, FRAME, 1).unwrap();
+    let mut under = Stepper::new(&apart, SolverSettings::FAST, FRAME, 1).unwrap();
     for _ in 0..180 {
         with.step(&touching, &mut a, &[]);
     }
@@ -175,7 +170,7 @@ fn what_bodies_do_to_each_other_is_equal_and_opposite() {
     let mut b = State::new(&apart);
     assert!(b.copy_motion(&a));
     let before = a.positions(&touching, 1);
-    under.step_under(&apart, &mut b, &[], &loads);
+    under.step_with_loads(&apart, &mut b, &[], &loads);
     let most = (0..before.len()).map(|i| b.position(&apart, 1, i).distance(before[i])).fold(0.0, f64::max);
     let fall = 9.81 * FRAME * FRAME;
     assert!(most < 0.01 * fall, "{:.5} mm in a frame; it would fall {:.5} mm", most * 1e3, fall * 1e3);

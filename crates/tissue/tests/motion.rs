@@ -5,18 +5,19 @@ mod common;
 use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Descent, Material, ModelBuilder, Schedule, Start, State, Stepper, SupportPlane,
+    BodyDescription, ConstitutiveModel, Descent, Material, ModelBuilder, SolverSettings, Start, State, Stepper,
+    SupportPlane,
 };
 
-/// SPEC T2: free fall matches g t^2/2 and g t to four digits, with damping, in all materials; the paper's schedule follows
-/// implicit Euler's own law g t (t + h)/2.
+/// Free fall matches g t^2/2 and g t to four digits, with damping, in all materials; the
+/// paper's schedule follows implicit Euler's own law g t (t + h)/2.
 #[test]
 fn free_fall() {
     let mesh = block([3, 3, 3], 2e-3);
     for constitutive in ConstitutiveModel::ALL {
         let material = Material { model: constitutive, viscosity: 4.0, ..tissue(12e3) };
         let model = model(&mesh, material, vec![], GRAVITY);
-        for (schedule, h) in [(Schedule::default(), 0.0), (Schedule::PAPER, FRAME / 8.0)] {
+        for (schedule, h) in [(SolverSettings::default(), 0.0), (SolverSettings::PAPER, FRAME / 8.0)] {
             let mut state = State::new(&model);
             let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
             for _ in 0..60 {
@@ -34,7 +35,8 @@ fn free_fall() {
     }
 }
 
-/// A column that stands on its pinned foot sags by rho g L^2/(2E) at its top (nu = 0: no foot effect).
+/// A column that stands on its pinned foot sags by rho g L^2/(2E) at its top (nu = 0: no foot
+/// effect).
 #[test]
 fn a_column_sags_under_its_weight() {
     let (cells, edge) = ([4, 4, 10], 2e-3);
@@ -42,7 +44,7 @@ fn a_column_sags_under_its_weight() {
     let material = Material { poisson_ratio: 0.0, viscosity: 4.0, ..tissue(12e3) };
     let model = model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 0).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 0).unwrap();
     let mut report = Default::default();
     for _ in 0..180 {
         report = stepper.step(&model, &mut state, &[]);
@@ -78,7 +80,7 @@ fn dashpots_do_not_brake_rotation() {
                 .sum()
         };
         let before = momentum(&state);
-        let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 1).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 1).unwrap();
         for _ in 0..30 {
             stepper.step(&model, &mut state, &[]);
         }
@@ -88,7 +90,8 @@ fn dashpots_do_not_brake_rotation() {
     assert!(kept[0] > 0.9, "kept {}", kept[0]);
 }
 
-/// A block dropped on the plane comes to rest on it; one pushed along it is stopped by friction after about v^2/(2 mu g).
+/// A block dropped on the plane comes to rest on it; one pushed along it is stopped by friction
+/// after about v^2/(2 mu g).
 #[test]
 fn the_plane_supports_and_holds() {
     let mesh = block([4, 4, 2], 3e-3);
@@ -106,9 +109,9 @@ fn the_plane_supports_and_holds() {
         .unwrap();
     let model = builder.build().unwrap();
     let mut state = State::new(&model);
-    // Ten sweeps do not carry the friction of the foot through the block, which then slides several times too far; the law itself is
-    // tested with enough of them.
-    let schedule = Schedule::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive });
+    // Ten sweeps do not carry the friction of the foot through the block, which then slides several
+    // times too far; the law itself is tested with enough of them.
+    let schedule = SolverSettings::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive });
     let mut stepper = Stepper::new(&model, schedule, FRAME, 0).unwrap();
     let all: Vec<u32> = (0..mesh.vertices.len() as u32).collect();
     let mut report = Default::default();

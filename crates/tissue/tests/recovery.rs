@@ -6,10 +6,11 @@ mod common;
 
 use common::{FRAME, block, model, nodes, noise, tissue};
 use glam::DVec3;
-use trocar_tissue::{ConstitutiveModel, Divergence, Material, Schedule, State, Stepper};
+use trocar_tissue::{ConstitutiveModel, Divergence, Material, SolverSettings, State, Stepper};
 
-/// Nodes at random places inside the bounding box find back until no element is inverted. They are near their rest shape then, and end in it.
-fn recovers(name: &str, schedule: Schedule) {
+/// Nodes at random places inside the bounding box find back until no element is inverted. They are
+/// near their rest shape then, and end in it.
+fn recovers(name: &str, schedule: SolverSettings) {
     let mesh = block([3, 3, 3], 2e-3);
     let high = DVec3::splat(6e-3);
     for constitutive in ConstitutiveModel::ALL {
@@ -55,11 +56,11 @@ fn recovers(name: &str, schedule: Schedule) {
 
 #[test]
 fn random_starts_recover_by_sweeps() {
-    recovers("paper", Schedule::PAPER);
+    recovers("paper", SolverSettings::PAPER);
     recovers("adaptive sweeps", common::adaptive());
 }
 
 #[test]
 fn random_starts_recover_by_the_fast_schedule() {
-    recovers("fast", Schedule::FAST);
+    recovers("fast", SolverSettings::FAST);
 }

@@ -9,17 +9,19 @@ use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_tissue::{
-    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, Schedule, State, Stepper, ToolMotion,
+    BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
+    ToolMotion,
 };
 
 fn lifted(height: f64) -> Pose {
     Pose { translation: DVec3::Z * height, ..Pose::IDENTITY }
 }
 
-/// Grasps the top of a block pinned at its foot and moves it by `travel` in `frames` frames; returns the most elements inverted in any frame.
+/// Grasps the top of a block pinned at its foot and moves it by `travel` in `frames` frames;
+/// returns the most elements inverted in any frame.
 fn drag(model: &Model, mesh: &TetMesh, top: f64, travel: f64, frames: usize) -> (usize, State) {
     let mut state = State::new(model);
-    let mut stepper = Stepper::new(model, Schedule::default(), FRAME, 0).unwrap();
+    let mut stepper = Stepper::new(model, SolverSettings::default(), FRAME, 0).unwrap();
     let held = nodes(mesh, |p| p.z > top);
     state.grasps = vec![Grasp::capture(model, &state, 0, &held, 0, &Pose::IDENTITY)];
     let mut worst = 0;
@@ -71,7 +73,7 @@ fn the_grasp_is_exact_when_it_closes() {
     let mesh = block([3, 3, 3], 2e-3);
     let model = model(&mesh, tissue(12e3), vec![], GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 1).unwrap();
     for _ in 0..7 {
         stepper.step(&model, &mut state, &[]);
     }
@@ -100,7 +102,7 @@ fn held_nodes_follow_the_tool_and_are_free_afterwards() {
     let rest = State::new(&model).centroid(&model, 0, &top);
     assert!((state.centroid(&model, 0, &top) - rest - DVec3::Z * 4e-3).length() < 1e-7);
     state.grasps.clear();
-    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 1).unwrap();
     for _ in 0..120 {
         stepper.step(&model, &mut state, &[]);
     }
@@ -126,7 +128,7 @@ fn the_same_bits_for_any_run_and_any_number_of_threads() {
     let run = |threads: usize| {
         let mut state = State::new(&model);
         state.grasps = vec![Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY)];
-        let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, threads).unwrap();
+        let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, threads).unwrap();
         for k in 0..6 {
             let motion = ToolMotion { from: lifted(5e-4 * k as f64), to: lifted(5e-4 * (k + 1) as f64) };
             stepper.step(&model, &mut state, &[motion]);
@@ -142,7 +144,7 @@ fn the_same_bits_for_any_run_and_any_number_of_threads() {
 #[test]
 fn a_saved_state_goes_on_as_if_nothing_had_happened() {
     let (model, _) = two_bodies();
-    let mut stepper = Stepper::new(&model, Schedule::default(), FRAME, 2).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 2).unwrap();
     let mut state = State::new(&model);
     for _ in 0..3 {
         stepper.step(&model, &mut state, &[]);

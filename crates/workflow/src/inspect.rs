@@ -1,4 +1,4 @@
-//! What a recording holds, before anything is made of it; and the file to say more of it.
+//! Describes the contents of a recording, and writes a template of its `recording.toml`.
 
 use crate::{Error, Result};
 use serde::Serialize;
@@ -7,42 +7,44 @@ use trocar_camera::Camera;
 use trocar_recording::{OrganInfo, Recording, RecordingInfo};
 use trocar_specimen::{Material, Pins};
 
-/// A recording in figures.
+/// The contents of a recording.
 #[derive(Clone, Debug, Serialize)]
 pub struct Inspection {
     /// The recording.
     pub recording: String,
-    /// Frames, paired.
+    /// Number of frames, paired.
     pub frames: usize,
-    /// The camera on whose pixels everything ends up.
+    /// The camera to whose pixels everything is registered.
     pub camera: Camera,
     /// The depth camera where it is another; depth is then registered.
     pub depth_camera: Option<Camera>,
-    /// Metres a unit of depth.
+    /// Unit of depth (m).
     pub depth_scale_m: f64,
     /// Share of the middle frame's pixels with depth.
     pub coverage: f64,
-    /// Nearest and farthest depth of the middle frame, without the outermost hundredths [m].
+    /// Nearest and farthest depth of the middle frame without the outermost hundredths (m).
     pub depth_range_m: [f64; 2],
-    /// Organs named in the `.toml`.
+    /// Organs of the `.toml` with a mask, an outline or points.
     pub organs: Vec<String>,
+    /// What the organs of the `.toml` lack, one sentence each.
+    pub missing: Vec<String>,
     /// The topics of a log.
     pub topics: Vec<String>,
-    /// What was dropped or replaced.
+    /// Notes on dropped or replaced frames.
     pub notes: Vec<String>,
     /// Files written.
     pub written: Vec<String>,
 }
 
-/// Opens `recording` and looks at its middle frame. With `template`, a `.toml` to fill in and a still of the middle frame are
-/// written beside a log that has no `.toml` yet.
+/// Opens `recording` and measures its middle frame. With `template`, writes a template `.toml` and
+/// an image of the middle frame beside a log without a `.toml`.
 ///
 /// # Errors
-/// As for reading the recording; a template where there is a `.toml` already.
+/// As for reading the recording; with `template`, where there already is a `.toml`.
 pub fn inspect(recording: &Path, template: bool) -> Result<Inspection> {
     let opened = Recording::open(recording)?;
     let middle = opened.len() / 2;
-    // A broken frame in the middle is no reason to say nothing.
+    // A broken middle frame is replaced by the next whole one.
     let frame = (0..opened.len()).map(|i| opened.frame((middle + i) % opened.len())).find_map(std::result::Result::ok);
     let depths = frame.as_ref().map(|f| f.depth.depth.as_slice()).unwrap_or_default();
     let mut valid: Vec<f64> = depths.iter().filter(|z| **z > 0.0).map(|z| f64::from(*z)).collect();
@@ -51,7 +53,7 @@ pub fn inspect(recording: &Path, template: bool) -> Result<Inspection> {
     let mut written = Vec::new();
     if template {
         if opened.toml().is_file() {
-            let reason = "is there already; it is not overwritten".to_owned();
+            let reason = "it exists already and is not overwritten".to_owned();
             return Err(Error::Exists { path: opened.toml().to_owned(), reason });
         }
         write_template(&opened, &mut written)?;
@@ -63,6 +65,11 @@ pub fn inspect(recording: &Path, template: bool) -> Result<Inspection> {
             }
         }
     }
+    let (found, without): (Vec<&OrganInfo>, Vec<&OrganInfo>) = opened
+        .info
+        .organs
+        .iter()
+        .partition(|o| !o.polygon.is_empty() || !o.points.is_empty() || opened.organ_mask_file(&o.name).is_file());
     Ok(Inspection {
         recording: recording.display().to_string(),
         frames: opened.len(),
@@ -71,11 +78,22 @@ pub fn inspect(recording: &Path, template: bool) -> Result<Inspection> {
         depth_scale_m: opened.depth_scale(),
         coverage: valid.len() as f64 / depths.len().max(1) as f64,
         depth_range_m: [at(0.01), at(0.99)],
-        organs: opened.info.organs.iter().map(|o| o.name.clone()).collect(),
+        organs: found.iter().map(|o| o.name.clone()).collect(),
+        missing: without.iter().map(|o| missing_mask(&opened, o)).collect(),
         topics: opened.describe(),
         notes: opened.notes().to_vec(),
         written: written.iter().map(|p: &PathBuf| p.display().to_string()).collect(),
     })
+}
+
+/// Says that an organ cannot be found.
+fn missing_mask(recording: &Recording, organ: &OrganInfo) -> String {
+    let file = recording.organ_mask_file(&organ.name);
+    format!(
+        "organ '{}' has no mask: {} does not exist, and there are neither a polygon nor points",
+        organ.name,
+        file.display()
+    )
 }
 
 fn write_template(recording: &Recording, written: &mut Vec<PathBuf>) -> Result<()> {
@@ -94,13 +112,14 @@ fn write_template(recording: &Recording, written: &mut Vec<PathBuf>) -> Result<(
     };
     let described = |info: &RecordingInfo| toml::to_string(info).map_err(|e| Error::Format(e.to_string()));
     let text = described(&recording.info)?;
-    // The organ is a comment: an outline that nobody drew must not become an organ.
+    // The organ is a comment, because an outline that nobody drew must not become an organ.
     let with_organ = described(&RecordingInfo { organs: vec![organ], ..recording.info.clone() })?;
     let example = with_organ.split_once("[[organ]]").map_or(String::new(), |(_, rest)| format!("[[organ]]{rest}"));
     let example: String =
         example.lines().map(|l| if l.is_empty() { "#\n".into() } else { format!("# {l}\n") }).collect();
-    let comment = "# What is known of this recording; docs/guides/recordings.md explains every key. Cameras and depth scale come from the log\n\
-                   # unless they are said here. Name each organ below, with its outline in pixels of the colour image, or a mask.\n";
+    let comment = "# Facts of this recording; docs/guides/recordings.md explains every key. Cameras and\n\
+                   # depth scale come from the log unless they are given here. Describe each organ below\n\
+                   # by its outline in pixels of the colour image, or by a mask.\n";
     let path = recording.toml().to_owned();
     std::fs::write(&path, format!("{comment}{text}\n{example}"))
         .map_err(|source| Error::Io { path: path.clone(), source })?;

@@ -1,4 +1,4 @@
-//! The phantoms as specimens: recorded, unless an earlier run left the recording, and reconstructed.
+//! Phantoms as specimens: recorded, unless an earlier run left the recording, and reconstructed.
 
 use crate::workflow::reconstruct_recording;
 use crate::{Error, Result};
@@ -15,7 +15,7 @@ use trocar_specimen::Specimen;
 /// Frames of a phantom's recording: the composite's window.
 const FRAMES: usize = 181;
 
-/// Records `phantom` into `dir` unless a recording of the same options lies there.
+/// Records `phantom` into `dir` unless `dir` has a recording with the same options.
 ///
 /// # Errors
 /// A phantom that is not known, a folder that cannot be written.
@@ -30,11 +30,12 @@ pub fn recorded(phantom: &str, options: &RecordOptions, dir: &Path, progress: &d
     Ok(trocar_phantom::record(phantom, options, dir, progress)?)
 }
 
-/// What a kept specimen must have been made by and with to be used again.
+/// The file with the program and options that made a kept specimen; it is reused only for the same.
 const STAMP: &str = "made-by.txt";
 
-/// `phantom` recorded into `folder/recording` and reconstructed with the default settings into `folder/specimen`, or what lies there of an earlier time if the same program would make the same.
-/// Of several processes that want it at once, one makes it and the others wait.
+/// `phantom`, recorded into `folder/recording` and reconstructed with the default settings into
+/// `folder/specimen`. A specimen of an earlier run is reused if the same program would make the
+/// same. Of several processes that need it at once, one makes it and the others wait.
 ///
 /// # Errors
 /// A phantom that is not known, a folder that cannot be written.
@@ -51,7 +52,7 @@ pub fn specimen(phantom: &str, options: &RecordOptions, folder: &Path, progress:
     {
         return Ok(kept);
     }
-    // Until all is made anew, what lies there is of nobody.
+    // Without the stamp, nobody reuses the folder while it is made.
     match std::fs::remove_file(&path) {
         Err(e) if e.kind() != ErrorKind::NotFound => return Err(io(e)),
         _ => {}
@@ -59,11 +60,12 @@ pub fn specimen(phantom: &str, options: &RecordOptions, folder: &Path, progress:
     recorded(phantom, options, &recording, progress)?;
     reconstruct_recording(&recording, &settings, &specimen, progress)?;
     std::fs::write(&path, &stamp).map_err(io)?;
-    // Read back, so that it is the same to the bit whoever made it.
+    // Reads it back, so that its bits do not depend on who made it.
     Ok(Specimen::read(&specimen)?)
 }
 
-/// The specimen of a scene: its folder's, or its phantom's, recorded and reconstructed below the folder `phantoms`.
+/// The specimen of a scene: from its folder, or of its phantom, which is made once in the folder
+/// `phantoms` and kept.
 ///
 /// # Errors
 /// A specimen that cannot be read or made.

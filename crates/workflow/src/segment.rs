@@ -1,4 +1,4 @@
-//! Masks of a recording, made and put where the reconstruction looks for them.
+//! Makes the masks of a recording in the folder structure that the reconstruction reads.
 
 use crate::{Error, Result};
 use rayon::prelude::*;
@@ -7,37 +7,38 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_camera::{ColorImage, Mask};
 use trocar_core::Progress;
-use trocar_recording::{Recording, RgbdFrame};
+use trocar_recording::{InstrumentRule, Recording, RgbdFrame};
 use trocar_report::overlays::overlay;
 use trocar_segment::{MetalDetector, Picture, Sam2, Segmenter, Target, Tracker, WantedFile, wanted_files};
 use trocar_specimen::StagedFolder;
 
-/// The file that makes a folder one of masks of ours.
+/// The file whose presence makes a folder one of masks.
 const MARKER: &str = "masks.json";
 
-/// How the masks of a recording are made.
+/// Settings of the segmentation of a recording.
 #[derive(Clone, Debug, Default)]
 pub struct Segment {
-    /// Folder with the networks of SAM 2.1: for organs that are pointed at, and to follow the recording's instruments.
+    /// Folder with the networks of SAM 2.1, for organs with points and to follow the recording's
+    /// instruments.
     pub sam: Option<PathBuf>,
     /// ONNX Runtime's library; `ORT_DYLIB_PATH` by default.
     pub onnxruntime: Option<PathBuf>,
 }
 
-/// What was found.
+/// The result of a segmentation.
 #[derive(Clone, Debug, Serialize)]
 pub struct Segmented {
     /// The folder of masks.
     pub masks: String,
-    /// Organs, and the pixels of each.
+    /// Organs, and the number of pixels of each.
     pub organs: Vec<(String, usize)>,
-    /// What found the instruments.
+    /// How the instruments were found.
     pub instruments: String,
-    /// Frames.
+    /// Number of frames with instrument masks.
     pub frames: usize,
     /// Mean share of a frame that instruments cover.
     pub covered: f64,
-    /// Wall time [s].
+    /// Wall time (s).
     pub seconds: f64,
 }
 
@@ -46,15 +47,15 @@ pub struct Segmented {
 pub struct Wanted {
     /// Its name, or how it is recognised.
     pub name: &'static str,
-    /// What it is for.
+    /// Its purpose.
     pub purpose: &'static str,
-    /// Where it was found.
+    /// Where it was found, if it was.
     pub found: Option<String>,
-    /// Where it can be had.
+    /// How to get it.
     pub how_to_get: &'static str,
 }
 
-/// The files that SAM 2.1 needs, and which of them are there.
+/// The files that SAM 2.1 needs, and which of them are present.
 pub fn wanted_weights(folder: Option<&Path>) -> Vec<Wanted> {
     let of = |w: WantedFile| Wanted {
         name: w.name,
@@ -66,33 +67,42 @@ pub fn wanted_weights(folder: Option<&Path>) -> Vec<Wanted> {
 }
 
 impl Segment {
-    /// Writes masks of every organ that is pointed at and of the instruments of every frame into the folder `output`, with
-    /// pictures to judge them by. Instruments that the recording points at are followed by SAM 2.1; without, metal is looked for.
+    /// Writes masks of every organ with points, and of the instruments of every frame, into the
+    /// folder `output`, with pictures for checking. SAM 2.1 follows instruments that the recording
+    /// marks; without any, metal is detected. A recording with `instruments = "none"` gets no
+    /// instrument masks.
     ///
     /// # Errors
-    /// One line that names the file, organ or instrument; `output` is then left as it was.
+    /// One line that names the file, organ or instrument; `output` then stays unchanged.
     pub fn run(&self, recording: &Path, output: &Path, progress: &dyn Progress) -> Result<Segmented> {
         let clock = Instant::now();
         let recording = Recording::open(recording)?;
         if output.exists() {
-            let reason =
-                "is there already; masks may have been corrected by hand, so it is not overwritten; name a new folder";
+            let reason = "the folder exists and is not overwritten, because its masks may have been corrected by hand; choose a new folder";
             return Err(Error::Exists { path: output.to_owned(), reason: reason.into() });
         }
         let staged = StagedFolder::create(output, MARKER)?;
         let folder = staged.path();
         let organs: Vec<_> = recording.info.organs.iter().filter(|o| !o.points.is_empty()).collect();
-        let follow = !recording.info.followed.is_empty();
+        // `instruments = "none"` goes before instruments that are marked.
+        let without = recording.info.instruments == InstrumentRule::None;
+        let follow = !recording.info.followed.is_empty() && !without;
+        if without && organs.is_empty() {
+            let reason = "there is nothing to segment: instruments = \"none\", and no organ has points";
+            return Err(Error::Mismatch(format!("{}: {reason}", recording.toml().display())));
+        }
         let sam = match (&self.sam, organs.is_empty() && !follow) {
             (Some(weights), false) => Some(Sam2::open(weights, self.onnxruntime.as_deref())?),
             (None, false) => {
                 let reason =
-                    "points and [[instrument]] need SAM 2.1: --sam FOLDER; `trocar segment --weights` says which files";
+                    "points and [[instrument]] need SAM 2.1: --sam FOLDER; `trocar segment --weights` lists the files";
                 return Err(Error::Mismatch(format!("{}: {reason}", recording.toml().display())));
             }
             (_, true) => None,
         };
-        make(&folder.join("instruments"))?;
+        if !without {
+            make(&folder.join("instruments"))?;
+        }
         let middle = recording.frame(recording.len() / 2)?;
         let mut found = Vec::new();
         let mut shown = middle.color.clone();
@@ -111,8 +121,9 @@ impl Segment {
             found.push((organ.name.clone(), mask.count()));
         }
         shown.write_png(&folder.join("organs-seen.png"))?;
-        progress.begin("frames", recording.len() as u64);
+        progress.begin("frames", if without { 0 } else { recording.len() as u64 });
         let covered = match (&sam, follow) {
+            _ if without => Ok(Vec::new()),
             (Some(sam), true) => followed(&recording, sam, folder, progress),
             _ => by_metal(&recording, folder, progress),
         }?;
@@ -121,10 +132,11 @@ impl Segment {
             masks: output.display().to_string(),
             organs: found,
             instruments: match (&sam, follow) {
+                _ if without => "none, as the recording says".to_owned(),
                 (Some(sam), true) => format!("followed by {}", sam.describe()),
                 _ => MetalDetector::default().describe(),
             },
-            frames: recording.len(),
+            frames: if without { 0 } else { recording.len() },
             covered: covered.iter().sum::<f64>() / covered.len().max(1) as f64,
             seconds: clock.elapsed().as_secs_f64(),
         };
@@ -136,7 +148,7 @@ impl Segment {
     }
 }
 
-/// Finds metal in every frame, many at a time.
+/// Detects metal in every frame, many frames in parallel.
 fn by_metal(recording: &Recording, folder: &Path, progress: &dyn Progress) -> Result<Vec<f64>> {
     let all: Vec<usize> = (0..recording.len()).collect();
     let detector = MetalDetector::default();
@@ -148,7 +160,7 @@ fn by_metal(recording: &Recording, folder: &Path, progress: &dyn Progress) -> Re
             if progress.interrupted() {
                 return Err(Error::Interrupted);
             }
-            // A broken frame has no mask and is left out of the composite too.
+            // A broken frame has no mask; the composite leaves it out too.
             let Ok(frame) = packet.parts.and_then(|parts| recording.decode(packet.frame, &parts)) else {
                 return Ok(0.0);
             };
@@ -163,7 +175,7 @@ fn by_metal(recording: &Recording, folder: &Path, progress: &dyn Progress) -> Re
     shares
 }
 
-/// Follows every instrument of the recording forward and backward from where it is pointed at.
+/// Follows every instrument of the recording forward and backward from its marked frame.
 fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Progress) -> Result<Vec<f64>> {
     let mut masks: Vec<Option<Mask>> = vec![None; recording.len()];
     let frame_of = |index: usize| -> Result<Option<RgbdFrame>> {
@@ -181,7 +193,7 @@ fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Pro
             ..Target::default()
         };
         if first >= recording.len() {
-            let reason = format!("frame is {first}; the recording has {}", recording.len());
+            let reason = format!("frame is {first}; the recording has {} frames", recording.len());
             return Err(Error::Mismatch(format!("instrument '{}': {reason}", instrument.name)));
         }
         let ways: [Vec<usize>; 2] = [(first..recording.len()).collect(), (0..=first).rev().collect()];
@@ -208,7 +220,7 @@ fn followed(recording: &Recording, sam: &Sam2, folder: &Path, progress: &dyn Pro
     Ok(shares)
 }
 
-/// Writes the mask of a frame, and of a few frames spread over the recording a picture to judge it by.
+/// Writes the mask of a frame, and for a few frames over the recording a picture for checking.
 fn save(folder: &Path, recording: &Recording, index: usize, frame: &RgbdFrame, mask: &Mask) -> Result<()> {
     const SHOWN: usize = 6;
     mask.write_png(&folder.join("instruments").join(recording.mask_file_name(index)))?;

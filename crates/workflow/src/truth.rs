@@ -1,4 +1,4 @@
-//! The composite against the instrument-free truth of a phantom, in figures.
+//! Compares the composite with the instrument-free truth of a phantom.
 
 use crate::{Error, Result};
 use serde::Serialize;
@@ -6,10 +6,10 @@ use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage};
 use trocar_reconstruct::Reconstruction;
 
-/// Unit of a phantom's truth depth [m].
+/// Unit of a phantom's truth depth (m).
 pub const DEPTH_UNIT: f64 = 1e-4;
 
-/// What the camera would see without instruments and noise.
+/// The camera's view without instruments and noise.
 pub struct Truth {
     /// Its colours.
     pub color: Option<ColorImage>,
@@ -21,30 +21,32 @@ pub struct Truth {
 pub struct Part {
     /// Its name.
     pub name: &'static str,
-    /// Depth: pixels, median and 95th percentile of the absolute error, median of the signed one [mm].
+    /// Depth: pixels, median and 95th percentile of the absolute error, median of the signed error
+    /// (mm).
     pub depth: Option<(usize, f64, f64, f64)>,
-    /// Colour: mean absolute difference over the three channels and its 95th percentile over pixels, of 255 levels.
+    /// Colour: mean absolute difference over the three channels, and its 95th percentile over
+    /// pixels, of 255 levels.
     pub color: Option<(f64, f64)>,
 }
 
-/// The composite against the truth (SPEC R2).
+/// Errors of the composite against the truth.
 #[derive(Clone, Copy, Debug, Default, Serialize)]
 pub struct TruthFigures {
-    /// Median absolute error of depth [mm].
+    /// Median absolute error of depth (mm).
     pub depth_error_median_mm: f64,
-    /// 95th percentile of the absolute error of depth [mm].
+    /// 95th percentile of the absolute error of depth (mm).
     pub depth_error_p95_mm: f64,
-    /// Median error of depth, composite minus truth [mm].
+    /// Median error of depth, composite minus truth (mm).
     pub depth_error_signed_mm: f64,
-    /// Median absolute error of depth where an instrument stood in the window's centre frame [mm].
+    /// Median absolute error of depth under the instruments of the window's centre frame (mm).
     pub under_instruments_median_mm: Option<f64>,
     /// Mean absolute difference of colour, of 255 levels.
     pub color_error_mean: Option<f64>,
 }
 
 impl Truth {
-    /// Reads `color.png` and `depth.png` of the folder `dir` of the truth, or of the recording that holds it as `truth/`; `None`
-    /// where there is neither.
+    /// Reads `color.png` and `depth.png` in the folder `dir` of the truth, or in `truth/` of the
+    /// recording `dir`; `None` without either.
     ///
     /// # Errors
     /// Names the file when it is unreadable or of another size than the composite.
@@ -55,7 +57,7 @@ impl Truth {
             if (width, height) == size {
                 return Ok(());
             }
-            let reason = format!("{width} x {height} pixels; the composite has {} x {}", size.0, size.1);
+            let reason = format!("it has {width} x {height} pixels; the composite has {} x {}", size.0, size.1);
             Err(Error::Truth { path: path.to_owned(), reason })
         };
         let mut truth = Self { color: None, depth: None };
@@ -72,7 +74,7 @@ impl Truth {
         Ok((truth.color.is_some() || truth.depth.is_some()).then_some(truth))
     }
 
-    /// The whole image, what lies under the instruments, and the rest.
+    /// The whole image, the part under the instruments, and the rest.
     pub fn parts(&self, r: &Reconstruction) -> [Part; 3] {
         let under = |i: usize| r.instruments.set[i];
         [
@@ -118,7 +120,7 @@ impl Truth {
     }
 }
 
-/// Value below which the share `q` of the finite values lies (nearest rank); `None` without any.
+/// Value below which the share `q` of the finite values is (nearest rank); `None` without any.
 pub fn quantile(values: &[f64], q: f64) -> Option<f64> {
     let mut sorted: Vec<f64> = values.iter().copied().filter(|v| v.is_finite()).collect();
     sorted.sort_unstable_by(f64::total_cmp);

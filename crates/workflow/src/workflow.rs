@@ -21,18 +21,20 @@ const RUN_MARKER: &str = "result.json";
 /// Frames between snapshots of a run's moving picture.
 const SNAPSHOT_EVERY: usize = 8;
 
-/// A specimen that was made, in figures.
+/// A reconstructed specimen in figures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Reconstructed {
     /// The specimen's folder.
     pub specimen: String,
     /// Its organs.
     pub organs: Vec<OrganRow>,
-    /// How the composite went; `None` for a ready surface.
+    /// Figures of the composite; `None` for a surface file.
     pub composite: Option<CompositeFigures>,
-    /// What the user should know.
+    /// Warnings that the result may be wrong, one sentence each.
+    pub warnings: Vec<String>,
+    /// Notes for the user, one sentence each.
     pub notes: Vec<String>,
-    /// Wall time [s].
+    /// Wall time (s).
     pub seconds: f64,
     /// The report's path.
     pub report: String,
@@ -46,9 +48,11 @@ pub struct OrganRow {
     /// Its measurements.
     #[serde(flatten)]
     pub facts: OrganFacts,
+    /// Share of its pixels that move during the window; `None` for a surface file.
+    pub moving_share: Option<f64>,
 }
 
-/// The composite in figures (SPEC R2).
+/// The composite in figures.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CompositeFigures {
     /// Frames used.
@@ -57,13 +61,13 @@ pub struct CompositeFigures {
     pub recovered_share: f64,
     /// Share of pixels with depth.
     pub coverage: f64,
-    /// Median over pixels of the inter-percentile (10 to 90) range of depth [mm].
+    /// Median over pixels of the 10th to 90th percentile range of depth (mm).
     pub depth_range_median_mm: f64,
-    /// Wall time of reading and decoding the frames [s].
+    /// Wall time of reading and decoding the frames (s).
     pub frames_s: f64,
-    /// Time that all threads together spent decoding images [s].
+    /// Time that all threads together spent decoding images (s).
     pub decoding_cpu_s: f64,
-    /// Wall time of the medians [s].
+    /// Wall time of the medians (s).
     pub medians_s: f64,
     /// Its errors against the truth, where the recording has one.
     pub truth: Option<TruthFigures>,
@@ -99,10 +103,11 @@ pub struct SimulatedRun {
     pub report: String,
 }
 
-/// Reconstructs the recording in folder `recording` into the specimen folder `output`, report included.
+/// Reconstructs the recording in folder `recording` into the specimen folder `output`, with its
+/// report.
 ///
 /// # Errors
-/// One line that names the file or field of a bad input; `output` is then left as it was.
+/// One line that names the file or field of a wrong input; `output` then stays unchanged.
 pub fn reconstruct_recording(
     recording: &Path,
     settings: &Settings,
@@ -118,13 +123,18 @@ pub fn reconstruct_recording(
     finish(staged, &reconstruction.specimen, &html, progress)?;
     let composite = CompositeFigures::of(&reconstruction, recording)?;
     let r = &reconstruction;
-    Ok((figures(&r.specimen, Some(composite), r.notes.clone(), output, clock), reconstruction))
+    let mut figures = figures(&r.specimen, Some(composite), r.notes.clone(), output, clock);
+    figures.warnings.clone_from(&r.warnings);
+    for (row, view) in figures.organs.iter_mut().zip(&r.organs) {
+        row.moving_share = Some(view.moving_share);
+    }
+    Ok((figures, reconstruction))
 }
 
-/// Makes the specimen folder `output` of a ready surface, report included.
+/// Makes the specimen folder `output` from a surface file, with its report.
 ///
 /// # Errors
-/// One line that names the file and what is wrong with it; `output` is then left as it was.
+/// One line that names the file and what is wrong with it; `output` then stays unchanged.
 pub fn reconstruct_surface(
     surface: &Path,
     unit: Unit,
@@ -147,7 +157,8 @@ pub fn reconstruct_surface(
     Ok(figures(&specimen, None, notes, output, clock))
 }
 
-/// Runs `task` on the specimen folder `specimen` into the run folder `output`: figures, channels and report.
+/// Runs `task` on the specimen folder `specimen` into the run folder `output`: figures, channels
+/// and report.
 ///
 /// # Errors
 /// One line that names the file, organ or option; `output` is then left as it was.
@@ -157,7 +168,8 @@ pub fn simulate(specimen: &Path, task: &GraspLift, output: &Path, progress: &dyn
     Ok(SimulatedRun { summary: run.summary, report: output.join(REPORT).display().to_string() })
 }
 
-/// Runs the grasp-lift with pictures and writes it to the folder `output`; `before` goes first in the report.
+/// Runs the grasp-lift with pictures and writes it to the folder `output`; `before` goes first in
+/// the report.
 pub fn simulate_specimen(
     specimen: &Specimen,
     task: &GraspLift,
@@ -203,14 +215,15 @@ fn finish(staged: StagedFolder, specimen: &Specimen, html: &str, progress: &dyn 
     Ok(staged.commit()?)
 }
 
-/// A report is made without looking up; a request to stop that came meanwhile is honoured before anything is put in place.
+/// Making a report does not check for interruption, so a request to stop is honoured before
+/// anything is put in place.
 fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
     if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-/// Refuses an output that holds the input, is it, or lies in it: the input would be replaced or changed.
+/// Refuses an output that is, contains or is inside the input, which would be replaced or changed.
 pub fn refuse_overlap(input: &Path, output: &Path) -> Result<()> {
-    // An output that is not there yet is where its nearest existing parent is.
+    // A missing output is placed by its nearest existing parent.
     let placed = |path: &Path| {
         let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
         let root = path.ancestors().find_map(|p| Some((p, p.canonicalize().ok()?)));
@@ -232,8 +245,13 @@ fn figures(
 ) -> Reconstructed {
     Reconstructed {
         specimen: output.display().to_string(),
-        organs: specimen.organs.iter().map(|o| OrganRow { organ: o.name.clone(), facts: o.facts }).collect(),
+        organs: specimen
+            .organs
+            .iter()
+            .map(|o| OrganRow { organ: o.name.clone(), facts: o.facts, moving_share: None })
+            .collect(),
         composite,
+        warnings: Vec::new(),
         notes,
         seconds: clock.elapsed().as_secs_f64(),
         report: output.join(REPORT).display().to_string(),

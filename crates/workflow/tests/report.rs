@@ -1,4 +1,5 @@
-//! Reports of made-up organs: what must hold for any page. The pages are left in the target's tmp folder to look at.
+//! Reports of made-up organs: what must hold for any page. The pages are left in the target's tmp
+//! folder to look at.
 #![allow(clippy::unwrap_used, clippy::expect_used)] // the helpers are test code too
 
 use base64::{Engine, engine::general_purpose::STANDARD};
@@ -430,4 +431,21 @@ fn snapshots_of_another_specimen_are_refused() {
     let mut run = run(&s, 2);
     run.snapshots[1].nodes[0].pop();
     assert!(report::grasp_lift(&s, &run, None).unwrap_err().to_string().contains("not of specimen"));
+}
+
+/// Beside a warning nothing is shown as good, and the warning stands out above the figures.
+#[test]
+fn a_warning_stands_above_the_figures_and_nothing_is_green_beside_it() {
+    let good = "card good";
+    let section = |html: &str| {
+        html[html.find("From the recording").unwrap()..html.find("What the camera saw").unwrap()].to_owned()
+    };
+    let mut r = reconstruction();
+    assert!(section(&report::reconstruction(&r, None).unwrap()).contains(good));
+    r.warnings = vec!["Tissue moves during the window: appendix <1>.".to_owned()];
+    let doubtful = section(&report::reconstruction(&r, None).unwrap());
+    let warning =
+        doubtful.find("<p class=\"warning\"><b>Warning.</b> Tissue moves during the window: appendix &lt;1&gt;.</p>");
+    assert!(warning.unwrap() < doubtful.find("Watertight").unwrap());
+    assert!(!doubtful.contains(good), "{doubtful}");
 }

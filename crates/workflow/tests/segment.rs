@@ -1,4 +1,4 @@
-//! `trocar segment`'s work from recording to masks, and from these to a specimen.
+//! `trocar segment`: from a recording to masks, and from these to a specimen.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
 #[path = "../../recording/tests/common/mod.rs"]
@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 use trocar_camera::Mask;
 use trocar_core::Silent;
 use trocar_reconstruct::{Settings, reconstruct};
-use trocar_recording::{InstrumentInfo, Recording, RecordingInfo};
-use trocar_workflow::{Segment, wanted_weights};
+use trocar_recording::{InstrumentInfo, InstrumentRule, Recording, RecordingInfo};
+use trocar_workflow::{Segment, inspect, wanted_weights};
 
-/// Networks of SAM's interface that select by colour; `None`, saying so, without ONNX Runtime.
+/// Networks with SAM's interface that select by colour; `None`, with a message, without ONNX
+/// Runtime.
 fn sam() -> Option<Segment> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let tools = root.join("../../target/tools");
@@ -38,11 +39,11 @@ fn iou(a: &Mask, b: &Mask) -> f64 {
 }
 
 #[test]
-fn an_organ_that_is_pointed_at_is_found_and_reconstructed() {
+fn an_organ_with_points_is_found_and_reconstructed() {
     let Some(segment) = sam() else { return };
     let mut info = info();
     info.organs[0].points = vec![[82.0, 58.0]];
-    // Before frame 2 the bar comes from the image's other side, where nothing can follow it.
+    // Before frame 2 the bar comes from the image's other side, where it cannot be followed.
     info.followed =
         vec![InstrumentInfo { name: "bar".into(), frame: 2, points: vec![[152.0, 30.0]], points_outside: vec![] }];
     let (root, dir) = recording(&info);
@@ -65,7 +66,7 @@ fn an_organ_that_is_pointed_at_is_found_and_reconstructed() {
 }
 
 #[test]
-fn without_sam_metal_is_looked_for_and_points_are_refused() {
+fn without_sam_metal_is_detected_and_points_are_refused() {
     let (root, dir) = recording(&info());
     let masks = root.path().join("masks");
     let made = Segment::default().run(&dir, &masks, &Silent).unwrap();
@@ -81,4 +82,39 @@ fn without_sam_metal_is_looked_for_and_points_are_refused() {
     let error = Segment::default().run(&dir, &root.path().join("other"), &Silent).unwrap_err().to_string();
     assert!(error.contains("recording.toml") && error.contains("--sam FOLDER"), "{error}");
     assert!(wanted_weights(None).iter().all(|w| w.found.is_none() || w.name.contains("ONNX Runtime")));
+}
+
+/// `instruments = "none"` leaves the frames without masks, whatever is marked; a recording in which
+/// nothing is left to segment is refused.
+#[test]
+fn a_recording_without_instruments_gets_no_instrument_masks() {
+    let mut info = info();
+    info.instruments = InstrumentRule::None;
+    info.followed =
+        vec![InstrumentInfo { name: "bar".into(), frame: 2, points: vec![[152.0, 30.0]], points_outside: vec![] }];
+    let (root, dir) = recording(&info);
+    let masks = root.path().join("masks");
+    let error = Segment::default().run(&dir, &masks, &Silent).unwrap_err().to_string();
+    assert!(error.contains("recording.toml: there is nothing to segment: instruments = \"none\""), "{error}");
+    assert!(!masks.exists());
+
+    let Some(segment) = sam() else { return };
+    info.organs[0].points = vec![[82.0, 58.0]];
+    let (root, dir) = recording(&info);
+    let masks = root.path().join("masks");
+    let made = segment.run(&dir, &masks, &Silent).unwrap();
+    assert_eq!((made.frames, made.instruments.as_str()), (0, "none, as the recording says"));
+    assert!(masks.join("ball.png").is_file() && !masks.join("instruments").exists());
+}
+
+#[test]
+fn an_organ_without_its_mask_is_named_as_missing() {
+    let (_root, dir) = recording(&info());
+    let whole = inspect(&dir, false).unwrap();
+    assert_eq!((whole.organs.as_slice(), whole.missing.len()), (["ball".to_owned()].as_slice(), 0));
+    std::fs::remove_file(dir.join("masks/ball.png")).unwrap();
+    let without = inspect(&dir, false).unwrap();
+    assert!(without.organs.is_empty());
+    let [missing] = &without.missing[..] else { panic!("{:?}", without.missing) };
+    assert!(missing.starts_with("organ 'ball' has no mask: ") && missing.contains("ball.png"), "{missing}");
 }

@@ -1,6 +1,9 @@
-"""OpenCV's answers for a calibration file: python opencv.py FOLDER. Reads FOLDER/points (float64 x y z), FOLDER/pixels
-(float64 u v) and FOLDER/calibration.yml, written by the test; writes FOLDER/projected, FOLDER/undistorted (x, y at z = 1),
-FOLDER/map (u, v of every pixel of an undistorted picture through `plain`) and FOLDER/back.yml, FOLDER/back.json."""
+"""Results of OpenCV for a calibration file: python opencv.py FOLDER.
+
+Reads FOLDER/points (float64 x y z), FOLDER/pixels (float64 u v) and FOLDER/calibration.yml, written by
+the test. Writes FOLDER/projected, FOLDER/undistorted (x, y at z = 1), FOLDER/map (u, v of every pixel
+of an undistorted picture with the camera matrix FOLDER/plain), FOLDER/back.yml and FOLDER/back.json.
+"""
 
 import sys
 import cv2

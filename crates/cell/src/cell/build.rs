@@ -6,10 +6,10 @@ use crate::{Error, GraspDesign, Jaw, Result, Scissors};
 use glam::DVec3;
 use trocar_robot::chain::{InverseOptions, Joints, MassProperties, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument, Jaw as JawDrive, Limits};
-use trocar_robot::manipulator::{Manipulator, ModelError, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Manipulator, ModelError};
 use trocar_robot::port::Port;
 use trocar_scene::{ArmModel, GraspDesignName, InstrumentKind, Scene, ScheduleName};
-use trocar_tissue::{Descent, Schedule, Start};
+use trocar_tissue::{Descent, SolverSettings, Start};
 
 /// Clearance that a tilt at the limit leaves [m].
 const LEAST_CLEARANCE: f64 = 2e-5;
@@ -41,11 +41,13 @@ const WALK: u32 = 24;
 const TOUCHING_SHAFT: f64 = 0.2;
 
 /// The schedule of that name.
-pub(super) fn schedule(name: ScheduleName) -> Schedule {
+pub(super) fn schedule(name: ScheduleName) -> SolverSettings {
     match name {
-        ScheduleName::Fast => Schedule::FAST,
-        ScheduleName::Paper => Schedule::PAPER,
-        ScheduleName::Adaptive => Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive }),
+        ScheduleName::Fast => SolverSettings::FAST,
+        ScheduleName::Paper => SolverSettings::PAPER,
+        ScheduleName::Adaptive => {
+            SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
+        }
     }
 }
 
@@ -103,7 +105,7 @@ fn station(
     }
     let chain = chain(scene, arm)?;
     limits.roll = roll_of(&chain, &hole, &instrument, &limits, &start)?;
-    let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
+    let mut settings = ControllerSettings::named(&arm.controller.name, &arm.controller.gains)?;
     let error = scene.gravity_error;
     settings.error = ModelError {
         links: error.link_mass_share,

@@ -17,8 +17,9 @@ pub struct Episode {
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Episode folder to write: episode.trocar, channels.parquet, result.json.
     #[arg(short, long)]
@@ -39,8 +40,9 @@ pub struct Replay {
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }
 

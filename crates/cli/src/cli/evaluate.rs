@@ -23,8 +23,9 @@ pub struct Evaluate {
     /// Episodes that ended because their policy failed are done again.
     #[arg(long)]
     pub retry_failed: bool,
-    /// Folder for a scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
     /// Campaign folder: begun there, or gone on with where it was left.
     #[arg(short, long, visible_alias = "resume", value_name = "FOLDER", default_value = "trocar-campaign")]

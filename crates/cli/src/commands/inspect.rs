@@ -21,14 +21,19 @@ fn text(i: &Inspection) -> String {
         lines.push(format!("depth camera  {}; registered to colour", camera(depth)));
     }
     lines.push(format!(
-        "depth         {} mm a unit; the middle frame has it on {:.0}% of its pixels, {:.0} to {:.0} mm",
+        "depth         unit {} mm; the middle frame has depth on {:.0}% of its pixels, from {:.0} to {:.0} mm",
         1e3 * i.depth_scale_m,
         100.0 * i.coverage,
         1e3 * i.depth_range_m[0],
         1e3 * i.depth_range_m[1]
     ));
-    let organs = if i.organs.is_empty() { "none named yet".to_owned() } else { i.organs.join(", ") };
+    let organs = match (i.organs.is_empty(), i.missing.is_empty()) {
+        (false, _) => i.organs.join(", "),
+        (true, true) => "none described yet".to_owned(),
+        (true, false) => "none with a mask, a polygon or points".to_owned(),
+    };
     lines.push(format!("organs        {organs}"));
+    lines.extend(i.missing.iter().map(|m| format!("missing       {m}")));
     lines.extend(i.topics.iter().map(|t| format!("topic         {t}")));
     lines.extend(i.notes.iter().map(|n| format!("note: {n}")));
     lines.extend(i.written.iter().map(|w| format!("wrote {w}")));

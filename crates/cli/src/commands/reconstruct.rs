@@ -23,11 +23,11 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
     let reconstructed = match (&arguments.recording, &arguments.surface) {
         (Some(recording), _) => reconstruct_recording(recording, &settings, &arguments.output, progress)?.0,
         (None, Some(surface)) => {
-            // clap asks for the unit where there is a surface.
+            // clap requires the unit with a surface.
             let unit = arguments.units.map_or(Unit::Millimetre, Unit::from);
             reconstruct_surface(surface, unit, &settings, &arguments.output, progress)?
         }
-        (None, None) => unreachable!("clap asks for one of the two"),
+        (None, None) => unreachable!("clap requires one of the two"),
     };
     output::print(json, &reconstructed, text);
     Ok(())
@@ -59,7 +59,7 @@ pub fn text(r: &Reconstructed) -> String {
         "organ",
         "nodes",
         "tets",
-        "min dih deg",
+        "min dihedral deg",
         "edge mm",
         "cm3",
         "closed",
@@ -85,6 +85,9 @@ pub fn text(r: &Reconstructed) -> String {
                 t.under_instruments_median_mm.map_or("-".to_owned(), |e| format!("{e:.2}"))
             );
         }
+    }
+    for warning in &r.warnings {
+        out += &format!("\nwarning: {warning}");
     }
     for note in &r.notes {
         out += &format!("\nnote: {note}");

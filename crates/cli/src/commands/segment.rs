@@ -5,7 +5,7 @@ use trocar_core::Progress;
 use trocar_workflow::{Result, Segment, Segmented, Wanted, wanted_weights};
 
 pub fn run(arguments: &cli::Segment, json: bool, progress: &dyn Progress) -> Result<()> {
-    // clap asks for both unless the files are asked for.
+    // clap requires both unless --weights is given.
     let (Some(recording), Some(masks), false) = (&arguments.recording, &arguments.output, arguments.weights) else {
         output::print(json, &wanted_weights(arguments.sam.folder.as_deref()), |files| list(files));
         return Ok(());
@@ -26,10 +26,13 @@ fn list(files: &[Wanted]) -> String {
 
 fn text(s: &Segmented) -> String {
     let mut lines: Vec<String> = s.organs.iter().map(|(name, pixels)| format!("{name}: {pixels} pixels")).collect();
-    lines.push(format!("instruments: {}; on {:.1}% of the image in the mean", s.instruments, 100.0 * s.covered));
-    lines.push(format!(
-        "masks of {} frames in {} ({:.1} s); look at the pictures beside them",
-        s.frames, s.masks, s.seconds
-    ));
+    if s.frames == 0 {
+        lines.push(format!("instruments: {}", s.instruments));
+    } else {
+        let covered = 100.0 * s.covered;
+        lines.push(format!("instruments: {}; they cover {covered:.1}% of the image on average", s.instruments));
+        lines.push(format!("masks of {} frames", s.frames));
+    }
+    lines.push(format!("written to {} in {:.1} s; check the pictures beside the masks", s.masks, s.seconds));
     lines.join("\n")
 }

@@ -46,7 +46,7 @@ pub(super) struct Filling<'a> {
 }
 
 impl<'a> Filling<'a> {
-    /// Prepares leaves of at millions `coarsest` cells.
+    /// Prepares leaves of at most `coarsest` cells.
     pub(super) fn new(lattice: &'a Lattice, cuts: &'a Cuts, coarsest: u32) -> Result<Self> {
         let tree = Octree::over(lattice, coarsest);
         let blocks = lattice.blocks.count.iter().product();

@@ -1,11 +1,11 @@
-//! What the tests of the meshers share: shapes given by closures, and a check that a mesh is sound.
+//! Shared by the mesher tests: shapes defined by closures, and a check of meshes.
 
-#![allow(dead_code, reason = "not every test file uses everything")]
+#![allow(dead_code, reason = "each test file uses a part")]
 
 use glam::DVec3;
 use trocar_geometry::{SignedDistance, TetMesh};
 
-/// A shape given by a closure.
+/// A shape defined by a closure.
 pub struct Shape<F: Fn(DVec3) -> f64 + Sync>(pub F);
 
 impl<F: Fn(DVec3) -> f64 + Sync> SignedDistance for Shape<F> {
@@ -14,9 +14,9 @@ impl<F: Fn(DVec3) -> f64 + Sync> SignedDistance for Shape<F> {
     }
 }
 
-/// Panics unless the tets conform and their boundary is a closed surface every edge of which has
-/// two triangles that run along it in opposite directions. Returns the number of boundary nodes
-/// where the surface touches itself.
+/// Panics unless the tets conform and every edge of their boundary has two triangles that traverse
+/// it in opposite directions. Returns the number of boundary nodes where the surface touches
+/// itself.
 pub fn check_conforming(mesh: &TetMesh) -> usize {
     let mut faces: Vec<[u32; 3]> = Vec::new();
     for &[a, b, c, d] in &mesh.tets {
@@ -37,7 +37,7 @@ pub fn check_conforming(mesh: &TetMesh) -> usize {
     assert!(edges.windows(2).all(|w| w[0] != w[1]), "an edge with two triangles in the same direction");
     assert!(edges.iter().all(|&[a, b]| edges.binary_search(&[b, a]).is_ok()), "an open edge");
 
-    // Walk around each vertex; a triangle not reached means a second fan.
+    // Walk around each vertex. A triangle that is not reached belongs to a second fan.
     let mut next = std::collections::BTreeMap::new();
     for &[a, b, c] in &surface.triangles {
         for (centre, from, to) in [(a, b, c), (b, c, a), (c, a, b)] {

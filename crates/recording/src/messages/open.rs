@@ -13,6 +13,15 @@ use std::path::Path;
 ///
 /// # Errors
 /// [`Error::File`] if the file cannot be read or is neither a ROS 1 bag nor MCAP.
+///
+/// ```no_run
+/// use trocar_recording::messages::{find_rgbd_topics, open};
+///
+/// let log = open("session.mcap".as_ref())?;
+/// let topics = find_rgbd_topics(&*log, None, None)?;
+/// println!("colour is {}", log.topics()[topics.color].name);
+/// # Ok::<(), trocar_recording::messages::Error>(())
+/// ```
 pub fn open(path: &Path) -> Result<Box<dyn MessageLog>> {
     let file = std::fs::File::open(path)
         .map_err(|e| Error::File { path: path.to_owned(), reason: format!("cannot be opened ({e})") })?;

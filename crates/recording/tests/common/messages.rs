@@ -1,4 +1,4 @@
-//! What `make_fixtures.py` writes, by the same formulas.
+//! The contents that `make_fixtures.py` writes, by the same formulas.
 
 #![allow(dead_code, reason = "every test file uses a part")]
 #![allow(clippy::unwrap_used, reason = "a helper of tests")]
@@ -104,7 +104,7 @@ pub fn floats(image: &StampedImage) -> &[f32] {
     }
 }
 
-/// Every message of a log, decoded in every way; how many messages could be had, and how many
+/// Decodes every message of a log in every way. Returns how many messages were read, and how many
 /// decoded as something.
 pub fn read_all(log: &dyn MessageLog) -> (usize, usize) {
     let wanted: Vec<_> = (0..log.topics().len()).flat_map(|t| (0..log.times(t).len()).map(move |i| (t, i))).collect();
@@ -117,7 +117,7 @@ pub fn read_all(log: &dyn MessageLog) -> (usize, usize) {
     (had, decoded)
 }
 
-/// A message decoded in every way; whether one of them gives something.
+/// Decodes a message in every way; returns whether one of them succeeds.
 pub fn decode_all(topic: &Topic, bytes: &[u8]) -> bool {
     let image = decode_image(topic, bytes);
     if let Ok(StampedImage { image: Image::Depth(depth), .. }) = &image {

@@ -1,6 +1,6 @@
 //! A small recording of a sphere on a bed, seen from above, with a bar that moves across it.
 #![allow(dead_code)]
-#![allow(clippy::unwrap_used, reason = "a test's helper")]
+#![allow(clippy::unwrap_used, reason = "test helpers")]
 
 pub mod messages;
 

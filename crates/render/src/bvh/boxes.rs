@@ -52,7 +52,7 @@ impl BoxTree {
         Self { nodes }
     }
 
-    /// Visits the leaves below `entry` (a child of a node; [`ROOT`] for all) whose boxes the ray
+    /// Visits the leaves below `entry` (a child of a node; `ROOT` for all) whose boxes the ray
     /// meets before `reach`, nearest first.
     #[inline(always)]
     pub fn walk<S: Simd, V: Visitor<S>>(

@@ -64,7 +64,7 @@ fn first_hit_matches_brute_force_on_every_instruction_set() {
         }
     }
     assert!(hits > 300, "{hits} rays hit");
-    assert!(differ <= 2, "{differ} rays end elsewhere; only grazed edges may");
+    assert!(differ <= 2, "{differ} rays differ; only rays that graze an edge may");
 }
 
 #[test]
@@ -75,13 +75,13 @@ fn refitted_tree_equals_rebuilt_tree() {
         *p += 0.2 * Vec3A::new((3.0 * p.y).sin(), (2.0 * p.z).cos(), p.x * p.y);
     }
     tree.refit(&positions, &triangles);
-    let anew = TriangleTree::new(&positions, &triangles);
-    assert_eq!(tree.bounds(), anew.bounds());
+    let rebuilt = TriangleTree::new(&positions, &triangles);
+    assert_eq!(tree.bounds(), rebuilt.bounds());
     let mut r = noise(3);
     let level = Level::new();
     for _ in 0..2000 {
         let ray = Ray::new(2.0 * Vec3A::new(r(), r(), r()), Vec3A::new(r(), r(), r()));
-        let hits = [&tree, &anew]
+        let hits = [&tree, &rebuilt]
             .map(|t| dispatch!(level, simd => t.first(simd, &ray, ROOT, f32::INFINITY, &mut [0; STACK_SIZE])));
         assert_eq!(hits[0], hits[1]);
     }

@@ -99,6 +99,17 @@ impl Default for MetalParameters {
 }
 
 /// Finds all metal instruments in a picture. The target is ignored.
+///
+/// ```
+/// use trocar_camera::ColorImage;
+/// use trocar_segment::{MetalDetector, Picture, Segmenter, Target};
+///
+/// let tissue = ColorImage::new(64, 48, [170, 60, 50]);
+/// let picture = Picture { color: &tissue, depth: None, name: "frame 0" };
+/// let mask = MetalDetector::default().segment(&picture, &Target::default())?;
+/// assert_eq!(mask.count(), 0);
+/// # Ok::<(), trocar_segment::Error>(())
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct MetalDetector {
     /// Its parameters.

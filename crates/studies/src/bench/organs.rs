@@ -197,7 +197,12 @@ struct Tube {
 }
 
 impl Tube {
-    fn run(scene: &Scene, schedule: trocar_tissue::Schedule, threads: usize, progress: &dyn Progress) -> Result<Self> {
+    fn run(
+        scene: &Scene,
+        schedule: trocar_tissue::SolverSettings,
+        threads: usize,
+        progress: &dyn Progress,
+    ) -> Result<Self> {
         let substeps = schedule.substeps();
         let last = TUBE_FRAMES[TUBE_FRAMES.len() - 1];
         progress.begin("tube, oracle", (last * substeps) as u64);

@@ -50,8 +50,9 @@ pub struct RenderBench {
     /// Scene file or built-in scene whose cameras are measured; none for none.
     #[arg(long, default_value = "cell-a")]
     pub scene: String,
-    /// Folder for the scene's phantom, which is recorded and reconstructed there.
-    #[arg(long, value_name = "FOLDER", default_value = "trocar-phantoms")]
+    /// Folder of made phantoms, where the scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }
 

@@ -11,7 +11,7 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{fixed, percent};
-use trocar_robot::manipulator::{Law, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Law};
 
 /// The paper's figures for its chosen controller (section VI-A), which are the bars.
 const BARS: ControllerBars = ControllerBars { rcm_p95_mm: 0.34, tracking_rms_mm: 0.048, droop_mm: 0.26 };
@@ -113,12 +113,12 @@ pub struct ControllerGridResult {
 }
 
 /// All configurations.
-fn grid() -> Vec<Settings> {
+fn grid() -> Vec<ControllerSettings> {
     let mut all = Vec::with_capacity(KINDS.len() * BANDWIDTHS.len() * DAMPINGS.len());
     for (law, correction) in KINDS {
         for bandwidth in BANDWIDTHS {
             for damping in DAMPINGS {
-                let mut settings = Settings { law, ..Settings::default() };
+                let mut settings = ControllerSettings { law, ..ControllerSettings::default() };
                 (settings.gains.bandwidth, settings.gains.damping) = (bandwidth, damping);
                 match law {
                     Law::Integral => settings.gains.integral = correction,
@@ -132,7 +132,7 @@ fn grid() -> Vec<Settings> {
     all
 }
 
-fn key(s: &Settings) -> String {
+fn key(s: &ControllerSettings) -> String {
     let g = &s.gains;
     let of =
         |name: &str, value: f64| if s.law.gains().contains(&name) { format!(" {name} {value}") } else { String::new() };
@@ -146,7 +146,7 @@ fn key(s: &Settings) -> String {
     )
 }
 
-fn row(s: &Settings) -> Result<ControllerRow> {
+fn row(s: &ControllerSettings) -> Result<ControllerRow> {
     let has = |name: &str, value: f64| s.law.gains().contains(&name).then_some(value);
     Ok(ControllerRow {
         controller: s.law.name().to_owned(),
@@ -176,14 +176,15 @@ impl Study for ControllerGridExperiment {
     fn run(&self, job: &Job<'_>) -> Result<(ControllerGridResult, Document)> {
         job.claim()?;
         let grid = grid();
-        let store = Trials::open(job.output(), "controller-grid", &format!("{:?}", Settings::default().error))?;
+        let store =
+            Trials::open(job.output(), "controller-grid", &format!("{:?}", ControllerSettings::default().error))?;
         let Outcomes { rows, resumed } =
             store.run("configurations", &grid, key, self.threads, job.progress, |s, _| row(s))?;
         let chosen = choose(&rows);
         let (mut shown, mut plain) = (Vec::new(), Vec::new());
         if let Some(k) = chosen {
             shown = trace(&grid[k], EVERY)?;
-            plain = trace(&Settings { law: Law::ComputedTorque, ..grid[k] }, EVERY)?;
+            plain = trace(&ControllerSettings { law: Law::ComputedTorque, ..grid[k] }, EVERY)?;
         }
         let own = |k: usize| {
             let mut settings = grid[k];
@@ -192,7 +193,7 @@ impl Study for ControllerGridExperiment {
         };
         let result = ControllerGridResult {
             chosen_with_own_friction: chosen.map(own).transpose()?,
-            chosen_is_default: chosen.is_some_and(|k| key(&grid[k]) == key(&Settings::default())),
+            chosen_is_default: chosen.is_some_and(|k| key(&grid[k]) == key(&ControllerSettings::default())),
             chosen: chosen.map(|k| rows[k].clone()),
             bars: BARS,
             stable: rows.iter().filter(|r| r.figures.stable).count(),
@@ -484,7 +485,7 @@ mod tests {
 
     /// A result of made-up rows.
     fn made_up_result() -> ControllerGridResult {
-        let row = |k: usize, s: &Settings| {
+        let row = |k: usize, s: &ControllerSettings| {
             let size = 1.0 + k as f64;
             ControllerRow {
                 controller: s.law.name().to_owned(),
@@ -539,7 +540,7 @@ mod tests {
         keys.dedup();
         assert_eq!(keys.len(), 182);
         grid().iter().for_each(|s| s.check().unwrap());
-        assert!(grid().iter().any(|s| key(s) == key(&Settings::default())), "the default is one of them");
+        assert!(grid().iter().any(|s| key(s) == key(&ControllerSettings::default())), "the default is one of them");
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::time::Instant;
 use trocar_cell::{GraspDesign, GraspLift, GraspLiftRun, World, clusters};
 use trocar_core::Progress;
 use trocar_specimen::{Material, Specimen};
-use trocar_tissue::Schedule;
+use trocar_tissue::SolverSettings;
 use trocar_workflow::REPORT;
 
 /// The file that makes a folder one of this experiment's.
@@ -253,7 +253,7 @@ impl GraspDesignsExperiment {
 
 /// Grip locations: evenly over the part of the organ that can be grasped and lifted.
 fn locations(specimen: &Specimen) -> Result<Vec<f64>> {
-    let world = World::new(specimen, Schedule::default(), 1)?;
+    let world = World::new(specimen, SolverSettings::default(), 1)?;
     let all = clusters(&world, 0);
     let clear: Vec<f64> = all.iter().filter(|c| c.clear).map(|c| c.s).collect();
     let (Some(first), Some(last)) = (clear.first(), clear.last()) else {

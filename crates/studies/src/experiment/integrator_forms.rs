@@ -1,14 +1,15 @@
 //! The integrators that are compared, each as the paper or an engine has it and in its best form, and what the comparison says.
 
 use super::integrator_row::IntegratorRow;
-use trocar_tissue::{Descent, Model, Schedule, SemiImplicit, Start, Xpbd, XpbdConstraints, XpbdSweep};
+use trocar_tissue::{Descent, Model, SolverSettings, Start};
+use trocar_tissue_reference::{Scheme, SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep};
 
 /// An integrator with its settings.
 pub(super) struct Form {
     pub name: &'static str,
     pub settings: String,
     pub paper: &'static str,
-    pub schedule: Schedule,
+    pub scheme: Scheme,
 }
 
 /// What the paper says of both explicit integration and XPBD (section VII-B).
@@ -22,7 +23,7 @@ const RIGHT: f64 = 0.1;
 
 /// Every integrator, for frames of `dt` [s].
 pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
-    let form = |name, settings: String, paper, schedule| Form { name, settings, paper, schedule };
+    let form = |name, settings: String, paper, scheme| Form { name, settings, paper, scheme };
     let stable = SemiImplicit::stable(model, dt);
     let small_steps = Xpbd::default();
     let strains = Xpbd { constraints: XpbdConstraints::Strains, ..small_steps };
@@ -31,41 +32,51 @@ pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
     let adaptive = Descent { substeps: 8, iterations: 10, start: Start::Adaptive };
     let cut = |x: &Xpbd| format!("{} substeps of {}", x.substeps, x.iterations);
     vec![
-        form("Semi-implicit Euler", "8 substeps".into(), DIVERGES, Schedule::SemiImplicit(SemiImplicit::PAPER)),
+        form("Semi-implicit Euler", "8 substeps".into(), DIVERGES, Scheme::SemiImplicit(SemiImplicit::PAPER)),
         form(
             "Semi-implicit Euler, stable steps",
             format!("{} substeps", stable.substeps),
             "",
-            Schedule::SemiImplicit(stable),
+            Scheme::SemiImplicit(stable),
         ),
         form(
             "XPBD as in Newton 1.8",
             format!("{}, Jacobi, relaxation 0.9", cut(&Xpbd::NEWTON)),
             DIVERGES,
-            Schedule::Xpbd(Xpbd::NEWTON),
+            Scheme::Xpbd(Xpbd::NEWTON),
         ),
         form(
             "XPBD as in Newton, relaxed",
             format!("{}, Jacobi, relaxation 0.1", cut(&relaxed)),
             "",
-            Schedule::Xpbd(relaxed),
+            Scheme::Xpbd(relaxed),
         ),
         form(
             "XPBD, neo-Hookean, large steps",
             format!("{}, Gauss-Seidel", cut(&large_steps)),
             "",
-            Schedule::Xpbd(large_steps),
+            Scheme::Xpbd(large_steps),
         ),
         form(
             "XPBD, neo-Hookean, small steps",
             format!("{}, Gauss-Seidel", cut(&small_steps)),
             "",
-            Schedule::Xpbd(small_steps),
+            Scheme::Xpbd(small_steps),
         ),
-        form("XPBD, six strains, small steps", format!("{}, Gauss-Seidel", cut(&strains)), "", Schedule::Xpbd(strains)),
-        form("Vertex Block Descent as in the paper", "8 substeps of 10".into(), "stays at 0.16 m/s", Schedule::PAPER),
-        form("Vertex Block Descent, adaptive start", "8 substeps of 10".into(), "", Schedule::Descent(adaptive)),
-        form("Quasi-Newton", "fast schedule".into(), "", Schedule::FAST),
+        form("XPBD, six strains, small steps", format!("{}, Gauss-Seidel", cut(&strains)), "", Scheme::Xpbd(strains)),
+        form(
+            "Vertex Block Descent as in the paper",
+            "8 substeps of 10".into(),
+            "stays at 0.16 m/s",
+            SolverSettings::PAPER.into(),
+        ),
+        form(
+            "Vertex Block Descent, adaptive start",
+            "8 substeps of 10".into(),
+            "",
+            SolverSettings::Descent(adaptive).into(),
+        ),
+        form("Quasi-Newton", "fast schedule".into(), "", SolverSettings::FAST.into()),
     ]
 }
 

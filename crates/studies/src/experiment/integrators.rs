@@ -18,7 +18,8 @@ use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
 use trocar_testing::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
-use trocar_tissue::{Model, Oracle, OracleState, Schedule, State, Stepper, stable_explicit_step};
+use trocar_tissue::{Model, SolverSettings, State};
+use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
 use trocar_workflow::phantoms;
 
 /// Speed at which a node has diverged [m/s], the paper's limit.
@@ -140,7 +141,7 @@ impl IntegratorsExperiment {
         }
         let specimen =
             phantoms::specimen("phantom-a", &self.recorded.options(), &job.output().join("phantom-a"), job.progress)?;
-        Ok(World::new(&specimen, Schedule::default(), 1)?.model)
+        Ok(World::new(&specimen, SolverSettings::default(), 1)?.model)
     }
 }
 
@@ -172,7 +173,7 @@ fn measured(
     threads: usize,
     progress: &dyn Progress,
 ) -> Result<IntegratorRow> {
-    let mut stepper = Stepper::new(model, form.schedule, FRAME, threads)?;
+    let mut stepper = form.scheme.stepper(model, FRAME, threads)?;
     let mut state = State::new(model);
     let mut mean = vec![DVec3::ZERO; truth.rest.len()];
     let first_measured = frames - ((MEASURED_SHARE * frames as f64) as usize).max(1);

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_testing::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
-use trocar_tissue::{OracleState, Schedule, State, Stepper, ToolMotion};
+use trocar_tissue::{SolverSettings, State, Stepper, ToolMotion};
+use trocar_tissue_reference::OracleState;
 use trocar_workflow::solver_named;
 
 /// Steps of the oracle a frame on the way to the state.
@@ -93,7 +94,7 @@ pub(super) fn climb(scene: &Scene, solvers: &[&str], most: usize, progress: &dyn
 }
 
 /// 1, 2, 4, ... and the schedule's own number.
-fn rungs(schedule: Schedule, most: usize) -> Vec<usize> {
+fn rungs(schedule: SolverSettings, most: usize) -> Vec<usize> {
     let doubling = std::iter::successors(Some(1_usize), |k| k.checked_mul(2)).take_while(|k| *k <= most);
     let mut all: Vec<usize> = doubling.chain([own_iterations(schedule)]).collect();
     all.sort_unstable();
@@ -101,7 +102,7 @@ fn rungs(schedule: Schedule, most: usize) -> Vec<usize> {
     all
 }
 
-fn own_iterations(schedule: Schedule) -> usize {
+fn own_iterations(schedule: SolverSettings) -> usize {
     crate::schedules::iterations_of(schedule)
 }
 
@@ -125,7 +126,13 @@ struct Ladder<'a> {
 }
 
 impl<'a> Ladder<'a> {
-    fn new(scene: &'a Scene, run: &mut OracleRun<'_>, start: &'a State, time: f64, schedule: Schedule) -> Result<Self> {
+    fn new(
+        scene: &'a Scene,
+        run: &mut OracleRun<'_>,
+        start: &'a State,
+        time: f64,
+        schedule: SolverSettings,
+    ) -> Result<Self> {
         let h = FRAME / schedule.substeps() as f64;
         let before = OracleState::from_state(&scene.model, start);
         let held = run.held_between_frames(time + h);
@@ -163,7 +170,7 @@ impl<'a> Ladder<'a> {
         })
     }
 
-    fn row(&self, run: &mut OracleRun<'_>, name: &str, schedule: Schedule, iterations: usize) -> Result<StepRow> {
+    fn row(&self, run: &mut OracleRun<'_>, name: &str, schedule: SolverSettings, iterations: usize) -> Result<StepRow> {
         let model = &self.scene.model;
         let mut stepper = Stepper::new(model, one_substep(schedule, iterations), self.h, 1)?;
         let mut state = self.start.clone();

@@ -553,7 +553,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let refused = |e: Weighing| study::run(&e, dir.path(), &Silent).err().unwrap().to_string();
         assert!(refused(Weighing { poses: 2, ..good }).contains("static poses"));
-        assert!(refused(Weighing { tilt: 0.02, ..good }).contains("too alike"));
+        assert!(refused(Weighing { tilt: 0.02, ..good }).contains("too similar"));
         assert!(refused(Weighing { runs: 0, ..good }).contains("runs"));
         assert!(refused(Weighing { force_noise: -1.0, ..good }).contains("noise"));
     }

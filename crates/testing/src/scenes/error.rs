@@ -25,4 +25,7 @@ pub enum Error {
     /// A model cannot be built or stepped.
     #[error(transparent)]
     Tissue(#[from] trocar_tissue::Error),
+    /// The oracle or a comparator failed.
+    #[error(transparent)]
+    Reference(#[from] trocar_tissue_reference::Error),
 }

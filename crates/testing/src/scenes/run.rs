@@ -3,7 +3,8 @@
 use super::error::{Error, Result};
 use super::scene::{FRAME, Patch, Scene};
 use glam::DVec3;
-use trocar_tissue::{Grasp, Held, Model, Oracle, OracleState, Schedule, State, StepReport, Stepper, ToolMotion};
+use trocar_tissue::{Grasp, Model, SolverSettings, State, StepReport, Stepper, ToolMotion};
+use trocar_tissue_reference::{Held, Oracle, OracleState};
 
 /// A scene stepped by a schedule, frame by frame.
 pub struct Run<'a> {
@@ -20,7 +21,7 @@ impl<'a> Run<'a> {
     ///
     /// # Errors
     /// A schedule or threads that cannot be had.
-    pub fn new(scene: &'a Scene, schedule: Schedule, threads: usize) -> Result<Self> {
+    pub fn new(scene: &'a Scene, schedule: SolverSettings, threads: usize) -> Result<Self> {
         let stepper = Stepper::new(&scene.model, schedule, FRAME, threads)?;
         let mut state = State::new(&scene.model);
         state.grasps = grasps(scene, &state);

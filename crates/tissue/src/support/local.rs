@@ -22,7 +22,7 @@ pub(crate) struct LocalPlane {
 #[derive(Clone, Debug)]
 pub(crate) struct LocalField {
     origin: Vec3A,
-    /// Along columns and rows over the cell [1/m], and up.
+    /// Along columns and rows over the cell (1/m), and up.
     axes: [Vec3A; 3],
     columns: usize,
     /// Last middle of three coefficients, by axis.
@@ -32,7 +32,7 @@ pub(crate) struct LocalField {
 }
 
 impl LocalSupport {
-    /// What supports a body.
+    /// The supports of a body.
     pub fn of(body: &Body) -> Vec<Self> {
         let local = |support: &Support| match support {
             Support::Plane(plane) => Self::Plane(LocalPlane::new(plane, body.origin)),
@@ -48,12 +48,12 @@ impl LocalSupport {
         }
     }
 
-    /// Height of a point above the support [m], and its gradient.
+    /// Height of a point above the support (m), and its gradient.
     #[inline]
-    pub fn touch(&self, x: Vec3A) -> (f32, Vec3A) {
+    pub fn contact(&self, x: Vec3A) -> (f32, Vec3A) {
         match self {
             Self::Plane(plane) => ((x - plane.point).dot(plane.normal), plane.normal),
-            Self::Field(field) => field.touch(x),
+            Self::Field(field) => field.contact(x),
         }
     }
 }
@@ -82,7 +82,7 @@ impl LocalField {
     }
 
     #[inline]
-    fn touch(&self, x: Vec3A) -> (f32, Vec3A) {
+    fn contact(&self, x: Vec3A) -> (f32, Vec3A) {
         let off = x - self.origin;
         let [a, b, up] = self.axes;
         let (column, across, slope_across) = knot(off.dot(a), self.last[0]);
@@ -100,7 +100,8 @@ impl LocalField {
     }
 }
 
-/// First of the three coefficients at a place along an axis, their weights and the weights' derivatives. A place that is not a number is the first.
+/// First of the three coefficients at a place along an axis, their weights and the weights'
+/// derivatives. NaN counts as the first place.
 #[inline]
 fn knot(place: f32, last: f32) -> (usize, [f32; 3], [f32; 3]) {
     let place = place.clamp(0.5, last + 0.5);
@@ -143,8 +144,8 @@ mod tests {
         for k in 0..500 {
             let at = |f: f64| (f64::from(k) * f).fract();
             let x = 0.02 * DVec3::new(at(0.617), at(0.137), at(0.711)) - DVec3::splat(5e-3);
-            let exact = field.touch(x);
-            let (height, gradient) = local.touch((x - body.origin).as_vec3a());
+            let exact = field.contact(x);
+            let (height, gradient) = local.contact((x - body.origin).as_vec3a());
             highest = highest.max((exact.gradient - DVec3::Z).length());
             assert!((f64::from(height) - exact.height).abs() < 1e-8, "{x}: {height} m, {} m", exact.height);
             assert!((gradient.as_dvec3() - exact.gradient).length() < 1e-4, "{x}");

@@ -1,4 +1,4 @@
-//! What a body rests on: one-sided surfaces with a quadratic penalty and Coulomb friction.
+//! Supports of a body: one-sided surfaces with a quadratic penalty and Coulomb friction.
 
 mod field;
 mod local;
@@ -20,7 +20,7 @@ pub enum Support {
 /// A one-sided plane that a body rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupportPlane {
-    /// A point of the plane [m].
+    /// A point of the plane (m).
     pub point: DVec3,
     /// Unit normal, into the free side.
     pub normal: DVec3,
@@ -28,14 +28,14 @@ pub struct SupportPlane {
     pub friction: f64,
 }
 
-/// A point at a support. A pressed node's energy is k/2 height^2.
+/// A point at a support. The energy of a pressed node of stiffness k is k/2 height^2.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Touch {
-    /// Height above the support [m], along a field's `up`; negative below.
+pub struct SupportContact {
+    /// Height above the support (m), along a field's `up`; negative below.
     pub height: f64,
     /// Its gradient; of unit length for planes, longer on a field's slopes.
     pub gradient: DVec3,
-    /// Its second derivative [1/m].
+    /// Its second derivative (1/m).
     pub curvature: DMat3,
 }
 
@@ -48,21 +48,25 @@ impl Support {
         }
     }
 
-    /// Height of `x` above the support [m]: along a plane's normal, along a field's `up`; negative below.
+    /// Height of `x` above the support (m): along a plane's normal, along a field's `up`; negative
+    /// below.
     pub fn height(&self, x: DVec3) -> f64 {
-        self.touch(x).height
+        self.contact(x).height
     }
 
-    pub(crate) fn touch(&self, x: DVec3) -> Touch {
+    /// The support at `x` (m): height, gradient and curvature.
+    pub fn contact(&self, x: DVec3) -> SupportContact {
         match self {
-            Self::Plane(plane) => {
-                Touch { height: (x - plane.point).dot(plane.normal), gradient: plane.normal, curvature: DMat3::ZERO }
-            }
-            Self::Field(field) => field.touch(x),
+            Self::Plane(plane) => SupportContact {
+                height: (x - plane.point).dot(plane.normal),
+                gradient: plane.normal,
+                curvature: DMat3::ZERO,
+            },
+            Self::Field(field) => field.contact(x),
         }
     }
 
-    /// Says what is wrong, if anything.
+    /// Checks the support.
     pub(crate) fn check(&self) -> Result<(), String> {
         let Self::Plane(plane) = self else {
             return Ok(());

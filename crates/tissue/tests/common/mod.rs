@@ -3,7 +3,9 @@
 
 use glam::DVec3;
 use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
-use trocar_tissue::{BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, Schedule, Start};
+use trocar_tissue::{
+    BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, SolverSettings, Start,
+};
 
 pub const FRAME: f64 = 1.0 / 60.0;
 pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
@@ -22,29 +24,30 @@ pub fn tissue(young_modulus: f64) -> Material {
 /// A schedule to be judged.
 pub struct Judged {
     pub name: &'static str,
-    pub schedule: Schedule,
-    /// Whether it minimises: held to the laws that the minimum keeps. Sweeps that stop early are not at the minimum.
+    pub schedule: SolverSettings,
+    /// Whether it minimises: held to the laws that the minimum keeps. Sweeps that stop early are
+    /// not at the minimum.
     pub converges: bool,
 }
 
 /// Every schedule that solvers are judged by.
 pub fn schedules() -> Vec<Judged> {
     vec![
-        Judged { name: "paper", schedule: Schedule::PAPER, converges: false },
+        Judged { name: "paper", schedule: SolverSettings::PAPER, converges: false },
         Judged { name: "adaptive sweeps", schedule: adaptive(), converges: false },
-        Judged { name: "fast", schedule: Schedule::FAST, converges: true },
+        Judged { name: "fast", schedule: SolverSettings::FAST, converges: true },
         Judged { name: "many sweeps", schedule: many_sweeps(), converges: true },
     ]
 }
 
 /// The paper's sweeps from an adaptive start.
-pub fn adaptive() -> Schedule {
-    Schedule::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
+pub fn adaptive() -> SolverSettings {
+    SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
 }
 
 /// So many sweeps that little is left to minimise on a small mesh.
-pub fn many_sweeps() -> Schedule {
-    Schedule::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive })
+pub fn many_sweeps() -> SolverSettings {
+    SolverSettings::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive })
 }
 
 /// A number in 0..1 for each counter, the same on every machine.
@@ -56,7 +59,8 @@ pub fn noise(k: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// A box of `cells` cubes of edge `edge` [m], lower corner at the origin, six tetrahedra a cube around its main diagonal.
+/// A box of `cells` cubes of edge `edge` (m), lower corner at the origin, six tetrahedra a cube
+/// around its main diagonal.
 pub fn block(cells: [usize; 3], edge: f64) -> TetMesh {
     let [nx, ny, nz] = cells;
     let index = |i: usize, j: usize, k: usize| ((k * (ny + 1) + j) * (nx + 1) + i) as u32;
@@ -93,7 +97,8 @@ pub fn model(mesh: &TetMesh, material: Material, pinned: Vec<u32>, gravity: DVec
     builder.build().unwrap()
 }
 
-/// An organ of an appendix's size, bent in the plane z = 0, by the lattice mesher with cells of `cell` [m]. It lies along x from 0 to its length.
+/// An organ of an appendix's size, bent in the plane z = 0, by the lattice mesher with cells of
+/// `cell` (m). It lies along x from 0 to its length.
 pub fn appendix(cell: f64) -> TetMesh {
     struct Tube;
     impl SignedDistance for Tube {

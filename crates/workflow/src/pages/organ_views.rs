@@ -22,7 +22,8 @@ impl Directions {
     /// Of `specimen`.
     pub fn of(specimen: &Specimen) -> Self {
         let up = specimen.up.normalize_or(DVec3::Z);
-        // The recording frame is the camera's: y runs down the image. A ready surface has z up and is looked at from -y.
+        // The recording frame is the camera's: y runs down the image. A ready surface has z up and
+        // is looked at from -y.
         let towards = if specimen.camera.is_some() { DVec3::Y } else { DVec3::NEG_Y };
         let flat = |d: DVec3| (d - up * d.dot(up)).try_normalize();
         let front = flat(towards).or_else(|| flat(DVec3::Z)).unwrap_or_else(|| up.any_orthonormal_vector());
@@ -54,8 +55,9 @@ pub fn label(index: usize) -> u16 {
     u16::try_from(index + 1).unwrap_or(u16::MAX)
 }
 
-/// The tetrahedra of every organ as wires in its colour; `cut` removes the half of each organ on the side of that
-/// direction, along the plane through the middle of its nodes. Cut faces are lighter.
+/// The tetrahedra of every organ as wires in its colour; `cut` removes the half of each organ on
+/// the side of that direction, along the plane through the middle of its nodes. Cut faces are
+/// lighter.
 pub fn wires(specimen: &Specimen, nodes: &[Vec<DVec3>], cut: Option<DVec3>) -> Vec<Instance> {
     let instance = |(i, (organ, nodes)): (usize, (&trocar_specimen::Organ, &Vec<DVec3>))| {
         let color = colors::organ(i);

@@ -1,4 +1,5 @@
-//! Sections on what the camera saw: the frame, the composite, masks, and how far the surfaces are from the depth.
+//! Sections on the camera's input and the fit: the frame, the composite, masks, and depth errors of
+//! the surfaces.
 
 use super::organ_views;
 use crate::truth::quantile;
@@ -15,7 +16,7 @@ use trocar_report::{figures, overlays};
 /// Refuses a reconstruction whose images differ in size.
 ///
 /// # Errors
-/// Which image is of another size.
+/// Names the image of another size.
 pub fn check_sizes(r: &Reconstruction) -> Result<()> {
     let size = (r.input.width, r.input.height);
     let pixels = size.0 * size.1;
@@ -39,12 +40,13 @@ pub fn check_sizes(r: &Reconstruction) -> Result<()> {
     }
 }
 
-/// The figures of R2 and the state of the bodies, beside the paper's.
+/// Figures of the composite and the bodies, beside the paper's.
 pub(super) fn overview(r: &Reconstruction) -> String {
     let facts = || r.specimen.organs.iter().map(|o| &o.facts);
     let inverted: usize = facts().map(|f| f.inverted).sum();
     let tight = facts().filter(|f| f.watertight).count();
     let organs = facts().count();
+    let doubtful = !r.warnings.is_empty();
     let errors: Vec<f64> = facts().filter_map(|f| f.depth_error_median_mm).collect();
     let worst = errors.iter().copied().fold(f64::NAN, f64::max);
     let cards = [
@@ -57,13 +59,19 @@ pub(super) fn overview(r: &Reconstruction) -> String {
         ),
         Card::new("Frames used", table::count(r.frames_used), "in the composite"),
         Card::new("Depth error", format!("{} mm", fixed(worst, 2)), "median of the organ that fits worst"),
-        Card::new("Watertight", format!("{tight} of {organs}"), "organs").met(tight == organs),
-        Card::new("Inverted elements", table::count(inverted), "over all organs").met(inverted == 0),
+        judged(Card::new("Watertight", format!("{tight} of {organs}"), "organs"), tight == organs, doubtful),
+        judged(Card::new("Inverted elements", table::count(inverted), "over all organs"), inverted == 0, doubtful),
     ];
-    page::section("From the recording", "", &page::cards(&cards))
+    let warnings: String = r.warnings.iter().map(|w| page::warning(w)).collect();
+    page::section("From the recording", "", &(warnings + &page::cards(&cards)))
 }
 
-/// Input, composite, masks and the surfaces seen by the recording camera.
+/// The card with its target. A target that is met is not shown as good beside a warning.
+fn judged(card: Card, met: bool, doubtful: bool) -> Card {
+    if met && doubtful { card } else { card.met(met) }
+}
+
+/// Input, composite, masks, and the surfaces through the recording camera.
 pub(super) fn images(r: &Reconstruction) -> Result<String> {
     let mut input = r.input.clone();
     overlays::outline(&mut input, &r.instruments, INSTRUMENT);
@@ -74,7 +82,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
     let composite = page::figure(
         &figures::img(&r.background, "composite without instruments")?,
         &format!(
-            "<b>Composite.</b> Per-pixel median of {} frames, instruments removed; pixels never seen stay empty.",
+            "<b>Composite.</b> Per-pixel median of {} frames, instruments removed; pixels that were never visible are empty.",
             table::count(r.frames_used)
         ),
     );
@@ -86,7 +94,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
     let names = r.organs.iter().enumerate().map(|(i, o)| (o.name.as_str(), colors::organ(i)));
     let masked = page::figure(
         &figures::img(&masked, "organ masks over the composite")?,
-        &format!("<b>Masks.</b> Each organ in its colour, here and in all that follows.{}", page::legend(names)),
+        &format!("<b>Masks.</b> Each organ has this colour in all figures.{}", page::legend(names)),
     );
     let mut top = vec![input, composite, depth_figure(r)?, masked];
     if let Some(camera) = &r.specimen.camera {
@@ -95,7 +103,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
         let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
         let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
         let photograph = figures::img(&r.background, "composite, for comparison")?;
-        top.push(page::figure(&photograph, "<b>Photograph.</b> The composite once more, to compare."));
+        top.push(page::figure(&photograph, "<b>Composite,</b> for comparison."));
         top.push(page::figure(
             &rendered,
             "<b>Surfaces through the recording camera.</b> Rendered anew with the camera's own lens; \
@@ -112,7 +120,7 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
 
 fn depth_figure(r: &Reconstruction) -> Result<String> {
     let valid: Vec<f64> = r.depth.depth.iter().filter(|d| **d > 0.0).map(|d| f64::from(*d)).collect();
-    // Stray depths must not eat the colours: the ends are percentiles.
+    // The ends are percentiles, so that stray depths do not stretch the colour scale.
     let low = quantile(&valid, 0.005).unwrap_or(0.0);
     let high = quantile(&valid, 0.995).unwrap_or(1.0);
     let img = figures::img(&overlays::depth(&r.depth, (low, high)), "composite depth in false colours")?;
@@ -120,7 +128,7 @@ fn depth_figure(r: &Reconstruction) -> Result<String> {
     Ok(page::figure(&img, &format!("<b>Composite depth.</b> Distance along the view; black: no depth.{bar}")))
 }
 
-/// Where the surfaces lie in front of or behind the depth they were made from.
+/// Depth errors of the surfaces: their distance before or behind the depth they were made from.
 pub(super) fn depth_errors(r: &Reconstruction) -> Result<String> {
     if r.organs.is_empty() {
         return Ok(String::new());
@@ -133,7 +141,7 @@ pub(super) fn depth_errors(r: &Reconstruction) -> Result<String> {
     let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "surface minus measured depth [mm]", "+5");
     let map = page::figure(
         &figures::img(&all, "signed depth error of all organs")?,
-        &format!("<b>Depth error.</b> Blue: the surface lies nearer to the camera than measured; red: behind.{bar}"),
+        &format!("<b>Depth error.</b> Blue: the surface is nearer to the camera than measured; red: farther.{bar}"),
     );
     let names = r.organs.iter().enumerate().map(|(i, o)| (o.name.as_str(), colors::organ(i)));
     let spread = page::figure(

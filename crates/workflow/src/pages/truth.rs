@@ -9,8 +9,8 @@ use trocar_report::overlays;
 use trocar_report::page::{self, Columns};
 use trocar_report::{colors::DIVERGING, figures, table};
 
-/// The section, empty when `dir` (the folder of the truth, or the recording that holds it as `truth/`) has neither
-/// `color.png` nor `depth.png`.
+/// The section; empty when `dir` (the folder of the truth, or the recording with it as `truth/`)
+/// has neither `color.png` nor `depth.png`.
 ///
 /// # Errors
 /// Names the file when it is unreadable or of another size than the composite.
@@ -54,7 +54,7 @@ fn error_map(r: &Reconstruction, truth: &DepthImage) -> Result<String> {
     overlays::outline(&mut picture, &r.instruments, trocar_report::colors::INSTRUMENT);
     let img = figures::img(&picture, "depth error of the composite")?;
     let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "composite minus true depth [mm]", "+5");
-    let caption = "<b>Depth error of the composite.</b> Where the instruments stood in the centre frame is outlined.";
+    let caption = "<b>Depth error of the composite.</b> Outlined: the instruments of the centre frame.";
     Ok(page::figure(&img, &format!("{caption}{bar}")))
 }
 

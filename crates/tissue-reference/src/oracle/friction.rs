@@ -1,0 +1,48 @@
+//! Friction, which has no potential: minimise with its limits held, update them, until the forces
+//! of the true law balance.
+
+use super::newton::{Solver, norm};
+use super::potential::Potential;
+use super::solution::{Failure, Solution};
+use glam::DVec3;
+
+/// Greatest number of updates of the limits.
+const MAX_FRICTION_ROUNDS: usize = 100;
+
+/// Share of the true law's imbalance to which a round minimises.
+const INNER_SHARE: f64 = 0.1;
+
+/// Moves `x` to the minimum of `potential` with fixed nodes at their targets.
+pub(super) fn minimise(
+    solver: &mut Solver,
+    potential: &mut Potential<'_>,
+    fixed: &[bool],
+    targets: &[DVec3],
+    velocities: &[DVec3],
+    x: &mut [DVec3],
+) -> Result<Solution, Failure> {
+    let rubs = potential.rubs();
+    // Limits of the beginning may be far from those of the end: the first round has none.
+    let guess = potential.motion.as_ref().map(|motion| motion.dt());
+    let load_steps = solver.move_fixed(potential, fixed, targets, guess.map(|dt| (dt, velocities)), x)?;
+    let tolerance = solver.tolerance();
+    let mut solution = solver.minimise(potential, fixed, tolerance, x)?;
+    solution.load_steps = load_steps;
+    if !rubs {
+        return Ok(solution);
+    }
+    let mut gradient = vec![DVec3::ZERO; x.len()];
+    for _ in 0..MAX_FRICTION_ROUNDS {
+        potential.limits = potential.friction_limits(x);
+        potential.gradient(x, &mut gradient);
+        solution.gradient = norm(&gradient, fixed);
+        if solution.gradient <= tolerance {
+            return Ok(solution);
+        }
+        // Held limits need no more precision than they are true.
+        let next = solver.minimise(potential, fixed, tolerance.max(INNER_SHARE * solution.gradient), x)?;
+        solution.iterations += next.iterations;
+        solution.projected += next.projected;
+    }
+    Err(Failure::Friction { gradient: solution.gradient, tolerance })
+}
