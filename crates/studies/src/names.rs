@@ -2,8 +2,8 @@
 
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use trocar_cell::GraspDesign;
 use trocar_phantom::RecordOptions;
+use trocar_scene::{GraspDesignName, ScheduleName};
 
 /// A length written in millimetres, in metres.
 ///
@@ -76,6 +76,15 @@ pub enum SolverName {
 }
 
 impl SolverName {
+    /// The schedule of a scene of this name.
+    pub fn schedule(self) -> ScheduleName {
+        match self {
+            Self::Paper => ScheduleName::Paper,
+            Self::Fast => ScheduleName::Fast,
+            Self::Adaptive => ScheduleName::Adaptive,
+        }
+    }
+
     /// Its name in reports and JSON.
     pub fn name(self) -> &'static str {
         match self {
@@ -99,7 +108,7 @@ pub enum DesignName {
     Compliant,
 }
 
-impl From<DesignName> for GraspDesign {
+impl From<DesignName> for GraspDesignName {
     fn from(name: DesignName) -> Self {
         match name {
             DesignName::Friction => Self::Friction,

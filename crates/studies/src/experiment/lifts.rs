@@ -1,15 +1,36 @@
 //! The studies of lifts of the appendix, as the command line runs them: Table II and Fig. 7(f).
 
-use super::appendix::AppendixSource;
 use super::element_quality::{ElementQualityExperiment, ElementQualityResult, ElementQualityRow};
 use super::grasp_designs::{GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult};
+use super::lift_trials::{AppendixSource, Condition};
 use super::trials::resumed;
 use crate::Result;
 use crate::names::{AppendixChoice, millimetres};
 use crate::study::{Job, Kind, Study};
-use clap::Args;
+use clap::{Args, ValueEnum};
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed};
+
+/// In what the appendix is lifted.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ConditionName {
+    /// In the whole cell: organs touch each other, and a dynamic arm works through its port.
+    Cell,
+    /// The appendix alone, lifted by an ideal arm without a port.
+    Appendix,
+    /// Both, one after the other.
+    Both,
+}
+
+impl ConditionName {
+    fn conditions(self) -> Vec<Condition> {
+        match self {
+            Self::Cell => vec![Condition::Cell],
+            Self::Appendix => vec![Condition::Appendix],
+            Self::Both => vec![Condition::Cell, Condition::Appendix],
+        }
+    }
+}
 
 /// Table II and Fig. 7(a) to (c): four ways to hold the appendix, at five places and from three sides, and again after a drag.
 #[derive(Clone, Debug, Args)]
@@ -17,7 +38,10 @@ pub struct GraspDesigns {
     /// The appendix.
     #[command(flatten)]
     pub appendix: AppendixChoice,
-    /// Lift of the jaws [mm].
+    /// In what the appendix is lifted: the whole cell, alone, or both.
+    #[arg(long, value_enum, default_value_t = ConditionName::Both)]
+    pub condition: ConditionName,
+    /// Lift of the jaws (mm).
     #[arg(long, default_value = "15", value_parser = millimetres)]
     pub lift: f64,
     /// Force with which the jaws close [N].
@@ -34,9 +58,16 @@ pub struct ElementQuality {
     /// The appendix.
     #[command(flatten)]
     pub appendix: AppendixChoice,
-    /// Force with which the jaws close on tissue of 12 kPa [N]; on other tissue in proportion to its modulus.
+    /// In what the appendix is lifted: the whole cell, alone, or both.
+    #[arg(long, value_enum, default_value_t = ConditionName::Both)]
+    pub condition: ConditionName,
+    /// Force with which the jaws close (N), the same for all moduli.
     #[arg(long, default_value_t = trocar_cell::JAW_FORCE)]
     pub jaw_force: f64,
+    /// Run all cases a second time with a jaw force in proportion to the modulus (--jaw-force at 12 kPa), so that
+    /// tissue of every modulus is squeezed alike: a second table.
+    #[arg(long)]
+    pub scaled_force: bool,
     /// Cases at once; as many as the machine has threads by default. The figures do not depend on it.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
@@ -59,6 +90,7 @@ impl Study for GraspDesigns {
                 specimen: self.appendix.specimen.clone(),
                 record: self.appendix.recorded.options(),
             },
+            conditions: self.condition.conditions(),
             lift: self.lift,
             jaw_force: self.jaw_force,
             threads: self.threads,
@@ -82,7 +114,9 @@ impl Study for ElementQuality {
                 specimen: self.appendix.specimen.clone(),
                 record: self.appendix.recorded.options(),
             },
+            conditions: self.condition.conditions(),
             jaw_force: self.jaw_force,
+            scaled: self.scaled_force,
             threads: self.threads,
         };
         let result = experiment.run(job.output(), job.progress)?;
@@ -92,8 +126,19 @@ impl Study for ElementQuality {
 }
 
 fn designs(r: &GraspDesignsResult) -> Document {
-    let head =
-        ["Design", "Held", "Diverged", "Lift [mm]", "Slip [mm]", "Snap [mm]", "Follows", "Inverted", "Least volume"];
+    let head = [
+        "Condition",
+        "Design",
+        "Held",
+        "Diverged",
+        "Lift [mm]",
+        "Slip [mm]",
+        "Snap [mm]",
+        "Step [mm]",
+        "Inverted",
+        "Least volume",
+        "Suspensions",
+    ];
     let range = |ends: Option<(f64, f64)>| match ends {
         None => "\u{2013}".to_owned(),
         Some((least, most)) if most - least < 0.05 => fixed(most, 2),
@@ -101,32 +146,37 @@ fn designs(r: &GraspDesignsResult) -> Document {
     };
     let ours = |row: &GraspDesignRow| {
         vec![
+            row.condition.name().to_owned(),
             row.design.clone(),
             format!("{}/{}", row.held, row.trials),
             row.diverged.to_string(),
-            fixed(row.lift_mm, 2),
-            fixed(row.slip_mm, 3),
+            fixed(row.lift_median_mm, 2),
+            fixed(row.slip_median_mm, 3),
             range(row.snap_least_mm.zip(row.snap_mm)),
-            fixed(row.follow_ratio, 3),
+            fixed(row.activation_step_median_mm, 3),
             row.inverted_peak.to_string(),
             fixed(row.min_volume_ratio, 2),
+            suspensions(row.suspensions),
         ]
     };
     let paper = |row: &GraspDesignRow| {
         row.paper.map(|p| {
-            vec![
+            let cells = [
                 "(paper)".to_owned(),
+                row.design.clone(),
                 format!("{}/{}", p.held, p.trials),
                 p.diverged.to_string(),
                 fixed(p.lift_mm, 1),
                 fixed(p.slip_mm, 2),
                 range(p.snap_mm),
-            ]
+            ];
+            let empty = head.len() - cells.len();
+            cells.into_iter().chain(std::iter::repeat_n(String::new(), empty)).collect::<Vec<_>>()
         })
     };
     let rows = r.rows.iter().flat_map(|row| std::iter::once(ours(row)).chain(paper(row))).collect();
     let what = format!(
-        "appendix alone, {} nodes, {} tets, {} kPa, {} kg/m3; {} mm lift, jaws of {} N",
+        "the appendix: {} nodes, {} tets, {} kPa, {} kg/m3; {} mm lift, jaws of {} N",
         count(r.nodes),
         count(r.tets),
         r.modulus_kpa,
@@ -134,53 +184,69 @@ fn designs(r: &GraspDesignsResult) -> Document {
         r.lift_mm,
         r.jaw_force_n
     );
-    let lines = std::iter::once(what).chain(resumed(&r.resumed, "trials"));
+    let meaning = "Medians, as the paper's. Snap: what the grasp prescribes, zero by construction for live-pose and \
+                   compliant. Step: what moves in the grasp's first frame. Suspensions: contacts disabled / contacts of \
+                   blades disabled / organs relaxed.";
+    let lines = [meaning.to_owned(), what].into_iter().chain(resumed(&r.resumed, "trials"));
     Document::new("Grasp designs", "Four ways to hold the appendix")
         .with(Section::new("Table II", "").table(Table::new(head, rows)).lines(lines))
 }
 
+fn suspensions([contacts, blades, relaxed]: [usize; 3]) -> String {
+    format!("{contacts}/{blades}/{relaxed}")
+}
+
 fn quality(r: &ElementQualityResult) -> Document {
     let head = [
+        "Condition",
         "Design",
         "Pins",
         "Lift [mm]",
         "E [kPa]",
+        "Jaws [N]",
         "Inverted",
         "Diverged",
         "Least volume",
         "Yielded",
         "Follows",
         "Slip [mm]",
+        "Step [mm]",
         "Pull [N]",
         "Held",
+        "Suspensions",
         "Note",
     ];
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
-    let note = |row: &ElementQualityRow| match row {
-        row if !row.attached => "nothing in the jaws",
-        row if row.torn => "torn",
-        row if row.slipped > 0 => "slid",
-        _ => "",
-    };
     let row = |row: &ElementQualityRow| {
         vec![
+            row.condition.name().to_owned(),
             row.design.clone(),
             row.pins.clone(),
             fixed(row.lift_mm, 0),
             fixed(row.modulus_kpa, 0),
+            fixed(row.jaw_force_n, 2),
             row.inverted_peak.to_string(),
             yes(row.diverged),
             fixed(row.min_volume_ratio, 3),
             row.yielded_substeps.to_string(),
             fixed(row.follow_ratio, 3),
             fixed(row.slip_mm, 2),
+            fixed(row.activation_step_mm, 2),
             fixed(row.peak_constraint_n, 2),
             yes(row.held),
-            note(row).to_owned(),
+            suspensions(row.suspensions),
+            row.why.clone().unwrap_or_default(),
         ]
     };
-    let what = format!("appendix alone, {} nodes, {} tets; jaws of {} N", count(r.nodes), count(r.tets), r.jaw_force_n);
+    let table = |scaled: bool| {
+        let rows: Vec<Vec<String>> = r.rows.iter().filter(|c| c.scaled == scaled).map(row).collect();
+        (!rows.is_empty()).then(|| Table::new(head, rows))
+    };
+    let what = format!("the appendix: {} nodes, {} tets; jaws of {} N", count(r.nodes), count(r.tets), r.jaw_force_n);
     let lines = std::iter::once(what).chain(resumed(&r.resumed, "cases"));
+    let scaled = table(true).map(|t| Section::new("Jaw force in proportion to the modulus", "").table(t));
     Document::new("Element quality", "Lifts of the appendix against its pins")
-        .with(Section::new("Fig. 7(f)", "").table(Table::new(head, r.rows.iter().map(row).collect())).lines(lines))
+        .with_all(table(false).map(|t| Section::new("Fig. 7(f)", "").table(t)))
+        .with_all(scaled)
+        .with(Section::new("Settings", "").lines(lines))
 }

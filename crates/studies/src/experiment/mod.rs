@@ -1,6 +1,5 @@
 //! The paper's tables and figures: one file each.
 
-mod appendix;
 mod controller_grid;
 mod controller_motion;
 mod convergence;
@@ -9,6 +8,7 @@ mod grasp_designs;
 mod integrator_forms;
 mod integrator_row;
 mod integrators;
+mod lift_trials;
 mod lifts;
 mod normal;
 mod port_budget;
@@ -16,6 +16,7 @@ mod random_actions;
 mod reconstruction;
 mod rollouts;
 mod settling;
+mod side_by_side;
 mod similarity;
 mod step_ladder;
 mod trials;
@@ -26,10 +27,13 @@ pub use convergence::ConvergenceExperiment;
 #[cfg(test)]
 pub(crate) use element_quality::tests::made_up_result as made_up_element_quality;
 pub(crate) use element_quality::{ElementQualityResult, ElementQualityRow};
+pub(crate) use grasp_designs::DESIGNS;
 #[cfg(test)]
 pub(crate) use grasp_designs::tests::made_up_result as made_up_grasp_designs;
 pub(crate) use grasp_designs::{GraspDesignRow, GraspDesignsResult, GraspTrial};
 pub use integrators::IntegratorsExperiment;
+pub use lift_trials::Condition;
+pub(crate) use lift_trials::design_name;
 pub use lifts::{ElementQuality, GraspDesigns};
 pub use port_budget::PortBudget;
 pub use random_actions::RandomActionsExperiment;

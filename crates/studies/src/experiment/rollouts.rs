@@ -94,6 +94,8 @@ pub struct RolloutsResult {
     pub rcm_within_5_mm: usize,
     /// Most inverted elements in any frame.
     pub inverted_peak: usize,
+    /// Suspensions of physics in all rollouts: contacts disabled, contacts of blades disabled, organs relaxed.
+    pub suspensions: [usize; 3],
     /// Controller by controller.
     pub by_policy: Vec<PolicyRow>,
     /// What the paper says.
@@ -155,6 +157,11 @@ impl RolloutsResult {
             rcm_within_3_mm: within(THRESHOLD_MM),
             rcm_within_5_mm: within(ABORT_MM),
             inverted_peak: kept.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+            suspensions: [
+                kept.iter().map(|k| k.summary.disabled_contacts).sum(),
+                kept.iter().map(|k| k.summary.disabled_blades).sum(),
+                kept.iter().map(|k| k.summary.relaxed).sum(),
+            ],
             by_policy: made.policies,
             paper: PAPER,
             hash: made.hash,
@@ -178,6 +185,12 @@ fn document(plan: &Plan, r: &RolloutsResult, kept: &[Kept]) -> Result<Document> 
         Card::new("Diverged", count(r.diverged), "of all rollouts").met(r.diverged == 0),
         Card::new("Inverted elements", count(r.inverted_peak), "at worst, in any frame").met(r.inverted_peak == 0),
         Card::new("Passed", format!("{} of {}", r.passed, r.rollouts), "all stages"),
+        Card::new(
+            "Suspensions",
+            r.suspensions.map(|n| n.to_string()).join("/"),
+            "of physics: contacts disabled / contacts of blades disabled / organs relaxed",
+        )
+        .met(r.suspensions == [0; 3]),
     ];
     let outcome = Section::new("Outcome", lead).cards(cards).table(beside_paper(r));
     let spread = Section::new("Lift and RCM deviation", "Every rollout that attached the organ.")
