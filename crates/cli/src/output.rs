@@ -27,7 +27,12 @@ pub fn print<T: Serialize>(json: bool, value: &T, text: impl FnOnce(&T) -> Strin
     } else {
         text(value)
     };
-    match writeln!(std::io::stdout(), "{line}") {
+    self::line(&line);
+}
+
+/// Prints a line, or several.
+pub fn line(text: &str) {
+    match writeln!(std::io::stdout(), "{text}") {
         // Nobody reads on: that is theirs to decide.
         Err(e) if e.kind() != ErrorKind::BrokenPipe => lose(format_args!("standard output: {e}")),
         _ => {}

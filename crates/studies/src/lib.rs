@@ -1,25 +1,21 @@
-//! The paper's tables and figures, and benchmarks.
+//! The paper's tables and figures, and benchmarks: one file each, behind one trait.
+//!
+//! A [`study::Study`] has options, runs, and gives its figures and a document of them. [`registry::STUDIES`]
+//! lists all. Command line, JSON, page, progress and the tables for the docs come from there.
 
 mod bench;
+pub mod docs;
 mod error;
 mod experiment;
+pub mod names;
 mod pages;
+pub mod registry;
 mod schedules;
+pub mod study;
 
-pub use bench::{
-    CameraRow, CellBench, CellBenchResult, CellRow, EpisodeBench, EpisodeBenchResult, GraspBench, GraspBenchResult,
-    GraspPhaseTiming, Machine, ManyRow, MeshingBench, MeshingResult, MeshingRow, OrganSource, OrgansBench,
-    OrgansResult, RayRow, RenderBench, RenderBenchResult, ScalingBench, ScalingResult, ScalingRow, Timing,
-};
+pub use bench::{EpisodeBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
 pub use error::{Error, Result};
 pub use experiment::{
-    AppendixSource, Condition, ControllerBars, ControllerFigures, ControllerGridExperiment, ControllerGridResult,
-    ControllerInstant, ControllerRow, ConvergenceCase, ConvergenceExperiment, ConvergenceResult,
-    ElementQualityExperiment, ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment,
-    GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PaperRollouts,
-    PaperSimilarity, PhantomFigures, PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart,
-    RandomActionsExperiment, RandomActionsResult, RandomActionsRow, ReconstructionExperiment, ReconstructionResult,
-    ReconstructionRow, Resumed, RolloutsExperiment, RolloutsResult, SettlingExperiment, SettlingOrgan, SettlingResult,
-    SettlingRow, SimilarityExperiment, SimilarityResult, SimilarityRow, StepRow, WrenchExperiment, WrenchFrame,
-    WrenchParameter, WrenchResult, WrenchTilt,
+    ControllerGridExperiment, ConvergenceExperiment, IntegratorsExperiment, PortBudget, RandomActionsExperiment,
+    ReconstructionExperiment, RolloutsExperiment, Settling, SimilarityExperiment, Weighing,
 };

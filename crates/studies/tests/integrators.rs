@@ -2,8 +2,9 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use trocar_core::Silent;
-use trocar_phantom::RecordOptions;
 use trocar_studies::IntegratorsExperiment;
+use trocar_studies::names::Recorded;
+use trocar_studies::study::run;
 use trocar_testing::scenes::Organs;
 
 #[test]
@@ -14,13 +15,13 @@ fn the_papers_finding_is_one_of_settings() {
     trocar_geometry::io::write_msh(&mesh, &organs.organs[0].mesh).unwrap();
     let experiment = IntegratorsExperiment {
         mesh: Some(mesh),
-        record: RecordOptions::default(),
+        recorded: Recorded { frames: 181, seed: 1 },
         seconds: 0.2,
         undamped: false,
         threads: 1,
     };
     let output = folder.path().join("out");
-    let result = experiment.run(&output, &Silent).unwrap();
+    let result = run(&experiment, &output, &Silent).unwrap().0;
     let row = |name: &str| result.integrators.iter().find(|r| r.name == name).unwrap();
     assert!(!row("Semi-implicit Euler").bounded);
     assert_eq!(row("XPBD as in Newton 1.8").ended_at_s, Some(1.0 / 60.0));
@@ -40,6 +41,6 @@ fn the_papers_finding_is_one_of_settings() {
     let foreign = folder.path().join("foreign");
     std::fs::create_dir(&foreign).unwrap();
     std::fs::write(foreign.join("thesis.txt"), "mine").unwrap();
-    assert!(experiment.run(&foreign, &Silent).is_err());
-    assert!(IntegratorsExperiment { seconds: f64::NAN, ..experiment }.run(&output, &Silent).is_err());
+    assert!(run(&experiment, &foreign, &Silent).is_err());
+    assert!(run(&IntegratorsExperiment { seconds: f64::NAN, ..experiment }, &output, &Silent).is_err());
 }

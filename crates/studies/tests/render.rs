@@ -5,13 +5,14 @@
 use std::path::Path;
 use trocar_core::Silent;
 use trocar_studies::RenderBench;
+use trocar_studies::study::run;
 
 #[test]
 fn rays_end_where_embrees_do() {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
-    let (scene, phantoms) = (None, std::path::PathBuf::new());
+    let (scene, phantoms) = ("none".to_owned(), std::path::PathBuf::new());
     let bench = RenderBench { triangles: 20_000, samples: 0, rays: 200, python, picture: None, scene, phantoms };
-    let result = bench.run(&Silent).unwrap();
+    let result = run(&bench, Path::new(""), &Silent).unwrap().0;
     assert!((result.triangles as f64 / 20_000.0 - 1.0).abs() < 0.1, "{} triangles", result.triangles);
     assert!(result.preview_224_ms > 0.0 && result.refit_ms > 0.0 && result.path_720p_ms.is_none());
     assert_eq!(result.rays.len(), 2);

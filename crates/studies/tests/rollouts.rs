@@ -3,19 +3,20 @@
 use tempfile::TempDir;
 use trocar_core::Silent;
 use trocar_studies::RolloutsExperiment;
+use trocar_studies::names::SceneChoice;
+use trocar_studies::study::run;
 
 #[test]
 fn too_many_rollouts_are_refused_by_their_option() {
     let dir = TempDir::new().unwrap();
     let rollouts = RolloutsExperiment {
-        scene: "cell-a".to_owned(),
-        phantoms: dir.path().join("phantoms"),
+        scene: SceneChoice { scene: "cell-a".to_owned(), phantoms: dir.path().join("phantoms") },
         rollouts: 900_000_000,
         seed: 0,
         jobs: 1,
     };
     let folder = dir.path().join("campaign");
-    let why = rollouts.run(&folder, &Silent).unwrap_err().to_string();
+    let why = run(&rollouts, &folder, &Silent).unwrap_err().to_string();
     assert!(why.starts_with("--rollouts 900000000: "), "the command's own option: {why}");
     assert!(!folder.exists(), "nothing was begun");
 }

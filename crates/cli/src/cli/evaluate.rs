@@ -34,27 +34,3 @@ pub struct Evaluate {
     #[arg(short, long, visible_alias = "resume", value_name = "FOLDER", default_value = "trocar-campaign")]
     pub output: PathBuf,
 }
-
-/// Arguments of `experiment rollouts`.
-#[derive(Debug, Args)]
-pub struct RolloutsExperiment {
-    /// Scene file, or a built-in scene.
-    #[arg(default_value = "cell-a")]
-    pub scene: String,
-    /// Rollouts of all six controllers together.
-    #[arg(long, default_value_t = 140)]
-    pub rollouts: usize,
-    /// Seed of each controller's first rollout; the next have the next.
-    #[arg(long, default_value_t = 0)]
-    pub seed: u64,
-    /// Rollouts at once; as many as the machine has cores by default. The result does not depend on it.
-    #[arg(long, default_value_t = 0)]
-    pub jobs: usize,
-    /// Folder of made phantoms, where a scene's phantom is made once and kept
-    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
-    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
-    pub phantoms: PathBuf,
-    /// Campaign folder: begun there, or gone on with where it was left.
-    #[arg(short, long, visible_alias = "resume", value_name = "FOLDER", default_value = "trocar-experiment/rollouts")]
-    pub output: PathBuf,
-}

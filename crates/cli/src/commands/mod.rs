@@ -1,10 +1,8 @@
 //! One file a command.
 
-mod bench;
 mod demo;
 mod episode;
 mod evaluate;
-mod experiment;
 mod inspect;
 mod reconstruct;
 mod record;
@@ -12,15 +10,17 @@ mod render;
 mod scene;
 mod segment;
 mod simulate;
+mod study;
 
 use crate::cli::{Cli, Command};
 use trocar_core::Progress;
 use trocar_studies::Result;
+use trocar_studies::study::Kind;
 
 /// Runs the command that was typed.
 pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
     match &cli.command {
-        Command::Bench(arguments) => bench::run(arguments, cli.json, progress)?,
+        Command::Bench(arguments) => study::run(&arguments.study.0, Kind::Bench, cli.json, progress)?,
         Command::Demo(arguments) => demo::run(arguments, cli.json, progress)?,
         Command::Evaluate(arguments) => evaluate::run(arguments, cli.json, progress)?,
         Command::Episode(arguments) => episode::run(arguments, cli.json, progress)?,
@@ -30,7 +30,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Record(arguments) => record::run(arguments, cli.json, progress)?,
         Command::Render(arguments) => render::run(arguments, cli.json, progress)?,
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress)?,
-        Command::Experiment(arguments) => experiment::run(arguments, cli.json, progress)?,
+        Command::Experiment(arguments) => study::run(&arguments.study.0, Kind::Experiment, cli.json, progress)?,
         Command::Scene(arguments) => scene::run(arguments, cli.json)?,
         Command::Segment(arguments) => segment::run(arguments, cli.json, progress)?,
         Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress)?,

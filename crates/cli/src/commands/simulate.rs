@@ -37,7 +37,7 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
         organ: arguments.organ.clone(),
         design: arguments.design.map(Into::into),
         jaw_force: arguments.jaw_force,
-        schedule: arguments.schedule.as_ref().map(crate::cli::SolverName::schedule),
+        schedule: arguments.schedule.map(crate::cli::SolverName::schedule),
         threads: arguments.threads,
     };
     let result = match scene {

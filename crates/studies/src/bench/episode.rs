@@ -4,16 +4,23 @@
 
 use super::machine::Machine;
 use super::timing::median;
+use crate::names::SceneChoice;
+use crate::study::{Job, Kind, Study, stop_if_asked};
 use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use trocar_core::Progress;
 use trocar_render::RenderSettings;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
 use trocar_task::{Episode, Policy, policy};
 use trocar_workflow::scene_specimen;
+
+/// Path-traced frames that are timed.
+const PATH_FRAMES: usize = 10;
 
 /// Least real-time factor that is asked of two cores (SPEC E6).
 const BAR: f64 = 0.5;
@@ -21,23 +28,30 @@ const BAR: f64 = 0.5;
 /// Largest side of a picture [px].
 const LARGEST: usize = 4096;
 
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// Speed of a whole scripted episode with arms, organs and two cameras, and what its parts cost.
+#[derive(Clone, Debug, Args)]
 pub struct EpisodeBench {
-    /// Scene file or name.
-    pub scene: String,
-    /// Folder for a scene's phantom.
-    pub phantoms: PathBuf,
-    /// Worker threads for tissue, 0 for all.
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneChoice,
+    /// Worker threads for tissue; all by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Times that the episode is run.
+    /// Times that the episode is run; the median counts.
+    #[arg(long, default_value_t = 3)]
     pub runs: usize,
     /// Seed of the episode.
+    #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// Cameras that look once a control period.
+    /// A camera that looks once a control period; the endoscope and the depth camera by default. Several are named by several.
+    #[arg(long = "camera", value_name = "NAME", default_values_t = ["endoscope".to_owned(), "d405".to_owned()])]
     pub cameras: Vec<String>,
-    /// Side of their square pictures [px].
+    /// Side of the square pictures [px].
+    #[arg(long, default_value_t = 224)]
     pub size: usize,
+    /// Paths a pixel of the path-traced pictures of 1280 x 720; 0 leaves them out.
+    #[arg(long, default_value_t = 64)]
+    pub samples: u32,
 }
 
 /// The benchmark's outcome: medians over runs. Times are means over control periods, in milliseconds of wall time.
@@ -83,6 +97,14 @@ pub struct EpisodeBenchResult {
     pub size: usize,
     /// Worker threads for tissue.
     pub threads: usize,
+    /// What the pictures of `real_time_factor` are.
+    pub pictures: String,
+    /// Ten frames of 1280 x 720, path-traced, by the first camera: their mean [ms]; left out with 0 samples.
+    pub path_720p_ms: Option<f64>,
+    /// Paths a pixel of them.
+    pub samples: u32,
+    /// Real-time factor of an episode with such a picture from every camera once a control period, extrapolated from these ten.
+    pub real_time_factor_path_720p: Option<f64>,
     /// The machine.
     pub machine: Machine,
 }
@@ -96,18 +118,21 @@ struct Took {
     all: f64,
 }
 
-impl EpisodeBench {
-    /// Runs it.
-    ///
-    /// # Errors
-    /// A scene or specimen that cannot be had, a camera that the scene lacks, an interruption.
-    pub fn run(&self, progress: &dyn Progress) -> Result<EpisodeBenchResult> {
+impl Study for EpisodeBench {
+    const NAME: &'static str = "episode";
+    const KIND: Kind = Kind::Bench;
+    const FOLDER: Option<&'static str> = None;
+    const SCHEMA: u32 = 2;
+    type Figures = EpisodeBenchResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(EpisodeBenchResult, Document)> {
         if self.runs == 0 || !(1..=LARGEST).contains(&self.size) {
             let given = format!("--runs {} --size {}", self.runs, self.size);
             return Err(Error::Mismatch(format!("{given}: 1 or more runs and 1 to {LARGEST} px are wanted")));
         }
-        let scene = Scene::read(&self.scene)?;
-        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
+        let progress = job.progress;
+        let scene = Scene::read(&self.scene.scene)?;
+        let specimen = scene_specimen(&scene, &self.scene.phantoms, progress)?;
         let machine = Machine::here();
         let mut episode = Episode::new(&scene, &specimen, self.threads)?;
         let mut sight = CameraRig::new(&scene, &specimen, episode.cell())?;
@@ -125,10 +150,18 @@ impl EpisodeBench {
             let mut values: Vec<f64> = runs.iter().map(|t| 1e3 * of(t) / periods.max(1) as f64).collect();
             median(&mut values)
         };
+        let period_ms = 1e3 * episode.cell().period();
         let run_factors: Vec<f64> = runs.iter().map(|t| episode.time() / t.all.max(1e-9)).collect();
         let real_time_factor = median(&mut run_factors.clone());
         let bodies = episode.cell().world().model.bodies();
-        Ok(EpisodeBenchResult {
+        let path_720p_ms = (self.samples > 0).then(|| self.path_traced(&episode, &mut sight, progress)).transpose()?;
+        let rest_of_period = ms(|t| t.all - t.pictures);
+        let with_paths = |frame: f64| period_ms / (rest_of_period + frame * self.cameras.len() as f64);
+        let result = EpisodeBenchResult {
+            pictures: format!("previews of {0} x {0} pixels without shadows", self.size),
+            real_time_factor_path_720p: path_720p_ms.map(with_paths),
+            path_720p_ms,
+            samples: self.samples,
             real_time_factor,
             bar: BAR,
             met: real_time_factor >= BAR,
@@ -137,7 +170,7 @@ impl EpisodeBench {
             tissue_ms: ms(|t| t.tissue),
             pictures_ms: ms(|t| t.pictures),
             rest_ms: ms(|t| t.all - t.arms - t.tissue - t.pictures),
-            period_ms: 1e3 * episode.cell().period(),
+            period_ms,
             periods,
             simulated_s: episode.time(),
             end: episode.end().map_or("no end".to_owned(), ToString::to_string),
@@ -150,7 +183,28 @@ impl EpisodeBench {
             size: self.size,
             threads: if self.threads == 0 { machine.cores } else { self.threads },
             machine,
-        })
+        };
+        let document = document(&result);
+        Ok((result, document))
+    }
+}
+
+impl EpisodeBench {
+    /// Mean wall time of path-traced frames of 1280 x 720 through the first camera, where the episode ended [ms].
+    fn path_traced(&self, episode: &Episode, sight: &mut CameraRig, progress: &dyn Progress) -> Result<f64> {
+        let Some(camera) = self.cameras.first() else {
+            return Err(Error::Mismatch("--camera: one or more are wanted".to_owned()));
+        };
+        let settings = RenderSettings::path(self.samples);
+        progress.begin("path-traced frames", PATH_FRAMES as u64);
+        let clock = Instant::now();
+        for _ in 0..PATH_FRAMES {
+            stop_if_asked(progress)?;
+            sight.render(episode.cell(), camera, [1280, 720], &settings)?;
+            progress.advance(1);
+        }
+        progress.end();
+        Ok(1e3 * clock.elapsed().as_secs_f64() / PATH_FRAMES as f64)
     }
 
     fn once(
@@ -189,4 +243,48 @@ impl EpisodeBench {
             all: all.as_secs_f64(),
         })
     }
+}
+
+fn document(r: &EpisodeBenchResult) -> Document {
+    let head = [
+        "Pictures, once a control period",
+        "times real time",
+        "arms [ms]",
+        "tissue [ms]",
+        "pictures [ms]",
+        "rest [ms]",
+    ];
+    let cameras = r.cameras.len();
+    let row = |name: String, factor: f64, pictures: f64| {
+        let times = [r.arms_ms, r.tissue_ms, pictures, r.rest_ms].map(|ms| fixed(ms, 2));
+        [name, fixed(factor, if factor < 0.1 { 4 } else { 2 })].into_iter().chain(times).collect::<Vec<_>>()
+    };
+    let mut rows = vec![row(format!("{cameras} {}", r.pictures), r.real_time_factor, r.pictures_ms)];
+    if let (Some(factor), Some(ms)) = (r.real_time_factor_path_720p, r.path_720p_ms) {
+        let name =
+            format!("{cameras} of 1280 x 720 pixels, {} paths a pixel (extrapolated from {PATH_FRAMES})", r.samples);
+        rows.push(row(name, factor, ms * cameras as f64));
+    }
+    let factors = r.run_factors.iter().map(|f| fixed(*f, 2)).collect::<Vec<_>>().join(", ");
+    let mut lines = vec![
+        format!("bar {}; runs {factors}; a control period lasts {} ms", r.bar, fixed(r.period_ms, 1)),
+        format!(
+            "{} s simulated, {}, {} periods, {} organs, {} nodes; {}; {} threads on {}",
+            fixed(r.simulated_s, 1),
+            r.end,
+            r.periods,
+            r.organs,
+            count(r.nodes),
+            r.cameras.join(", "),
+            r.threads,
+            r.machine.described()
+        ),
+    ];
+    if !r.repeatable {
+        lines.push("the runs ended in DIFFERENT states".to_owned());
+    }
+    let lead = "The scripted controller does the scene's task. The first row's pictures are previews for policies: small, and \
+                without shadows; the second row's are what the paper's figures look like.";
+    Document::new("Episode", "Speed of a whole episode")
+        .with(Section::new("Episode", lead).table(Table::new(head, rows)).lines(lines))
 }

@@ -20,4 +20,10 @@ impl Machine {
             load: load.and_then(|text| text.split(' ').next().and_then(|word| word.parse().ok())),
         }
     }
+
+    /// In words: cores, and the load where the system tells.
+    pub fn described(&self) -> String {
+        let load = self.load.map_or(String::new(), |l| format!(", load {l:.1} at the beginning"));
+        format!("{} cores{load}", self.cores)
+    }
 }

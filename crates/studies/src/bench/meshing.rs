@@ -1,32 +1,37 @@
 //! What meshing costs: the lattice mesher from ten thousand to a million elements, and side by side with TetGen and fTetWild.
 
 use super::pytetwild::PytetwildMesher;
-use crate::{Error, Result, pages};
+use crate::names::Units;
+use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
-use trocar_core::Progress;
-use trocar_geometry::io::{Unit, read_surface};
+use trocar_geometry::io::read_surface;
 use trocar_geometry::{LatticeMesher, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, repair};
-use trocar_specimen::StagedFolder;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::plots::{Line, Plot};
+use trocar_report::table::{count, fixed, percent};
+use trocar_report::{colors, page};
 use trocar_testing::scenes::ellipsoid;
-use trocar_workflow::REPORT;
 
-/// The file that makes a folder one of this benchmark's.
-const MARKER: &str = "meshing.json";
 /// Half axes of the body that is meshed where no surface is named [m]: 815 cm3, the paper's liver.
 const LIVER: [f64; 3] = [0.105, 0.064, 0.029];
 
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// The lattice mesher from ten thousand to a million elements, and beside TetGen and fTetWild.
+#[derive(Clone, Debug, Args)]
 pub struct MeshingBench {
-    /// Surfaces; an ellipsoid of a liver's size where there is none.
+    /// Closed surfaces (.stl, .ply, .obj); an ellipsoid of a liver's size by default. The first is the one meshed finer and finer.
     pub surfaces: Vec<PathBuf>,
-    /// Their unit.
-    pub unit: Unit,
-    /// Numbers of elements the lattice mesher is asked for.
+    /// Unit of the surface files.
+    #[arg(long, value_enum, default_value_t = Units::Mm)]
+    pub units: Units,
+    /// Numbers of elements to aim at.
+    #[arg(long, value_delimiter = ',', default_values_t = [10_000, 30_000, 100_000, 300_000, 1_000_000])]
     pub sizes: Vec<usize>,
-    /// Python that has `pytetwild`.
+    /// Python that has the package pytetwild.
+    #[arg(long, default_value = "python3")]
     pub python: PathBuf,
 }
 
@@ -76,24 +81,22 @@ pub struct MeshingResult {
     pub report: String,
 }
 
-impl MeshingBench {
-    /// Runs everything and writes the report into the folder `output`.
-    ///
-    /// # Errors
-    /// A surface that cannot be read, a folder that cannot be written, an interruption. A mesher that fails is a row that says why.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<MeshingResult> {
-        let staged = StagedFolder::create(output, MARKER)?;
+impl Study for MeshingBench {
+    const NAME: &'static str = "meshing";
+    const KIND: Kind = Kind::Bench;
+    type Figures = MeshingResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(MeshingResult, Document)> {
         let surfaces = self.surfaces()?;
-        progress.begin("meshes", (self.sizes.len() + 3 * surfaces.len()) as u64);
+        job.progress.begin("meshes", (self.sizes.len() + 3 * surfaces.len()) as u64);
         let mut rows = Vec::new();
-        let mut measure = |name: &str, series: &'static str, surface: &TriMesh, mesher: &dyn Mesher, runs: usize| {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
-            rows.push(row(name, series, surface, mesher, runs));
-            progress.advance(1);
-            Ok(())
-        };
+        let mut measure =
+            |name: &str, series: &'static str, surface: &TriMesh, mesher: &dyn Mesher, runs: usize| -> Result<()> {
+                stop_if_asked(job.progress)?;
+                rows.push(row(name, series, surface, mesher, runs));
+                job.progress.advance(1);
+                Ok(())
+            };
         let (name, first) = &surfaces[0];
         for &size in &self.sizes {
             let mesher = LatticeMesher::for_body(first, 0.0, size);
@@ -105,30 +108,19 @@ impl MeshingBench {
             measure(name, "peers", surface, &TetgenMesher::default(), 1)?;
             measure(name, "peers", surface, &PytetwildMesher { python: self.python.clone() }, 1)?;
         }
-        progress.end();
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        job.progress.end();
+        stop_if_asked(job.progress)?;
         let per_tet = |r: Option<&MeshingRow>| r.filter(|r| r.tets > 0).map(|r| r.ns_per_tet);
         let mut of_size: Vec<&MeshingRow> = rows.iter().filter(|r| r.series == "size").collect();
         of_size.sort_by_key(|r| r.tets);
         let linearity = per_tet(of_size.last().copied()).zip(per_tet(of_size.first().copied())).map(|(a, b)| a / b);
-        let result = MeshingResult {
-            linearity,
-            threads: rayon::current_num_threads(),
-            report: output.join(REPORT).display().to_string(),
-            rows,
-        };
-        let html = pages::meshing(&result)?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        for (name, bytes) in [(REPORT, html.into_bytes()), (MARKER, json)] {
-            let path = staged.path().join(name);
-            std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })?;
-        }
-        staged.commit()?;
-        Ok(result)
+        let result = MeshingResult { linearity, threads: rayon::current_num_threads(), report: job.report(), rows };
+        let document = document(&result)?;
+        Ok((result, document))
     }
+}
 
+impl MeshingBench {
     /// The surfaces by name, repaired if need be.
     fn surfaces(&self) -> Result<Vec<(String, TriMesh)>> {
         if self.surfaces.is_empty() {
@@ -136,7 +128,7 @@ impl MeshingBench {
         }
         let read = |path: &PathBuf| -> Result<(String, TriMesh)> {
             let name = path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-            let raw = read_surface(path, self.unit)?;
+            let raw = read_surface(path, self.units.into())?;
             Ok((name, repair(&raw)?.0))
         };
         self.surfaces.iter().map(read).collect()
@@ -176,4 +168,80 @@ fn row(name: &str, series: &'static str, surface: &TriMesh, mesher: &dyn Mesher,
         volume_error: if tets > 0 { quality.volume / surface.volume() - 1.0 } else { 0.0 },
         failure,
     }
+}
+
+fn document(result: &MeshingResult) -> Result<Document> {
+    let of = |series: &'static str| result.rows.iter().filter(move |r| r.series == series);
+    let points = |f: &dyn Fn(&MeshingRow) -> f64| -> Vec<(f64, f64)> {
+        let mut points: Vec<_> = of("size").filter(|r| r.tets > 0).map(|r| (r.tets as f64 / 1e3, f(r))).collect();
+        points.sort_by(|a, b| a.0.total_cmp(&b.0));
+        points
+    };
+    let plot = |title: &'static str, y: &'static str, points: Vec<(f64, f64)>| {
+        let line = Line { points, color: colors::organ(0), filled: false };
+        let x = "tetrahedra [thousands]";
+        let plot = Plot {
+            title,
+            x,
+            y,
+            lines: vec![line],
+            bands: vec![],
+            show: vec![0.0],
+            limits: vec![],
+            log_x: false,
+            log_y: false,
+        };
+        Ok::<_, Error>(page::figure(&plot.svg()?, &format!("<b>{title}.</b>")))
+    };
+    let figures = [
+        plot("Time over size", "time [s]", points(&|r| r.seconds))?,
+        plot("Time per element", "time [\u{b5}s]", points(&|r| 1e-3 * r.ns_per_tet))?,
+    ];
+    let linear = result.linearity.map_or(String::new(), |ratio| {
+        format!(" Time per element at the largest size over that at the smallest: {}.", fixed(ratio, 2))
+    });
+    let lead = format!("The lattice mesher on one surface, finer and finer, {} threads.{linear}", result.threads);
+    let cost = Section::new("Cost", lead).figures(figures).table(rows(of("size")));
+    let peers = Section::new(
+        "Side by side",
+        "One surface, one run each on the same machine. The lattice mesher at the default settings (2.2 mm, or about 50,000 \
+         elements), TetGen at the paper's, fTetWild at its own; the time of the last two holds the start of their process.",
+    )
+    .table(rows(of("peers")));
+    Ok(Document::new("Meshing", "From closed surfaces to tetrahedra").with(cost).with(peers))
+}
+
+fn rows<'a>(rows: impl Iterator<Item = &'a MeshingRow>) -> Table {
+    let head = [
+        "Surface",
+        "Mesher",
+        "Nodes",
+        "Tetrahedra",
+        "Time [s]",
+        "[ns/tet]",
+        "Dihedral min.",
+        "median",
+        "max.",
+        "Inverted",
+        "Edge [mm]",
+        "Volume",
+    ];
+    let row = |r: &MeshingRow| match &r.failure {
+        Some(why) => vec![r.surface.clone(), r.mesher.clone(), why.clone()],
+        None => vec![
+            r.surface.clone(),
+            r.mesher.clone(),
+            count(r.nodes),
+            count(r.tets),
+            fixed(r.seconds, 2),
+            fixed(r.ns_per_tet, 0),
+            format!("{}\u{b0}", fixed(r.min_dihedral_deg, 1)),
+            format!("{}\u{b0}", fixed(r.median_dihedral_deg, 1)),
+            format!("{}\u{b0}", fixed(r.max_dihedral_deg, 1)),
+            count(r.inverted),
+            fixed(r.median_edge_mm, 2),
+            percent(r.volume_error, 2),
+        ],
+    };
+    Table::new(head, rows.map(row).collect())
 }

@@ -2,10 +2,15 @@
 
 use super::machine::Machine;
 use super::timing::Timing;
+use crate::names::{SolverName, kilopascals};
+use crate::study::{Job, Kind, Study, stop_if_asked};
 use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use trocar_core::Progress;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::table::{count, fixed, percent};
 use trocar_testing::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
 use trocar_tissue::Material;
 use trocar_workflow::solver_named;
@@ -16,65 +21,36 @@ const TUBE_FRAMES: [usize; 3] = [15, 30, 60];
 /// Longest time to settle [s].
 const LONGEST: f64 = 3600.0;
 
-/// Where organs come from.
-#[derive(Clone, Debug)]
-pub enum OrganSource {
-    /// A Gmsh file in metres.
-    File(PathBuf),
-    /// Our own organs with about so many elements.
-    Analytic(usize),
-}
-
-impl OrganSource {
-    /// The organs.
-    ///
-    /// # Errors
-    /// As [`Organs::read`] and [`Organs::analytic`].
-    pub fn organs(&self) -> Result<Organs> {
-        Ok(match self {
-            Self::File(path) => Organs::read(path)?,
-            Self::Analytic(tets) => Organs::analytic(*tets)?,
-        })
-    }
-}
-
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// Speed and error of the stepping of six organs by one schedule.
+#[derive(Clone, Debug, Args)]
 pub struct OrgansBench {
-    /// The organs.
-    pub organs: OrganSource,
-    /// Name of the schedule, one of [`trocar_workflow::SOLVERS`].
-    pub schedule: String,
-    /// Worker threads; 0: as many as the machine has.
+    /// Gmsh file (.msh, in metres, z up) with the organs, one a physical group or connected part; our own organs by default.
+    #[arg(long, value_name = "FILE", conflicts_with = "tets")]
+    pub mesh: Option<PathBuf>,
+    /// Elements of our own organs together, about.
+    #[arg(long, default_value_t = 44_000)]
+    pub tets: usize,
+    /// What steps them.
+    #[arg(long, value_enum, default_value_t = SolverName::Fast)]
+    pub schedule: SolverName,
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Young's modulus [Pa].
+    /// Young's modulus [kPa].
+    #[arg(long = "young", default_value = "12", value_parser = kilopascals)]
     pub young_modulus: f64,
     /// Poisson's ratio.
+    #[arg(long = "poisson", default_value_t = 0.45)]
     pub poisson_ratio: f64,
-    /// Whether tissue is damped as in the cell while it is timed and judged; it always is while it settles. The peers have no damping.
+    /// Damp the tissue as in the cell while it is timed and judged, too; the peers have no damping.
+    #[arg(long)]
     pub damped: bool,
-    /// Frames before the timed ones.
-    pub warm_up: usize,
-    /// Timed frames.
+    /// Timed frames, after a quarter as many that are not.
+    #[arg(long, default_value_t = 120)]
     pub frames: usize,
-    /// Simulated time for which the organs settle before their sag is measured [s].
+    /// Simulated seconds for which the organs settle before their sag is measured.
+    #[arg(long, default_value_t = 3.0)]
     pub settle: f64,
-}
-
-impl Default for OrgansBench {
-    fn default() -> Self {
-        Self {
-            organs: OrganSource::Analytic(44_000),
-            schedule: "fast".into(),
-            threads: 0,
-            young_modulus: 12e3,
-            poisson_ratio: 0.45,
-            damped: false,
-            warm_up: 30,
-            frames: 120,
-            settle: 3.0,
-        }
-    }
 }
 
 /// The benchmark's outcome.
@@ -130,12 +106,13 @@ pub struct OrgansResult {
     pub machine: Machine,
 }
 
-impl OrgansBench {
-    /// Runs the scenes.
-    ///
-    /// # Errors
-    /// Organs that cannot be read or simulated, a scene that diverges, an oracle that finds no minimum, an interruption.
-    pub fn run(&self, progress: &dyn Progress) -> Result<OrgansResult> {
+impl Study for OrgansBench {
+    const NAME: &'static str = "organs";
+    const KIND: Kind = Kind::Bench;
+    const FOLDER: Option<&'static str> = None;
+    type Figures = OrgansResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(OrgansResult, Document)> {
         if self.frames == 0 || !(self.settle > 0.0 && self.settle <= LONGEST) {
             return Err(Error::Mismatch(format!(
                 "{} timed frames and {} s to settle; 1 or more frames and up to {LONGEST} s make sense",
@@ -143,14 +120,19 @@ impl OrgansBench {
             )));
         }
         let machine = Machine::here();
-        let schedule = solver_named(&self.schedule)?;
-        let organs = self.organs.organs()?;
+        let progress = job.progress;
+        let schedule = solver_named(self.schedule.name())?;
+        let organs = match &self.mesh {
+            Some(path) => Organs::read(path)?,
+            None => Organs::analytic(self.tets)?,
+        };
+        let warm_up = self.frames / 4;
         let damped = material(self.young_modulus, self.poisson_ratio);
         let material = if self.damped { damped } else { Material { viscosity: 0.0, ..damped } };
         let time = |scene: &Scene| {
-            progress.begin(scene.name, (self.warm_up + self.frames) as u64);
+            progress.begin(scene.name, (warm_up + self.frames) as u64);
             let mut run = Run::new(scene, schedule, self.threads)?;
-            let timing = Timing::of(&mut run, self.warm_up, self.frames, f64::INFINITY, progress);
+            let timing = Timing::of(&mut run, warm_up, self.frames, f64::INFINITY, progress);
             progress.end();
             timing
         };
@@ -163,7 +145,7 @@ impl OrgansBench {
         progress.begin("sag", frames as u64 + 1);
         let mut settled_speed_m_s = 0.0;
         for _ in 0..frames {
-            stop_if(progress)?;
+            stop_if_asked(progress)?;
             settled_speed_m_s = run.frame()?.max_speed;
             progress.advance(1);
         }
@@ -176,7 +158,7 @@ impl OrgansBench {
         let free = sag.model.bodies().iter().flat_map(|b| b.pinned()).filter(|p| !**p).count();
 
         let tube = Tube::run(&Scene::tube(&organs, material)?, schedule, self.threads, progress)?;
-        Ok(OrgansResult {
+        let result = OrgansResult {
             real_time_factor: drag.real_time_factor,
             real_time_factor_moving: moving.real_time_factor,
             frame_ms_median: drag.frame_ms_median,
@@ -184,7 +166,7 @@ impl OrgansBench {
             step_error: tube.errors.iter().copied().fold(0.0, f64::max),
             threads: if self.threads == 0 { machine.cores } else { self.threads },
             isa: schedule.isa(),
-            schedule: self.schedule.clone(),
+            schedule: self.schedule.name().to_owned(),
             damped: self.damped,
             substeps: schedule.substeps(),
             mesh: organs.source.clone(),
@@ -201,7 +183,9 @@ impl OrgansBench {
             tube_inverted: tube.inverted,
             tube_yielded_substeps: tube.yielded,
             machine,
-        })
+        };
+        let document = document(&result);
+        Ok((result, document))
     }
 }
 
@@ -232,7 +216,7 @@ impl Tube {
             tube.inverted = tube.inverted.max(report.inverted);
             tube.yielded += report.grasp_limited;
             for substep in 0..substeps {
-                stop_if(progress)?;
+                stop_if_asked(progress)?;
                 oracle.step(h, frame as f64 * FRAME + (substep + 1) as f64 * h)?;
                 progress.advance(1);
             }
@@ -245,6 +229,49 @@ impl Tube {
     }
 }
 
-fn stop_if(progress: &dyn Progress) -> Result<()> {
-    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+fn document(r: &OrgansResult) -> Document {
+    let head =
+        ["1/60 s frames", "median [ms]", "worst [ms]", "real time", "iterations", "inverted", "yielded", "fallbacks"];
+    let row = |name: String, t: &Timing| {
+        vec![
+            name,
+            fixed(t.frame_ms_median, 2),
+            fixed(t.frame_ms_worst, 2),
+            format!("{}\u{d7}", fixed(t.real_time_factor, 2)),
+            fixed(t.iterations_per_frame, 0),
+            count(t.inverted),
+            count(t.yielded_substeps),
+            count(t.fallbacks),
+        ]
+    };
+    let rows = vec![row(format!("{} dragged", r.appendix), &r.drag), row("every organ shaken".to_owned(), &r.moving)];
+    let lines = [
+        format!(
+            "{}: {} organs, {} nodes, {} tets; schedule '{}' ({} substeps), {} threads, {} kernels ({})",
+            r.mesh,
+            r.organs,
+            r.nodes,
+            r.tets,
+            r.schedule,
+            r.substeps,
+            r.threads,
+            r.isa,
+            r.machine.described()
+        ),
+        format!(
+            "sag {} off the static solution (mean {} \u{b5}m) after {} s, when the fastest node moves at {:.1e} m/s",
+            percent(r.static_sag_error, 3),
+            fixed(r.static_sag_um, 2),
+            fixed(r.settled_s, 1),
+            r.settled_speed_m_s
+        ),
+        format!(
+            "tube {} off the oracle at frames 15, 30, 60; {} inverted, grasp yielded in {} substeps",
+            r.step_errors.map(|e| percent(e, 3)).join(", "),
+            r.tube_inverted,
+            r.tube_yielded_substeps
+        ),
+    ];
+    Document::new("Organs", "Speed and error of the stepping")
+        .with(Section::new("Six organs", "").table(Table::new(head, rows)).lines(lines))
 }

@@ -4,9 +4,11 @@ mod rays;
 
 pub use rays::RayRow;
 
-use super::Machine;
-use super::median;
+use super::machine::Machine;
+use super::timing::median;
+use crate::study::{Job, Kind, Study, stop_if_asked};
 use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -14,6 +16,8 @@ use trocar_camera::{Camera, Endoscope};
 use trocar_cell::Cell;
 use trocar_core::{Pose, Progress};
 use trocar_render::{Appearance, BodyId, Film, Light, RayGenerator, RenderSettings, ShapeId, Stage, render};
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
 use trocar_testing::scenes::{LaparoscopicScene, endoscope_view};
@@ -25,22 +29,30 @@ const MOVING: usize = 1;
 /// Frames that are timed, after a tenth as many that are not.
 const FRAMES: usize = 60;
 
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// What pictures cost: a preview for policies, a path-traced frame, rays beside Embree.
+#[derive(Clone, Debug, Args)]
 pub struct RenderBench {
-    /// Triangles of all organs, about; a fifth of them deform.
+    /// Triangles of the organs, about; a fifth of them deform.
+    #[arg(long, default_value_t = 100_000)]
     pub triangles: usize,
     /// Paths a pixel of the large picture; 0 leaves it out.
+    #[arg(long, default_value_t = 64)]
     pub samples: u32,
-    /// Side of the square image of rays for the comparison with Embree.
+    /// Side of the square image of rays that are cast beside Embree.
+    #[arg(long, default_value_t = 1024)]
     pub rays: usize,
-    /// Python with `embreex`.
+    /// Python that has the package embreex.
+    #[arg(long, default_value = "python3")]
     pub python: PathBuf,
-    /// Where to write the large picture (PNG); nowhere if left out.
+    /// Where to write the large picture (PNG).
+    #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
-    /// Scene whose cameras are measured while its grasp-lift goes on; none if left out.
-    pub scene: Option<String>,
-    /// Folder in which its phantom is recorded and reconstructed.
+    /// Scene file or built-in scene whose cameras are measured; none for none.
+    #[arg(long, default_value = "cell-a")]
+    pub scene: String,
+    /// Folder of made phantoms, where the scene's phantom is made once and kept
+    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }
 
@@ -186,19 +198,21 @@ impl Set {
     }
 }
 
-impl RenderBench {
-    /// Runs everything.
-    ///
-    /// # Errors
-    /// An interruption, or a picture that cannot be written. Embree that cannot be run is told in the result.
-    pub fn run(&self, progress: &dyn Progress) -> Result<RenderBenchResult> {
+impl Study for RenderBench {
+    const NAME: &'static str = "render";
+    const KIND: Kind = Kind::Bench;
+    const FOLDER: Option<&'static str> = None;
+    type Figures = RenderBenchResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(RenderBenchResult, Document)> {
         let machine = Machine::here();
+        let progress = job.progress;
         progress.begin("measurements", 5);
         let step = || {
             progress.advance(1);
-            if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
+            stop_if_asked(progress)
         };
-        let cell = self.scene.as_ref().map(|scene| self.cell(scene, progress)).transpose()?;
+        let cell = (self.scene != "none").then(|| self.cell(&self.scene, progress)).transpose()?;
         let clock = Instant::now();
         let mut set = Set::new(self.triangles)?;
         let build_ms = 1e3 * clock.elapsed().as_secs_f64();
@@ -208,14 +222,14 @@ impl RenderBench {
         let loops_refit_ms = set.refit()?;
         step()?;
         let whole = rays::merged(&set.scene.organs);
-        let (mut rays, embree_failure) = self.rays(&whole, &set.view)?;
+        let (mut rays, embree_failure) = rays::measure(&whole, &set.view, self.rays, &self.python)?;
         rays.shrink_to_fit();
         step()?;
         let path_720p_ms = if self.samples > 0 { Some(self.path(&mut set)?) } else { None };
         step()?;
         progress.end();
         let first = cell.as_ref().and_then(|c| c.cameras.first());
-        Ok(RenderBenchResult {
+        let result = RenderBenchResult {
             preview_224_ms: first.map_or(loops_224_ms, |c| c.ms),
             preview_224_unshadowed_ms: first.map_or(loops_224_unshadowed_ms, |c| c.unshadowed_ms),
             preview_224_best_ms: first.map_or(loops_best_ms, |c| c.best_ms),
@@ -232,9 +246,13 @@ impl RenderBench {
             embree_failure,
             threads: rayon::current_num_threads(),
             machine,
-        })
+        };
+        let document = document(&result);
+        Ok((result, document))
     }
+}
 
+impl RenderBench {
     /// The cell's cameras while the grasp-lift goes on: frames of all of them after each period, which is not timed.
     fn cell(&self, name: &str, progress: &dyn Progress) -> Result<CellRow> {
         let scene = Scene::read(name)?;
@@ -298,4 +316,54 @@ impl RenderBench {
         }
         Ok(took)
     }
+}
+
+fn document(r: &RenderBenchResult) -> Document {
+    let mut lines = Vec::new();
+    let mut rows = Vec::new();
+    let picture =
+        |name: String, shadowed: String, best: String, plain: f64| vec![name, shadowed, best, fixed(plain, 1)];
+    if let Some(cell) = &r.cell {
+        lines.push(format!(
+            "{}: {} triangles, made in {} ms; following the cell {} ms",
+            cell.scene,
+            count(cell.triangles),
+            fixed(cell.begin_ms, 0),
+            fixed(cell.follow_ms, 2)
+        ));
+        for c in &cell.cameras {
+            rows.push(picture(c.camera.clone(), fixed(c.ms, 1), fixed(c.best_ms, 1), c.unshadowed_ms));
+        }
+    }
+    rows.push(picture("loops of bowel".to_owned(), fixed(r.loops_224_ms, 1), String::new(), r.loops_224_unshadowed_ms));
+    lines.push(format!(
+        "loops of bowel: {} triangles, {} of them refitted each frame; all trees again {} ms; {} threads on {}",
+        count(r.triangles),
+        count(r.refitted_triangles),
+        fixed(r.build_ms, 0),
+        r.threads,
+        r.machine.described()
+    ));
+    if let Some(ms) = r.path_720p_ms {
+        lines.push(format!("1280 x 720 pixels with {} paths each: {} s", r.samples, fixed(1e-3 * ms, 1)));
+    }
+    lines.extend(r.embree_failure.as_ref().map(|why| format!("Embree: {why}")));
+    let dash = || "\u{2013}".to_owned();
+    let million = |x: Option<f64>| x.map_or_else(dash, |x| fixed(1e-6 * x, 2));
+    let rays = r.rays.iter().map(|row| {
+        vec![
+            row.kind.to_owned(),
+            count(row.rays),
+            million(Some(row.rays_per_second)),
+            million(row.embree_rays_per_second),
+            row.ratio.map_or_else(dash, |x| fixed(x, 2)),
+            row.differing.map_or_else(dash, count),
+            row.largest_difference_m.map_or_else(dash, |x| fixed(1e6 * x, 2)),
+        ]
+    });
+    let head = ["Rays", "count", "ours [M/s]", "Embree [M/s]", "ratio", "differ", "most [\u{b5}m]"];
+    let pictures = ["224 x 224 pixels", "with shadows [ms]", "best [ms]", "without shadows [ms]"];
+    Document::new("Render", "What pictures cost")
+        .with(Section::new("Previews", "").table(Table::new(pictures, rows)).lines(lines))
+        .with(Section::new("Rays on one thread", "").table(Table::new(head, rays.collect())))
 }

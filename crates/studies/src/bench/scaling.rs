@@ -3,17 +3,18 @@
 use super::machine::Machine;
 use super::many::{self, ManyRow};
 use super::timing::Timing;
-use crate::{Error, Result, pages};
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
-use std::path::Path;
 use trocar_core::Progress;
-use trocar_specimen::StagedFolder;
+use trocar_report::colors;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::plots::{Line, Plot};
+use trocar_report::table::{count, fixed, percent};
 use trocar_testing::scenes::{Organs, Run, Scene, material};
-use trocar_workflow::REPORT;
 use trocar_workflow::{SOLVERS, solver_named};
-
-/// The file that makes a folder one of this benchmark's.
-const MARKER: &str = "scaling.json";
 
 /// Frames before the timed ones, and most timed ones.
 const WARM_UP: usize = 3;
@@ -22,31 +23,24 @@ const FRAMES: usize = 60;
 /// Frames that a measurement has at least, warm-up included.
 const LEAST_FRAMES: f64 = 6.0;
 
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// Speed of the stepping from a thousand to a million elements, over threads, and of many small models at once.
+#[derive(Clone, Debug, Args)]
 pub struct ScalingBench {
-    /// Elements of our own organs together, about; ascending.
+    /// Numbers of elements to aim at, ascending.
+    #[arg(long, value_delimiter = ',', default_values_t = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000])]
     pub sizes: Vec<usize>,
     /// Numbers of worker threads.
+    #[arg(long, value_delimiter = ',', default_values_t = [1, 2])]
     pub threads: Vec<usize>,
-    /// Wall time that one measurement may take [s]: what is expected to take longer is left out, and said.
+    /// Seconds that one measurement may take; what is expected to take longer is left out.
+    #[arg(long, default_value_t = 20.0)]
     pub budget: f64,
-    /// Small models stepped at once; 0: none.
+    /// Small models stepped at once; 0 for none.
+    #[arg(long, default_value_t = 64)]
     pub many: usize,
     /// Elements of each of them, about.
+    #[arg(long, default_value_t = 700)]
     pub small: usize,
-}
-
-impl Default for ScalingBench {
-    fn default() -> Self {
-        Self {
-            sizes: vec![1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000],
-            threads: vec![1, 2],
-            budget: 20.0,
-            many: 64,
-            small: 700,
-        }
-    }
 }
 
 /// One size with one schedule and number of threads.
@@ -81,46 +75,41 @@ pub struct ScalingResult {
     pub report: String,
 }
 
-impl ScalingBench {
-    /// Runs everything and writes the report into the folder `output`.
-    ///
-    /// # Errors
-    /// A folder that cannot be written, an interruption. What cannot be measured is a row that says why.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<ScalingResult> {
-        let staged = StagedFolder::create(output, MARKER)?;
+impl Study for ScalingBench {
+    const NAME: &'static str = "scaling";
+    const KIND: Kind = Kind::Bench;
+    type Figures = ScalingResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(ScalingResult, Document)> {
         let machine = Machine::here();
         let settings = SOLVERS.len() * self.threads.len();
         let mut rows: Vec<ScalingRow> = Vec::new();
         for size in &self.sizes {
-            progress.begin(&format!("{size} tets"), (settings * (WARM_UP + FRAMES)) as u64);
+            job.progress.begin(&format!("{size} tets"), (settings * (WARM_UP + FRAMES)) as u64);
             let made =
                 Organs::analytic(*size).and_then(|organs| Ok((Scene::moving(&organs, material(12e3, 0.45))?, organs)));
             for schedule in SOLVERS {
                 for threads in &self.threads {
                     let row = match &made {
-                        Ok((scene, organs)) => self.row(scene, organs, schedule, *threads, &rows, progress)?,
+                        Ok((scene, organs)) => self.row(scene, organs, schedule, *threads, &rows, job.progress)?,
                         Err(why) => blank(schedule, *threads, *size, why.to_string()),
                     };
                     rows.push(row);
                 }
             }
-            progress.end();
+            job.progress.end();
         }
         let many = match self.many {
             0 => Vec::new(),
-            count => many::measure(count, self.small, &self.threads, self.budget, progress)?,
+            count => many::measure(count, self.small, &self.threads, self.budget, job.progress)?,
         };
-        let result = ScalingResult { rows, many, machine, report: output.join(REPORT).display().to_string() };
-        let html = pages::scaling(&result)?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        for (name, bytes) in [(REPORT, html.into_bytes()), (MARKER, json)] {
-            let path = staged.path().join(name);
-            std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })?;
-        }
-        staged.commit()?;
-        Ok(result)
+        let result = ScalingResult { rows, many, machine, report: job.report() };
+        let document = document(&result)?;
+        Ok((result, document))
     }
+}
 
+impl ScalingBench {
     fn row(
         &self,
         scene: &Scene,
@@ -158,4 +147,141 @@ fn expected_seconds(before: &[ScalingRow], schedule: &str, threads: usize, tets:
 
 fn blank(schedule: &str, threads: usize, tets: usize, why: String) -> ScalingRow {
     ScalingRow { schedule: schedule.to_owned(), isa: "", threads, tets, nodes: 0, timing: None, skipped: Some(why) }
+}
+
+/// What many small models may lose.
+const LOSS: f64 = 0.1;
+
+fn document(result: &ScalingResult) -> Result<Document> {
+    let m = &result.machine;
+    let load = m.load.map_or(String::new(), |l| {
+        let busy = if l > 0.5 { "; the machine was not idle, so the figures are too low" } else { "" };
+        format!(", load {} at the beginning{busy}", fixed(l, 1))
+    });
+    let lead = format!(
+        "Our own six organs (fewer at the smallest sizes), finer and finer, the lowest 42% of each pinned and a patch of each shaken. Median of up to 60 frames of \
+         1/60 s; {} cores{load}. The dashed line is real time.",
+        m.cores
+    );
+    let plots = [
+        plot(result, "Real-time factor", "times real time", &|r, t| (r.tets as f64, t.real_time_factor))?,
+        plot(result, "Time per element", "\u{b5}s a frame", &|r, t| {
+            (r.tets as f64, 1e3 * t.frame_ms_median / r.tets as f64)
+        })?,
+    ];
+    let mut document = Document::new("Scaling", "Stepping over elements, threads and models")
+        .with(Section::new("Sizes", lead).figures(plots).table(sizes(result)));
+    if !result.many.is_empty() {
+        let section = Section::new(
+            "Many small models",
+            "Each small model is an appendix with a stepper of its own; they are shared out among the threads. The same appendixes stand in one model beside them, and \
+             six organs of the same total size.",
+        );
+        document = document.with(section.cards(cards(result)).table(many_table(result)));
+    }
+    Ok(document)
+}
+
+/// The schedules and threads, in the order of the rows.
+fn settings(result: &ScalingResult) -> Vec<(&str, usize)> {
+    let mut all: Vec<(&str, usize)> = Vec::new();
+    for row in &result.rows {
+        if !all.contains(&(row.schedule.as_str(), row.threads)) {
+            all.push((&row.schedule, row.threads));
+        }
+    }
+    all
+}
+
+fn plot(
+    result: &ScalingResult,
+    title: &'static str,
+    y: &'static str,
+    point: &dyn Fn(&ScalingRow, &Timing) -> (f64, f64),
+) -> Result<String> {
+    let settings = settings(result);
+    let line = |(k, (schedule, threads)): (usize, &(&str, usize))| {
+        let rows = result.rows.iter().filter(|r| (r.schedule.as_str(), r.threads) == (schedule, *threads));
+        let points = rows.filter_map(|r| r.timing.as_ref().map(|t| point(r, t))).collect();
+        Line { points, color: colors::organ(k), filled: false }
+    };
+    let lines = settings.iter().enumerate().map(line).collect();
+    let limits = if title == "Real-time factor" { vec![1.0] } else { vec![] };
+    let plot = Plot { title, x: "elements", y, lines, bands: vec![], show: vec![], limits, log_x: true, log_y: true };
+    let names: Vec<String> = settings.iter().map(|(s, t)| format!("{s}, {}", threads(*t))).collect();
+    let legend = page::legend(names.iter().enumerate().map(|(k, name)| (name.as_str(), colors::organ(k))));
+    Ok(page::figure(&plot.svg()?, &format!("<b>{title}.</b>{legend}")))
+}
+
+fn threads(n: usize) -> String {
+    if n == 1 { "1 thread".to_owned() } else { format!("{n} threads") }
+}
+
+fn sizes(result: &ScalingResult) -> Table {
+    let head = [
+        "Schedule",
+        "Kernels",
+        "Threads",
+        "Elements",
+        "Nodes",
+        "Frame [ms]",
+        "Real time",
+        "Iterations a frame",
+        "Inverted",
+        "Yielded",
+    ];
+    let row = |r: &ScalingRow| {
+        let mut cells =
+            vec![r.schedule.clone(), r.isa.to_owned(), r.threads.to_string(), count(r.tets), count(r.nodes)];
+        match (&r.timing, &r.skipped) {
+            (Some(t), _) => cells.extend([
+                fixed(t.frame_ms_median, 2),
+                format!("{}\u{d7}", fixed(t.real_time_factor, 2)),
+                fixed(t.iterations_per_frame, 0),
+                count(t.inverted),
+                count(t.yielded_substeps),
+            ]),
+            (None, why) => cells.push(why.clone().unwrap_or_default()),
+        }
+        cells
+    };
+    Table::new(head, result.rows.iter().map(row).collect())
+}
+
+fn cards(result: &ScalingResult) -> Vec<Card> {
+    let card = |r: &ManyRow| {
+        let note = format!("{} models, {}, {}; at most {}", r.models, r.schedule, threads(r.threads), percent(LOSS, 0));
+        Card::new("Loss against one model", percent(r.loss, 1), note).met(r.loss <= LOSS)
+    };
+    result.many.iter().map(card).collect()
+}
+
+fn many_table(result: &ScalingResult) -> Table {
+    let head = [
+        "Schedule",
+        "Threads",
+        "Models",
+        "Elements",
+        "Many [ms]",
+        "One model [ms]",
+        "Loss",
+        "Six organs [ms]",
+        "their elements",
+        "Loss an element",
+    ];
+    let row = |r: &ManyRow| {
+        vec![
+            r.schedule.clone(),
+            r.threads.to_string(),
+            r.models.to_string(),
+            count(r.tets),
+            fixed(r.many_ms, 2),
+            fixed(r.one_model_ms, 2),
+            percent(r.loss, 1),
+            fixed(r.organs_ms, 2),
+            count(r.organs_tets),
+            percent(r.loss_against_organs, 1),
+        ]
+    };
+    Table::new(head, result.many.iter().map(row).collect())
 }

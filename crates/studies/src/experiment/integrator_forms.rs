@@ -1,6 +1,6 @@
 //! The integrators that are compared, each as the paper or an engine has it and in its best form, and what the comparison says.
 
-use super::integrators::IntegratorRow;
+use super::integrator_row::IntegratorRow;
 use trocar_tissue::{Descent, Model, SolverSettings, Start};
 use trocar_tissue_reference::{Scheme, SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep};
 

@@ -1,25 +1,29 @@
 //! Fig. 6(b): which integrators stay bounded when specimen A is released under gravity, and how far each comes to rest from the true equilibrium.
 
 use super::integrator_forms::{Form, forms};
-use crate::{Error, Result, pages};
+use super::integrator_row::IntegratorRow;
+use crate::names::Recorded;
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use glam::DVec3;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 use trocar_cell::World;
 use trocar_core::Progress;
-use trocar_phantom::RecordOptions;
+use trocar_report::colors;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::plots::{Line, Plot};
+use trocar_report::table::{count, fixed, percent};
 use trocar_testing::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
 use trocar_tissue::{Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
-use trocar_workflow::REPORT;
 use trocar_workflow::phantoms;
 
-/// The file that makes a folder one of this experiment's.
-const MARKER: &str = "integrators.json";
-
 /// Speed at which a node has diverged [m/s], the paper's limit.
-pub(crate) const SPEED_LIMIT: f64 = 20.0;
+const SPEED_LIMIT: f64 = 20.0;
 
 /// The last share of the run, over which positions are averaged before they are compared with the equilibrium: tissue that is not damped swings around it.
 const MEASURED_SHARE: f64 = 1.0 / 3.0;
@@ -30,48 +34,24 @@ const LIGHT_DAMPING: f64 = 0.02 / 15.0;
 /// Young's modulus [Pa] and Poisson's ratio of organs out of a file.
 const TISSUE: (f64, f64) = (12e3, 0.45);
 
-/// The experiment's options.
-#[derive(Clone, Debug)]
+/// Fig. 6(b): which integrators stay bounded when specimen A is released, and how far each sags from the truth.
+#[derive(Clone, Debug, Args)]
 pub struct IntegratorsExperiment {
-    /// A Gmsh file with the organs, the lowest 42% of each pinned; phantom A, recorded, reconstructed and put into the cell, without one.
+    /// Gmsh file (.msh, in metres, z up) with the organs, the lowest 42% of each pinned; phantom A, reconstructed, by default.
+    #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
-    /// How phantom A is filmed.
-    pub record: RecordOptions,
     /// Simulated time [s].
+    #[arg(long, default_value_t = 1.0)]
     pub seconds: f64,
-    /// Leave dashpots out.
+    /// Leave the tissue's dashpots out (with --mesh).
+    #[arg(long, requires = "mesh")]
     pub undamped: bool,
-    /// Worker threads, 0 for all.
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
-}
-
-/// One integrator.
-#[derive(Clone, Debug, Serialize)]
-pub struct IntegratorRow {
-    /// Its name.
-    pub name: &'static str,
-    /// Its settings.
-    pub settings: String,
-    /// What the paper says of it.
-    pub paper: &'static str,
-    /// It ran to the end and no node came to the speed limit.
-    pub bounded: bool,
-    /// What ended it, if anything did.
-    pub event: Option<String>,
-    /// The time at whose frame it ended [s].
-    pub ended_at_s: Option<f64>,
-    /// Greatest node speed at the end of any frame [m/s]; at the speed limit where it reached that.
-    pub peak_speed_m_s: f64,
-    /// Greatest node speed in the last frame [m/s].
-    pub last_speed_m_s: f64,
-    /// Mean distance of the nodes from the static equilibrium over their mean displacement in it, positions averaged over the last third of the run; none if it diverged.
-    pub sag_error: Option<f64>,
-    /// Mean displacement over the equilibrium's.
-    pub sag_ratio: Option<f64>,
-    /// Median wall time of a frame [ms].
-    pub frame_ms: f64,
-    /// Time [s] and greatest node speed [m/s], frame by frame.
-    pub speeds: Vec<(f64, f64)>,
+    /// How phantom A is recorded.
+    #[command(flatten)]
+    pub recorded: Recorded,
 }
 
 /// The experiment's outcome.
@@ -101,32 +81,33 @@ pub struct IntegratorsResult {
     pub report: String,
 }
 
-impl IntegratorsExperiment {
-    /// Runs everything into the folder `output`.
-    ///
-    /// # Errors
-    /// Organs or a folder that cannot be had, an equilibrium that is not found, an interruption. An integrator that diverges is a row that says so.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<IntegratorsResult> {
-        let clock = Instant::now();
+impl Study for IntegratorsExperiment {
+    const NAME: &'static str = "integrators";
+    const KIND: Kind = Kind::Experiment;
+    const FOLDER: Option<&'static str> =
+        Some("Folder for recording, specimen and report; a finished recording in it is used again.");
+    type Figures = IntegratorsResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(IntegratorsResult, Document)> {
         if !(self.seconds >= 3.0 * FRAME && self.seconds <= 60.0) {
             return Err(Error::Mismatch(format!("{} s are to be simulated; 0.05 to 60 make sense", self.seconds)));
         }
         let organs = self.mesh.as_deref().map(Organs::read).transpose()?;
-        super::claim(output, MARKER)?;
+        job.claim()?;
         let (specimen, model) = match &organs {
             Some(organs) => (organs.source.clone(), self.pinned(organs)?),
-            None => ("phantom A, reconstructed".to_owned(), self.phantom(output, progress)?),
+            None => ("phantom A, reconstructed".to_owned(), self.phantom(job)?),
         };
         let truth = Equilibrium::of(&model)?;
         let stable = stable_explicit_step(&model);
         let forms = forms(&model, FRAME);
         let frames = (self.seconds / FRAME).round() as usize;
-        progress.begin("frames", (forms.len() * frames) as u64);
+        job.progress.begin("frames", (forms.len() * frames) as u64);
         let mut integrators = Vec::with_capacity(forms.len());
         for form in forms {
-            integrators.push(measured(form, &model, &truth, frames, self.threads, progress)?);
+            integrators.push(measured(form, &model, &truth, frames, self.threads, job.progress)?);
         }
-        progress.end();
+        job.progress.end();
         let result = IntegratorsResult {
             findings: super::integrator_forms::findings(&integrators),
             integrators,
@@ -137,15 +118,15 @@ impl IntegratorsExperiment {
             sag_mm: 1e3 * truth.sag,
             undamped: self.undamped,
             threads: if self.threads == 0 { rayon::current_num_threads() } else { self.threads },
-            seconds: clock.elapsed().as_secs_f64(),
-            report: output.join(REPORT).display().to_string(),
+            seconds: job.seconds(),
+            report: job.report(),
         };
-        super::write(&output.join(REPORT), pages::integrators(&result)?.as_bytes())?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        super::write(&output.join(MARKER), &json)?;
-        Ok(result)
+        let document = document(&result)?;
+        Ok((result, document))
     }
+}
 
+impl IntegratorsExperiment {
     /// Organs of a file, the lowest 42% of each one's nodes pinned.
     fn pinned(&self, organs: &Organs) -> Result<Model> {
         let tissue = material(TISSUE.0, TISSUE.1);
@@ -154,11 +135,12 @@ impl IntegratorsExperiment {
     }
 
     /// Phantom A as the cell has it.
-    fn phantom(&self, output: &Path, progress: &dyn Progress) -> Result<Model> {
+    fn phantom(&self, job: &Job<'_>) -> Result<Model> {
         if self.undamped {
             return Err(Error::Mismatch("the cell's organs are damped; name a mesh for undamped ones".to_owned()));
         }
-        let specimen = phantoms::specimen("phantom-a", &self.record, &output.join("phantom-a"), progress)?;
+        let specimen =
+            phantoms::specimen("phantom-a", &self.recorded.options(), &job.output().join("phantom-a"), job.progress)?;
         Ok(World::new(&specimen, SolverSettings::default(), 1)?.model)
     }
 }
@@ -234,4 +216,106 @@ fn measured(
         frame_ms: times[times.len() / 2],
         speeds,
     })
+}
+
+fn document(result: &IntegratorsResult) -> Result<Document> {
+    let damping = if result.undamped { "without dashpots" } else { "with the cell's dashpots" };
+    let lead = format!(
+        "{} ({} elements, {} nodes), at rest in its rest shape, released under gravity {damping}. The greatest speed of any node at the end of each frame of 1/60 s; the \
+         dashed line is the paper's limit of {SPEED_LIMIT} m/s, at which a run ends here. Nothing is clamped.",
+        page::escape(&result.specimen),
+        count(result.tets),
+        count(result.nodes),
+    );
+    let line = |(k, row): (usize, &IntegratorRow)| {
+        // A run that ends in its first frame is a short mark rather than a point.
+        let mut points = row.speeds.clone();
+        if let [(t, v)] = points[..] {
+            points = vec![(0.0, v), (t, v)];
+        }
+        Line { points, color: color(k), filled: false }
+    };
+    let plot = Plot {
+        title: "Greatest node speed",
+        x: "time since release [s]",
+        y: "speed [m/s]",
+        lines: result.integrators.iter().enumerate().map(line).collect(),
+        bands: vec![],
+        show: vec![],
+        limits: vec![SPEED_LIMIT],
+        log_x: false,
+        log_y: true,
+    };
+    let legend = page::legend(result.integrators.iter().enumerate().map(|(k, r)| (r.name, color(k))));
+    let bounded = Section::new("What stays bounded", lead)
+        .cards(cards(result))
+        .plot(&plot, &format!("<b>Fig. 6(b) anew.</b>{legend}"))?;
+    let findings = Section::new("What the data say", "").lines(result.findings.iter().cloned());
+    let document = Document::new("Integrators", "Which stay bounded, and which are right");
+    Ok(document.with(bounded).with(findings).with(rows(result)))
+}
+
+/// There are more forms than hues of organs; the last ones have their own.
+fn color(k: usize) -> [u8; 3] {
+    match k {
+        0..8 => colors::organ(k),
+        8 => [150, 90, 60],
+        _ => [190, 30, 60],
+    }
+}
+
+fn cards(result: &IntegratorsResult) -> [Card; 4] {
+    let bounded = result.integrators.iter().filter(|r| r.bounded).count();
+    let best = |start: &str| {
+        let rows = result.integrators.iter().filter(|r| r.name.starts_with(start));
+        rows.filter_map(|r| r.sag_error).min_by(f64::total_cmp).map_or("none".to_owned(), |e| percent(e, 2))
+    };
+    [
+        Card::new("Bounded", format!("{bounded} of {}", result.integrators.len()), "ran to the end below 20 m/s"),
+        Card::new(
+            "Stable explicit step",
+            format!("{} \u{b5}s", fixed(result.stable_step_us, 1)),
+            "2/\u{3c9} of the stiffest mode at rest",
+        ),
+        Card::new("XPBD's least sag error", best("XPBD"), "of its bounded forms"),
+        Card::new("Sag", format!("{} mm", fixed(result.sag_mm, 4)), "mean displacement in the static equilibrium"),
+    ]
+}
+
+fn rows(result: &IntegratorsResult) -> Section {
+    let head = [
+        "Integrator",
+        "Settings",
+        "The paper",
+        "Outcome",
+        "Peak [m/s]",
+        "Last [m/s]",
+        "Sag over true sag",
+        "Sag error",
+        "Frame [ms]",
+    ];
+    let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
+    let row = |r: &IntegratorRow| {
+        let outcome = match (&r.event, r.ended_at_s) {
+            (Some(event), Some(at)) => format!("{event}, after {} s", fixed(at, 3)),
+            _ => "bounded".to_owned(),
+        };
+        vec![
+            r.name.to_owned(),
+            r.settings.clone(),
+            r.paper.to_owned(),
+            outcome,
+            format!("{:.1e}", r.peak_speed_m_s),
+            format!("{:.1e}", r.last_speed_m_s),
+            or_dash(r.sag_ratio.map(|s| fixed(s, 2))),
+            or_dash(r.sag_error.map(|e| percent(e, 2))),
+            fixed(r.frame_ms, 1),
+        ]
+    };
+    let lead = format!(
+        "<i>Sag error</i>: mean distance of the nodes from the static equilibrium (Newton\u{2019}s method in double precision) over their mean displacement in it, positions \
+         averaged over the last third of the run. Frames on {} threads.",
+        result.threads
+    );
+    Section::new("Every form", lead).table(Table::new(head, result.integrators.iter().map(row).collect()))
 }

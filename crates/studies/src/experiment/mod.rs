@@ -1,4 +1,4 @@
-//! The paper's tables and figures, made anew: one file an experiment.
+//! The paper's tables and figures: one file each.
 
 mod controller_grid;
 mod controller_motion;
@@ -6,8 +6,10 @@ mod convergence;
 mod element_quality;
 mod grasp_designs;
 mod integrator_forms;
+mod integrator_row;
 mod integrators;
 mod lift_trials;
+mod lifts;
 mod normal;
 mod port_budget;
 mod random_actions;
@@ -20,40 +22,26 @@ mod step_ladder;
 mod trials;
 mod wrench;
 
-pub(crate) use controller_grid::IN_HAND;
-#[cfg(test)]
-pub(crate) use controller_grid::tests::made_up_result as made_up_controller_grid;
-pub use controller_grid::{ControllerBars, ControllerGridExperiment, ControllerGridResult, ControllerRow};
-pub use controller_motion::{ControllerFigures, ControllerInstant};
-pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult};
+pub use controller_grid::ControllerGridExperiment;
+pub use convergence::ConvergenceExperiment;
 #[cfg(test)]
 pub(crate) use element_quality::tests::made_up_result as made_up_element_quality;
-pub use element_quality::{ElementQualityExperiment, ElementQualityResult, ElementQualityRow};
+pub(crate) use element_quality::{ElementQualityResult, ElementQualityRow};
 pub(crate) use grasp_designs::DESIGNS;
 #[cfg(test)]
 pub(crate) use grasp_designs::tests::made_up_result as made_up_grasp_designs;
-pub use grasp_designs::{GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial, PaperGrasp};
-pub(crate) use integrators::SPEED_LIMIT;
-pub use integrators::{IntegratorRow, IntegratorsExperiment, IntegratorsResult};
+pub(crate) use grasp_designs::{GraspDesignRow, GraspDesignsResult, GraspTrial};
+pub use integrators::IntegratorsExperiment;
+pub use lift_trials::Condition;
 pub(crate) use lift_trials::design_name;
-pub use lift_trials::{AppendixSource, Condition};
-pub(crate) use port_budget::SHEETS;
-#[cfg(test)]
-pub(crate) use port_budget::tests::measured as measured_port_budget;
-pub use port_budget::{PortBudgetExperiment, PortBudgetResult, PortBudgetRow, PortRoom, PortStart};
-pub use random_actions::{RandomActionsExperiment, RandomActionsResult, RandomActionsRow};
-pub use reconstruction::{PhantomFigures, ReconstructionExperiment, ReconstructionResult, ReconstructionRow};
-pub use rollouts::{PaperRollouts, RolloutsExperiment, RolloutsResult};
-pub(crate) use settling::SETTLED;
-pub use settling::{SettlingExperiment, SettlingOrgan, SettlingResult, SettlingRow};
-pub(crate) use similarity::SimilarityPictures;
-pub use similarity::{PaperSimilarity, SimilarityExperiment, SimilarityResult, SimilarityRow};
-pub use step_ladder::StepRow;
-pub use trials::Resumed;
-#[cfg(test)]
-pub(crate) use wrench::tests::measured as measured_wrench;
-pub(crate) use wrench::{CHI_SQUARED_95, chi_squared_10};
-pub use wrench::{WrenchExperiment, WrenchFrame, WrenchParameter, WrenchResult, WrenchTilt};
+pub use lifts::{ElementQuality, GraspDesigns};
+pub use port_budget::PortBudget;
+pub use random_actions::RandomActionsExperiment;
+pub use reconstruction::ReconstructionExperiment;
+pub use rollouts::RolloutsExperiment;
+pub use settling::Settling;
+pub use similarity::SimilarityExperiment;
+pub use wrench::Weighing;
 
 use crate::{Error, Result};
 use std::path::Path;

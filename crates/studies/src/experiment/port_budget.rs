@@ -1,17 +1,20 @@
 //! Fig. 5: how far a shaft may lie beside the port's centre at each tilt, by the formula and by pushing one through the contact model.
 
-use crate::{Error, Result, pages};
+use crate::names::millimetres;
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::path::Path;
-use std::time::Instant;
+use std::fmt::Write;
 use trocar_core::Progress;
+use trocar_report::colors;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::plots::{Line, Plot};
+use trocar_report::table::fixed;
 use trocar_robot::port::{Port, RimState, Shaft, Twist};
-use trocar_workflow::REPORT;
-
-/// The file that makes a folder one of this experiment's.
-const MARKER: &str = "port-budget.json";
 
 /// Tilts of the table [degrees]: from 0 ...
 const LAST_TILT: f64 = 35.0;
@@ -31,7 +34,7 @@ const AROUND: [f64; 5] = [0.0, 13.3, 18.3, 24.1, 30.0];
 const DIRECTIONS: usize = 90;
 
 /// Sheets beside the one that was asked for [mm].
-pub(crate) const SHEETS: [f64; 2] = [1.0, 2.0];
+const SHEETS: [f64; 2] = [1.0, 2.0];
 
 /// No shaft is pushed farther than this share of the hole.
 const FARTHEST: f64 = 1.0;
@@ -39,16 +42,20 @@ const FARTHEST: f64 = 1.0;
 /// Halvings of a search: to the last digits.
 const HALVINGS: usize = 60;
 
-/// The experiment's options.
-#[derive(Clone, Debug)]
-pub struct PortBudgetExperiment {
-    /// Diameter of the hole [m].
+/// Fig. 5: how far a shaft may lie beside its port's centre at each tilt, by the formula and by the contact model.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct PortBudget {
+    /// Diameter of the hole [mm].
+    #[arg(long, default_value = "6", value_parser = millimetres, allow_negative_numbers = true)]
     pub hole: f64,
-    /// Diameter of the shaft [m].
+    /// Diameter of the shaft [mm].
+    #[arg(long, default_value = "5", value_parser = millimetres, allow_negative_numbers = true)]
     pub shaft: f64,
-    /// Thickness of the sheet [m]; the paper's formula is that of 0.
+    /// Thickness of the sheet [mm]; at 0 the clearance is the paper's.
+    #[arg(long, default_value = "0", value_parser = millimetres, allow_negative_numbers = true)]
     pub thickness: f64,
     /// Force of the push for the deviation under load [N].
+    #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     pub push: f64,
 }
 
@@ -130,24 +137,22 @@ pub struct PortBudgetResult {
     pub report: String,
 }
 
-impl PortBudgetExperiment {
-    /// Measures all tilts and writes the report into the folder `output`.
-    ///
-    /// # Errors
-    /// A hole, sheet or shaft that no port has, a folder that cannot be written, an interruption.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<PortBudgetResult> {
-        let clock = Instant::now();
-        let pushing = Pushing::new(self)?;
-        super::claim(output, MARKER)?;
-        let mut result = self.measure(&pushing, progress)?;
-        result.report = output.join(REPORT).display().to_string();
-        result.seconds = clock.elapsed().as_secs_f64();
-        super::write(&output.join(REPORT), pages::port_budget(&result)?.as_bytes())?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        super::write(&output.join(MARKER), &json)?;
-        Ok(result)
-    }
+impl Study for PortBudget {
+    const NAME: &'static str = "port-budget";
+    const KIND: Kind = Kind::Experiment;
+    type Figures = PortBudgetResult;
 
+    fn run(&self, job: &Job<'_>) -> Result<(PortBudgetResult, Document)> {
+        let pushing = Pushing::new(self)?;
+        job.claim()?;
+        let measured = self.measure(&pushing, job.progress)?;
+        let result = PortBudgetResult { report: job.report(), seconds: job.seconds(), ..measured };
+        let document = document(&result)?;
+        Ok((result, document))
+    }
+}
+
+impl PortBudget {
     fn measure(&self, pushing: &Pushing, progress: &dyn Progress) -> Result<PortBudgetResult> {
         let (port, radius) = (&pushing.port, pushing.radius);
         let count = (LAST_TILT / STEP).round() as usize + 1;
@@ -200,7 +205,7 @@ struct Pushing {
 }
 
 impl Pushing {
-    fn new(experiment: &PortBudgetExperiment) -> Result<Self> {
+    fn new(experiment: &PortBudget) -> Result<Self> {
         let port = Port {
             hole_diameter: experiment.hole,
             thickness: experiment.thickness,
@@ -281,13 +286,232 @@ fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     low
 }
 
+/// Every so many rows are in the page's table; the JSON has all.
+const EVERY: usize = 5;
+
+fn document(r: &PortBudgetResult) -> Result<Document> {
+    let lead = format!(
+        "A {} mm shaft in a {} mm hole of a sheet {} mm thick. By the formula: (D \u{2212} d/cos \u{2212} t tan)/2 at each tilt, the paper\u{2019}s where t is 0. Measured: a shaft pushed sideways through \
+         the contact model until the rim pushes back.",
+        r.shaft_mm, r.hole_mm, r.thickness_mm
+    );
+    let section =
+        Section::new("Port budget", lead).cards(cards(r)).figures([clearance(r)?, sections(r), around(r)?, loaded(r)?]);
+    let subtitle = "How far a shaft may lie beside its port's centre";
+    Ok(Document::new("Port budget", subtitle).with(section).with(starts(r)).with(rows(r)))
+}
+
+fn cards(r: &PortBudgetResult) -> Vec<Card> {
+    let degrees = |v: Option<f64>| v.map_or("none".to_owned(), |v| format!("{}\u{b0}", fixed(v, 2)));
+    let start = |s: &PortStart| {
+        let name = if s.arm == "left" { "Left arm's start" } else { "Right arm's start" };
+        let near = s.measured_mm.is_some_and(|m| (m - s.paper_mm).abs() < 0.005);
+        let note = format!("at {}\u{b0}, measured; the paper: {} mm", s.tilt_deg, fixed(s.paper_mm, 2));
+        Card::new(name, format!("{} mm", fixed(s.measured_mm.unwrap_or(f64::NAN), 3)), note).met(near)
+    };
+    let mut all: Vec<Card> = r.starts.iter().map(start).collect();
+    let note = format!("formula {}; the paper: about {}\u{b0}", degrees(r.limit_deg), r.paper_limit_deg);
+    all.push(Card::new("No clearance from", degrees(r.measured_limit_deg), note));
+    let worst = format!("{:.0e} mm", r.largest_difference_mm);
+    all.push(Card::new("Formula and contact model", worst, "largest difference, in the direction of the tilt"));
+    all
+}
+
+fn start_color(k: usize) -> [u8; 3] {
+    colors::organ([0, 3][k % 2])
+}
+
+fn clearance(r: &PortBudgetResult) -> Result<String> {
+    let (formula, measured) = (colors::organ(1), colors::organ(4));
+    let thick = |k: usize| colors::organ([2, 7][k % 2]);
+    let mut lines: Vec<Line> = (0..SHEETS.len())
+        .rev()
+        .map(|k| {
+            let points = r.rows.iter().map(|row| (row.tilt_deg, row.thicker_mm[k]));
+            Line { points: points.filter(|p| p.1 > -0.15).collect(), color: thick(k), filled: false }
+        })
+        .collect();
+    let points = r.rows.iter().map(|row| (row.tilt_deg, row.clearance_mm)).collect();
+    lines.push(Line { points, color: formula, filled: false });
+    // The plot has lines only: a measured value is a short one.
+    for row in r.rows.iter().step_by(EVERY) {
+        let points = row.measured_mm.map(|m| vec![(row.tilt_deg - 0.25, m), (row.tilt_deg + 0.25, m)]);
+        lines.extend(points.map(|points| Line { points, color: measured, filled: false }));
+    }
+    for (k, s) in r.starts.iter().enumerate() {
+        let points = vec![(s.tilt_deg, 0.0), (s.tilt_deg, s.clearance_mm), (0.0, s.clearance_mm)];
+        lines.push(Line { points, color: start_color(k), filled: false });
+    }
+    let plot = Plot {
+        title: "Lateral clearance over tilt",
+        x: "tilt [\u{b0}]",
+        y: "clearance [mm]",
+        lines,
+        bands: vec![],
+        show: vec![],
+        limits: vec![0.0],
+        log_x: false,
+        log_y: false,
+    };
+    let sheet = format!("formula, {} mm sheet", r.thickness_mm);
+    let thicker = SHEETS.map(|mm| format!("{mm} mm sheet"));
+    let starts: Vec<String> = r.starts.iter().map(|s| format!("{} start, {}\u{b0}", s.arm, s.tilt_deg)).collect();
+    let entries = [(sheet.as_str(), formula), ("measured (dashes)", measured)]
+        .into_iter()
+        .chain(thicker.iter().enumerate().map(|(k, t)| (t.as_str(), thick(k))))
+        .chain(starts.iter().enumerate().map(|(k, s)| (s.as_str(), start_color(k))));
+    let caption = format!("<b>Lateral clearance</b> in the direction of the tilt.{}", page::legend(entries));
+    Ok(page::figure(&plot.svg()?, &caption))
+}
+
+/// The shaft's elliptic section in the hole's plane, pushed until it touches in the direction of the tilt.
+fn sections(r: &PortBudgetResult) -> String {
+    let hole = 0.5 * r.hole_mm;
+    let step = 2.5 * hole;
+    let shown: Vec<_> = r.rooms.iter().filter(|room| !room.room.is_empty()).collect();
+    let columns = shown.len().clamp(1, 3);
+    let lines = shown.len().div_ceil(columns).max(1);
+    let (width, height) = (columns as f64 * step, lines as f64 * (step + 0.3 * hole));
+    let mut svg = format!(
+        "<svg viewBox=\"0 0 {width:.3} {height:.3}\" role=\"img\" aria-label=\"Sections of the shaft in the hole\">"
+    );
+    for (k, room) in shown.iter().enumerate() {
+        let x = (0.5 + (k % columns) as f64) * step;
+        let y = 0.5 * step + (k / columns) as f64 * (step + 0.3 * hole);
+        let cos = room.tilt_deg.to_radians().cos();
+        let pushed = room.room.first().map_or(0.0, |p| p.1);
+        let thin = 0.02 * hole;
+        let _ = write!(
+            svg,
+            "<circle cx=\"{x:.3}\" cy=\"{y:.3}\" r=\"{hole:.3}\" fill=\"none\" stroke=\"currentColor\" stroke-width=\"{thin:.3}\"/>\
+             <ellipse cx=\"{:.3}\" cy=\"{y:.3}\" rx=\"{:.3}\" ry=\"{:.3}\" fill=\"{}\" fill-opacity=\"0.35\" stroke=\"{}\" stroke-width=\"{thin:.3}\"/>\
+             <text x=\"{x:.3}\" y=\"{:.3}\" font-size=\"{:.3}\" text-anchor=\"middle\" fill=\"currentColor\">{}\u{b0}</text>",
+            x + pushed,
+            0.5 * r.shaft_mm / cos,
+            0.5 * r.shaft_mm,
+            page::hex(colors::organ(1)),
+            page::hex(colors::organ(1)),
+            y + 1.36 * hole,
+            0.26 * hole,
+            room.tilt_deg
+        );
+    }
+    svg.push_str("</svg>");
+    page::figure(
+        &svg,
+        "<b>The shaft\u{2019}s section in the port\u{2019}s plane</b> at five tilts (to the right), pushed to the right until it touches.",
+    )
+}
+
+fn around(r: &PortBudgetResult) -> Result<String> {
+    let line = |(k, points): (usize, &Vec<(f64, f64)>)| Line {
+        points: points.clone(),
+        color: colors::organ(k),
+        filled: false,
+    };
+    let plot = Plot {
+        title: "Room to all sides",
+        x: "direction of the push from that of the tilt [\u{b0}]",
+        y: "admissible deviation [mm]",
+        lines: r.rooms.iter().map(|room| &room.room).enumerate().map(line).collect(),
+        bands: vec![],
+        show: vec![0.0],
+        limits: vec![],
+        log_x: false,
+        log_y: false,
+    };
+    let names: Vec<String> = r.rooms.iter().map(|room| format!("{}\u{b0}", room.tilt_deg)).collect();
+    let legend = page::legend(names.iter().enumerate().map(|(k, n)| (n.as_str(), colors::organ(k))));
+    let caption = format!(
+        "<b>Admissible deviation</b> to all sides, measured. Across the tilt it is (D \u{2212} d)/2 up to acos \u{221a}(d/D), 24.1\u{b0} for 5 in 6 mm; beyond, the section is \
+         blunter than the hole and touches at two points.{legend}"
+    );
+    Ok(page::figure(&plot.svg()?, &caption))
+}
+
+fn loaded(r: &PortBudgetResult) -> Result<String> {
+    let (free, pushed) = (colors::organ(1), colors::organ(2));
+    let points = |value: &dyn Fn(&PortBudgetRow) -> Option<f64>| -> Vec<(f64, f64)> {
+        r.rows.iter().filter_map(|row| value(row).map(|v| (row.tilt_deg, v))).collect()
+    };
+    let plot = Plot {
+        title: "Deviation under load",
+        x: "tilt [\u{b0}]",
+        y: "deviation [mm]",
+        lines: vec![
+            Line { points: points(&|row| row.measured_least_mm), color: free, filled: true },
+            Line { points: points(&|row| Some(row.pushed_mm)), color: pushed, filled: false },
+        ],
+        bands: vec![],
+        show: vec![0.0],
+        limits: vec![],
+        log_x: false,
+        log_y: false,
+    };
+    let push = format!("pushed with {} N", r.push_n);
+    let legend = page::legend([("free to every side", free), (push.as_str(), pushed)]);
+    let caption = format!(
+        "<b>Deviation under load</b>: the rim gives by {} N/mm (our assumption; the paper states none).{legend}",
+        fixed(r.stiffness_n_mm, 0)
+    );
+    Ok(page::figure(&plot.svg()?, &caption))
+}
+
+fn starts(r: &PortBudgetResult) -> Section {
+    let head = ["Start pose", "Tilt [\u{b0}]", "Paper [mm]", "Formula [mm]", "Measured [mm]"];
+    let number = |v: Option<f64>| fixed(v.unwrap_or(f64::NAN), 4);
+    let rows: Vec<Vec<String>> = r
+        .starts
+        .iter()
+        .map(|s| {
+            let numbers = [fixed(s.tilt_deg, 1), fixed(s.paper_mm, 2), fixed(s.clearance_mm, 4), number(s.measured_mm)];
+            [s.arm.to_owned()].into_iter().chain(numbers).collect()
+        })
+        .collect();
+    Section::new("Beside the paper", "").table(Table::new(head, rows))
+}
+
+fn rows(r: &PortBudgetResult) -> Section {
+    let head = [
+        "Tilt [\u{b0}]",
+        "Formula [mm]",
+        "Measured, with the tilt [mm]",
+        "against it [mm]",
+        "across it [mm]",
+        "Least to any side [mm]",
+        "Pushed [mm]",
+        "1 mm sheet [mm]",
+        "2 mm sheet [mm]",
+    ];
+    let number = |v: Option<f64>| fixed(v.unwrap_or(f64::NAN), 4);
+    let rows: Vec<Vec<String>> = r
+        .rows
+        .iter()
+        .step_by(EVERY)
+        .map(|row| {
+            vec![
+                fixed(row.tilt_deg, 1),
+                fixed(row.clearance_mm, 4),
+                number(row.measured_mm),
+                number(row.measured_against_mm),
+                number(row.measured_across_mm),
+                number(row.measured_least_mm),
+                fixed(row.pushed_mm, 4),
+                fixed(row.thicker_mm[0], 4),
+                fixed(row.thicker_mm[1], 4),
+            ]
+        })
+        .collect();
+    Section::new("Over tilt", "A dash: a centred shaft touches already.").table(Table::new(head, rows).on_page_only())
+}
+
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
     use trocar_core::Silent;
 
-    pub(crate) fn measured() -> PortBudgetResult {
-        let experiment = PortBudgetExperiment { hole: 6e-3, shaft: 5e-3, thickness: 0.0, push: 5.0 };
+    fn measured() -> PortBudgetResult {
+        let experiment = PortBudget { hole: 6e-3, shaft: 5e-3, thickness: 0.0, push: 5.0 };
         experiment.measure(&Pushing::new(&experiment).unwrap(), &Silent).unwrap()
     }
 
@@ -310,11 +534,25 @@ pub(crate) mod tests {
 
     #[test]
     fn options_that_make_no_port_are_refused() {
-        let good = PortBudgetExperiment { hole: 6e-3, shaft: 5e-3, thickness: 0.0, push: 5.0 };
-        let refused = |e: PortBudgetExperiment| Pushing::new(&e).err().unwrap().to_string();
-        assert!(refused(PortBudgetExperiment { hole: f64::NAN, ..good }).contains("hole_diameter"));
-        assert!(refused(PortBudgetExperiment { shaft: -1.0, ..good }).contains("shaft_radius"));
-        assert!(refused(PortBudgetExperiment { push: 0.0, ..good }).contains("push"));
-        assert!(refused(PortBudgetExperiment { shaft: 7e-3, ..good }).contains("7 mm do not go through"));
+        let good = PortBudget { hole: 6e-3, shaft: 5e-3, thickness: 0.0, push: 5.0 };
+        let refused = |e: PortBudget| Pushing::new(&e).err().unwrap().to_string();
+        assert!(refused(PortBudget { hole: f64::NAN, ..good }).contains("hole_diameter"));
+        assert!(refused(PortBudget { shaft: -1.0, ..good }).contains("shaft_radius"));
+        assert!(refused(PortBudget { push: 0.0, ..good }).contains("push"));
+        assert!(refused(PortBudget { shaft: 7e-3, ..good }).contains("7 mm do not go through"));
+    }
+
+    #[test]
+    fn the_paper_stands_beside() {
+        let html = document(&measured()).unwrap().page();
+        assert_eq!(html.matches("<svg").count(), 4);
+        assert_eq!(html.matches("card good").count(), 2, "both starts are the paper's");
+        assert!(
+            html.contains("A 5 mm shaft in a 6 mm hole")
+                && html.contains("0.43")
+                && html.contains("33.56\u{b0}")
+                && !html.contains("NaN")
+        );
+        assert_eq!(html.matches("<ellipse").count(), 5);
     }
 }

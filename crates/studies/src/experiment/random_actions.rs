@@ -1,38 +1,42 @@
 //! Random but legal actions in a scene's cell: whether anything breaks.
 
-use super::trials::{Resumed, Trials};
-use crate::{Error, Result, pages};
+use super::trials::{Resumed, Trials, resumed};
+use crate::names::SceneChoice;
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-use std::time::Instant;
 use trocar_cell::Cell;
 use trocar_core::Progress;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::table::{count, fixed, percent};
 use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::policy::RandomActions;
 use trocar_task::{ArmChannels, End, Episode, Policy};
-use trocar_workflow::{REPORT, scene_specimen};
-
-/// The file that makes a folder one of this experiment's.
-const MARKER: &str = "random-actions.json";
+use trocar_workflow::scene_specimen;
 
 /// RCM deviation below which nothing is said of it (mm). An episode would end at the scene's own limit.
 const ENDLESS_RCM_MM: f64 = 25.0;
 
-/// The experiment's options.
-#[derive(Clone, Debug)]
+/// Random but legal actions in a scene's cell: whether tissue or arms break.
+#[derive(Clone, Debug, Args)]
 pub struct RandomActionsExperiment {
-    /// Scene file or built-in scene.
-    pub scene: String,
-    /// Folder in which a scene's phantom is recorded and reconstructed; what is there is used again.
-    pub phantoms: PathBuf,
-    /// Seeds: this and as many more as make `seeds`.
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneChoice,
+    /// First seed; every fourth (3, 7, ...) moves the tips, the others ask for coordinates in the ports.
+    #[arg(long, default_value_t = 0)]
     pub first_seed: u64,
-    /// How many seeds.
+    /// Number of seeds.
+    #[arg(long, default_value_t = 20)]
     pub seeds: u64,
     /// Actions a seed.
+    #[arg(long, default_value_t = 500)]
     pub actions: usize,
-    /// Seeds that are run at once, 0 for as many as there are threads.
+    /// Seeds that are run at once; as many as there are threads by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
 }
 
@@ -86,23 +90,24 @@ pub struct RandomActionsResult {
     pub report: String,
 }
 
-impl RandomActionsExperiment {
-    /// Runs everything into the folder `output`: trials, figures and report.
-    ///
-    /// # Errors
-    /// A scene or specimen that cannot be had, a folder that cannot be written, an interruption.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<RandomActionsResult> {
-        let clock = Instant::now();
-        let scene = Scene::read(&self.scene)?;
-        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
-        super::claim(output, MARKER)?;
+impl Study for RandomActionsExperiment {
+    const NAME: &'static str = "random-actions";
+    const KIND: Kind = Kind::Experiment;
+    const FOLDER: Option<&'static str> = Some("Folder for trials and report; finished seeds in it are not run again.");
+    type Figures = RandomActionsResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(RandomActionsResult, Document)> {
+        let scene = Scene::read(&self.scene.scene)?;
+        let specimen = scene_specimen(&scene, &self.scene.phantoms, job.progress)?;
+        job.claim()?;
         let places = specimen.organs.iter().flat_map(|o| &o.body.vertices);
         let sum: f64 = places.map(|p| p.x + 2.0 * p.y + 3.0 * p.z).sum();
         let settings = format!("{scene:?}\n{sum:?}\n{}", self.actions);
-        let trials = Trials::open(output, "random-actions", &settings)?;
+        let trials = Trials::open(job.output(), "random-actions", &settings)?;
         let seeds: Vec<u64> = (0..self.seeds).map(|k| self.first_seed.saturating_add(k)).collect();
         let one = |seed: &u64, progress: &dyn Progress| run(&scene, &specimen, *seed, self.actions, progress);
-        let made = trials.run("random actions", &seeds, |seed| format!("seed {seed}"), self.threads, progress, one)?;
+        let made =
+            trials.run("random actions", &seeds, |seed| format!("seed {seed}"), self.threads, job.progress, one)?;
         let whole = |r: &RandomActionsRow| {
             r.diverged.is_none() && r.inverted_peak == 0 && r.joint_limits_broken == 0 && r.actions == self.actions
         };
@@ -112,13 +117,11 @@ impl RandomActionsExperiment {
             unbroken: made.rows.iter().all(whole),
             rows: made.rows,
             resumed: made.resumed,
-            seconds: clock.elapsed().as_secs_f64(),
-            report: output.join(REPORT).display().to_string(),
+            seconds: job.seconds(),
+            report: job.report(),
         };
-        super::write(&output.join(REPORT), pages::random_actions(&result).as_bytes())?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        super::write(&output.join(MARKER), &json)?;
-        Ok(result)
+        let document = document(&result);
+        Ok((result, document))
     }
 }
 
@@ -192,4 +195,59 @@ fn joint_limits_broken(cell: &Cell) -> Result<usize> {
         }
     }
     Ok(broken)
+}
+
+fn document(r: &RandomActionsResult) -> Document {
+    let lead = format!(
+        "Random but legal actions in the cell of {}, from {} seeds. An instrument that pierces, hooks or crushes tissue lets go of it and passes through until it is out; an organ folded for good is put \
+         right. Both are counted.",
+        page::escape(&r.scene),
+        r.rows.len()
+    );
+    let good = r.rows.iter().filter(|row| row.diverged.is_none() && row.inverted_peak == 0).count();
+    let broken: usize = r.rows.iter().map(|row| row.joint_limits_broken).sum();
+    let cards = [
+        Card::new("Actions", count(r.actions), "done"),
+        Card::new("Seeds unbroken", format!("{good} of {}", r.rows.len()), "no divergence, no inverted element")
+            .met(good == r.rows.len()),
+        Card::new("Joint limits broken", count(broken), "over all actions").met(broken == 0),
+    ];
+    let head = [
+        "Seed",
+        "Actions",
+        "Diverged",
+        "Inverted",
+        "Stretch",
+        "Least volume",
+        "RCM [mm]",
+        "Force [N]",
+        "Contacts disabled",
+        "Of blades",
+        "Relaxed",
+        "Guarded",
+    ];
+    let rows: Vec<Vec<String>> = r
+        .rows
+        .iter()
+        .map(|row| {
+            vec![
+                row.seed.to_string(),
+                count(row.actions),
+                row.diverged.clone().unwrap_or_default(),
+                count(row.inverted_peak),
+                fixed(row.max_stretch, 2),
+                percent(row.min_volume_ratio, 2),
+                fixed(row.rcm_max_mm, 2),
+                fixed(row.force_max_n, 2),
+                count(row.disabled_contacts),
+                count(row.disabled_blades),
+                count(row.relaxed),
+                count(row.guarded),
+            ]
+        })
+        .collect();
+    let seeds = Section::new("Seed by seed", "").table(Table::new(head, rows)).lines(resumed(&r.resumed, "seeds"));
+    Document::new("Random actions", "What breaks under random but legal actions")
+        .with(Section::new("Random actions", lead).cards(cards))
+        .with(seeds)
 }

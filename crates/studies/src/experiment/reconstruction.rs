@@ -1,33 +1,46 @@
 //! Table I and Fig. 6(a): every phantom recorded, reconstructed with one set of settings, and measured against its truth.
 
-use super::{claim, write};
-use crate::{Error, Result, pages};
+use crate::names::{BackName, MesherName, Recorded, SensorName, phantoms_or_all};
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 use trocar_camera::DepthImage;
-use trocar_core::Progress;
+use trocar_core::Pose;
 use trocar_geometry::io::{Unit, read_surface};
 use trocar_phantom::RecordOptions;
 use trocar_reconstruct::{BackRule, Reconstruction, Settings, SurfaceRule, depth_error, modelled_volume};
 use trocar_recording::Recording;
+use trocar_render::phong::PhongScene;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card, Columns};
+use trocar_report::table::{count, fixed, percent};
+use trocar_report::{colors, figures, overlays};
+use trocar_workflow::pages::check_sizes;
 use trocar_workflow::paper::table_i;
 use trocar_workflow::phantoms::recorded;
 use trocar_workflow::truth::DEPTH_UNIT;
-use trocar_workflow::{CompositeFigures, REPORT, reconstruct_recording};
+use trocar_workflow::{CompositeFigures, reconstruct_recording};
 
-/// The file that makes a folder one of this experiment's.
-const MARKER: &str = "reconstruction.json";
-
-/// The experiment's options.
-#[derive(Clone, Debug)]
+/// Table I and Fig. 6(a): every phantom recorded, reconstructed and measured against its truth.
+#[derive(Clone, Debug, Args)]
 pub struct ReconstructionExperiment {
-    /// Which phantoms.
+    /// Phantoms; all by default.
+    #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
-    /// How they are filmed. An earlier recording in the output folder is used again when it is of the same options.
-    pub record: RecordOptions,
-    /// How they are reconstructed.
-    pub settings: Settings,
+    /// How they are recorded.
+    #[command(flatten)]
+    pub recorded: Recorded,
+    /// What kind of noise depth has.
+    #[arg(long, value_enum, default_value_t = SensorName::Plain)]
+    pub sensor: SensorName,
+    /// How thick organs are taken to be behind their fronts.
+    #[arg(long, value_enum, default_value_t = BackName::Rounded)]
+    pub back: BackName,
+    /// What fills the surfaces with tetrahedra.
+    #[arg(long, value_enum, default_value_t = MesherName::Lattice)]
+    pub mesher: MesherName,
 }
 
 /// One organ: what is asked of it, and the paper's beside it.
@@ -101,30 +114,29 @@ pub struct ReconstructionResult {
     pub report: String,
 }
 
-impl ReconstructionExperiment {
-    /// Runs everything into the folder `output`: `<phantom>/recording`, `<phantom>/specimen`, and the report.
-    ///
-    /// # Errors
-    /// When the folder cannot be written, or an interruption; what is finished by then is used again the next time.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<ReconstructionResult> {
-        let clock = Instant::now();
-        claim(output, MARKER)?;
-        let mut result = ReconstructionResult {
-            organs: Vec::new(),
-            phantoms: Vec::new(),
-            seconds: 0.0,
-            report: output.join(REPORT).display().to_string(),
-        };
+impl Study for ReconstructionExperiment {
+    const NAME: &'static str = "reconstruction";
+    const KIND: Kind = Kind::Experiment;
+    const FOLDER: Option<&'static str> =
+        Some("Folder for recordings, specimens and the report; finished recordings in it are used again.");
+    type Figures = ReconstructionResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(ReconstructionResult, Document)> {
+        job.claim()?;
+        let record = RecordOptions { sensor: self.sensor.into(), ..self.recorded.options() };
+        let settings = Settings { back: self.back.into(), mesher: self.mesher.into(), ..Settings::default() };
+        let mut result =
+            ReconstructionResult { organs: Vec::new(), phantoms: Vec::new(), seconds: 0.0, report: job.report() };
         let mut pictures = Vec::new();
-        for phantom in &self.phantoms {
-            let folder = output.join(phantom);
+        for phantom in &phantoms_or_all(&self.phantoms) {
+            let folder = job.output().join(phantom);
             let recording = folder.join("recording");
-            recorded(phantom, &self.record, &recording, progress)?;
+            recorded(phantom, &record, &recording, job.progress)?;
             let (made, reconstruction) =
-                reconstruct_recording(&recording, &self.settings, &folder.join("specimen"), progress)?;
-            let paper_way = Settings { surface: SurfaceRule::BinaryGrid, ..self.settings.clone() };
-            let paper_way = trocar_reconstruct::reconstruct(&Recording::open(&recording)?, &paper_way, progress)?;
-            result.organs.extend(rows(phantom, &recording, &reconstruction, &paper_way, self.settings.back)?);
+                reconstruct_recording(&recording, &settings, &folder.join("specimen"), job.progress)?;
+            let paper_way = Settings { surface: SurfaceRule::BinaryGrid, ..settings.clone() };
+            let paper_way = trocar_reconstruct::reconstruct(&Recording::open(&recording)?, &paper_way, job.progress)?;
+            result.organs.extend(rows(phantom, &recording, &reconstruction, &paper_way, settings.back)?);
             result.phantoms.push(PhantomFigures {
                 phantom: phantom.clone(),
                 composite: CompositeFigures::of(&reconstruction, &recording)?,
@@ -133,12 +145,9 @@ impl ReconstructionExperiment {
             });
             pictures.push(reconstruction);
         }
-        result.seconds = clock.elapsed().as_secs_f64();
-        let html = pages::reconstruction_experiment(&result, &pictures)?;
-        write(&output.join(REPORT), html.as_bytes())?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        write(&output.join(MARKER), &json)?;
-        Ok(result)
+        result.seconds = job.seconds();
+        let document = document(&result, &pictures)?;
+        Ok((result, document))
     }
 }
 
@@ -190,4 +199,171 @@ fn rows(
         })
     };
     made.specimen.organs.iter().enumerate().map(row).collect()
+}
+
+/// What is asked of each organ: depth error, signed error [mm], volume error, dihedral angle [degrees].
+const DEPTH_ERROR: f64 = 1.0;
+const SIGNED_ERROR: f64 = 0.3;
+const VOLUME_ERROR: f64 = 0.1;
+const DIHEDRAL: f64 = 10.0;
+
+fn document(result: &ReconstructionResult, made: &[Reconstruction]) -> Result<Document> {
+    made.iter().try_for_each(check_sizes)?;
+    let subtitle = format!("{} organs of {} phantoms, one set of settings", result.organs.len(), made.len());
+    let document = Document::new("Reconstruction", subtitle).with(summary(result)).with(table_i_beside_paper(result));
+    Ok(document.with(errors(made)?).with(composites(result)).with(looks(made)?))
+}
+
+fn summary(result: &ReconstructionResult) -> Section {
+    let rows = &result.organs;
+    let n = rows.len();
+    let tight = rows.iter().filter(|r| r.watertight).count();
+    let inverted: usize = rows.iter().map(|r| r.inverted).sum();
+    let worst = |f: &dyn Fn(&ReconstructionRow) -> f64| rows.iter().map(|r| f(r).abs()).fold(0.0, f64::max);
+    let dihedral = rows.iter().map(|r| r.min_dihedral_deg).fold(f64::INFINITY, f64::min);
+    let (depth, signed, volume) =
+        (worst(&|r| r.depth_error_median_mm), worst(&|r| r.signed_error_median_mm), worst(&|r| r.volume_error));
+    let cards = [
+        Card::new("Watertight", format!("{tight} of {n}"), "organs; paper 13 of 13").met(tight == n),
+        Card::new("Inverted elements", count(inverted), "of all; paper 0").met(inverted == 0),
+        Card::new("Smallest dihedral", format!("{}\u{b0}", fixed(dihedral, 1)), "of all elements; at least 10\u{b0}")
+            .met(dihedral >= DIHEDRAL),
+        Card::new("Depth error", format!("{} mm", fixed(depth, 2)), "the worst organ's median; paper 1.33 to 4.77 mm")
+            .met(depth <= DEPTH_ERROR),
+        Card::new(
+            "Signed error",
+            format!("{} mm", fixed(signed, 2)),
+            "the worst organ's median, either way; paper \u{2212}1.15 to \u{2212}4.88 mm",
+        )
+        .met(signed <= SIGNED_ERROR),
+        Card::new("Volume", percent(volume, 1), "off the true front with the modelled back, at worst")
+            .met(volume <= VOLUME_ERROR),
+    ];
+    Section::new("Together", "").cards(cards)
+}
+
+fn table_i_beside_paper(result: &ReconstructionResult) -> Section {
+    let head = [
+        "Organ",
+        "Phantom",
+        "Nodes",
+        "(paper)",
+        "Tetrahedra",
+        "(paper)",
+        "Min. dihedral [\u{b0}]",
+        "Median dihedral [\u{b0}]",
+        "Median edge [mm]",
+        "Watertight",
+        "Inverted",
+        "Depth error [mm]",
+        "signed [mm]",
+        "binary grid, signed [mm]",
+        "against truth [mm]",
+        "Covered",
+        "Volume [cm\u{b3}]",
+        "off the model",
+        "off the truth",
+    ];
+    let paper = |n: Option<usize>| n.map_or(String::new(), count);
+    let row = |r: &ReconstructionRow| {
+        vec![
+            r.organ.clone(),
+            r.phantom.clone(),
+            count(r.nodes),
+            paper(r.paper_nodes),
+            count(r.tets),
+            paper(r.paper_tets),
+            fixed(r.min_dihedral_deg, 1),
+            fixed(r.median_dihedral_deg, 1),
+            fixed(r.median_edge_mm, 2),
+            if r.watertight { "yes" } else { "no" }.to_owned(),
+            count(r.inverted),
+            fixed(r.depth_error_median_mm, 2),
+            fixed(r.signed_error_median_mm, 2),
+            fixed(r.binary_grid_signed_error_mm.unwrap_or(f64::NAN), 2),
+            fixed(r.truth_error_median_mm, 2),
+            percent(r.covered, 0),
+            fixed(r.volume_cm3, 2),
+            percent(r.volume_error, 1),
+            percent(r.volume_error_truth, 0),
+        ]
+    };
+    Section::new(
+        "Table I",
+        "The depth error is the paper's measure: the surface through the recording camera against the depth it was made \
+         from. <i>Off the model</i>: the volume against that between the true front and the back that the paper's closure \
+         puts behind it. <i>Off the truth</i>: against the organ itself, whose back no camera saw.",
+    )
+    .table(Table::new(head, result.organs.iter().map(row).collect()))
+}
+
+/// Fig. 6(a): where the surfaces lie before or behind the depth.
+fn errors(made: &[Reconstruction]) -> Result<Section> {
+    let mut shown = Vec::new();
+    for r in made {
+        let mut picture = overlays::dimmed(&r.background);
+        for organ in &r.organs {
+            overlays::error(&mut picture, &organ.depth_error, &organ.compared);
+        }
+        let img = figures::img(&picture, "signed depth error of all organs")?;
+        shown.push(page::figure(&img, &format!("<b>{}.</b>", page::escape(&r.specimen.name))));
+    }
+    let bar = page::scale_bar(&colors::DIVERGING, "\u{2212}5", "surface minus measured depth [mm]", "+5");
+    let lead = "Blue: the surface lies nearer to the camera than measured; red: behind.";
+    let section = Section::new("Depth error (Fig. 6a)", lead);
+    Ok(shown.into_iter().fold(section, |s, f| s.figure(Columns::Three, f)).html(bar))
+}
+
+fn composites(result: &ReconstructionResult) -> Section {
+    let head = [
+        "Phantom",
+        "Frames",
+        "Recovered (paper 3.4 %)",
+        "Coverage (90.3 %)",
+        "Depth range (2.0 mm)",
+        "Depth error, median",
+        "95th percentile",
+        "under the instruments",
+        "Reconstruction",
+    ];
+    let rows: Vec<Vec<String>> = result
+        .phantoms
+        .iter()
+        .map(|p| {
+            let c = &p.composite;
+            let truth = c.truth.unwrap_or_default();
+            let mm = |v: f64| format!("{} mm", fixed(v, 2));
+            vec![
+                p.phantom.clone(),
+                count(c.frames_used),
+                percent(c.recovered_share, 1),
+                percent(c.coverage, 1),
+                mm(c.depth_range_median_mm),
+                mm(truth.depth_error_median_mm),
+                mm(truth.depth_error_p95_mm),
+                mm(truth.under_instruments_median_mm.unwrap_or(f64::NAN)),
+                format!("{} s", fixed(p.seconds, 1)),
+            ]
+        })
+        .collect();
+    let lead = "What the window's frames say of the scene behind the instruments, and how far that is from the truth.";
+    Section::new("Composites", lead).table(Table::new(head, rows))
+}
+
+/// Photograph and reconstruction, side by side.
+fn looks(made: &[Reconstruction]) -> Result<Section> {
+    let mut shown = Vec::new();
+    for r in made {
+        let Some(camera) = &r.specimen.camera else { continue };
+        let name = page::escape(&r.specimen.name);
+        let input = figures::img(&r.input, "input frame")?;
+        shown.push(page::figure(&input, &format!("<b>{name}.</b> The window's centre frame as recorded.")));
+        let scene =
+            PhongScene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
+                .with_ambient_occlusion(24, 0.012);
+        let rendered = scene.render(camera, &Pose::IDENTITY, 2).color;
+        let rendered = figures::img(&rendered, "reconstructed surfaces through the recording camera")?;
+        shown.push(page::figure(&rendered, "<b>Reconstructed.</b> The surfaces through the recording camera."));
+    }
+    Ok(Section::new("Pictures", "").figures(shown))
 }

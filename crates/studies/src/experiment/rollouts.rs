@@ -1,11 +1,14 @@
 //! The paper's rollouts made anew (Fig. 6(d, e)): 140 episodes of six controllers, as a campaign that goes on where it was left.
 
-use crate::{Error, Result, pages};
+use crate::names::SceneChoice;
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
-use trocar_campaign::CampaignResult;
-use trocar_campaign::{Campaign, Kept, PolicyRow, PolicySpec, median};
-use trocar_core::Progress;
+use trocar_campaign::{Campaign, CampaignResult, Kept, Plan, PolicyRow, PolicySpec, lift_and_rcm, lifts, median};
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::table::{count, fixed};
 use trocar_task::policy::POLICIES;
 
 /// The page that stands beside the campaign's own.
@@ -17,18 +20,20 @@ const ABORT_MM: f64 = 5.0;
 /// The paper's threshold for RCM deviations [mm].
 const THRESHOLD_MM: f64 = 3.0;
 
-/// The experiment's options.
-#[derive(Clone, Debug)]
+/// Fig. 6(d, e): 140 rollouts of six controllers; resumable, safe to interrupt at any time.
+#[derive(Clone, Debug, Args)]
 pub struct RolloutsExperiment {
-    /// Scene file or built-in scene.
-    pub scene: String,
-    /// Folder in which a scene's phantom is recorded and reconstructed; what is there is used again.
-    pub phantoms: PathBuf,
-    /// Rollouts of all controllers together; the first controllers have one more where it does not divide.
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneChoice,
+    /// Rollouts of all six controllers together; the first controllers have one more if it does not divide.
+    #[arg(long, default_value_t = 140)]
     pub rollouts: usize,
-    /// Seed of each controller's first; the next have the next.
+    /// Seed of each controller's first rollout; the next have the next.
+    #[arg(long, visible_alias = "first-seed", default_value_t = 0)]
     pub seed: u64,
-    /// Rollouts at once, 0 for as many as the machine has cores. Results do not depend on it.
+    /// Rollouts at once; as many as the machine has cores by default. The result does not depend on it.
+    #[arg(long, default_value_t = 0)]
     pub jobs: usize,
 }
 
@@ -52,7 +57,7 @@ pub struct PaperRollouts {
 }
 
 /// Fig. 6(d, e).
-pub(crate) const PAPER: PaperRollouts = PaperRollouts {
+const PAPER: PaperRollouts = PaperRollouts {
     rollouts: 140,
     attached: 84,
     held_to_end: 83,
@@ -103,32 +108,35 @@ pub struct RolloutsResult {
     pub report: String,
 }
 
-impl RolloutsExperiment {
-    /// Runs what is missing in the campaign folder `output`, then writes the pages there.
-    ///
-    /// # Errors
-    /// As [`Campaign::run`]; no rollouts.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<RolloutsResult> {
+impl Study for RolloutsExperiment {
+    const NAME: &'static str = "rollouts";
+    const KIND: Kind = Kind::Experiment;
+    const FOLDER: Option<&'static str> = Some("Campaign folder: a new one, or one of an earlier run to resume.");
+    const KEEPS_OWN_FILES: bool = true;
+    type Figures = RolloutsResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(RolloutsResult, Document)> {
         if self.rollouts == 0 {
             return Err(Error::Mismatch("--rollouts 0: 1 or more are to be run; the paper has 140".to_owned()));
         }
         let campaign = Campaign {
-            scene: self.scene.clone(),
+            scene: self.scene.scene.clone(),
             policies: POLICIES.iter().map(|name| PolicySpec::parse(name)).collect::<std::result::Result<_, _>>()?,
             episodes: self.rollouts.div_ceil(POLICIES.len()),
             seed: self.seed,
             jobs: self.jobs,
             retry_failed: false,
-            phantoms: self.phantoms.clone(),
+            phantoms: self.scene.phantoms.clone(),
         };
-        let (store, plan) = campaign.keep(output, Some(self.rollouts), progress)?;
+        let (store, plan) = campaign.keep(job.output(), Some(self.rollouts), job.progress)?;
         let (made, kept) = (store.finish(&plan)?, store.kept(&plan)?);
-        let page = output.join(PAGE);
+        let page = job.output().join(PAGE);
         let result = RolloutsResult::of(made, &kept, page.display().to_string());
-        store.write(PAGE, pages::rollouts(&plan, &result, &kept)?.as_bytes())?;
+        let document = document(&plan, &result, &kept)?;
+        store.write(PAGE, document.page().as_bytes())?;
         let text = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
         store.write("rollouts.json", &text)?;
-        Ok(result)
+        Ok((result, document))
     }
 }
 
@@ -161,4 +169,81 @@ impl RolloutsResult {
             report,
         }
     }
+}
+
+fn document(plan: &Plan, r: &RolloutsResult, kept: &[Kept]) -> Result<Document> {
+    let lead = format!(
+        "{} rollouts of {} by {} controllers, seeds from {}. The paper\u{2019}s 140 are of its own six; counts compare by their shares of what attached.",
+        r.rollouts,
+        page::escape(&r.scene),
+        plan.policies.len(),
+        plan.seed
+    );
+    let cards = [
+        Card::new("Held to the end", format!("{} of {}", r.held_to_end, r.attached), "of the attached; paper 83 of 84")
+            .met(r.held_to_end == r.attached),
+        Card::new("Diverged", count(r.diverged), "of all rollouts").met(r.diverged == 0),
+        Card::new("Inverted elements", count(r.inverted_peak), "at worst, in any frame").met(r.inverted_peak == 0),
+        Card::new("Passed", format!("{} of {}", r.passed, r.rollouts), "all stages"),
+        Card::new(
+            "Suspensions",
+            r.suspensions.map(|n| n.to_string()).join("/"),
+            "of physics: contacts disabled / contacts of blades disabled / organs relaxed",
+        )
+        .met(r.suspensions == [0; 3]),
+    ];
+    let outcome = Section::new("Outcome", lead).cards(cards).table(beside_paper(r));
+    let spread = Section::new("Lift and RCM deviation", "Every rollout that attached the organ.")
+        .figures([lift_and_rcm(plan, kept)?, lifts(plan, kept)?]);
+    let by_controller = Section::new("Controllers", "").table(controllers(&r.by_policy));
+    let subtitle = "Lift and RCM deviation of six controllers, beside the paper's Fig. 6(d, e)";
+    Ok(Document::new("Rollouts", subtitle).with(outcome).with(spread).with(by_controller))
+}
+
+fn or_dash(value: Option<f64>, decimals: usize) -> String {
+    value.map_or("\u{2013}".to_owned(), |v| fixed(v, decimals))
+}
+
+fn beside_paper(r: &RolloutsResult) -> Table {
+    let p = &r.paper;
+    let of = |n: usize, all: usize| format!("{n} of {all}");
+    let row = |what: &str, here: String, paper: String| vec![what.to_owned(), here, paper];
+    let rows = vec![
+        row("Attached", of(r.attached, r.rollouts), of(p.attached, p.rollouts)),
+        row("Held to the end", of(r.held_to_end, r.attached), of(p.held_to_end, p.attached)),
+        row("Lift, median [mm]", or_dash(r.lift_median_mm, 1), fixed(p.lift_median_mm, 1)),
+        row("Peak RCM deviation, median [mm]", or_dash(r.rcm_peak_median_mm, 3), fixed(p.rcm_peak_median_mm, 2)),
+        row("RCM deviation under load, median of medians [mm]", or_dash(r.rcm_loaded_median_mm, 4), or_dash(None, 0)),
+        row("RCM within 3 mm", of(r.rcm_within_3_mm, r.attached), of(p.rcm_within_3_mm, p.attached)),
+        row("RCM within 5 mm", of(r.rcm_within_5_mm, r.attached), of(p.rcm_within_5_mm, p.attached)),
+    ];
+    Table::new(["", "here", "paper"], rows)
+}
+
+fn controllers(rows: &[PolicyRow]) -> Table {
+    let head = [
+        "controller",
+        "rollouts",
+        "passed",
+        "attached",
+        "held",
+        "lift mm",
+        "RCM mm, loaded median",
+        "RCM mm, max",
+        "diverged",
+    ];
+    let row = |p: &PolicyRow| {
+        vec![
+            p.policy.clone(),
+            count(p.episodes),
+            count(p.passed),
+            count(p.attached),
+            count(p.held_to_end),
+            or_dash(p.lift_median_mm, 1),
+            or_dash(p.rcm_median_mm, 4),
+            or_dash(p.rcm_max_mm, 3),
+            count(p.ends.diverged),
+        ]
+    };
+    Table::new(head, rows.iter().map(row).collect())
 }

@@ -1,21 +1,22 @@
 //! Fig. 6(c): phantoms A, B and C released into the cell; how fast they still move after a second.
 
-use crate::{Error, Result, pages};
+use crate::names::{Recorded, SolverName, phantoms_or_all};
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
-use std::path::Path;
-use std::time::Instant;
 use trocar_cell::{FRAME, World};
 use trocar_core::Progress;
-use trocar_phantom::RecordOptions;
-use trocar_workflow::REPORT;
+use trocar_report::colors;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::plots::{Line, Plot};
+use trocar_report::table::{count, fixed, percent};
 use trocar_workflow::phantoms;
 use trocar_workflow::solver_named;
 
-/// The file that makes a folder one of this experiment's.
-const MARKER: &str = "settling.json";
-
 /// Speed under which every specimen must be ... [m/s]
-pub(crate) const SETTLED: f64 = 0.01;
+const SETTLED: f64 = 0.01;
 /// ... after this long [s].
 const AFTER: f64 = 1.0;
 
@@ -26,17 +27,21 @@ const SECONDS: f64 = 1.5;
 const PAPER: [(&str, f64, f64); 3] =
     [("phantom-a", 0.007, 0.416), ("phantom-b", 0.136, 0.211), ("phantom-c", 0.029, 0.066)];
 
-/// The experiment's options.
-#[derive(Clone, Debug)]
-pub struct SettlingExperiment {
-    /// Which phantoms.
+/// Fig. 6(c): how fast phantoms A, B and C come to rest in the cell.
+#[derive(Clone, Debug, Args)]
+pub struct Settling {
+    /// Phantoms; all by default.
+    #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
-    /// How they are filmed.
-    pub record: RecordOptions,
-    /// Name of the schedule, one of [`trocar_workflow::SOLVERS`].
-    pub schedule: String,
-    /// Worker threads, 0 for all.
+    /// What steps them.
+    #[arg(long, value_enum, default_value_t = SolverName::Fast)]
+    pub schedule: SolverName,
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
+    /// How they are recorded.
+    #[command(flatten)]
+    pub recorded: Recorded,
 }
 
 /// One organ after a second.
@@ -96,30 +101,31 @@ pub struct SettlingResult {
     pub report: String,
 }
 
-impl SettlingExperiment {
-    /// Runs everything into the folder `output`: `<phantom>/recording`, `<phantom>/specimen`, and the report.
-    ///
-    /// # Errors
-    /// A phantom or schedule of another name, a folder that cannot be written, an interruption.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<SettlingResult> {
-        let clock = Instant::now();
-        let schedule = solver_named(&self.schedule)?;
-        super::claim(output, MARKER)?;
-        let mut rows = Vec::with_capacity(self.phantoms.len());
-        for phantom in &self.phantoms {
-            let specimen = phantoms::specimen(phantom, &self.record, &output.join(phantom), progress)?;
-            rows.push(released(phantom, World::new(&specimen, schedule, self.threads)?, progress)?);
+impl Study for Settling {
+    const NAME: &'static str = "settling";
+    const KIND: Kind = Kind::Experiment;
+    const FOLDER: Option<&'static str> =
+        Some("Folder for recordings, specimens and report; finished recordings in it are used again.");
+    type Figures = SettlingResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(SettlingResult, Document)> {
+        let schedule = solver_named(self.schedule.name())?;
+        job.claim()?;
+        let named = phantoms_or_all(&self.phantoms);
+        let mut rows = Vec::with_capacity(named.len());
+        for phantom in &named {
+            let specimen =
+                phantoms::specimen(phantom, &self.recorded.options(), &job.output().join(phantom), job.progress)?;
+            rows.push(released(phantom, World::new(&specimen, schedule, self.threads)?, job.progress)?);
         }
         let result = SettlingResult {
             phantoms: rows,
-            schedule: self.schedule.clone(),
-            seconds: clock.elapsed().as_secs_f64(),
-            report: output.join(REPORT).display().to_string(),
+            schedule: self.schedule.name().to_owned(),
+            seconds: job.seconds(),
+            report: job.report(),
         };
-        super::write(&output.join(REPORT), pages::settling(&result)?.as_bytes())?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        super::write(&output.join(MARKER), &json)?;
-        Ok(result)
+        let document = document(&result)?;
+        Ok((result, document))
     }
 }
 
@@ -185,4 +191,90 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
         organs,
         speeds,
     })
+}
+
+fn document(result: &SettlingResult) -> Result<Document> {
+    let lead = format!(
+        "Each phantom recorded, reconstructed and released into the cell in its recorded shape (schedule {}). The greatest speed of any node at the end of each frame; the dashed \
+         line is {SETTLED} m/s, below which each must be after a second.",
+        page::escape(&result.schedule)
+    );
+    let line = |(k, speeds): (usize, &Vec<(f64, f64)>)| Line {
+        points: speeds.clone(),
+        color: colors::organ(k),
+        filled: false,
+    };
+    let plot = Plot {
+        title: "Greatest node speed",
+        x: "time since release [s]",
+        y: "speed [m/s]",
+        lines: result.phantoms.iter().map(|p| &p.speeds).enumerate().map(line).collect(),
+        bands: vec![],
+        show: vec![],
+        limits: vec![SETTLED],
+        log_x: false,
+        log_y: true,
+    };
+    let legend = page::legend(result.phantoms.iter().enumerate().map(|(k, p)| (p.phantom.as_str(), colors::organ(k))));
+    let settled = result.phantoms.iter().filter(|p| p.settled).count();
+    let card = Card::new(
+        "Settled within a second",
+        format!("{settled} of {}", result.phantoms.len()),
+        "below 0.01 m/s; the paper: one of three",
+    );
+    let section = Section::new("Settling", lead)
+        .cards([card.met(settled == result.phantoms.len())])
+        .plot(&plot, &format!("<b>Fig. 6(c) anew.</b>{legend}"))?;
+    Ok(Document::new("Settling", "Phantoms released into the cell")
+        .with(section)
+        .with(beside_paper(result))
+        .with(organs(result)))
+}
+
+fn beside_paper(result: &SettlingResult) -> Section {
+    let head = [
+        "Phantom",
+        "Nodes",
+        "Tetrahedra",
+        "Pinned",
+        "(paper)",
+        "Peak [m/s]",
+        "After 1 s [m/s]",
+        "(paper)",
+        "Settled after",
+        "Event",
+    ];
+    let rows: Vec<Vec<String>> = result
+        .phantoms
+        .iter()
+        .map(|p| {
+            vec![
+                p.phantom.clone(),
+                count(p.nodes),
+                count(p.tets),
+                percent(p.pinned, 1),
+                p.paper_pinned.map_or(String::new(), |s| percent(s, 1)),
+                fixed(p.peak_speed_m_s, 3),
+                fixed(p.speed_m_s, 4),
+                p.paper_speed_m_s.map_or(String::new(), |s| fixed(s, 3)),
+                p.settled_after_s.map_or("not within 1.5 s".to_owned(), |s| format!("{} s", fixed(s, 2))),
+                p.event.clone().unwrap_or_default(),
+            ]
+        })
+        .collect();
+    Section::new("Beside the paper", "").table(Table::new(head, rows))
+}
+
+fn organs(result: &SettlingResult) -> Section {
+    let head = ["Organ", "Phantom", "Pinned", "Peak [m/s]", "After 1 s [m/s]"];
+    let rows: Vec<Vec<String>> = result
+        .phantoms
+        .iter()
+        .flat_map(|p| p.organs.iter().map(move |o| (p, o)))
+        .map(|(p, o)| {
+            let name = [o.organ.clone(), p.phantom.clone(), percent(o.pinned, 1)];
+            name.into_iter().chain([fixed(o.peak_speed_m_s, 3), fixed(o.speed_m_s, 4)]).collect()
+        })
+        .collect();
+    Section::new("Organ by organ", "").table(Table::new(head, rows).on_page_only())
 }

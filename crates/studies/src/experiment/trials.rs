@@ -45,6 +45,12 @@ pub struct Resumed {
     pub put_aside: Option<String>,
 }
 
+/// What was taken from an earlier run, in sentences; `what` names the trials.
+pub(super) fn resumed(resumed: &Resumed, what: &str) -> Vec<String> {
+    let earlier = (resumed.trials > 0).then(|| format!("{} {what} taken from an earlier run", resumed.trials));
+    earlier.into_iter().chain(resumed.put_aside.clone()).collect()
+}
+
 /// Outcomes of trials in the items' order, and how many of them are an earlier run's.
 #[derive(Debug)]
 pub(super) struct Outcomes<R> {

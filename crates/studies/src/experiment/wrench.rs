@@ -1,26 +1,28 @@
 //! Force at the tool mount: an instrument weighed in 54 noisy poses, many times over; and a small contact force after the tare.
 
 use super::normal::normals;
-use crate::{Error, Result, pages};
+use crate::names::degrees;
+use crate::study::{Job, Kind, Study};
+use crate::{Error, Result};
+use clap::Args;
 use glam::{DQuat, DVec3};
 use serde::Serialize;
-use std::path::Path;
-use std::time::Instant;
 use trocar_core::{Progress, Wrench};
+use trocar_report::colors;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::plots::{Line, Plot};
+use trocar_report::table::{count, fixed, percent};
 use trocar_robot::instrument::{GRAVITY, Instrument};
 use trocar_robot::wrench::{
     Compensator, ForceKind, Identification, LoadModel, SensorNoise, StaticReading, identify, static_orientations,
 };
-use trocar_workflow::REPORT;
-
-/// The file that makes a folder one of this experiment's.
-const MARKER: &str = "wrench.json";
 
 /// The paper's weight of an instrument [N].
-pub(crate) const PAPER_WEIGHT: f64 = 4.7;
+const PAPER_WEIGHT: f64 = 4.7;
 
 /// 95% of chi-squared with ten degrees of freedom are below.
-pub(crate) const CHI_SQUARED_95: f64 = 18.307;
+const CHI_SQUARED_95: f64 = 18.307;
 
 /// Largest tilts that are compared for what they tell [degrees].
 const TILTS: [f64; 6] = [5.0, 10.0, 20.0, 33.6, 60.0, 180.0];
@@ -40,18 +42,26 @@ const DRIFT: DVec3 = DVec3::new(0.04, -0.03, 0.06);
 /// Tilt of the shaft at reset and at the end [degrees].
 const TILT: [f64; 2] = [13.3, 18.3];
 
-/// The experiment's options.
-#[derive(Clone, Debug)]
-pub struct WrenchExperiment {
+/// The instrument weighed in 54 noisy poses, many times over; and a touch of tens of millinewtons after the tare.
+#[derive(Clone, Copy, Debug, Args)]
+pub struct Weighing {
     /// Static poses of an identification.
+    #[arg(long, default_value_t = trocar_robot::wrench::STATIC_POSES)]
     pub poses: usize,
-    /// Largest tilt of the instrument in them [rad].
+    /// Largest tilt of the instrument in them [degrees].
+    #[arg(long, default_value = "60", value_parser = degrees, allow_negative_numbers = true)]
     pub tilt: f64,
-    /// Identifications.
+    /// Identifications, each with other noise.
+    #[arg(long, default_value_t = 400)]
     pub runs: usize,
-    /// Noise of one reading.
-    pub noise: SensorNoise,
+    /// Noise of a force reading [N].
+    #[arg(long, default_value_t = 0.02, allow_negative_numbers = true)]
+    pub force_noise: f64,
+    /// Noise of a torque reading [N m].
+    #[arg(long, default_value_t = 0.001, allow_negative_numbers = true)]
+    pub torque_noise: f64,
     /// Seed of the noise.
+    #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }
 
@@ -156,7 +166,7 @@ pub struct WrenchResult {
 }
 
 /// Share of chi-squared with ten degrees of freedom below `x`.
-pub(crate) fn chi_squared_10(x: f64) -> f64 {
+fn chi_squared_10(x: f64) -> f64 {
     let half = 0.5 * x;
     let terms = (1..5).scan(1.0, |term, k| {
         *term *= half / f64::from(k);
@@ -165,26 +175,29 @@ pub(crate) fn chi_squared_10(x: f64) -> f64 {
     1.0 - (-half).exp() * (1.0 + terms.sum::<f64>())
 }
 
-impl WrenchExperiment {
-    /// Weighs and touches, and writes the report into the folder `output`.
-    ///
-    /// # Errors
-    /// Options of no use (no run, poses too few or too alike, noise that is not positive), a folder that cannot be written, an interruption.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<WrenchResult> {
-        let clock = Instant::now();
+impl Study for Weighing {
+    const NAME: &'static str = "wrench";
+    const KIND: Kind = Kind::Experiment;
+    type Figures = WrenchResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(WrenchResult, Document)> {
         if !(1..=1_000_000).contains(&self.runs) {
             let reason = format!("{} is not between 1 and 1,000,000", self.runs);
             return Err(trocar_robot::Error::Invalid { what: "number of runs".into(), reason }.into());
         }
         let first = self.weigh(0, self.tilt)?;
-        super::claim(output, MARKER)?;
-        let mut result = self.measure(&first, progress)?;
-        result.report = output.join(REPORT).display().to_string();
-        result.seconds = clock.elapsed().as_secs_f64();
-        super::write(&output.join(REPORT), pages::wrench(&result)?.as_bytes())?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        super::write(&output.join(MARKER), &json)?;
-        Ok(result)
+        job.claim()?;
+        let measured = self.measure(&first, job.progress)?;
+        let result = WrenchResult { report: job.report(), seconds: job.seconds(), ..measured };
+        let document = document(&result)?;
+        Ok((result, document))
+    }
+}
+
+impl Weighing {
+    /// Noise of one reading.
+    fn noise(&self) -> SensorNoise {
+        SensorNoise { force: self.force_noise, torque: self.torque_noise }
     }
 
     fn measure(&self, first: &Identification, progress: &dyn Progress) -> Result<WrenchResult> {
@@ -240,7 +253,7 @@ impl WrenchExperiment {
             poses: self.poses,
             tilt_deg: self.tilt.to_degrees(),
             runs: self.runs,
-            noise: self.noise,
+            noise: self.noise(),
             condition: first.condition,
             weight_n: GRAVITY * (parameters[0].truth + parameters[0].bias),
             weight_spread_mn: 1e3 * GRAVITY * parameters[0].spread,
@@ -270,18 +283,18 @@ impl WrenchExperiment {
             let noise = self.noise_at(&[self.seed, 1, run, k as u64], 1.0);
             StaticReading { orientation, reading: truth().reading(orientation, DOWN) + noise }
         });
-        Ok(identify(&readings.collect::<Vec<_>>(), &self.noise, DOWN)?)
+        Ok(identify(&readings.collect::<Vec<_>>(), &self.noise(), DOWN)?)
     }
 
     fn noise_at(&self, keys: &[u64], share: f64) -> Wrench {
         let of = |which: u64| normals(&[keys, &[which]].concat());
-        Wrench { force: share * self.noise.force * of(0), torque: share * self.noise.torque * of(1) }
+        Wrench { force: share * self.force_noise * of(0), torque: share * self.torque_noise * of(1) }
     }
 
     /// The instrument in its port: tared at reset, then leaned to the other start tilt while a contact force grows at the jaws.
     fn ramp(&self, load: &Identification) -> Result<Vec<WrenchFrame>> {
         let share = 1.0 / (READINGS as f64).sqrt();
-        let noise = SensorNoise { force: share * self.noise.force, torque: share * self.noise.torque };
+        let noise = SensorNoise { force: share * self.force_noise, torque: share * self.torque_noise };
         let untared = Compensator::new(load.clone(), noise, DOWN)?;
         let mut tared = untared.clone();
         let mut drifted = truth();
@@ -346,14 +359,173 @@ fn numbers(m: &LoadModel) -> [f64; 10] {
     [m.mass, c.x, c.y, c.z, f.x, f.y, f.z, t.x, t.y, t.z]
 }
 
+fn document(r: &WrenchResult) -> Result<Document> {
+    let lead = format!(
+        "The grasper weighed in {} poses tilted by up to {}\u{b0} (condition number {}), {} times with other noise: {} mN a force and {} mN m a torque. Each time ten numbers are estimated, with their covariance.",
+        r.poses,
+        fixed(r.tilt_deg, 0),
+        fixed(r.condition, 1),
+        count(r.runs),
+        fixed(1e3 * r.noise.force, 0),
+        fixed(1e3 * r.noise.torque, 1),
+    );
+    let weighing = Section::new("Weighing", lead).cards(cards(r)).figures([distances(r)?, tilts(r)?]);
+    let document = Document::new("Force at the tool mount", "An instrument weighed, tared and touched");
+    Ok(document.with(weighing).with(touching(r)?).with(parameters(r)))
+}
+
+fn cards(r: &WrenchResult) -> [Card; 4] {
+    let off = 1e3 * (r.weight_n - r.paper_weight_n).abs();
+    let mean_deviation = r.weight_predicted_mn / (r.runs as f64).sqrt();
+    let weight = format!(
+        "spread {} mN, predicted {} mN; the paper: {} N",
+        fixed(r.weight_spread_mn, 2),
+        fixed(r.weight_predicted_mn, 2),
+        r.paper_weight_n
+    );
+    let seen = r.seen_from_mn.map_or("not seen".to_owned(), |f| format!("{} mN", fixed(f, 0)));
+    [
+        Card::new("Weight", format!("{} N", fixed(r.weight_n, 4)), weight).met(off < 4.0 * mean_deviation),
+        Card::new("Within the predicted 95%", percent(r.within_95, 1), "of all ten numbers together"),
+        Card::new(
+            "Chi-squared",
+            fixed(r.mean_distance_squared, 2),
+            format!(
+                "mean, 10 is right; farthest from its distribution by {} (limit {})",
+                fixed(r.largest_difference, 3),
+                fixed(r.difference_limit, 3)
+            ),
+        )
+        .met(r.largest_difference < r.difference_limit),
+        Card::new("A touch is seen from", seen, "tared reading above three deviations for good")
+            .met(r.seen_from_mn.is_some()),
+    ]
+}
+
+fn distances(r: &WrenchResult) -> Result<String> {
+    let (found, right) = (colors::organ(1), colors::organ(0));
+    let n = r.distances.len() as f64;
+    let steps = r.distances.iter().enumerate().flat_map(|(k, d)| [(*d, k as f64 / n), (*d, (k as f64 + 1.0) / n)]);
+    let last = r.distances.last().copied().unwrap_or(1.0).max(CHI_SQUARED_95);
+    let curve = (0..=120).map(|k| last * f64::from(k) / 120.0).map(|x| (x, chi_squared_10(x)));
+    let plot = Plot {
+        title: "Distances of the estimates from the truth",
+        x: "squared distance in predicted deviations",
+        y: "share below",
+        lines: vec![
+            Line { points: curve.collect(), color: right, filled: false },
+            Line { points: steps.collect(), color: found, filled: false },
+        ],
+        bands: vec![],
+        show: vec![0.0, 1.0],
+        limits: vec![0.95],
+        log_x: false,
+        log_y: false,
+    };
+    let legend = page::legend([("estimates", found), ("chi-squared, 10 degrees", right)]);
+    Ok(page::figure(&plot.svg()?, &format!("<b>Estimates lie as far from the truth as predicted.</b>{legend}")))
+}
+
+fn tilts(r: &WrenchResult) -> Result<String> {
+    let (weight, condition) = (colors::organ(2), colors::organ(3));
+    let line = |color, value: &dyn Fn(&WrenchTilt) -> f64| Line {
+        points: r.tilts.iter().map(|t| (t.tilt_deg, value(t))).collect(),
+        color,
+        filled: false,
+    };
+    let plot = Plot {
+        title: "What the poses' tilt tells",
+        x: "largest tilt of the poses [\u{b0}]",
+        y: "mN, or condition",
+        lines: vec![line(weight, &|t| t.weight_deviation_mn), line(condition, &|t| t.condition)],
+        bands: vec![],
+        show: vec![],
+        limits: vec![],
+        log_x: true,
+        log_y: true,
+    };
+    let legend = page::legend([("deviation of the weight [mN]", weight), ("condition number", condition)]);
+    let caption = format!("<b>Poses must be tilted</b> to tell weight from bias.{legend}");
+    Ok(page::figure(&plot.svg()?, &caption))
+}
+
+fn touching(r: &WrenchResult) -> Result<Section> {
+    let points = |value: &dyn Fn(&WrenchFrame) -> f64| r.ramp.iter().map(|f| (f.time_s, value(f))).collect::<Vec<_>>();
+    let (truth, tared, untared, raw) = (colors::organ(0), colors::organ(1), colors::organ(7), colors::organ(4));
+    let plot = |title, y, lines, show| Plot {
+        title,
+        x: "time [s]",
+        y,
+        lines,
+        bands: vec![],
+        show,
+        limits: vec![],
+        log_x: false,
+        log_y: false,
+    };
+    let line = |color, points| Line { points, color, filled: false };
+    let before = plot("Reading before the tare", "reading [N]", vec![line(raw, points(&|f| f.raw_n))], vec![0.0]);
+    let after = plot(
+        "Force after the tare",
+        "force [mN]",
+        vec![
+            line(untared, points(&|f| f.untared_mn)),
+            line(tared, points(&|f| f.tared_mn)),
+            line(truth, points(&|f| f.truth_mn)),
+        ],
+        vec![0.0],
+    );
+    let legend = page::legend([("contact force", truth), ("tared", tared), ("identified bias, not tared", untared)]);
+    let figures = [
+        page::figure(
+            &before.svg()?,
+            "<b>What the sensor reads</b> along the contact force, weight and bias included: the touch is a hundredth of it.",
+        ),
+        page::figure(
+            &after.svg()?,
+            &format!("<b>After the weight is taken off</b>; kind of the force: contact.{legend}"),
+        ),
+    ];
+    let first = r.ramp.first().map_or(f64::NAN, |f| f.deviation_mn);
+    let lead = format!(
+        "The sensor\u{2019}s bias has drifted since the weighing. At reset the instrument is tared; then it is leaned from 13.3 to 18.3\u{b0} while tissue pulls at its jaws, up to 50 mN. A frame is the mean of \
+         33 readings; its predicted deviation is {} mN. RMS error {} mN tared, {} mN not tared.",
+        fixed(first, 1),
+        fixed(r.tared_error_mn, 1),
+        fixed(r.untared_error_mn, 1)
+    );
+    Ok(Section::new("A touch of tens of millinewtons", lead).figures(figures))
+}
+
+fn parameters(r: &WrenchResult) -> Section {
+    let head = ["Parameter", "Truth", "Mean error", "Spread", "Predicted", "Within 1.96 deviations"];
+    let small = |v: f64| format!("{v:.2e}").replace('-', "\u{2212}");
+    let rows: Vec<Vec<String>> = r
+        .parameters
+        .iter()
+        .map(|p| {
+            vec![
+                format!("{} [{}]", p.name, p.unit),
+                fixed(p.truth, 4),
+                small(p.bias),
+                small(p.spread),
+                small(p.predicted),
+                percent(p.within, 1),
+            ]
+        })
+        .collect();
+    Section::new("Every parameter", "").table(Table::new(head, rows))
+}
+
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
+    use crate::study;
     use trocar_core::Silent;
 
-    pub(crate) fn measured() -> WrenchResult {
-        let noise = SensorNoise { force: 0.02, torque: 1e-3 };
-        let e = WrenchExperiment { poses: 54, tilt: 60_f64.to_radians(), runs: 200, noise, seed: 1 };
+    fn measured() -> WrenchResult {
+        let (force_noise, torque_noise) = (0.02, 1e-3);
+        let e = Weighing { poses: 54, tilt: 60_f64.to_radians(), runs: 200, force_noise, torque_noise, seed: 1 };
         e.measure(&e.weigh(0, e.tilt).unwrap(), &Silent).unwrap()
     }
 
@@ -377,13 +549,20 @@ pub(crate) mod tests {
 
     #[test]
     fn useless_options_are_refused() {
-        let noise = SensorNoise { force: 0.02, torque: 1e-3 };
-        let good = WrenchExperiment { poses: 54, tilt: 1.0, runs: 10, noise, seed: 1 };
+        let good = Weighing { poses: 54, tilt: 1.0, runs: 10, force_noise: 0.02, torque_noise: 1e-3, seed: 1 };
         let dir = tempfile::tempdir().unwrap();
-        let refused = |e: WrenchExperiment| e.run(dir.path(), &Silent).err().unwrap().to_string();
-        assert!(refused(WrenchExperiment { poses: 2, ..good }).contains("static poses"));
-        assert!(refused(WrenchExperiment { tilt: 0.02, ..good }).contains("too similar"));
-        assert!(refused(WrenchExperiment { runs: 0, ..good }).contains("runs"));
-        assert!(refused(WrenchExperiment { noise: SensorNoise { force: -1.0, ..noise }, ..good }).contains("noise"));
+        let refused = |e: Weighing| study::run(&e, dir.path(), &Silent).err().unwrap().to_string();
+        assert!(refused(Weighing { poses: 2, ..good }).contains("static poses"));
+        assert!(refused(Weighing { tilt: 0.02, ..good }).contains("too similar"));
+        assert!(refused(Weighing { runs: 0, ..good }).contains("runs"));
+        assert!(refused(Weighing { force_noise: -1.0, ..good }).contains("noise"));
+    }
+
+    #[test]
+    fn everything_is_shown() {
+        let html = document(&measured()).unwrap().page();
+        assert_eq!(html.matches("<svg").count(), 4);
+        assert_eq!(html.matches("<tr>").count(), 11);
+        assert!(html.contains("4.7 N") && html.contains("card good") && !html.contains("NaN"));
     }
 }

@@ -1,11 +1,11 @@
 //! Rays a second, beside Embree's.
 
-use super::RenderBench;
 use crate::bench::embree::{Embree, EmbreeRows};
 use crate::{Error, Result};
 use glam::Vec3;
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
+use std::path::Path;
 use std::time::Instant;
 use trocar_camera::Camera;
 use trocar_core::Pose;
@@ -36,59 +36,62 @@ pub struct RayRow {
     pub largest_difference_m: Option<f64>,
 }
 
-impl RenderBench {
-    /// Both kinds of rays, by us and by Embree.
-    pub(super) fn rays(&self, mesh: &TriMesh, view: &Pose) -> Result<(Vec<RayRow>, Option<String>)> {
-        let mut stage = Stage::new();
-        stage.add_mesh(mesh, 1, &Appearance::matte([128; 3]))?;
-        let camera = Camera::centred(self.rays, self.rays, 1.2);
-        let eye = view.translation.as_vec3();
-        let ahead: Vec<(Vec3, Vec3)> = (0..self.rays * self.rays)
-            .map(|i| (eye, (view.rotation * camera.ray((i % self.rays) as f64, (i / self.rays) as f64)).as_vec3()))
-            .collect();
-        let away: Vec<(Vec3, Vec3)> = ahead
-            .iter()
-            .enumerate()
-            .map(|(i, (o, d))| {
-                let t = stage.cast(*o, *d).map_or(0.1, |m| m.t);
-                // A millimetre back, to where a golden spiral over the sphere points, far from its neighbour's.
-                let turn = i as f32 * 2.399_963_2;
-                let z = 1.0 - 2.0 * ((i * 7_919) % 10_007) as f32 / 10_007.0;
-                let r = (1.0 - z * z).max(0.0).sqrt();
-                (*o + *d * (t - 1e-3 / d.length()), Vec3::new(r * turn.cos(), r * turn.sin(), z))
-            })
-            .collect();
-        let one = ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::Format(e.to_string()))?;
-        let mut rows = Vec::new();
-        let mut failure = None;
-        for (kind, rays) in [("camera", &ahead), ("scattered", &away)] {
-            let mut seconds = f64::INFINITY;
-            let mut ours = Vec::new();
-            for _ in 0..TRIES {
-                let clock = Instant::now();
-                ours = one.install(|| {
-                    rays.iter().map(|(o, d)| stage.cast(*o, *d).map_or(f32::INFINITY, |m| m.t)).collect::<Vec<_>>()
-                });
-                seconds = seconds.min(clock.elapsed().as_secs_f64());
-            }
-            let mut row = RayRow {
-                kind,
-                rays: rays.len(),
-                rays_per_second: rays.len() as f64 / seconds,
-                embree_rays_per_second: None,
-                ratio: None,
-                differing: None,
-                compared: None,
-                largest_difference_m: None,
-            };
-            match (Embree { python: &self.python, tries: TRIES }).cast(mesh, rays) {
-                Ok(theirs) => row.compare(rays, &ours, &theirs, self.rays),
-                Err(why) => failure = Some(why),
-            }
-            rows.push(row);
+/// Both kinds of rays of a square image of `side` pixels, by us and by Embree.
+pub(super) fn measure(
+    mesh: &TriMesh,
+    view: &Pose,
+    side: usize,
+    python: &Path,
+) -> Result<(Vec<RayRow>, Option<String>)> {
+    let mut stage = Stage::new();
+    stage.add_mesh(mesh, 1, &Appearance::matte([128; 3]))?;
+    let camera = Camera::centred(side, side, 1.2);
+    let eye = view.translation.as_vec3();
+    let ahead: Vec<(Vec3, Vec3)> = (0..side * side)
+        .map(|i| (eye, (view.rotation * camera.ray((i % side) as f64, (i / side) as f64)).as_vec3()))
+        .collect();
+    let away: Vec<(Vec3, Vec3)> = ahead
+        .iter()
+        .enumerate()
+        .map(|(i, (o, d))| {
+            let t = stage.cast(*o, *d).map_or(0.1, |m| m.t);
+            // A millimetre back, to where a golden spiral over the sphere points, far from its neighbour's.
+            let turn = i as f32 * 2.399_963_2;
+            let z = 1.0 - 2.0 * ((i * 7_919) % 10_007) as f32 / 10_007.0;
+            let r = (1.0 - z * z).max(0.0).sqrt();
+            (*o + *d * (t - 1e-3 / d.length()), Vec3::new(r * turn.cos(), r * turn.sin(), z))
+        })
+        .collect();
+    let one = ThreadPoolBuilder::new().num_threads(1).build().map_err(|e| Error::Format(e.to_string()))?;
+    let mut rows = Vec::new();
+    let mut failure = None;
+    for (kind, rays) in [("camera", &ahead), ("scattered", &away)] {
+        let mut seconds = f64::INFINITY;
+        let mut ours = Vec::new();
+        for _ in 0..TRIES {
+            let clock = Instant::now();
+            ours = one.install(|| {
+                rays.iter().map(|(o, d)| stage.cast(*o, *d).map_or(f32::INFINITY, |m| m.t)).collect::<Vec<_>>()
+            });
+            seconds = seconds.min(clock.elapsed().as_secs_f64());
         }
-        Ok((rows, failure))
+        let mut row = RayRow {
+            kind,
+            rays: rays.len(),
+            rays_per_second: rays.len() as f64 / seconds,
+            embree_rays_per_second: None,
+            ratio: None,
+            differing: None,
+            compared: None,
+            largest_difference_m: None,
+        };
+        match (Embree { python, tries: TRIES }).cast(mesh, rays) {
+            Ok(theirs) => row.compare(rays, &ours, &theirs, side),
+            Err(why) => failure = Some(why),
+        }
+        rows.push(row);
     }
+    Ok((rows, failure))
 }
 
 impl RayRow {

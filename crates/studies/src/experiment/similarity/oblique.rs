@@ -1,11 +1,11 @@
 //! A phantom filmed through the endoscope from the side: its true surfaces and what was around them, ray traced wet in the endoscope's light, with
 //! a stereo camera's depth noise.
 
-use super::in_vivo::endoscope_camera;
+use super::endoscope::endoscope_camera;
 use super::measure::labelled;
 use super::scenery::{BESIDE_LENS, surroundings};
-use super::stop_if_asked;
 use crate::Result;
+use crate::study::stop_if_asked;
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, DepthNoise, Mask};

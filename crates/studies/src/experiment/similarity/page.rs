@@ -1,14 +1,16 @@
-//! The page of the similarity experiment: reconstructions beside the real pictures, in pictures and figures.
+//! The page: reconstructions beside the real pictures, in pictures and figures.
 
+use super::measure::{SimilarityPictures, SimilarityRow};
+use super::result::SimilarityResult;
 use crate::Result;
-use crate::experiment::{SimilarityPictures, SimilarityResult, SimilarityRow};
 use trocar_camera::ColorImage;
 use trocar_camera::metrics::ImageMetrics;
 use trocar_report::colors::{self, SEQUENTIAL};
+use trocar_report::document::{Document, Section, Table};
 use trocar_report::figures;
 use trocar_report::overlays;
-use trocar_report::page::{self, Card, Columns};
-use trocar_report::table::{self, fixed};
+use trocar_report::page::{self, Card};
+use trocar_report::table::fixed;
 
 /// What is asked of a phantom's silhouettes.
 const BAR: f64 = 0.95;
@@ -19,25 +21,27 @@ const ONLY_REAL: [u8; 3] = [70, 165, 225];
 const ONLY_RENDERED: [u8; 3] = [214, 64, 52];
 const BOTH: [u8; 3] = [0, 158, 115];
 
-pub(super) fn body(
+pub(super) fn document(
     r: &SimilarityResult,
     shown: &[SimilarityPictures],
     oblique: &[SimilarityPictures],
-) -> Result<String> {
-    let mut out = page::section("Together", "", &cards(r)) + &table(r);
+) -> Result<Document> {
+    let document = Document::new("Similarity", "Reconstructions rendered beside what was filmed");
+    let mut out = document.with(Section::new("Together", "").cards(cards(r))).with(table(r));
     for (row, pictures) in r.rows.iter().zip(shown) {
         let lead = format!("Through the recovered recording camera. {}.", page::escape(&capital(&row.note)));
-        out += &page::section(&row.specimen, &lead, &(views(pictures)? + &organs(row)));
+        out = out.with(views(pictures, Section::new(&row.specimen, lead))?.html(organs(row)));
     }
-    for (row, pictures) in r.in_vivo.iter().zip(oblique) {
+    for (row, pictures) in r.oblique.iter().zip(oblique) {
         let lead = format!(
             "An oblique view through the thirty-degree endoscope (86.2 x 54.6 degrees), its lens where the recording camera stood, beside the real frame as that lens shows it. {}.",
             page::escape(&capital(&row.note))
         );
-        out += &page::section(&format!("In vivo: {}", row.specimen), &lead, &(views(pictures)? + &organs(row)));
+        let title = format!("Oblique view: {}", row.specimen);
+        out = out.with(views(pictures, Section::new(title, lead))?.html(organs(row)));
     }
     if !r.skipped.is_empty() {
-        out += &page::section("Left out", "", &page::list(&r.skipped));
+        out = out.with(Section::new("Left out", "").lines(r.skipped.iter().cloned()));
     }
     Ok(out)
 }
@@ -47,14 +51,14 @@ fn capital(text: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_uppercase().collect::<String>() + letters.as_str())
 }
 
-fn cards(r: &SimilarityResult) -> String {
+fn cards(r: &SimilarityResult) -> [Card; 4] {
     let p = r.paper;
     let least = |rows: &[SimilarityRow]| rows.iter().map(|row| row.iou).fold(f64::INFINITY, f64::min);
     let mean = |f: &dyn Fn(&ImageMetrics) -> f64| {
         r.rows.iter().map(|row| f(&row.rendered)).sum::<f64>() / r.rows.len().max(1) as f64
     };
     let pair = |[ssim, psnr]: [f64; 2]| format!("{} / {} dB", fixed(ssim, 2), fixed(psnr, 1));
-    page::cards(&[
+    [
         Card::new(
             "Silhouettes",
             fixed(least(&r.rows), 3),
@@ -71,11 +75,15 @@ fn cards(r: &SimilarityResult) -> String {
             pair([mean(&|l| l.ssim_matched), mean(&|l| l.psnr_matched_db)]),
             format!("mean over specimens; paper {}", pair(p.matched)),
         ),
-        Card::new("Oblique views", fixed(least(&r.in_vivo), 3), "the worst IoU through the endoscope"),
-    ])
+        Card::new(
+            "Oblique views",
+            fixed(least(&r.oblique), 3),
+            "the worst IoU through the endoscope; phantom and mug, not in vivo",
+        ),
+    ]
 }
 
-fn table(r: &SimilarityResult) -> String {
+fn table(r: &SimilarityResult) -> Section {
     let head =
         ["Specimen", "What beside the first frame", "IoU", "SSIM", "PSNR [dB]", "matched SSIM", "matched PSNR [dB]"];
     let cells = |l: &ImageMetrics| [l.ssim, l.psnr_db, l.ssim_matched, l.psnr_matched_db];
@@ -84,7 +92,7 @@ fn table(r: &SimilarityResult) -> String {
         vec![name.to_owned(), what.to_owned(), iou, fixed(a, 3), fixed(b, 1), fixed(c, 3), fixed(d, 1)]
     };
     let mut rows = Vec::new();
-    for (s, place) in r.rows.iter().map(|s| (s, "rendered")).chain(r.in_vivo.iter().map(|s| (s, "endoscope"))) {
+    for (s, place) in r.rows.iter().map(|s| (s, "rendered")).chain(r.oblique.iter().map(|s| (s, "endoscope"))) {
         rows.push(row(&s.specimen, place, Some(s.iou), cells(&s.rendered)));
         if let Some(second) = &s.second_frame {
             rows.push(row("", "second frame", None, cells(second)));
@@ -98,7 +106,7 @@ fn table(r: &SimilarityResult) -> String {
     rows.push(row("", "second frame", None, both(none, p.second_frame)));
     rows.push(row("", "mean colour", None, both(none, p.mean_colour)));
     let lead = "Within the organs\u{2019} masks, less what instruments cover. SSIM is Wang and others\u{2019} (2004), 8-bit sRGB, the mean over the channels; matching scales each channel by least squares.";
-    page::section("Beside the paper", lead, &table::plain(&head, &rows))
+    Section::new("Beside the paper", lead).table(Table::new(head, rows))
 }
 
 fn organs(row: &SimilarityRow) -> String {
@@ -110,7 +118,7 @@ fn organs(row: &SimilarityRow) -> String {
     )
 }
 
-fn views(p: &SimilarityPictures) -> Result<String> {
+fn views(p: &SimilarityPictures, section: Section) -> Result<Section> {
     let part = overlays::crop_box(&p.silhouettes[0], 30, 1.5).unwrap_or([0, 0, p.real.width, p.real.height]);
     let figure = |picture: &ColorImage, alt: &str, caption: &str| -> Result<String> {
         Ok(page::figure(&figures::img(&overlays::crop(picture, part), alt)?, caption))
@@ -126,7 +134,7 @@ fn views(p: &SimilarityPictures) -> Result<String> {
     if let Some((what, picture)) = &p.other {
         all.push(figure(picture, what, &format!("<b>Relit.</b> {}", page::escape(what)))?);
     }
-    Ok(page::grid(Columns::Two, &all))
+    Ok(section.figures(all))
 }
 
 fn difference(p: &SimilarityPictures) -> ColorImage {
