@@ -1,15 +1,19 @@
-"""LeRobot's own evaluation (lerobot 0.4.4) of a policy in Trocar's environments.
+r"""LeRobot's own evaluation (lerobot 0.4.4) of a policy in Trocar's environments.
 
     pip install . lerobot==0.4.4
-    python examples/python/evaluate_lerobot.py --policy.path=outputs/train/act/checkpoints/last/pretrained_model
+    python examples/python/evaluate_lerobot.py \
+        --policy.path=outputs/train/act/checkpoints/last/pretrained_model
     python examples/python/evaluate_lerobot.py
 
-The arguments are those of `lerobot-eval`; `--env.type=trocar` with the options below stands before them. Without any, a freshly made
-ACT with random weights is evaluated over one short episode, which shows that all fits together and passes nothing. A policy trained
-on what `record_demonstrations.py` records fits if `--env.size`, `--env.cameras` and `--env.normalize` are as they were there.
+The arguments are those of `lerobot-eval`; `--env.type=trocar` comes before them. The fields of
+`TrocarConfig` below are the options of `--env`. Without arguments, an ACT policy with random
+weights runs one short episode, which shows that everything fits together and passes nothing. A
+policy trained on a dataset of `record_demonstrations.py` needs the `--env.size`, `--env.cameras`
+and `--env.normalize` of the dataset.
 
-LeRobot steps the environments of a batch one after the other, each with all cores. `--eval.use_async_envs=true` is not for this
-version of it, which asks the environments for their task in this process.
+LeRobot steps the environments of a batch one after the other, each with all cores.
+`--eval.use_async_envs=true` does not work with this version, which reads the task from the
+environments in its own process.
 """
 
 import sys
@@ -21,11 +25,11 @@ from lerobot.envs.configs import EnvConfig
 from lerobot.scripts import lerobot_eval
 from lerobot.utils.constants import ACTION, OBS_IMAGES, OBS_STATE
 
-#: Numbers of a state and of an action.
-STATE, TARGETS = 47, 10
+#: Lengths of a state and of an action.
+STATE_SIZE, ACTION_SIZE = 47, 10
 
-#: A policy of random weights (and none fetched), over one episode of a second.
-FRESH = [
+#: A policy with random weights (none are downloaded) over one episode of a second.
+DEFAULT_ARGUMENTS = [
     "--policy.type=act",
     "--policy.device=cpu",
     "--policy.push_to_hub=false",
@@ -40,28 +44,30 @@ FRESH = [
 @EnvConfig.register_subclass("trocar")
 @dataclass
 class TrocarConfig(EnvConfig):
-    """An environment of Trocar, for LeRobot: `trocar/` and `task` are what `gymnasium.make` is asked for."""
+    """An environment of Trocar for LeRobot, which makes the id `trocar/` + `task`."""
 
     task: str | None = "GraspLift-v0"
     fps: int = 30
     scene: str = "cell-a"
     cameras: list[str] = field(default_factory=lambda: ["endoscope", "d405"])
-    #: Side of the pictures [px].
+    #: Edge of the pictures (px).
     size: int = 224
-    #: Actions are -1 to 1.
+    #: Whether actions are in [-1, 1].
     normalize: bool = False
-    #: Longest episode [s]; the scene's if not given.
+    #: Maximum duration of an episode (s), by default the scene's.
     episode_s: float | None = None
 
     def __post_init__(self) -> None:
-        """What the policy sees and does, and what LeRobot calls it."""
+        """Declares observations and actions by LeRobot's names."""
         self.features = {
-            ACTION: PolicyFeature(type=FeatureType.ACTION, shape=(TARGETS,)),
-            "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(STATE,)),
+            ACTION: PolicyFeature(type=FeatureType.ACTION, shape=(ACTION_SIZE,)),
+            "agent_pos": PolicyFeature(type=FeatureType.STATE, shape=(STATE_SIZE,)),
         }
         self.features_map = {ACTION: ACTION, "agent_pos": OBS_STATE}
         for camera in self.cameras:
-            self.features[f"pixels/{camera}"] = PolicyFeature(type=FeatureType.VISUAL, shape=(self.size, self.size, 3))
+            self.features[f"pixels/{camera}"] = PolicyFeature(
+                type=FeatureType.VISUAL, shape=(self.size, self.size, 3)
+            )
             self.features_map[f"pixels/{camera}"] = f"{OBS_IMAGES}.{camera}"
 
     @property
@@ -71,7 +77,7 @@ class TrocarConfig(EnvConfig):
 
     @property
     def gym_kwargs(self) -> dict[str, Any]:
-        """Options of the environment; a state without pictures is in a dict too, which LeRobot wants."""
+        """Options of the environment. LeRobot needs a dict even without pictures."""
         return {
             "scene": self.scene,
             "obs": "agent_pos+rgb" if self.cameras else "agent_pos",
@@ -84,7 +90,7 @@ class TrocarConfig(EnvConfig):
 
 
 def main() -> None:
-    sys.argv[1:] = ["--env.type=trocar", *(sys.argv[1:] or FRESH)]
+    sys.argv[1:] = ["--env.type=trocar", *(sys.argv[1:] or DEFAULT_ARGUMENTS)]
     lerobot_eval.main()
 
 

@@ -1,28 +1,31 @@
-"""A policy served by PyPI's `openpi-server`, as one would serve a trained one from a machine with a GPU.
+"""Serves a policy by the package `openpi-server`, as from a machine with a GPU.
 
     pip install openpi-server
     python examples/python/serve_openpi.py --port 8000
     trocar evaluate cell-a --policy sway=ws://127.0.0.1:8000 --episodes 2
 
-(`python -m trocar.serve MODULE:NAME` serves the same object without that package.)
+`python -m trocar.serve examples/python/serve_openpi.py:Sway` serves the same object without that
+package.
 """
 
 import argparse
+from typing import Any
 
 import numpy as np
 
-#: Numbers of `observation/state` that are an arm's coordinates: two pivots [rad], insertion [m], roll [rad], jaw opening.
+#: Coordinates of an arm in `observation/state`: two pivot angles (rad), insertion (m), roll (rad),
+#: jaw opening.
 LEFT, RIGHT = slice(0, 5), slice(23, 28)
 
 
 class Sway:
-    """Leans both instruments slowly from side to side about where they were at the beginning."""
+    """Swings both instruments slowly from side to side about their initial poses."""
 
     def __init__(self) -> None:
         self.start: np.ndarray | None = None
 
-    def infer(self, obs: dict) -> dict:
-        """A chunk of 8 actions of 10 numbers: absolute targets at 30 a second."""
+    def infer(self, obs: dict[str, Any]) -> dict[str, Any]:
+        """A chunk of 8 actions (8, 10): absolute targets at 30 a second."""
         state, step = np.asarray(obs["observation/state"]), int(obs["episode/step"])
         if step == 0 or self.start is None:
             self.start = np.concatenate([state[LEFT], state[RIGHT]])
@@ -32,6 +35,7 @@ class Sway:
         return {"actions": chunk}
 
     def reset(self) -> None:
+        """Starts an episode."""
         self.start = None
 
 

@@ -1,19 +1,22 @@
-"""Reinforcement learning on GraspLift: Stable-Baselines3's SAC, with a few scripted demonstrations, learns to grasp and lift, and draws its learning curve.
+"""Reinforcement learning on GraspLift by SAC of Stable-Baselines3, with scripted demonstrations.
 
     pip install stable-baselines3 matplotlib
     python examples/python/train_grasp_lift.py --decisions 3000
 
-What is learned: the left arm's five targets, five decisions a second; the right arm stays. The policy sees what the robot measures
-(coordinates, tip, force, whether the jaws hold tissue, the stage). Only the reward knows more: the gain in stages is joined by how much
-nearer the mouth has come to the organ (privileged; a policy on a robot never needs it).
+The policy sets the left arm's five targets, five times a second; the right arm stands still. It
+observes what a robot measures (coordinates, tip, force, whether the jaws hold tissue, the stage).
+Only the reward is privileged: the gain in stages, and how much nearer the jaws came to the organ. A
+policy on a robot does not need it.
 
-Demonstrations of the program's own `scripted` controller lie in the replay buffer from the beginning, and half of each batch is drawn
-from them (Ball et al. 2023, RLPD); the policy itself starts from nothing. `--demonstrations 0` does without.
+The replay buffer begins with demonstrations of the built-in controller `scripted`, and half of each
+batch is drawn from them (Ball et al. 2023, RLPD). The policy itself starts from random weights.
+`--demonstrations 0` runs without them. The result is a learning curve.
 """
 
 import argparse
 import time
 from pathlib import Path
+from typing import Any, cast
 
 import gymnasium as gym
 import matplotlib
@@ -22,32 +25,37 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 import torch
-import trocar
 from stable_baselines3 import SAC
 from stable_baselines3.common.buffers import ReplayBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.torch_layers import create_mlp
 from stable_baselines3.common.vec_env import VecEnv
 
+import trocar
+
 #: Control steps (1/30 s) of one decision.
 EVERY = 6
-#: What an action of 1 changes in a decision: two pivots [rad], insertion [m], roll [rad]. The fifth number is the jaw: closed to open.
+#: Change of the targets by an action of 1 in a decision: two pivot angles (rad), insertion (m),
+#: roll (rad). The fifth number of an action is the jaw: -1 is closed, 1 is open.
 STEP = np.array([0.07, 0.07, 0.009, 0.35])
-#: The left arm's numbers among an action's and among a state's.
+#: The left arm's numbers in an action and in a state, and the index of its jaw.
 ARM, JAW = slice(0, 5), 4
-#: Episodes that shares and means are of.
+#: Number of episodes in the reported rates and means.
 PART = 20
 #: Widths of the networks' hidden layers.
 NET = [128, 128]
-#: Within this distance of the organ the reward begins to pull [mm].
+#: Length of the decay of the reward for distance to the organ (mm).
 NEAR_MM = 10.0
 
 
 class LiftCells(VecEnv):
-    """Cells of GraspLift for Stable-Baselines3: the left arm alone, a decision every 0.2 s, a shaped reward."""
+    """Cells of GraspLift for Stable-Baselines3, with a shaped reward.
+
+    An action moves the left arm only, for 0.2 s.
+    """
 
     def __init__(self, cells: int, seconds: float, seed: int):
-        self.cells = gym.make_vec(
+        envs = gym.make_vec(
             "trocar/GraspLift-v0",
             num_envs=cells,
             vectorization_mode="vector_entry_point",
@@ -55,12 +63,21 @@ class LiftCells(VecEnv):
             episode_s=seconds,
             privileged=True,
         )
+        # Its own attributes are not in Gymnasium's types.
+        self.cells = cast(Any, envs)
         space = self.cells.single_action_space
+        assert isinstance(space, gym.spaces.Box)
         self.low, self.high = space.low.astype(float), space.high.astype(float)
-        self.distance_column = self.cells.channel_names.index("grasp_distance_mm")
+        channel_names: list[str] = self.cells.channel_names
+        self.distance_column = channel_names.index("grasp_distance_mm")
         self.seed_first = seed
+        self._start = np.zeros((cells, 10))
         self.render_mode = None
-        super().__init__(cells, gym.spaces.Box(-np.inf, np.inf, (21,), np.float32), gym.spaces.Box(-1.0, 1.0, (5,), np.float32))
+        super().__init__(
+            cells,
+            gym.spaces.Box(-np.inf, np.inf, (21,), np.float32),
+            gym.spaces.Box(-1.0, 1.0, (5,), np.float32),
+        )
 
     def reset(self) -> np.ndarray:
         self.state, infos = self.cells.reset(seed=self.seed_first)
@@ -71,16 +88,25 @@ class LiftCells(VecEnv):
         return self._seen(self.state, self.targets)
 
     def _stay(self, which: np.ndarray) -> None:
-        """The targets of cells that have begun an episode: where the arms are."""
-        self.targets[which, :5], self.targets[which, 5:] = self.state[which, :5], self.state[which, 23:28]
+        """Sets the targets of the flagged cells to the current coordinates of their arms."""
+        self.targets[which, :5], self.targets[which, 5:] = (
+            self.state[which, :5],
+            self.state[which, 23:28],
+        )
 
     def _near(self, channels: np.ndarray) -> np.ndarray:
-        """1 with the mouth at the organ, to 0 far away. Before an episode's first step its channels are all 0, which says nothing."""
+        """From 1 with the jaws at the organ to 0 far away.
+
+        0 before an episode's first step, when its channels are all 0.
+        """
         distance = channels[..., self.distance_column]
         return np.where(distance > 0.0, np.exp(-distance / NEAR_MM), 0.0)
 
     def _seen(self, state: np.ndarray, targets: np.ndarray) -> np.ndarray:
-        """What the policy sees, scaled to about one: coordinates, how far their targets are ahead, rates, tip, force, holding, stage."""
+        """The policy's observation (..., 21), scaled to about 1.
+
+        Coordinates, targets relative to them, rates, tip, force, whether the jaws hold, stage.
+        """
         scale = np.array([0.3, 0.3, 0.05, 1.0, 1.0])
         here = state[..., ARM]
         parts = [
@@ -112,12 +138,15 @@ class LiftCells(VecEnv):
         return self._decide(row)
 
     def demonstrate(self, experts: list[trocar.Policy]):
-        """A decision of the program's controllers: what was seen, what they did as an action, and what `step_wait` gives."""
+        """A decision of the built-in controllers.
+
+        Returns the observations before, the equivalent actions, and the result of `step_wait`.
+        """
         before, start = self._seen(self.state, self.targets), self.targets.copy()
 
         def row(_: int) -> np.ndarray:
             self.targets = np.stack([expert(self.cells, k) for k, expert in enumerate(experts)])
-            # What is done is what is recorded: the targets of the last step that was not of the next episode.
+            # The recorded action is that of the last step before a restart.
             done[~self.fresh] = self.targets[~self.fresh]
             return self.targets
 
@@ -127,8 +156,15 @@ class LiftCells(VecEnv):
         return before, np.clip(actions, -1.0, 1.0).astype(np.float32), after, rewards, over, infos
 
     def _decide(self, row, experts: list[trocar.Policy] | None = None):
-        """Does the control steps of one decision. A cell whose episode ends amid it waits at its new start for the others."""
-        rewards, over, self.fresh = np.zeros(self.num_envs), np.zeros(self.num_envs, bool), np.zeros(self.num_envs, bool)
+        """Runs the control steps of one decision.
+
+        A cell whose episode ends during it waits at its new start for the others.
+        """
+        rewards, over, self.fresh = (
+            np.zeros(self.num_envs),
+            np.zeros(self.num_envs, bool),
+            np.zeros(self.num_envs, bool),
+        )
         infos: list[dict] = [{} for _ in range(self.num_envs)]
         for step in range(EVERY):
             actions = row(step).copy()
@@ -139,12 +175,16 @@ class LiftCells(VecEnv):
             rewards[going] += 2.0 * gain[going]
             ends = (ended | late) & going
             near = self._near(told["channels"])
-            for k in np.flatnonzero(ends):
+            for k in np.flatnonzero(ends).tolist():
                 last = told["final_info"]
                 seen = self._seen(told["final_obs"][k], actions[k])
                 passed = bool(last["is_success"][k])
                 rewards[k] += self._near(last["channels"][k]) - self.near[k] + 3.0 * passed
-                infos[k] = {"terminal_observation": seen, "TimeLimit.truncated": bool(late[k]), "is_success": passed}
+                infos[k] = {
+                    "terminal_observation": seen,
+                    "TimeLimit.truncated": bool(late[k]),
+                    "is_success": passed,
+                }
                 infos[k]["stage"] = int(last["stage"][k])
                 self.near[k] = near[k]
                 if experts is not None:
@@ -152,10 +192,12 @@ class LiftCells(VecEnv):
             if ends.any():
                 self.fresh |= ends
                 over |= ends
-                self._start = np.concatenate([self.state[:, :5], self.state[:, 23:28]], 1).astype(float)
+                self._start = np.concatenate([self.state[:, :5], self.state[:, 23:28]], 1).astype(
+                    float
+                )
         going = ~self.fresh
         rewards[going] += near[going] - self.near[going]
-        # Time is dear.
+        # A cost for time.
         rewards -= 0.02
         self.near = near
         self._stay(self.fresh) if experts is None else None
@@ -169,7 +211,7 @@ class LiftCells(VecEnv):
     def close(self) -> None:
         self.cells.close()
 
-    # Nothing of this is a single environment's.
+    # Stable-Baselines3 asks these of environments.
 
     def get_attr(self, attr_name, indices=None):
         return [getattr(self, attr_name)] * self.num_envs
@@ -185,7 +227,7 @@ class LiftCells(VecEnv):
 
 
 class Mixed(ReplayBuffer):
-    """A replay buffer that draws half of each batch from demonstrations, as long as there are any."""
+    """A replay buffer that draws half of each batch from demonstrations, if there are any."""
 
     demonstrations: ReplayBuffer | None = None
 
@@ -199,11 +241,13 @@ class Mixed(ReplayBuffer):
 
 
 def normalized(model: SAC, net: list[int]) -> None:
-    """Gives the critics layer normalization, which keeps what they think of actions that nobody has tried within bounds (RLPD)."""
+    """Adds layer normalization to the critics, which bounds values of unseen actions (RLPD)."""
     inputs = model.observation_space.shape[0] + model.action_space.shape[0]
     for critic in (model.critic, model.critic_target):
         for k in range(critic.n_critics):
-            made = torch.nn.Sequential(*create_mlp(inputs, 1, net, torch.nn.ReLU, post_linear_modules=[torch.nn.LayerNorm]))
+            made = torch.nn.Sequential(
+                *create_mlp(inputs, 1, net, torch.nn.ReLU, post_linear_modules=[torch.nn.LayerNorm])
+            )
             setattr(critic, f"qf{k}", made)
             critic.q_networks[k] = made
     model.critic_target.load_state_dict(model.critic.state_dict())
@@ -211,8 +255,10 @@ def normalized(model: SAC, net: list[int]) -> None:
 
 
 def demonstrations(envs: LiftCells, episodes: int) -> tuple[ReplayBuffer, list[bool]]:
-    """Episodes of the scripted controller as transitions, and which of them passed."""
-    kept = ReplayBuffer(200 * episodes, envs.observation_space, envs.action_space, handle_timeout_termination=True)
+    """Transitions of the scripted controller's episodes, and which of them passed."""
+    kept = ReplayBuffer(
+        200 * episodes, envs.observation_space, envs.action_space, handle_timeout_termination=True
+    )
     experts = [trocar.Policy("scripted") for _ in range(envs.num_envs)]
     envs.reset()
     for k, expert in enumerate(experts):
@@ -227,16 +273,24 @@ def demonstrations(envs: LiftCells, episodes: int) -> tuple[ReplayBuffer, list[b
             if over[k] and len(passed) < episodes:
                 passed.append(infos[k]["is_success"])
                 for seen, then, action, reward, end, info in rows[k]:
-                    kept.add(seen[None], then[None], action[None], np.array([reward]), np.array([end]), info)
+                    kept.add(
+                        seen[None],
+                        then[None],
+                        action[None],
+                        np.array([reward]),
+                        np.array([end]),
+                        info,
+                    )
             if over[k]:
                 rows[k] = []
     return kept, passed
 
 
 def test(model: SAC, cells: int, seconds: float, episodes: int) -> list[bool]:
-    """Which of `episodes` new episodes the policy passes without its exploration.
+    """Which of `episodes` new episodes the policy passes without exploration.
 
-    How many of each cell count is settled beforehand: episodes that pass end early, so that those that end first are no fair sample.
+    The number of episodes of each cell is fixed beforehand: episodes that pass end early, so the
+    first ones to end are a biased sample.
     """
     envs = LiftCells(cells, seconds, seed=1_000_000)
     left = np.full(cells, episodes // cells)
@@ -252,7 +306,7 @@ def test(model: SAC, cells: int, seconds: float, episodes: int) -> list[bool]:
 
 
 class Log(BaseCallback):
-    """Decisions so far, minutes, return, stage and success of every episode."""
+    """Records decisions so far, minutes, return, stage and success of every episode."""
 
     def __init__(self):
         super().__init__()
@@ -262,12 +316,22 @@ class Log(BaseCallback):
         for info in self.locals["infos"]:
             if "episode" in info:
                 minutes = (time.perf_counter() - self.begun) / 60.0
-                self.rows.append((self.num_timesteps, minutes, info["episode"]["r"], info["stage"], info["is_success"]))
+                self.rows.append(
+                    (
+                        self.num_timesteps,
+                        minutes,
+                        info["episode"]["r"],
+                        info["stage"],
+                        info["is_success"],
+                    )
+                )
                 if len(self.rows) % PART == 0:
                     last = np.array(self.rows[-PART:], float)
+                    grasped = np.mean(last[:, 3] > 0)
                     print(
-                        f"{self.num_timesteps} decisions, {minutes:.1f} min, {len(self.rows)} episodes; last {PART}: "
-                        f"return {last[:, 2].mean():.2f}, grasped {np.mean(last[:, 3] > 0):.0%}, passed {last[:, 4].mean():.0%}",
+                        f"{self.num_timesteps} decisions, {minutes:.1f} min, "
+                        f"{len(self.rows)} episodes; last {PART}: return {last[:, 2].mean():.2f}, "
+                        f"grasped {grasped:.0%}, passed {last[:, 4].mean():.0%}",
                         flush=True,
                     )
         return True
@@ -299,10 +363,16 @@ def draw(rows: np.ndarray, path: Path, script: float | None) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--decisions", type=int, default=3000, help="five a second of simulated time")
-    parser.add_argument("--demonstrations", type=int, default=10, help="scripted episodes in the replay buffer")
+    parser.add_argument(
+        "--decisions", type=int, default=3000, help="five a second of simulated time"
+    )
+    parser.add_argument(
+        "--demonstrations", type=int, default=10, help="scripted episodes in the replay buffer"
+    )
     parser.add_argument("--cells", type=int, default=4)
-    parser.add_argument("--seconds", type=float, default=7.0, help="longest episode")
+    parser.add_argument(
+        "--seconds", type=float, default=7.0, help="maximum duration of an episode (s)"
+    )
     parser.add_argument("--test", type=int, default=20, help="new episodes of the test at the end")
     parser.add_argument("--updates", type=int, default=6, help="gradient steps a decision")
     parser.add_argument("--seed", type=int, default=0)
@@ -319,7 +389,8 @@ def main() -> None:
         learning_rate=5e-4,
         batch_size=256,
         learning_starts=100,
-        # Rewards are of the order of 0.1: with the usual first weight of 1, entropy would be all that counts for a long time.
+        # Rewards are about 0.1: with the default initial weight of 1, entropy would dominate them
+        # for a long time.
         ent_coef="auto_0.02",
         train_freq=1,
         gradient_steps=options.cells * options.updates,
@@ -332,17 +403,27 @@ def main() -> None:
         kept, passed = demonstrations(envs, options.demonstrations)
         model.replay_buffer.demonstrations = kept
         script = float(kept.rewards[: kept.size()].sum() / options.demonstrations)
-        print(f"demonstrations: {sum(passed)} of {len(passed)} pass, return {script:.2f}, {kept.size()} decisions", flush=True)
+        print(
+            f"demonstrations: {sum(passed)} of {len(passed)} pass, return {script:.2f}, "
+            f"{kept.size()} decisions",
+            flush=True,
+        )
         kept.device = model.device
     log = Log()
     model.learn(options.decisions, callback=log)
     rows = np.array(log.rows, dtype=float)
     if not len(rows):
-        print("no episode was finished; give it more --decisions")
+        print("no episode was finished; try more --decisions")
         return
     options.output.parent.mkdir(parents=True, exist_ok=True)
     model.save(options.output.with_suffix(".zip"))
-    np.savetxt(options.output.with_suffix(".csv"), rows, delimiter=",", header="decisions,minutes,return,stage,passed", fmt="%.4g")
+    np.savetxt(
+        options.output.with_suffix(".csv"),
+        rows,
+        delimiter=",",
+        header="decisions,minutes,return,stage,passed",
+        fmt="%.4g",
+    )
     draw(rows, options.output, script)
     if options.test:
         passed = test(model, options.cells, options.seconds, options.test)

@@ -1,15 +1,16 @@
-"""What several files of tests share: cells that are built once, since building one takes about a second of work."""
+"""Fixtures of several files. Cells are built once, because building one takes about a second."""
 
-from pathlib import Path
 import os
 import shutil
+from pathlib import Path
 
 import gymnasium as gym
 import numpy as np
 import pytest
+
 import trocar  # noqa: F401  (registers the environments)
 
-#: Short episodes: a test of the contract needs no more.
+#: Short episodes are enough for tests of the contract.
 SHORT = {"episode_s": 0.4}
 
 
@@ -22,24 +23,37 @@ def one():
 @pytest.fixture(scope="session")
 def seeing():
     """One cell with state, colours and depth of two cameras."""
-    return gym.make("trocar/GraspLift-v0", obs="state+rgb+depth", image_size=(48, 64), render_mode="rgb_array", **SHORT)
+    return gym.make(
+        "trocar/GraspLift-v0",
+        obs="state+rgb+depth",
+        image_size=(48, 64),
+        render_mode="rgb_array",
+        **SHORT,
+    )
 
 
 @pytest.fixture(scope="session")
 def program():
-    """The program `trocar`: `$TROCAR_PROGRAM`, or what cargo has built, or the one on the path."""
+    """The program `trocar`: `$TROCAR_PROGRAM`, or cargo's build, or the one on the path."""
     built = Path(__file__).parents[2] / "target/release/trocar"
-    found = os.environ.get("TROCAR_PROGRAM") or (str(built) if built.exists() else shutil.which("trocar"))
+    found = os.environ.get("TROCAR_PROGRAM") or (
+        str(built) if built.exists() else shutil.which("trocar")
+    )
     if not found:
         pytest.skip("the program is not built (cargo build --release)")
     return found
 
 
 def changed_scene(folder, task, seconds):
-    """The built-in scene as a file, with another task and another longest episode."""
+    """The built-in scene as a file, with another task, another duration (s) and small pictures."""
     text = (Path(__file__).parents[2] / "crates/scene/scenes/cell-a.toml").read_text()
-    text = text.replace('name = "appendix-resection"', f'name = "{task}"').replace("episode_s = 40.0", f"episode_s = {seconds}")
-    assert task in text and f"episode_s = {seconds}" in text
+    for old, new in [
+        ('name = "appendix-resection"', f'name = "{task}"'),
+        ("episode_s = 40.0", f"episode_s = {seconds}"),
+        ("policy_size_px = [224, 224]", "policy_size_px = [48, 48]"),
+    ]:
+        assert old in text
+        text = text.replace(old, new)
     path = folder / f"{task}.toml"
     path.write_text(text)
     return path
@@ -47,13 +61,13 @@ def changed_scene(folder, task, seconds):
 
 @pytest.fixture(scope="session")
 def short_scene(tmp_path_factory):
-    """A scene file whose episodes of port-reach are over after half a second."""
+    """A scene file of port-reach with episodes of half a second."""
     return changed_scene(tmp_path_factory.mktemp("scene"), "port-reach", 0.5)
 
 
 @pytest.fixture(scope="session")
 def lift_scene(tmp_path_factory):
-    """A scene file of grasp-lift, with time enough to pass."""
+    """A scene file of grasp-lift with enough time to pass."""
     return changed_scene(tmp_path_factory.mktemp("scene"), "grasp-lift", 20.0)
 
 

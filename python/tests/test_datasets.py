@@ -1,4 +1,4 @@
-"""LeRobot datasets are read back: by pyarrow always, by LeRobot where it is installed."""
+"""LeRobot datasets are read back: by pyarrow, and by LeRobot where it is installed."""
 
 import json
 import os
@@ -14,19 +14,23 @@ pytest.importorskip("h5py")
 
 import pandas as pd
 import pyarrow.parquet as pq
-from trocar.datasets import LeRobotWriter
-from trocar.datasets import _layouts, _stats, _video, lerobot
+
+from trocar.datasets import LeRobotWriter, _layouts, _stats, _video, lerobot
 
 FEATURES = {
     "observation.state": {"dtype": "float32", "shape": (3,), "names": ["x", "y", "z"]},
-    "observation.images.endoscope": {"dtype": "video", "shape": (64, 96, 3), "names": ["height", "width", "channels"]},
+    "observation.images.endoscope": {
+        "dtype": "video",
+        "shape": (64, 96, 3),
+        "names": ["height", "width", "channels"],
+    },
     "action": {"dtype": "float32", "shape": (2,), "names": None},
 }
 LENGTHS = [7, 12, 5]
 
 
 def picture(episode: int, frame: int) -> np.ndarray:
-    """A smooth picture whose colours say which frame it is."""
+    """A smooth picture whose colours depend on the frame."""
     y, x = np.mgrid[0:64, 0:96]
     return np.stack([x * 2, y * 3, np.full_like(x, 20 * episode + 10 * frame)], -1).astype(np.uint8)
 
@@ -50,11 +54,15 @@ def write(root, version, episodes=range(len(LENGTHS))):
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
-def test_numbers_and_pictures_come_back(tmp_path, version):
+def test_numbers_and_pictures_survive_a_round_trip(tmp_path, version):
     root = tmp_path / "set"
     write(root, version)
     info = json.loads((root / "meta/info.json").read_text())
-    assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (3, sum(LENGTHS), 2)
+    assert (info["total_episodes"], info["total_frames"], info["total_tasks"]) == (
+        3,
+        sum(LENGTHS),
+        2,
+    )
     table = pd.concat(pd.read_parquet(p) for p in sorted((root / "data").rglob("*.parquet")))
     assert table["index"].tolist() == list(range(sum(LENGTHS)))
     assert table["episode_index"].tolist() == [e for e, n in enumerate(LENGTHS) for _ in range(n)]
@@ -70,25 +78,33 @@ def test_numbers_and_pictures_come_back(tmp_path, version):
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
-def test_a_dataset_is_gone_on_with_and_looks_as_if_written_at_once(tmp_path, version):
+def test_a_continued_dataset_equals_one_written_at_once(tmp_path, version):
     write(tmp_path / "whole", version)
     write(tmp_path / "parts", version, [0])
     write(tmp_path / "parts", version, [1, 2])
-    whole = sorted(p.relative_to(tmp_path / "whole") for p in (tmp_path / "whole").rglob("*") if p.is_file())
-    assert whole == sorted(p.relative_to(tmp_path / "parts") for p in (tmp_path / "parts").rglob("*") if p.is_file())
+    whole = sorted(
+        p.relative_to(tmp_path / "whole") for p in (tmp_path / "whole").rglob("*") if p.is_file()
+    )
+    assert whole == sorted(
+        p.relative_to(tmp_path / "parts") for p in (tmp_path / "parts").rglob("*") if p.is_file()
+    )
     for name in whole:
         if name.suffix == ".parquet":
-            assert pq.read_table(tmp_path / "whole" / name).equals(pq.read_table(tmp_path / "parts" / name)), name
+            assert pq.read_table(tmp_path / "whole" / name).equals(
+                pq.read_table(tmp_path / "parts" / name)
+            ), name
         elif name.suffix != ".mp4":
-            assert (tmp_path / "whole" / name).read_text() == (tmp_path / "parts" / name).read_text(), name
+            assert (tmp_path / "whole" / name).read_text() == (
+                tmp_path / "parts" / name
+            ).read_text(), name
 
 
-class Killed(Exception):
-    """In place of a kill: nothing after it is done."""
+class KilledError(Exception):
+    """Stands for a kill: nothing after it is executed."""
 
 
 def same(a, b):
-    """Two datasets hold the same files with the same contents."""
+    """Asserts that two datasets have the same files with the same contents."""
     names = sorted(p.relative_to(a) for p in a.rglob("*") if p.is_file())
     assert names == sorted(p.relative_to(b) for p in b.rglob("*") if p.is_file())
     for name in names:
@@ -99,8 +115,10 @@ def same(a, b):
 
 
 @pytest.mark.parametrize(("version", "mb"), [("v3.0", 0), ("v3.0", 16), ("v2.1", 16)])
-def test_killed_between_any_two_files_it_is_gone_on_with_as_if_never(tmp_path, monkeypatch, version, mb):
-    # With 0 every file is full after an episode, so that the next one begins new files.
+def test_a_kill_between_any_two_files_changes_nothing_after_it_resumes(
+    tmp_path, monkeypatch, version, mb
+):
+    # With 0 every file is full after an episode, so the next one starts new files.
     monkeypatch.setattr(_layouts, "DATA_FILE_MB", mb)
     write(tmp_path / "whole", version)
     replace = os.replace
@@ -109,7 +127,7 @@ def test_killed_between_any_two_files_it_is_gone_on_with_as_if_never(tmp_path, m
 
         def counted(source, target):
             if left[0] == 0:
-                raise Killed
+                raise KilledError
             left[0] -= 1
             replace(source, target)
 
@@ -118,7 +136,7 @@ def test_killed_between_any_two_files_it_is_gone_on_with_as_if_never(tmp_path, m
             write(root, version)
             assert kill > 12
             break
-        except Killed:
+        except KilledError:
             pass
         monkeypatch.setattr(os, "replace", replace)
         kept = LeRobotWriter(root, fps=30, features=FEATURES, version=version).episodes
@@ -131,7 +149,7 @@ def test_killed_between_any_two_files_it_is_gone_on_with_as_if_never(tmp_path, m
         raise AssertionError("the loop ends when nothing is killed any more")
 
 
-def test_an_episode_that_could_not_be_written_is_written_again(tmp_path, monkeypatch):
+def test_an_episode_is_written_again_after_an_error(tmp_path, monkeypatch):
     monkeypatch.setattr(_layouts, "DATA_FILE_MB", 0)
     write(tmp_path / "whole", "v3.0")
     writer = write(tmp_path / "set", "v3.0", [0])
@@ -153,7 +171,7 @@ def test_an_episode_that_could_not_be_written_is_written_again(tmp_path, monkeyp
     same(tmp_path / "whole", tmp_path / "set")
 
 
-def test_a_first_episode_that_could_not_be_written_is_written_again(tmp_path, monkeypatch):
+def test_the_first_episode_is_written_again_after_an_error(tmp_path, monkeypatch):
     write(tmp_path / "whole", "v3.0", [0])
     write_json = lerobot.write_json
     for failing in range(2):
@@ -183,18 +201,18 @@ def test_two_writers_of_a_folder_take_turns(tmp_path, monkeypatch):
     write(tmp_path / "set", "v3.0", [1])
     for frame in frames(2):
         one.add_frame(frame)
-    # While one saves, another that opens the folder takes nothing away, and may not save.
+    # While one saves, another that opens the folder removes nothing and cannot save.
     inside, save = [], lerobot.LeRobotWriter._save
 
     def watched(self, task):
         monkeypatch.setattr(lerobot.LeRobotWriter, "_save", save)
-        (tmp_path / "set/meta/under-way.partial").write_text("")
+        (tmp_path / "set/meta/unfinished.partial").write_text("")
         other = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version="v3.0")
         other.add_frame(next(frames(0)))
-        assert (tmp_path / "set/meta/under-way.partial").exists()
-        with pytest.raises(RuntimeError, match="another writer"), other._alone(0.0):
+        assert (tmp_path / "set/meta/unfinished.partial").exists()
+        with pytest.raises(RuntimeError, match="another writer"), other._locked(0.0):
             pass
-        (tmp_path / "set/meta/under-way.partial").unlink()
+        (tmp_path / "set/meta/unfinished.partial").unlink()
         inside.append(other.episodes)
         return save(self, task)
 
@@ -204,23 +222,23 @@ def test_two_writers_of_a_folder_take_turns(tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
-def test_what_another_writer_left_when_it_died_is_not_built_upon(tmp_path, monkeypatch, version):
+def test_files_of_a_killed_writer_are_removed(tmp_path, monkeypatch, version):
     monkeypatch.setattr(_layouts, "DATA_FILE_MB", 0)
     write(tmp_path / "whole", version)
     dying = write(tmp_path / "set", version, [0])
-    # Opened before the other's death, once while it holds the folder and once while it does not.
+    # Opened before the other is killed, once while it holds the lock and once while it does not.
     before = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version=version)
-    with dying._alone():
+    with dying._locked():
         amid = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version=version)
     for frame in frames(2):
         dying.add_frame(frame)
     write_json = lerobot.write_json
 
     def die(path, value):
-        raise Killed
+        raise KilledError
 
     monkeypatch.setattr(lerobot, "write_json", die)
-    with pytest.raises(Killed):
+    with pytest.raises(KilledError):
         dying.save_episode("fold")
     monkeypatch.setattr(lerobot, "write_json", write_json)
     for episode, writer, task in [(1, before, "lift"), (2, amid, "cut")]:
@@ -230,10 +248,10 @@ def test_what_another_writer_left_when_it_died_is_not_built_upon(tmp_path, monke
     same(tmp_path / "whole", tmp_path / "set")
 
 
-def test_a_writer_opened_while_another_saves_keeps_what_is_there(tmp_path):
+def test_a_writer_opened_while_another_saves_keeps_its_files(tmp_path):
     write(tmp_path / "whole", "v3.0")
     one = write(tmp_path / "set", "v3.0", [0, 1])
-    with one._alone():
+    with one._locked():
         other = LeRobotWriter(tmp_path / "set", fps=30, features=FEATURES, version="v3.0")
     for frame in frames(2):
         other.add_frame(frame)
@@ -246,7 +264,7 @@ def test_wrong_frames_are_named_and_not_kept(tmp_path):
     good = next(frames(0))
     for change, words in [
         ({"action": np.zeros(3, np.float32)}, r"action has shape \(3,\)"),
-        ({"action": np.array([np.nan, 0], np.float32)}, "action holds a number that is not finite"),
+        ({"action": np.array([np.nan, 0], np.float32)}, "action has a number that is not finite"),
         ({"observation.images.endoscope": np.zeros((64, 96, 3))}, "pictures are uint8"),
         ({"more": 1}, "more unknown"),
     ]:
@@ -258,14 +276,17 @@ def test_wrong_frames_are_named_and_not_kept(tmp_path):
         writer.save_episode("lift")
     (tmp_path / "foreign").mkdir()
     (tmp_path / "foreign/letter.txt").write_text("dear")
-    with pytest.raises(FileExistsError, match="no LeRobot dataset"):
+    with pytest.raises(FileExistsError, match="not a LeRobot dataset"):
         LeRobotWriter(tmp_path / "foreign", fps=30, features=FEATURES)
 
 
 def test_merged_statistics_are_those_of_all_frames():
     dice = np.random.default_rng(1)
     a, b = dice.normal(size=(50, 4)), dice.normal(2.0, 3.0, size=(130, 4))
-    got, want = _stats.merged(_stats.of_numbers(a), _stats.of_numbers(b)), _stats.of_numbers(np.concatenate([a, b]))
+    got, want = (
+        _stats.merged(_stats.of_numbers(a), _stats.of_numbers(b)),
+        _stats.of_numbers(np.concatenate([a, b])),
+    )
     for name in ("min", "max", "mean", "std", "count"):
         np.testing.assert_allclose(got[name], want[name], rtol=1e-12)
 
@@ -275,7 +296,12 @@ def test_lerobot_reads_it(tmp_path):
     from lerobot.datasets.lerobot_dataset import LeRobotDataset
 
     write(tmp_path / "set", "v3.0")
-    dataset = LeRobotDataset("trocar/test", root=tmp_path / "set", video_backend="pyav", delta_timestamps={"action": [0, 1 / 30]})
+    dataset = LeRobotDataset(
+        "trocar/test",
+        root=tmp_path / "set",
+        video_backend="pyav",
+        delta_timestamps={"action": [0, 1 / 30]},
+    )
     assert (dataset.num_episodes, dataset.num_frames, dataset.fps) == (3, sum(LENGTHS), 30)
     first = 0
     for episode, length in enumerate(LENGTHS):
@@ -290,18 +316,25 @@ def test_lerobot_reads_it(tmp_path):
     assert dataset.meta.stats["observation.state"]["max"].shape == (3,)
 
 
-#: Types of numbers that a feature may have.
-NUMBERS = [*("bool float16 float32 float64".split()), *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))]
+#: Numeric types of features.
+NUMBERS = [
+    *(["bool", "float16", "float32", "float64"]),
+    *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)),
+]
 
 
 @pytest.mark.parametrize("version", ["v3.0", "v2.1"])
-def test_each_type_of_numbers_is_written(tmp_path, version):
-    features = {dtype: {"dtype": dtype, "shape": (n,)} for dtype in NUMBERS for n in [1 + len(dtype) % 2]}
+def test_each_numeric_type_is_written(tmp_path, version):
+    features = {
+        dtype: {"dtype": dtype, "shape": (n,)} for dtype in NUMBERS for n in [1 + len(dtype) % 2]
+    }
     writer = LeRobotWriter(tmp_path / "set", fps=30, features=features, version=version)
     for k in range(3):
         writer.add_frame({key: np.full(f["shape"], k % 2, key) for key, f in features.items()})
     writer.save_episode("count")
-    table = pd.concat(pd.read_parquet(p) for p in sorted((tmp_path / "set/data").rglob("*.parquet")))
+    table = pd.concat(
+        pd.read_parquet(p) for p in sorted((tmp_path / "set/data").rglob("*.parquet"))
+    )
     for key in NUMBERS:
         assert [np.ravel(value)[0] for value in table[key]] == [0, 1, 0], key
 
@@ -314,26 +347,32 @@ def test_features_that_cannot_be_written_are_refused_at_once(tmp_path):
         ({"shape": (1,)}, "view has dtype 'None'"),
         ({"dtype": "video", "shape": (64, 96)}, r"view has shape \(64, 96\)"),
         ({"dtype": "video", "shape": (64, 96, 1)}, "view has 1 channels"),
-        ({"dtype": "video", "shape": (64, 95, 3)}, "view is 95x64; a video needs even"),
+        (
+            {"dtype": "video", "shape": (64, 95, 3)},
+            "view is 95x64; the edges of a video must be even",
+        ),
     ]:
         with pytest.raises(ValueError, match=words):
             LeRobotWriter(tmp_path / "set", fps=30, features={"view": feature})
     for fps in (0, 29.97):
-        with pytest.raises(ValueError, match="no whole number of frames"):
+        with pytest.raises(ValueError, match="must be a positive integer"):
             LeRobotWriter(tmp_path / "set", fps=fps, features=FEATURES)
     assert LeRobotWriter(tmp_path / "set", fps=30.0, features=FEATURES).fps == 30
     assert not (tmp_path / "set").exists()
 
 
 def test_without_fcntl_datasets_are_written(tmp_path):
-    # As on Windows, where writers do not take turns.
+    # As on Windows, where there is no lock.
     lines = [
         "import sys",
         "sys.modules['fcntl'] = None",
         "from trocar.datasets import LeRobotWriter",
-        "writer = LeRobotWriter(sys.argv[1], fps=30, features={'action': {'dtype': 'float32', 'shape': (1,)}})",
+        "features = {'action': {'dtype': 'float32', 'shape': (1,)}}",
+        "writer = LeRobotWriter(sys.argv[1], fps=30, features=features)",
         "writer.add_frame({'action': 1.0})",
         "assert writer.save_episode('wait') == 0",
     ]
-    done = subprocess.run([sys.executable, "-c", "\n".join(lines), tmp_path / "set"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(lines), tmp_path / "set"], capture_output=True, text=True
+    )
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""One cell keeps Gymnasium's contract: seeds, saved states, ends, errors by name."""
+"""One cell fulfils Gymnasium's contract: seeds, saved states, ends, errors by name."""
 
 import os
 import signal
@@ -11,27 +11,27 @@ import typing
 import gymnasium as gym
 import numpy as np
 import pytest
-import trocar
+from conftest import SHORT, actions_of, changed_scene, rollout
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from gymnasium.utils.env_checker import check_env
 
-from conftest import SHORT, actions_of, changed_scene, rollout
+import trocar
 
 NAMES = list(trocar.TASKS)
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_gymnasium_finds_nothing_wrong(name):
+def test_the_environment_passes_gymnasiums_checker(name):
     env = gym.make(name, **SHORT)
     assert type(env) is trocar.TrocarEnv, "nothing is wrapped around it that hides its attributes"
-    # The check of closing builds another cell; one environment's is enough.
+    # The check of `close` builds another cell; it runs for one environment.
     check_env(env, skip_render_check=True, skip_close_check=name != NAMES[0])
     assert env.unwrapped.task_description and env.unwrapped._max_episode_steps == 12
     assert len(env.unwrapped.state_names) == env.observation_space.shape[0]
     assert len(env.unwrapped.action_names) == env.action_space.shape[0] == 10
 
 
-def test_a_seed_gives_the_same_bits_again_and_from_a_saved_state(one):
+def test_a_seed_and_a_saved_state_give_the_same_bits(one):
     actions = actions_of(one, 5, 12)
     first = rollout(one, 7, actions)
     rollout(one, 8, actions_of(one, 6, 4))
@@ -51,7 +51,7 @@ def test_a_seed_gives_the_same_bits_again_and_from_a_saved_state(one):
         assert one.unwrapped.state_hash == first[2][k]
 
 
-def test_the_last_step_says_why(one):
+def test_the_last_step_says_why_it_ended(one):
     actions = actions_of(one, 5, 12)
     one.reset(seed=1)
     for action in actions:
@@ -83,7 +83,7 @@ def test_wrong_actions_are_refused_by_name_and_change_nothing(one):
         ({"threads": 10**6}, "threads: .* 1024"),
         ({"obs": "state+agent_pos"}, "obs: .*once"),
         ({"image_size": 64}, "image_size: is 64"),
-        ({"image_size": (64.5, 64)}, "image_size: .*whole"),
+        ({"image_size": (64.5, 64)}, "image_size: .*integers in"),
         ({"image_size": "64"}, "image_size"),
     ]:
         with pytest.raises(ValueError, match=words):
@@ -94,12 +94,16 @@ def test_wrong_actions_are_refused_by_name_and_change_nothing(one):
 
 def test_two_processes_give_the_same_numbers(one):
     script = (
-        "import trocar, numpy as np; env = trocar.TrocarEnv(task='grasp-lift', episode_s=0.4, threads=1);"
-        "env.reset(seed=3); dice = np.random.default_rng(1); low, high = env.action_space.low, env.action_space.high\n"
+        "import trocar, numpy as np\n"
+        "env = trocar.TrocarEnv(task='grasp-lift', episode_s=0.4, threads=1)\n"
+        "env.reset(seed=3); dice = np.random.default_rng(1)\n"
+        "low, high = env.action_space.low, env.action_space.high\n"
         "for _ in range(8): env.step(dice.uniform(low, high))\n"
         "print(env.state_hash)"
     )
-    printed = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ)
+    printed = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True, env=os.environ
+    )
     one.reset(seed=3)
     dice = np.random.default_rng(1)
     for _ in range(8):
@@ -120,7 +124,7 @@ def test_a_restored_state_has_its_seed_and_draws_the_same_seeds(one):
     assert [one.reset()[1]["seed"] for _ in range(2)] == after, "a saved state stays as it was"
 
 
-def test_a_state_of_something_else_is_refused_and_changes_nothing(one, tmp_path):
+def test_a_state_of_another_scene_is_refused_and_changes_nothing(one, tmp_path):
     other = trocar.TrocarEnv(task="port-reach", **SHORT)
     path = changed_scene(tmp_path, "grasp-lift", 0.4)
     path.write_text(path.read_text().replace("control_hz = 30", "control_hz = 60"))
@@ -141,7 +145,7 @@ def test_a_state_of_something_else_is_refused_and_changes_nothing(one, tmp_path)
     assert info["seed"] == 6 and one.state_hash != before
 
 
-def test_order_is_kept_without_wrappers():
+def test_calls_in_the_wrong_order_raise_without_wrappers():
     env = trocar.TrocarEnv(task="port-reach", render_mode="rgb_array", **SHORT)
     for too_early in (lambda: env.step(env.action_space.low), env.render, env.save_state):
         with pytest.raises(ResetNeeded, match="reset first"):
@@ -151,27 +155,38 @@ def test_order_is_kept_without_wrappers():
     saved = env.save_state()
     env.close()
     env.close()
-    for too_late in (env.reset, lambda: env.step(env.action_space.low), env.render, env.save_state, lambda: env.restore_state(saved)):
+    for too_late in (
+        env.reset,
+        lambda: env.step(env.action_space.low),
+        env.render,
+        env.save_state,
+        lambda: env.restore_state(saved),
+    ):
         with pytest.raises(ClosedEnvironmentError, match="closed"):
             too_late()
     assert env.cells._native is None, "the cell is freed"
     assert env.task == "port-reach" and len(env.state_names) == env.observation_space.shape[0]
 
 
-def test_seeds_are_told_by_name(one):
-    assert one.reset(seed=np.int64(3))[1]["seed"] == 3 and one.reset(seed=2**63 - 1)[1]["seed"] == 2**63 - 1
+def test_wrong_seeds_are_refused_by_name(one):
+    assert (
+        one.reset(seed=np.int64(3))[1]["seed"] == 3
+        and one.reset(seed=2**63 - 1)[1]["seed"] == 2**63 - 1
+    )
     for seed in (-1, 2**63, 2**64, 1.5):
         with pytest.raises(ValueError, match="seed: is "):
             one.reset(seed=seed)
 
 
-def test_the_state_alone_may_be_in_a_dict():
+def test_the_state_alone_can_be_in_a_dict():
     env = trocar.TrocarEnv(task="grasp-lift", obs="agent_pos", **SHORT)
     check_env(env, skip_render_check=True, skip_close_check=True)
-    assert set(env.observation_space) == {"agent_pos"} and set(env.reset(seed=1)[0]) == {"agent_pos"}
+    assert set(env.observation_space) == {"agent_pos"} and set(env.reset(seed=1)[0]) == {
+        "agent_pos"
+    }
 
 
-def test_the_rate_is_the_scenes(one, tmp_path):
+def test_the_rate_is_that_of_the_scene(one, tmp_path):
     path = changed_scene(tmp_path, "port-reach", 0.5)
     path.write_text(path.read_text().replace("control_hz = 30", "control_hz = 60"))
     env = trocar.TrocarEnv(str(path))
@@ -181,13 +196,13 @@ def test_the_rate_is_the_scenes(one, tmp_path):
     assert envs.metadata["render_fps"] == envs.envs[0].metadata["render_fps"] == 60
 
 
-def test_types_of_options_can_be_asked_for():
+def test_types_of_options_can_be_resolved():
     for kind in (trocar.TrocarEnv, trocar.TrocarVectorEnv):
         assert "options" in typing.get_type_hints(kind.__init__)
 
 
 def refuses(use):
-    """Whether `use` says that the environment is another process's."""
+    """Whether `use` raises because the environment belongs to another process."""
     try:
         use()
     except RuntimeError as why:
@@ -202,11 +217,19 @@ def test_a_forked_child_is_refused_and_makes_its_own(one):
     saved = one.save_state()
     child = os.fork()
     if child == 0:
-        # Nothing of the tests' own is to run in the child, whatever happens.
+        # No code of pytest may run in the child.
         try:
             signal.alarm(60)
-            refused = [refuses(use) for use in (lambda: one.reset(seed=1), lambda: one.step(one.action_space.low), one.save_state,
-                                                lambda: one.restore_state(saved), lambda: one.cells.render(0))]
+            refused = [
+                refuses(use)
+                for use in (
+                    lambda: one.reset(seed=1),
+                    lambda: one.step(one.action_space.low),
+                    one.save_state,
+                    lambda: one.restore_state(saved),
+                    lambda: one.cells.render(0),
+                )
+            ]
             own = trocar.TrocarEnv(task="grasp-lift", **SHORT)
             own.reset(seed=1)
             own.step(own.action_space.low)
@@ -218,8 +241,8 @@ def test_a_forked_child_is_refused_and_makes_its_own(one):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a process cannot be sent Ctrl-C so")
-def test_ctrl_c_ends_the_building_of_many_cells():
-    # All of them would take minutes.
+def test_ctrl_c_stops_the_construction_of_many_cells():
+    # Building all of them would take minutes.
     press = threading.Timer(2.0, os.kill, (os.getpid(), signal.SIGINT))
     press.start()
     began = time.monotonic()

@@ -1,4 +1,4 @@
-"""What examples and documents say, without the packages that they need beside this one."""
+"""Code of examples and guides, without the other packages that they need."""
 
 import importlib.util
 import json
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from trocar import campaign
 
 ROOT = Path(__file__).parents[2]
@@ -24,18 +25,34 @@ class Anything(types.ModuleType):
 
 @pytest.fixture
 def learning(monkeypatch):
-    """The learning example, whether Stable-Baselines3 is there or not."""
-    names = ["common", "common.buffers", "common.callbacks", "common.torch_layers", "common.vec_env"]
-    for name in ["torch", "matplotlib", "matplotlib.pyplot", "stable_baselines3", *(f"stable_baselines3.{n}" for n in names)]:
+    """The learning example, with or without Stable-Baselines3."""
+    names = [
+        "common",
+        "common.buffers",
+        "common.callbacks",
+        "common.torch_layers",
+        "common.vec_env",
+    ]
+    for name in [
+        "torch",
+        "matplotlib",
+        "matplotlib.pyplot",
+        "stable_baselines3",
+        *(f"stable_baselines3.{n}" for n in names),
+    ]:
         monkeypatch.setitem(sys.modules, name, Anything(name))
-    spec = importlib.util.spec_from_file_location("train_grasp_lift", ROOT / "examples/python/train_grasp_lift.py")
+    spec = importlib.util.spec_from_file_location(
+        "train_grasp_lift", ROOT / "examples/python/train_grasp_lift.py"
+    )
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
 
 
 @pytest.mark.parametrize("episodes", [4, 9, 10])
-def test_the_test_of_what_was_learned_takes_as_many_episodes_of_every_cell(learning, monkeypatch, episodes):
+def test_the_test_of_the_learned_policy_takes_equally_many_episodes_of_each_cell(
+    learning, monkeypatch, episodes
+):
     class Cells:
         """Cell 0 always passes, after a step; cells 1 and 2 never do, after ten."""
 
@@ -58,13 +75,17 @@ def test_the_test_of_what_was_learned_takes_as_many_episodes_of_every_cell(learn
     assert len(passed) == episodes and sum(passed) == -(-episodes // 3)
 
 
-def test_the_policy_of_the_document_stays_where_it_is(short_scene, tmp_path):
-    """It is served as it is written there; only the server of another package is left out."""
+def test_the_policy_of_the_guide_runs(short_scene, tmp_path):
+    """It is served as it is written there, without the server of another package."""
     pytest.importorskip("msgpack")
     pytest.importorskip("websockets")
     text = (ROOT / "docs/guides/policies.md").read_text()
     (code,) = [block.partition("```")[0] for block in text.split("```python\n")[1:]]
-    kept = [line for line in code.splitlines() if "openpi_server" not in line and not line.startswith("WebsocketPolicyServer")]
+    kept = [
+        line
+        for line in code.splitlines()
+        if "openpi_server" not in line and not line.startswith("WebsocketPolicyServer")
+    ]
     (tmp_path / "still.py").write_text("\n".join(kept))
     policy = f"still=python:{tmp_path / 'still.py'}:Still"
     result = campaign.run(str(short_scene), [policy], tmp_path / "out", episodes=1)

@@ -1,4 +1,4 @@
-"""A recorder writes what its environment shows, at its environment's rate."""
+"""A recorder writes its environment's observations, at its rate."""
 
 import gymnasium as gym
 import numpy as np
@@ -8,11 +8,17 @@ pytest.importorskip("pyarrow")
 pytest.importorskip("av")
 h5py = pytest.importorskip("h5py")
 
-from trocar.datasets import LeRobotWriter, Recorder, RobomimicWriter, features_of, robomimic_observations
+from trocar.datasets import (
+    LeRobotWriter,
+    Recorder,
+    RobomimicWriter,
+    features_of,
+    robomimic_observations,
+)
 
 
 class Still(gym.Env):
-    """An environment of two steps an episode that shows how many were done."""
+    """An environment with two steps an episode that observes the number of steps."""
 
     metadata = {"render_modes": [], "render_fps": 60}
     observation_space = gym.spaces.Box(0, 9, (1,), np.float32)
@@ -28,15 +34,18 @@ class Still(gym.Env):
         return np.full(1, self.count, np.float32), 0.5, self.count == 2, False, {"is_success": True}
 
 
-def test_a_recorder_wants_the_rate_of_its_environment(tmp_path):
+def test_a_recorder_needs_the_rate_of_its_environment(tmp_path):
     env = Still()
 
     def writer(fps):
         return LeRobotWriter(tmp_path / f"set-{fps}", fps=fps, features=features_of(env))
 
-    with pytest.raises(ValueError, match="the writer has 30, the environment does 60 steps a second; make the writer with fps=60"):
+    with pytest.raises(
+        ValueError,
+        match=r"the writer has 30, the environment runs 60 steps a second; .*with fps=60",
+    ):
         Recorder(env, writer(30))
-    # What an environment says of itself counts, not its class.
+    # The environment's metadata count, not its class's.
     env.metadata = Still.metadata | {"render_fps": 30}
     env = Recorder(gym.wrappers.TimeLimit(env, 9), writer(30))
     env.reset(seed=0)
@@ -50,13 +59,18 @@ def test_a_recorder_wants_the_rate_of_its_environment(tmp_path):
         metadata = {"render_modes": [], "render_fps": 15}
 
     Recorder(EverySecond(env.unwrapped), writer(15))
-    with pytest.raises(ValueError, match="the environment does 15"):
+    with pytest.raises(ValueError, match="the environment runs 15"):
         Recorder(EverySecond(env.unwrapped), writer(30))
 
 
 def test_a_recorder_feeds_a_robomimic_file(tmp_path):
     env = Still()
-    with RobomimicWriter(tmp_path / "set.hdf5", observations=robomimic_observations(env), actions=2, env_name="Still-v0") as writer:
+    with RobomimicWriter(
+        tmp_path / "set.hdf5",
+        observations=robomimic_observations(env),
+        actions=2,
+        env_name="Still-v0",
+    ) as writer:
         recorder = Recorder(env, writer)
         for seed in range(2):
             recorder.reset(seed=seed)
@@ -64,5 +78,7 @@ def test_a_recorder_feeds_a_robomimic_file(tmp_path):
                 recorder.step(np.ones(2))
     with h5py.File(tmp_path / "set.hdf5") as file:
         demo = file["data/demo_1"]
-        assert demo["obs/state"][:].tolist() == [[0], [1]] and demo["next_obs/state"][:].tolist() == [[1], [2]]
+        assert demo["obs/state"][:].tolist() == [[0], [1]] and demo["next_obs/state"][
+            :
+        ].tolist() == [[1], [2]]
         assert demo["rewards"][:].tolist() == [0.5, 0.5] and demo.attrs["success"]

@@ -1,4 +1,4 @@
-"""robomimic's files: what is in them, and that they are whole whatever happens to the writer."""
+"""robomimic files: their content, and that they are complete whatever happens to the writer."""
 
 import json
 import os
@@ -13,10 +13,12 @@ h5py = pytest.importorskip("h5py")
 pytest.importorskip("pyarrow")
 pytest.importorskip("av")
 
-from trocar.datasets import RobomimicWriter, robomimic_environment
-from trocar.datasets import _spare, robomimic
+from trocar.datasets import RobomimicWriter, _spare, robomimic_environment
 
-OBSERVATIONS = {"state": {"dtype": "float32", "shape": (3,)}, "endoscope_image": {"dtype": "image", "shape": (16, 24, 3)}}
+OBSERVATIONS = {
+    "state": {"dtype": "float32", "shape": (3,)},
+    "endoscope_image": {"dtype": "image", "shape": (16, 24, 3)},
+}
 LENGTHS = [7, 12, 5]
 NAME = "trocar/GraspLift-v0"
 
@@ -26,7 +28,12 @@ def picture(episode, frame):
 
 
 def opened(path, **changed):
-    options = {"observations": OBSERVATIONS, "actions": 2, "env_name": NAME, "env_kwargs": {"obs": "state+rgb", "image_size": (16, 24)}}
+    options = {
+        "observations": OBSERVATIONS,
+        "actions": 2,
+        "env_name": NAME,
+        "env_kwargs": {"obs": "state+rgb", "image_size": (16, 24)},
+    }
     return RobomimicWriter(path, **options | changed)
 
 
@@ -46,17 +53,25 @@ def save(writer, episode):
 
 
 def check(path, episodes):
-    """The file holds the first `episodes` episodes, all of each, and nothing else."""
+    """Asserts that the file holds the first `episodes` episodes completely and nothing else."""
     with h5py.File(path, "r") as file:
         data = file["data"]
         assert sorted(data) == [f"demo_{k}" for k in range(episodes)]
         assert data.attrs["total"] == sum(LENGTHS[:episodes])
-        assert [name.decode() for name in file["mask/train"][:]] == sorted(data) if episodes else "mask" not in file
+        assert (
+            [name.decode() for name in file["mask/train"][:]] == sorted(data)
+            if episodes
+            else "mask" not in file
+        )
         for k in range(episodes):
             demo = data[f"demo_{k}"]
             assert demo.attrs["num_samples"] == LENGTHS[k] and demo.attrs["success"] == (k == 1)
             assert demo["dones"][:].tolist() == [0] * (LENGTHS[k] - 1) + [1]
-            assert demo["rewards"][:].tolist() == demo["actions"][:, 0].tolist() == list(range(LENGTHS[k]))
+            assert (
+                demo["rewards"][:].tolist()
+                == demo["actions"][:, 0].tolist()
+                == list(range(LENGTHS[k]))
+            )
             assert demo["obs/state"][:, 0].tolist() == list(range(LENGTHS[k]))
             assert demo["next_obs/state"][:, 0].tolist() == [*range(1, LENGTHS[k]), 99]
             seen = [picture(k, n) for n in [*range(LENGTHS[k]), 99]]
@@ -64,7 +79,7 @@ def check(path, episodes):
             assert np.array_equal(demo["next_obs/endoscope_image"], seen[1:])
 
 
-def test_what_robomimic_reads(tmp_path):
+def test_the_file_has_the_content_that_robomimic_reads(tmp_path):
     path = tmp_path / "new/set.hdf5"
     for part in ([0, 1], [2]):
         with opened(path) as writer:
@@ -74,18 +89,22 @@ def test_what_robomimic_reads(tmp_path):
         assert os.listdir(path.parent) == ["set.hdf5"]
     with h5py.File(path) as file:
         # robomimic's EnvType.GYM_TYPE is 2; 1 is robosuite.
-        known = {"env_name": NAME, "type": 2, "env_kwargs": {"obs": "state+rgb", "image_size": [16, 24]}}
+        known = {
+            "env_name": NAME,
+            "type": 2,
+            "env_kwargs": {"obs": "state+rgb", "image_size": [16, 24]},
+        }
         assert json.loads(file["data"].attrs["env_args"]) == known
 
 
-def test_every_tenth_is_for_validation_and_masks_made_elsewhere_go_on(tmp_path):
+def test_every_tenth_is_for_validation_and_other_masks_are_continued(tmp_path):
     path = tmp_path / "set.hdf5"
     writer = opened(path)
     for _ in range(11):
         save(writer, 0)
     with h5py.File(path, "a") as file:
         assert file["mask/valid"][:].tolist() == [b"demo_9"] and len(file["mask/train"]) == 10
-        # As robomimic's own script does.
+        # As robomimic's script does.
         del file["mask/train"]
         file["mask/train"] = np.array(["demo_9", "demo_8"], dtype="S")
     assert save(writer, 0) == 11
@@ -95,11 +114,12 @@ def test_every_tenth_is_for_validation_and_masks_made_elsewhere_go_on(tmp_path):
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="a fork dies at each write")
-def test_killed_at_any_write_the_file_holds_all_that_was_saved(tmp_path, monkeypatch):
+def test_a_kill_at_any_write_loses_no_saved_episode(tmp_path, monkeypatch):
     base, real = tmp_path / "base.hdf5", h5py.File
     with opened(base) as writer:
         save(writer, 0)
-    for kill in range(1000):
+    # Every third write: HDF5 writes a demonstration in many small pieces.
+    for kill in range(0, 1000, 3):
         path, log = tmp_path / f"{kill}/set.hdf5", tmp_path / f"{kill}.log"
         path.parent.mkdir()
         path.write_bytes(base.read_bytes())
@@ -123,7 +143,7 @@ def test_killed_at_any_write_the_file_holds_all_that_was_saved(tmp_path, monkeyp
             held = len(file["data"])
         assert returned <= held <= returned + 1
         check(path, held)
-        # What is left of the dead goes, and what is gone on with is as if nobody had died.
+        # The killed writer's files are removed, and the continued file is as without the kill.
         with opened(path) as writer:
             assert os.listdir(path.parent) == ["set.hdf5"]
             for episode in range(held, 3):
@@ -133,15 +153,15 @@ def test_killed_at_any_write_the_file_holds_all_that_was_saved(tmp_path, monkeyp
         if status == 0:
             assert kill > 50
             return
-    raise AssertionError("the loop ends when nothing is killed any more")
+    raise AssertionError("the loop ends when the child finishes")
 
 
-#: Exit status of a child that died as it was told to.
+#: Exit status of a killed child.
 DEAD = 9
 
 
 def die_at(kill, monkeypatch):
-    """From now on this process ends without a word before its write, link, replacement or removal number `kill`."""
+    """Makes this process exit before its write, link, replacement or removal number `kill`."""
     left = [kill]
 
     def counted(function):
@@ -164,7 +184,9 @@ def die_at(kill, monkeypatch):
             return getattr(self.file, name)
 
     def through(path, mode):
-        return real(path, "r") if mode == "r" else real(Disk(path, mode), "w" if mode == "w" else "r+")
+        return (
+            real(path, "r") if mode == "r" else real(Disk(path, mode), "w" if mode == "w" else "r+")
+        )
 
     real = h5py.File
     monkeypatch.setattr(h5py, "File", through)
@@ -173,14 +195,16 @@ def die_at(kill, monkeypatch):
     monkeypatch.setattr(_spare.shutil, "copy", counted(_spare.shutil.copy))
 
 
-def test_an_episode_costs_its_own_writing_whatever_was_before(tmp_path, monkeypatch):
+def test_the_cost_of_an_episode_does_not_depend_on_earlier_ones(tmp_path, monkeypatch):
     copied, copy = [], _spare.shutil.copy
-    monkeypatch.setattr(_spare.shutil, "copy", lambda a, b: (copied.append(os.path.getsize(a)), copy(a, b)))
+    monkeypatch.setattr(
+        _spare.shutil, "copy", lambda a, b: (copied.append(os.path.getsize(a)), copy(a, b))
+    )
     path = tmp_path / "set.hdf5"
     with opened(path) as writer:
         for _ in range(12):
             save(writer, 0)
-    # Once, when there was nothing in it.
+    # Copied once, when the file was empty.
     assert len(copied) == 1 and copied[0] < 10_000
     with opened(path) as writer:
         for _ in range(12):
@@ -188,17 +212,25 @@ def test_an_episode_costs_its_own_writing_whatever_was_before(tmp_path, monkeypa
     assert len(copied) == 2
 
 
-def test_readers_keep_what_they_opened(tmp_path):
+def test_readers_keep_the_file_that_they_opened(tmp_path):
     path = tmp_path / "set.hdf5"
     writer = opened(path)
     save(writer, 0)
-    read = "import h5py,sys; f = h5py.File(sys.argv[1], 'r'); print(1, flush=True); input(); print(len(f['data']), f['data/demo_0/obs/endoscope_image'][-1].sum())"
-    reader = subprocess.Popen([sys.executable, "-c", read, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    read = (
+        "import h5py,sys; f = h5py.File(sys.argv[1], 'r'); print(1, flush=True); input();"
+        "print(len(f['data']), f['data/demo_0/obs/endoscope_image'][-1].sum())"
+    )
+    reader = subprocess.Popen(
+        [sys.executable, "-c", read, path], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
     assert reader.stdout.readline() == "1\n"
     with h5py.File(path, "r"):
         save(writer, 1)
         save(writer, 2)
-    assert reader.communicate("\n")[0].split() == ["1", str(picture(0, LENGTHS[0] - 1).sum(dtype=int))]
+    assert reader.communicate("\n")[0].split() == [
+        "1",
+        str(picture(0, LENGTHS[0] - 1).sum(dtype=int)),
+    ]
     check(path, 3)
 
 
@@ -211,18 +243,18 @@ def test_a_wrong_last_observation_changes_nothing(tmp_path):
         ({"state": good["state"]}, "last: endoscope_image missing"),
         (good | {"more": 1}, "last: more unknown"),
         (good | {"state": np.zeros(4)}, r"last: state has shape \(4,\)"),
-        (good | {"state": np.full(3, np.nan)}, "last: state holds a number that is not finite"),
+        (good | {"state": np.full(3, np.nan)}, "last: state has a number that is not finite"),
         (good | {"endoscope_image": np.zeros((16, 24, 3))}, "last: endoscope_image is float64"),
     ]:
         with pytest.raises(ValueError, match=words):
             writer.save_episode(wrong)
         check(path, 0)
-    # The frames are still there.
+    # The frames are kept.
     assert writer.save_episode(good) == 0
     check(path, 1)
 
 
-def test_what_cannot_be_written_is_written_again(tmp_path, monkeypatch):
+def test_an_episode_is_written_again_after_an_error(tmp_path, monkeypatch):
     path = tmp_path / "set.hdf5"
     writer = opened(path)
     save(writer, 0)
@@ -240,8 +272,10 @@ def test_what_cannot_be_written_is_written_again(tmp_path, monkeypatch):
     monkeypatch.setattr(h5py.Group, "create_dataset", create)
     check(path, 1)
     assert writer.save_episode(last(1), success=True) == 1
-    # Without second names (some network and memory-card file systems) it is slower, and right.
-    monkeypatch.setattr(os, "link", lambda a, b: (_ for _ in ()).throw(PermissionError("no links here")))
+    # Without hard links (some network and memory-card file systems) it is slower and correct.
+    monkeypatch.setattr(
+        os, "link", lambda a, b: (_ for _ in ()).throw(PermissionError("no links here"))
+    )
     assert save(writer, 2) == 2
     check(path, 3)
 
@@ -253,14 +287,14 @@ def test_two_writers_of_a_file_take_turns(tmp_path):
     other.close()
     assert save(one, 2) == 2 and one.episodes == other.episodes == 3
     check(path, 3)
-    # While one saves, the end of another takes nothing away.
-    with one._spare.alone():
+    # While one saves, the end of another removes nothing.
+    with one._spare.locked():
         one._spare.copy()
         other.close()
         assert one._spare.path.exists()
 
 
-def test_only_what_fits_is_gone_on_with(tmp_path):
+def test_only_a_fitting_file_is_continued(tmp_path):
     path = tmp_path / "set.hdf5"
     save(opened(path), 0)
     for change, words in [
@@ -270,22 +304,28 @@ def test_only_what_fits_is_gone_on_with(tmp_path):
         ({"env_kwargs": {"obs": "rgb"}}, "another environment"),
         ({"env_kwargs": {"obs": object()}}, "env_kwargs: .* not JSON"),
         ({"observations": {"word": {"dtype": "string", "shape": (1,)}}}, "word has dtype 'string'"),
-        ({"observations": {"actions": OBSERVATIONS["state"]}}, "actions are written by themselves"),
+        (
+            {"observations": {"actions": OBSERVATIONS["state"]}},
+            "actions: the writer adds these itself",
+        ),
     ]:
         with pytest.raises(ValueError, match=words):
             opened(path, **change)
     with h5py.File(tmp_path / "foreign.hdf5", "w") as file:
         file["letter"] = "dear"
-    with pytest.raises(ValueError, match="no robomimic file"):
+    with pytest.raises(ValueError, match="not a robomimic file"):
         opened(tmp_path / "foreign.hdf5")
     (tmp_path / "letter.txt").write_text("dear")
-    with pytest.raises(OSError, match="letter.txt cannot be opened as HDF5"):
+    with pytest.raises(OSError, match=r"letter\.txt cannot be opened as HDF5"):
         opened(tmp_path / "letter.txt")
     check(path, 1)
 
 
 def test_the_environment_is_that_of_its_spec():
     env = gym.make("CartPole-v1", sutton_barto_reward=True)
-    assert robomimic_environment(env) == {"env_name": "CartPole-v1", "env_kwargs": {"sutton_barto_reward": True}}
+    assert robomimic_environment(env) == {
+        "env_name": "CartPole-v1",
+        "env_kwargs": {"sutton_barto_reward": True},
+    }
     with pytest.raises(ValueError, match="no spec"):
         robomimic_environment(gym.Env())

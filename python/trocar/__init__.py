@@ -4,8 +4,11 @@
 >>> env = gym.make("trocar/AppendixResection-v0", obs="state")
 >>> envs = gym.make_vec("trocar/GraspLift-v0", num_envs=16)
 
-Environments are documented in `trocar.envs`, demonstrations on disk in `trocar.datasets`, camera calibration in `trocar.calibration`,
-policies served to `trocar evaluate` in `trocar.serve`, campaigns over many machines in `trocar.campaign`.
+- `trocar.envs`: the environments and their options.
+- `trocar.datasets`: demonstrations as LeRobot and robomimic files.
+- `trocar.calibration`: camera calibration.
+- `trocar.serve`: serves a Python policy to `trocar evaluate`.
+- `trocar.campaign`: campaigns on this machine or on a Ray cluster.
 """
 
 import gymnasium as _gymnasium
@@ -16,7 +19,7 @@ from .policy import Policy, policies
 
 __all__ = ["TASKS", "Policy", "TrocarEnv", "TrocarVectorEnv", "__version__", "policies", "scenes"]
 
-#: Environments by name, with the task that each asks for.
+#: Environment ids and their tasks.
 TASKS = {
     "trocar/AppendixResection-v0": "appendix-resection",
     "trocar/GraspLift-v0": "grasp-lift",
@@ -30,10 +33,11 @@ for _name, _task in TASKS.items():
             entry_point="trocar.envs:TrocarEnv",
             vector_entry_point="trocar.envs:TrocarVectorEnv",
             kwargs={"task": _task},
-            # The episode's time is the task's and ends it from within.
+            # The native episode ends itself when its time is up.
             max_episode_steps=None,
-            # Wrappers hand no attributes on, so `gym.make` gives the environment itself: LeRobot asks it for `task_description`. It
-            # says itself that a reset is missing, and the tests check what the checker would.
+            # LeRobot reads `task_description` from the environment, and Gymnasium's wrappers hide
+            # attributes. The environment itself raises when a reset is missing, and the tests run
+            # Gymnasium's checker.
             order_enforce=False,
             disable_env_checker=True,
         )

@@ -1,15 +1,15 @@
-"""Types of the native module; what it does is documented in `crates/python/src`."""
+"""Types of the native module, which is documented in `crates/python/src`."""
 
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 __version__: str
 
-#: What steps write, (cells, numbers) each: states, figures, channels.
+#: Arrays that steps write, (cells, numbers) each: states, figures, channels.
 Arrays = tuple[NDArray[np.float32], NDArray[np.float64], NDArray[np.float64]]
 
 def scenes() -> list[str]:
@@ -19,18 +19,19 @@ def phantoms_folder() -> Path:
     """The folder of made phantoms: `$TROCAR_PHANTOMS`, or `trocar/phantoms` in the user's cache."""
 
 def policies() -> list[str]:
-    """Names of the controllers."""
+    """Names of the built-in controllers."""
 
 def cameras(scene: str) -> list[tuple[str, int, int, bool]]:
-    """A scene's cameras: name, height and width [px] of what policies see, whether it measures depth."""
+    """A scene's cameras: name, height and width (px) for policies, whether it measures depth."""
 
 class State:
-    """A saved cell with the scene and specimen that it is of; it stays in the process."""
+    """A saved cell with its scene and specimen. It is only valid in this process."""
 
 class Cells:
-    """Episodes of one scene, stepped side by side without the interpreter's lock; arrays are the caller's.
+    """Cells of one scene, stepped in parallel, without Python's global lock, into caller's arrays.
 
-    In another process than that which made them (a child made by `fork`) they raise RuntimeError. Building them listens to Ctrl-C.
+    In another process than the one that made them (a child made by `fork`) they raise RuntimeError.
+    Ctrl-C stops their construction.
     """
 
     def __init__(
@@ -69,8 +70,12 @@ class Cells:
     def stage_names(self) -> list[str]: ...
     @property
     def action_limits(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]: ...
-    def reset(self, which: NDArray[np.int64], seeds: NDArray[np.uint64], arrays: Arrays) -> None: ...
-    def step(self, actions: NDArray[np.float64], active: NDArray[np.bool_], arrays: Arrays) -> None: ...
+    def reset(
+        self, which: NDArray[np.int64], seeds: NDArray[np.uint64], arrays: Arrays
+    ) -> None: ...
+    def step(
+        self, actions: NDArray[np.float64], active: NDArray[np.bool_], arrays: Arrays
+    ) -> None: ...
     def see(
         self,
         cameras: Sequence[str],
@@ -79,7 +84,10 @@ class Cells:
         color: Sequence[NDArray[np.uint8]],
         depth: Sequence[NDArray[np.float32]],
     ) -> None:
-        """Writes (cells, height, width, 3) colours and (cells, height, width, 1) depths [m] of the cells that are active."""
+        """Writes the pictures of active cells.
+
+        `color`: (cells, height, width, 3) a camera. `depth`: (cells, height, width, 1), z (m).
+        """
     def picture(self, k: int, camera: str, height: int, width: int) -> NDArray[np.uint8]: ...
     def why(self, k: int) -> str | None: ...
     def events(self, k: int) -> str: ...
@@ -87,10 +95,10 @@ class Cells:
     def state_hash(self, k: int) -> int: ...
     def save(self, k: int) -> State: ...
     def restore(self, k: int, saved: State, arrays: Arrays) -> None:
-        """ValueError, and nothing changed, where the state is of another scene, task or specimen."""
+        """ValueError, with nothing changed, for a state of another scene, task or specimen."""
 
 class Controller:
-    """A controller of the program."""
+    """A built-in controller."""
 
     def __init__(self, name: str) -> None: ...
     def begin(self, cells: Cells, k: int) -> None: ...
@@ -115,7 +123,7 @@ class Campaign:
     def finish(self, films: bool = True) -> str: ...
 
 class Stop:
-    """What tells workers to give up, whichever thread they are in and whatever they wait for."""
+    """Stops workers on any thread, whatever they wait for."""
 
     def set(self) -> None: ...
 
@@ -132,5 +140,5 @@ class Worker:
         python: str | None = None,
     ) -> None: ...
     def start(self, jobs: list[str]) -> None:
-        """Makes the policies of `jobs` ready; `ValueError` for a Python policy that cannot be loaded."""
+        """Loads the policies of `jobs`. ValueError for one that cannot be loaded."""
     def run(self, job: str) -> list[tuple[str, bytes]]: ...

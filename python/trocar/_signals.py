@@ -1,17 +1,17 @@
-"""What is done after a Ctrl-C is done once, and to its end."""
+"""Blocks Ctrl-C while an earlier one is handled."""
 
 from __future__ import annotations
 
 import signal
 import threading
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Iterator
 
 
 @contextmanager
-def deaf() -> Iterator[None]:
-    """Ctrl-C is not listened to within it: for the moments in which one is being obeyed."""
-    # Only the main thread gets signals, and only it may say what becomes of them.
+def ignore_interrupts() -> Iterator[None]:
+    """Ignores Ctrl-C inside the context."""
+    # Only the main thread receives signals and may set their handlers.
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -19,5 +19,5 @@ def deaf() -> Iterator[None]:
     try:
         yield
     finally:
-        # None is a handler that was not set from Python, and cannot be set again from there.
+        # None is a handler that Python did not set and cannot set again.
         signal.signal(signal.SIGINT, before if before is not None else signal.default_int_handler)

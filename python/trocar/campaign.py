@@ -1,13 +1,17 @@
-"""Campaigns of policies, on this machine or on many by Ray: the plan, folder, table and report of `trocar evaluate`.
+r"""Campaigns of policies, on this machine or on a Ray cluster, as `trocar evaluate` runs them.
 
-    python -m trocar.campaign SCENE --policy scripted --policy mine=ws://gpu:8000 --episodes 100 -o campaign --ray auto
+    python -m trocar.campaign SCENE --policy scripted --policy mine=ws://gpu:8000 \
+        --episodes 100 -o campaign --ray auto
 
-An episode's bits depend on scene, specimen, policy and seed alone, so it does not matter who runs it: `hash` in `result.json` is the
-same however many workers there were, and whether they were on one machine or on many. Each worker builds its own cell (about a
-second) and runs one episode after the other on one CPU. A worker that is lost has its episode run again elsewhere. Finished episodes
-are kept one by one; the same command goes on where it was stopped, be it by Ctrl-C.
+The plan, folder, table and report are those of `trocar evaluate`. An episode's bits depend on
+scene, specimen, policy and seed only: `hash` in `result.json` is the same for any number of workers
+on any number of machines. Each worker builds its own cell (about a second) and runs one episode
+after the other on one CPU. An episode whose worker is lost runs again on another worker. Finished
+episodes are kept one by one. It is safe to stop at any time, by Ctrl-C too: the same command
+resumes.
 
-With Ray, a scene file and a policy's module must be found under the same names on every machine. It needs `pip install .[ray]`.
+On Ray, a scene file and a policy's module must have the same path on every machine. Ray needs
+`pip install '.[ray]'`.
 """
 
 from __future__ import annotations
@@ -15,19 +19,25 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import shutil
 import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Callable, Sequence
+from typing import Any
 
-from ._native import Campaign
+from ._loading import check_python_policies
+from ._native import Campaign, cameras
 from ._progress import Bar
 from ._ray import run_on_ray
-from ._signals import deaf
+from ._signals import ignore_interrupts
 from ._threads import run_on_threads
 from .envs.cells import phantoms_folder
 
-#: Called with how many episodes are done and how many were missing: before the first one, and after each.
+#: Called with the numbers of finished and of missing episodes: before the first and after each.
 Progress = Callable[[int, int], None]
+
+#: Index of `policy failed` in a policy's `ends`.
+POLICY_FAILED = 4
 
 
 def run(
@@ -42,59 +52,104 @@ def run(
     retry_failed: bool = False,
     progress: Progress | None = None,
 ) -> dict[str, Any]:
-    """Runs what is missing of the campaign in `output` and gives what `result.json` says.
+    """Runs the missing episodes of the campaign in `output` and returns its `result.json`.
 
-    `ray_address`: `auto` for a cluster that runs, `local` for a new one on this machine, `host:port`; None does without Ray.
-    `workers`: as many as there are CPUs if not given. Policies `python:...` are served by the interpreter that runs this, unless
-    `$TROCAR_PYTHON` names another.
+    - `ray_address`: `auto` for a running cluster, `local` for a new one on this machine,
+      `host:port`; None runs without Ray.
+    - `workers`: episodes at once (default: one a CPU).
+    - `retry_failed`: episodes whose policy failed run again.
 
-    Ctrl-C ends it within moments, whatever is waited for: `KeyboardInterrupt`, with the finished episodes kept and in table and report. ValueError for a
-    scene, policy or folder that cannot be used; on Ray, RuntimeError says what went wrong in a worker.
+    `$TROCAR_PYTHON`, or else this interpreter, serves `python:...` policies. They are loaded before
+    anything is built.
+
+    Ctrl-C stops it within moments: KeyboardInterrupt, with the finished episodes kept and in table
+    and report. ValueError for a scene, policy or folder that cannot be used. On Ray, RuntimeError
+    for an error in a worker. A campaign that fails before its first episode leaves no folder.
     """
+    output = Path(output)
+    # Raises for a scene that cannot be read.
+    cameras(scene)
+    if ray_address in (None, "local"):
+        # Other machines may have what this one lacks. There the first worker checks.
+        check_python_policies(policies, output, episodes, retry_failed=retry_failed)
     folder = phantoms_folder()
     folder.mkdir(parents=True, exist_ok=True)
-    campaign = Campaign(scene, list(policies), episodes, seed, folder, Path(output))
-    jobs = campaign.missing(retry_failed)
-    progress = progress or (lambda done, all: None)
+    is_new = not output.exists()
+    campaign = Campaign(scene, list(policies), episodes, seed, folder, output)
+    progress = progress or (lambda done, missing: None)
     try:
+        jobs = campaign.missing(retry_failed)
         if jobs and ray_address is None:
             run_on_threads(campaign, scene, jobs, workers, progress)
-        elif jobs:
+        elif jobs and ray_address is not None:
             run_on_ray(campaign, scene, jobs, workers, ray_address, progress)
-        return json.loads(campaign.finish())
+        result: dict[str, Any] = json.loads(campaign.finish())
     except KeyboardInterrupt:
-        # Films take long; the next time will have them.
-        with deaf():
+        # Videos take long; the next run makes them.
+        with ignore_interrupts():
             campaign.finish(films=False)
         raise
+    except Exception:
+        if is_new and not any(output.glob("episodes/*/*/result.json")):
+            # The campaign holds the folder's lock.
+            del campaign
+            shutil.rmtree(output, ignore_errors=True)
+        raise
+    return result
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """The command; returns its exit status."""
-    parser = argparse.ArgumentParser(prog="python -m trocar.campaign", description=__doc__.splitlines()[0])
+    """Runs the command and returns its exit status."""
+    parser = argparse.ArgumentParser(
+        prog="python -m trocar.campaign",
+        description="Campaigns of policies, on this machine or on a Ray cluster.",
+    )
     parser.add_argument("scene", help="scene file, or a built-in scene such as cell-a")
-    parser.add_argument("--policy", action="append", metavar="POLICY", help="as in trocar evaluate; may be given again (default scripted)")
-    parser.add_argument("--episodes", type=int, default=15, help="episodes of each policy (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=0, help="seed of the first episode (default %(default)s)")
+    parser.add_argument(
+        "--policy",
+        action="append",
+        metavar="POLICY",
+        help="as in trocar evaluate; may be given again (default scripted)",
+    )
+    parser.add_argument(
+        "--episodes", type=int, default=15, help="episodes of each policy (default %(default)s)"
+    )
+    parser.add_argument(
+        "--seed", type=int, default=0, help="seed of the first episode (default %(default)s)"
+    )
     parser.add_argument("--workers", type=int, help="episodes at once (default: one a CPU)")
-    parser.add_argument("--retry-failed", action="store_true", help="do episodes again whose policy failed")
+    parser.add_argument(
+        "--retry-failed", action="store_true", help="run episodes again whose policy failed"
+    )
     where = parser.add_mutually_exclusive_group()
-    where.add_argument("--ray", metavar="ADDRESS", help="run on a Ray cluster: auto, local, or host:port")
-    where.add_argument("--local", action="store_true", help="run on this machine without Ray (the default)")
-    parser.add_argument("-o", "--output", type=Path, default=Path("trocar-campaign"), help="campaign folder (default %(default)s)")
+    where.add_argument(
+        "--ray", metavar="ADDRESS", help="run on a Ray cluster: auto, local, or host:port"
+    )
+    where.add_argument(
+        "--local", action="store_true", help="run on this machine without Ray (the default)"
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        type=Path,
+        default=Path("trocar-campaign"),
+        help="campaign folder (default %(default)s)",
+    )
     parser.add_argument("--json", action="store_true", help="print one JSON object")
     options = parser.parse_args(arguments)
     if options.workers is not None and options.workers < 1:
-        parser.error(f"--workers {options.workers}: at least 1 is needed")
-    if options.seed < 0 or options.episodes < 1:
-        parser.error("--seed and --episodes must not be negative, and an episode is needed")
+        parser.error(f"--workers {options.workers}: must be at least 1")
+    if options.seed < 0:
+        parser.error(f"--seed {options.seed}: must not be negative")
+    if options.episodes < 1:
+        parser.error(f"--episodes {options.episodes}: must be at least 1")
 
     bar = Bar()
 
-    def tell(done: int, missing: int) -> None:
+    def show(done: int, missing: int) -> None:
         bar(done, missing)
         if done == missing:
-            bar.say("writing the report, with moving pictures of the first failures")
+            bar.print("writing the report, with videos of the first failures")
 
     try:
         result = run(
@@ -106,22 +161,32 @@ def main(arguments: list[str] | None = None) -> int:
             workers=options.workers,
             ray_address=options.ray,
             retry_failed=options.retry_failed,
-            progress=tell,
+            progress=show,
         )
     except (ValueError, OSError, RuntimeError, ImportError) as why:
-        bar.say(f"error: {why}")
+        bar.print(f"error: {why}")
         return 1
     except KeyboardInterrupt:
-        kept = (options.output / "result.json").exists()
-        bar.say("interrupted; " + ("finished episodes are kept, with their table and report, and the same command goes on" if kept else "no episode was begun"))
+        if (options.output / "result.json").exists():
+            bar.print(
+                "interrupted; finished episodes are kept, with their table and report; "
+                "run the same command to resume"
+            )
+        else:
+            bar.print("interrupted; no episode was started")
         return 130
     if options.json:
         print(json.dumps(result))
     else:
         for row in result["policies"]:
-            print(f"{row['policy']}: {row['passed']} of {row['episodes']} passed, mean score {row['mean_score']:.2f}")
+            passed = f"{row['passed']} of {row['episodes']} passed"
+            print(f"{row['policy']}: {passed}, mean score {row['mean_score']:.2f}")
             if row["policy_error"]:
-                print(f"{row['policy']} failed in {row['ends'][4]} episodes, first: {row['policy_error']}; --retry-failed does them again")
+                failed = row["ends"][POLICY_FAILED]
+                print(
+                    f"{row['policy']}: the policy failed in {failed} episodes, "
+                    f"first: {row['policy_error']}; --retry-failed runs them again"
+                )
         print(f"states {result['hash']}\nreport {result['report']}")
     return 0
 

@@ -1,4 +1,4 @@
-"""The program's own controllers, callable from Python.
+"""The built-in controllers, callable from Python.
 
 >>> env = gym.make("trocar/GraspLift-v0")
 >>> expert = trocar.Policy("scripted")
@@ -6,7 +6,7 @@
 >>> expert.reset(env)
 >>> observation, *_ = env.step(expert(env))
 
-They look at the tissue, which a policy that is to be scored must not.
+They read the true state of the tissue. A policy that is scored must not.
 """
 
 from __future__ import annotations
@@ -16,14 +16,17 @@ from typing import Any
 import numpy as np
 
 from ._native import Controller, policies
+from .envs.cells import Cells
 
 __all__ = ["Policy", "policies"]
 
 
 class Policy:
-    """A controller by its name: one of `trocar.policies()`. It drives one cell, which is an environment or number `k` of a vector environment.
+    """A built-in controller by name, one of `trocar.policies()`.
 
-    The actions are those of `trocar evaluate` with the same seed, to the bit. Environments with `actions="tip"` are refused.
+    It drives one cell: an environment, or cell `k` of a vector environment. With the same seed its
+    actions equal those of `trocar evaluate` bit for bit. It needs an environment with
+    `actions="pivots"`.
     """
 
     def __init__(self, name: str = "scripted"):
@@ -31,22 +34,32 @@ class Policy:
         self._native = Controller(name)
 
     def reset(self, env: Any, k: int = 0) -> None:
-        """Begins anew; call it after each reset of the environment."""
-        cells, k = self._place(env, k)
+        """Starts an episode. Call it after each reset of the environment."""
+        cells, k = self._cell(env, k)
         self._native.begin(cells.native, k)
 
     def __call__(self, env: Any, k: int = 0) -> np.ndarray:
-        """The next action, for `env.step`: float64 (a cell's exact targets), or -1 to 1 where the environment is normalized."""
-        cells, k = self._place(env, k)
+        """Returns the next action (10,) for `env.step`.
+
+        float64 absolute targets (`trocar.envs`), or numbers in [-1, 1] where the environment is
+        normalized.
+        """
+        cells, k = self._cell(env, k)
         action = self._native.act(cells.native, k)
         if cells.normalize:
-            return 2.0 * (action - cells.low) / (cells.high - cells.low) - 1.0
+            action = 2.0 * (action - cells.low) / (cells.high - cells.low) - 1.0
         return action
 
     @staticmethod
-    def _place(env: Any, k: int) -> tuple[Any, int]:
-        """The cells of an environment, and which of them is its `k`th: `envs.envs[3]` has one, the fourth of `envs`."""
+    def _cell(env: Any, k: int) -> tuple[Cells, int]:
+        """The native cells of an environment and the index of its cell `k` among them.
+
+        `envs.envs[3]` has one cell, which is the fourth of `envs`.
+        """
         cells = env.unwrapped.cells
         if cells.action_kind != "pivots":
-            raise ValueError(f"policy: the environment has actions='{cells.action_kind}'; controllers give 'pivots'")
+            raise ValueError(
+                f"policy: the environment has actions='{cells.action_kind}'; "
+                "built-in controllers need actions='pivots'"
+            )
         return cells, env.unwrapped.cell + k

@@ -20,8 +20,8 @@ const TEST: &[Check] = &[
     ("docs", &["doc", "--workspace", "--no-deps", "--release", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")]),
 ];
 
-const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests and docs, warnings as errors
-       cargo xtask python        the tests of the Python package (apart from test: it builds everything once more; skipped without Python)
+const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests and docs, warnings as errors; then xtask python
+       cargo xtask python        ruff, mypy and the tests of the Python package (skipped without Python or network)
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
@@ -34,13 +34,7 @@ fn main() -> ExitCode {
             tools::fetch();
             test()
         }
-        ["python"] => {
-            if python::test() {
-                ExitCode::SUCCESS
-            } else {
-                ExitCode::FAILURE
-            }
-        }
+        ["python"] => check_python(python::Build::Module),
         ["tools"] => {
             tools::fetch();
             ExitCode::SUCCESS
@@ -75,7 +69,17 @@ fn test() -> ExitCode {
         }
     }
     eprintln!("\nformatting, lints, tests and docs are in order");
-    ExitCode::SUCCESS
+    check_python(python::Build::Workspace)
+}
+
+fn check_python(build: python::Build) -> ExitCode {
+    match python::check(build) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(name) => {
+            eprintln!("\nPython: {name} failed");
+            ExitCode::FAILURE
+        }
+    }
 }
 
 /// Runs the tests named `damage_never_panics` of all crates; each takes its share of the cases.

@@ -3,10 +3,12 @@
 use crate::page;
 use crate::pictures;
 use crate::plan::{self, Plan};
+use crate::served::{Served, serve_all};
 use crate::source::PolicySpec;
 use crate::store::{self, Store};
 use crate::table::{self, CampaignResult};
 use crate::worker::Worker;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -70,13 +72,17 @@ impl Campaign {
             return Err(Error::Mismatch(reason));
         }
         store::look(output, &self.policies, self.seed)?;
+        // A policy that cannot be loaded is reported before anything is built or written.
+        let missing = |p: &&PolicySpec| self.retry_failed || !store::has_episodes(output, &p.name, self.episodes);
+        let policies: Vec<&PolicySpec> = self.policies.iter().filter(missing).collect();
+        let served = serve_all(&policies, progress)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let plan = Plan::new(&scene, &specimen, &self.policies, self.episodes, self.seed)?;
         let plan = most.map_or(plan.clone(), |most| plan.at_most(most));
         let store = Store::open(output, &plan)?;
         let workers = if self.jobs == 0 { cores } else { self.jobs };
         let done = self
-            .run_missing(&scene, &specimen, &plan, &store, workers, progress)
+            .run_missing(&scene, &specimen, &plan, &store, workers, served, progress)
             .and_then(|()| store.film(&plan, &scene, &specimen, progress));
         match done {
             Ok(()) => Ok((store, plan)),
@@ -90,6 +96,7 @@ impl Campaign {
     }
 
     /// Runs the episodes that are not kept yet, `workers` at once.
+    #[allow(clippy::too_many_arguments, reason = "the parts of one campaign")]
     fn run_missing(
         &self,
         scene: &Scene,
@@ -97,6 +104,7 @@ impl Campaign {
         plan: &Plan,
         store: &Store,
         workers: usize,
+        served: BTreeMap<String, Served>,
         progress: &dyn Progress,
     ) -> Result<()> {
         let missing = store.missing(plan, self.retry_failed)?;
@@ -105,10 +113,13 @@ impl Campaign {
         let (next, stop) = (AtomicUsize::new(0), Arc::new(AtomicBool::new(false)));
         let at_work = AtomicUsize::new(workers);
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
+        let served = Mutex::new(served);
         let work = |first: bool| -> Result<()> {
             let mut worker = Worker::new(scene, specimen)?.stopped_by(Arc::clone(&stop));
             if first {
-                // A policy that cannot be loaded is told at the beginning, not when its turn comes.
+                let served = served.lock().map(|mut s| std::mem::take(&mut *s)).unwrap_or_default();
+                worker = worker.with_served(served);
+                // All policies are made ready at once, not when their first jobs come.
                 worker.start(missing.iter().map(|job| &job.policy))?;
             }
             while let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {

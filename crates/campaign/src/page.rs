@@ -129,6 +129,9 @@ fn cards(plan: &Plan, r: &CampaignResult) -> String {
     let diverged: usize = r.policies.iter().map(|p| p.ends[3]).sum();
     all.push(Card::new("Inverted elements", inverted.to_string(), "at worst, in any frame").met(inverted == 0));
     all.push(Card::new("Diverged", diverged.to_string(), "episodes").met(diverged == 0));
+    let suspended: usize = r.policies.iter().map(|p| p.disabled_contacts + p.disabled_blades + p.relaxed).sum();
+    let note = "of physics by safety rules: contacts disabled, contacts of blades disabled, organs relaxed";
+    all.push(Card::new("Suspensions", suspended.to_string(), note).met(suspended == 0));
     page::cards(&all)
 }
 
@@ -150,6 +153,7 @@ fn outcome(r: &CampaignResult) -> String {
         "lag ms",
         "jaw N",
         "grasp at s",
+        "suspensions",
     ];
     let row = |p: &PolicyRow| {
         let at = p.grasp_at.map_or("\u{2013}".to_owned(), |[m, l, h]| format!("{m:.2} ({l:.2}\u{2013}{h:.2})"));
@@ -170,6 +174,7 @@ fn outcome(r: &CampaignResult) -> String {
             or_dash(p.lag_ms, 0),
             or_dash(p.peak_jaw_n, 2),
             at,
+            p.suspensions(),
         ]
     };
     table::plain(&head, &r.policies.iter().map(row).collect::<Vec<_>>())
@@ -222,7 +227,8 @@ fn failures(plan: &Plan, kept: &[Kept], store: &Store) -> Result<String> {
 }
 
 fn why(k: &Kept) -> String {
-    k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string)
+    let end = || k.summary.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
+    k.summary.why.clone().unwrap_or_else(end)
 }
 
 /// When stages passed.

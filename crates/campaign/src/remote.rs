@@ -3,7 +3,7 @@
 //! What they are shown: `observation/state` (the numbers of [`trocar_task::STATE_NAMES`]), `observation/images/NAME` for each camera of the scene but the recording one, `prompt`,
 //! `episode/seed` and `episode/step`. What they answer: `actions`, a chunk of absolute targets (two pivots [rad], insertion [m], roll [rad], jaw opening, for each arm), of which up to 8 are done.
 
-use crate::served::{Served, serve};
+use crate::served::{PYTHON_SOURCE, Served, interpreter, serve};
 use crate::source::PolicySpec;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
@@ -22,9 +22,6 @@ use trocar_workflow::{Error, Result};
 
 /// The camera that policies do not see through: no hospital has it.
 const RECORDING: &str = "recording";
-
-/// The interpreter that serves `python:` policies, unless `$TROCAR_PYTHON` names another.
-const PYTHON: &str = "python3";
 
 /// The key that a server may want.
 const KEY: &str = "TROCAR_POLICY_KEY";
@@ -57,31 +54,32 @@ pub(super) struct Remote {
 }
 
 impl Remote {
-    /// Of a server, or of a Python callable, which is served from here on by `$TROCAR_PYTHON`, or by `python`, or by `python3`.
+    /// A server's policy, or a Python policy. `served` is the latter's server if it runs already;
+    /// otherwise `$TROCAR_PYTHON`, or `python`, or `python3` starts it.
     ///
     /// # Errors
-    /// A callable that cannot be loaded: unlike one that fails in an episode, it never says anything.
+    /// A Python policy that cannot be loaded.
     pub fn new(
         spec: &PolicySpec,
         specimen: &Specimen,
         episode: &Episode,
         stop: Arc<AtomicBool>,
         python: Option<&str>,
+        served: Option<Served>,
     ) -> Result<Self> {
         let scene = episode.scene();
-        let module = spec.source.strip_prefix("python:").map(str::to_owned);
+        let module = spec.source.strip_prefix(PYTHON_SOURCE).map(str::to_owned);
         let mut endpoint = endpoint(spec)?;
         endpoint.interrupt = Some(Arc::clone(&stop));
         let bounds = Bounds::new(episode.cell(), ActionSpace::Pivots)?;
         endpoint.actions.dim = Some(bounds.low.len());
         let seen = scene.cameras.iter().filter(|c| c.name != RECORDING);
         let cameras = seen.map(|c| (c.name.clone(), c.policy_size_px.map(|n| n as usize))).collect();
-        let python = std::env::var("TROCAR_PYTHON").ok().or_else(|| python.map(str::to_owned));
         let mut made = Self {
             name: spec.name.clone(),
             endpoint,
             module,
-            python: python.unwrap_or_else(|| PYTHON.to_owned()),
+            python: interpreter(python),
             child: None,
             client: None,
             bounds,
@@ -95,6 +93,10 @@ impl Remote {
             left: false,
             session: String::new(),
         };
+        if let Some(served) = served {
+            made.endpoint.url.clone_from(&served.url);
+            made.child = Some(served);
+        }
         match made.serve() {
             Err(_) if made.stop.load(Ordering::Relaxed) => Err(Error::Interrupted),
             Err(why) => Err(Error::Mismatch(why)),
@@ -203,8 +205,10 @@ impl Remote {
 /// # Errors
 /// An address, a key or a longest wait that cannot be used.
 pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
-    let served = spec.source.starts_with("python:");
-    let mut endpoint = Endpoint::new(if served { "ws://127.0.0.1:1" } else { &spec.source });
+    let is_python = spec.source.starts_with(PYTHON_SOURCE);
+    let mut endpoint = Endpoint::new(if is_python { "ws://127.0.0.1:1" } else { &spec.source });
+    // Its address is a random port, which says nothing to a reader and differs from run to run.
+    endpoint.label = is_python.then(|| spec.source.clone());
     endpoint.api_key = std::env::var(KEY).ok();
     if let Ok(text) = std::env::var(TIMEOUT) {
         let seconds = text.parse().ok().filter(|s: &f64| *s > 0.0 && *s < 1e6);

@@ -137,6 +137,12 @@ pub(super) fn look(folder: &Path, policies: &[PolicySpec], seed: u64) -> Result<
     Ok(())
 }
 
+/// Whether `folder` has `count` episodes of the policy `name`, whatever they are of.
+pub(super) fn has_episodes(folder: &Path, name: &str, count: usize) -> bool {
+    let episodes = folder.join(EPISODES).join(name);
+    (0..count).all(|index| episodes.join(format!("{index:06}")).join(RESULT_FILE).is_file())
+}
+
 impl Store {
     /// Opens the campaign in `folder` to go on with, or begins it. It may get more episodes and other policies, but not another scene, specimen or seed.
     ///

@@ -94,6 +94,12 @@ pub struct PolicyRow {
     pub lag_ms: Option<f64>,
     /// Most inverted elements.
     pub inverted_peak: usize,
+    /// Suspensions of physics in all episodes: times that contact of an instrument was disabled.
+    pub disabled_contacts: usize,
+    /// Times that contact of blades that hold tissue was disabled.
+    pub disabled_blades: usize,
+    /// Times that an organ was relaxed outside of time.
+    pub relaxed: usize,
     /// Why the policy failed, in the first episode that ended so.
     pub policy_error: Option<String>,
 }
@@ -140,6 +146,13 @@ pub struct CampaignResult {
     pub hash: String,
     /// The report.
     pub report: String,
+}
+
+impl PolicyRow {
+    /// Suspensions of physics as `contacts/blades/relaxed`.
+    pub fn suspensions(&self) -> String {
+        format!("{}/{}/{}", self.disabled_contacts, self.disabled_blades, self.relaxed)
+    }
 }
 
 impl CampaignResult {
@@ -189,7 +202,7 @@ fn row(name: &str, kept: &[&Kept], names: &[&'static str], plan: &Plan) -> Polic
     for k in kept {
         match &k.summary.end {
             Some(End::Passed) => ends[0] += 1,
-            Some(End::TimeOut) | None => ends[1] += 1,
+            Some(End::TimeOut | End::Finished) | None => ends[1] += 1,
             Some(End::RcmAbort { .. }) => ends[2] += 1,
             Some(End::Diverged { .. }) => ends[3] += 1,
             Some(End::PolicyError { .. }) => ends[4] += 1,
@@ -225,6 +238,9 @@ fn row(name: &str, kept: &[&Kept], names: &[&'static str], plan: &Plan) -> Polic
         peak_jaw_n: peak(|a| a.peak_jaw_n),
         lag_ms: median(kept.iter().filter_map(|k| k.lag_ms()).collect()),
         inverted_peak: kept.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+        disabled_contacts: kept.iter().map(|k| k.summary.disabled_contacts).sum(),
+        disabled_blades: kept.iter().map(|k| k.summary.disabled_blades).sum(),
+        relaxed: kept.iter().map(|k| k.summary.relaxed).sum(),
         policy_error,
     }
 }
@@ -295,6 +311,9 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
         "peak_constraint_n",
         "peak_jaw_n",
         "inverted_peak",
+        "disabled_contacts",
+        "disabled_blades",
+        "relaxed",
         "state_hash",
     ];
     table.write_record(head.into_iter().chain(times.iter().map(String::as_str))).map_err(format)?;
@@ -302,7 +321,7 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
     for k in kept {
         let s = &k.summary;
         let end = s.end.as_ref().map_or(String::new(), |e| e.name().to_owned());
-        let why = if s.passed { None } else { s.end.as_ref() };
+        let why = if s.passed { None } else { s.why.clone().or_else(|| s.end.as_ref().map(ToString::to_string)) };
         let record = [
             k.name.clone(),
             k.index.to_string(),
@@ -311,7 +330,7 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
             s.stage.to_string(),
             s.score.to_string(),
             end,
-            why.map_or(String::new(), ToString::to_string),
+            why.unwrap_or_default(),
             s.duration_s.to_string(),
             s.attached.to_string(),
             or_nothing(s.grasp_at),
@@ -325,6 +344,9 @@ pub(super) fn csv(kept: &[Kept]) -> Result<String> {
             k.peak(|a| a.peak_constraint_n).to_string(),
             k.peak(|a| a.peak_jaw_n).to_string(),
             s.inverted_peak.to_string(),
+            s.disabled_contacts.to_string(),
+            s.disabled_blades.to_string(),
+            s.relaxed.to_string(),
             k.state_hash.clone(),
         ];
         let times = (0..times.len()).map(|n| or_nothing(s.progress.stages.get(n).and_then(|p| p.time_s)));

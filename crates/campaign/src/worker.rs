@@ -2,6 +2,7 @@
 
 use crate::plan::Job;
 use crate::remote::Remote;
+use crate::served::Served;
 use crate::source::PolicySpec;
 use crate::store::Files;
 use std::collections::BTreeMap;
@@ -22,6 +23,8 @@ pub struct Worker {
     stop: Arc<AtomicBool>,
     /// The interpreter that serves Python policies, if `$TROCAR_PYTHON` names none.
     python: Option<String>,
+    /// Servers of Python policies that run already, by the policies' names.
+    served: BTreeMap<String, Served>,
 }
 
 impl Worker {
@@ -31,7 +34,14 @@ impl Worker {
     /// A scene that cannot be built.
     pub fn new(scene: &Scene, specimen: &Specimen) -> Result<Self> {
         let episode = Episode::new(scene, specimen, 1)?;
-        Ok(Self { specimen: specimen.clone(), episode, policies: BTreeMap::new(), stop: Arc::default(), python: None })
+        Ok(Self {
+            specimen: specimen.clone(),
+            episode,
+            policies: BTreeMap::new(),
+            stop: Arc::default(),
+            python: None,
+            served: BTreeMap::new(),
+        })
     }
 
     /// The same, which gives up what it does when `flag` becomes true.
@@ -45,6 +55,13 @@ impl Worker {
     #[must_use]
     pub fn served_by(mut self, python: Option<String>) -> Self {
         self.python = python;
+        self
+    }
+
+    /// The same, with servers of Python policies that run already, by the policies' names.
+    #[must_use]
+    pub(super) fn with_served(mut self, served: BTreeMap<String, Served>) -> Self {
+        self.served = served;
         self
     }
 
@@ -62,7 +79,8 @@ impl Worker {
             Entry::Occupied(made) => made.into_mut(),
             Entry::Vacant(place) => place.insert(if spec.is_remote() {
                 let stop = Arc::clone(&self.stop);
-                Box::new(Remote::new(spec, &self.specimen, &self.episode, stop, self.python.as_deref())?)
+                let served = self.served.remove(&spec.name);
+                Box::new(Remote::new(spec, &self.specimen, &self.episode, stop, self.python.as_deref(), served)?)
             } else {
                 policy::named(&spec.source)?
             }),

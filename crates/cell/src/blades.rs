@@ -1,11 +1,12 @@
 //! The gripper as tissue feels it: colliders of its blades and shaft.
 //!
-//! Three tools stand for one gripper: its own frame, which carries the shaft and whatever is held, and a frame for each blade ([`Gripper::blade`]).
-//! A blade is three thin capsules along it. With their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5 mm wide, 3.2 mm thick, and an
-//! inner face that is flat to 0.07 mm. A cutter's blade is a single capsule.
+//! Three tools stand for one gripper: its own frame, which carries the shaft and whatever is held,
+//! and a frame for each blade ([`Gripper::blade`]). A blade is three thin capsules along it. With
+//! their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5 mm wide, 3.2 mm
+//! thick, and an inner face that is flat to 0.07 mm. A cutter's blade is a single capsule.
 
 use crate::Gripper;
-use crate::gripper::{BLADE_TIP, BLADE_WIDTH, MAX_ANGLE, MOUTH_BEGIN, SHAFT_LENGTH, SHAFT_RADIUS};
+use crate::gripper::{BLADE_TIP, BLADE_WIDTH, JAW_REGION_BEGIN, MAX_ANGLE, SHAFT_LENGTH, SHAFT_RADIUS};
 use glam::DVec3;
 use trocar_tissue::{Collider, Shape, ToolForce};
 
@@ -38,17 +39,17 @@ impl Tools {
 /// Size and surface of an instrument's end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blades {
-    /// Length beyond the pivot [m].
+    /// Length beyond the pivot (m).
     pub length: f64,
     /// Ridges across a blade: three make it 5 mm wide, one is a cutter's.
     pub ridges: usize,
-    /// Widest angle between the blades [rad].
+    /// Widest angle between the blades (rad).
     pub max_angle: f64,
-    /// Radius of the shaft [m].
+    /// Radius of the shaft (m).
     pub shaft_radius: f64,
-    /// Length of the shaft behind the pivot that tissue may touch [m].
+    /// Length of the shaft behind the pivot that tissue may touch (m).
     pub shaft_length: f64,
-    /// Distance at which tissue rests on the blades [m].
+    /// Distance at which tissue rests on the blades (m).
     pub rest_offset: f64,
     /// Coulomb friction on tissue.
     pub friction: f64,
@@ -69,13 +70,13 @@ impl Default for Blades {
     }
 }
 
-/// Distance at which tissue rests on an instrument's tip [m] (SPEC C1).
+/// Distance at which tissue rests on an instrument's tip (m) (SPEC C1).
 pub const REST_OFFSET: f64 = 0.0015;
 
 /// Coulomb friction of the instrument on tissue (SPEC C1).
 pub const FRICTION: f64 = 0.6;
 
-/// Radius of a blade's ridges [m]: nearly none; the rest offset makes the blade's thickness.
+/// Radius of a blade's ridges (m): nearly none; the rest offset makes the blade's thickness.
 const RIDGE: f64 = 0.0001;
 
 /// The colliders of one gripper of the paper's size whose frames are tools 0 to 2.
@@ -93,7 +94,7 @@ impl Blades {
                 // -1, 0 and 1 of three; 0 of one.
                 let share = ridge as f64 - 0.5 * (self.ridges as f64 - 1.0);
                 let aside = share * (0.5 * BLADE_WIDTH - inset).max(0.0);
-                let (begin, end) = (MOUTH_BEGIN + inset, self.length - inset);
+                let (begin, end) = (JAW_REGION_BEGIN + inset, self.length - inset);
                 let middle = 0.5 * (begin + end);
                 let at = |x: f64| DVec3::new(x, side * inset, aside);
                 all.push(Collider {
@@ -106,7 +107,8 @@ impl Blades {
             }
         }
         // The shaft ends so that it does not fill the mouth.
-        let ends = [DVec3::new(-self.shaft_length, 0.0, 0.0), DVec3::new(MOUTH_BEGIN - self.shaft_radius, 0.0, 0.0)];
+        let ends =
+            [DVec3::new(-self.shaft_length, 0.0, 0.0), DVec3::new(JAW_REGION_BEGIN - self.shaft_radius, 0.0, 0.0)];
         let shape = Shape::Capsule { ends, radius: self.shaft_radius };
         let (tool, friction) = (tools.gripper, self.friction);
         all.push(Collider { name: "shaft".into(), tool, shape, rest_offset: 0.0, friction });
@@ -114,8 +116,9 @@ impl Blades {
     }
 }
 
-/// How hard tissue pushes the blades of `gripper` apart [N]: the mean over the two of the force outwards across the blade, which is what one rod that drives both feels of
-/// either. `forces` are those of the step's tools, of which `tools` are the gripper's; 0 where there are none.
+/// How hard tissue pushes the blades of `gripper` apart (N): the mean over the two of the force
+/// outwards across the blade, which is what one rod that drives both feels of either. `forces` are
+/// those of the step's tools, of which `tools` are the gripper's; 0 where there are none.
 pub fn opening_force(gripper: &Gripper, tools: Tools, forces: &[ToolForce]) -> f64 {
     let of = |(tool, side): (usize, f64)| {
         let outwards = gripper.blade(side).rotation * (side * DVec3::Y);
@@ -129,7 +132,7 @@ mod tests {
     use super::*;
     use trocar_core::{Pose, Wrench};
 
-    /// Distance of `p` [m, gripper frame] from the nearest surface at which tissue rests.
+    /// Distance of `p` (m, gripper frame) from the nearest surface at which tissue rests.
     fn rest_distance(gripper: &Gripper, p: DVec3) -> f64 {
         let frames = [gripper.pose, gripper.blade(1.0), gripper.blade(-1.0)];
         let to = |c: &Collider| c.shape.nearest(frames[c.tool].inverse().transform(p)).distance - c.rest_offset;

@@ -1,4 +1,5 @@
-//! Where a grasp may form: disjoint clusters of about 1 cm along an organ's axis (paper section IV-C).
+//! Where a grasp may form: disjoint clusters of about 1 cm along an organ's axis (paper section
+//! IV-C).
 //!
 //! A cluster's index is a position on the organ, so that "where was it grasped" is a number.
 
@@ -6,23 +7,25 @@ use crate::World;
 use glam::DVec3;
 use trocar_tissue::Body;
 
-/// Length of a cluster along the axis [m].
+/// Length of a cluster along the axis (m).
 const CLUSTER_LENGTH: f64 = 0.010;
 
-/// A cluster at least this many median edges long, so that a coarsely meshed large organ has nodes in every cluster.
+/// A cluster at least this many median edges long, so that a coarsely meshed large organ has nodes
+/// in every cluster.
 const CLUSTER_EDGES: f64 = 1.5;
 
-/// Nodes nearer to pinned tissue than this [m], or than this many median edges, are in no cluster while others are: a rigid cluster
-/// tied to pinned tissue by less would stretch what is between them beyond what tissue bears.
+/// Nodes nearer to pinned tissue than this (m), or than this many median edges, are in no cluster
+/// while others are: a rigid cluster tied to pinned tissue by less would stretch what is between
+/// them beyond what tissue bears.
 const CLEARANCE: f64 = 0.005;
 const CLEARANCE_EDGES: f64 = 1.5;
 
 const CLEARANCE_HALVINGS: u32 = 3;
 /// Fewest nodes the jaws take hold of, where there are as many.
-pub(crate) const FEWEST_HELD: usize = 8;
+pub(crate) const MIN_HELD_NODES: usize = 8;
 
 /// As many clear nodes are enough for a cluster.
-const FEWEST_CLEAR: usize = 12;
+const MIN_CLEAR_NODES: usize = 12;
 
 /// Nodes that are grasped together.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,10 +38,12 @@ pub struct Cluster {
     pub clear: bool,
 }
 
-/// The clusters of the free part of organ `organ`, from base to tip; parts without free nodes have none.
+/// The clusters of the free part of organ `organ`, from base to tip; parts without free nodes have
+/// none.
 ///
-/// Nodes that share an element with a pinned one belong to no cluster: an element all of whose nodes are prescribed could
-/// not give way, and a rigid cluster tied directly to pinned tissue would invert it.
+/// Nodes that share an element with a pinned one belong to no cluster: an element all of whose
+/// nodes are prescribed could not give way, and a rigid cluster tied directly to pinned tissue
+/// would invert it.
 pub fn clusters(world: &World, organ: usize) -> Vec<Cluster> {
     let (axis, body) = (&world.axes[organ], &world.model.bodies()[organ]);
     let length = CLUSTER_LENGTH.max(CLUSTER_EDGES * body.median_edge());
@@ -68,7 +73,8 @@ fn not_beside_pins(body: &Body) -> impl Iterator<Item = u32> + use<> {
     (0..free.len() as u32).filter(move |i| free[*i as usize])
 }
 
-/// Leaves out the cluster's nodes within `clearance` [m] of pinned tissue at rest, or within half of that, and so on, as long as too few are left.
+/// Leaves out the cluster's nodes within `clearance` (m) of pinned tissue at rest, or within half
+/// of that, and so on, as long as too few are left.
 fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
     let rest = body.rest_positions();
     let pinned: Vec<DVec3> = (0..rest.len()).filter(|i| body.pinned()[*i]).map(|i| rest[i]).collect();
@@ -80,7 +86,7 @@ fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
     for halvings in 0..=CLEARANCE_HALVINGS {
         let least = clearance / f64::from(1u32 << halvings);
         let clear: Vec<u32> = gaps.iter().filter(|(_, gap)| *gap >= least).map(|(i, _)| *i).collect();
-        if clear.len() >= FEWEST_CLEAR {
+        if clear.len() >= MIN_CLEAR_NODES {
             cluster.nodes = clear;
             cluster.clear = halvings == 0;
             return;
@@ -89,8 +95,8 @@ fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
 }
 
 impl Cluster {
-    /// The part of the cluster that jaws coming from above can hold: its nodes within `reach` [m] of its highest region.
-    /// Slender organs are held whole; of a liver, jaws pinch the top.
+    /// The part of the cluster that jaws coming from above can hold: its nodes within `reach` (m)
+    /// of its highest region. Slender organs are held whole; of a liver, jaws pinch the top.
     pub fn within_reach(&self, world: &World, organ: usize, reach: f64) -> Self {
         let position = |i: u32| world.state.position(&world.model, organ, i as usize);
         let centroid = self.centroid(world, organ);
@@ -108,7 +114,7 @@ impl Cluster {
         Self { s: self.s, nodes, clear: self.clear }
     }
 
-    /// Centroid of the cluster's nodes now [m].
+    /// Centroid of the cluster's nodes now (m).
     pub fn centroid(&self, world: &World, organ: usize) -> DVec3 {
         world.state.centroid(&world.model, organ, &self.nodes)
     }

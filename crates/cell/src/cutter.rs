@@ -1,25 +1,27 @@
 //! Scissors: what blades that close through tissue part.
 //!
-//! A cutter has the gripper's blades. Its cut is in the plane in which they swing, over their length and as wide as they were open. A tube across the blades is cut through where the mouth holds all of
-//! it, and in part otherwise. Its edges have no width: they push no tissue.
+//! A cutter has the gripper's blades. Its cut is in the plane in which they swing, over their
+//! length and as wide as they were open. A tube across the blades is cut through where the mouth
+//! holds all of it, and in part otherwise. Its edges have no width: they push no tissue.
 
-use crate::gripper::{BLADE_TIP, MOUTH_BEGIN};
+use crate::gripper::{BLADE_TIP, JAW_REGION_BEGIN};
 use crate::{Gripper, Result, World};
 use glam::DVec3;
 use trocar_tissue::{Cut, Piece, sever};
 
-/// Blades that were open wider than this [rad] are ready to cut (SPEC E1) ...
+/// Blades that were open wider than this (rad) are ready to cut (SPEC E1) ...
 pub const CUT_OPENED: f64 = 0.50;
 
-/// ... and cut when they close to less than this [rad].
+/// ... and cut when they close to less than this (rad).
 pub const CUT_CLOSED: f64 = 0.15;
 
 /// Watches the blades of a cutter: a cut is made by blades that were open and close.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scissors {
-    /// Blades wider than the first angle are ready to cut, and do when they close to less than the second [rad].
+    /// Blades wider than the first angle are ready to cut, and do when they close to less than the
+    /// second (rad).
     angles: [f64; 2],
-    /// Widest angle [rad] since the last cut, if that is wide enough for the next.
+    /// Widest angle (rad) since the last cut, if that is wide enough for the next.
     opened: Option<f64>,
 }
 
@@ -30,19 +32,21 @@ impl Default for Scissors {
 }
 
 impl Scissors {
-    /// Scissors that cut once they have been open wider than `opened` [rad] and close to less than `closed` [rad].
+    /// Scissors that cut once they have been open wider than `opened` (rad) and close to less than
+    /// `closed` (rad).
     pub fn new(opened: f64, closed: f64) -> Self {
         Self { angles: [opened, closed], opened: None }
     }
 
-    /// How wide they are or were [rad], if they are ready to cut.
+    /// How wide they are or were (rad), if they are ready to cut.
     pub fn opened(&self) -> Option<f64> {
         self.opened
     }
 
     /// The numbers of their state.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        self.angles.into_iter().chain([self.opened.unwrap_or(-1.0)])
+        let Self { angles, opened } = *self;
+        angles.into_iter().chain([opened.unwrap_or(-1.0)])
     }
 
     /// Forgets that they were open: nothing was between them for a while.
@@ -50,8 +54,10 @@ impl Scissors {
         self.opened = None;
     }
 
-    /// The cutter is at `gripper` now. When its blades have closed, after they were open, the gripper there with the blades as wide as they were: what lies between those is
-    /// cut ([`Gripper::cut`]). None otherwise; blades that close again without having opened cut nothing.
+    /// The cutter is at `gripper` now. When its blades have closed, after they were open, the
+    /// gripper there with the blades as wide as they were: what lies between those is cut
+    /// ([`Gripper::cut`]). None otherwise; blades that close again without having opened cut
+    /// nothing.
     pub fn follow(&mut self, gripper: &Gripper) -> Option<Gripper> {
         let angle = gripper.jaw_angle;
         if angle < self.angles[1] {
@@ -70,22 +76,23 @@ impl Gripper {
         self.cut_along(body, BLADE_TIP)
     }
 
-    /// The same for blades of another `length` [m].
+    /// The same for blades of another `length` (m).
     pub fn cut_along(&self, body: usize, length: f64) -> Cut {
         let turned = |axis: DVec3| self.pose.rotation * axis;
-        let middle = 0.5 * (MOUTH_BEGIN + length);
+        let middle = 0.5 * (JAW_REGION_BEGIN + length);
         Cut {
             body,
             point: self.pose.transform(middle * DVec3::X),
             normal: turned(DVec3::Z),
             along: turned(DVec3::X),
-            half_extents: [0.5 * (length - MOUTH_BEGIN), self.half_gap(length)],
+            half_extents: [0.5 * (length - JAW_REGION_BEGIN), self.half_gap(length)],
         }
     }
 }
 
 impl World {
-    /// Cuts a body; it keeps its index, and what it lost comes behind all others. The pieces, or none where nothing was cut. Nothing of it can be undone but by a clone of model and state.
+    /// Cuts a body; it keeps its index, and what it lost comes behind all others. The pieces, or
+    /// none where nothing was cut. Nothing of it can be undone but by a clone of model and state.
     ///
     /// # Errors
     /// A cut that cannot be, or pieces that cannot be stepped.

@@ -11,20 +11,24 @@ use trocar_tissue::{Compliance, Grasp};
 pub enum GraspDesign {
     /// By the friction of the two blades alone.
     Friction,
-    /// Nodes tied to the jaws where they were in the undeformed organ: whatever the organ has moved since becomes a jump (paper, equation 5).
+    /// Nodes tied to the jaws where they were in the undeformed organ: whatever the organ has moved
+    /// since becomes a jump (paper, equation 5).
     RestPose,
     /// Nodes tied to the jaws where they are when these close (paper, equation 4).
     LivePose,
-    /// As live-pose, on springs that hold no more than the friction of the jaws' force does, and tear.
+    /// As live-pose, on springs that hold no more than the friction of the jaws' force does, and
+    /// tear.
     #[default]
     Compliant,
 }
 
-/// Stiffness of a compliant grasp's spring over Young's modulus times the median edge, which is about what the tissue around a node resists with: far above it, so that held
-/// tissue follows the jaws.
+/// Stiffness of a compliant grasp's spring over Young's modulus times the median edge, which is
+/// about what the tissue around a node resists with: far above it, so that held tissue follows the
+/// jaws.
 const SPRING: f64 = 20.0;
 
-/// Pull at which tissue tears out of the jaws [N]: a wall of 1 mm (two layers of 0.5) over the 5 mm of the blades at a strength of 1 MPa.
+/// Pull at which tissue tears out of the jaws (N): a wall of 1 mm (two layers of 0.5) over the 5 mm
+/// of the blades at a strength of 1 MPa.
 const TEAR_FORCE: f64 = 5.0;
 
 impl GraspDesign {
@@ -41,7 +45,8 @@ impl GraspDesign {
         }
     }
 
-    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` [N] whose gripper, `tools` of the step, is at `pose`; none for friction, which needs none.
+    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` (N) whose gripper,
+    /// `tools` of the step, is at `pose`; none for friction, which needs none.
     pub fn grasp(
         self,
         world: &World,
@@ -57,7 +62,8 @@ impl GraspDesign {
         match self {
             Self::Friction => None,
             Self::RestPose => {
-                // Offsets as authored in the undeformed organ with the gripper where it closes: the displacement since rest becomes the snap.
+                // Offsets as authored in the undeformed organ with the gripper where it closes: the
+                // displacement since rest becomes the snap.
                 let rest: Vec<DVec3> = nodes.iter().map(|i| body.rest_positions()[*i as usize]).collect();
                 Some(Grasp::prescribe(model, organ, nodes, &rest, tools.gripper, pose))
             }

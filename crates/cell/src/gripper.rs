@@ -1,27 +1,27 @@
 //! A free-moving two-jaw gripper.
 //!
-//! Frame: origin at the jaw pivot, x along the closed blades towards their tips, y across the closing plane (the blades
-//! open towards +y and -y), z completes. The mouth (SPEC C3) is a wedge 2 to 21 mm beyond the pivot, 5 mm wide along z, with
-//! half-gap r sin(theta/2).
+//! Frame: origin at the jaw pivot, x along the closed blades towards their tips, y across the
+//! closing plane (the blades open towards +y and -y), z completes. The mouth (SPEC C3) is a wedge 2
+//! to 21 mm beyond the pivot, 5 mm wide along z, with half-gap r sin(theta/2).
 
 use glam::{DMat3, DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_tissue::ToolMotion;
 
-/// Widest angle between the blades [rad] (SPEC: theta_max 60 degrees).
+/// Widest angle between the blades (rad) (SPEC: theta_max 60 degrees).
 pub const MAX_ANGLE: f64 = std::f64::consts::FRAC_PI_3;
 
-/// Distance from the pivot at which tissue is taken [m]: the middle of the mouth.
+/// Distance from the pivot at which tissue is taken (m): the middle of the mouth.
 pub(crate) const GRIP_DISTANCE: f64 = 0.0115;
 
-/// The mouth begins this far beyond the pivot [m].
-pub(crate) const MOUTH_BEGIN: f64 = 0.002;
-/// The blades and the mouth end there [m].
+/// The mouth begins this far beyond the pivot (m).
+pub(crate) const JAW_REGION_BEGIN: f64 = 0.002;
+/// The blades and the mouth end there (m).
 pub(crate) const BLADE_TIP: f64 = 0.021;
 pub(crate) const BLADE_WIDTH: f64 = 0.005;
 pub(crate) const BLADE_THICKNESS: f64 = 0.0032;
-/// Width of a cutter's blade [m].
+/// Width of a cutter's blade (m).
 const CUTTER_WIDTH: f64 = 0.0012;
 pub(crate) const SHAFT_RADIUS: f64 = 0.0025;
 pub(crate) const SHAFT_LENGTH: f64 = 0.12;
@@ -31,12 +31,13 @@ pub(crate) const SHAFT_LENGTH: f64 = 0.12;
 pub struct Gripper {
     /// Pose of the gripper frame in the world (the recording frame).
     pub pose: Pose,
-    /// Angle between the blades [rad].
+    /// Angle between the blades (rad).
     pub jaw_angle: f64,
 }
 
 impl Gripper {
-    /// A gripper that comes from `up`, closes across `along` (the tube's direction) and holds `point` in mid-mouth.
+    /// A gripper that comes from `up`, closes across `along` (the tube's direction) and holds
+    /// `point` in mid-mouth.
     pub fn over(point: DVec3, up: DVec3, along: DVec3, jaw_angle: f64) -> Self {
         let x = -up;
         let z = (along - along.dot(up) * up).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
@@ -44,29 +45,32 @@ impl Gripper {
         Self { pose: Pose { rotation, translation: point + GRIP_DISTANCE * up }, jaw_angle }
     }
 
-    /// Frame of the blade that opens towards +y (`side` 1) or -y (`side` -1): at the pivot, x along the blade. Its inner face is the plane y = 0.
+    /// Frame of the blade that opens towards +y (`side` 1) or -y (`side` -1): at the pivot, x along
+    /// the blade. Its inner face is the plane y = 0.
     pub fn blade(&self, side: f64) -> Pose {
         let swing = DQuat::from_rotation_z(0.5 * side * self.jaw_angle);
         Pose { rotation: self.pose.rotation * swing, translation: self.pose.translation }
     }
 
-    /// How the gripper and its two blades move in a frame at whose end they are as in `next`: the motions of tools 0, 1 (the blade towards +y) and 2.
+    /// How the gripper and its two blades move in a frame at whose end they are as in `next`: the
+    /// motions of tools 0, 1 (the blade towards +y) and 2.
     pub fn motions_to(&self, next: &Self) -> [ToolMotion; 3] {
         let blade = |side| ToolMotion { from: self.blade(side), to: next.blade(side) };
         [ToolMotion { from: self.pose, to: next.pose }, blade(1.0), blade(-1.0)]
     }
 
-    /// Half the gap between the blades at distance `r` from the pivot [m].
+    /// Half the gap between the blades at distance `r` from the pivot (m).
     pub fn half_gap(&self, r: f64) -> f64 {
         r * (0.5 * self.jaw_angle).sin()
     }
 
-    /// The angle at which the blades touch tissue that reaches `half_width` [m] to either side in mid-mouth.
+    /// The angle at which the blades touch tissue that reaches `half_width` (m) to either side in
+    /// mid-mouth.
     pub fn angle_for(half_width: f64) -> f64 {
         (2.0 * (half_width / GRIP_DISTANCE).clamp(0.0, 1.0).asin()).min(MAX_ANGLE)
     }
 
-    /// Surface of the shaft and the two blades in the world [m], for pictures.
+    /// Surface of the shaft and the two blades in the world (m), for pictures.
     pub fn surface(&self) -> TriMesh {
         self.surface_of(BLADE_WIDTH, BLADE_THICKNESS, 0.0)
     }
@@ -76,12 +80,13 @@ impl Gripper {
         self.surface_of(CUTTER_WIDTH, BLADE_THICKNESS, 0.5 * CUTTER_WIDTH)
     }
 
-    /// Blades of a width and thickness [m], each shifted by `aside` [m] along z, and the shaft.
+    /// Blades of a width and thickness (m), each shifted by `aside` (m) along z, and the shaft.
     fn surface_of(&self, width: f64, thickness: f64, aside: f64) -> TriMesh {
         let mut mesh = TriMesh::default();
         for side in [1.0, -1.0] {
             let swing = DQuat::from_rotation_z(side * 0.5 * self.jaw_angle);
-            // The blade's inner face lies on the line from the pivot to the gap's edge; it narrows towards the tip.
+            // The blade's inner face lies on the line from the pivot to the gap's edge; it narrows
+            // towards the tip.
             let section = |x: f64, thickness: f64, width: f64| {
                 [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 1.0)]
                     .map(|(t, w)| swing * DVec3::new(x, side * t * thickness, 0.5 * w * width + side * aside))
@@ -110,7 +115,8 @@ impl Gripper {
     }
 }
 
-/// Adds the closed body spanned by rings of `N` points, given counter-clockwise seen from the last ring (`mirrored`: clockwise).
+/// Adds the closed body spanned by rings of `N` points, given counter-clockwise seen from the last
+/// ring (`mirrored`: clockwise).
 fn loft<const N: usize>(mesh: &mut TriMesh, rings: &[[DVec3; N]], mirrored: bool) {
     let start = mesh.vertices.len() as u32;
     let n = N as u32;

@@ -15,7 +15,7 @@ pub(crate) struct Hold {
     jaw: DVec3,
 }
 
-/// What has become of it [m].
+/// What has become of it (m).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Moved {
     pub jaw_lift: f64,
@@ -31,13 +31,14 @@ impl Hold {
         Self { organ, nodes, centroid, centroid_in_jaw, jaw: pose.translation }
     }
 
-    /// The organ has been cut into `pieces` of bodies in `world`: goes on with the piece that has the most of the nodes. `pose` is the gripper's now, `was` their centroid before the cut [m].
+    /// The organ has been cut into `pieces` of bodies in `world`: goes on with the piece that has
+    /// the most of the nodes. `pose` is the gripper's now, `was` their centroid before the cut (m).
     pub fn follow(&mut self, world: &World, pieces: &[Piece], pose: &Pose, was: DVec3) {
         let mut held = self.nodes.clone();
         held.sort_unstable();
         let of = |piece: &Piece| -> Vec<u32> {
-            let among = |k: &u32| held.binary_search(&piece.nodes[*k as usize]).is_ok();
-            (0..piece.nodes.len() as u32).filter(among).collect()
+            let is_held = |k: &u32| held.binary_search(&piece.nodes[*k as usize]).is_ok();
+            (0..piece.nodes.len() as u32).filter(is_held).collect()
         };
         let mut most: Option<(usize, Vec<u32>)> = None;
         for piece in pieces {
@@ -54,13 +55,20 @@ impl Hold {
         self.centroid_in_jaw += pose.rotation.inverse() * shift;
     }
 
-    /// The numbers of its state.
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let vectors = [self.centroid, self.centroid_in_jaw, self.jaw].map(|v| v.to_array());
-        vectors.into_iter().flatten().chain([self.organ as f64]).chain(self.nodes.iter().map(|n| f64::from(*n)))
+    /// Whether nothing has moved since the jaws closed, so that the next frame is the grasp's
+    /// first.
+    pub fn is_new(&self, world: &World) -> bool {
+        self.now(world) == self.centroid
     }
 
-    /// Centroid of the tissue now [m].
+    /// The numbers of its state.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        let Self { organ, nodes, centroid, centroid_in_jaw, jaw } = self;
+        let vectors = [*centroid, *centroid_in_jaw, *jaw].map(|v| v.to_array());
+        vectors.into_iter().flatten().chain([*organ as f64]).chain(nodes.iter().map(|n| f64::from(*n)))
+    }
+
+    /// Centroid of the tissue now (m).
     pub fn now(&self, world: &World) -> DVec3 {
         world.state.centroid(&world.model, self.organ, &self.nodes)
     }

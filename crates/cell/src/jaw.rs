@@ -1,17 +1,20 @@
 //! The jaw's drive: it closes until tissue presses with the force it may use, and keeps that force.
 //!
-//! A drive that is told an angle crushes what is soft and lets go of what is softer. This one is told a force. It closes at a limited speed that falls as the force nears the
-//! budget, and opens when it is above. At 60 commands a second against contact, which is stiff, a fixed gain would be unstable or slow; so every step is at most half of what
-//! the stiffness seen so far (a secant through the last two frames) says would meet the budget.
+//! A drive that is told an angle crushes what is soft and lets go of what is softer. This one is
+//! told a force. It closes at a limited speed that falls as the force nears the budget, and opens
+//! when it is above. At 60 commands a second against contact, which is stiff, a fixed gain would be
+//! unstable or slow; so every step is at most half of what the stiffness seen so far (a secant
+//! through the last two frames) says would meet the budget.
 
 use crate::FRAME;
 use crate::gripper::MAX_ANGLE;
 
-/// Force of the jaws [N] unless the user says otherwise: it squeezes the appendix, 9 mm of 12 kPa, to about 3 mm, and two blades with friction 0.6 then bear 0.6 N, of which
-/// a lift of 15 mm needs 0.2 to 0.4. See `docs/measurements/grasp.md`.
+/// Force of the jaws (N) unless the user says otherwise: it squeezes the appendix, 9 mm of 12 kPa,
+/// to about 3 mm, and two blades with friction 0.6 then bear 0.6 N, of which a lift of 15 mm needs
+/// 0.2 to 0.4. See `docs/measurements/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
 
-/// Time that the jaws take from wide open to closed on nothing [s].
+/// Time that the jaws take from wide open to closed on nothing (s).
 const CLOSING_TIME: f64 = 0.3;
 
 /// Share of the way to the budget that one step goes.
@@ -20,39 +23,44 @@ const GAIN: f64 = 0.5;
 /// Within this share of the budget the jaw stands still, so that held tissue comes to rest.
 const DEADBAND: f64 = 0.02;
 
-/// What is left of the stiffest secant from one frame to the next: tissue that was stiff a moment ago is approached with care.
+/// What is left of the stiffest secant from one frame to the next: tissue that was stiff a moment
+/// ago is approached with care.
 const FORGETTING: f64 = 0.8;
 
-/// Least motion that gives a secant [rad]; with less, the tissue's creep would be taken for its stiffness.
+/// Least motion that gives a secant (rad); with less, the tissue's creep would be taken for its
+/// stiffness.
 const LEAST_MOTION: f64 = 1e-4;
 
 /// A jaw that is driven by force.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jaw {
-    /// Force with which it presses [N].
+    /// Force with which it presses (N).
     pub budget: f64,
-    /// Widest angle [rad].
+    /// Widest angle (rad).
     max_angle: f64,
-    /// Fastest motion [rad a frame].
+    /// Fastest motion (rad a frame).
     fastest: f64,
-    /// Opening force gained per angle closed [N/rad].
+    /// Opening force gained per angle closed (N/rad).
     stiffness: f64,
-    /// Angle [rad] and opening force [N] a frame ago.
+    /// Angle (rad) and opening force (N) a frame ago.
     last: Option<(f64, f64)>,
 }
 
 impl Jaw {
-    /// A jaw that presses with `budget` [N], opens to [`MAX_ANGLE`](crate::MAX_ANGLE) and closes in 0.3 s.
+    /// A jaw that presses with `budget` (N), opens to [`MAX_ANGLE`](crate::MAX_ANGLE) and closes in
+    /// 0.3 s.
     pub fn new(budget: f64) -> Self {
         Self::sized(budget, MAX_ANGLE, CLOSING_TIME)
     }
 
-    /// A jaw that presses with `budget` [N], opens to `max_angle` [rad] and closes in `closing_time` [s].
+    /// A jaw that presses with `budget` (N), opens to `max_angle` (rad) and closes in
+    /// `closing_time` (s).
     pub fn sized(budget: f64, max_angle: f64, closing_time: f64) -> Self {
         Self { budget, max_angle, fastest: max_angle * FRAME / closing_time, stiffness: 0.0, last: None }
     }
 
-    /// The angle [rad] at the end of the next frame, for a jaw at `angle` that tissue pushes open with `force` [N]. 0 to the widest.
+    /// The angle (rad) at the end of the next frame, for a jaw at `angle` that tissue pushes open
+    /// with `force` (N). 0 to the widest.
     pub fn squeeze(&mut self, angle: f64, force: f64) -> f64 {
         self.stiffness *= FORGETTING;
         if let Some((then, was)) = self.last
@@ -72,11 +80,12 @@ impl Jaw {
 
     /// The numbers of its state.
     pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
-        let (angle, force) = self.last.unwrap_or((-1.0, 0.0));
-        [self.budget, self.stiffness, angle, force].into_iter()
+        let Self { budget, max_angle: _, fastest: _, stiffness, last } = *self;
+        let (angle, force) = last.unwrap_or((-1.0, 0.0));
+        [budget, stiffness, angle, force].into_iter()
     }
 
-    /// The angle [rad] at the end of the next frame on the way to `target` at full speed.
+    /// The angle (rad) at the end of the next frame on the way to `target` at full speed.
     pub fn turn_to(&mut self, angle: f64, target: f64) -> f64 {
         self.last = None;
         self.stiffness = 0.0;
@@ -88,7 +97,8 @@ impl Jaw {
 mod tests {
     use super::*;
 
-    /// Closes on something that pushes back by `spring` (angle, change of angle in the last frame) and returns the angle and forces of 90 frames.
+    /// Closes on something that pushes back by `spring` (angle, change of angle in the last frame)
+    /// and returns the angle and forces of 90 frames.
     fn close_on(spring: impl Fn(f64, f64) -> f64, budget: f64) -> (f64, Vec<f64>) {
         let mut jaw = Jaw::new(budget);
         let (mut angle, mut force) = (MAX_ANGLE, 0.0);
@@ -119,7 +129,8 @@ mod tests {
 
     #[test]
     fn it_does_not_overshoot_tissue_that_stiffens() {
-        // An exponential spring, as squeezed tissue is, that creeps: a force goes with the speed, too.
+        // An exponential spring, as squeezed tissue is, that creeps: a force goes with the speed,
+        // too.
         let creeping = |a: f64, turn: f64| 0.02 * ((8.0 * (0.8 - a).max(0.0)).exp() - 1.0) - 3.0 * turn;
         let (_, forces) = close_on(|a, turn| if a < 0.8 { creeping(a, turn) } else { 0.0 }, 1.0);
         assert!(forces.iter().all(|f| *f < 1.3), "{forces:?}");

@@ -1,69 +1,57 @@
-//! What a cut left: the pieces of an organ in figures, and the organ as its report shows it.
+//! A cut that parts an organ, in figures.
 
-use crate::World;
+use crate::{Gripper, JawRegion, World};
 use glam::DVec3;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use trocar_geometry::TetMesh;
 use trocar_tissue::Piece;
 
 /// Corners of the face opposite each corner of an element, counter-clockwise seen from outside.
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// A cut in figures.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+/// A cut in figures, at the instant it is made.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Severance {
-    /// `severed`, `cut in part`, `no tissue`, or `not closed` where the run ended before the blades had.
-    pub outcome: &'static str,
+    /// `severed`, `cut in part` or `no tissue`.
+    pub outcome: String,
     /// The same in a sentence.
     pub said: String,
-    /// Organ coordinate at which the cutter was put.
-    pub aimed_at: f64,
-    /// Organ coordinate of the cut: the mean over the nodes that fell apart; 0 where nothing was cut.
+    /// Organ coordinate of the cut: the mean over the nodes that fell apart; 0 where nothing was
+    /// cut.
     pub at: f64,
-    /// The least and greatest of these: elements' faces are no plane.
+    /// The least of these organ coordinates: elements' faces are no plane.
     pub at_least: f64,
-    /// See [`at_least`](Self::at_least).
+    /// The greatest of them.
     pub at_most: f64,
-    /// Time at which the blades closed [s].
-    pub time_s: f64,
-    /// How wide they were open [rad].
+    /// How wide the blades were open (rad).
     pub opened_rad: f64,
-    /// The angle at which they cut [rad].
+    /// The angle at which they cut (rad).
     pub closed_rad: f64,
-    /// Tissue of the organ between the open blades [mm3].
+    /// Tissue of the organ between the open blades (mm3).
     pub between_blades_mm3: f64,
     /// Faces between elements that opened.
     pub faces: usize,
-    /// Their area, of one side [mm2].
+    /// Their area, of one side (mm2).
     pub area_mm2: f64,
-    /// Nodes that came new, as copies of those on the cut.
+    /// Nodes that are new, as copies of those on the cut.
     pub copies: usize,
-    /// The pieces: the one that stays the organ, then those that came loose. Empty where nothing was cut.
+    /// The pieces: the one that stays the organ, then those that came loose. Empty where nothing
+    /// was cut.
     pub pieces: Vec<SeveredPiece>,
-    /// Volume of the organ just before the cut [mm3].
+    /// Volume of the organ just before the cut (mm3).
     pub volume_before_mm3: f64,
-    /// Volume of all pieces just after [mm3].
+    /// Volume of all pieces just after (mm3).
     pub volume_after_mm3: f64,
-    /// How far the two are apart, over the first.
+    /// The difference of the two over the first.
     pub volume_error: f64,
     /// Inverted elements of the organ just before the cut.
     pub inverted_before: usize,
     /// Inverted elements of the pieces just after.
     pub inverted_after: usize,
-    /// Most inverted elements of all organs in any frame since.
-    pub inverted_peak: usize,
-    /// Rise of the jaws since the blades closed [mm].
-    pub jaw_rise_mm: f64,
-    /// Rise of the tissue in the jaws since then [mm].
-    pub held_rise_mm: f64,
-    /// The jaws still hold it: it has followed at least 0.80 of their rise, and slipped less than 3 mm since. False where nothing was cut through.
-    pub held: bool,
-    /// Wall time of the cut: faces, new model, solver prepared [ms].
-    pub cut_ms: f64,
 }
 
 /// A piece of the organ in figures.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SeveredPiece {
     /// Its body's name.
     pub name: String,
@@ -73,72 +61,188 @@ pub struct SeveredPiece {
     pub elements: usize,
     /// Pinned nodes.
     pub pinned: usize,
-    /// Nodes in the jaws.
+    /// Nodes in jaws.
     pub held: usize,
     /// Least organ coordinate of its nodes.
     pub s_from: f64,
     /// Greatest organ coordinate of its nodes.
     pub s_to: f64,
-    /// Volume of its elements just before the cut [mm3].
+    /// Volume of its elements just before the cut (mm3).
     pub volume_before_mm3: f64,
-    /// And just after [mm3].
+    /// And just after (mm3).
     pub volume_after_mm3: f64,
-    /// Rise of its centroid from the cut to the end [mm].
+    /// Height of its centroid at the cut (m).
+    pub height_m: f64,
+    /// Rise of its centroid from the cut to the end (mm).
     pub rise_mm: f64,
 }
 
-/// An organ that was cut, for those who draw it. Its nodes are numbered through its pieces, one after the other; its elements keep the specimen's order.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct CutOrgan {
-    /// The organ's place in the specimen.
-    pub organ: usize,
-    /// Elements in the specimen's order.
-    pub tets: Vec<[u32; 4]>,
-    /// For each node, the specimen's that it is or is a copy of.
-    pub parents: Vec<u32>,
-    /// For each node, its piece.
-    pub piece: Vec<u32>,
-    /// Faces that the cut laid bare, of both sides; counter-clockwise seen from outside.
-    pub faces: Vec<[u32; 3]>,
-    /// Bodies of the pieces.
-    bodies: Vec<usize>,
+/// An organ just before it is cut.
+pub(crate) struct BeforeCut {
+    organ: usize,
+    mesh: TetMesh,
+    /// Organ coordinates of its nodes.
+    s: Vec<f64>,
+    opened: f64,
+    between_blades: f64,
 }
 
-impl CutOrgan {
-    /// The organ at `organ`, whose elements were `whole`, in `world` after it fell into `pieces`.
-    pub(crate) fn new(organ: usize, whole: &[[u32; 4]], pieces: &[Piece], world: &World) -> Self {
-        let mut cut = Self { organ, tets: vec![[0; 4]; whole.len()], ..Self::default() };
+/// An organ in its pieces. Its nodes are numbered through the pieces, one after the other; its
+/// elements keep the order of the whole organ.
+struct CutMesh {
+    mesh: TetMesh,
+    /// For each node, the node of the whole organ that it is or is a copy of.
+    parents: Vec<u32>,
+    /// For each node, its piece.
+    piece: Vec<usize>,
+    /// Faces that the cut laid bare, of both sides.
+    faces: Vec<[u32; 3]>,
+}
+
+impl Severance {
+    /// Organ `organ` before the blades of `open` part it.
+    pub(crate) fn before(world: &World, organ: usize, open: &Gripper) -> BeforeCut {
+        let tets = world.model.bodies()[organ].tets().to_vec();
+        BeforeCut {
+            organ,
+            mesh: TetMesh { vertices: world.state.positions(&world.model, organ), tets },
+            s: world.axes[organ].s.clone(),
+            opened: open.jaw_angle,
+            between_blades: JawRegion::of(open).tissue_of(world, organ).map_or(0.0, |tissue| tissue.volume),
+        }
+    }
+}
+
+impl BeforeCut {
+    /// The figures once the organ is in `pieces`; `held` are bodies and numbers of nodes in jaws,
+    /// and `closed` (rad) is the angle at which the blades cut.
+    pub(crate) fn after(self, world: &World, pieces: &[Piece], held: &[(usize, usize)], closed: f64) -> Severance {
+        let (volume, inverted) = (1e9 * self.mesh.volume(), self.mesh.inverted());
+        let mut figures = Severance {
+            outcome: "no tissue".to_owned(),
+            opened_rad: self.opened,
+            closed_rad: closed,
+            between_blades_mm3: 1e9 * self.between_blades,
+            volume_before_mm3: volume,
+            volume_after_mm3: volume,
+            inverted_before: inverted,
+            inverted_after: inverted,
+            ..Severance::default()
+        };
+        let name = world.model.bodies()[self.organ].name();
+        if pieces.is_empty() {
+            figures.said =
+                format!("the blades closed on the {name} and nothing was cut: too little of it lies beyond them");
+            return figures;
+        }
+        let cut = CutMesh::new(&self.mesh.tets, pieces, world);
+        let area = |face: &[u32; 3]| {
+            let [a, b, c] = face.map(|i| cut.mesh.vertices[i as usize]);
+            0.5 * (b - a).cross(c - a).length()
+        };
+        figures.faces = cut.faces.len() / 2;
+        figures.area_mm2 = 0.5e6 * cut.faces.iter().map(area).sum::<f64>();
+        figures.copies = cut.parents.len() - self.mesh.vertices.len();
+        self.place(&cut, &mut figures);
+        (figures.volume_after_mm3, figures.inverted_after) = (1e9 * cut.mesh.volume(), cut.mesh.inverted());
+        figures.volume_error = (figures.volume_after_mm3 / figures.volume_before_mm3 - 1.0).abs();
+        figures.pieces = pieces.iter().map(|piece| self.piece(world, piece, &cut, held)).collect();
+        let end = |best: fn(&f64, &f64) -> bool| {
+            let s = &self.s;
+            (0..s.len()).fold(0, |found, i| if best(&s[i], &s[found]) { i } else { found }) as u32
+        };
+        let through = cut.parts(end(|a, b| a < b), end(|a, b| a > b));
+        (figures.outcome, figures.said) = outcome(name, &figures, through);
+        figures
+    }
+
+    /// Where the cut is, by the organ coordinates of the nodes that fell apart.
+    fn place(&self, cut: &CutMesh, figures: &mut Severance) {
+        let s = &self.s;
+        let mut copies = vec![0; s.len()];
+        cut.parents.iter().for_each(|i| copies[*i as usize] += 1);
+        let mut split: Vec<f64> = (0..copies.len()).filter(|i| copies[*i] > 1).map(|i| s[i]).collect();
+        // A lone face that opens inside leaves its nodes whole.
+        if split.is_empty() {
+            split = cut.faces.iter().flatten().map(|i| s[cut.parents[*i as usize] as usize]).collect();
+        }
+        figures.at = split.iter().sum::<f64>() / split.len().max(1) as f64;
+        figures.at_least = split.iter().copied().fold(1.0, f64::min);
+        figures.at_most = split.iter().copied().fold(0.0, f64::max);
+    }
+
+    fn piece(&self, world: &World, piece: &Piece, cut: &CutMesh, held: &[(usize, usize)]) -> SeveredPiece {
+        let body = &world.model.bodies()[piece.body];
+        let volume = |mesh: &TetMesh| 1e9 * piece.elements.iter().map(|t| mesh.tet_volume(*t as usize)).sum::<f64>();
+        let along = || piece.nodes.iter().map(|i| self.s[*i as usize]);
+        let nodes: Vec<u32> = (0..body.len() as u32).collect();
+        SeveredPiece {
+            name: body.name().to_owned(),
+            nodes: body.len(),
+            elements: body.tets().len(),
+            pinned: body.pinned().iter().filter(|p| **p).count(),
+            held: held.iter().filter(|(body, _)| *body == piece.body).map(|(_, nodes)| nodes).sum(),
+            s_from: along().fold(1.0, f64::min),
+            s_to: along().fold(0.0, f64::max),
+            volume_before_mm3: volume(&self.mesh),
+            volume_after_mm3: volume(&cut.mesh),
+            height_m: world.state.centroid(&world.model, piece.body, &nodes).dot(world.up),
+            rise_mm: 0.0,
+        }
+    }
+}
+
+impl CutMesh {
+    /// The organ whose elements were `whole` in `world` after it fell into `pieces`.
+    fn new(whole: &[[u32; 4]], pieces: &[Piece], world: &World) -> Self {
+        let (mut tets, mut parents, mut piece_of) = (vec![[0; 4]; whole.len()], Vec::new(), Vec::new());
+        let mut vertices: Vec<DVec3> = Vec::new();
         for (k, piece) in pieces.iter().enumerate() {
-            let first = cut.parents.len() as u32;
-            let tets = world.model.bodies()[piece.body].tets();
-            for (element, tet) in piece.elements.iter().zip(tets) {
-                cut.tets[*element as usize] = tet.map(|i| first + i);
+            let first = parents.len() as u32;
+            for (element, tet) in piece.elements.iter().zip(world.model.bodies()[piece.body].tets()) {
+                tets[*element as usize] = tet.map(|i| first + i);
             }
-            cut.parents.extend(&piece.nodes);
-            cut.piece.resize(cut.parents.len(), k as u32);
-            cut.bodies.push(piece.body);
+            parents.extend(&piece.nodes);
+            piece_of.resize(parents.len(), k);
+            vertices.extend(world.state.positions(&world.model, piece.body));
         }
         let neighbours = |tets: &[[u32; 4]]| TetMesh { vertices: Vec::new(), tets: tets.to_vec() }.neighbours();
-        let (before, after) = (neighbours(whole), neighbours(&cut.tets));
-        for (t, tet) in cut.tets.iter().enumerate() {
+        let (before, after) = (neighbours(whole), neighbours(&tets));
+        let mut faces = Vec::new();
+        for (t, tet) in tets.iter().enumerate() {
             let bared = (0..4).filter(|k| before[t][*k].is_some() && after[t][*k].is_none());
-            cut.faces.extend(bared.map(|k| FACES[k].map(|corner| tet[corner])));
+            faces.extend(bared.map(|k| FACES[k].map(|corner| tet[corner])));
         }
-        cut
+        Self { mesh: TetMesh { vertices, tets }, parents, piece: piece_of, faces }
     }
 
-    /// Where its nodes are now [m].
-    pub(crate) fn positions(&self, world: &World) -> Vec<DVec3> {
-        self.bodies.iter().flat_map(|body| world.state.positions(&world.model, *body)).collect()
-    }
-
-    /// Whether nodes `a` and `b` of the whole organ are in different pieces; false where they have copies in several.
-    pub(crate) fn parts(&self, a: u32, b: u32) -> bool {
-        let pieces = |node: u32| -> Vec<u32> {
+    /// Whether nodes `a` and `b` of the whole organ are in different pieces; false where they have
+    /// copies in several.
+    fn parts(&self, a: u32, b: u32) -> bool {
+        let pieces = |node: u32| -> Vec<usize> {
             let copies = (0..self.parents.len()).filter(|i| self.parents[*i] == node);
             copies.map(|i| self.piece[i]).collect()
         };
         let (a, b) = (pieces(a), pieces(b));
         !a.iter().any(|piece| b.contains(piece))
     }
+}
+
+/// Name of the outcome, and a sentence of it. `through`: the ends of the organ are apart.
+fn outcome(name: &str, figures: &Severance, through: bool) -> (String, String) {
+    let area = format!("{} faces, {:.0} mm2", figures.faces, figures.area_mm2);
+    if !through {
+        let loose = match figures.pieces.len() {
+            1 => "it is still one piece".to_owned(),
+            2 => "its ends are still joined, though a bit came loose".to_owned(),
+            _ => "its ends are still joined, though some bits came loose".to_owned(),
+        };
+        let said = format!("the blades closed at s = {:.2} and cut the {name} in part ({area}): {loose}", figures.at);
+        return ("cut in part".to_owned(), said);
+    }
+    let pinned = figures.pieces.iter().filter(|p| p.pinned > 0).count();
+    let hangs = if pinned > 1 { "; both sides are pinned" } else { "" };
+    let (at, count) = (figures.at, figures.pieces.len());
+    let said = format!("the blades closed at s = {at:.2} and parted the {name} into {count} pieces ({area}){hangs}");
+    ("severed".to_owned(), said)
 }

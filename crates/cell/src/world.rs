@@ -9,17 +9,19 @@ use trocar_tissue::{
     SolverSettings, State, Stepper, Support, SupportField, ToolForce, ToolMotion, pins,
 };
 
-/// Length of a frame [s].
+/// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 60.0;
 
-/// Standard gravity [m/s2].
+/// Standard gravity (m/s2).
 pub(crate) const GRAVITY: f64 = 9.80665;
 
 /// Friction between tissue and what it lies on (paper section IV-C).
 const SUPPORT_FRICTION: f64 = 0.6;
 
-/// Shear viscosity of tissue over its Young's modulus [s]. Sheared tissue creeps with three times as long a time constant, 18 ms. The paper damps its elements
-/// without saying how much; this lets the organs of all phantoms come to rest within a second and stays far below the second that a lift takes.
+/// Shear viscosity of tissue over its Young's modulus (s). Sheared tissue creeps with three times
+/// as long a time constant, 18 ms. The paper damps its elements without saying how much; this lets
+/// the organs of all phantoms come to rest within a second and stays far below the second that a
+/// lift takes.
 pub const VISCOSITY_TIME: f64 = 0.006;
 
 /// Cell of the supports over the organ's median edge: as fine as the nodes that lie on it.
@@ -150,7 +152,8 @@ impl World {
         Ok(Self { model, state, axes, up, stepper, cuts: 0 })
     }
 
-    /// What tissue did to each tool in the last frame, in the order of the motions that were given; shorter where nothing is felt.
+    /// What tissue did to each tool in the last frame, in the order of the motions that were given;
+    /// shorter where nothing is felt.
     pub fn forces(&self) -> &[ToolForce] {
         self.stepper.forces()
     }
@@ -162,8 +165,9 @@ impl World {
 
     /// All that changes.
     pub(crate) fn save(&self) -> WorldState {
-        let (model, state, axes) = (self.model.clone(), self.state.clone(), self.axes.clone());
-        WorldState { model, state, axes, cuts: self.cuts }
+        // The upward direction never changes, and the stepper follows the model.
+        let Self { model, state, axes, up: _, stepper: _, cuts } = self;
+        WorldState { model: model.clone(), state: state.clone(), axes: axes.clone(), cuts: *cuts }
     }
 
     /// Puts back what [`World::save`] gave. What comes after is the same to the bit.
@@ -185,7 +189,16 @@ impl World {
         Ok(())
     }
 
-    /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and colliders.
+    /// Largest distance that any node has moved since `then`, a state of the same model (m).
+    pub(crate) fn largest_motion_since(&self, then: &State) -> f64 {
+        let bodies = self.model.bodies().iter().enumerate();
+        let nodes = bodies.flat_map(|(k, body)| (0..body.len()).map(move |i| (k, i)));
+        let way = |(k, i)| self.state.position(&self.model, k, i).distance(then.position(&self.model, k, i));
+        nodes.map(way).fold(0.0, f64::max)
+    }
+
+    /// Advances by one [`FRAME`]; `tools` are the motions of the tools that carry grasps and
+    /// colliders.
     pub fn step(&mut self, tools: &[ToolMotion]) -> trocar_tissue::StepReport {
         self.step_under(tools, &[])
     }

@@ -7,9 +7,10 @@ mod common;
 
 use common::{ONE_END, meshed, scene, two_tubes};
 use glam::{DMat3, DQuat, DVec3};
-use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellLift, CellReport, GraspDesign, RandomActions};
-use trocar_core::{Pose, Silent};
+use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellReport, Setpoint};
+use trocar_core::Pose;
 use trocar_robot::wrench::ForceKind;
+use trocar_scene::{Arm, Drive, GraspDesignName, Scene, Side};
 use trocar_specimen::{Pins, Specimen};
 
 const ARMS: [&str; 2] = ["left", "right"];
@@ -23,7 +24,7 @@ fn illegal_actions_are_refused_by_name_and_change_nothing() {
     let mut cell = cell(&meshed(ONE_END, 4e-3));
     cell.advance().unwrap();
     let before = cell.hash();
-    let good = Action::pivots(&ARMS.map(|arm| cell.setpoint(arm).unwrap()));
+    let good = Action::targets(&ARMS.map(|arm| cell.setpoint(arm).unwrap()));
     let mut said = |change: &dyn Fn(&mut Vec<f64>)| {
         let mut action = good.clone();
         change(&mut action.numbers);
@@ -50,33 +51,51 @@ fn illegal_actions_are_refused_by_name_and_change_nothing() {
     cell.step(&tip).unwrap();
 }
 
-/// The start of a lift, up to where tissue is held and a little further: 5 s.
-fn grasping(specimen: &Specimen, threads: usize) -> (Cell, Vec<Action>) {
-    let mut cell = Cell::new(&scene(), specimen, threads).unwrap();
-    let mut policy = trocar_cell::CellLiftPolicy::new(&CellLift::default(), &cell).unwrap();
-    let mut actions = Vec::new();
-    use trocar_cell::Policy;
-    while let Some(action) = policy.act(&cell).unwrap() {
-        cell.step(&action).unwrap();
-        actions.push(action);
-        if policy.phase() == "lift" && cell.observe()[0].tip.translation.z > 0.0 && actions.len() > 10 {
-            break;
-        }
+/// Moves `arm` to a pose of its tip with the jaw at `jaw`, in `periods`, by actions; the actions
+/// that it took.
+fn send(cell: &mut Cell, arm: &str, pose: &Pose, jaw: f64, periods: usize) -> (Vec<Action>, Vec<CellReport>) {
+    let k = cell.arm_index(arm).unwrap();
+    let from: Vec<Setpoint> = cell.observe().iter().map(|a| a.commanded).collect();
+    let to = cell.solve(arm, pose, &from[k]).unwrap().setpoint.with_jaw(jaw);
+    let mut made = (Vec::new(), Vec::new());
+    for n in 1..=periods {
+        let mut all = from.clone();
+        all[k] = from[k].towards(&to, n as f64 / periods as f64);
+        let action = Action::targets(&all);
+        made.1.push(cell.step(&action).unwrap());
+        made.0.push(action);
     }
-    (cell, actions)
+    made
 }
+
+/// Grasps the tube at `at` with `arm` and lifts it by `rise` (m).
+fn grasp_and_lift(cell: &mut Cell, arm: &str, at: DVec3, rise: f64) -> (Vec<Action>, Vec<CellReport>) {
+    let pose = over(cell, arm, at, 0.0);
+    let back = Pose { translation: pose.translation + 0.025 * DVec3::Z, ..pose };
+    let up = Pose { translation: pose.translation + rise * DVec3::Z, ..pose };
+    let mut all = (Vec::new(), Vec::new());
+    for (to, jaw, periods) in [(back, 1.0, 60), (pose, 1.0, 30), (pose, 0.0, 45), (up, 0.0, 45), (up, 0.0, 30)] {
+        let (actions, reports) = send(cell, arm, &to, jaw, periods);
+        all.0.extend(actions);
+        all.1.extend(reports);
+    }
+    all
+}
+
+/// The middle of the tube's free half in the cell (m).
+const HELD: DVec3 = DVec3::new(0.006, 0.46, 0.045);
 
 #[test]
 fn a_restored_state_goes_on_to_the_bit_and_threads_do_not_matter() {
     let specimen = two_tubes(ONE_END, 3e-3);
-    let (mut one, actions) = grasping(&specimen, 1);
+    let mut one = cell(&specimen);
+    let (actions, _) = grasp_and_lift(&mut one, "left", HELD, 0.005);
     assert!(one.held("left").unwrap().is_some(), "something is held when the state is saved");
     // The same actions on two threads.
     let mut two = Cell::new(&scene(), &specimen, 2).unwrap();
     actions.iter().for_each(|a| drop(two.step(a).unwrap()));
     assert_eq!(one.hash(), two.hash());
-    let mut dice = RandomActions::new(5, &ARMS);
-    let later: Vec<Action> = (0..12).map(|_| dice.draw(&one).unwrap()).collect();
+    let later = actions[100..112].to_vec();
     let go = |cell: &mut Cell| -> (Vec<CellReport>, u64) {
         let reports = later.iter().map(|a| cell.step(a).unwrap()).collect();
         (reports, cell.hash())
@@ -91,37 +110,92 @@ fn a_restored_state_goes_on_to_the_bit_and_threads_do_not_matter() {
     // In another cell, too.
     two.restore(&saved).unwrap();
     assert_eq!(go(&mut two), first);
-    let mut new = Cell::new(&scene(), &specimen, 1).unwrap();
+    let mut new = cell(&specimen);
     new.restore(&saved).unwrap();
     assert_eq!(go(&mut new), first);
 }
 
-#[test]
-fn the_left_arm_lifts_the_tube_by_actions() {
-    let specimen = two_tubes(ONE_END, 2.2e-3);
-    for design in [GraspDesign::LivePose, GraspDesign::Compliant] {
-        let mut cell = cell(&specimen);
-        let run = CellLift { design: Some(design), ..CellLift::default() }.run(&mut cell, &Silent).unwrap();
-        let s = &run.summary;
-        println!("{s:?}");
-        assert!(s.held && !s.diverged && s.inverted_peak == 0, "{s:?}");
-        assert!((s.lift_mm - 15.0).abs() < 2.0 && s.snap_mm == 0.0, "{s:?}");
-        assert!(s.rcm_median_mm <= 0.12 && s.rcm_run_max_mm < 3.0, "{s:?}");
-        let arm = &cell.observe()[0];
-        assert!(arm.attached && arm.force.kind == ForceKind::Constraint && arm.constraint.length() > 0.02);
-        assert_eq!(cell.measured_cf("left").unwrap().kind, ForceKind::Constraint);
-        assert_eq!(cell.measured_cf("right").unwrap().kind, ForceKind::Contact);
-        // Jaws that open let go.
-        cell.servo_jaw("left", 1.0).unwrap();
-        let events: Vec<CellEvent> = (0..6).flat_map(|_| cell.advance().unwrap().events).collect();
-        assert!(events.iter().any(|e| matches!(e, CellEvent::Released { .. })), "{events:?}");
-        assert!(!cell.observe()[0].attached && cell.world().state.grasps.is_empty());
+/// The cell with one arm that is ideal, in its port or without one.
+fn ideal(port: bool) -> Scene {
+    let mut scene = scene();
+    scene.arms.truncate(1);
+    match port {
+        true => (scene.arms[0].drive, scene.arms[0].base) = (Drive::Ideal, None),
+        false => scene.arms[0] = Arm::free(Side::Left, "grasper", [0.0, 0.46, 0.12]),
     }
+    scene.instruments.truncate(1);
+    scene.task.name = trocar_scene::TaskName::GraspLift;
+    scene.task.organ = "tube".to_owned();
+    scene
+}
+
+#[test]
+fn every_kind_of_arm_lifts_the_tube_by_actions() {
+    let specimen = two_tubes(ONE_END, 2.2e-3);
+    for (name, mut scene) in [("dynamic", scene()), ("ideal in a port", ideal(true)), ("free", ideal(false))] {
+        for design in [GraspDesignName::LivePose, GraspDesignName::Compliant] {
+            scene.task.grasp = design;
+            let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
+            let (_, reports) = grasp_and_lift(&mut cell, "left", HELD, 0.015);
+            let carried = cell.carried(0).unwrap();
+            let worst = |of: fn(&CellReport) -> f64| reports.iter().map(of).fold(0.0, f64::max);
+            println!("{name}, {design:?}: {carried:?}, rcm {} m", worst(|r| r.arms[0].rcm_peak));
+            assert!((carried.tissue_lift - 0.015).abs() < 0.002 && carried.slip < 0.003, "{name}: {carried:?}");
+            assert!(reports.iter().all(|r| r.tissue.inverted == 0 && r.tissue.divergence.is_none()), "{name}");
+            assert!(worst(|r| r.arms[0].rcm_peak) < if name == "dynamic" { 3e-3 } else { 1e-12 });
+            let step = worst(|r| r.activation_step);
+            assert!(step > 0.0 && step < 1e-3, "{name}: the first frame of the grasp moves {step} m");
+            let snap = reports.iter().flat_map(|r| &r.events).find_map(|e| match e {
+                CellEvent::Attached { snap_mm, .. } => Some(*snap_mm),
+                _ => None,
+            });
+            assert_eq!(snap, Some(0.0), "live-pose capture prescribes nodes where they are");
+            let arm = &cell.observe()[0];
+            assert!(arm.attached && arm.force.kind == ForceKind::Constraint && arm.constraint.length() > 0.02);
+            assert_eq!(cell.measured_cf("left").unwrap().kind, ForceKind::Constraint);
+            assert_eq!(cell.link_poses("left").unwrap().is_empty(), name != "dynamic");
+            // Jaws that open let go.
+            cell.servo_jaw("left", 1.0).unwrap();
+            let events: Vec<CellEvent> = (0..6).flat_map(|_| cell.advance().unwrap().events).collect();
+            assert!(events.iter().any(|e| matches!(e, CellEvent::Released { .. })), "{events:?}");
+            assert!(!cell.observe()[0].attached && cell.world().state.grasps.is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_free_arm_refuses_what_it_cannot_do_and_keeps_the_speed_limits() {
+    let specimen = meshed(ONE_END, 4e-3);
+    let mut cell = Cell::new(&ideal(false), &specimen, 1).unwrap();
+    let hash = cell.hash();
+    let said = |cell: &mut Cell, numbers: [f64; 5]| {
+        let action = Action { space: ActionSpace::Pivots, numbers: numbers.to_vec() };
+        cell.step(&action).unwrap_err().to_string()
+    };
+    assert!(said(&mut cell, [0.0, 0.46, 0.5, 0.0, 1.0]).contains("action[2], left z"));
+    assert!(said(&mut cell, [0.0, 0.46, 0.1, 4.0, 1.0]).contains("left roll"));
+    assert!(cell.measured_js("left").unwrap_err().to_string().contains("ideal"));
+    assert!(cell.servo_jp("left", &[0.0; 7]).unwrap_err().to_string().contains("no joints"));
+    assert_eq!(cell.hash(), hash);
+    // Far targets are approached at the greatest speed, and reached.
+    let to = Setpoint([0.05, 0.46, 0.12, 0.4, 0.0]);
+    let mut places = vec![cell.measured_cp("left").unwrap().translation];
+    for _ in 0..30 {
+        cell.step(&Action::targets(&[to])).unwrap();
+        places.push(cell.measured_cp("left").unwrap().translation);
+    }
+    let most = places.windows(2).map(|p| p[0].distance(p[1])).fold(0.0, f64::max);
+    assert!(most <= trocar_cell::TIP_SPEED * cell.period() + 1e-12, "{most} m a period");
+    assert!(places[30].distance(DVec3::new(0.05, 0.46, 0.12)) < 1e-12, "{}", places[30]);
+    // Steps of the tip work for it, too.
+    let by = Action { space: ActionSpace::Tip, numbers: vec![0.0, 0.002, 0.0, 0.0, 1.0] };
+    cell.step(&by).unwrap();
+    assert!((cell.measured_cp("left").unwrap().translation.y - 0.462).abs() < 1e-12);
 }
 
 /// The tip's pose with `at` [m] in mid-mouth of an arm, jaws across x.
 fn over(cell: &Cell, arm: &str, at: DVec3, beyond: f64) -> Pose {
-    let x = (at - cell.port(arm).unwrap().centre()).normalize();
+    let x = cell.workspace(arm).unwrap().direction_to(at);
     let z = (DVec3::X - DVec3::X.dot(x) * x).normalize();
     let pose = |z: DVec3| {
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
@@ -130,7 +204,7 @@ fn over(cell: &Cell, arm: &str, at: DVec3, beyond: f64) -> Pose {
     let near = cell.setpoint(arm).unwrap();
     let turn = |p: &Pose| {
         let s = cell.solve(arm, p, &near).unwrap();
-        (s.coordinates.roll - near.roll).abs() + 10.0 * s.excess.roll.abs()
+        (s.setpoint.roll() - near.roll()).abs() + 10.0 * s.roll_excess.abs()
     };
     let [one, other] = [pose(z), pose(-z)];
     if turn(&one) <= turn(&other) { one } else { other }
@@ -139,7 +213,7 @@ fn over(cell: &Cell, arm: &str, at: DVec3, beyond: f64) -> Pose {
 /// Goes to a pose in `periods`, starting and stopping gently, and stays for half a second.
 fn go(cell: &mut Cell, arm: &str, pose: &Pose, periods: usize) -> Vec<CellReport> {
     let from = cell.setpoint(arm).unwrap();
-    let start = cell.port(arm).unwrap().tip(&from);
+    let start = cell.workspace(arm).unwrap().tip(&from);
     (1..=periods + 15)
         .map(|k| {
             let t = (k as f64 / periods as f64).min(1.0);
@@ -188,7 +262,8 @@ fn pressing_on_stiff_tissue_neither_swings_nor_drifts_and_the_shaft_comes_back()
 
 #[test]
 fn a_load_aside_leans_the_shaft_in_its_port() {
-    // A tube pinned at its lower half and as stiff as cartilage, pushed aside with the closed blades.
+    // A tube pinned at its lower half and as stiff as cartilage, pushed aside with the closed
+    // blades.
     let mut specimen = two_tubes(Pins::Band { share: 0.42 }, 3e-3);
     specimen.organs[0].material.young_modulus_pa = 1e6;
     let mut cell = cell(&specimen);
@@ -203,7 +278,7 @@ fn a_load_aside_leans_the_shaft_in_its_port() {
     let after = go(&mut cell, "left", &free, 60).pop().unwrap();
     let tip = |r: &CellReport| {
         let arm = &r.arms[0];
-        cell.port("left").unwrap().tip(&arm.commanded).translation.distance(arm.tip.translation) * 1e3
+        cell.workspace("left").unwrap().tip(&arm.commanded).translation.distance(arm.tip.translation) * 1e3
     };
     let rcm = |r: &CellReport| r.arms[0].rcm_deviation * 1e3;
     let load = under.arms[0].contact.length();
@@ -233,7 +308,7 @@ fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
         let across = over(&cell, "right", at, 0.0);
         go(&mut cell, "right", &above, 60);
         go(&mut cell, "right", &across, 60);
-        assert_eq!(cell.in_mouth("right").unwrap(), Some(0));
+        assert_eq!(cell.in_jaws("right").unwrap(), Some(0));
         cell.servo_jaw("right", 0.0).unwrap();
         let mut events = Vec::new();
         for _ in 0..45 {
@@ -245,9 +320,20 @@ fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
             .iter()
             .filter_map(|e| if let CellEvent::Cut { pieces, .. } = e { Some(*pieces) } else { None })
             .collect();
-        println!("sever {sever}: {events:?}, jaw {:.3}", cell.observe()[1].coordinates.jaw);
+        println!("sever {sever}: {events:?}, jaw {:.3}", cell.observe()[1].measured.jaw());
         assert_eq!(pieces, [if sever { 2 } else { 1 }]);
         assert_eq!(cell.world().model.bodies().len(), if sever { 3 } else { 2 });
+        let parted =
+            events.iter().find_map(|e| if let CellEvent::Cut { parted, .. } = e { parted.clone() } else { None });
+        assert_eq!(parted.is_some(), sever);
+        if let Some(cut) = parted {
+            assert_eq!((cut.outcome.as_str(), cut.pieces.len()), ("severed", 2), "{cut:?}");
+            assert!(cut.opened_rad > 0.50 && cut.closed_rad < 0.16 && cut.between_blades_mm3 > 100.0, "{cut:?}");
+            assert!(cut.volume_error < 1e-6 && cut.inverted_after == 0, "{cut:?}");
+            // Its section is a disc of 9 mm, of faces that zigzag.
+            assert!((60.0..160.0).contains(&cut.area_mm2), "{cut:?}");
+            assert_eq!(cut.pieces.iter().map(|p| p.name.as_str()).collect::<Vec<_>>(), ["tube", "tube.1"]);
+        }
         // A state with a cut is restored, and one from before it.
         let saved = cell.save();
         cell.advance().unwrap();

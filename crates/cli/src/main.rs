@@ -29,7 +29,7 @@ fn main() -> ExitCode {
                 // It says what is kept and how to go on.
                 trocar_studies::Error::Work(trocar_workflow::Error::Stopped { .. }) => eprintln!("{error}"),
                 trocar_studies::Error::Interrupted => eprintln!("interrupted; nothing half-written was left behind"),
-                _ => eprintln!("interrupted; and then: {error}"),
+                _ => eprintln!("interrupted; nothing half-written was left behind ({error})"),
             }
             ExitCode::from(INTERRUPTED)
         }

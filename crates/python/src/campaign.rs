@@ -1,6 +1,8 @@
-//! Campaigns in pieces, so that Python may spread their jobs over machines: the plan with its store here, workers anywhere.
+//! Campaigns in pieces, so that Python may spread their jobs over machines: the plan with its store
+//! here, workers anywhere.
 //!
-//! Jobs and results are JSON text and bytes, which any transport carries. Plan, store, table and report are those of `trocar evaluate`.
+//! Jobs and results are JSON text and bytes, which any transport carries. Plan, store, table and
+//! report are those of `trocar evaluate`.
 
 use crate::error::{evaluate, wrong};
 use crate::prepare;
@@ -91,7 +93,8 @@ impl Campaign {
         py.detach(|| self.store()?.put(&job, &Files(files)).map_err(|e| evaluate(&e)))
     }
 
-    /// Films failures unless that takes too long now, makes table and report, and gives `result.json` as text.
+    /// Films failures unless that takes too long now, makes table and report, and gives
+    /// `result.json` as text.
     #[pyo3(signature = (films=true))]
     fn finish(&self, py: Python<'_>, films: bool) -> PyResult<String> {
         py.detach(|| {
@@ -105,7 +108,8 @@ impl Campaign {
     }
 }
 
-/// What tells workers to give up: Python shows its signals to its main thread alone, and a worker that waits for a policy looks at nothing else.
+/// What tells workers to give up: Python shows its signals to its main thread alone, and a worker
+/// that waits for a policy looks at nothing else.
 #[pyclass(frozen, module = "trocar._native")]
 #[derive(Default)]
 pub struct Stop(Arc<AtomicBool>);
@@ -143,7 +147,8 @@ fn go_on(stop: &AtomicBool) -> PyResult<()> {
 
 #[pymethods]
 impl Worker {
-    /// Builds the cell of `scene`; it must be what `plan` is of. `stop` ends what it does; `python` serves `python:` policies, unless `$TROCAR_PYTHON` names another interpreter.
+    /// Builds the cell of `scene`; it must be what `plan` is of. `stop` ends what it does; `python`
+    /// serves `python:` policies, unless `$TROCAR_PYTHON` names another interpreter.
     #[new]
     #[pyo3(signature = (scene, phantoms, plan, *, stop=None, python=None))]
     fn new(

@@ -11,11 +11,12 @@ use std::path::PathBuf;
 use trocar_cell::{Action, ActionSpace};
 use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
 
-/// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it goes on), time [s].
+/// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it
+/// goes on), time (s).
 const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 
 /// Names of the ends, by their number in `figures`.
-const ENDS: [&str; 5] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error"];
+const ENDS: [&str; 6] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error", "finished"];
 
 /// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
 #[pyclass(frozen, module = "trocar._native")]
@@ -31,7 +32,8 @@ pub struct Cells {
     task_name: &'static str,
     prompt: String,
     steps: usize,
-    /// The process that made them. The pool's threads do not live on in a child made by `fork`, and work given to them there would wait for ever.
+    /// The process that made them. The pool's threads do not live on in a child made by `fork`, and
+    /// work given to them there would wait for ever.
     process: u32,
 }
 
@@ -70,7 +72,8 @@ impl Place<'_> {
         }
     }
 
-    /// The reward is the gain in stages, parts of stages included: a task passed gives as much as it has stages in all.
+    /// The reward is the gain in stages, parts of stages included: a task passed gives as much as
+    /// it has stages in all.
     fn step(&mut self, action: &Action) -> Result<(), trocar_task::Error> {
         if self.episode.end().is_some() {
             return Err(trocar_task::Error::Ended(self.episode.end().map_or_else(String::new, End::to_string)));
@@ -85,7 +88,8 @@ impl Place<'_> {
 
 #[pymethods]
 impl Cells {
-    /// `count` episodes of `scene` on `threads` threads (0: as many as the machine has; results do not depend on them).
+    /// `count` episodes of `scene` on `threads` threads (0: as many as the machine has; results do
+    /// not depend on them).
     #[new]
     #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false))]
     fn new(
@@ -192,7 +196,8 @@ impl Cells {
         Stage::of(self.episodes[0].scene().task.name).iter().map(|s| s.name()).collect()
     }
 
-    /// Writes what `cameras` see of the cells that `active` says: `color` has an array (cells, height, width, 3) of bytes a camera, `depth` one (cells, height, width, 1) of z [m], 0 where
+    /// Writes what `cameras` see of the cells that `active` says: `color` has an array (cells,
+    /// height, width, 3) of bytes a camera, `depth` one (cells, height, width, 1) of z (m), 0 where
     /// nothing is; either list may be empty. Cells go in parallel, without the interpreter's lock.
     fn see(
         &mut self,
@@ -203,7 +208,8 @@ impl Cells {
         color: Vec<Bound<'_, PyArrayDyn<u8>>>,
         depth: Vec<Bound<'_, PyArrayDyn<f32>>>,
     ) -> PyResult<()> {
-        self.look(py, &cameras, &size, &active, &color, &depth)
+        self.here()?;
+        self.eyes.look(py, (&self.episodes, &self.pool), &cameras, &size, &active, &color, &depth)
     }
 
     /// A picture (height, width, 3) of cell `k` through `camera`.
@@ -215,7 +221,8 @@ impl Cells {
         height: usize,
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        self.photograph(py, k, camera, height, width)
+        self.at(k)?;
+        self.eyes.photograph(py, (&self.episodes[k], &self.pool), k, camera, height, width)
     }
 
     /// Least and greatest numbers of an action.
@@ -249,7 +256,8 @@ impl Cells {
         self.each(py, &arrays, &wanted, begin)
     }
 
-    /// Does one control period in every cell that `active` says, by its row of `actions`. An action that is not finite is refused before anything changes.
+    /// Does one control period in every cell that `active` says, by its row of `actions`. An action
+    /// that is not finite is refused before anything changes.
     fn step(
         &mut self,
         py: Python<'_>,
@@ -302,7 +310,8 @@ impl Cells {
         Ok(State(self.at(k)?.save()))
     }
 
-    /// Puts `saved` into cell `k`, and writes what is seen there. A state of something else is refused before anything changes.
+    /// Puts `saved` into cell `k`, and writes what is seen there. A state of something else is
+    /// refused before anything changes.
     fn restore(&mut self, py: Python<'_>, k: usize, saved: &State, arrays: Arrays<'_>) -> PyResult<()> {
         self.at(k)?;
         self.eyes.moved(k, self.episodes[k].scene());
@@ -315,7 +324,8 @@ impl Cells {
     }
 }
 
-/// `count` episodes, as many at a time as the pool has threads. In between the interpreter's signals are looked at: many cells take minutes.
+/// `count` episodes, as many at a time as the pool has threads. In between the interpreter's
+/// signals are looked at: many cells take minutes.
 fn built(
     pool: &rayon::ThreadPool,
     count: usize,
@@ -345,7 +355,8 @@ impl Cells {
         self.episodes.get(k).ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))
     }
 
-    /// Does `work` in every cell, with what `with` has for it, in parallel and without the interpreter's lock. The first error in the order of the cells is told.
+    /// Does `work` in every cell, with what `with` has for it, in parallel and without the
+    /// interpreter's lock. The first error in the order of the cells is told.
     fn each<T: Sync>(
         &mut self,
         py: Python<'_>,

@@ -1,6 +1,8 @@
-//! The native module of the Python package `trocar`: many cells in one process, stepped in parallel without the interpreter's lock.
+//! The native module of the Python package `trocar`: many cells in one process, stepped in parallel
+//! without the interpreter's lock.
 //!
-//! It knows no Gymnasium and no dataset; `python/trocar` makes environments of it. Arrays are the caller's and are written in place.
+//! It knows no Gymnasium and no dataset; `python/trocar` makes environments of it. Arrays are the
+//! caller's and are written in place.
 
 #![allow(clippy::needless_pass_by_value, reason = "what Python hands over arrives by value")]
 #![allow(clippy::too_many_arguments, reason = "Python's arguments have names")]

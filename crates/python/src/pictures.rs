@@ -1,6 +1,6 @@
-//! What the cameras see of the cells: colour and depth written into the caller's arrays, all cells at once.
+//! What the cameras see of the cells: colour and depth written into the caller's arrays, all cells
+//! at once.
 
-use crate::cells::Cells;
 use crate::error::wrong;
 use crate::frames::Rows;
 use crate::prepare;
@@ -39,7 +39,8 @@ impl Eyes {
         Self { sights: (0..count).map(|_| None).collect(), specimen, noise }
     }
 
-    /// The specimen of cell `k` may be elsewhere now: where a scene varies that, the field under it is made anew.
+    /// The specimen of cell `k` may be elsewhere now: where a scene varies that, the field under it
+    /// is made anew.
     pub fn moved(&mut self, k: usize, scene: &Scene) {
         let v = &scene.task.variation;
         if v.specimen_shift_mm != 0.0 || v.specimen_turn_deg != 0.0 {
@@ -72,7 +73,8 @@ fn awake<'a>(
     Ok(sight)
 }
 
-/// A camera as Python is told of it: name, height and width [px] of what policies see, whether it measures depth.
+/// A camera as Python is told of it: name, height and width (px) of what policies see, whether it
+/// measures depth.
 pub type Described = (String, usize, usize, bool);
 
 /// The cameras of a scene, before anything is built of it.
@@ -85,19 +87,19 @@ pub fn cameras(scene: &str) -> PyResult<Vec<Described>> {
     Ok(prepare::scene(scene, None, None)?.cameras.iter().map(row).collect())
 }
 
-impl Cells {
+impl Eyes {
     /// See `Cells.see`.
     pub fn look(
         &mut self,
         py: Python<'_>,
+        (episodes, pool): (&[Episode], &rayon::ThreadPool),
         cameras: &[String],
         size: &[(usize, usize)],
         active: &PyReadonlyArray1<'_, bool>,
         color: &[Bound<'_, PyArrayDyn<u8>>],
         depth: &[Bound<'_, PyArrayDyn<f32>>],
     ) -> PyResult<()> {
-        self.here()?;
-        let count = self.episodes.len();
+        let count = episodes.len();
         let active = active.as_slice().map_err(wrong)?;
         let fits = |n: usize| n == 0 || n == cameras.len();
         if active.len() != count || size.len() != cameras.len() || !fits(color.len()) || !fits(depth.len()) {
@@ -110,12 +112,11 @@ impl Cells {
         let mut depth = rows(depth, "depth", count, size, 1)?;
         let mut colors = by_cell(&mut color, count)?;
         let mut depths = by_cell(&mut depth, count)?;
-        let Self { episodes, eyes, pool, .. } = self;
-        let (specimen, noise) = (&eyes.specimen, eyes.noise);
-        let mut looks: Vec<Look<'_>> = eyes
+        let (specimen, noise) = (&self.specimen, self.noise);
+        let mut looks: Vec<Look<'_>> = self
             .sights
             .iter_mut()
-            .zip(&*episodes)
+            .zip(episodes)
             .zip(colors.drain(..).zip(depths.drain(..)))
             .zip(active)
             .filter(|(_, active)| **active)
@@ -143,15 +144,13 @@ impl Cells {
     pub fn photograph<'py>(
         &mut self,
         py: Python<'py>,
+        (episode, pool): (&Episode, &rayon::ThreadPool),
         k: usize,
         camera: &str,
         height: usize,
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        self.at(k)?;
-        let Self { episodes, eyes, pool, .. } = self;
-        let (episode, sight) = (&episodes[k], &mut eyes.sights[k]);
-        let (specimen, noise) = (&eyes.specimen, eyes.noise);
+        let (specimen, noise, sight) = (&self.specimen, self.noise, &mut self.sights[k]);
         let pixels = py.detach(|| {
             pool.install(|| {
                 let sight = awake(sight, episode, specimen, noise)?;

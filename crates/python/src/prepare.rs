@@ -1,4 +1,5 @@
-//! From the name of a scene to an episode: the scene with what the caller changes, its specimen from disk or made once and kept.
+//! From the name of a scene to an episode: the scene with what the caller changes, its specimen
+//! from disk or made once and kept.
 
 use crate::error::{evaluate, wrong};
 use crate::progress::Signals;
@@ -39,7 +40,8 @@ pub fn phantoms_folder() -> PathBuf {
     trocar_phantom::phantoms_folder()
 }
 
-/// The specimen of `scene`; a phantom's is made in the folder `phantoms` the first time, which takes seconds.
+/// The specimen of `scene`; a phantom's is made in the folder `phantoms` the first time, which
+/// takes seconds.
 pub fn specimen(scene: &Scene, phantoms: &Path) -> PyResult<Specimen> {
     scene_specimen(scene, phantoms, &Signals::new()).map_err(|e| evaluate(&e))
 }

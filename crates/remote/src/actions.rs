@@ -1,13 +1,13 @@
-//! Chunks of actions and how they are taken out of a reply.
+//! Chunks of actions and how a reply is read.
 
 use crate::array::{Array, Dtype, shape_text};
 use crate::error::{Error, Result};
 use crate::value::Value;
 
-/// The reply's field with the actions.
+/// The field of a reply that holds the actions.
 const FIELD: &str = "actions";
 
-/// A chunk: actions one after the other, each a row of finite numbers in the policy's own units.
+/// A chunk of actions: rows of finite numbers, in the units of the policy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Actions {
     dim: usize,
@@ -15,11 +15,11 @@ pub struct Actions {
 }
 
 impl Actions {
-    /// A chunk of rows of `dim` numbers.
+    /// A chunk of rows of `dim` numbers; `values` is row-major.
     ///
     /// # Errors
-    /// [`Error::EmptyChunk`] without numbers, [`Error::WrongDimension`] where `dim` does not divide their count,
-    /// [`Error::NotFinite`].
+    /// [`Error::EmptyChunk`] without numbers, [`Error::WrongDimension`] if `dim` does not divide
+    /// their count, [`Error::NotFinite`].
     pub fn new(dim: usize, values: Vec<f64>) -> Result<Self> {
         let at = String::new;
         if dim == 0 || values.is_empty() {
@@ -39,28 +39,28 @@ impl Actions {
         self.values.len() / self.dim
     }
 
-    /// Components of an action, at least one.
+    /// Number of components of an action, at least one.
     pub fn dim(&self) -> usize {
         self.dim
     }
 
-    /// Action `step`, counted from 0; none beyond the chunk.
+    /// Action `step`, from 0; `None` beyond the chunk.
     pub fn step(&self, step: usize) -> Option<&[f64]> {
         self.values.chunks_exact(self.dim).nth(step)
     }
 
-    /// All numbers, action by action.
+    /// All numbers, row-major.
     pub fn values(&self) -> &[f64] {
         &self.values
     }
 }
 
-/// Which chunks are taken.
+/// Limits of accepted chunks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ActionLimits {
-    /// Components that an action must have; any number where there is none.
+    /// Number of components that an action must have; `None` accepts any.
     pub dim: Option<usize>,
-    /// Most actions of a chunk. Those of openpi's models have 8 to 50.
+    /// Maximum number of actions in a chunk. Chunks of openpi's models have 8 to 50.
     pub max_horizon: usize,
 }
 
@@ -71,39 +71,41 @@ impl Default for ActionLimits {
 }
 
 impl ActionLimits {
-    /// The actions of a reply: its field `actions`, or the reply itself where it is an array, as with older RoboArena servers.
+    /// Reads the actions of a reply: its field `actions`, or the reply itself if it is an array, as
+    /// older RoboArena servers send.
     ///
     /// # Errors
-    /// [`Error::WrongField`] where it is missing or no table, [`Error::WrongDtype`], [`Error::WrongDimension`],
-    /// [`Error::EmptyChunk`], [`Error::LongChunk`], [`Error::NotFinite`].
+    /// [`Error::WrongField`] if it is missing or not two-dimensional, [`Error::WrongDtype`],
+    /// [`Error::WrongDimension`], [`Error::EmptyChunk`], [`Error::LongChunk`],
+    /// [`Error::NotFinite`].
     pub fn take(&self, reply: &Value) -> Result<Actions> {
         let wrong = |reason: String| Err(Error::WrongField { at: String::new(), reason });
         match reply {
             Value::Array(array) => self.check(array),
             Value::Map(map) => match map.get(FIELD) {
                 Some(Value::Array(array)) => self.check(array),
-                Some(other) => wrong(format!("must be an array, is {}", other.kind())),
+                Some(other) => wrong(format!("must be an array, not {}", other.kind())),
                 None => {
                     let there: Vec<&str> = map.keys().take(8).map(String::as_str).collect();
                     return wrong(format!(
-                        "no field '{FIELD}'; there are: {}",
+                        "there is no field '{FIELD}'; the fields are: {}",
                         crate::error::one_line(&there.join(", "))
                     ));
                 }
             }
             .map_err(|e| e.within(FIELD)),
-            other => wrong(format!("must be a map with the field '{FIELD}', is {}", other.kind())),
+            other => wrong(format!("must be a map with the field '{FIELD}', not {}", other.kind())),
         }
     }
 
     fn check(&self, array: &Array) -> Result<Actions> {
         let at = String::new;
         if array.dtype() == Dtype::Bool {
-            let wanted = "numbers are wanted";
+            let wanted = "must be of numbers";
             return Err(Error::WrongDtype { at: at(), dtype: array.dtype().name().into(), wanted });
         }
         let &[horizon, dim] = array.shape() else {
-            let reason = format!("must have the shape [horizon, components], has {}", shape_text(array.shape()));
+            let reason = format!("must have the shape [horizon, components], not {}", shape_text(array.shape()));
             return Err(Error::WrongField { at: at(), reason });
         };
         if horizon == 0 || dim == 0 {

@@ -1,27 +1,27 @@
-//! NumPy arrays as they go over the wire: a type of elements, a shape, bytes in C order.
+//! NumPy arrays in messages: a type of elements, a shape, bytes in C order.
 
 use crate::error::{Error, Result, one_line};
 
-/// Types of elements. Objects, records, complex numbers, text and times are not taken.
+/// Types of elements. Objects, records, complex numbers, text and times are refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Dtype {
-    /// Truth values, a byte each.
+    /// Booleans, a byte each.
     Bool,
-    /// Whole numbers of 8 bits.
+    /// Signed 8-bit integers.
     I8,
-    /// Whole numbers of 8 bits from 0 on: pictures.
+    /// Unsigned 8-bit integers: pictures.
     U8,
-    /// Whole numbers of 16 bits.
+    /// Signed 16-bit integers.
     I16,
-    /// Whole numbers of 16 bits from 0 on: depth in millimetres.
+    /// Unsigned 16-bit integers: depth (mm).
     U16,
-    /// Whole numbers of 32 bits.
+    /// Signed 32-bit integers.
     I32,
-    /// Whole numbers of 32 bits from 0 on.
+    /// Unsigned 32-bit integers.
     U32,
-    /// Whole numbers of 64 bits.
+    /// Signed 64-bit integers.
     I64,
-    /// Whole numbers of 64 bits from 0 on.
+    /// Unsigned 64-bit integers.
     U64,
     /// Half precision.
     F16,
@@ -31,7 +31,7 @@ pub enum Dtype {
     F64,
 }
 
-/// All types with NumPy's names and their sizes [bytes].
+/// All types with NumPy's names and sizes (bytes).
 const TYPES: [(Dtype, &str, usize); 12] = [
     (Dtype::Bool, "|b1", 1),
     (Dtype::I8, "|i1", 1),
@@ -48,12 +48,12 @@ const TYPES: [(Dtype, &str, usize); 12] = [
 ];
 
 impl Dtype {
-    /// NumPy's name of it, little-endian: `<f4`.
+    /// NumPy's name, little-endian: `<f4`.
     pub fn name(self) -> &'static str {
         TYPES.iter().find(|t| t.0 == self).map_or("", |t| t.1)
     }
 
-    /// Size of an element [bytes].
+    /// Size of an element (bytes).
     pub fn size(self) -> usize {
         TYPES.iter().find(|t| t.0 == self).map_or(1, |t| t.2)
     }
@@ -68,7 +68,7 @@ impl Dtype {
     }
 }
 
-/// An array: elements of one type, little-endian, the last index running fastest.
+/// An array of elements of one type, little-endian, in C order (the last index is the fastest).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Array {
     dtype: Dtype,
@@ -77,10 +77,10 @@ pub struct Array {
 }
 
 impl Array {
-    /// An array of `bytes`, which are little-endian elements in C order.
+    /// An array of little-endian elements in C order.
     ///
     /// # Errors
-    /// [`Error::WrongShape`] where shape and bytes do not belong together.
+    /// [`Error::WrongShape`] if the number of bytes does not fit the shape.
     pub fn new(dtype: Dtype, shape: &[usize], bytes: Vec<u8>) -> Result<Self> {
         let needed = shape.iter().try_fold(dtype.size(), |n, s| n.checked_mul(*s));
         if needed != Some(bytes.len()) {
@@ -88,14 +88,14 @@ impl Array {
                 at: String::new(),
                 shape: shape_text(shape),
                 dtype: dtype.name(),
-                needed: needed.map_or_else(|| "uncountable".to_owned(), |n| n.to_string()),
+                needed: needed.map_or_else(|| "more than 2^64".to_owned(), |n| n.to_string()),
                 bytes: bytes.len(),
             });
         }
         Ok(Self { dtype, shape: shape.to_vec(), bytes })
     }
 
-    /// An array of bytes, such as a picture of shape [height, width, 3].
+    /// An array of unsigned bytes, such as a picture of shape (height, width, 3).
     ///
     /// # Errors
     /// As [`Array::new`].
@@ -124,7 +124,7 @@ impl Array {
         self.dtype
     }
 
-    /// Length along each index; empty for a single number.
+    /// Length along each axis; empty for a single number.
     pub fn shape(&self) -> &[usize] {
         &self.shape
     }
@@ -134,7 +134,7 @@ impl Array {
         &self.bytes
     }
 
-    /// The elements as numbers; whole numbers beyond 2^53 are rounded, truth values are 0 and 1.
+    /// The elements as `f64`. Integers beyond 2^53 are rounded; booleans are 0 and 1.
     pub fn to_f64(&self) -> Vec<f64> {
         let bytes = &self.bytes;
         match self.dtype {
@@ -154,7 +154,7 @@ impl Array {
     }
 }
 
-/// IEEE 754's half precision, exactly.
+/// The exact value of an IEEE 754 half-precision number.
 fn half(bits: u16) -> f64 {
     let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
     let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023));
@@ -166,7 +166,7 @@ fn half(bits: u16) -> f64 {
     }
 }
 
-/// A shape for messages.
+/// A shape in error messages.
 pub(crate) fn shape_text(shape: &[usize]) -> String {
     one_line(&format!("{shape:?}"))
 }

@@ -1,4 +1,4 @@
-//! Where a policy is served and how long it is waited for.
+//! The address of a policy server, with time limits.
 
 use crate::actions::ActionLimits;
 use crate::error::{Error, Result, one_line};
@@ -7,10 +7,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tungstenite::http::{HeaderValue, Uri};
 
-/// What the server understands.
+/// The protocol of a server.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Dialect {
-    /// RoboArena's where the metadata have its fields, openpi's otherwise.
+    /// RoboArena's if the metadata have its fields, openpi's otherwise.
     #[default]
     Auto,
     /// openpi's: every message is an observation, and there is no reset.
@@ -19,12 +19,13 @@ pub enum Dialect {
     RoboArena,
 }
 
-/// Longest waits. Each is for the whole, so that a server that sends a byte now and then does not prolong it.
+/// Maximum durations. Each limits the whole operation: a server that sends a byte now and then does
+/// not extend it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Timeouts {
-    /// For an attempt to connect, until the metadata are there.
+    /// Of an attempt to connect, until the metadata have arrived.
     pub connect: Duration,
-    /// For a reply. The first one takes long where a model is compiled then.
+    /// Of a reply. The first one takes long if the server compiles its model then.
     pub infer: Duration,
 }
 
@@ -34,42 +35,45 @@ impl Default for Timeouts {
     }
 }
 
-/// How often it is tried to connect. Only servers that cannot be reached or are busy (502, 503, 504) are tried again.
+/// Attempts to connect. They are repeated only for servers that cannot be reached or are busy (502,
+/// 503, 504).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Retry {
-    /// Attempts in all, at least 1.
+    /// Number of attempts, at least 1.
     pub attempts: u32,
-    /// Wait after the first attempt; it doubles from one to the next.
-    pub first: Duration,
-    /// Longest wait.
-    pub most: Duration,
+    /// Pause after the first attempt. It doubles with every attempt.
+    pub first_pause: Duration,
+    /// Maximum pause.
+    pub max_pause: Duration,
 }
 
 impl Default for Retry {
     fn default() -> Self {
-        Self { attempts: 5, first: Duration::from_millis(200), most: Duration::from_secs(5) }
+        Self { attempts: 5, first_pause: Duration::from_millis(200), max_pause: Duration::from_secs(5) }
     }
 }
 
 /// A policy server.
 #[derive(Clone)]
 pub struct Endpoint {
-    /// `ws://host:port/path`; without a scheme it is `ws://`. `wss://` needs the feature `rustls`.
+    /// `ws://host:port/path`. Without a scheme it is `ws://`. `wss://` needs the feature `rustls`.
     pub url: String,
-    /// Sent as `Authorization: Api-Key ...`; readable by others on the way unless the address is `wss://`.
+    /// Sent as `Authorization: Api-Key ...`. Only `wss://` encrypts it.
     pub api_key: Option<String>,
-    /// Longest waits.
+    /// Maximum durations.
     pub timeouts: Timeouts,
-    /// How often it is tried to connect.
+    /// Attempts to connect.
     pub retry: Retry,
-    /// Largest message taken [bytes].
+    /// Maximum size of a message (bytes).
     pub max_message: usize,
-    /// Which chunks of actions are taken.
+    /// Limits of accepted chunks.
     pub actions: ActionLimits,
-    /// What the server understands.
+    /// The protocol of the server.
     pub dialect: Dialect,
-    /// When this becomes true, every wait ends with [`Error::Interrupted`].
+    /// When it becomes true, every wait ends with [`Error::Interrupted`].
     pub interrupt: Option<Arc<AtomicBool>>,
+    /// The server's name in error messages instead of its address, which may be a random port.
+    pub label: Option<String>,
 }
 
 impl std::fmt::Debug for Endpoint {
@@ -81,7 +85,8 @@ impl std::fmt::Debug for Endpoint {
 }
 
 impl Endpoint {
-    /// The server at `url` with the usual limits: 16 MiB a message, 10 s to connect, 60 s for a reply.
+    /// The server at `url` with the default limits: 16 MiB a message, 10 s to connect, 60 s for a
+    /// reply.
     pub fn new(url: impl Into<String>) -> Self {
         Self {
             url: url.into(),
@@ -92,11 +97,15 @@ impl Endpoint {
             actions: ActionLimits::default(),
             dialect: Dialect::default(),
             interrupt: None,
+            label: None,
         }
     }
 
-    /// The address for messages: without names and passwords.
+    /// The server in error messages: its label, or its address without names and passwords.
     pub(crate) fn shown(&self) -> String {
+        if let Some(label) = &self.label {
+            return one_line(label);
+        }
         let url = self.full();
         let (scheme, rest) = url.split_once("://").unwrap_or(("ws", &url));
         let rest = rest.split(['?', '#']).next().unwrap_or("");
@@ -110,30 +119,30 @@ impl Endpoint {
         if url.contains("://") { url.to_owned() } else { format!("ws://{url}") }
     }
 
-    /// Whether it was asked to stop.
+    /// Whether the interruption flag is set.
     pub(crate) fn interrupted(&self) -> bool {
         self.interrupt.as_ref().is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// Whether it can be connected to as it is written: address, key, waits, and what this build can do. Nothing is sent.
+    /// Checks address, key, timeouts and the features of this build. Sends nothing.
     ///
     /// # Errors
-    /// [`Error::Endpoint`] with what would be right; no password, query or key stands in it.
+    /// [`Error::Endpoint`] with the remedy. It contains no password, query or key.
     pub fn check(&self) -> Result<()> {
         self.parts().map(|_| ())
     }
 
-    /// The address and the header of the key.
+    /// The address and the header with the key.
     pub(crate) fn parts(&self) -> Result<(Uri, Option<HeaderValue>)> {
         let wrong = |field, reason: String| Err(Error::Endpoint { field, reason });
         let full = self.full();
         let place = full.split_once("://").map_or("", |(_, place)| place);
         if place.is_empty() || place.starts_with(['/', '?', '#', ':']) {
-            return wrong("url", format!("'{}' has no host; such as ws://127.0.0.1:8000", self.shown()));
+            return wrong("url", format!("'{}' has no host; it must be such as ws://127.0.0.1:8000", self.shown()));
         }
         let uri: Uri = match full.parse() {
             Ok(uri) => uri,
-            Err(e) => return wrong("url", format!("'{}': {e}; such as ws://127.0.0.1:8000", self.shown())),
+            Err(e) => return wrong("url", format!("'{}': {e}; it must be such as ws://127.0.0.1:8000", self.shown())),
         };
         match uri.scheme_str() {
             Some("ws") => {}
@@ -147,13 +156,13 @@ impl Endpoint {
         let authority = uri.authority().map_or("", |a| a.as_str());
         let port = authority.rsplit('@').next().unwrap_or("").strip_prefix(uri.host().unwrap_or("")).unwrap_or("");
         if !port.is_empty() && uri.port_u16().is_none_or(|p| p == 0) {
-            return wrong("url", format!("'{}' has a port that is not from 1 to 65535", self.shown()));
+            return wrong("url", format!("'{}': the port must be in [1, 65535]", self.shown()));
         }
         if self.timeouts.connect.is_zero() || self.timeouts.infer.is_zero() {
             return wrong("timeouts", "must be longer than 0 s".into());
         }
         if self.retry.attempts == 0 {
-            return wrong("retry", "at least 1 attempt is needed".into());
+            return wrong("retry", "attempts must be at least 1".into());
         }
         let key = match &self.api_key {
             None => None,
@@ -162,7 +171,7 @@ impl Endpoint {
                     value.set_sensitive(true);
                     Some(value)
                 }
-                // The key itself stays out of messages.
+                // The message must not contain the key.
                 Err(_) => return wrong("api_key", "must be one line of printable characters".into()),
             },
         };

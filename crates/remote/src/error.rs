@@ -1,44 +1,45 @@
-//! What can go wrong with a remote policy.
+//! Errors of remote policies.
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Longest piece of foreign text in a message [characters].
-const LONGEST: usize = 300;
+/// Maximum length of foreign text in a message (characters).
+const MAX_FOREIGN_TEXT: usize = 300;
 
-/// A policy that cannot be reached, or a server that does not keep to the protocol. Every message is one line.
+/// A policy that cannot be reached, or a server that breaks the protocol. Every message is one
+/// line.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
-    /// The endpoint cannot be used as it is written.
+    /// The endpoint is invalid.
     #[error("endpoint {field}: {reason}")]
     Endpoint {
-        /// What of it: `url`, `api_key`, ...
+        /// The field: `url`, `api_key`, ...
         field: &'static str,
-        /// What is wrong and what would be right.
+        /// What is wrong and the remedy.
         reason: String,
     },
-    /// No connection, after all attempts.
+    /// All attempts to connect failed.
     #[error("{url}: cannot connect: {reason}; is the policy server running?")]
     CannotConnect {
         /// The server.
         url: String,
-        /// What the system said.
+        /// The error of the system.
         reason: String,
     },
-    /// The server wants another API key.
+    /// The server refused the API key.
     #[error("{url}: the server refused the API key ({reason})")]
     KeyRefused {
         /// The server.
         url: String,
-        /// What it said, and whether a key was sent.
+        /// Its answer, and whether a key was sent.
         reason: String,
     },
-    /// What answers is no policy server.
-    #[error("{url}: no WebSocket there: {reason}")]
+    /// The server does not speak WebSocket.
+    #[error("{url}: not a WebSocket server: {reason}")]
     Handshake {
         /// The server.
         url: String,
-        /// What came instead.
+        /// What it sent instead.
         reason: String,
     },
     /// Encryption failed.
@@ -49,28 +50,28 @@ pub enum Error {
         /// What is wrong.
         reason: String,
     },
-    /// Nothing whole came by the deadline.
+    /// The deadline passed.
     #[error("{url}: timed out after {seconds} s waiting for {what}")]
     TimedOut {
         /// The server.
         url: String,
-        /// What was waited for.
+        /// What the client waited for.
         what: &'static str,
-        /// The time allowed [s].
+        /// The allowed duration (s).
         seconds: f64,
     },
     /// The server closed the connection.
-    #[error("{url}: the server closed the connection while {what} was awaited ({reason})")]
+    #[error("{url}: the server closed the connection while the client waited for {what} ({reason})")]
     Closed {
         /// The server.
         url: String,
-        /// What was waited for.
+        /// What the client waited for.
         what: &'static str,
-        /// The close code and what the server or the system said.
+        /// The close code and the message of the server or the system.
         reason: String,
     },
-    /// An earlier error ended the connection; a request is never sent twice.
-    #[error("{url}: not connected since an earlier error: {reason}; reset or reconnect")]
+    /// An earlier error ended the connection. A request is never sent twice.
+    #[error("{url}: not connected because of an earlier error: {reason}; reset or reconnect")]
     NotConnected {
         /// The server.
         url: String,
@@ -78,44 +79,44 @@ pub enum Error {
         reason: String,
     },
     /// The policy raised an exception.
-    #[error("{url}: the policy failed: {last}")]
+    #[error("{url}: {last}")]
     Server {
         /// The server.
         url: String,
-        /// The last line of the traceback, and where that was raised.
+        /// The last line of the traceback, and the place of its origin.
         last: String,
-        /// All that the server sent, at most 64 KiB.
+        /// The whole text of the server, at most 64 KiB.
         traceback: String,
     },
-    /// A message, or what its header claims, is above the limit.
-    #[error("{url}: a message of {size} bytes, {limit} allowed")]
+    /// A message, or the size in its header, exceeds the limit.
+    #[error("{url}: a message has {size} bytes; the maximum is {limit}")]
     TooLarge {
         /// The server.
         url: String,
-        /// Its size [bytes].
+        /// Its size (bytes).
         size: usize,
-        /// The limit [bytes].
+        /// The limit (bytes).
         limit: usize,
     },
-    /// The server does not keep to WebSocket, or speaks out of turn.
-    #[error("{url}: broken protocol: {reason}")]
+    /// The server breaks the WebSocket protocol, or sends a message without a request.
+    #[error("{url}: protocol error: {reason}")]
     Protocol {
         /// The server.
         url: String,
         /// What it did.
         reason: String,
     },
-    /// Bytes that are no MessagePack of this protocol.
+    /// Bytes that are not MessagePack of this protocol.
     #[error("{at}: malformed message at byte {byte}: {reason}")]
     Malformed {
         /// Message and field.
         at: String,
-        /// Where.
+        /// Offset of the byte.
         byte: usize,
-        /// What is wrong and what would be right.
+        /// What is wrong and the remedy.
         reason: String,
     },
-    /// Lists or maps within each other beyond the limit.
+    /// Lists or maps nested beyond the limit.
     #[error("{at}: nested deeper than {limit} levels")]
     TooDeep {
         /// Message and field.
@@ -123,7 +124,7 @@ pub enum Error {
         /// The limit.
         limit: usize,
     },
-    /// More values than any reply needs.
+    /// More values than a reply needs.
     #[error("{at}: more than {limit} values outside arrays")]
     TooMany {
         /// Message and field.
@@ -131,18 +132,18 @@ pub enum Error {
         /// The limit.
         limit: usize,
     },
-    /// An array of another type of elements than is allowed there.
-    #[error("{at}: an array of type '{dtype}'; {wanted}")]
+    /// An array of a type of elements that is not allowed.
+    #[error("{at}: an array has type '{dtype}'; it {wanted}")]
     WrongDtype {
         /// Message and field.
         at: String,
         /// NumPy's name of the type.
         dtype: String,
-        /// What would be right.
+        /// The allowed types.
         wanted: &'static str,
     },
-    /// An array whose shape and bytes do not belong together.
-    #[error("{at}: shape {shape} of {dtype} needs {needed} bytes, there are {bytes}")]
+    /// An array whose bytes do not fit its shape.
+    #[error("{at}: shape {shape} of {dtype} needs {needed} bytes; there are {bytes}")]
     WrongShape {
         /// Message and field.
         at: String,
@@ -150,31 +151,31 @@ pub enum Error {
         shape: String,
         /// NumPy's name of the type.
         dtype: &'static str,
-        /// The bytes needed, in words where they cannot be counted.
+        /// The number of bytes that the shape needs, in words.
         needed: String,
-        /// The bytes there are.
+        /// The number of bytes in the message.
         bytes: usize,
     },
-    /// A field that must be there is not, or is something else.
+    /// A field is missing or of another kind.
     #[error("{at}: {reason}")]
     WrongField {
         /// Message and field.
         at: String,
-        /// What is wrong and what would be right.
+        /// What is wrong and the remedy.
         reason: String,
     },
-    /// An action with another number of components.
-    #[error("{at}: actions of {found} components, {expected} wanted")]
+    /// Actions with another number of components.
+    #[error("{at}: actions have {found} components; {expected} are needed")]
     WrongDimension {
         /// Message and field.
         at: String,
-        /// Components found.
+        /// Components of the actions.
         found: usize,
-        /// Components wanted.
+        /// Components needed.
         expected: usize,
     },
     /// A chunk without actions.
-    #[error("{at}: an empty chunk of actions (shape {shape})")]
+    #[error("{at}: the chunk of actions is empty (shape {shape})")]
     EmptyChunk {
         /// Message and field.
         at: String,
@@ -182,25 +183,25 @@ pub enum Error {
         shape: String,
     },
     /// A chunk with too many actions.
-    #[error("{at}: a chunk of {found} actions, at most {limit} allowed")]
+    #[error("{at}: the chunk has {found} actions; the maximum is {limit}")]
     LongChunk {
         /// Message and field.
         at: String,
-        /// Actions found.
+        /// Actions in the chunk.
         found: usize,
         /// The limit.
         limit: usize,
     },
-    /// A component that is no number.
-    #[error("{at}: component {component} of action {step} is {value}, not a finite number")]
+    /// A component that is not finite.
+    #[error("{at}: component {component} of action {step} is {value}; it must be finite")]
     NotFinite {
         /// Message and field.
         at: String,
-        /// Which action, from 0.
+        /// The action, from 0.
         step: usize,
-        /// Which component, from 0.
+        /// The component, from 0.
         component: usize,
-        /// What it is.
+        /// Its value.
         value: f64,
     },
     /// The interruption flag was set.
@@ -209,12 +210,14 @@ pub enum Error {
 }
 
 impl Error {
-    /// Whether the connection ended, rather than that a message or an answer was wrong: another connection may do.
+    /// Whether the connection ended. Another connection may then succeed; with a wrong message it
+    /// does not.
     pub fn is_disconnection(&self) -> bool {
         matches!(self, Self::Closed { .. } | Self::NotConnected { .. })
     }
 
-    /// This error with `place` before its place, where it has one: `within("reply")` makes `actions` `reply/actions`.
+    /// This error with `place` before its place, if it has one: `within("reply")` turns `actions`
+    /// into `reply/actions`.
     pub(crate) fn within(mut self, place: &str) -> Self {
         if let Self::Malformed { at, .. }
         | Self::TooDeep { at, .. }
@@ -228,7 +231,7 @@ impl Error {
         | Self::NotFinite { at, .. } = &mut self
         {
             let place = one_line(place);
-            // Keys are the server's: a deep tree of long ones must not make a long message.
+            // The server chooses the keys: a deep tree of long keys must not make a long message.
             let whole = if at.is_empty() { place } else { format!("{place}/{at}") };
             *at = one_line(&whole);
         }
@@ -236,10 +239,11 @@ impl Error {
     }
 }
 
-/// Foreign text as a part of a message: one line without control characters, not too long.
+/// Foreign text for a message: one line without control characters, of limited length.
 pub(crate) fn one_line(text: &str) -> String {
-    let mut line: String = text.trim().chars().take(LONGEST).map(|c| if c.is_control() { ' ' } else { c }).collect();
-    if text.trim().chars().nth(LONGEST).is_some() {
+    let mut line: String =
+        text.trim().chars().take(MAX_FOREIGN_TEXT).map(|c| if c.is_control() { ' ' } else { c }).collect();
+    if text.trim().chars().nth(MAX_FOREIGN_TEXT).is_some() {
         line.push_str("...");
     }
     line

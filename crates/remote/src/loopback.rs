@@ -1,4 +1,5 @@
-//! A policy server on this machine's loopback, for tests and examples: openpi's or RoboArena's, one client at a time.
+//! A policy server on the loopback interface, for tests and examples. It speaks openpi's or
+//! RoboArena's protocol with one client at a time.
 
 use crate::client::stream::{Control, Timed};
 use crate::endpoint::Dialect;
@@ -15,34 +16,34 @@ use tungstenite::http::{StatusCode, header};
 use tungstenite::protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCode};
 use tungstenite::{Message, WebSocket};
 
-/// Largest observation taken [bytes].
-const LIMIT: usize = 256 << 20;
-/// Longest wait for a client's next request; a forgotten client gives way to another then.
-const PATIENCE: Duration = Duration::from_secs(3600);
-/// Longest wait for a client to close after an error.
-const FAREWELL: Duration = Duration::from_secs(2);
+/// Maximum size of an observation (bytes).
+const MAX_MESSAGE: usize = 256 << 20;
+/// Maximum wait for a client's next request. Then another client is served.
+const REQUEST_TIMEOUT: Duration = Duration::from_secs(3600);
+/// Maximum wait for a client to close after an error.
+const CLOSE_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// What a policy is asked.
+/// A call of the policy.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Call {
-    /// Actions for an observation: a map with the field `actions`.
+    /// Asks for the actions of an observation. The policy returns a map with the field `actions`.
     Infer(Map),
-    /// To forget the last episode; what is returned is not sent.
+    /// Starts an episode. The result is not sent.
     Reset(Map),
 }
 
-/// How a loopback server behaves.
+/// Options of a loopback server.
 #[derive(Clone, Debug, Default)]
 pub struct LoopbackOptions {
-    /// What it sends to a client first.
+    /// The first message to a client.
     pub metadata: Map,
-    /// The key that clients must have.
+    /// The key that clients must send.
     pub api_key: Option<String>,
-    /// [`Dialect::RoboArena`] or, otherwise, openpi's.
+    /// [`Dialect::RoboArena`]; any other value is openpi's.
     pub dialect: Dialect,
 }
 
-/// A server; it stops when it is dropped.
+/// A running server. It stops when it is dropped.
 #[derive(Debug)]
 pub struct Loopback {
     address: SocketAddr,
@@ -51,11 +52,11 @@ pub struct Loopback {
 }
 
 impl Loopback {
-    /// Serves `policy` on a free port of 127.0.0.1. An error of the policy goes to the client as the last line of a traceback,
-    /// and its connection is closed.
+    /// Serves `policy` on a free port of 127.0.0.1. An error of the policy is sent to the client as
+    /// the last line of a traceback, and closes its connection.
     ///
     /// # Errors
-    /// [`Error::CannotConnect`] where no port is to be had, those of [`pack`] for the metadata.
+    /// [`Error::CannotConnect`] if there is no free port, those of [`pack`] for the metadata.
     pub fn start<P>(options: &LoopbackOptions, policy: P) -> Result<Self>
     where
         P: FnMut(Call) -> std::result::Result<Map, String> + Send + 'static,
@@ -80,7 +81,7 @@ impl Loopback {
                 if server.stop.load(Ordering::Relaxed) {
                     return;
                 }
-                // A client that goes away or talks nonsense ends its own connection only.
+                // An error of a client ends its own connection only.
                 let _ = server.serve(socket);
             }
         };
@@ -88,7 +89,7 @@ impl Loopback {
         Ok(Self { address, stop, thread: Some(thread) })
     }
 
-    /// Its address for an [`Endpoint`](crate::Endpoint).
+    /// The address for an [`Endpoint`](crate::Endpoint).
     pub fn url(&self) -> String {
         format!("ws://{}", self.address)
     }
@@ -97,7 +98,7 @@ impl Loopback {
 impl Drop for Loopback {
     fn drop(&mut self) {
         self.stop.store(true, Ordering::Relaxed);
-        // Wakes the thread where it waits for a client.
+        // Wakes the thread, which waits for a client.
         let _ = TcpStream::connect_timeout(&self.address, Duration::from_secs(1));
         if let Some(thread) = self.thread.take() {
             let _ = thread.join();
@@ -119,10 +120,10 @@ type Ended = Box<dyn std::error::Error>;
 impl<P: FnMut(Call) -> std::result::Result<Map, String>> Server<P> {
     fn serve(&mut self, socket: TcpStream) -> std::result::Result<(), Ended> {
         socket.set_nodelay(true)?;
-        let (stream, control) = Timed::new(socket, Instant::now() + PATIENCE, Some(Arc::clone(&self.stop)));
-        let config = WebSocketConfig::default().max_message_size(Some(LIMIT)).max_frame_size(Some(LIMIT));
+        let (stream, control) = Timed::new(socket, Instant::now() + REQUEST_TIMEOUT, Some(Arc::clone(&self.stop)));
+        let config = WebSocketConfig::default().max_message_size(Some(MAX_MESSAGE)).max_frame_size(Some(MAX_MESSAGE));
         let key = self.key.clone();
-        #[allow(clippy::result_large_err, reason = "the signature is the crate's")]
+        #[allow(clippy::result_large_err, reason = "tungstenite's signature")]
         let check = |request: &Request, response: Response| -> std::result::Result<Response, ErrorResponse> {
             let sent = request.headers().get(header::AUTHORIZATION).and_then(|v| v.to_str().ok());
             if key.is_none() || sent == key.as_deref() {
@@ -135,7 +136,7 @@ impl<P: FnMut(Call) -> std::result::Result<Map, String>> Server<P> {
         let mut web = tungstenite::accept_hdr_with_config(stream, check, Some(config)).map_err(|e| e.to_string())?;
         web.send(Message::Binary(self.metadata.clone().into()))?;
         loop {
-            control.until(Instant::now() + PATIENCE);
+            control.until(Instant::now() + REQUEST_TIMEOUT);
             let bytes = match web.read()? {
                 Message::Binary(bytes) => bytes,
                 Message::Close(_) => {
@@ -157,7 +158,7 @@ impl<P: FnMut(Call) -> std::result::Result<Map, String>> Server<P> {
         }
     }
 
-    /// Answers one request; the inner error is the policy's.
+    /// Answers one request. The inner error is the policy's.
     fn answer(
         &mut self,
         web: &mut WebSocket<Timed>,
@@ -193,13 +194,13 @@ impl<P: FnMut(Call) -> std::result::Result<Map, String>> Server<P> {
     }
 }
 
-/// Sends what went wrong as a traceback's last line, and closes.
+/// Sends an error as the last line of a traceback, and closes.
 fn fail(web: &mut WebSocket<Timed>, control: &Control, why: &str) -> std::result::Result<(), Ended> {
-    control.until(Instant::now() + FAREWELL);
+    control.until(Instant::now() + CLOSE_TIMEOUT);
     web.send(Message::text(format!("Traceback (most recent call last):\nRuntimeError: {}\n", one_line(why))))?;
     let reason = "Internal server error.".into();
     web.close(Some(CloseFrame { code: CloseCode::Error, reason }))?;
-    // Until the client has closed as well, so that it reads the text.
+    // Reads until the client has closed, so that it receives the text.
     while web.read().is_ok() {}
     Ok(())
 }

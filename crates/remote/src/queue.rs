@@ -1,14 +1,15 @@
-//! A chunk of actions played at a steady rate, and a new one asked for in time.
+//! Plays chunks of actions at a constant rate and requests the next chunk in time.
 
 use crate::actions::Actions;
 use crate::error::{Error, Result};
 
-/// How chunks are played.
+/// Rate and length of playback.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Playback {
     /// Actions a second.
     pub rate_hz: f64,
-    /// Actions of a chunk that are played before the next one is asked for; the rest is dropped. A shorter chunk is played whole.
+    /// Number of actions of a chunk that are played before the next chunk is requested. The rest is
+    /// dropped; a shorter chunk is played whole.
     pub replan: usize,
 }
 
@@ -18,12 +19,12 @@ impl Default for Playback {
     }
 }
 
-/// Plays chunks by the simulation's time, which stands still while the policy thinks.
+/// Plays chunks by simulation time, which does not advance while the policy computes.
 #[derive(Clone, Debug)]
 pub struct ActionQueue {
     playback: Playback,
     chunk: Option<Actions>,
-    /// When the chunk began [s].
+    /// Start time of the chunk (s).
     start: f64,
 }
 
@@ -43,25 +44,26 @@ impl ActionQueue {
         Ok(Self { playback, chunk: None, start: 0.0 })
     }
 
-    /// Forgets the chunk: the next call asks for a new one. For the beginning of an episode.
+    /// Drops the chunk, at the start of an episode. The next call requests a new one.
     pub fn clear(&mut self) {
         self.chunk = None;
     }
 
-    /// The action of simulation time `time` [s]. `infer` is called when the chunk is played out, or when time went back.
+    /// The action at simulation time `time` (s). Calls `infer` when the chunk has been played or
+    /// when time has gone back.
     ///
     /// # Errors
-    /// Those of `infer`; the queue is then empty.
+    /// Those of `infer`. The queue is then empty.
     pub fn at(&mut self, time: f64, infer: impl FnOnce() -> Result<Actions>) -> Result<&[f64]> {
         let rate = self.playback.rate_hz;
-        // A frame that ends where an action does must not fall short by rounding.
+        // Rounding must not delay an action that starts with a frame.
         let tick = |start: f64| ((time - start) * rate + 1e-6).floor();
         let played = self.chunk.as_ref().map_or(0, |c| c.horizon().min(self.playback.replan));
         let mut step = tick(self.start);
         if !(step >= 0.0 && step < played as f64) {
             self.chunk = None;
             let next = self.start + played as f64 / rate;
-            // Frames need not be whole parts of an action's time: the next chunk begins where the last one ended.
+            // A frame may lie between two actions: the next chunk starts where the last one ended.
             self.start = if played > 0 && tick(next) == 0.0 { next } else { time };
             step = 0.0;
             self.chunk = Some(infer()?);
@@ -76,24 +78,24 @@ impl ActionQueue {
 mod tests {
     use super::*;
 
-    /// Plays for `frames` at `fps`; the actions, and the number of inferences.
+    /// Plays `frames` frames at `fps`. Returns the actions and the number of inferences.
     fn play(playback: Playback, horizon: usize, fps: f64, frames: usize) -> (Vec<f64>, usize) {
         let mut queue = ActionQueue::new(playback).unwrap();
-        let mut asked = 0;
+        let mut inferences = 0;
         let actions = (0..frames).map(|f| {
             let infer = || {
-                asked += 1;
-                Actions::new(1, (0..horizon).map(|i| (100 * asked + i) as f64).collect())
+                inferences += 1;
+                Actions::new(1, (0..horizon).map(|i| (100 * inferences + i) as f64).collect())
             };
             queue.at(f as f64 / fps, infer).unwrap()[0]
         });
-        (actions.collect(), asked)
+        (actions.collect(), inferences)
     }
 
     #[test]
     fn eight_actions_at_thirty_hertz() {
-        let (actions, asked) = play(Playback::default(), 50, 60.0, 960);
-        assert_eq!(asked, 60);
+        let (actions, inferences) = play(Playback::default(), 50, 60.0, 960);
+        assert_eq!(inferences, 60);
         for (f, action) in actions.iter().enumerate() {
             let tick = f / 2;
             assert_eq!(*action, (100 * (tick / 8 + 1) + tick % 8) as f64, "frame {f}");
@@ -103,25 +105,25 @@ mod tests {
     #[test]
     fn short_chunks_and_odd_rates_keep_time() {
         assert_eq!(play(Playback::default(), 3, 30.0, 90).1, 30);
-        // 7 s at 50 frames a second are 210 actions whose frames do not meet theirs.
+        // 7 s at 50 frames a second are 210 actions that do not start with frames.
         assert_eq!(play(Playback { rate_hz: 30.0, replan: 7 }, 16, 50.0, 350).1, 30);
-        // Slower frames than actions: some actions are passed over.
-        let (actions, asked) = play(Playback { rate_hz: 30.0, replan: 6 }, 16, 10.0, 20);
-        assert_eq!((&actions[..4], asked), (&[100.0, 103.0, 200.0, 203.0][..], 10));
+        // With fewer frames than actions some actions are skipped.
+        let (actions, inferences) = play(Playback { rate_hz: 30.0, replan: 6 }, 16, 10.0, 20);
+        assert_eq!((&actions[..4], inferences), (&[100.0, 103.0, 200.0, 203.0][..], 10));
     }
 
     #[test]
-    fn time_that_goes_back_asks_anew() {
+    fn time_that_goes_back_requests_a_new_chunk() {
         let mut queue = ActionQueue::new(Playback::default()).unwrap();
-        let mut asked = 0;
+        let mut inferences = 0;
         for time in [0.0, 0.1, 0.05, 0.02, f64::NAN, 0.0] {
             let infer = || {
-                asked += 1;
+                inferences += 1;
                 Actions::new(2, vec![0.0; 16])
             };
             queue.at(time, infer).unwrap();
         }
-        assert_eq!(asked, 3);
+        assert_eq!(inferences, 3);
         assert!(queue.at(9.0, || Err(Error::Interrupted)).is_err());
         assert!(ActionQueue::new(Playback { rate_hz: 0.0, replan: 8 }).is_err());
         assert!(ActionQueue::new(Playback { rate_hz: 30.0, replan: 0 }).is_err());

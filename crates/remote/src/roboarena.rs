@@ -1,33 +1,34 @@
-//! What a RoboArena server asks for: the fields of `PolicyServerConfig` in github.com/robo-arena/roboarena, which it sends as its
-//! metadata. Fields that are missing have that class's defaults.
+//! The requirements of a RoboArena server: the fields of `PolicyServerConfig` in
+//! github.com/robo-arena/roboarena, which it sends as its metadata. Missing fields have the
+//! defaults of that class.
 
 use crate::error::{Error, Result};
 use crate::value::{Map, Value};
 
-/// Which observations a RoboArena server wants and which actions it gives.
+/// The observations that a RoboArena server needs, and its actions.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ServerConfig {
-    /// Height and width that pictures are to have; their own where there is none.
+    /// Height and width of pictures (px); `None` leaves them as they are.
     pub image_resolution: Option<[usize; 2]>,
-    /// `observation/wrist_image_left` is wanted.
+    /// Whether it needs `observation/wrist_image_left`.
     pub needs_wrist_camera: bool,
-    /// How many `observation/exterior_image_{i}_left` are wanted, 0 to 2.
+    /// Number of `observation/exterior_image_{i}_left` that it needs, in [0, 2].
     pub n_external_cameras: usize,
-    /// The right pictures are wanted too.
+    /// Whether it needs the right pictures too.
     pub needs_stereo_camera: bool,
-    /// `session_id` is wanted.
+    /// Whether it needs `session_id`.
     pub needs_session_id: bool,
     /// `joint_position`, `joint_velocity`, `cartesian_position` or `cartesian_velocity`.
     pub action_space: String,
 }
 
 impl ServerConfig {
-    /// Whether metadata are a RoboArena server's.
+    /// Whether the metadata are those of a RoboArena server.
     pub fn is_in(metadata: &Map) -> bool {
         ["image_resolution", "needs_wrist_camera", "n_external_cameras"].iter().all(|k| metadata.contains_key(*k))
     }
 
-    /// The metadata of a RoboArena server. Other fields are passed over.
+    /// Reads the metadata of a RoboArena server. Other fields are ignored.
     ///
     /// # Errors
     /// [`Error::WrongField`] for a field of another kind.
@@ -47,9 +48,9 @@ impl ServerConfig {
             Some(Value::Nil) => None,
             Some(Value::List(sides)) if sides.len() == 2 => match (side(&sides[0]), side(&sides[1])) {
                 (Some(height), Some(width)) => Some([height, width]),
-                _ => return Err(wrong("image_resolution", "height and width from 1 to 16384")),
+                _ => return Err(wrong("image_resolution", "height and width in [1, 16384]")),
             },
-            Some(_) => return Err(wrong("image_resolution", "height and width, or nothing")),
+            Some(_) => return Err(wrong("image_resolution", "height and width, or null")),
         };
         let n_external_cameras = match metadata.get("n_external_cameras") {
             None => 1,
@@ -71,7 +72,8 @@ impl ServerConfig {
         })
     }
 
-    /// Components of an action in this space, the gripper's included: 8 of joints, 7 of a pose; none where the space is unknown.
+    /// Number of components of an action, gripper included: 8 for joints, 7 for a pose, `None` for
+    /// an unknown action space.
     pub fn action_dim(&self) -> Option<usize> {
         match self.action_space.as_str() {
             "joint_position" | "joint_velocity" => Some(8),

@@ -1,12 +1,13 @@
-//! What messages consist of.
+//! Values of messages.
 
 use crate::array::Array;
 use std::collections::BTreeMap;
 
-/// A message or a part of one: values by name, in the order of their names.
+/// A message or a part of one: values by name, sorted by name.
 pub type Map = BTreeMap<String, Value>;
 
-/// What a policy is shown: pictures, states, the instruction, by the names that the policy wants. Maps may lie in maps.
+/// An observation: pictures, states and the prompt, by the names that the policy needs. Maps may be
+/// nested.
 pub type Observation = Map;
 
 /// A value of a message.
@@ -14,17 +15,17 @@ pub type Observation = Map;
 pub enum Value {
     /// Python's `None`.
     Nil,
-    /// A truth value.
+    /// A boolean.
     Bool(bool),
-    /// A whole number.
+    /// An integer.
     Int(i64),
-    /// A number in double precision; single precision is widened.
+    /// A double-precision number. Single precision is widened.
     Float(f64),
     /// Text.
     Text(String),
     /// Bytes.
     Bytes(Vec<u8>),
-    /// Values in a row; tuples too.
+    /// A list or tuple.
     List(Vec<Value>),
     /// Values by name.
     Map(Map),
@@ -33,12 +34,12 @@ pub enum Value {
 }
 
 impl Value {
-    /// What it is, for messages.
+    /// The kind of value, for error messages.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
-            Self::Nil => "nothing",
-            Self::Bool(_) => "a truth value",
-            Self::Int(_) => "a whole number",
+            Self::Nil => "null",
+            Self::Bool(_) => "a boolean",
+            Self::Int(_) => "an integer",
             Self::Float(_) => "a number",
             Self::Text(_) => "text",
             Self::Bytes(_) => "bytes",
@@ -48,7 +49,7 @@ impl Value {
         }
     }
 
-    /// The number it is, if it is one.
+    /// The number; `None` for other kinds.
     pub fn as_f64(&self) -> Option<f64> {
         match self {
             Self::Int(i) => Some(*i as f64),

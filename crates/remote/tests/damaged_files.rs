@@ -1,4 +1,5 @@
-//! Damaged messages give a value or a one-line error, and messages that claim to be huge cost nothing.
+//! Damaged messages give a value or an error of one line. Messages with huge sizes in their headers
+//! allocate nothing.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -12,10 +13,10 @@ use trocar_testing::{Allowance, PEAK, Peak, assault};
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// Memory is counted for all threads together: one test at a time.
+/// Memory is counted for all threads together, so one test runs at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// An empty list of a byte becomes a value of 64.
+/// An empty list of one byte becomes a value of 64 bytes.
 const ALLOWANCE: Allowance = Allowance { fixed: 1 << 20, per_byte: 300 };
 
 #[test]
@@ -45,7 +46,7 @@ fn damage_never_panics() {
 }
 
 #[test]
-fn claims_are_not_allocated() {
+fn sizes_in_headers_are_not_allocated() {
     let _alone = ALONE.lock().unwrap();
     // A frame of 1 TB; one of 2^63 - 1 bytes; 1,000 fragments of 64 KiB, which are 64 MB in all.
     let terabyte = [&[0x82, 127][..], &(1u64 << 40).to_be_bytes()].concat();

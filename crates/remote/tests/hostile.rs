@@ -1,5 +1,5 @@
-//! Servers that do everything wrong, each answered by its own error of one line, in time.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests, which tell the errors they saw")]
+//! Misbehaving servers: each gives its own error of one line, in time.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests, which print the errors")]
 
 mod common;
 
@@ -14,7 +14,7 @@ use trocar_remote::{Array, Client, Endpoint, Error, Loopback, LoopbackOptions, M
 use tungstenite::Message;
 use tungstenite::protocol::{CloseFrame, frame::coding::CloseCode};
 
-/// The error of connecting and asking once, checked for its form.
+/// The error of a connection with one request. Checks that it is one line and comes in time.
 fn fails(endpoint: &Endpoint) -> Error {
     let start = Instant::now();
     let e = Client::connect(endpoint).and_then(|mut client| client.infer(&observation())).unwrap_err();
@@ -30,7 +30,7 @@ fn error(server: &common::Hostile) -> Error {
 }
 
 #[test]
-fn endpoints_that_cannot_be_are_refused() {
+fn invalid_endpoints_are_refused() {
     let field = |endpoint: &Endpoint| match fails(endpoint) {
         Error::Endpoint { field, .. } => field,
         e => panic!("{e}"),
@@ -51,13 +51,13 @@ fn endpoints_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn nobody_there() {
+fn a_missing_server_is_tried_again() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = listener.local_addr().unwrap().to_string();
     drop(listener);
     let mut endpoint = endpoint(&url);
     endpoint.retry.attempts = 3;
-    endpoint.retry.first = Duration::from_millis(100);
+    endpoint.retry.first_pause = Duration::from_millis(100);
     let start = Instant::now();
     assert!(matches!(fails(&endpoint), Error::CannotConnect { .. }));
     // 100 ms and 200 ms between three attempts.
@@ -69,7 +69,7 @@ fn nobody_there() {
 }
 
 #[test]
-fn a_server_that_comes_up_late_is_found() {
+fn a_server_that_starts_late_is_found() {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let address = listener.local_addr().unwrap();
     drop(listener);
@@ -82,13 +82,13 @@ fn a_server_that_comes_up_late_is_found() {
     });
     let mut endpoint = endpoint(&address.to_string());
     endpoint.retry.attempts = 10;
-    endpoint.retry.first = Duration::from_millis(20);
+    endpoint.retry.first_pause = Duration::from_millis(20);
     drop(Client::connect(&endpoint).unwrap());
     thread.join().unwrap();
 }
 
 #[test]
-fn keys_are_asked_for() {
+fn keys_are_checked() {
     let options = LoopbackOptions { api_key: Some("right".into()), ..LoopbackOptions::default() };
     let server = Loopback::start(&options, |_| Ok(Map::new())).unwrap();
     for key in [None, Some("wrong")] {
@@ -112,7 +112,7 @@ fn keys_are_asked_for() {
 }
 
 #[test]
-fn what_is_no_policy_server() {
+fn other_servers_are_handshake_errors() {
     let bad: [&[u8]; 5] = [
         b"HTTP/1.1 404 Not Found\r\nContent-Length: 0\r\n\r\n",
         b"HTTP/1.1 200 OK\r\nContent-Length: 2\r\n\r\nOK",
@@ -139,20 +139,20 @@ fn what_is_no_policy_server() {
 }
 
 #[test]
-fn tracebacks_are_told_by_their_last_line() {
+fn tracebacks_are_shown_by_their_last_line() {
     const TRACEBACK: &str = "Traceback (most recent call last):\n  File \"serve.py\", line 3, in infer\n    raise\nValueError: bad \u{1b}[31mshape\n";
-    let told = |e: Error| match e {
+    let check = |e: Error| match e {
         Error::Server { last, traceback, .. } => {
             assert_eq!(traceback, TRACEBACK);
             assert_eq!(last, "ValueError: bad  [31mshape (File \"serve.py\", line 3, in infer)");
         }
         e => panic!("{e}"),
     };
-    told(error(&after_request(|mut socket| {
+    check(error(&after_request(|mut socket| {
         socket.send(Message::text(TRACEBACK)).unwrap();
         linger(&mut socket);
     })));
-    told(error(&web(|mut socket| {
+    check(error(&web(|mut socket| {
         socket.send(Message::text(TRACEBACK)).unwrap();
         linger(&mut socket);
     })));
@@ -164,7 +164,7 @@ fn tracebacks_are_told_by_their_last_line() {
 }
 
 #[test]
-fn connections_that_end() {
+fn closed_connections_are_errors() {
     assert!(matches!(error(&raw(drop)), Error::Handshake { .. } | Error::Closed { .. }));
     assert!(matches!(error(&web(drop)), Error::Closed { what: "the server's metadata", .. }));
     assert!(matches!(error(&after_request(drop)), Error::Closed { what: "a reply", .. }));
@@ -180,13 +180,13 @@ fn connections_that_end() {
 }
 
 #[test]
-fn waits_end_by_a_deadline() {
+fn waits_end_at_a_deadline() {
     let pause = || std::thread::sleep(Duration::from_millis(700));
     let whats = [
         (raw(move |_socket| pause()), "the WebSocket handshake"),
         (web(move |_socket| pause()), "the server's metadata"),
         (after_request(move |_socket| pause()), "a reply"),
-        // A byte now and then: nothing is idle, and nothing comes of it.
+        // A byte now and then: never idle, never complete.
         (
             raw(|mut socket| {
                 for byte in b"HTTP/1.1 101 Switching Protocols\r\n" {
@@ -208,7 +208,7 @@ fn waits_end_by_a_deadline() {
             }),
             "a reply",
         ),
-        // Pings without end are no reply.
+        // Pings are not a reply.
         (after_request(|mut socket| while socket.send(Message::Ping(vec![1].into())).is_ok() {}), "a reply"),
     ];
     for (server, expected) in whats {
@@ -220,7 +220,7 @@ fn waits_end_by_a_deadline() {
 }
 
 #[test]
-fn a_server_that_reads_nothing_is_not_waited_for() {
+fn a_server_that_reads_nothing_times_out() {
     let server = web(|mut socket| {
         socket.send(Message::Binary(pack(&Map::new()).unwrap().into())).unwrap();
         std::thread::sleep(Duration::from_millis(900));
@@ -234,8 +234,9 @@ fn a_server_that_reads_nothing_is_not_waited_for() {
 }
 
 #[test]
-fn frames_that_are_wrong() {
-    // Reserved bits; an opcode that is none; a masked frame; a fragmented ping; a continuation of nothing; text that is not UTF-8.
+fn wrong_frames_are_protocol_errors() {
+    // Reserved bits; an unknown opcode; a masked frame; a fragmented ping; a continuation without a
+    // start; text that is not UTF-8.
     let frames: [&[u8]; 6] = [
         &[0xf2, 1, 0xc0],
         &[0x83, 1, 0xc0],
@@ -265,7 +266,7 @@ fn damaged_streams_give_errors() {
     for case in 0..300 {
         let bytes = trocar_testing::damage(&seeds[0].1, &seeds, &mut Pcg64Mcg::new(case));
         let server = web(move |mut socket| {
-            // The client may be gone before all is written.
+            // The client may have closed before everything is written.
             let _ = socket.get_mut().write_all(&bytes);
         });
         if let Err(e) = Client::connect(&endpoint(&server.url)).and_then(|mut c| c.infer(&observation())) {
@@ -275,7 +276,7 @@ fn damaged_streams_give_errors() {
 }
 
 #[test]
-fn what_nobody_asked_for_is_not_taken_for_a_reply() {
+fn a_message_without_a_request_is_not_a_reply() {
     let server = web(|mut socket| {
         let reply = common::actions(common::array(common::text("<f4"), &[1, 1], &common::floats(&[9.0])));
         socket.send(Message::Binary(pack(&Map::new()).unwrap().into())).unwrap();
@@ -287,7 +288,7 @@ fn what_nobody_asked_for_is_not_taken_for_a_reply() {
     let e = client.infer(&observation()).unwrap_err();
     assert!(matches!(e, Error::Protocol { .. } | Error::NotConnected { .. }), "{e}");
     let again = client.infer(&observation()).unwrap_err();
-    assert!(matches!(&again, Error::NotConnected { reason, .. } if reason.contains("nobody asked for")), "{again}");
+    assert!(matches!(&again, Error::NotConnected { reason, .. } if reason.contains("without a request")), "{again}");
     assert!(!client.is_connected());
 }
 
@@ -309,7 +310,7 @@ fn pings_between_requests_are_answered() {
 }
 
 #[test]
-fn a_flag_ends_every_wait() {
+fn the_interruption_flag_ends_every_wait() {
     let flag = Arc::new(AtomicBool::new(false));
     let stop = Arc::clone(&flag);
     let server = after_request(move |mut socket| {
@@ -320,19 +321,19 @@ fn a_flag_ends_every_wait() {
     endpoint.interrupt = Some(Arc::clone(&flag));
     endpoint.timeouts.infer = Duration::from_secs(60);
     assert_eq!(fails(&endpoint), Error::Interrupted);
-    // Set already: nothing is even begun.
+    // Set before: nothing is started.
     let silent = raw(drop);
     endpoint.url = silent.url.clone();
     assert_eq!(fails(&endpoint), Error::Interrupted);
     let nobody = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
     endpoint.url = nobody.to_string();
     endpoint.retry.attempts = 100;
-    endpoint.retry.first = Duration::from_secs(60);
+    endpoint.retry.first_pause = Duration::from_secs(60);
     assert_eq!(fails(&endpoint), Error::Interrupted);
 }
 
 #[test]
-fn a_lost_connection_comes_back_with_a_reset_only() {
+fn only_a_reset_restores_a_lost_connection() {
     let mut calls = 0;
     let policy = move |_| {
         calls += 1;
@@ -354,7 +355,7 @@ fn a_lost_connection_comes_back_with_a_reset_only() {
 }
 
 #[test]
-fn replies_that_are_wrong_leave_the_connection() {
+fn wrong_replies_leave_the_connection_open() {
     let mut calls = 0;
     let policy = move |_| {
         calls += 1;
@@ -365,28 +366,28 @@ fn replies_that_are_wrong_leave_the_connection() {
     let mut client = Client::connect(&endpoint(&server.url())).unwrap();
     assert!(matches!(client.infer(&observation()), Err(Error::WrongField { .. })));
     assert_eq!(client.infer(&observation()).unwrap().actions.horizon(), 2);
-    // An observation that cannot be sent is not sent.
+    // An observation that cannot be packed is not sent.
     let deep = (0..100).fold(Value::Nil, |inner, _| Value::List(vec![inner]));
     assert!(matches!(client.infer(&Map::from([("deep".to_owned(), deep)])), Err(Error::TooDeep { .. })));
     assert!(client.infer(&observation()).is_ok());
 }
 
 #[test]
-fn one_bad_reply_of_each_kind_over_the_wire() {
+fn each_kind_of_bad_reply_has_its_error() {
     let e = error(&replies(common::actions(common::array(common::text("|O"), &[1], b"\x80\x04pickle"))));
     assert!(matches!(&e, Error::WrongDtype { at, dtype, .. } if at.ends_with("reply/actions") && dtype == "|O"), "{e}");
     assert!(e.to_string().starts_with("ws://127.0.0.1:"), "{e}");
 }
 
 #[test]
-fn a_server_that_never_stops_talking_is_told() {
-    // Pings and empty pieces of a message, for as long as somebody listens, before any request.
+fn a_server_that_sends_without_a_pause_is_an_error() {
+    // Pings and empty fragments without end, before any request.
     for pieces in [&[0x89u8, 0x00][..], &[0x00, 0x00]] {
         let server = web(move |mut socket| {
             socket.send(Message::Binary(pack(&Map::new()).unwrap().into())).unwrap();
             let stream = socket.get_mut();
             if pieces[0] == 0 {
-                // A message that has begun.
+                // The start of a message.
                 stream.write_all(&[0x02, 0x00]).unwrap();
             }
             let flood = pieces.repeat(4096);
@@ -404,7 +405,7 @@ fn a_server_that_never_stops_talking_is_told() {
 }
 
 #[test]
-fn an_address_is_checked_without_being_connected_to_and_shows_no_secret() {
+fn an_address_is_checked_without_a_connection_and_shows_no_secret() {
     assert_eq!(Endpoint::new("ws://user:secret@127.0.0.1:1/a?token=secret").check(), Ok(()));
     for bad in ["ws://", "ws://:1", "ws://user:secret@two words?secret", "http://user:secret@h", "ws://h:0?secret"] {
         let why = Endpoint::new(bad).check().unwrap_err();

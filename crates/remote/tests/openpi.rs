@@ -1,4 +1,5 @@
-//! Against openpi's own code from PyPI: its packer, its server, its client. Skipped, saying so, without it.
+//! Comparison with openpi's packer, server and client from PyPI. Skipped, with a message, without
+//! them.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
 mod common;
@@ -12,7 +13,7 @@ use trocar_remote::{
     Array, Call, Client, Dialect, Endpoint, Error, Loopback, LoopbackOptions, Map, Value, pack, unpack,
 };
 
-/// The Python with openpi's packages, or why there is none.
+/// The interpreter with openpi's packages; prints why there is none.
 fn python() -> Option<PathBuf> {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools-openpi/bin/python");
     let imports =
@@ -50,7 +51,7 @@ fn bytes_are_those_of_openpi() {
 }
 
 #[test]
-fn our_client_asks_their_server() {
+fn our_client_works_with_their_server() {
     let Some(python) = python() else { return };
     let mut child = peer(&python, &["serve"]).stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
     let mut port = String::new();
@@ -59,7 +60,7 @@ fn our_client_asks_their_server() {
     let mut endpoint = Endpoint::new(format!("127.0.0.1:{}", port.trim()));
     endpoint.api_key = Some("unused".into());
     endpoint.retry.attempts = 100;
-    endpoint.retry.most = Duration::from_millis(200);
+    endpoint.retry.max_pause = Duration::from_millis(200);
     endpoint.actions.dim = Some(3);
     let mut client = Client::connect(&endpoint).unwrap();
     assert_eq!(client.dialect(), Dialect::OpenPi);
@@ -93,7 +94,7 @@ fn our_client_asks_their_server() {
 }
 
 #[test]
-fn their_client_asks_our_server() {
+fn their_client_works_with_our_server() {
     let Some(python) = python() else { return };
     let metadata = Map::from([("name".to_owned(), Value::from("ours"))]);
     let options = LoopbackOptions { metadata, api_key: Some("open sesame".into()), ..LoopbackOptions::default() };

@@ -1,4 +1,4 @@
-//! Messages: what is packed is unpacked, what is wrong is named.
+//! Messages: a round trip, and an error for each kind of damage.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use trocar_remote::{ActionLimits, Actions, Array, Dtype, Error, Map, Result, ServerConfig, Value, pack, unpack};
 
 #[test]
-fn messages_come_back() {
+fn messages_survive_a_round_trip() {
     let observation = observation();
     assert_eq!(unpack(&pack(&observation).unwrap()).unwrap(), Value::Map(observation));
 }
@@ -37,13 +37,13 @@ fn values() -> impl Strategy<Value = Value> {
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(300) })]
     #[test]
-    fn any_message_comes_back(value in values()) {
+    fn any_message_survives_a_round_trip(value in values()) {
         let message = Map::from([("value".to_owned(), value)]);
         prop_assert_eq!(unpack(&pack(&message).unwrap()).unwrap(), Value::Map(message));
     }
 }
 
-/// The actions of a reply with the usual limits, or with these.
+/// The actions of a reply with the given limits.
 fn taken(reply: &[u8], limits: ActionLimits) -> Result<Actions> {
     unpack(reply).and_then(|reply| limits.take(&reply))
 }
@@ -56,7 +56,7 @@ fn named(e: &Error) -> String {
 }
 
 #[test]
-fn chunks_are_taken_in_every_type_of_number() {
+fn chunks_may_have_every_type_of_number() {
     let limits = ActionLimits { dim: Some(2), max_horizon: 2 };
     let types: [(&str, Vec<u8>); 8] = [
         ("<f4", floats(&[1.0, -2.0, 3.0, 4.0])),
@@ -74,12 +74,12 @@ fn chunks_are_taken_in_every_type_of_number() {
         assert_eq!(chunk.step(1).unwrap(), [3.0, 4.0]);
         assert_eq!(chunk.step(2), None);
     }
-    // Older RoboArena servers send the array alone.
+    // Older RoboArena servers send only the array.
     assert_eq!(taken(&array(text("<f4"), &[1, 2], &floats(&[5.0, 6.0])), limits).unwrap().values(), [5.0, 6.0]);
 }
 
 #[test]
-fn chunks_that_cannot_be_are_refused() {
+fn invalid_chunks_are_refused() {
     let limits = ActionLimits { dim: Some(2), max_horizon: 2 };
     let float = |shape: &[u8], values: &[f32]| actions(array(text("<f4"), shape, &floats(values)));
     let cases: [(&str, Vec<u8>); 21] = [
@@ -111,7 +111,7 @@ fn chunks_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn bytes_that_are_no_message_are_refused() {
+fn invalid_messages_are_refused() {
     let half = |key: &str, value: Vec<u8>| map(&[(bin(b"__ndarray__"), vec![0xc3]), (bin(key.as_bytes()), value)]);
     let cases: Vec<(&str, Vec<u8>)> = vec![
         ("Malformed", vec![]),
@@ -119,7 +119,7 @@ fn bytes_that_are_no_message_are_refused() {
         ("Malformed", vec![0xc0, 0xc0]),
         ("Malformed", vec![0xa5, b'a']),
         ("Malformed", vec![0xa2, 0xc3, 0x28]),
-        // Claims of 4 GiB.
+        // Sizes of 4 GiB in the header.
         ("Malformed", vec![0xdb, 0xff, 0xff, 0xff, 0xff]),
         ("Malformed", vec![0xc6, 0xff, 0xff, 0xff, 0xff]),
         ("Malformed", vec![0xdd, 0xff, 0xff, 0xff, 0xff]),
@@ -128,11 +128,11 @@ fn bytes_that_are_no_message_are_refused() {
         ("Malformed", vec![0xd4, 5, 0]),
         ("Malformed", vec![0xd6, 0xff, 0, 0, 0, 0]),
         ("Malformed", vec![0xcf, 0x80, 0, 0, 0, 0, 0, 0, 0]),
-        // Keys: a number, not UTF-8, twice.
+        // Keys: a number, not UTF-8, a duplicate.
         ("Malformed", vec![0x81, 1, 1]),
         ("Malformed", vec![0x81, 0xc4, 1, 0xff, 1]),
         ("Malformed", vec![0x82, 0xa1, b'a', 1, 0xa1, b'a', 2]),
-        // Arrays without parts, of other packages, with text for keys.
+        // Arrays with missing parts, of other packages, with text keys.
         ("Malformed", half("data", bin(&[]))),
         ("Malformed", half("dtype", text("<f4"))),
         ("Malformed", map(&[(bin(b"nd"), vec![0xc3]), (bin(b"type"), text("<f4"))])),
@@ -168,7 +168,7 @@ fn numpy_numbers_are_numbers() {
 }
 
 #[test]
-fn roboarena_asks_for_what_it_wants() {
+fn roboarena_metadata_are_read() {
     let resolution = Value::List(vec![180.into(), 320.into()]);
     let mut metadata = Map::from([
         ("image_resolution".to_owned(), resolution),

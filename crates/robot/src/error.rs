@@ -1,11 +1,11 @@
-//! What can go wrong with an arm or an instrument.
+//! Errors of arms and instruments.
 
 use std::path::PathBuf;
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// An arm or instrument that cannot be described, or a motion that cannot be computed.
+/// An invalid arm or instrument, or a motion that cannot be computed.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// A file could not be opened or read.
@@ -13,29 +13,29 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the system.
         source: std::io::Error,
     },
-    /// A description file does not say what it should.
+    /// A description file is invalid.
     #[error("{path}: {reason}", path = path.display())]
     Description {
         /// The file.
         path: PathBuf,
-        /// Element, what is wrong with it, what would be right.
+        /// The element, what is wrong with it and the remedy.
         reason: String,
     },
     /// A value is out of range.
     #[error("{what}: {reason}")]
     Invalid {
-        /// The thing and its field.
+        /// The object and its field.
         what: String,
-        /// What is wrong with it, what would be right.
+        /// What is wrong with it and the remedy.
         reason: String,
     },
-    /// A number went beyond what can be computed with. The state is as it was before the call.
+    /// A number is not finite. The state is unchanged.
     #[error("{what} is not finite")]
     NotFinite {
-        /// Which number.
+        /// The number.
         what: &'static str,
     },
 }
@@ -47,10 +47,11 @@ impl Error {
     }
 }
 
-/// `value` of `what`, if it is finite and within `low..=high`; `unit` is for the message.
+/// `value`, if it is in [`low`, `high`]. `what` and `unit` are for the message.
 pub(crate) fn within(what: &str, value: f64, low: f64, high: f64, unit: &str) -> Result<f64> {
     if value.is_finite() && (low..=high).contains(&value) {
         return Ok(value);
     }
-    Err(Error::invalid(what, format!("{value} {unit} is not between {low} and {high} {unit}")))
+    let unit = if unit.is_empty() { String::new() } else { format!(" {unit}") };
+    Err(Error::invalid(what, format!("is {value}{unit}; it must be in [{low}, {high}]{unit}")))
 }

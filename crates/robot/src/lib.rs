@@ -1,6 +1,17 @@
-//! Robot arms as dynamic serial chains, laparoscopic instruments, the ports that they work through, and their control.
+//! Robot arms as dynamic serial chains, laparoscopic instruments, their ports, and their control.
 //!
-//! Knows nothing of tissue, cameras or files of scenes. SI units and radians; all in double precision.
+//! This crate does not depend on tissue, cameras or scene files. It uses SI units and radians, in
+//! double precision.
+//!
+//! ```
+//! use trocar_robot::chain::SerialArm;
+//!
+//! // The torques that hold a Franka Research 3 against gravity in its home posture.
+//! let arm = SerialArm::franka_fr3()?;
+//! let torque = arm.gravity_torque(&arm.home());
+//! assert!(torque.iter().all(|t| t.abs() < 87.0));
+//! # Ok::<(), trocar_robot::Error>(())
+//! ```
 
 pub mod chain;
 mod error;

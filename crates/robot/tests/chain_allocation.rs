@@ -1,4 +1,4 @@
-//! Stepping an arm, its kinematics, its inverse kinematics and its control allocate nothing.
+//! The step of an arm, its kinematics, inverse kinematics and control do not allocate.
 
 mod common;
 
@@ -7,22 +7,22 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_robot::chain::{ArmState, Coupling, CouplingLaw, Drive, InverseOptions, SerialArm};
 
-/// The system's allocator, counting.
+/// The system's allocator with a counter.
 struct Counting;
 
 static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
 
 #[allow(unsafe_code, reason = "an allocator cannot be written without")]
-// SAFETY: every call is handed on to the system's allocator unchanged.
+// SAFETY: every call goes to the system's allocator unchanged.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are handed on.
+        // SAFETY: the caller's guarantees hold for the system's allocator.
         unsafe { System.alloc(layout) }
     }
 
     unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the pointer came from `alloc` above, that is, from the system.
+        // SAFETY: the pointer came from `alloc` above, so from the system.
         unsafe { System.dealloc(pointer, layout) }
     }
 }
@@ -31,7 +31,7 @@ unsafe impl GlobalAlloc for Counting {
 static ALLOCATOR: Counting = Counting;
 
 #[test]
-fn stepping_and_searching_allocate_nothing() {
+fn steps_and_searches_do_not_allocate() {
     let arm = SerialArm::franka_fr3().unwrap().with_payload(common::rod(0.5, 0.2)).unwrap();
     let mut state = ArmState::at_rest(arm.home());
     let options = InverseOptions { restarts: 4, ..InverseOptions::default() };
@@ -48,7 +48,7 @@ fn stepping_and_searching_allocate_nothing() {
         arm.inverse(&flange, &arm.home(), &options).unwrap();
     }
     let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
-    let mut controlled = common::cell(0, trocar_robot::manipulator::Settings::default());
+    let mut controlled = common::cell(0, trocar_robot::manipulator::ControllerSettings::default());
     let start = controlled.commanded();
     let made = ALLOCATIONS.load(Ordering::Relaxed);
     for k in 0..480 {

@@ -1,4 +1,5 @@
-//! Damaged descriptions of arms give an arm or an error, never a panic. Alone in its program, as what others allocate would count.
+//! Damaged descriptions of arms give an arm or an error, never a panic. In a program of its own,
+//! because it counts allocations.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -11,7 +12,7 @@ use trocar_testing::{Allowance, PEAK, Peak, assault};
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// The file, its text and the parser's tree.
+/// Memory for the file, its text and the parser's tree.
 const ALLOWANCE: Allowance = Allowance { fixed: 1 << 20, per_byte: 100 };
 
 #[test]
@@ -27,7 +28,7 @@ fn damage_never_panics() {
             SerialArm::from_mjcf(&path, "tool")
         };
         match read {
-            // What was accepted can be worked with.
+            // An accepted arm is usable.
             Ok(arm) => assert!(arm.mass_matrix(&arm.home()).factor().is_some()),
             Err(error) => {
                 let message = error.to_string();

@@ -1,6 +1,7 @@
-//! Damaged descriptions that show something give looks or an error, never a panic. Alone in its program, as what others allocate would count.
+//! Damaged descriptions with visual shapes give shapes or an error, never a panic. In a program of
+//! its own, because it counts allocations.
 
-#![allow(clippy::unwrap_used, reason = "what tests share may panic")]
+#![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
 mod common;
 
@@ -11,7 +12,7 @@ use trocar_testing::{Allowance, PEAK, Peak, assault};
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
 
-/// The file, its text and the parser's tree.
+/// Memory for the file, its text and the parser's tree.
 const ALLOWANCE: Allowance = Allowance { fixed: 1 << 20, per_byte: 100 };
 
 #[test]
@@ -27,7 +28,7 @@ fn damage_and_cuts_never_panic() {
             mjcf_visuals(&path, Some("tool"))
         };
         match seen {
-            // The base is always there.
+            // There is always a base.
             Ok(links) => assert!(!links.is_empty()),
             Err(error) => {
                 let message = error.to_string();

@@ -1,4 +1,5 @@
-//! An arm's kinematics and dynamics against themselves: finite differences, energy, symmetry, the identities between them.
+//! Consistency of an arm's kinematics and dynamics: finite differences, energy, symmetry and
+//! identities.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -23,7 +24,7 @@ fn jacobians_are_the_derivatives_of_the_frames() {
             let q = posture(&arm, &mut rng);
             let frames = arm.frames(&q);
             let link = arm.dof() / 2;
-            // A point that is fixed to the link.
+            // A point fixed to the link.
             let own = DVec3::new(0.1, -0.2, 0.05);
             let jacobian = frames.jacobian(link, frames.link(link).transform(own));
             for k in 0..arm.dof() {
@@ -45,7 +46,7 @@ fn jacobians_are_the_derivatives_of_the_frames() {
 }
 
 #[test]
-fn the_mass_matrix_is_symmetric_and_positive_and_gives_the_inverse_dynamics() {
+fn the_mass_matrix_is_symmetric_positive_and_consistent_with_inverse_dynamics() {
     let mut rng = Random(2);
     for arm in arms() {
         let n = arm.dof();
@@ -66,7 +67,7 @@ fn the_mass_matrix_is_symmetric_and_positive_and_gives_the_inverse_dynamics() {
             for i in 0..n {
                 assert!((torque[i] - moved[i] - d.bias[i]).abs() < 1e-12 * size);
             }
-            // Forward dynamics is its inverse, and a load on a link is one through the Jacobian.
+            // Forward dynamics is its inverse, and a load on a link acts through the Jacobian.
             let back = arm.forward_dynamics(&q, &qd, &torque, &[]).unwrap();
             let off = (0..n).fold(0.0, |m: f64, i| m.max((back[i] - qdd[i]).abs()));
             assert!(off < 1e-8 * qdd.max_abs(), "{off}");
@@ -81,7 +82,7 @@ fn the_mass_matrix_is_symmetric_and_positive_and_gives_the_inverse_dynamics() {
     }
 }
 
-/// The kinetic energy is that of its links, whose speeds come from the Jacobians.
+/// The kinetic energy is the sum over links, with speeds from the Jacobians.
 #[test]
 fn gravity_is_the_slope_of_the_potential_energy() {
     let mut rng = Random(3);
@@ -104,7 +105,7 @@ fn gravity_is_the_slope_of_the_potential_energy() {
 }
 
 #[test]
-fn an_undriven_arm_keeps_its_energy() {
+fn an_undriven_arm_conserves_energy() {
     let arm = free_fr3().with_payload(rod(0.5, 0.2)).unwrap();
     let start = ArmState { q: arm.home(), qd: noise(7, 1.0, &mut Random(4)) };
     let drive = Drive { torque: arm.zeros(), external: arm.zeros() };
@@ -112,7 +113,8 @@ fn an_undriven_arm_keeps_its_energy() {
         let (kinetic, potential) = arm.energy(&s.q, &s.qd);
         kinetic + potential
     };
-    // Of first order in the step: half the step, half the error, which no wrong term in bias or mass matrix would leave.
+    // The error is of first order in the step: half the step gives half the error. A wrong term in
+    // bias or mass matrix would not.
     let drift = |substeps: usize| {
         let (mut state, mut worst, mut most) = (start, 0.0, 0.0);
         for _ in 0..960 {
@@ -130,7 +132,7 @@ fn an_undriven_arm_keeps_its_energy() {
 }
 
 #[test]
-fn a_payload_is_as_a_heavier_last_link() {
+fn a_payload_equals_a_heavier_last_link() {
     let arm = free_fr3();
     let payload = rod(0.5, 0.2);
     let loaded = arm.clone().with_payload(payload).unwrap();
@@ -141,9 +143,9 @@ fn a_payload_is_as_a_heavier_last_link() {
     let q = posture(&arm, &mut Random(5));
     assert_eq!(loaded.gravity_torque(&q), heavy.gravity_torque(&q));
     assert_eq!(loaded.mass_matrix(&q), heavy.mass_matrix(&q));
-    // What hangs 0.2 m beyond the flange is felt at the wrist.
+    // A mass 0.2 m beyond the flange loads the wrist.
     assert!((loaded.gravity_torque(&q)[5] - arm.gravity_torque(&q)[5]).abs() > 0.05);
-    // Every mass 2% lighter: the gravity torque too.
+    // With masses 2% lower the gravity torque is 2% lower.
     let light = loaded.clone().with_mass_scaled(0.98, 0.98).unwrap();
     let (a, b) = (light.gravity_torque(&q), loaded.gravity_torque(&q));
     assert!(a.iter().zip(b.iter()).all(|(a, b)| (a - 0.98 * b).abs() < 1e-12));

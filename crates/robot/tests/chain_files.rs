@@ -1,4 +1,4 @@
-//! Description files: what they say is read, what is wrong is told.
+//! Description files: valid ones are read, errors in others are named.
 
 #![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
@@ -28,14 +28,14 @@ fn mjcf(text: &str) -> Result<SerialArm, Error> {
 }
 
 #[test]
-fn both_formats_give_the_arm_that_they_describe() {
+fn both_formats_give_the_described_arm() {
     let (a, b) = (urdf(URDF).unwrap(), mjcf(MJCF).unwrap());
     for arm in [&a, &b] {
         assert_eq!(arm.dof(), 2);
         let [turn, slide] = arm.segments() else { panic!() };
         assert_eq!((turn.joint.kind, slide.joint.kind), (JointKind::Revolute, JointKind::Prismatic));
         assert_eq!((turn.joint.axis, turn.joint.limits.effort), (DVec3::Z, 40.0));
-        // The box is part of the link that it is fixed to.
+        // The box is part of the link to which it is fixed.
         assert!((turn.mass.mass - 3.0).abs() < 1e-12 && (turn.mass.center.x - 0.5 / 3.0).abs() < 1e-12);
         let q = Joints::new(&[std::f64::consts::FRAC_PI_2, 0.2]).unwrap();
         let tool = arm.frames(&q).flange().translation;
@@ -53,7 +53,7 @@ fn both_formats_give_the_arm_that_they_describe() {
     assert_eq!([joint(1).damping, joint(1).friction, joint(1).armature], [0.7, 0.3, 0.1]);
     assert!((joint(0).limits.position[1] - 120f64.to_radians()).abs() < 1e-15);
     assert_eq!((&b.home()[..], b.gravity().z), (&[0.2, 0.1][..], -9.7));
-    // Without names the only end is not the only one here.
+    // Without names there are several ends.
     let (_folder, path) = write("arm.urdf", URDF);
     assert!(SerialArm::from_urdf(&path, None, None).unwrap_err().to_string().contains("several ends"));
     assert_eq!(SerialArm::from_urdf(&path, Some("a"), Some("tool")).unwrap().dof(), 1);
@@ -61,7 +61,7 @@ fn both_formats_give_the_arm_that_they_describe() {
 }
 
 #[test]
-fn what_is_wrong_is_told() {
+fn errors_are_named() {
     let cases = [
         (r#"<robot name="two">"#, r#"<robots>"#, "expected"),
         (r#"type="prismatic""#, r#"type="planar""#, "planar"),
@@ -70,7 +70,7 @@ fn what_is_wrong_is_told() {
         (r#"<axis xyz="1 0 0"/>"#, r#"<axis xyz="nan 0 0"/>"#, "not a finite number"),
         (r#"<axis xyz="1 0 0"/>"#, r#"<axis xyz="1 0"/>"#, "must have 3"),
         (r#"<axis xyz="1 0 0"/>"#, r#"<mimic joint="j1"/>"#, "mimics"),
-        (r#"name="fix" type="fixed""#, r#"name="fix" type="continuous""#, "branches"),
+        (r#"name="fix" type="fixed""#, r#"name="fix" type="continuous""#, "must not branch"),
         (r#"<mass value="2"/>"#, "", "without <mass>"),
         (r#"<mass value="2"/>"#, r#"<mass value="-2"/>"#, "must be positive"),
         (r#"<mass value="2"/>"#, r#"<mass value="2e999"/>"#, "not a finite number"),
@@ -81,8 +81,8 @@ fn what_is_wrong_is_told() {
         ),
         (r#"ixx="0.01" ixy="0" ixz="0" iyy="0.02""#, r#"ixx="0.01" ixz="0" iyy="0.02""#, "ixy"),
         (r#"<parent link="b"/>"#, r#"<parent link="tool"/>"#, "loop"),
-        (r#"<parent link="b"/>"#, r#"<parent link="bb"/>"#, "no link"),
-        (r#"<child link="box"/>"#, r#"<child link="b"/>"#, "two parents"),
+        (r#"<parent link="b"/>"#, r#"<parent link="bb"/>"#, "not a link"),
+        (r#"<child link="box"/>"#, r#"<child link="b"/>"#, "has two parents"),
         (r#"<link name="tool"/>"#, r#"<link name="tool"/><link name="tool"/>"#, "twice"),
         (r#"lower="-1" upper="2""#, r#"lower="2" upper="-1""#, "limits"),
         (r#"effort="40""#, r#"effort="0""#, "effort"),
@@ -107,14 +107,14 @@ fn what_is_wrong_is_told() {
         (r#"mass="2""#, r#"mass="0""#, "must be positive"),
         (r#"mass="2""#, r#"mass="two""#, "not a finite number"),
         (r#"diaginertia="0.02 0.01 0.025" euler"#, r#"euler"#, "diaginertia"),
-        (r#"euler="0 0 90""#, r#"quat="0 0 0 0""#, "no length"),
-        (r#"<body name="box" pos="0.3 0 0">"#, r#"<body name="box"><joint/>"#, "branches"),
+        (r#"euler="0 0 90""#, r#"quat="0 0 0 0""#, "zero length"),
+        (r#"<body name="box" pos="0.3 0 0">"#, r#"<body name="box"><joint/>"#, "must not branch"),
         (r#"name="tool""#, r#"name="tools""#, "no body or site 'tool'"),
-        (r#"actuatorfrcrange="-40 40""#, r#"actuatorfrcrange="-40 30""#, "both ways"),
+        (r#"actuatorfrcrange="-40 40""#, r#"actuatorfrcrange="-40 30""#, "not symmetric"),
         (r#"range="-60 120""#, r#"range="120 -60""#, "limits"),
         (r#"<joint name="j2""#, r#"<joint name="j3"/><joint name="j2""#, "several joints"),
         (r#"<body name="a">"#, r#"<body name="a" gravcomp="1">"#, "gravcomp"),
-        (r#"angle="degree""#, r#"angle="grad""#, "not understood"),
+        (r#"angle="degree""#, r#"angle="grad""#, "not supported"),
     ];
     for (good, bad, word) in cases {
         assert!(MJCF.contains(good), "{good}");
@@ -127,7 +127,7 @@ fn what_is_wrong_is_told() {
 }
 
 #[test]
-fn files_made_to_hurt_are_refused() {
+fn malicious_files_are_refused() {
     let bomb = format!(
         "<!DOCTYPE robot [<!ENTITY a \"{}\"><!ENTITY b \"{}\">]><robot name=\"&b;\"/>",
         "x".repeat(1000),

@@ -1,4 +1,5 @@
-//! Inverse kinematics: it comes back to reachable poses, says what is missing of others, and is smooth.
+//! Inverse kinematics: it reaches reachable poses, reports the remaining error of others, and is
+//! smooth.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -20,7 +21,7 @@ fn gap(a: &Pose, b: &Pose) -> (f64, f64) {
 }
 
 #[test]
-fn every_reachable_pose_is_reached_again() {
+fn every_reachable_pose_is_reached() {
     let arm = SerialArm::franka_fr3().unwrap();
     let mut rng = Random(21);
     let options = InverseOptions { restarts: 300, ..InverseOptions::default() };
@@ -31,7 +32,7 @@ fn every_reachable_pose_is_reached_again() {
         used += found.iterations;
         near += usize::from(found.reached);
         let off = gap(&target, &arm.frames(&found.q).flange());
-        // What it says is missing is what is missing.
+        // The reported error is the actual error.
         assert!((off.0 - found.translation.length()).abs() < 1e-12);
         arm.posture(&found.q).unwrap();
         if found.reached {
@@ -48,11 +49,11 @@ fn every_reachable_pose_is_reached_again() {
 }
 
 #[test]
-fn from_nearby_no_restart_is_needed_and_it_is_quick() {
+fn a_near_start_needs_no_restart_and_few_iterations() {
     let arm = SerialArm::franka_fr3().unwrap();
     let mut rng = Random(22);
     let options = InverseOptions::default();
-    // A 30 Hz motion of an arm at work: some millimetres and a degree or so a call.
+    // A 30 Hz motion of an arm: some millimetres and about a degree a call.
     let mut q = Joints::new(&[0.0, -0.2, 0.0, -2.2, 0.0, 2.0, 0.0]).unwrap();
     let start = arm.frames(&q).flange();
     let (mut reached, mut iterations, mut calls, mut time, mut jump) = (0, 0, 0, 0.0, 0.0f64);
@@ -80,7 +81,7 @@ fn from_nearby_no_restart_is_needed_and_it_is_quick() {
 }
 
 #[test]
-fn the_elbow_does_not_depend_on_the_way() {
+fn the_elbow_does_not_depend_on_the_path() {
     let arm = SerialArm::franka_fr3().unwrap();
     let mut rng = Random(23);
     let options = InverseOptions { posture_tolerance: 1e-7, iterations: 200, ..InverseOptions::default() };
@@ -95,7 +96,7 @@ fn the_elbow_does_not_depend_on_the_way() {
         assert!(a.reached && b.reached);
         assert!(apart(&a.q, &b.q) < 1e-5, "{:?} {:?}", a.q, b.q);
     }
-    // And goes where it is preferred.
+    // The elbow follows the preferred posture.
     let target = arm.frames(&arm.home()).flange();
     let mut preferred = arm.home();
     preferred[2] += 0.6;
@@ -103,10 +104,10 @@ fn the_elbow_does_not_depend_on_the_way() {
     assert!(found.reached && found.q[2] > 0.1, "{:?}", found.q);
 }
 
-/// A straight line outwards through the reach, to where the arm is stretched and beyond: no joint jumps, the flange stays near, and what is missing
-/// is said.
+/// A straight line outwards through the workspace to the stretched arm and beyond: no joint jumps,
+/// the flange stays near, and the error is reported.
 #[test]
-fn it_is_smooth_to_the_end_of_the_reach_and_beyond() {
+fn it_is_smooth_to_the_end_of_the_workspace_and_beyond() {
     let arm = SerialArm::franka_fr3().unwrap();
     let options = InverseOptions { within: 1.0 / 30.0, ..InverseOptions::default() };
     let mut q = arm.home();
@@ -133,9 +134,9 @@ fn it_is_smooth_to_the_end_of_the_reach_and_beyond() {
 }
 
 #[test]
-fn limits_bind_and_are_told() {
+fn binding_limits_are_reported() {
     let arm = SerialArm::franka_fr3().unwrap();
-    // Turned about the flange's axis far beyond the last joint's range.
+    // Rotated about the flange's axis far beyond the last joint's range.
     let start = arm.frames(&arm.home()).flange();
     let mut q = arm.home();
     let mut bound = false;
@@ -150,7 +151,7 @@ fn limits_bind_and_are_told() {
     let far = Pose { translation: DVec3::new(5.0, 0.0, 0.0), ..start };
     let found = arm.inverse(&far, &arm.home(), &InverseOptions::default()).unwrap();
     assert!(!found.reached && found.translation.length() > 3.0);
-    // Not numbers.
+    // Numbers that are not finite.
     for target in
         [Pose { translation: DVec3::NAN, ..start }, Pose { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..start }]
     {
@@ -164,7 +165,7 @@ fn limits_bind_and_are_told() {
 }
 
 #[test]
-fn arms_of_other_sizes_are_served() {
+fn arms_of_other_sizes_work() {
     let mut rng = Random(24);
     for n in [1, 3, 6, 12] {
         let arm = skewed(n);

@@ -1,5 +1,5 @@
-//! Arms against MuJoCo: kinematics, mass matrix, bias and gravity at random states, and driven motion. Skipped, saying so, where MuJoCo or the
-//! FR3's files are not.
+//! Comparison of arms with MuJoCo: kinematics, mass matrix, bias and gravity in random states, and
+//! driven motion. Skipped, with a message, without MuJoCo or the FR3's files.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -15,7 +15,7 @@ use trocar_robot::chain::{ArmState, Drive, JointKind, JointLimits, Joints, Seria
 
 const STATES: usize = 1000;
 
-/// The Menagerie's FR3, or why there is none.
+/// The Menagerie's FR3; prints why there is none.
 fn menagerie() -> Option<PathBuf> {
     let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/franka_fr3/fr3.xml"));
     if !path.is_file() {
@@ -25,7 +25,7 @@ fn menagerie() -> Option<PathBuf> {
     Some(path.to_owned())
 }
 
-/// The Python with MuJoCo, or why there is none.
+/// The interpreter with MuJoCo; prints why there is none.
 fn python() -> Option<PathBuf> {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
     let imports = Command::new(&python).args(["-c", "import mujoco"]).output();
@@ -56,7 +56,7 @@ fn push(table: &mut String, parts: &[&Joints]) {
     table.push('\n');
 }
 
-/// The largest relative difference of each quantity over random states.
+/// The maximum relative difference of each quantity over random states.
 fn compare(arm: &SerialArm, python: &Path, model: &Path, names: [&str; 2]) -> [f64; 6] {
     let n = arm.dof();
     let mut rng = Random(7);
@@ -108,7 +108,7 @@ fn compare(arm: &SerialArm, python: &Path, model: &Path, names: [&str; 2]) -> [f
     worst
 }
 
-/// Our arm as a file for MuJoCo.
+/// Our arm as an MJCF file.
 fn as_mjcf(arm: &SerialArm) -> String {
     let mut text = String::from("<mujoco><compiler angle=\"radian\"/><worldbody>\n");
     let pose = |p: Pose| {
@@ -153,7 +153,7 @@ fn as_mjcf(arm: &SerialArm) -> String {
 }
 
 #[test]
-fn the_arm_read_from_mjcf_is_mujocos() {
+fn the_arm_read_from_mjcf_equals_mujocos() {
     let (Some(model), Some(python)) = (menagerie(), python()) else { return };
     let arm = SerialArm::from_mjcf(&model, "attachment_site").unwrap();
     assert_eq!(arm.dof(), 7);
@@ -161,10 +161,10 @@ fn the_arm_read_from_mjcf_is_mujocos() {
     assert!(worst.iter().all(|w| *w < 1e-9), "{worst:?}");
 }
 
-/// The built-in table has the manufacturer's inertias, unrounded: exactly against its own figures in MuJoCo, to the Menagerie's rounding
-/// against its file.
+/// The built-in table has the manufacturer's unrounded inertias: it equals its own figures in
+/// MuJoCo exactly, and the Menagerie's file up to rounding.
 #[test]
-fn the_built_in_fr3_is_mujocos() {
+fn the_built_in_fr3_equals_mujocos() {
     let Some(python) = python() else { return };
     let payload = common::rod(0.5, 0.2);
     let base = Pose { rotation: glam::DQuat::from_rotation_y(0.3), translation: DVec3::new(-0.45, 0.1, 0.2) };
@@ -175,7 +175,7 @@ fn the_built_in_fr3_is_mujocos() {
         std::fs::write(&file, as_mjcf(&arm)).unwrap();
         let worst = compare(&arm, &python, &file, [&arm.segments()[6].link, "flange"]);
         assert!(worst.iter().all(|w| *w < 1e-9), "{worst:?}");
-        // And our reader reads what MuJoCo read.
+        // Our reader reads the same as MuJoCo.
         let read = SerialArm::from_mjcf(&file, "flange").unwrap();
         let q = posture(&arm, &mut Random(1));
         let off = (read.frames(&q).flange().translation - arm.frames(&q).flange().translation).length();
@@ -187,7 +187,7 @@ fn the_built_in_fr3_is_mujocos() {
     assert!(worst.iter().all(|w| *w < 1e-4), "{worst:?}");
     let theirs = SerialArm::from_mjcf(&model, "attachment_site").unwrap();
     for (a, b) in arm.segments().iter().zip(theirs.segments()) {
-        // The limits of this version of the file are the manufacturer's; speeds MJCF does not know.
+        // The limits of this version of the file are the manufacturer's. MJCF has no speeds.
         assert_eq!(a.joint.limits.position, b.joint.limits.position);
         assert_eq!(a.joint.limits.effort, b.joint.limits.effort);
         let rest = |j: &trocar_robot::chain::Joint| [j.armature, j.damping, j.friction];
@@ -196,7 +196,7 @@ fn the_built_in_fr3_is_mujocos() {
     assert!(arm.home().iter().zip(theirs.home().iter()).all(|(a, b)| (a - b).abs() < 2e-4), "theirs is rounded");
 }
 
-/// Largest distance of joints over 2 s of the same torques [rad].
+/// Maximum difference of joints over 2 s with the same torques (rad).
 fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str) -> f64 {
     let n = arm.dof();
     let steps = (2.0 / step).round() as usize;
@@ -204,7 +204,7 @@ fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str
     let mut rng = Random(3);
     let start = Joints::from_fn(n, |i| [0.2, -0.3, 0.1, -1.8, 0.3, 1.6, 0.2][i]);
     let qd = noise(n, 0.3, &mut rng);
-    // The torques of a controller that swings the joints about, recorded; then they are played to both.
+    // Records the torques of a controller that swings the joints, then applies them to both.
     let phase: Vec<_> = (0..n).map(|_| (between(&mut rng, 0.5, 1.1), between(&mut rng, 0.0, 6.0))).collect();
     let mut table = String::new();
     push(&mut table, &[&start, &qd]);
@@ -244,10 +244,11 @@ fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str
     off
 }
 
-/// Both semi-implicit Euler with implicit damping and the same step. Without friction they are the same to rounding at 480 Hz. MuJoCo's friction is a soft
-/// constraint, which creeps under a load; it is made as hard as its step allows, at 4,800 Hz.
+/// Both use semi-implicit Euler with implicit damping and the same step. Without friction they
+/// agree to rounding at 480 Hz. MuJoCo's friction is a soft constraint, which creeps under a load;
+/// at 4,800 Hz it is as hard as its step allows.
 #[test]
-fn a_driven_arm_moves_as_mujocos() {
+fn a_driven_arm_moves_like_mujocos() {
     let (Some(model), Some(python)) = (menagerie(), python()) else { return };
     let arm = SerialArm::from_mjcf(&model, "attachment_site").unwrap();
     let damping: Vec<_> = arm.segments().iter().map(|s| s.joint.damping).collect();

@@ -1,4 +1,5 @@
-//! The step: friction that holds, limits that are kept, stiff couplings that do not blow up, the same bits each time.
+//! The step: friction holds, limits are kept, stiff couplings are stable, and the bits are
+//! reproducible.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -15,15 +16,16 @@ fn loaded() -> SerialArm {
     SerialArm::franka_fr3().unwrap().with_payload(rod(0.5, 0.2)).unwrap()
 }
 
-/// Friction of 0.2 N m a joint, nothing viscous, no limits.
+/// Friction of 0.2 N m a joint, without damping and limits.
 fn rough() -> SerialArm {
     loaded().with_friction(&[0.2; 7], &[0.0; 7]).unwrap()
 }
 
 #[test]
-fn friction_holds_what_it_can_without_creeping() {
+fn friction_holds_without_creep() {
     let arm = rough();
-    // A controller that believes the arm 2% lighter asks for too little: where the difference is below friction, nothing moves, to the bit.
+    // A controller with masses 2% too low commands too little torque. If the difference is below
+    // friction, nothing moves at all.
     let believed = arm.clone().with_mass_scaled(0.98, 0.95).unwrap();
     let q = arm.posture(&[0.3, -0.1, 0.2, -1.0, 0.1, 1.0, 0.4]).unwrap();
     let torque = believed.gravity_torque(&q);
@@ -37,7 +39,7 @@ fn friction_holds_what_it_can_without_creeping() {
         assert_eq!(report.stuck.iter().count(), 7);
     }
     assert_eq!(state, ArmState::at_rest(q));
-    // Less friction than what is missing slides.
+    // With less friction than the missing torque the joint slides.
     let slippery = arm.with_friction(&[0.5 * missing; 7], &[0.0; 7]).unwrap();
     for _ in 0..480 {
         slippery.step(&mut state, &Drive { torque, external: slippery.zeros() }, &mut [], DT, 1).unwrap();
@@ -64,9 +66,10 @@ fn a_moving_arm_comes_to_rest_and_stays() {
     assert!(at_rest.is_some());
 }
 
-/// One joint: a spinning wheel slows at friction / inertia, a block on a slope, v(t) = v0 - a t to the step.
+/// One joint: a spinning wheel slows down at friction / inertia; a block on a slope has v(t) = v0 -
+/// a t up to the step.
 #[test]
-fn friction_slows_a_joint_as_coulomb_says() {
+fn friction_slows_a_joint_by_coulombs_law() {
     let arm = skewed(1).with_gravity(DVec3::ZERO).unwrap().with_friction(&[0.3], &[0.0]).unwrap();
     let inertia = arm.mass_matrix(&arm.zeros()).row(0)[0];
     let mut state = ArmState { q: arm.zeros(), qd: Joints::new(&[2.0]).unwrap() };
@@ -125,14 +128,15 @@ fn a_stop_takes_the_speed_and_holds() {
     let report = arm.step(&mut state, &pushed, &mut [], DT, 1).unwrap();
     assert_eq!((state.q[0], state.qd[0]), (2.7437, 0.0));
     assert!(report.at_position_limit.contains(0));
-    // The others, which nothing damps, still swing a little and press through the base.
+    // The other joints are undamped, still swing a little and press through the base.
     assert!((report.resisting[0] + 20.0).abs() < 10.0, "{}", report.resisting[0]);
 }
 
-/// A light arm at a stiff rim: a shaft of 0.5 kg that slides, held to a place by a spring far stiffer than the step could take explicitly.
+/// A light arm at a stiff rim: a sliding shaft of 0.5 kg, held by a spring far too stiff for an
+/// explicit step.
 #[test]
-fn a_stiff_coupling_is_stable_and_right() {
-    // The last joint of the arm slides a link of 0.5 kg.
+fn a_stiff_coupling_is_stable_and_correct() {
+    // The last joint of the arm is prismatic, with a link of 0.5 kg.
     let mut segments = skewed(3).segments().to_vec();
     segments[2].mass = rod(0.5, 0.1);
     let arm = SerialArm::new("light", segments, trocar_core::Pose::IDENTITY).unwrap();
@@ -160,15 +164,15 @@ fn a_stiff_coupling_is_stable_and_right() {
     }
 }
 
-/// Pressed onto a plane with 10 N and drawn along it with less and with more than friction holds.
+/// Pressed onto a plane with 10 N and pulled along it below and above the friction limit.
 #[test]
-fn a_touch_pushes_only_and_its_friction_holds_below_the_limit() {
+fn a_contact_only_pushes_and_its_friction_holds_below_the_limit() {
     let arm = loaded().with_friction(&[0.0; 7], &[1.0; 7]).unwrap();
     const FRICTION: f64 = 0.4;
     for (pull, holds) in [(3.0, true), (5.0, false)] {
         let mut state = ArmState::at_rest(arm.home());
         let ground = arm.frames(&state.q).flange().translation;
-        // The place to which friction's spring goes; it follows when the limit is reached.
+        // The anchor of friction's spring; it slides at the limit.
         let mut anchor = ground;
         let mut last = [0.0; 2];
         let mut start = ground;
@@ -195,7 +199,7 @@ fn a_touch_pushes_only_and_its_friction_holds_below_the_limit() {
                     && couplings[1].force.abs() <= FRICTION * couplings[0].force * (1.0 + 1e-6) + 1e-9
             );
             last = [couplings[0].force, couplings[1].force];
-            // Sliding: the place follows at the limit's length.
+            // Sliding: the anchor follows at the limit's extension.
             let now = arm.frames(&state.q).flange().translation;
             let reach = FRICTION * couplings[0].force / 3e4;
             anchor.x = now.x - (now.x - anchor.x).clamp(-reach, reach);
@@ -214,7 +218,7 @@ fn a_touch_pushes_only_and_its_friction_holds_below_the_limit() {
             assert!(slid > 1e-3);
         }
     }
-    // Off the plane it does nothing.
+    // Above the plane there is no force.
     let mut state = ArmState::at_rest(arm.home());
     let row = arm.frames(&state.q).flange_jacobian().row(DVec3::Z);
     let mut touch = [Coupling::new(row, 1e-3, 1e5, CouplingLaw::Push)];
@@ -229,7 +233,7 @@ fn hash(state: &ArmState) -> u64 {
 }
 
 #[test]
-fn a_run_repeated_has_the_same_bits_also_from_a_snapshot() {
+fn a_repeated_run_has_the_same_bits_also_from_a_snapshot() {
     let arm = loaded();
     let run = |from: ArmState, steps: std::ops::Range<usize>| {
         let mut state = from;
@@ -252,7 +256,7 @@ fn a_run_repeated_has_the_same_bits_also_from_a_snapshot() {
 }
 
 #[test]
-fn what_cannot_be_stepped_is_refused_and_leaves_the_state() {
+fn invalid_steps_are_refused_and_leave_the_state() {
     let arm = loaded();
     let start = ArmState::at_rest(arm.home());
     let still = Drive { torque: arm.zeros(), external: arm.zeros() };
@@ -282,7 +286,8 @@ fn what_cannot_be_stepped_is_refused_and_leaves_the_state() {
     }
 }
 
-/// Prints what a step costs; the bound is that of two arms at 480 Hz under 3% of a core, with room for a busy machine.
+/// Prints the cost of a step. The bound is 3% of a core for two arms at 480 Hz, with a margin for a
+/// busy machine.
 #[test]
 fn a_step_is_cheap() {
     let arm = loaded();
@@ -321,9 +326,10 @@ fn a_step_is_cheap() {
     assert!(share < 0.03, "{share}");
 }
 
-/// Couplings of any stiffness in any number, at random: solved, within what their laws allow, and never won from (no drive, no gravity).
+/// Random couplings of any stiffness and number are solved, obey their laws, and never add energy
+/// (no drive, no gravity).
 #[test]
-fn random_couplings_are_solved_and_give_no_energy() {
+fn random_couplings_are_solved_and_add_no_energy() {
     let arm = loaded().with_gravity(DVec3::ZERO).unwrap();
     let mut rng = Random(31);
     let mut unsolved = 0;
@@ -355,7 +361,7 @@ fn random_couplings_are_solved_and_give_no_energy() {
         }
         let before = arm.energy(&state.q, &state.qd).0;
         let still = Drive { torque: arm.zeros(), external: arm.zeros() };
-        // The mass matrix of the step is that of its beginning.
+        // The mass matrix of the step is that of its start.
         let matrix = arm.mass_matrix(&state.q);
         let bias = arm.bias(&state.q, &state.qd);
         let report = arm.step(&mut state, &Drive { external: bias, ..still }, &mut couplings, DT, 1).unwrap();

@@ -1,6 +1,6 @@
-//! What descriptions show of an arm: every shape on the link that carries it, at its pose, in its colour; what is wrong is told.
+//! Visual shapes in descriptions: each on its link, with pose and colour; errors are named.
 
-#![allow(clippy::unwrap_used, reason = "what tests share may panic")]
+#![allow(clippy::unwrap_used, reason = "helper functions of tests")]
 
 mod common;
 
@@ -28,7 +28,7 @@ fn mjcf(text: &str) -> Result<Vec<Vec<Visual>>, Error> {
 }
 
 #[test]
-fn both_formats_show_the_same() {
+fn both_formats_have_the_same_shapes() {
     let of_mjcf = mjcf(&shown_mjcf()).unwrap();
     for (name, links) in [("urdf", urdf(&shown_urdf()).unwrap()), ("mjcf", of_mjcf)] {
         let counts: Vec<usize> = links.iter().map(Vec::len).collect();
@@ -49,7 +49,7 @@ fn both_formats_show_the_same() {
 }
 
 #[test]
-fn what_is_wrong_names_file_and_place() {
+fn errors_name_file_and_element() {
     let said = |found: Result<Vec<Vec<Visual>>, Error>, words: &[&str]| {
         let said = found.unwrap_err().to_string();
         assert!(words.iter().all(|w| said.contains(w)) && !said.contains('\n'), "{said}");
@@ -85,7 +85,7 @@ fn default_classes_place_geoms() {
 }
 
 #[test]
-fn sizes_are_numbers_and_may_be_longer_than_needed() {
+fn sizes_are_numbers_and_may_have_unused_ones() {
     let ball = |size: &str| mjcf(&shown_mjcf().replace(r#"size="0.05""#, &format!("size=\"{size}\"")));
     assert_eq!(ball("0.05 0 0").unwrap()[0][0].shape, VisualShape::Ball(0.05));
     for (size, word) in [
@@ -111,7 +111,7 @@ fn paths_do_not_leave_their_package() {
 }
 
 #[test]
-fn packages_lie_beside_the_file_or_above_it() {
+fn packages_are_found_beside_the_file_or_above_it() {
     let folder = tempfile::tempdir().unwrap();
     let package = folder.path().join("two_description");
     std::fs::create_dir_all(package.join("urdf")).unwrap();
@@ -124,7 +124,7 @@ fn packages_lie_beside_the_file_or_above_it() {
 }
 
 #[test]
-fn every_link_of_the_menageries_fr3_shows_its_meshes() {
+fn every_link_of_the_menageries_fr3_has_its_meshes() {
     let file = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data/franka_fr3/fr3.xml"));
     if !file.is_file() {
         println!("skipped: no {}", file.display());

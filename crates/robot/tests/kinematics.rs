@@ -1,4 +1,4 @@
-//! Coordinates to poses and back, and what a wanted pose leaves over.
+//! Poses from coordinates and back, and rejected parts of wanted poses.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -37,10 +37,10 @@ fn angle(q: DQuat) -> f64 {
 }
 
 #[test]
-fn a_thousand_coordinates_go_there_and_back() {
+fn a_thousand_coordinates_survive_a_round_trip() {
     let (port, limits, mut random_numbers) = (port(), limits(), Random(1));
     let mut instrument = Instrument::grasper();
-    // A mount that is nothing special.
+    // A general mount.
     instrument.mount.rotation = DQuat::from_rotation_x(0.4) * DQuat::from_rotation_z(1.1);
     instrument.mount.translation = DVec3::new(0.03, -0.02, 0.05);
     for _ in 0..1000 {
@@ -81,13 +81,13 @@ fn the_jacobian_is_the_derivative() {
 }
 
 #[test]
-fn what_the_port_does_not_allow_is_told_and_not_dropped() {
+fn rejected_parts_are_reported() {
     let (port, limits, mut random_numbers) = (port(), limits(), Random(3));
     let instrument = Instrument::grasper();
     for _ in 0..1000 {
         let c = random(&mut random_numbers, &limits);
         let reached = port.tip(&c);
-        // A turn across the shaft is what the port rejects.
+        // The port rejects a rotation across the shaft.
         let along = reached.rotation * DVec3::X;
         let across = random_numbers.vector().cross(along).normalize() * random_numbers.between(0.0, 3.1);
         let wanted = Pose { rotation: (DQuat::from_scaled_axis(across) * reached.rotation).normalize(), ..reached };
@@ -96,7 +96,7 @@ fn what_the_port_does_not_allow_is_told_and_not_dropped() {
         assert!(off(&s.coordinates, &c) < 1e-9 && !s.excess.any());
     }
     for _ in 0..1000 {
-        // Anything at all: what was reached and what was rejected make what was wanted.
+        // Any pose: the reached and the rejected part add up to the wanted pose.
         let wanted =
             Pose { rotation: random_numbers.rotation(), translation: port.centre() + 0.3 * random_numbers.vector() };
         let near = random(&mut random_numbers, &limits);
@@ -113,7 +113,7 @@ fn what_the_port_does_not_allow_is_told_and_not_dropped() {
 }
 
 #[test]
-fn out_of_reach_the_nearest_point_is_taken_and_moves_smoothly() {
+fn out_of_reach_the_nearest_point_is_used_and_moves_smoothly() {
     let (port, limits) = (port(), limits());
     let instrument = Instrument::grasper();
     let near = Coordinates { insertion: 0.1, ..Coordinates::default() };
@@ -133,7 +133,8 @@ fn out_of_reach_the_nearest_point_is_taken_and_moves_smoothly() {
             let q = l * DVec3::new(tilt.sin() * to.cos(), tilt.sin() * to.sin(), tilt.cos());
             assert!(s.rejected_translation.length() <= (q - p).length() + 1e-12, "{p} {q}");
         }
-        // 10 um on, the answer has moved no farther, but for the turn about the axis where the wanted point is nearer to it.
+        // After 10 um the result has moved no farther, except for the rotation about the axis if
+        // the wanted point is nearer to it.
         let next = solve(p + DVec3::new(1e-5, -0.5e-5, 0.5e-5));
         let across = p.truncate().length();
         let widest = 0.35 * 0.55;
@@ -142,7 +143,7 @@ fn out_of_reach_the_nearest_point_is_taken_and_moves_smoothly() {
             assert!((next.tip.translation - s.tip.translation).length() < most, "{p}");
         }
     }
-    // Which limit binds and by how much.
+    // The binding limit and its excess.
     let s = solve(DVec3::new(0.0, 0.0, 0.5));
     assert_eq!(s.excess.binding().map(|b| b.0).collect::<Vec<_>>(), ["insertion"]);
     assert!((s.excess.insertion - (0.5 - limits.insertion[1])).abs() < 1e-12);
@@ -151,7 +152,7 @@ fn out_of_reach_the_nearest_point_is_taken_and_moves_smoothly() {
 }
 
 #[test]
-fn the_roll_does_not_jump_where_it_wraps() {
+fn the_roll_does_not_jump_at_half_a_turn() {
     let port = port();
     let instrument = Instrument::grasper();
     let limits = Limits { roll: [-10.0, 10.0], ..limits() };
@@ -176,13 +177,13 @@ fn a_shaft_beside_the_centre_is_measured() {
         flange.translation += port.pose.rotation * beside.extend(0.0);
         let m = port.measure(&instrument, &flange, c.jaw).unwrap();
         assert!((m.offset - beside).length() < 1e-14 && off(&m.coordinates, &c) < 1e-12);
-        // The deviation is in the port's plane, not the least distance to the axis.
+        // The deviation is in the port's plane, not the minimum distance to the axis.
         assert!((m.deviation() - beside.length()).abs() < 1e-14);
     }
 }
 
 #[test]
-fn rates_are_those_of_the_measured_coordinates() {
+fn rates_are_the_derivatives_of_measured_coordinates() {
     let (port, limits) = (port(), limits());
     let mut random_numbers = Random(6);
     let mut instrument = Instrument::grasper();
@@ -222,13 +223,13 @@ fn bad_input_gives_errors() {
     assert!(port.solve(&instrument, &limits, &pose, &lost).is_err());
     let empty = Limits { insertion: [0.2, 0.1], ..limits };
     assert!(port.solve(&instrument, &empty, &pose, &near).unwrap_err().to_string().contains("insertion"));
-    // Out of the body, and in the sheet's plane.
+    // Pointing out of the body, and in the sheet's plane.
     for rotation in [DQuat::from_rotation_x(3.0), DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2)] {
         let flange = Pose { rotation: port.pose.rotation * rotation, translation: port.centre() };
         assert!(port.measure(&instrument, &flange, 0.0).unwrap_err().to_string().contains("into the body"));
     }
     assert!(port.measure(&instrument, &nan, 0.0).is_err());
-    // A wanted point at the centre itself goes somewhere.
+    // A wanted point at the centre has a solution.
     let at_centre = Pose { translation: port.centre(), ..pose };
     assert!(port.solve(&instrument, &limits, &at_centre, &near).unwrap().excess.insertion < 0.0);
 }

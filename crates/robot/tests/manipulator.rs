@@ -1,4 +1,4 @@
-//! Controlled arms in their ports: what they do with commands, at rest, under load, and what they say.
+//! Controlled arms in their ports: commands, rest, loads and readings.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -8,7 +8,7 @@ use glam::DVec3;
 use trocar_core::{Pose, Wrench};
 use trocar_robot::chain::Joints;
 use trocar_robot::instrument::Coordinates;
-use trocar_robot::manipulator::{Law, Manipulator, ModelError, Settings, StepReport};
+use trocar_robot::manipulator::{ControllerSettings, Law, Manipulator, ModelError, StepReport};
 use trocar_robot::wrench::LoadModel;
 
 const DT: f64 = 1.0 / 480.0;
@@ -24,7 +24,7 @@ fn rest(m: &mut Manipulator, load: Wrench, seconds: f64, mut each: impl FnMut(&M
     }
 }
 
-/// Sends the tip round its circle in 4 s.
+/// Moves the tip around its circle in 4 s.
 fn circle(m: &mut Manipulator, mut each: impl FnMut(&Manipulator, &StepReport)) {
     let start = m.commanded();
     for k in 0..4 * 480 {
@@ -38,10 +38,10 @@ fn circle(m: &mut Manipulator, mut each: impl FnMut(&Manipulator, &StepReport)) 
 }
 
 #[test]
-fn the_default_meets_the_papers_figures() {
+fn the_default_reaches_the_papers_figures() {
     for side in 0..2 {
-        let mut m = cell(side, Settings::default());
-        // Gravity's error shows at once: let it settle as a start pose is settled.
+        let mut m = cell(side, ControllerSettings::default());
+        // The gravity error acts at once: let it settle.
         rest(&mut m, Wrench::default(), 1.0, |_, _| {});
         let (mut squares, mut deviations) = (0.0, Vec::new());
         circle(&mut m, |m, r| {
@@ -60,10 +60,10 @@ fn the_default_meets_the_papers_figures() {
 }
 
 #[test]
-fn droop_without_integral_action_is_that_of_the_hand_computation() {
+fn droop_without_integral_action_equals_the_analytic_value() {
     for law in [Law::JointImpedance, Law::ComputedTorque] {
         let error = ModelError { friction: Some(0.0), ..ModelError::default() };
-        let mut settings = Settings { law, error, ..Settings::default() };
+        let mut settings = ControllerSettings { law, error, ..ControllerSettings::default() };
         settings.gains.bandwidth = 60.0;
         let mut m = cell(0, settings);
         let began = m.measured_js().position;
@@ -86,10 +86,10 @@ fn droop_without_integral_action_is_that_of_the_hand_computation() {
 }
 
 #[test]
-fn friction_makes_no_limit_cycle() {
+fn friction_causes_no_limit_cycle() {
     for side in 0..2 {
         for law in [Law::ComputedTorque, Law::Integral, Law::Observer, Law::RcmImpedance] {
-            let mut m = cell(side, Settings { law, ..Settings::default() });
+            let mut m = cell(side, ControllerSettings { law, ..ControllerSettings::default() });
             circle(&mut m, |_, _| {});
             rest(&mut m, Wrench::default(), 5.0, |_, _| {});
             let at = m.measured_cp().translation;
@@ -106,11 +106,11 @@ fn friction_makes_no_limit_cycle() {
 
 #[test]
 fn torques_keep_their_limits_and_their_rate() {
-    let mut m = cell(1, Settings::default());
+    let mut m = cell(1, ControllerSettings::default());
     let mut last = m.measured_js().effort;
     let mut random = Random(3);
     for k in 0..4800 {
-        // Pushes that no controller can hold.
+        // Forces that no controller can hold.
         let load = if k % 480 < 30 {
             Wrench { force: 60.0 * random.vector(), torque: DVec3::ZERO }
         } else {
@@ -141,7 +141,7 @@ fn somewhere(m: &Manipulator, random: &mut Random) -> Coordinates {
     l.clamp(&coordinates).0
 }
 
-/// What a run leaves, as bits.
+/// The bits of a state.
 fn digest(m: &Manipulator) -> Vec<u64> {
     let (js, cf) = (m.measured_js(), m.measured_cf());
     let all = js.position.iter().chain(js.velocity.iter()).chain(js.effort.iter()).copied();
@@ -149,14 +149,14 @@ fn digest(m: &Manipulator) -> Vec<u64> {
 }
 
 #[test]
-fn ten_thousand_random_commands_break_nothing() {
+fn ten_thousand_random_commands_keep_limits() {
     let (mut worst, mut short) = (0.0_f64, 0);
     for side in 0..2 {
-        let (mut m, mut random) = (cell(side, Settings::default()), Random(5 + side as u64));
+        let (mut m, mut random) = (cell(side, ControllerSettings::default()), Random(5 + side as u64));
         for command in 0..5000 {
             let said = m.servo_cp(&somewhere(&m, &mut random)).unwrap();
             short += usize::from(said.reach < 1.0);
-            // Most are overtaken by the next, some are carried out.
+            // Most are replaced by the next, some are completed.
             let frames = if command % 50 == 0 { 20 } else { 1 };
             for _ in 0..16 * frames {
                 let report = m.step(Wrench::default(), DT).unwrap();
@@ -180,7 +180,7 @@ fn ten_thousand_random_commands_break_nothing() {
 }
 
 #[test]
-fn the_same_commands_give_the_same_bits_and_a_state_goes_on_to_the_bit() {
+fn the_same_commands_give_the_same_bits_also_from_a_restored_state() {
     let run = |m: &mut Manipulator, seed: u64| {
         let mut random = Random(seed);
         for _ in 0..40 {
@@ -191,7 +191,7 @@ fn the_same_commands_give_the_same_bits_and_a_state_goes_on_to_the_bit() {
         }
         digest(m)
     };
-    let (mut one, mut two) = (cell(0, Settings::default()), cell(0, Settings::default()));
+    let (mut one, mut two) = (cell(0, ControllerSettings::default()), cell(0, ControllerSettings::default()));
     assert_eq!(run(&mut one, 1), run(&mut two, 1));
     let state = one.state();
     let later = run(&mut one, 2);
@@ -203,7 +203,7 @@ fn the_same_commands_give_the_same_bits_and_a_state_goes_on_to_the_bit() {
 
 #[test]
 fn illegal_commands_are_refused_and_change_nothing() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let before = m.clone();
     for k in 0..5 {
         for bad in [f64::NAN, f64::INFINITY] {
@@ -229,26 +229,29 @@ fn illegal_commands_are_refused_and_change_nothing() {
     assert!(m.step(Wrench { force: DVec3::splat(f64::MAX), torque: DVec3::ZERO }, DT).is_err());
     assert!(m == before);
     let wide = Coordinates { pivots: [0.0, 0.6], ..start(0) };
-    let new = |start| Manipulator::new(m.arm().clone(), m.instrument().clone(), *m.port(), Settings::default(), start);
+    let new = |start| {
+        Manipulator::new(m.arm().clone(), m.instrument().clone(), *m.port(), ControllerSettings::default(), start)
+    };
     assert!(new(wide).unwrap_err().to_string().contains("tilt"));
     let far = m.arm().clone().with_base(Pose::IDENTITY).unwrap();
     let far = far.with_base(Pose { translation: DVec3::new(-2.0, 0.0, 0.0), ..Pose::IDENTITY }).unwrap();
-    let said = Manipulator::new(far, m.instrument().clone(), *m.port(), Settings::default(), start(0)).unwrap_err();
-    assert!(said.to_string().contains("mm from its place"), "{said}");
+    let said =
+        Manipulator::new(far, m.instrument().clone(), *m.port(), ControllerSettings::default(), start(0)).unwrap_err();
+    assert!(said.to_string().contains("mm from its pose"), "{said}");
 }
 
 #[test]
-fn what_is_beyond_limits_or_reach_is_cut_and_told() {
-    let mut m = cell(0, Settings::default());
+fn parts_beyond_limits_or_reach_are_cut_and_reported() {
+    let mut m = cell(0, ControllerSettings::default());
     let said = m.servo_cp(&Coordinates { insertion: 0.9, jaw: 2.0, ..start(0) }).unwrap();
     assert!(said.excess.insertion > 0.5 && said.excess.jaw == 1.0 && said.coordinates.jaw == 1.0);
     assert_eq!(said.coordinates, m.commanded());
-    // A turn about an axis across the shaft is none of its degrees of freedom.
+    // A rotation about an axis across the shaft is not a degree of freedom.
     let tip = m.measured_cp();
     let turned = Pose { rotation: tip.rotation * glam::DQuat::from_rotation_z(0.3), ..tip };
     let said = m.servo_tip(&turned, 0.5).unwrap();
     assert!((said.rejected_rotation.length() - 0.3).abs() < 1e-6 && said.rejected_translation.length() < 1e-9);
-    // The wrist does not turn that far.
+    // The wrist does not rotate that far.
     let said = m.servo_cp(&Coordinates { roll: 2.7, ..start(0) }).unwrap();
     assert!(said.reach < 1.0 && said.coordinates.roll < 2.7 && said.excess == Default::default());
     rest(&mut m, Wrench::default(), 4.0, |_, r| assert!(r.rcm_deviation < 1e-3));
@@ -256,8 +259,8 @@ fn what_is_beyond_limits_or_reach_is_cut_and_told() {
 }
 
 #[test]
-fn a_steady_command_is_followed_at_its_lag() {
-    let mut m = cell(0, Settings::default());
+fn a_steady_command_is_followed_with_its_lag() {
+    let mut m = cell(0, ControllerSettings::default());
     let at = |t: f64| Coordinates { insertion: 0.1 + 0.03 * t, ..start(0) };
     for k in 0..480 {
         if k % 16 == 0 {
@@ -276,15 +279,15 @@ fn a_steady_command_is_followed_at_its_lag() {
 }
 
 #[test]
-fn joints_are_commanded_too_and_the_shaft_comes_back_to_the_centre() {
-    let mut m = cell(0, Settings::default());
+fn after_joint_commands_the_shaft_returns_to_the_centre() {
+    let mut m = cell(0, ControllerSettings::default());
     let began = m.measured_js().position;
     let target: Vec<f64> = began.iter().enumerate().map(|(i, q)| q + if i == 6 { 0.3 } else { 0.0 }).collect();
     m.servo_jp(&target).unwrap();
     rest(&mut m, Wrench::default(), 2.0, |_, _| {});
     let off = m.measured_js().position.iter().zip(&target).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
     assert!(off < 5e-4, "{off}");
-    // The last joint turns the shaft about itself.
+    // The last joint rotates the shaft about its axis.
     assert!((m.coordinates().0.roll - 0.3).abs() < 1e-3 && m.rcm_deviation() < 2e-4);
     m.servo_cp(&start(0)).unwrap();
     rest(&mut m, Wrench::default(), 3.0, |_, _| {});
@@ -292,13 +295,13 @@ fn joints_are_commanded_too_and_the_shaft_comes_back_to_the_centre() {
 }
 
 #[test]
-fn a_thick_sheet_leans_on_the_shaft_and_other_steps_give_the_same_motion() {
-    // 2 mm of sheet leave 0.04 mm at 18.3 degrees: the shaft rubs on its rim wherever it goes.
-    let thin = cell(1, Settings::default());
+fn a_thick_sheet_is_in_contact_and_other_steps_give_the_same_motion() {
+    // A sheet of 2 mm leaves 0.04 mm at 18.3 degrees: the shaft slides on its rim everywhere.
+    let thin = cell(1, ControllerSettings::default());
     let port = trocar_robot::port::Port { thickness: 2e-3, ..*thin.port() };
     let new = || {
         let arm = thin.arm().clone();
-        Manipulator::new(arm, thin.instrument().clone(), port, Settings::default(), start(1)).unwrap()
+        Manipulator::new(arm, thin.instrument().clone(), port, ControllerSettings::default(), start(1)).unwrap()
     };
     let run = |rate: usize| {
         let mut m = new();
@@ -320,8 +323,8 @@ fn a_thick_sheet_leans_on_the_shaft_and_other_steps_give_the_same_motion() {
 }
 
 #[test]
-fn a_leap_is_no_jerk() {
-    let mut m = cell(0, Settings::default());
+fn a_jump_of_the_command_is_smoothed() {
+    let mut m = cell(0, ControllerSettings::default());
     m.servo_cp(&Coordinates { insertion: 0.2, pivots: [0.2, 0.0], ..start(0) }).unwrap();
     let mut last = m.setpoint_js().velocity;
     let mut most = 0.0_f64;
@@ -337,7 +340,7 @@ fn a_leap_is_no_jerk() {
 
 #[test]
 fn the_mount_reads_weight_load_and_inertia() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let model = LoadModel::of(m.instrument(), Wrench::default());
     let near = |a: Wrench, b: Wrench| (a.force - b.force).length() + 3.0 * (a.torque - b.torque).length();
     assert!(near(m.measured_cf(), model.reading(m.flange().rotation, m.arm().gravity())) < 1e-12);
@@ -347,7 +350,8 @@ fn the_mount_reads_weight_load_and_inertia() {
     let back = flange.rotation.inverse();
     let touch = Wrench { force: back * push, torque: back * (tip - flange.translation).cross(push) };
     assert!(near(m.measured_cf(), model.reading(flange.rotation, m.arm().gravity()) + touch) < 1e-3);
-    // In motion: an arm without payload that feels the reading at its flange takes the same torques.
+    // In motion: an arm without payload, loaded by the reading at its flange, needs the same
+    // torques.
     let bare = m.arm().clone().with_payload(trocar_robot::chain::MassProperties::NONE).unwrap();
     let (mut before, mut worst, mut inertial) = (m.measured_js(), 0.0_f64, 0.0_f64);
     circle(&mut m, |m, report| {
@@ -373,11 +377,11 @@ fn the_mount_reads_weight_load_and_inertia() {
 
 #[test]
 fn a_step_is_cheap() {
-    let mut m = cell(0, Settings::default());
+    let mut m = cell(0, ControllerSettings::default());
     let began = std::time::Instant::now();
     circle(&mut m, |_, _| {});
     let micros = began.elapsed().as_secs_f64() * 1e6 / 1920.0;
     println!("a step of one manipulator, commands and reference included: {micros:.1} us");
-    // The bar is 25 us on a quiet machine; this one is shared.
+    // The limit is 25 us on an idle machine; this one may be shared.
     assert!(micros < 100.0, "{micros}");
 }

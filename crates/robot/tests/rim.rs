@@ -1,4 +1,4 @@
-//! A shaft in its hole: against points sampled by brute force, against closed forms, and in motion.
+//! A shaft in its hole: compared with sampled points and closed forms, and in motion.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -13,13 +13,13 @@ fn port() -> Port {
     Port::new(DVec3::ZERO, DVec3::Z, DVec3::X).unwrap()
 }
 
-/// A shaft tilted towards `to`, whose axis crosses z = 0 at `at`.
+/// A shaft tilted towards the angle `to`, whose axis crosses z = 0 at `at`.
 fn shaft(tilt: f64, to: f64, at: DVec2) -> Shaft {
     let direction = DVec3::new(tilt.sin() * to.cos(), tilt.sin() * to.sin(), tilt.cos());
     Shaft { base: at.extend(0.0) - 0.2 * direction, direction, radius: RADIUS, length: 0.33 }
 }
 
-/// Distance from the axis of a point, less the radius.
+/// Distance of a point from the axis, minus the radius.
 fn gap(s: &Shaft, q: DVec3) -> f64 {
     (q - s.base).cross(s.direction).length() - s.radius
 }
@@ -48,7 +48,8 @@ fn no_sampled_point_of_the_rim_is_nearer_and_every_contact_is_on_it() {
             let here: Vec<_> = found.iter().filter(|p| (p.point.z - z).abs() < 1e-12).collect();
             let least = here.iter().map(|p| p.gap).fold(f64::INFINITY, f64::min);
             let sampled = gaps.iter().copied().fold(f64::INFINITY, f64::min);
-            // Between samples the rim comes nearer by at most an eighth of the square of their distance times the curvature.
+            // Between samples the rim is nearer by at most an eighth of the squared spacing times
+            // the curvature.
             assert!(least <= sampled + 1e-15 && least > sampled - 5e-9, "{least} {sampled}");
             minima += (0..SAMPLES)
                 .filter(|k| gaps[*k] < gaps[(k + 1) % SAMPLES] && gaps[*k] <= gaps[(k + SAMPLES - 1) % SAMPLES])
@@ -69,7 +70,7 @@ fn no_sampled_point_of_the_rim_is_nearer_and_every_contact_is_on_it() {
     assert!(doubles > 50, "the cases cover shafts between two sides: {doubles}");
 }
 
-/// How far the axis may be moved from the centre along `to` before something is touched.
+/// Distance of the axis from the centre along `to` at first contact.
 fn room(port: &Port, tilt: f64, to: f64) -> f64 {
     let fits =
         |d: f64| port.nearest(&shaft(tilt, 0.0, d * DVec2::from_angle(to))).iter().flatten().all(|p| p.gap >= 0.0);
@@ -82,7 +83,7 @@ fn room(port: &Port, tilt: f64, to: f64) -> f64 {
 }
 
 #[test]
-fn the_room_is_the_papers_clearance() {
+fn the_distance_to_contact_is_the_papers_clearance() {
     for thickness in [0.0, 1e-3] {
         let port = Port { thickness, ..port() };
         for degrees in [0.0, 5.0, 13.3, 18.3, 24.0, 30.0, 33.0_f64] {
@@ -93,7 +94,7 @@ fn the_room_is_the_papers_clearance() {
             }
         }
     }
-    // Across the tilt: (D - d)/2 until the shaft's section is blunter than the hole.
+    // Across the tilt: (D - d)/2 until the shaft's section has a smaller curvature than the hole.
     for degrees in [0.0, 13.3, 18.3, 24.0, 27.0, 30.0, 33.0_f64] {
         let (across, tilt) = (room(&port(), degrees.to_radians(), std::f64::consts::FRAC_PI_2), degrees.to_radians());
         assert!((across - port().clearance_across(RADIUS, tilt)).abs() < 1e-10, "{degrees} {across}");
@@ -103,7 +104,8 @@ fn the_room_is_the_papers_clearance() {
 
 #[test]
 fn an_ellipse_of_sampled_points_agrees() {
-    // The other way round: the shaft's elliptic section in the sheet's plane lies within the hole just when nothing is touched.
+    // The inverse check: the shaft's elliptic section in the sheet's plane is inside the hole
+    // exactly when there is no contact.
     let (port, mut random) = (port(), Random(12));
     let mut inside = 0;
     for _ in 0..2000 {
@@ -124,7 +126,7 @@ fn an_ellipse_of_sampled_points_agrees() {
 }
 
 #[test]
-fn forces_are_the_slope_of_the_springs_energy() {
+fn forces_are_the_gradient_of_the_springs_energy() {
     let port = Port { damping: 0.0, friction: 0.0, thickness: 1e-3, ..port() };
     let energy = |s: &Shaft| {
         let pressed = port.contacts(s, &Twist::default(), &RimState::default());
@@ -175,8 +177,9 @@ fn undamped_contact_gains_no_energy() {
     }
 }
 
-/// A shaft of 0.48 kg that leans on the rim with 2 N, comes to rest for a second and is then pulled along itself by `pull(t)`; its place along itself since
-/// then, at every millisecond of `seconds`.
+/// A shaft of 0.48 kg leans on the rim with 2 N, comes to rest for a second and is then pulled
+/// along itself by `pull(t)` (N). Returns its displacement since then (m), at every millisecond of
+/// `seconds`.
 fn pulled(port: &Port, seconds: usize, pull: impl Fn(f64) -> f64) -> Vec<f64> {
     let (mass, h) = (0.48, 1e-4);
     let (mut s, mut motion, mut state) =
@@ -212,7 +215,7 @@ fn friction_holds_for_a_minute_without_creep_and_slides_above_its_limit() {
 }
 
 #[test]
-fn friction_that_is_shaken_below_its_limit_comes_back() {
+fn friction_shaken_below_its_limit_returns() {
     let places = pulled(&port(), 11, |t| if t < 10.0 { 0.25 * (6.0 * t).sin() } else { 0.0 });
     assert!((places.last().unwrap() - places[10_900]).abs() < 1e-8);
     let amplitude = places[3_000..9_000].iter().fold(0.0_f64, |m, p| m.max(p.abs()));
@@ -220,7 +223,7 @@ fn friction_that_is_shaken_below_its_limit_comes_back() {
 }
 
 #[test]
-fn rows_say_how_forces_change() {
+fn rows_are_the_derivatives_of_forces() {
     let port = port();
     let s = shaft(0.2, 0.3, DVec2::new(6e-4, 0.0));
     let moving = Twist { linear: DVec3::new(0.01, 0.0, 0.0), angular: DVec3::ZERO };
@@ -242,7 +245,7 @@ fn rows_say_how_forces_change() {
 }
 
 #[test]
-fn shafts_that_are_not_in_the_hole_touch_nothing() {
+fn shafts_outside_the_hole_have_no_contact() {
     let port = port();
     let none = |s: Shaft| port.nearest(&s).iter().flatten().count() == 0;
     let s = shaft(0.1, 0.0, DVec2::ZERO);
@@ -250,7 +253,7 @@ fn shafts_that_are_not_in_the_hole_touch_nothing() {
     assert!(none(Shaft { direction: DVec3::X, ..s }), "lies in the sheet");
     assert!(none(Shaft { base: DVec3::NAN, ..s }) && none(Shaft { direction: DVec3::NAN, ..s }));
     assert!(!none(s));
-    // A shaft that was forced through the rim is pushed back in.
+    // A shaft that was forced through the rim is pushed back.
     let through = port.contacts(&shaft(0.1, 0.0, DVec2::new(4e-3, 0.0)), &Twist::default(), &RimState::default());
     assert!(through.on_shaft(DVec3::ZERO).0.x < 0.0);
 }

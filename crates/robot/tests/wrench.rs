@@ -1,4 +1,4 @@
-//! The load at the tool mount: identified within its covariance, and taken off.
+//! The load at the tool mount: identified within its covariance, and compensated.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 mod common;
@@ -44,7 +44,7 @@ fn the_instrument_weighs_4_7_newtons() {
 }
 
 #[test]
-fn estimates_are_as_wrong_as_they_say() {
+fn errors_of_estimates_match_their_covariance() {
     let runs = 400;
     let (mut distance, mut fit, mut weights) = (0.0, 0.0, 0.0);
     let mut said = 0.0;
@@ -64,13 +64,14 @@ fn estimates_are_as_wrong_as_they_say() {
 }
 
 #[test]
-fn what_is_left_is_the_contact_force_within_its_uncertainty() {
+fn the_rest_is_the_contact_force_within_its_uncertainty() {
     let (mut outside, mut count, mut squares) = (0, 0, 0.0);
     for seed in 0..200 {
         let mut random = Random(5000 + seed);
         let load = identify(&weighed(&mut random, STATIC_TILT), &NOISE, GRAVITY).unwrap();
         let mut compensator = Compensator::new(load, NOISE, GRAVITY).unwrap();
-        // The bias drifts between weighing and reset, as strain gauges do: a tare takes it off.
+        // The bias drifts between identification and reset, as in strain gauges: the tare removes
+        // it.
         let drifted = LoadModel { bias: Wrench { force: DVec3::splat(0.7), torque: DVec3::splat(0.02) }, ..truth() };
         let start = DQuat::from_rotation_x(std::f64::consts::PI - 0.23);
         let tare: Vec<_> = (0..30).map(|_| noisy(&mut random, drifted.reading(start, GRAVITY))).collect();
@@ -92,7 +93,7 @@ fn what_is_left_is_the_contact_force_within_its_uncertainty() {
 }
 
 #[test]
-fn turning_about_the_tare_adds_nothing_and_away_from_it_something() {
+fn the_uncertainty_grows_with_the_rotation_since_the_tare() {
     let mut random = Random(3);
     let load = identify(&weighed(&mut random, STATIC_TILT), &NOISE, GRAVITY).unwrap();
     let mut c = Compensator::new(load, NOISE, GRAVITY).unwrap();
@@ -109,7 +110,7 @@ fn turning_about_the_tare_adds_nothing_and_away_from_it_something() {
 }
 
 #[test]
-fn orientations_that_are_too_alike_are_refused() {
+fn too_similar_orientations_are_refused() {
     let read = |o: DQuat| StaticReading { orientation: o, reading: truth().reading(o, GRAVITY) };
     let refused = |poses: &[StaticReading], why: &str| {
         let e = identify(poses, &NOISE, GRAVITY).unwrap_err().to_string();
@@ -118,12 +119,12 @@ fn orientations_that_are_too_alike_are_refused() {
     let good: Vec<_> = static_orientations(54, STATIC_TILT).unwrap().into_iter().map(read).collect();
     refused(&[], "too few");
     refused(&good[..2], "too few");
-    refused(&[good[0]; 54], "too alike");
-    // Turns about the vertical do not change what gravity does.
+    refused(&[good[0]; 54], "too similar");
+    // Rotations about the vertical do not change the effect of gravity.
     let yaw: Vec<_> = (0..54).map(|k| read(DQuat::from_rotation_z(0.1 * f64::from(k)))).collect();
-    refused(&yaw, "too alike");
+    refused(&yaw, "too similar");
     let narrow = static_orientations(54, 1_f64.to_radians()).unwrap().into_iter().map(read).collect::<Vec<_>>();
-    refused(&narrow, "too alike");
+    refused(&narrow, "too similar");
     let mut bad = good.clone();
     bad[7].reading.torque.y = f64::NAN;
     refused(&bad, "pose 7, reading");

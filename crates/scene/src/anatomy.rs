@@ -1,4 +1,5 @@
-//! The organs of a scene: where they come from, what is said otherwise than in the specimen, and how their tissue is stepped.
+//! The organs of a scene: where they come from, what is said otherwise than in the specimen, and
+//! how their tissue is stepped.
 
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -14,7 +15,8 @@ pub struct SpecimenSource {
     /// Specimen folder, relative to the scene file.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub path: Option<String>,
-    /// Built-in phantom: phantom-a, phantom-b (rabbits) or phantom-c (a pig's liver and gallbladder).
+    /// Built-in phantom: phantom-a, phantom-b (rabbits) or phantom-c (a pig's liver and
+    /// gallbladder).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub phantom: Option<String>,
     /// Seed of the phantom's anatomy.
@@ -41,7 +43,8 @@ impl SpecimenSource {
         Self { path: None, phantom: Some(name.to_owned()), seed }
     }
 
-    /// What it names; the folder where both are given, `None` where neither is. A checked scene has exactly one.
+    /// What it names; the folder where both are given, `None` where neither is. A checked scene has
+    /// exactly one.
     pub fn source(&self) -> Option<Source<'_>> {
         match (&self.path, &self.phantom) {
             (Some(path), _) => Some(Source::Folder(path)),
@@ -70,13 +73,13 @@ pub struct MaterialOverride {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(schema_with = "material_models")]
     pub model: Option<MaterialModel>,
-    /// Young's modulus [Pa]; soft tissue has about 12000.
+    /// Young's modulus (Pa); soft tissue has about 12000.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub young_modulus_pa: Option<f64>,
     /// Poisson's ratio, 0 to 0.4999.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub poisson_ratio: Option<f64>,
-    /// Density [kg/m3]; the paper's cell has 1200.
+    /// Density (kg/m3); the paper's cell has 1200.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub density_kg_m3: Option<f64>,
 }
@@ -128,7 +131,8 @@ pub enum PinRule {
         end: PinEnd,
         /// Organ coordinate distance from that end within which every node is held, 0 to 1.
         length: f64,
-        /// Organ coordinate length of the part next to the end in which the lowest nodes are held too.
+        /// Organ coordinate length of the part next to the end in which the lowest nodes are held
+        /// too.
         #[serde(default)]
         band_length: f64,
         /// Share of that part's nodes, lowest first.
@@ -174,9 +178,9 @@ pub enum ScheduleName {
 pub struct Tissue {
     /// Schedule: fast (the default solver), paper or adaptive (Vertex Block Descent).
     pub schedule: ScheduleName,
-    /// Distance at which contact between organs is looked for [mm].
+    /// Distance at which contact between organs is looked for (mm).
     pub contact_offset_mm: f64,
-    /// Distance at which tissue rests on the tips of instruments [mm].
+    /// Distance at which tissue rests on the tips of instruments (mm).
     pub tip_rest_offset_mm: f64,
     /// Coulomb friction of tissue on tissue and of instruments on tissue.
     pub friction: f64,

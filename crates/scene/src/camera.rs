@@ -17,13 +17,14 @@ pub struct CellCamera {
     pub view: View,
     /// What its lens does.
     pub lens: Lens,
-    /// Width and height of the image [px]; the recording's own if its lens is the recording's.
+    /// Width and height of the image (px); the recording's own if its lens is the recording's.
     #[serde(default = "image_size")]
     pub size_px: [u32; 2],
-    /// Width and height of the image that policies get [px].
+    /// Width and height of the image that policies get (px).
     #[serde(default = "policy_size")]
     pub policy_size_px: [u32; 2],
-    /// For an oblique endoscope: the angle from its shaft to the view [degrees]; the shaft points from the view towards the image's top. 0 for any other camera.
+    /// For an oblique endoscope: the angle from its shaft to the view (degrees); the shaft points
+    /// from the view towards the image's top. 0 for any other camera.
     #[serde(default)]
     pub oblique_deg: f64,
     /// It measures depth, too.
@@ -45,16 +46,16 @@ fn policy_size() -> [u32; 2] {
 pub enum View {
     /// From one point to another.
     LookAt {
-        /// Where it is in the cell frame [m].
+        /// Where it is in the cell frame (m).
         eye_m: [f64; 3],
-        /// What is in the image's middle [m].
+        /// What is in the image's middle (m).
         target_m: [f64; 3],
         /// The image's top is towards this direction.
         up: [f64; 3],
     },
     /// A pose in the cell frame.
     Pose {
-        /// Where it is in the cell frame [m].
+        /// Where it is in the cell frame (m).
         position_m: [f64; 3],
         /// Unit quaternion, scalar first.
         rotation_wxyz: [f64; 4],
@@ -80,20 +81,20 @@ impl View {
 pub enum Lens {
     /// A pinhole with the principal point in the middle.
     FieldOfView {
-        /// What it sees from left to right [degrees].
+        /// What it sees from left to right (degrees).
         width_deg: f64,
-        /// What it sees from top to bottom [degrees].
+        /// What it sees from top to bottom (degrees).
         height_deg: f64,
     },
     /// A calibrated camera with OpenCV's distortion.
     Opencv {
-        /// Focal length along x [px].
+        /// Focal length along x (px).
         fx_px: f64,
-        /// Focal length along y [px].
+        /// Focal length along y (px).
         fy_px: f64,
-        /// Principal point, x [px]; the middle of the first pixel is 0.
+        /// Principal point, x (px); the middle of the first pixel is 0.
         cx_px: f64,
-        /// Principal point, y [px].
+        /// Principal point, y (px).
         cy_px: f64,
         /// k1 k2 p1 p2 [k3 [k4 k5 k6]]; none if left out.
         #[serde(default)]
@@ -104,7 +105,8 @@ pub enum Lens {
 }
 
 impl CellCamera {
-    /// Its model; `recording` is the specimen's camera. `None` where that is asked for and there is none, or the numbers make no camera, which a checked scene does not have.
+    /// Its model; `recording` is the specimen's camera. `None` where that is asked for and there is
+    /// none, or the numbers make no camera, which a checked scene does not have.
     pub fn model(&self, recording: Option<&Camera>) -> Option<Camera> {
         let [width, height] = self.size_px.map(|n| n as usize);
         let camera = match &self.lens {
@@ -127,14 +129,16 @@ impl CellCamera {
         camera.validate().is_ok().then_some(camera)
     }
 
-    /// Pose of the endoscope's shaft in the cell frame: the view turned back towards the image's top by the oblique angle, z along the shaft.
+    /// Pose of the endoscope's shaft in the cell frame: the view turned back towards the image's
+    /// top by the oblique angle, z along the shaft.
     pub fn shaft(&self, placement: &Frame) -> Pose {
         let view = self.view.pose(placement);
         let turn = DQuat::from_rotation_x(self.oblique_deg.to_radians());
         Pose { rotation: view.rotation * turn, translation: view.translation }
     }
 
-    /// The paper's three (section IV-D): endoscope, D405 above the port midpoint, and the recording camera.
+    /// The paper's three (section IV-D): endoscope, D405 above the port midpoint, and the recording
+    /// camera.
     pub(crate) fn paper() -> Vec<Self> {
         let camera = |name: &str, view: View, lens: Lens| Self {
             name: name.to_owned(),

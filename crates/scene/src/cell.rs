@@ -1,7 +1,7 @@
 //! The robots of a scene: arms, the ports they work through, and what they hold.
 
 use crate::Start;
-use glam::{DQuat, DVec3};
+use glam::DQuat;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -17,7 +17,7 @@ pub(crate) const SIMPLE: &str = "simple";
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Frame {
-    /// Origin [m].
+    /// Origin (m).
     pub position_m: [f64; 3],
     /// Unit quaternion, scalar first.
     #[serde(default = "no_rotation")]
@@ -68,25 +68,39 @@ impl Side {
 pub struct Arm {
     /// left or right.
     pub name: Side,
+    /// What moves the instrument: dynamics (joint torques, through a port) or ideal (the tip goes
+    /// where it is commanded, within the speed limits of actions; no arm is simulated).
+    #[serde(default, skip_serializing_if = "Drive::is_default")]
+    pub drive: Drive,
     /// franka_fr3, or a URDF (.urdf) or MJCF (.xml, .mjcf) file relative to the scene file.
     #[serde(default = "franka_fr3")]
     pub model: String,
-    /// The link or body in a model file on which the instrument is mounted; the last one if left out.
+    /// The link or body in a model file on which the instrument is mounted; the last one if left
+    /// out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub flange: Option<String>,
-    /// What it looks like in pictures: simple, or a URDF or MJCF file relative to the scene file whose visual meshes are drawn; if left out, those of a model file, and simple shapes for franka_fr3.
+    /// What it looks like in pictures: simple, or a URDF or MJCF file relative to the scene file
+    /// whose visual meshes are drawn; if left out, those of a model file, and simple shapes for
+    /// franka_fr3.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shapes: Option<String>,
-    /// Pose of the base in the cell frame.
-    pub base: Frame,
-    /// Joint angles towards which the elbow is drawn [degrees], as many as the arm has joints; the model's own if left out.
+    /// Pose of the base in the cell frame. An ideal arm has none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub base: Option<Frame>,
+    /// Joint angles towards which the elbow is drawn (degrees), as many as the arm has joints; the
+    /// model's own if left out.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub posture_deg: Vec<f64>,
     /// What drives it.
     #[serde(default)]
     pub controller: Controller,
-    /// Name of the port that it works through.
-    pub port: String,
+    /// Name of the port that it works through. An ideal arm may have none: it then moves freely and
+    /// has no RCM.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub port: Option<String>,
+    /// Direction of the shaft of an arm without a port, towards its tip; straight down if left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direction: Option<[f64; 3]>,
     /// Name of the instrument that it holds.
     pub instrument: String,
     /// Pose of the instrument in the port when an episode starts.
@@ -96,6 +110,24 @@ pub struct Arm {
 
 fn franka_fr3() -> String {
     FRANKA_FR3.to_owned()
+}
+
+/// What moves an instrument.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Drive {
+    /// An arm with a controller, friction and a wrong model of itself, through a port.
+    #[default]
+    Dynamics,
+    /// The tip goes where it is commanded, within the speed limits of actions.
+    Ideal,
+}
+
+impl Drive {
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// The model of an arm.
@@ -110,7 +142,8 @@ pub enum ArmModel<'a> {
 }
 
 impl Arm {
-    /// Its model; `None` where `model` is neither a name nor a file of a known kind, which a checked scene does not have.
+    /// Its model; `None` where `model` is neither a name nor a file of a known kind, which a
+    /// checked scene does not have.
     pub fn source(&self) -> Option<ArmModel<'_>> {
         let ends = |end: &str| self.model.to_ascii_lowercase().ends_with(end);
         match self.model.as_str() {
@@ -121,13 +154,34 @@ impl Arm {
         }
     }
 
-    /// The description, relative to the scene file, whose meshes pictures show; `None` for simple shapes.
+    /// The description, relative to the scene file, whose meshes pictures show; `None` for simple
+    /// shapes.
     pub fn drawn(&self) -> Option<&str> {
         match (self.shapes.as_deref(), self.source()) {
             (Some(SIMPLE), _) => None,
+            // An ideal arm has no links.
+            _ if self.drive == Drive::Ideal => None,
             (Some(file), _) => Some(file),
             (None, Some(ArmModel::Urdf(file) | ArmModel::Mjcf(file))) => Some(file),
             (None, _) => None,
+        }
+    }
+
+    /// An ideal arm without a port: its instrument starts with the pivot of its jaw at `start_m`.
+    pub fn free(name: Side, instrument: &str, start_m: [f64; 3]) -> Self {
+        Self {
+            name,
+            drive: Drive::Ideal,
+            model: franka_fr3(),
+            flange: None,
+            shapes: None,
+            base: None,
+            posture_deg: Vec::new(),
+            controller: Controller::default(),
+            port: None,
+            direction: None,
+            instrument: instrument.to_owned(),
+            start: Start { position_m: Some(start_m), jaw: 1.0, ..Start::default() },
         }
     }
 
@@ -137,12 +191,14 @@ impl Arm {
         Self {
             name,
             model: franka_fr3(),
+            drive: Drive::Dynamics,
             flange: None,
             shapes: None,
-            base: Frame { position_m: [x, 0.0, 0.0], rotation_wxyz: [half, 0.0, 0.0, half] },
+            base: Some(Frame { position_m: [x, 0.0, 0.0], rotation_wxyz: [half, 0.0, 0.0, half] }),
             posture_deg: Vec::new(),
             controller: Controller::default(),
-            port: name.name().to_owned(),
+            port: Some(name.name().to_owned()),
+            direction: None,
             instrument: instrument.to_owned(),
             start,
         }
@@ -155,83 +211,14 @@ impl Arm {
 pub struct Controller {
     /// Its name; `default` is the one that the arm's model comes with.
     pub name: String,
-    /// Gains by name, 0 or more; those left out are the controller's own. Units are the controller's.
+    /// Gains by name, 0 or more; those left out are the controller's own. Units are the
+    /// controller's.
     pub gains: BTreeMap<String, f64>,
 }
 
 impl Default for Controller {
     fn default() -> Self {
         Self { name: "default".to_owned(), gains: BTreeMap::new() }
-    }
-}
-
-/// A hole in the wall, through which an instrument works.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct Port {
-    /// Name.
-    pub name: String,
-    /// Centre in the cell frame [m].
-    pub centre_m: [f64; 3],
-    /// Unit vector out of the body, towards the arm.
-    #[serde(default = "upwards")]
-    pub normal: [f64; 3],
-    /// Diameter of the hole [mm].
-    #[serde(default = "hole")]
-    pub hole_diameter_mm: f64,
-    /// Thickness of the wall [mm]; of a wall of 0 the hole is one edge, as in the paper's formula of the clearance (SPEC K3). One of 2 mm leaves a shaft of 5 mm in 6 mm 19 degrees of tilt.
-    #[serde(default = "sheet")]
-    pub sheet_thickness_mm: f64,
-    /// Diameter of the piece of abdominal wall that pictures show round the hole [mm]; of 0 they show a ring on a holder alone. Nothing but pictures knows of it.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub sheet_diameter_mm: f64,
-}
-
-#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
-fn is_zero(value: &f64) -> bool {
-    *value == 0.0
-}
-
-fn upwards() -> [f64; 3] {
-    [0.0, 0.0, 1.0]
-}
-
-fn hole() -> f64 {
-    6.0
-}
-
-fn sheet() -> f64 {
-    0.0
-}
-
-impl Port {
-    /// A port of the paper's size at `centre_m`.
-    pub(crate) fn paper(side: Side, centre_m: [f64; 3]) -> Self {
-        let name = side.name().to_owned();
-        Self {
-            name,
-            centre_m,
-            normal: upwards(),
-            hole_diameter_mm: hole(),
-            sheet_thickness_mm: sheet(),
-            sheet_diameter_mm: 0.0,
-        }
-    }
-
-    /// Its frame in the cell: origin at the centre, z along the normal, x the cell's x as far as it lies in the wall (the cell's y where it does not).
-    pub fn frame(&self) -> Pose {
-        let z = DVec3::from(self.normal).normalize_or(DVec3::Z);
-        let in_wall = |v: DVec3| v - v.dot(z) * z;
-        let along = if z.x.abs() < 0.99 { in_wall(DVec3::X) } else { in_wall(DVec3::Y) };
-        let x = along.normalize_or(DVec3::X);
-        let rotation = DQuat::from_mat3(&glam::DMat3::from_cols(x, z.cross(x), z));
-        Pose { rotation, translation: self.centre_m.into() }
-    }
-
-    /// Largest tilt of a shaft of `diameter_mm` [rad]: acos(d/D), where it fills the hole (SPEC K3); `None` for a shaft that does not fit.
-    pub fn tilt_limit(&self, diameter_mm: f64) -> Option<f64> {
-        let share = diameter_mm / self.hole_diameter_mm;
-        (share > 0.0 && share < 1.0).then(|| share.acos())
     }
 }
 
@@ -253,25 +240,27 @@ pub struct Instrument {
     pub name: String,
     /// grasper or cutter.
     pub kind: InstrumentKind,
-    /// Diameter of the shaft [mm].
+    /// Diameter of the shaft (mm).
     #[serde(default = "shaft_diameter")]
     pub shaft_diameter_mm: f64,
-    /// Length from the mount to the pivot of the jaw [mm].
+    /// Length from the mount to the pivot of the jaw (mm).
     #[serde(default = "shaft_length")]
     pub shaft_length_mm: f64,
-    /// Length of the blades beyond the pivot [mm].
+    /// Length of the blades beyond the pivot (mm).
     #[serde(default = "blade_length")]
     pub blade_length_mm: f64,
-    /// Mass with its motor [kg]; the paper's weighs 4.7 N.
+    /// Mass with its motor (kg); the paper's weighs 4.7 N.
     #[serde(default = "instrument_mass")]
     pub mass_kg: f64,
-    /// Centre of mass from the mount, along the instrument's axes; z runs along the shaft towards the tip [mm].
+    /// Centre of mass from the mount, along the instrument's axes; z runs along the shaft towards
+    /// the tip (mm).
     #[serde(default = "centre_of_mass")]
     pub centre_of_mass_mm: [f64; 3],
-    /// Full angle between the open blades [degrees].
+    /// Full angle between the open blades (degrees).
     #[serde(default = "jaw_max_angle")]
     pub jaw_max_angle_deg: f64,
-    /// Force with which the jaws close [N]; 0.5 if left out, for a cutter too. The paper's cutter has 20.
+    /// Force with which the jaws close (N); 0.5 if left out, for a cutter too. The paper's cutter
+    /// has 20.
     #[serde(default = "jaw_force")]
     pub jaw_force_n: f64,
     /// Pose of the mount in the flange's frame.
@@ -307,7 +296,9 @@ fn jaw_force() -> f64 {
     0.5
 }
 
-/// Force of the paper's cutter [N]. Tissue between blades stiffens without end as they close, so a grasper's half a newton stops short of closed in thick or stiff tissue; laparoscopic scissors close with tens.
+/// Force of the paper's cutter (N). Tissue between blades stiffens without end as they close, so a
+/// grasper's half a newton stops short of closed in thick or stiff tissue; laparoscopic scissors
+/// close with tens.
 const CUTTER_FORCE_N: f64 = 20.0;
 
 impl Instrument {
@@ -334,7 +325,7 @@ impl Instrument {
         }
     }
 
-    /// From the mount to the tip of the closed blades [m].
+    /// From the mount to the tip of the closed blades (m).
     pub fn length(&self) -> f64 {
         1e-3 * (self.shaft_length_mm + self.blade_length_mm)
     }
@@ -348,7 +339,7 @@ pub struct GravityError {
     pub link_mass_share: f64,
     /// Share by which the instrument is believed lighter than it is.
     pub instrument_mass_share: f64,
-    /// Coulomb friction in each joint that the controller knows nothing of [N m].
+    /// Coulomb friction in each joint that the controller knows nothing of (N m).
     pub joint_friction_nm: f64,
 }
 

@@ -1,10 +1,14 @@
 //! Scene files: the whole cell in one TOML file, checked before anything is built from it.
 //!
-//! A [`Scene`] says which specimen lies where, how its tissue is stepped, which arms hold which instruments through which ports, what the cameras see, and what the task asks for.
-//! [`Scene::read`] takes a file or the name of a built-in scene, refuses unknown keys and values that cannot be meant, and says in one line where and why.
+//! A [`Scene`] says which specimen lies where, how its tissue is stepped, which arms hold which
+//! instruments through which ports, what the cameras see, and what the task asks for.
+//! [`Scene::read`] takes a file or the name of a built-in scene, refuses unknown keys and values
+//! that cannot be meant, and says in one line where and why.
 //!
-//! One rule for units: a key ends in its unit. Where things are in the cell is in metres (`_m`); how large things are and how far they may go is in millimetres (`_mm`);
-//! angles are in degrees (`_deg`), pressures in pascals (`_pa`), forces in newtons (`_n`). Shares, organ coordinates and jaw openings run from 0 to 1 and have no unit.
+//! One rule for units: a key ends in its unit. Where things are in the cell is in metres (`_m`);
+//! how large things are and how far they may go is in millimetres (`_mm`); angles are in degrees
+//! (`_deg`), pressures in pascals (`_pa`), forces in newtons (`_n`). Shares, organ coordinates and
+//! jaw openings run from 0 to 1 and have no unit.
 
 mod anatomy;
 mod builtin;
@@ -13,6 +17,7 @@ mod cell;
 mod check;
 mod error;
 mod phantoms;
+mod port;
 mod read;
 mod scene;
 mod schema;
@@ -25,9 +30,10 @@ pub use anatomy::{
 };
 pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
-pub use cell::{Arm, ArmModel, Controller, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Port, Side};
+pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Side};
 pub use error::{Error, Result};
 pub use phantoms::{PHANTOMS, Phantom};
-pub use scene::{Rates, Scene};
+pub use port::Port;
+pub use scene::{Rates, Scene, Tool};
 pub use start::Start;
 pub use task::{Gates, GraspDesignName, Safety, Task, TaskName, Variation};

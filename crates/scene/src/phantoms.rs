@@ -1,6 +1,7 @@
 //! The phantoms that a scene may name, with their organs.
 //!
-//! Kept here and not asked of the crate that films them, so that a cell does not depend on recordings; a test holds the two together.
+//! Kept here and not asked of the crate that films them, so that a cell does not depend on
+//! recordings; a test holds the two together.
 
 /// A phantom as scenes know it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,14 +6,16 @@ use std::io::Read;
 use std::path::Path;
 use trocar_specimen::{Specimen, line_of, nearest, parse_toml};
 
-/// Largest scene file [bytes]; the paper's has about 8,000.
+/// Largest scene file (bytes); the paper's has about 8,000.
 const MOST_BYTES: u64 = 1 << 20;
 
 impl Scene {
-    /// The scene of that path or built-in name, checked whole: what it names by path is there, and what it says of organs is said of organs that the specimen has.
+    /// The scene of that path or built-in name, checked whole: what it names by path is there, and
+    /// what it says of organs is said of organs that the specimen has.
     ///
     /// # Errors
-    /// Names the file, the line and the field, what is wrong and what would be right; see [`Error`].
+    /// Names the file, the line and the field, what is wrong and what would be right; see
+    /// [`Error`].
     pub fn read(path_or_name: &str) -> Result<Self> {
         if Builtin::named(path_or_name).is_some() {
             return Self::builtin(path_or_name);
@@ -69,7 +71,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// Checks a scene that was put together or changed by a program, as [`read`](Self::read) checks a file.
+    /// Checks a scene that was put together or changed by a program, as [`read`](Self::read) checks
+    /// a file.
     ///
     /// # Errors
     /// As [`read`](Self::read), without lines.

@@ -10,8 +10,9 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use xxhash_rust::xxh3::Xxh3;
 
-/// A Trocar scene: the whole two-arm cell. The cell frame is right-handed with z up; its origin is midway between the arms' bases on their mounting plane, x runs from the left base to the
-/// right, y towards the phantom.
+/// A Trocar scene: the whole two-arm cell. The cell frame is right-handed with z up; its origin is
+/// midway between the arms' bases on their mounting plane, x runs from the left base to the right,
+/// y towards the phantom.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scene {
@@ -60,13 +61,24 @@ pub struct Scene {
     pub folder: PathBuf,
 }
 
+/// An arm of a scene with its instrument and its port.
+#[derive(Clone, Copy, Debug)]
+pub struct Tool<'a> {
+    /// The arm.
+    pub arm: &'a Arm,
+    /// The port it works through; `None` for an ideal arm that moves freely.
+    pub port: Option<&'a Port>,
+    /// The instrument it holds.
+    pub instrument: &'a Instrument,
+}
+
 /// How often things happen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Rates {
-    /// Actions and observations a second [Hz].
+    /// Actions and observations a second (Hz).
     pub control_hz: u32,
-    /// Steps of the arms a second [Hz]; a multiple of `control_hz`.
+    /// Steps of the arms a second (Hz); a multiple of `control_hz`.
     pub physics_hz: u32,
 }
 
@@ -83,8 +95,9 @@ impl Rates {
     }
 }
 
-/// The recording camera looks straight down, its image's top away from the arms, such that the middle of phantom A's appendix lies below the ports' midpoint. The phantom's bed, 150 mm
-/// below the camera, is at z = 0.02.
+/// The recording camera looks straight down, its image's top away from the arms, such that the
+/// middle of phantom A's appendix lies below the ports' midpoint. The phantom's bed, 150 mm below
+/// the camera, is at z = 0.02.
 fn placement() -> Frame {
     Frame { position_m: [-0.012, 0.48, 0.17], rotation_wxyz: [0.0, 1.0, 0.0, 0.0] }
 }
@@ -95,7 +108,7 @@ fn arms() -> Vec<Arm> {
 }
 
 fn ports() -> Vec<Port> {
-    vec![Port::paper(Side::Left, [-0.045, 0.46, 0.16]), Port::paper(Side::Right, [0.045, 0.46, 0.16])]
+    vec![Port::paper(Side::Left.name(), [-0.045, 0.46, 0.16]), Port::paper(Side::Right.name(), [0.045, 0.46, 0.16])]
 }
 
 fn instruments() -> Vec<Instrument> {
@@ -103,7 +116,8 @@ fn instruments() -> Vec<Instrument> {
 }
 
 impl Scene {
-    /// The paper's cell around a specimen, with every default; paths start from the working directory.
+    /// The paper's cell around a specimen, with every default; paths start from the working
+    /// directory.
     pub fn new(name: &str, specimen: SpecimenSource) -> Self {
         Self {
             name: name.to_owned(),
@@ -124,7 +138,8 @@ impl Scene {
         }
     }
 
-    /// A path of the scene as the system understands it: relative ones start from the scene file's folder.
+    /// A path of the scene as the system understands it: relative ones start from the scene file's
+    /// folder.
     pub fn resolve(&self, path: &str) -> PathBuf {
         self.folder.join(path)
     }
@@ -139,21 +154,23 @@ impl Scene {
         self.instruments.iter().find(|i| i.name == name)
     }
 
-    /// The arms, the left one first, each with its port and instrument. A checked scene has them all.
-    pub fn stations(&self) -> Vec<(&Arm, &Port, &Instrument)> {
+    /// The arms with what they hold, the left one first. A checked scene has a tool for every arm.
+    pub fn tools(&self) -> Vec<Tool<'_>> {
         let mut all = Vec::new();
         for arm in &self.arms {
-            if let (Some(port), Some(instrument)) = (self.port(&arm.port), self.instrument(&arm.instrument)) {
-                all.push((arm, port, instrument));
+            let port = arm.port.as_deref().map(|name| self.port(name));
+            // A port that is named and missing is a mistake, and not an arm without a port.
+            if let (None | Some(Some(_)), Some(instrument)) = (port, self.instrument(&arm.instrument)) {
+                all.push(Tool { arm, port: port.flatten(), instrument });
             }
         }
-        all.sort_by_key(|(arm, _, _)| arm.name);
+        all.sort_by_key(|tool| tool.arm.name);
         all
     }
 
     /// The first arm, the left one before the right one, whose instrument is of that kind.
     pub fn arm_with(&self, kind: InstrumentKind) -> Option<&Arm> {
-        self.stations().into_iter().find(|(_, _, instrument)| instrument.kind == kind).map(|(arm, _, _)| arm)
+        self.tools().into_iter().find(|tool| tool.instrument.kind == kind).map(|tool| tool.arm)
     }
 
     /// The arm that grasps: see [`PinEnd::Far`](crate::PinEnd::Far).
@@ -161,7 +178,8 @@ impl Scene {
         self.arm_with(InstrumentKind::Grasper)
     }
 
-    /// The scene as TOML with every value, in a fixed order: the same scene always gives the same text.
+    /// The scene as TOML with every value, in a fixed order: the same scene always gives the same
+    /// text.
     ///
     /// # Errors
     /// When a value has no place in TOML; none that a file could hold.
@@ -169,8 +187,10 @@ impl Scene {
         toml::to_string(self).map_err(|e| Error::Write(e.to_string()))
     }
 
-    /// What replays know the scene by: xxh3 of its canonical form and of `contents`, the hashes of what it names by path or as a phantom (the specimen, then the arms' model files in
-    /// order). The description and the specimen folder's path do not count, so that a scene may be explained better and a folder may move.
+    /// What replays know the scene by: xxh3 of its canonical form and of `contents`, the hashes of
+    /// what it names by path or as a phantom (the specimen, then the arms' model files in order).
+    /// The description and the specimen folder's path do not count, so that a scene may be
+    /// explained better and a folder may move.
     ///
     /// # Errors
     /// As [`to_toml`](Self::to_toml).

@@ -6,14 +6,16 @@ use schemars::{Schema, generate::SchemaSettings};
 use serde_json::Value;
 
 impl Scene {
-    /// JSON schema (draft 7, which editors of TOML read) of a scene file. Descriptions have units, and defaults where there are any.
+    /// JSON schema (draft 7, which editors of TOML read) of a scene file. Descriptions have units,
+    /// and defaults where there are any.
     pub fn json_schema() -> Value {
         let settings = SchemaSettings::draft07().with_transform(RecursiveTransform(Defaults));
         settings.into_generator().into_root_schema_for::<Self>().to_value()
     }
 }
 
-/// Says a default in the description, too: editors show descriptions and not all of them show defaults.
+/// Says a default in the description, too: editors show descriptions and not all of them show
+/// defaults.
 #[derive(Clone, Debug)]
 struct Defaults;
 

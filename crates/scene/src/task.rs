@@ -50,12 +50,20 @@ pub struct Task {
     pub name: TaskName,
     /// The organ it is about.
     pub organ: String,
-    /// Longest episode [s].
+    /// Longest episode (s).
     pub episode_s: f64,
     /// How the grasper holds: friction, rest-pose, live-pose or compliant.
     pub grasp: GraspDesignName,
+    /// How the first grasp of an episode holds, where that differs from `grasp`: for tissue that is
+    /// dragged aside, let go of and grasped again.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub first_grasp: Option<GraspDesignName>,
     /// A cut parts the tissue.
     pub sever: bool,
+    /// The episode ends when its last stage has passed. Without, it runs until its time is up or
+    /// the policy has finished.
+    #[serde(skip_serializing_if = "is_true")]
+    pub stop_when_passed: bool,
     /// When stages count as done.
     pub gates: Gates,
     /// How episodes differ by their seed.
@@ -69,11 +77,18 @@ impl Default for Task {
             organ: "appendix".to_owned(),
             episode_s: 40.0,
             grasp: GraspDesignName::default(),
+            first_grasp: None,
             sever: false,
+            stop_when_passed: true,
             gates: Gates::default(),
             variation: Variation::default(),
         }
     }
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 impl Task {
@@ -91,11 +106,11 @@ pub struct Gates {
     pub grasp_from: f64,
     /// Grasp: and at this one or before.
     pub grasp_to: f64,
-    /// Lift: the held cluster's centroid rises by this much [mm] ...
+    /// Lift: the held cluster's centroid rises by this much (mm) ...
     pub lift_mm: f64,
-    /// ... for this long [s].
+    /// ... for this long (s).
     pub lift_s: f64,
-    /// Positioning: the cutter's tip is this near to the tissue between grasp and base [mm].
+    /// Positioning: the cutter's tip is this near to the tissue between grasp and base (mm).
     pub positioning_mm: f64,
     /// Cut: the jaw first opens beyond this (0 closed to 1) ...
     pub cut_open: f64,
@@ -117,21 +132,22 @@ impl Default for Gates {
     }
 }
 
-/// How episodes differ by their seed: each figure is the most that a value goes to either side, all values equally likely. All 0 for the same start every time.
+/// How episodes differ by their seed: each figure is the most that a value goes to either side, all
+/// values equally likely. All 0 for the same start every time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Variation {
-    /// Tilt of the instruments [degrees].
+    /// Tilt of the instruments (degrees).
     pub tilt_deg: f64,
-    /// Azimuth of the instruments [degrees].
+    /// Azimuth of the instruments (degrees).
     pub azimuth_deg: f64,
-    /// Insertion of the instruments [mm].
+    /// Insertion of the instruments (mm).
     pub insertion_mm: f64,
-    /// Roll of the instruments [degrees].
+    /// Roll of the instruments (degrees).
     pub roll_deg: f64,
-    /// Shift of the specimen along the cell's x and along its y [mm].
+    /// Shift of the specimen along the cell's x and along its y (mm).
     pub specimen_shift_mm: f64,
-    /// Turn of the specimen about the vertical [degrees].
+    /// Turn of the specimen about the vertical (degrees).
     pub specimen_turn_deg: f64,
 }
 
@@ -152,11 +168,11 @@ impl Default for Variation {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Safety {
-    /// RCM deviation that episodes are scored against [mm].
+    /// RCM deviation that episodes are scored against (mm).
     pub rcm_threshold_mm: f64,
-    /// RCM deviation at which the hardware stops [mm].
+    /// RCM deviation at which the hardware stops (mm).
     pub rcm_abort_mm: f64,
-    /// Force of tissue on an instrument against which no command pushes it on [N].
+    /// Force of tissue on an instrument against which no command pushes it on (N).
     pub force_limit_n: f64,
 }
 

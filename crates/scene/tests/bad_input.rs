@@ -7,7 +7,8 @@ use trocar_scene::{Builtin, Scene};
 /// Marks, in the changed text, the line that the message names.
 const HERE: char = '§';
 
-/// What is changed in cell-a, into what, and what is then said after the file and the line. Where another line is named than the changed one, it goes before, between two `@`.
+/// What is changed in cell-a, into what, and what is then said after the file and the line. Where
+/// another line is named than the changed one, it goes before, between two `@`.
 struct Case(&'static str, &'static str, &'static str);
 
 fn said(text: &str, folder: &Path) -> String {

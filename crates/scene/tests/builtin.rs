@@ -38,7 +38,9 @@ fn a_minimal_scene_is_three_lines() {
 fn the_papers_clearances() {
     let scene = Scene::builtin("cell-a").unwrap();
     let mut clearances = Vec::new();
-    for (arm, port, instrument) in scene.stations() {
+    for tool in scene.tools() {
+        let (arm, instrument) = (tool.arm, tool.instrument);
+        let Some(port) = tool.port else { panic!("{} has no port", arm.name.name()) };
         let cos = arm.start.tilt_deg.to_radians().cos();
         clearances.push(0.5 * (port.hole_diameter_mm - instrument.shaft_diameter_mm / cos));
         let limit = port.tilt_limit(instrument.shaft_diameter_mm).unwrap().to_degrees();

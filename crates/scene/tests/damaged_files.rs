@@ -1,4 +1,5 @@
-//! Damaged scenes give a scene or a one-line error: never a panic, a hang, or more memory than their size calls for.
+//! Damaged scenes give a scene or a one-line error: never a panic, a hang, or more memory than
+//! their size calls for.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use trocar_scene::{BUILTINS, Scene};

@@ -1,4 +1,5 @@
-//! The schema accepts the scenes, refuses what the reader refuses by form, and says units, defaults and all keys; so does the users' page.
+//! The schema accepts the scenes, refuses what the reader refuses by form, and says units, defaults
+//! and all keys; so does the users' page.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use serde_json::Value;
@@ -56,16 +57,16 @@ fn every_key_is_explained_with_its_unit() {
     assert!(found.len() > 80, "{}", found.len());
     let page = include_str!("../../../docs/guides/scenes.md");
     let units = [
-        ("_mm", "[mm]"),
-        ("_m", "[m]"),
-        ("_deg", "[degrees]"),
-        ("_pa", "[Pa]"),
-        ("_kg", "[kg]"),
-        ("_n", "[N]"),
-        ("_nm", "[N m]"),
-        ("_hz", "[Hz]"),
-        ("_s", "[s]"),
-        ("_px", "[px]"),
+        ("_mm", "(mm)"),
+        ("_m", "(m)"),
+        ("_deg", "(degrees)"),
+        ("_pa", "(Pa)"),
+        ("_kg", "(kg)"),
+        ("_n", "(N)"),
+        ("_nm", "(N m)"),
+        ("_hz", "(Hz)"),
+        ("_s", "(s)"),
+        ("_px", "(px)"),
     ];
     for (key, said) in &found {
         // Tags of enums have no words of their own.

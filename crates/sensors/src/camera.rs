@@ -106,7 +106,12 @@ impl RigCamera {
     /// The overview camera: beyond the specimen, high enough to look into the tray.
     fn outside(scene: &Scene, room: Room) -> Self {
         let n = scene.arms.len().max(1) as f64;
-        let bases = scene.arms.iter().map(|a| DVec3::from(a.base.position_m)).sum::<DVec3>() / n;
+        let bases = scene
+            .arms
+            .iter()
+            .map(|a| DVec3::from(a.base.map_or(a.start.position_m.unwrap_or_default(), |b| b.position_m)))
+            .sum::<DVec3>()
+            / n;
         let away = room.middle - bases;
         let away = DVec3::new(away.x, away.y, 0.0).try_normalize().unwrap_or(DVec3::Y);
         let side = away.cross(DVec3::Z);

@@ -67,8 +67,8 @@ impl CameraRig {
         visible.rebuild()?;
         let room = Room { middle: middle(&placed) };
         let cameras = RigCamera::all(scene, specimen.camera.as_ref(), room, &mut visible.stage)?;
-        for (k, (described, _, instrument)) in scene.stations().iter().enumerate() {
-            visible.add_arm(k, (scene, described), instrument, cell)?;
+        for (k, tool) in scene.tools().iter().enumerate() {
+            visible.add_arm(k, (scene, tool.arm), tool.instrument, cell)?;
         }
         visible.invalidate();
         visible.update(cell)?;

@@ -6,11 +6,10 @@
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use trocar_camera::Camera;
-use trocar_cell::{Action, Cell};
+use trocar_cell::{Action, Cell, Setpoint};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
 use trocar_render::RenderSettings;
-use trocar_robot::instrument::Coordinates;
 use trocar_scene::{Scene, SpecimenSource};
 use trocar_sensors::CameraRig;
 use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
@@ -89,11 +88,13 @@ fn cell_runs_and_draws_arms_described_in_mjcf() {
         let mut cell = Cell::new(scene, &specimen, 1).unwrap();
         for k in 0..15 {
             let deeper = |a: &trocar_cell::ArmObservation| {
-                let insertion = a.commanded.insertion - 4e-4 * f64::from(k % 5);
-                Coordinates { insertion, jaw: 0.8, ..a.commanded }
+                let insertion = a.commanded.0[2] - 4e-4 * f64::from(k % 5);
+                let mut to = a.commanded.with_jaw(0.8);
+                to.0[2] = insertion;
+                to
             };
-            let action: Vec<Coordinates> = cell.observe().iter().map(deeper).collect();
-            let report = cell.step(&Action::pivots(&action)).unwrap();
+            let action: Vec<Setpoint> = cell.observe().iter().map(deeper).collect();
+            let report = cell.step(&Action::targets(&action)).unwrap();
             assert!(report.tissue.divergence.is_none());
         }
         cell

@@ -124,7 +124,7 @@ fn every_camera_sees_the_scene_independent_of_threads() {
     let still = rig.render(&cell, "endoscope", [96, 64], &RenderSettings::preview()).unwrap().clone();
     let action: Vec<_> = cell.observe().iter().map(|a| trocar_cell_coordinates(a, 0.004)).collect();
     for _ in 0..10 {
-        cell.step(&Action::pivots(&action)).unwrap();
+        cell.step(&Action::targets(&action)).unwrap();
     }
     let moved = rig.render(&cell, "endoscope", [96, 64], &RenderSettings::preview()).unwrap().clone();
     assert_ne!(still.labels, moved.labels);
@@ -138,8 +138,10 @@ fn every_camera_sees_the_scene_independent_of_threads() {
     }
 }
 
-fn trocar_cell_coordinates(arm: &trocar_cell::ArmObservation, deeper: f64) -> trocar_robot::instrument::Coordinates {
-    trocar_robot::instrument::Coordinates { insertion: arm.commanded.insertion - deeper, jaw: 1.0, ..arm.commanded }
+fn trocar_cell_coordinates(arm: &trocar_cell::ArmObservation, deeper: f64) -> trocar_cell::Setpoint {
+    let mut to = arm.commanded.with_jaw(1.0);
+    to.0[2] -= deeper;
+    to
 }
 
 #[test]

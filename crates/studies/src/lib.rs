@@ -13,7 +13,7 @@ pub use bench::{
 };
 pub use error::{Error, Result};
 pub use experiment::{
-    AppendixSource, ControllerBars, ControllerFigures, ControllerGridExperiment, ControllerGridResult,
+    AppendixSource, Condition, ControllerBars, ControllerFigures, ControllerGridExperiment, ControllerGridResult,
     ControllerInstant, ControllerRow, ConvergenceCase, ConvergenceExperiment, ConvergenceResult,
     ElementQualityExperiment, ElementQualityResult, ElementQualityRow, GraspDesignRow, GraspDesignsExperiment,
     GraspDesignsResult, GraspTrial, IntegratorRow, IntegratorsExperiment, IntegratorsResult, PaperGrasp, PaperRollouts,

@@ -1,4 +1,5 @@
-//! Channels: one flat row of figures a control period. All gates, sweeps and summaries are functions of these rows alone.
+//! Channels: one flat row of figures a control period. All gates, sweeps and summaries are
+//! functions of these rows alone.
 
 use serde::Serialize;
 
@@ -27,27 +28,27 @@ macro_rules! row {
 row! {
     /// One arm in a period; all zero where the scene has no such arm. Flags are 0 or 1.
     ArmChannels {
-        /// First pivot, measured [rad].
+        /// First pivot, measured (rad); 0 without a port, as the next two.
         pivot_1_rad,
-        /// Second pivot [rad].
+        /// Second pivot (rad).
         pivot_2_rad,
-        /// Port's centre to the jaw's pivot [m].
+        /// Port's centre to the jaw's pivot (m).
         insertion_m,
-        /// Turn about the shaft [rad].
+        /// Turn about the shaft (rad).
         roll_rad,
         /// Jaw opening, 0 closed to 1.
         jaw,
-        /// Rate of the first pivot [rad/s].
+        /// Rate of the first pivot (rad/s).
         pivot_1_rad_s,
-        /// Rate of the second pivot [rad/s].
+        /// Rate of the second pivot (rad/s).
         pivot_2_rad_s,
-        /// Rate of the insertion [m/s].
+        /// Rate of the insertion (m/s).
         insertion_m_s,
-        /// Rate of the roll [rad/s].
+        /// Rate of the roll (rad/s).
         roll_rad_s,
-        /// Rate of the jaw's opening [1/s].
+        /// Rate of the jaw's opening (1/s).
         jaw_1_s,
-        /// Measured tip frame (at the jaw's pivot) in the cell [m].
+        /// Measured tip frame (at the jaw's pivot) in the cell (m).
         tip_x_m,
         /// See [`tip_x_m`](Self::tip_x_m).
         tip_y_m,
@@ -61,33 +62,33 @@ row! {
         tip_qy,
         /// See [`tip_qw`](Self::tip_qw).
         tip_qz,
-        /// Commanded place of the tip frame [m].
+        /// Commanded place of the tip frame (m).
         commanded_x_m,
         /// See [`commanded_x_m`](Self::commanded_x_m).
         commanded_y_m,
         /// See [`commanded_x_m`](Self::commanded_x_m).
         commanded_z_m,
-        /// Distance between the two at the same time: error and lag together [mm].
+        /// Distance between the two at the same time: error and lag together (mm).
         tracking_mm,
-        /// RCM deviation at the period's end [mm].
+        /// RCM deviation at the period's end (mm).
         rcm_mm,
-        /// The largest in the period [mm].
+        /// The largest in the period (mm).
         rcm_peak_mm,
-        /// Angle between shaft and port normal [degrees].
+        /// Angle between shaft and port normal (degrees).
         tilt_deg,
-        /// Contact force on the instrument along the cell's axes [N].
+        /// Contact force on the instrument along the cell's axes (N).
         contact_x_n,
         /// See [`contact_x_n`](Self::contact_x_n).
         contact_y_n,
         /// See [`contact_x_n`](Self::contact_x_n).
         contact_z_n,
-        /// Constraint force of a latched grasp [N].
+        /// Constraint force of a latched grasp (N).
         constraint_x_n,
         /// See [`constraint_x_n`](Self::constraint_x_n).
         constraint_y_n,
         /// See [`constraint_x_n`](Self::constraint_x_n).
         constraint_z_n,
-        /// Force with which tissue pushes the blades apart [N].
+        /// Force with which tissue pushes the blades apart (N).
         jaw_force_n,
         /// The jaws hold tissue of any organ.
         attached,
@@ -95,35 +96,42 @@ row! {
         in_mouth,
         /// Share of the wedge between the blades that it fills.
         mouth_share,
-        /// Rotation that was asked for and that four degrees of freedom cannot do [degrees].
+        /// Rotation that was asked for and that four degrees of freedom cannot do (degrees).
         rejected_deg,
         /// The command stops short of what was asked.
         held_back,
         /// Tissue pushed with more than an arm bears.
         load_limited,
-        /// The instrument passes through tissue that it had crushed or overstretched.
-        unhooked,
+        /// Contact of the instrument with tissue is disabled: it had pierced or strained it.
+        contact_disabled,
+        /// Contact of the blades alone is disabled: they hold tissue that they had strained.
+        blades_disabled,
+        /// The force guard shortened the command.
+        guarded,
     }
 }
 
 row! {
-    /// The task in a period. What concerns tissue in jaws is zero while the grasper holds none of the task's organ. Flags are 0 or 1.
+    /// The task in a period. What concerns tissue in jaws is zero while the grasper holds none of
+    /// the task's organ. Flags are 0 or 1.
     TaskChannels {
-        /// Distance from the middle of the grasper's mouth to the organ's axis where the grasp gate wants it [mm].
+        /// Distance from the middle of the grasper's mouth to the organ's axis where the grasp gate
+        /// wants it (mm).
         grasp_distance_mm,
         /// The grasper holds the task's organ.
         grasped,
         /// Organ coordinate of what it holds.
         grasp_s,
-        /// Rise of the held tissue's centroid since [mm].
+        /// Rise of the held tissue's centroid since (mm).
         lift_mm,
-        /// Rise of the jaws since [mm].
+        /// Rise of the jaws since (mm).
         jaw_lift_mm,
         /// Follow ratio: tissue lift over jaw lift; 0 below 0.1 mm of jaw lift.
         follow,
-        /// Slip [mm].
+        /// Slip (mm).
         slip_mm,
-        /// Distance from the cutter's tip to the nearest tissue between grasp (the gate's upper end while nothing is held) and base [mm].
+        /// Distance from the cutter's tip to the nearest tissue between grasp (the gate's upper end
+        /// while nothing is held) and base (mm).
         position_mm,
         /// Jaw opening of the cutter.
         cut_jaw,
@@ -133,7 +141,8 @@ row! {
         cut_share,
         /// Cuts in the period.
         cuts,
-        /// Largest distance of any arm's blade tip from its first target [mm]; port-reach only, as the next two.
+        /// Largest distance of any arm's blade tip from its first target (mm); port-reach only, as
+        /// the next two.
         reach_1_mm,
         /// From its second.
         reach_2_mm,
@@ -143,7 +152,7 @@ row! {
         torn,
         /// Times that it began to slide.
         slipped,
-        /// Largest node speed [m/s].
+        /// Largest node speed (m/s).
         max_speed_m_s,
         /// Most inverted elements in any frame of the period.
         inverted,
@@ -155,13 +164,22 @@ row! {
         fallbacks,
         /// The tissue diverged.
         diverged,
+        /// Times that contact of an instrument was disabled in the period.
+        disabled_contacts,
+        /// Times that contact of blades alone was disabled.
+        disabled_blades,
+        /// Times that an organ was relaxed outside of time.
+        relaxed,
+        /// Largest motion of any node in the first frame after jaws took hold (mm); 0 where none
+        /// did.
+        activation_step_mm,
     }
 }
 
 /// A row.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Channels {
-    /// Time at the period's end since the episode's start [s].
+    /// Time at the period's end since the episode's start (s).
     pub time_s: f64,
     /// The left arm.
     pub left: ArmChannels,
@@ -175,7 +193,8 @@ impl Channels {
     /// Numbers a row.
     pub const COUNT: usize = 1 + 2 * ArmChannels::NAMES.len() + TaskChannels::NAMES.len();
 
-    /// Whether the episode is lost here: tissue or an arm diverged, or an arm's RCM deviation went beyond `abort_mm`.
+    /// Whether the episode is lost here: tissue or an arm diverged, or an arm's RCM deviation went
+    /// beyond `abort_mm`.
     pub fn is_lost(&self, abort_mm: Option<f64>) -> bool {
         let out = |mm: f64| abort_mm.is_some_and(|most| mm > most);
         self.task.diverged > 0.0 || out(self.left.rcm_peak_mm) || out(self.right.rcm_peak_mm)
@@ -214,12 +233,12 @@ impl Channels {
 }
 
 impl ArmChannels {
-    /// Magnitude of the contact force [N].
+    /// Magnitude of the contact force (N).
     pub fn contact_n(&self) -> f64 {
         glam::DVec3::new(self.contact_x_n, self.contact_y_n, self.contact_z_n).length()
     }
 
-    /// Magnitude of the constraint force [N].
+    /// Magnitude of the constraint force (N).
     pub fn constraint_n(&self) -> f64 {
         glam::DVec3::new(self.constraint_x_n, self.constraint_y_n, self.constraint_z_n).length()
     }

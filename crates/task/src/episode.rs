@@ -1,72 +1,20 @@
-//! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is scored and what happened.
+//! An episode: a scene's cell from a seeded start to an end, with what a policy sees, what is
+//! scored and what happened.
 
+use crate::facts::Facts;
 use crate::measure::Subject;
 use crate::random::Random;
 use crate::stages::Tracker;
 use crate::start::{Arrangement, starts, targets};
-use crate::{Channels, Error, Observation, Progress, Result, Summary, specimen_hash};
-use serde::{Deserialize, Serialize};
-use trocar_cell::{Action, Cell, CellEvent, CellState};
+use crate::{Channels, End, Error, Observation, Progress, Result, Summary, specimen_hash};
+use trocar_cell::{Action, Cell, CellEvent, CellState, Settling};
 use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
 
-/// How long organs settle under gravity before any episode begins [s]: all phantoms are at rest within it (SPEC, settled).
+/// How long organs settle under gravity before any episode begins (s): all phantoms are at rest
+/// within it (SPEC, settled).
 pub const SETTLE_S: f64 = 1.0;
-
-/// How an episode ended.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "end", rename_all = "kebab-case")]
-pub enum End {
-    /// All stages are passed.
-    Passed,
-    /// The scene's time is up.
-    TimeOut,
-    /// The RCM deviation went beyond that at which hardware stops.
-    RcmAbort {
-        /// The arm.
-        arm: String,
-        /// The deviation [mm].
-        deviation_mm: f64,
-    },
-    /// Tissue or an arm is lost.
-    Diverged {
-        /// Why.
-        why: String,
-    },
-    /// The policy gave no action that could be done.
-    PolicyError {
-        /// What was wrong with it.
-        why: String,
-    },
-}
-
-impl End {
-    /// Its name in files.
-    pub fn name(&self) -> &'static str {
-        match self {
-            Self::Passed => "passed",
-            Self::TimeOut => "time-out",
-            Self::RcmAbort { .. } => "rcm-abort",
-            Self::Diverged { .. } => "diverged",
-            Self::PolicyError { .. } => "policy-error",
-        }
-    }
-}
-
-impl std::fmt::Display for End {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Passed => write!(f, "all stages passed"),
-            Self::TimeOut => write!(f, "the time was up"),
-            Self::RcmAbort { arm, deviation_mm } => {
-                write!(f, "the {arm} RCM deviation of {deviation_mm:.2} mm is where hardware stops")
-            }
-            Self::Diverged { why } => write!(f, "diverged: {why}"),
-            Self::PolicyError { why } => write!(f, "the policy failed: {why}"),
-        }
-    }
-}
 
 /// What a step gives.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,18 +63,20 @@ pub struct Episode {
     /// Where the specimen is in `cell`, and the tissue there when it has settled.
     arrangement: Arrangement,
     settled: CellState,
+    settling: Settling,
     now: Now,
 }
 
 impl Episode {
-    /// The episodes of `scene` around `specimen`, stepped by `threads` threads (0: as many as the machine has; results do not depend on them). Builds the models and lets the organs settle once;
-    /// the episode stands at the start of seed 0.
+    /// The episodes of `scene` around `specimen`, stepped by `threads` threads (0: as many as the
+    /// machine has; results do not depend on them). Builds the models and lets the organs settle
+    /// once; the episode stands at the start of seed 0.
     ///
     /// # Errors
     /// A scene without the task's organ or instruments, or one that cannot be built.
     pub fn new(scene: &Scene, specimen: &Specimen, threads: usize) -> Result<Self> {
         let arrangement = Arrangement::default();
-        let (cell, settled) = build(scene, specimen, threads, &arrangement)?;
+        let (cell, settled, settling) = build(scene, specimen, threads, &arrangement)?;
         let now = Now {
             seed: 0,
             subject: Subject::new(&cell, &scene.task.organ, &scene.task.gates, Vec::new()),
@@ -145,6 +95,7 @@ impl Episode {
             cell,
             arrangement,
             settled,
+            settling,
             now,
         };
         made.check()?;
@@ -171,7 +122,8 @@ impl Episode {
         Ok(())
     }
 
-    /// Begins the episode of `seed`: the arms' starts, and where the scene says so the specimen's place, are those of the seed. The same seed gives the same bits, whatever was before. Takes
+    /// Begins the episode of `seed`: the arms' starts, and where the scene says so the specimen's
+    /// place, are those of the seed. The same seed gives the same bits, whatever was before. Takes
     /// milliseconds; a specimen that moves is built and settled anew, which takes seconds.
     ///
     /// # Errors
@@ -179,7 +131,7 @@ impl Episode {
     pub fn reset(&mut self, seed: u64) -> Result<Observation> {
         let arrangement = Arrangement::of(&self.scene, seed);
         if arrangement != self.arrangement {
-            (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &arrangement)?;
+            (self.cell, self.settled, self.settling) = build(&self.scene, &self.specimen, self.threads, &arrangement)?;
             self.arrangement = arrangement;
         }
         let starts = starts(&self.scene, &self.cell, seed);
@@ -203,7 +155,8 @@ impl Episode {
     /// Does one control period.
     ///
     /// # Errors
-    /// An action that cannot be done: nothing has changed, and the caller may try another or [`fail`](Self::fail). An episode that has ended.
+    /// An action that cannot be done: nothing has changed, and the caller may try another or
+    /// [`fail`](Self::fail). An episode that has ended.
     pub fn step(&mut self, action: &Action) -> Result<Step> {
         if let Some(end) = &self.now.end {
             return Err(Error::Ended(end.to_string()));
@@ -211,13 +164,16 @@ impl Episode {
         let report = match self.cell.step(action) {
             Ok(report) => report,
             Err(refused @ trocar_cell::Error::Action { .. }) => return Err(refused.into()),
-            // An arm whose numbers are lost: the last row that was right again, but for the time, that it diverged, and that nothing happened.
+            // An arm whose numbers are lost: the last row that was right again, but for the time,
+            // that it diverged, and that nothing happened.
             Err(lost) => {
                 self.now.end = Some(End::Diverged { why: lost.to_string() });
                 let mut channels = self.now.rows.last().copied().unwrap_or_default();
                 channels.time_s += self.cell.period();
                 let task = &mut channels.task;
                 (task.diverged, task.cuts, task.torn, task.yielded) = (1.0, 0.0, 0.0, 0.0);
+                (task.disabled_contacts, task.disabled_blades, task.relaxed) = (0.0, 0.0, 0.0);
+                task.activation_step_mm = 0.0;
                 self.now.rows.push(channels);
                 let (progress, end) = (self.progress().clone(), self.now.end.clone());
                 return Ok(Step { channels, progress, end, events: Vec::new() });
@@ -233,10 +189,10 @@ impl Episode {
             Some(End::Diverged { why: why.to_string() })
         } else if let Some(arm) = abort {
             Some(End::RcmAbort { arm: arm.side.name().to_owned(), deviation_mm: 1e3 * arm.rcm_peak })
-        } else if self.now.tracker.progress().passed() {
+        } else if self.now.tracker.progress().passed() && self.scene.task.stop_when_passed {
             Some(End::Passed)
         } else if report.time >= self.scene.task.episode_s - 0.5 * self.cell.period() {
-            Some(End::TimeOut)
+            Some(if self.now.tracker.progress().passed() { End::Passed } else { End::TimeOut })
         } else {
             None
         };
@@ -244,6 +200,13 @@ impl Episode {
         self.now.events.extend(report.events.iter().map(|e| (report.time, e.clone())));
         let (progress, end) = (self.progress().clone(), self.now.end.clone());
         Ok(Step { channels, progress, end, events: report.events })
+    }
+
+    /// Ends the episode because its policy has nothing left to do.
+    pub fn finish(&mut self) {
+        if self.now.end.is_none() {
+            self.now.end = Some(if self.progress().passed() { End::Passed } else { End::Finished });
+        }
     }
 
     /// Ends the episode because its policy failed.
@@ -273,12 +236,12 @@ impl Episode {
         &self.now.rows
     }
 
-    /// What happened so far, with times [s].
+    /// What happened so far, with times (s).
     pub fn events(&self) -> &[(f64, CellEvent)] {
         &self.now.events
     }
 
-    /// Simulated time since the start [s].
+    /// Simulated time since the start (s).
     pub fn time(&self) -> f64 {
         self.cell.time()
     }
@@ -308,6 +271,12 @@ impl Episode {
         &self.cell
     }
 
+    /// Length of the most stretched edge of any organ now over that at rest: privileged. Takes a
+    /// pass over all edges.
+    pub fn max_stretch(&mut self) -> f64 {
+        self.cell.max_stretch()
+    }
+
     /// Places of the first grasper and of the first cutter among the arms.
     pub fn roles(&self) -> (Option<usize>, Option<usize>) {
         (self.now.subject.grasper, self.now.subject.cutter)
@@ -318,7 +287,7 @@ impl Episode {
         self.now.subject.bodies(&self.cell)
     }
 
-    /// Targets of port-reach in the cell [m], three an arm; empty for other tasks.
+    /// Targets of port-reach in the cell (m), three an arm; empty for other tasks.
     pub fn targets(&self) -> &[[glam::DVec3; 3]] {
         &self.now.subject.targets
     }
@@ -331,8 +300,38 @@ impl Episode {
     /// The episode in figures so far.
     pub fn summary(&self) -> Summary {
         let arms: Vec<&str> = self.cell.arms().iter().map(|(side, _)| side.name()).collect();
-        let threshold = self.scene.safety.rcm_threshold_mm;
-        Summary::of(&self.now.rows, self.progress(), self.end(), &arms, threshold)
+        let safety = self.scene.safety.rcm_threshold_mm;
+        let mut summary = Summary::of(&self.now.rows, self.progress(), self.end(), &arms, safety);
+        summary.add_facts(&self.facts());
+        summary
+    }
+
+    fn facts(&self) -> Facts<'_> {
+        let grasper = self.now.subject.grasper.and_then(|k| self.scene.tools().get(k).map(|t| t.instrument));
+        let bodies = self.bodies();
+        Facts {
+            task: &self.scene.task,
+            grasper: self.now.subject.grasper.map(|k| self.cell.arms()[k].0),
+            jaw_force_n: grasper.map_or(0.0, |i| i.jaw_force_n),
+            settling: self.settling,
+            inverted_rest: self.specimen.organs.iter().map(|o| o.body.inverted()).sum(),
+            pin_drift_mm: 1e3 * self.cell.pin_drift(),
+            organ_weight_n: self.cell.weight(&bodies),
+            events: &self.now.events,
+            rows: &self.now.rows,
+            heights: self.heights(),
+        }
+    }
+
+    /// Name and height of the centroid (m) of every body.
+    fn heights(&self) -> Vec<(String, f64)> {
+        let world = self.cell.world();
+        let bodies = world.model.bodies().iter().enumerate();
+        let heights = bodies.map(|(k, body)| {
+            let nodes: Vec<u32> = (0..body.len() as u32).collect();
+            (body.name().to_owned(), world.state.centroid(&world.model, k, &nodes).dot(world.up))
+        });
+        heights.collect()
     }
 
     /// The state as it is now.
@@ -360,7 +359,8 @@ impl Episode {
             return Err(Error::Option("state: is of another scene or specimen than this episode".to_owned()));
         }
         if state.arrangement != self.arrangement {
-            (self.cell, self.settled) = build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
+            (self.cell, self.settled, self.settling) =
+                build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
             self.arrangement = state.arrangement;
         }
         self.cell.restore(&state.cell)?;
@@ -368,31 +368,33 @@ impl Episode {
         Ok(())
     }
 
-    /// Hash over every bit that the future depends on, but for the seed's random numbers: cell and stages.
+    /// Hash over every bit that the future depends on, but for the seed's random numbers: cell and
+    /// stages.
     pub fn state_hash(&self) -> u64 {
+        // What was recorded so far, and why the episode ended, decide nothing that follows.
+        let Now { seed: _, subject: _, tracker, rows: _, events: _, end: _ } = &self.now;
         let mut hash = Xxh3::new();
         hash.update(&self.cell.hash().to_le_bytes());
-        for number in self.now.tracker.numbers() {
+        for number in tracker.numbers() {
             hash.update(&number.to_bits().to_le_bytes());
         }
         hash.digest()
     }
 }
 
-/// What a state is known by to belong to an episode: the scene and the specimen. How long an episode may be does not matter.
+/// What a state is known by to belong to an episode: the scene and the specimen. How long an
+/// episode may be does not matter.
 fn key(scene: &Scene, specimen: u64) -> Result<u64> {
     let mut scene = scene.clone();
     scene.task.episode_s = 0.0;
     Ok(scene.hash(&[specimen])?)
 }
 
-/// The cell with the specimen as arranged, and its state once the organs have settled.
-fn build(scene: &Scene, specimen: &Specimen, threads: usize, at: &Arrangement) -> Result<(Cell, CellState)> {
+/// The cell with the specimen as arranged, its state once the organs have settled, and how they
+/// did.
+fn build(scene: &Scene, specimen: &Specimen, threads: usize, at: &Arrangement) -> Result<(Cell, CellState, Settling)> {
     let mut cell = Cell::new(&at.scene(scene, specimen), specimen, threads)?;
-    let periods = (SETTLE_S / cell.period()).round() as usize;
-    for _ in 0..periods {
-        cell.advance()?;
-    }
+    let settling = cell.settle(SETTLE_S)?;
     let settled = cell.save();
-    Ok((cell, settled))
+    Ok((cell, settled, settling))
 }

@@ -1,12 +1,15 @@
 //! Tasks in the two-arm cell: stages, channels, episodes, their files, and policies.
 //!
-//! An [`Episode`] steps a scene's cell from a seeded start to its [`End`]. Each step gives a row of [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds the
-//! actions and a hash a step, so that anyone can run it again and compare.
+//! An [`Episode`] steps a scene's cell from a seeded start to its [`End`]. Each step gives a row of
+//! [`Channels`]; stages, sweeps and summaries are functions of rows alone. An episode file holds
+//! the actions and a hash a step, so that anyone can run it again and compare.
 
 mod bounds;
 mod channels;
+mod end;
 mod episode;
 mod error;
+mod facts;
 mod measure;
 mod observation;
 pub mod policy;
@@ -20,17 +23,20 @@ mod start;
 mod storage;
 mod summary;
 mod sweep;
+mod why;
 
 pub use bounds::Bounds;
 pub use channels::{ArmChannels, Channels, TaskChannels};
-pub use episode::{End, Episode, EpisodeState, SETTLE_S, Step};
+pub use end::End;
+pub use episode::{Episode, EpisodeState, SETTLE_S, Step};
 pub use error::{Error, Result};
+pub use facts::{Details, Severed};
 pub use observation::{ArmState, Observation, STATE_NAMES, STATE_SIZE, privileged};
 pub use policy::Policy;
 pub use prompt::prompt;
 pub use random::Random;
 pub use replay::{EpisodeFile, Header, Verdict, scene_hash};
-pub use run::{CHANNELS_FILE, EPISODE_FILE, EpisodeResult, RESULT_FILE, Recording, TimedEvent, run};
+pub use run::{CHANNELS_FILE, EPISODE_FILE, EpisodeResult, RESULT_FILE, Recording, TimedEvent, run, run_watched};
 pub use specimen::specimen_hash;
 pub use stages::{Progress, Stage, StageProgress, Tracker};
 pub use storage::{ChannelsInfo, read_channels, write_channels};

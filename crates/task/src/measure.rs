@@ -6,11 +6,11 @@ use glam::{DQuat, DVec3};
 use trocar_cell::{ArmObservation, Cell, CellEvent, CellReport};
 use trocar_scene::{Gates, InstrumentKind, Side};
 
-/// Middle of a mouth from the pivot [m].
-const MID_MOUTH: f64 = 0.0115;
+/// Middle of the region between the blades from the pivot (m).
+const MID_JAWS: f64 = 0.0115;
 
-/// Jaw lift below which no follow ratio is told [m].
-const LEAST_LIFT: f64 = 1e-4;
+/// Jaw lift below which no follow ratio is told (m).
+const MIN_JAW_LIFT: f64 = 1e-4;
 
 /// What of a cell the channels are about.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,7 +21,7 @@ pub(crate) struct Subject {
     /// Places of the first grasper and the first cutter among the arms.
     pub grasper: Option<usize>,
     pub cutter: Option<usize>,
-    /// Targets of port-reach: blade tips in the cell [m], three an arm; empty for other tasks.
+    /// Targets of port-reach: blade tips in the cell (m), three an arm; empty for other tasks.
     pub targets: Vec<[DVec3; 3]>,
 }
 
@@ -69,6 +69,10 @@ impl Subject {
             yielded: report.tissue.yielded_substeps as f64,
             fallbacks: report.tissue.fallbacks as f64,
             diverged: flag(report.tissue.divergence.is_some()),
+            disabled_contacts: report.rules.disabled_contacts as f64,
+            disabled_blades: report.rules.disabled_blades as f64,
+            relaxed: report.rules.relaxed as f64,
+            activation_step_mm: 1e3 * report.activation_step,
             ..TaskChannels::default()
         };
         for event in &report.events {
@@ -82,7 +86,7 @@ impl Subject {
         let world = cell.world();
         let mut upper = self.gates.grasp_to;
         if let Some(k) = self.grasper {
-            let middle = report.arms[k].tip.transform(MID_MOUTH * DVec3::X);
+            let middle = report.arms[k].tip.transform(MID_JAWS * DVec3::X);
             let axis_distance = |body: &usize| {
                 let axis = &world.axes[*body];
                 let part = (self.gates.grasp_from, self.gates.grasp_to);
@@ -94,7 +98,7 @@ impl Subject {
                 t.grasp_s = held.s;
                 t.lift_mm = 1e3 * held.tissue_lift;
                 t.jaw_lift_mm = 1e3 * held.jaw_lift;
-                t.follow = if held.jaw_lift > LEAST_LIFT { held.tissue_lift / held.jaw_lift } else { 0.0 };
+                t.follow = if held.jaw_lift > MIN_JAW_LIFT { held.tissue_lift / held.jaw_lift } else { 0.0 };
                 t.slip_mm = 1e3 * held.slip;
                 upper = held.s;
             }
@@ -103,8 +107,8 @@ impl Subject {
             let tip = cell.blade_tip(report.arms[k].side.name())?;
             let part = |body: &usize| nearest(cell, *body, tip, |i| world.axes[*body].s[i] <= upper);
             t.position_mm = 1e3 * bodies.iter().map(part).fold(f64::INFINITY, f64::min);
-            t.cut_jaw = report.arms[k].coordinates.jaw;
-            let (within, share) = mouth(cell, k, bodies);
+            t.cut_jaw = report.arms[k].measured.jaw();
+            let (within, share) = between_blades(cell, k, bodies);
             (t.cut_mouth, t.cut_share) = (flag(within), share);
         }
         for name in [&mut t.grasp_distance_mm, &mut t.position_mm] {
@@ -135,7 +139,7 @@ pub(crate) fn upright(q: DQuat) -> DQuat {
     if q.w < 0.0 { -q } else { q }
 }
 
-/// Distance from `p` to the nearest node of a body among those `of` [m]; infinite without any.
+/// Distance from `p` to the nearest node of a body among those `of` (m); infinite without any.
 fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f64 {
     let world = cell.world();
     let count = world.model.bodies()[body].len();
@@ -143,26 +147,33 @@ fn nearest(cell: &Cell, body: usize, p: DVec3, of: impl Fn(usize) -> bool) -> f6
     (0..count).filter(|i| of(*i)).map(square).fold(f64::INFINITY, f64::min).sqrt()
 }
 
-/// Whether any of `bodies` is between the blades of arm `k`, and the share of the wedge that they fill.
-fn mouth(cell: &Cell, k: usize, bodies: &[usize]) -> (bool, f64) {
+/// Whether any of `bodies` is between the blades of arm `k`, and the share of the wedge that they
+/// fill.
+fn between_blades(cell: &Cell, k: usize, bodies: &[usize]) -> (bool, f64) {
     let all: Vec<f64> = bodies.iter().filter_map(|body| Some(cell.between_blades(k, *body)?.1)).collect();
     (!all.is_empty(), all.iter().sum::<f64>().min(1.0))
 }
 
 fn arm_channels(cell: &Cell, k: usize, arm: &ArmObservation, bodies: &[usize]) -> Result<ArmChannels> {
-    let c = &arm.coordinates;
-    let commanded = cell.port(arm.side.name())?.tip(&arm.commanded).translation;
+    let name = arm.side.name();
+    let space = cell.workspace(name)?;
+    let commanded = space.tip(&arm.commanded).translation;
     let (tip, q) = (arm.tip.translation, upright(arm.tip.rotation));
-    let (within, share) = mouth(cell, k, bodies);
+    let (within, share) = between_blades(cell, k, bodies);
+    let (contact_disabled, blades_disabled) = cell.disabled_contact(name)?;
+    // An arm without a port has no pivots and no insertion: its place is that of the tip.
+    let in_port = |numbers: [f64; 3]| if space.as_port().is_some() { numbers } else { [0.0; 3] };
+    let [a, b, c, roll, jaw] = arm.measured.0;
+    let ([a, b, c], [a_s, b_s, c_s]) = (in_port([a, b, c]), in_port([arm.rates[0], arm.rates[1], arm.rates[2]]));
     Ok(ArmChannels {
-        pivot_1_rad: c.pivots[0],
-        pivot_2_rad: c.pivots[1],
-        insertion_m: c.insertion,
-        roll_rad: c.roll,
-        jaw: c.jaw,
-        pivot_1_rad_s: arm.rates[0],
-        pivot_2_rad_s: arm.rates[1],
-        insertion_m_s: arm.rates[2],
+        pivot_1_rad: a,
+        pivot_2_rad: b,
+        insertion_m: c,
+        roll_rad: roll,
+        jaw,
+        pivot_1_rad_s: a_s,
+        pivot_2_rad_s: b_s,
+        insertion_m_s: c_s,
         roll_rad_s: arm.rates[3],
         jaw_1_s: arm.rates[4],
         tip_x_m: tip.x,
@@ -192,6 +203,8 @@ fn arm_channels(cell: &Cell, k: usize, arm: &ArmObservation, bodies: &[usize]) -
         rejected_deg: arm.rejected_rotation.length().to_degrees(),
         held_back: flag(arm.held_back),
         load_limited: flag(arm.load_limited),
-        unhooked: flag(cell.unhooked(arm.side.name())?),
+        contact_disabled: flag(contact_disabled),
+        blades_disabled: flag(blades_disabled),
+        guarded: flag(arm.guarded),
     })
 }

@@ -10,17 +10,18 @@ use trocar_scene::Side;
 /// What is seen of one arm; all zero where the scene has no such arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct ArmState {
-    /// Two pivots [rad], insertion [m], roll [rad], jaw opening 0 to 1: as in an action.
+    /// Two pivots (rad), insertion (m), roll (rad), jaw opening 0 to 1, as in an action. Of an arm
+    /// without a port the first three are the place of the jaw's pivot in the cell (m).
     pub coordinates: [f64; 5],
     /// Their rates a second.
     pub rates: [f64; 5],
-    /// Tip frame (at the jaw's pivot) in the cell [m].
+    /// Tip frame (at the jaw's pivot) in the cell (m).
     pub tip_m: [f64; 3],
     /// Its rotation, a unit quaternion, scalar first and not negative.
     pub tip_wxyz: [f64; 4],
-    /// RCM deviation [m].
+    /// RCM deviation (m).
     pub rcm_m: f64,
-    /// Force of the tissue on the instrument along the cell's axes [N].
+    /// Force of the tissue on the instrument along the cell's axes (N).
     pub force_n: [f64; 3],
     /// What that force is: 0 contact, 1 the constraint of a latched grasp.
     pub force_kind: f64,
@@ -31,7 +32,7 @@ pub struct ArmState {
 /// What a policy sees at the end of a period. No tissue value is in it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Observation {
-    /// Time since the episode's start [s].
+    /// Time since the episode's start (s).
     pub time_s: f64,
     /// The left arm.
     pub left: ArmState,
@@ -44,7 +45,8 @@ pub struct Observation {
 /// Numbers of [`Observation::to_vec`].
 pub const STATE_SIZE: usize = 47;
 
-/// Names of the numbers of [`Observation::to_vec`], in order. The time is not among them: a policy that counts seconds learns the script, not the task.
+/// Names of the numbers of [`Observation::to_vec`], in order. The time is not among them: a policy
+/// that counts seconds learns the script, not the task.
 pub const STATE_NAMES: [&str; STATE_SIZE] = [
     "left_pivot_1_rad",
     "left_pivot_2_rad",
@@ -99,7 +101,7 @@ impl ArmState {
     fn of(arm: &ArmObservation) -> Self {
         let q = upright(arm.tip.rotation);
         Self {
-            coordinates: arm.coordinates.to_action(),
+            coordinates: arm.measured.0,
             rates: arm.rates,
             tip_m: arm.tip.translation.to_array(),
             tip_wxyz: [q.w, q.x, q.y, q.z],

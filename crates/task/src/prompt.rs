@@ -2,9 +2,11 @@
 
 use trocar_scene::{InstrumentKind, Scene, TaskName};
 
-/// What the task of `scene` asks for, with the arms that hold the first grasper and the first cutter in it by their sides.
+/// What the task of `scene` asks for, with the arms that hold the first grasper and the first
+/// cutter in it by their sides.
 ///
-/// This is the `prompt` that policies are shown, the `task_description` of Python's environments and the task in datasets.
+/// This is the `prompt` that policies are shown, the `task_description` of Python's environments
+/// and the task in datasets.
 pub fn prompt(scene: &Scene) -> String {
     let organ = &scene.task.organ;
     let with = |kind: InstrumentKind| match scene.arm_with(kind) {

@@ -1,6 +1,8 @@
 //! Episode files: what was done, so that anyone can do it again and compare every step.
 //!
-//! One line of JSON (scene text and hash, specimen hash, seed, program), then for every step the action's numbers and the state's hash after it as little-endian binary, then xxh3 of all before it.
+//! One line of JSON (scene text and hash, specimen hash, seed, program), then for every step the
+//! action's numbers and the state's hash after it as little-endian binary, then xxh3 of all before
+//! it.
 
 use crate::storage::write_whole;
 use crate::{End, Episode, Error, Result, specimen_hash};
@@ -14,9 +16,9 @@ use xxhash_rust::xxh3::xxh3_64;
 const FORMAT: &str = "trocar-episode";
 const VERSION: u32 = 1;
 
-/// Largest file [bytes]: a million steps.
+/// Largest file (bytes): a million steps.
 const MOST_BYTES: u64 = 100 << 20;
-/// Longest header line [bytes].
+/// Longest header line (bytes).
 const MOST_HEADER: usize = 4 << 20;
 /// Numbers of an arm in an action.
 const NUMBERS: usize = 5;
@@ -82,7 +84,8 @@ pub struct Verdict {
     pub replayed_by: String,
 }
 
-/// What replays know a scene by: [`Scene::hash`] over the specimen's hash and the arms' model files.
+/// What replays know a scene by: [`Scene::hash`] over the specimen's hash and the arms' model
+/// files.
 ///
 /// # Errors
 /// A model file that cannot be read.
@@ -225,7 +228,8 @@ impl EpisodeFile {
         Ok(scene)
     }
 
-    /// Whether specimen, scene or an arm's model are others than the recorded ones, in a sentence; `None` where they are the same.
+    /// Whether specimen, scene or an arm's model are others than the recorded ones, in a sentence;
+    /// `None` where they are the same.
     ///
     /// # Errors
     /// A model file that cannot be read.
@@ -241,7 +245,8 @@ impl EpisodeFile {
             .then(|| format!("the scene or an arm's model is another one: {found}, not {}", header.scene_hash)))
     }
 
-    /// Does the episode again with `specimen` and compares every step. What differs is a verdict, not an error. `watch` is asked before each step and returns false to stop.
+    /// Does the episode again with `specimen` and compares every step. What differs is a verdict,
+    /// not an error. `watch` is asked before each step and returns false to stop.
     ///
     /// # Errors
     /// An episode that cannot be built; [`trocar_cell::Error::Interrupted`] when `watch` stops it.
@@ -284,7 +289,7 @@ impl EpisodeFile {
                 return Ok(differs(Some(number), said));
             }
         }
-        let by_policy = matches!(header.end, Some(End::PolicyError { .. }));
+        let by_policy = matches!(header.end, Some(End::PolicyError { .. } | End::Finished));
         if !by_policy && header.end.as_ref() != episode.end() {
             let name = |end: Option<&End>| end.map_or("no end", End::name);
             let said = format!("it ends with {}, not {}", name(episode.end()), name(header.end.as_ref()));

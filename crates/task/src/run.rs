@@ -23,7 +23,7 @@ pub struct Recording {
     pub info: ChannelsInfo,
     /// The rows.
     pub channels: Vec<Channels>,
-    /// What happened, with times [s].
+    /// What happened, with times (s).
     pub events: Vec<(f64, CellEvent)>,
     /// The figures.
     pub summary: Summary,
@@ -52,29 +52,51 @@ pub struct EpisodeResult {
 /// Something that happened, and when.
 #[derive(Clone, Debug, Serialize)]
 pub struct TimedEvent {
-    /// Time at the end of its control period [s].
+    /// Time at the end of its control period (s).
     pub time_s: f64,
     /// What.
     #[serde(flatten)]
     pub event: CellEvent,
 }
 
-/// Resets `episode` to `seed` and lets `policy` go through it. `watch` sees every step and returns false to stop.
+/// Resets `episode` to `seed` and lets `policy` go through it. `watch` sees every step and returns
+/// false to stop.
 ///
 /// # Errors
-/// A reset or a first look that fails, or [`trocar_cell::Error::Interrupted`] when `watch` stops it. A policy that fails on the way ends the episode, which is a result.
+/// A reset or a first look that fails, or [`trocar_cell::Error::Interrupted`] when `watch` stops
+/// it. A policy that fails on the way ends the episode, which is a result.
 pub fn run(
     episode: &mut Episode,
     policy: &mut dyn Policy,
     seed: u64,
     watch: &mut dyn FnMut(&Step) -> bool,
 ) -> Result<Recording> {
+    run_watched(episode, policy, seed, &mut |_, step| step.is_none_or(&mut *watch))
+}
+
+/// The same with a `watch` that sees the episode, first at its start and then with every step.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_watched(
+    episode: &mut Episode,
+    policy: &mut dyn Policy,
+    seed: u64,
+    watch: &mut dyn FnMut(&Episode, Option<&Step>) -> bool,
+) -> Result<Recording> {
     episode.reset(seed)?;
     let mut header = Header::of(episode, policy.name())?;
     let mut steps = Vec::new();
     policy.begin(episode, seed)?;
+    if !watch(episode, None) {
+        return Err(trocar_cell::Error::Interrupted.into());
+    }
     while episode.end().is_none() {
         let chunk = match policy.act(episode) {
+            Ok(chunk) if chunk.is_empty() && policy.finished() => {
+                episode.finish();
+                break;
+            }
             Ok(chunk) if chunk.is_empty() => {
                 episode.fail("it gave no action");
                 break;
@@ -89,7 +111,7 @@ pub fn run(
             match episode.step(&action) {
                 Ok(step) => {
                     steps.push((action, episode.state_hash()));
-                    if !watch(&step) {
+                    if !watch(episode, Some(&step)) {
                         return Err(trocar_cell::Error::Interrupted.into());
                     }
                     if step.end.is_some() {

@@ -1,26 +1,28 @@
-//! The stages of each task, as pure functions of the channels: nothing but rows and gates decides (SPEC, stage gates).
+//! The stages of each task, as pure functions of the channels: nothing but rows and gates decides
+//! (SPEC, stage gates).
 //!
-//! Stages pass in their order and stay passed. All of the resection's stages after the lift need tissue in the grasper: without it there is no "tissue between grasp and base".
+//! Stages pass in their order and stay passed. All of the resection's stages after the lift need
+//! tissue in the grasper: without it there is no "tissue between grasp and base".
 
 use crate::{Channels, Error, Result};
 use serde::{Deserialize, Serialize};
 use trocar_scene::{Gates, TaskName};
 
-/// Largest distance of a blade tip from its target for port-reach [mm] ...
+/// Largest distance of a blade tip from its target for port-reach (mm) ...
 pub const REACH_MM: f64 = 2.0;
-/// ... for this long [s].
+/// ... for this long (s).
 pub const REACH_S: f64 = 0.2;
-/// grasp-lift: the grasp holds for this long after the lift has passed [s] (SPEC, held) ...
+/// grasp-lift: the grasp holds for this long after the lift has passed (s) (SPEC, held) ...
 pub const HELD_S: f64 = 1.0;
 /// ... with at least this follow ratio ...
 pub const HELD_FOLLOW: f64 = 0.80;
-/// ... and less slip than this [mm].
+/// ... and less slip than this (mm).
 pub const HELD_SLIP_MM: f64 = 3.0;
 
-/// Progress towards what is approached is counted from this far [mm].
+/// Progress towards what is approached is counted from this far (mm).
 const FAR_MM: f64 = 60.0;
 
-/// Rounding of times [s].
+/// Rounding of times (s).
 const TICK: f64 = 1e-6;
 
 /// A stage.
@@ -80,7 +82,7 @@ pub struct StageProgress {
     pub stage: Stage,
     /// Passed, and so for good.
     pub passed: bool,
-    /// When [s].
+    /// When (s).
     pub time_s: Option<f64>,
     /// How far it is, 0 to 1: 1 once passed, 0 before its turn.
     pub share: f64,
@@ -142,7 +144,7 @@ pub fn held(c: &Channels, gates: &Gates) -> bool {
 pub struct Tracker {
     gates: Gates,
     progress: Progress,
-    /// Since when the present stage's condition has held without a break [s].
+    /// Since when the present stage's condition has held without a break (s).
     since: Option<f64>,
     /// The cutter has been open beyond the gate, and tissue in its mouth ever since.
     armed: bool,
@@ -189,7 +191,7 @@ impl Tracker {
         }
     }
 
-    /// Whether `condition` has held up to `now` [s] for `long` [s].
+    /// Whether `condition` has held up to `now` (s) for `long` (s).
     fn lasted(&mut self, condition: bool, now: f64, long: f64) -> bool {
         self.since = condition.then(|| self.since.unwrap_or(now));
         self.since.is_some_and(|since| now - since >= long - TICK)
@@ -210,8 +212,9 @@ impl Tracker {
         }
     }
 
-    /// Blades that were open beyond the gate with tissue between them have closed, and it was between them in every row until they did. Blades that are nearly closed have a
-    /// mouth too thin to hold anything, so the last row does not count.
+    /// Blades that were open beyond the gate with tissue between them have closed, and it was
+    /// between them in every row until they did. Blades that are nearly closed have a mouth too
+    /// thin to hold anything, so the last row does not count.
     fn cut(&mut self, c: &Channels) -> bool {
         let (gates, t) = (&self.gates, &c.task);
         if t.grasped <= 0.0 {
@@ -251,8 +254,11 @@ impl Tracker {
 
     /// The numbers of the state, for its hash.
     pub fn numbers(&self) -> Vec<f64> {
-        let mut all = vec![self.progress.stage as f64, self.since.unwrap_or(-1.0), f64::from(u8::from(self.armed))];
-        all.extend(self.progress.stages.iter().flat_map(|s| [s.time_s.unwrap_or(-1.0), s.share]));
+        let Self { gates: _, progress: Progress { stage, stages }, since, armed } = self;
+        let mut all = vec![*stage as f64, since.unwrap_or(-1.0), f64::from(u8::from(*armed))];
+        for StageProgress { stage: _, passed: _, time_s, share } in stages {
+            all.extend([time_s.unwrap_or(-1.0), *share]);
+        }
         all
     }
 }

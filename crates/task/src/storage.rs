@@ -1,4 +1,5 @@
-//! Channels as Parquet: one flat column of doubles a channel, read back checked. Any data-frame library reads them.
+//! Channels as Parquet: one flat column of doubles a channel, read back checked. Any data-frame
+//! library reads them.
 
 use crate::{Channels, Error, Result};
 use parquet::basic::{Repetition, Type as Physical};
@@ -19,11 +20,22 @@ use xxhash_rust::xxh3::Xxh3;
 /// The key of [`ChannelsInfo`] in the file's metadata.
 const KEY: &str = "trocar";
 const FORMAT: &str = "trocar-channels";
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
+
+/// What a column of this version was called in files of version 1. `None` for one that they do not
+/// have, which is read as zeros.
+fn name_in_version_1(name: &str) -> Option<String> {
+    let new = ["_blades_disabled", "_guarded"];
+    let task = ["disabled_contacts", "disabled_blades", "relaxed", "activation_step_mm"];
+    if new.iter().any(|end| name.ends_with(end)) || task.contains(&name) {
+        return None;
+    }
+    Some(name.replace("_contact_disabled", "_unhooked"))
+}
 
 /// Most rows of a file: nine hours.
 const MOST_ROWS: usize = 1_000_000;
-/// Largest file [bytes].
+/// Largest file (bytes).
 const MOST_BYTES: u64 = 1 << 31;
 
 /// What a file of channels says of itself.
@@ -35,9 +47,10 @@ pub struct ChannelsInfo {
     pub task: TaskName,
     /// Its gates.
     pub gates: Gates,
-    /// RCM deviation that episodes are scored against [mm].
+    /// RCM deviation that episodes are scored against (mm).
     pub rcm_threshold_mm: f64,
-    /// RCM deviation beyond which an episode is lost [mm]; None in files that were written before it was.
+    /// RCM deviation beyond which an episode is lost (mm); None in files that were written before
+    /// it was.
     #[serde(default)]
     pub rcm_abort_mm: Option<f64>,
     /// The arms that the scene has, left first.
@@ -87,12 +100,13 @@ fn encode(info: &ChannelsInfo, rows: &[Channels]) -> std::result::Result<Vec<u8>
     };
     let fields = names.iter().map(field).collect::<std::result::Result<_, _>>().map_err(failed)?;
     let schema = Type::group_type_builder("channels").with_fields(fields).build().map_err(failed)?;
+    let table: Vec<Vec<f64>> = rows.iter().map(Channels::to_row).collect();
     let stored = Stored {
         format: FORMAT.to_owned(),
         version: VERSION,
         program: env!("CARGO_PKG_VERSION").to_owned(),
         rows: rows.len(),
-        hash: format!("{:016x}", hash(rows)),
+        hash: format!("{:016x}", hash(&table)),
         info: info.clone(),
     };
     let text = serde_json::to_string(&stored).map_err(|e| format!("cannot be written: {e}"))?;
@@ -101,7 +115,6 @@ fn encode(info: &ChannelsInfo, rows: &[Channels]) -> std::result::Result<Vec<u8>
         .set_key_value_metadata(Some(vec![KeyValue::new(KEY.to_owned(), text)]))
         .build();
     let mut writer = SerializedFileWriter::new(Vec::new(), Arc::new(schema), Arc::new(properties)).map_err(failed)?;
-    let table: Vec<Vec<f64>> = rows.iter().map(Channels::to_row).collect();
     let mut group = writer.next_row_group().map_err(failed)?;
     let mut k = 0;
     while let Some(mut column) = group.next_column().map_err(failed)? {
@@ -114,10 +127,10 @@ fn encode(info: &ChannelsInfo, rows: &[Channels]) -> std::result::Result<Vec<u8>
     writer.into_inner().map_err(failed)
 }
 
-fn hash(rows: &[Channels]) -> u64 {
+fn hash(rows: &[Vec<f64>]) -> u64 {
     let mut hash = Xxh3::new();
     for row in rows {
-        row.to_row().iter().for_each(|x| hash.update(&x.to_bits().to_le_bytes()));
+        row.iter().for_each(|x| hash.update(&x.to_bits().to_le_bytes()));
     }
     hash.digest()
 }
@@ -125,7 +138,8 @@ fn hash(rows: &[Channels]) -> u64 {
 /// Reads what [`write_channels`] wrote.
 ///
 /// # Errors
-/// Names the file and what is wrong: not Parquet, not ours, a column that is missing, values that are not those that were written.
+/// Names the file and what is wrong: not Parquet, not ours, a column that is missing, values that
+/// are not those that were written.
 pub fn read_channels(path: &Path) -> Result<(ChannelsInfo, Vec<Channels>)> {
     let io = |source| Error::Io { path: path.to_owned(), source };
     let invalid = |reason: String| Error::Invalid { path: path.to_owned(), reason };
@@ -148,9 +162,9 @@ fn decode(file: std::fs::File) -> std::result::Result<(ChannelsInfo, Vec<Channel
     let text = said.and_then(|kv| kv.value.as_deref());
     let text = text.ok_or(format!("has no '{KEY}' metadata; channels are written by trocar episode"))?;
     let stored: Stored = serde_json::from_str(text).map_err(|e| format!("its '{KEY}' metadata is damaged: {e}"))?;
-    if stored.format != FORMAT || stored.version != VERSION {
+    if stored.format != FORMAT || !(1..=VERSION).contains(&stored.version) {
         let (format, version) = (&stored.format, stored.version);
-        return Err(format!("is {format} version {version}; {FORMAT} version {VERSION} is read"));
+        return Err(format!("is {format} version {version}; {FORMAT} versions 1 to {VERSION} are read"));
     }
     let count = usize::try_from(metadata.file_metadata().num_rows()).unwrap_or(usize::MAX);
     if count != stored.rows || count > MOST_ROWS {
@@ -158,7 +172,13 @@ fn decode(file: std::fs::File) -> std::result::Result<(ChannelsInfo, Vec<Channel
     }
     let columns = metadata.file_metadata().schema_descr().columns();
     let mut table = vec![Vec::with_capacity(Channels::COUNT); count];
+    let mut sum = vec![Vec::new(); count];
     for name in Channels::names() {
+        let name = if stored.version == 1 { name_in_version_1(&name) } else { Some(name) };
+        let Some(name) = name else {
+            table.iter_mut().for_each(|row| row.push(0.0));
+            continue;
+        };
         let column = columns.iter().position(|c| c.name() == name);
         let column = column.ok_or_else(|| format!("has no column '{name}'"))?;
         let mut values = Vec::new();
@@ -178,11 +198,12 @@ fn decode(file: std::fs::File) -> std::result::Result<(ChannelsInfo, Vec<Channel
         if values.len() != count {
             return Err(format!("its column '{name}' has {} values; there are {count} rows", values.len()));
         }
+        sum.iter_mut().zip(&values).for_each(|(row, value)| row.push(*value));
         table.iter_mut().zip(values).for_each(|(row, value)| row.push(value));
     }
     let rows: Option<Vec<Channels>> = table.iter().map(|row| Channels::from_row(row)).collect();
     let rows = rows.ok_or("has rows that are no channels")?;
-    let found = format!("{:016x}", hash(&rows));
+    let found = format!("{:016x}", hash(&sum));
     if found != stored.hash {
         return Err(format!("its values are not those that were written: their hash is {found}, not {}", stored.hash));
     }

@@ -1,14 +1,21 @@
-//! An episode in figures (SPEC E2), computed from its channels alone.
+//! An episode in figures, computed from its channels and, where these do not say it, from its
+//! events.
 
-use crate::channels::ArmChannels;
+use crate::channels::{ArmChannels, TaskChannels};
+use crate::facts::{Details, Facts};
+use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
+use crate::why::why;
 use crate::{Channels, End, Progress, Stage};
 use serde::{Deserialize, Serialize};
 
-/// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument [N].
+/// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument (N).
 pub const LOADED_N: f64 = 0.05;
 
-/// The greatest lag that is looked for [s], and the step of the search.
-const LONGEST_LAG: f64 = 0.3;
+/// Jaws are at the top of their lift within this share of it.
+const TOP_SHARE: f64 = 0.05;
+
+/// The greatest lag that is looked for (s), and the step of the search.
+const MAX_LAG: f64 = 0.3;
 const LAG_STEP: f64 = 1e-3;
 
 /// One arm in figures.
@@ -16,32 +23,40 @@ const LAG_STEP: f64 = 1e-3;
 pub struct ArmSummary {
     /// left or right.
     pub arm: String,
-    /// Time under load [s]; the next three are over it, and 0 without any.
+    /// Time under load (s); the next three are over it, and 0 without any.
     pub loaded_s: f64,
-    /// RCM deviation under load, median over periods [mm].
+    /// RCM deviation under load, median over periods (mm).
     pub rcm_median_mm: f64,
-    /// Its 95th percentile [mm].
+    /// Its 95th percentile (mm).
     pub rcm_p95_mm: f64,
-    /// The largest in any physics step under load [mm].
+    /// The largest in any physics step under load (mm).
     pub rcm_max_mm: f64,
-    /// The largest of the whole episode [mm].
+    /// The largest of the whole episode (mm).
     pub rcm_peak_mm: f64,
-    /// Root mean square distance between commanded and measured tip at the same time, without load [mm].
+    /// Root mean square distance between commanded and measured tip at the same time, without load
+    /// (mm).
     pub tracking_rms_mm: f64,
-    /// The delay of the measured tip behind the commanded one that makes that distance least [ms].
+    /// The delay of the measured tip behind the commanded one that makes that distance least (ms).
     pub lag_ms: f64,
-    /// The distance that is left then [mm].
+    /// The distance that is left then (mm).
     pub lagged_rms_mm: f64,
-    /// Peak contact force [N].
+    /// Peak contact force (N).
     pub peak_contact_n: f64,
-    /// Peak constraint force [N]: the pull of what is held, no contact.
+    /// Peak constraint force (N): the pull of what is held, no contact.
     pub peak_constraint_n: f64,
-    /// Peak force with which tissue pushed the blades apart [N].
+    /// Peak force with which tissue pushed the blades apart (N).
     pub peak_jaw_n: f64,
-    /// Largest tilt [degrees].
+    /// Largest tilt (degrees).
     pub tilt_max_deg: f64,
-    /// Periods in which the instrument passed through tissue that it had crushed or overstretched.
-    pub unhooked: usize,
+    /// Periods in which contact of the instrument with tissue was disabled.
+    #[serde(default, alias = "unhooked")]
+    pub contact_disabled: usize,
+    /// Periods in which contact of its blades alone was disabled.
+    #[serde(default)]
+    pub blades_disabled: usize,
+    /// Periods in which the force guard shortened its command.
+    #[serde(default)]
+    pub guarded: usize,
 }
 
 /// An episode in figures.
@@ -59,7 +74,7 @@ pub struct Summary {
     pub progress: Progress,
     /// How it ended; None while it goes on.
     pub end: Option<End>,
-    /// Simulated time [s].
+    /// Simulated time (s).
     pub duration_s: f64,
     /// The grasper has held the organ at some time.
     pub attached: bool,
@@ -67,12 +82,17 @@ pub struct Summary {
     pub grasp_at: Option<f64>,
     /// It held it at the end too.
     pub held_to_end: bool,
-    /// Greatest rise of held tissue [mm].
+    /// Greatest rise of held tissue (mm).
     pub lift_mm: f64,
-    /// Slip of what is held, at the end or when it was last held [mm].
+    /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest
+    /// lift.
     pub slip_mm: f64,
-    /// Follow ratio then.
+    /// Follow ratio (tissue lift over jaw lift) then.
     pub follow_ratio: f64,
+    /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than
+    /// 3 mm.
+    #[serde(default)]
+    pub held: bool,
     /// Times that tissue tore out of jaws.
     pub torn: usize,
     /// Times that a cutter closed through tissue.
@@ -85,23 +105,44 @@ pub struct Summary {
     pub yielded_substeps: usize,
     /// The tissue diverged.
     pub diverged: bool,
-    /// Largest node speed at any period's end [m/s].
+    /// Largest node speed at any period's end (m/s).
     pub max_speed_m_s: f64,
-    /// Largest RCM deviation of any arm [mm].
+    /// Largest RCM deviation of any arm (mm).
     pub rcm_peak_mm: f64,
     /// It never went beyond the scene's threshold (3 mm).
     pub rcm_within: bool,
+    /// Times that contact of an instrument with tissue was disabled: a suspension of physics.
+    #[serde(default)]
+    pub disabled_contacts: usize,
+    /// Times that contact of blades that hold tissue was disabled: a suspension of physics.
+    #[serde(default)]
+    pub disabled_blades: usize,
+    /// Times that an organ was relaxed outside of time: a suspension of physics.
+    #[serde(default)]
+    pub relaxed: usize,
     /// The arms, left first.
     pub arms: Vec<ArmSummary>,
+    /// Why not all stages passed, in one line.
+    #[serde(default)]
+    pub why: Option<String>,
+    /// What jaw force would bear the organ, where a grasp that presses slipped.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub advice: Option<String>,
+    /// Figures that channels do not have.
+    #[serde(default, flatten)]
+    pub details: Details,
 }
 
 impl Summary {
-    /// Of the rows of an episode that ended as `end` says; `threshold_mm` is the RCM deviation that it is scored against.
+    /// Of the rows of an episode that ended as `end` says; `threshold_mm` is the RCM deviation that
+    /// it is scored against.
     pub fn of(rows: &[Channels], progress: &Progress, end: Option<&End>, arms: &[&str], threshold_mm: f64) -> Self {
         let tasks = || rows.iter().map(|c| &c.task);
         // What has blown up is told as a very large number: files have no infinity.
         let most = |f: fn(&Channels) -> f64| rows.iter().map(f).fold(0.0, f64::max).min(f64::MAX);
         let held = rows.iter().rfind(|c| c.task.grasped > 0.0).map(|c| c.task);
+        let top = top_of_last_grasp(rows);
+        let count = |f: fn(&TaskChannels) -> f64| tasks().map(f).sum::<f64>() as usize;
         let arms: Vec<ArmSummary> = arms.iter().map(|name| arm(name, rows)).collect();
         let rcm_peak_mm = arms.iter().map(|a| a.rcm_peak_mm).fold(0.0, f64::max);
         Self {
@@ -117,25 +158,67 @@ impl Summary {
             grasp_at: tasks().find(|t| t.grasped > 0.0).map(|t| t.grasp_s),
             held_to_end: rows.last().is_some_and(|c| c.task.grasped > 0.0),
             lift_mm: most(|c| c.task.lift_mm),
-            slip_mm: held.map_or(0.0, |t| finite(t.slip_mm)),
-            follow_ratio: held.map_or(0.0, |t| finite(t.follow)),
-            torn: tasks().map(|t| t.torn).sum::<f64>() as usize,
-            cuts: tasks().map(|t| t.cuts).sum::<f64>() as usize,
+            slip_mm: top.map_or(0.0, |t| finite(t.slip_mm)),
+            follow_ratio: top.map_or(0.0, |t| finite(t.follow)),
+            held: top.is_some_and(|t| t.follow >= HELD_FOLLOW && t.slip_mm < HELD_SLIP_MM),
+            torn: count(|t| t.torn),
+            cuts: count(|t| t.cuts),
             inverted_peak: most(|c| c.task.inverted) as usize,
             min_volume_ratio: tasks().map(|t| t.min_volume).fold(1.0, f64::min).max(f64::MIN),
-            yielded_substeps: tasks().map(|t| t.yielded).sum::<f64>() as usize,
+            yielded_substeps: count(|t| t.yielded),
             diverged: tasks().any(|t| t.diverged > 0.0) || matches!(end, Some(End::Diverged { .. })),
             max_speed_m_s: most(|c| c.task.max_speed_m_s),
             rcm_peak_mm,
             rcm_within: rcm_peak_mm <= threshold_mm,
+            disabled_contacts: count(|t| t.disabled_contacts),
+            disabled_blades: count(|t| t.disabled_blades),
+            relaxed: count(|t| t.relaxed),
             arms,
+            why: None,
+            advice: None,
+            details: Details::default(),
         }
     }
 
-    /// When `stage` passed [s].
+    /// Adds what the channels do not have.
+    pub(crate) fn add_facts(&mut self, facts: &Facts<'_>) {
+        self.details = facts.details();
+        self.why = why(facts.rows, facts, &self.progress, self.end.as_ref());
+        let slipped = self.attached && !self.held && !self.diverged && self.torn == 0;
+        self.advice = if slipped { facts.advice() } else { None };
+    }
+
+    /// Suspensions of physics in a few words; `None` without any.
+    pub fn suspensions(&self) -> Option<String> {
+        let said = |n: usize, one: &str, many: &str| match n {
+            0 => None,
+            1 => Some(format!("1 {one}")),
+            n => Some(format!("{n} {many}")),
+        };
+        let all = [
+            said(self.disabled_contacts, "contact disabled", "contacts disabled"),
+            said(self.disabled_blades, "contact of blades disabled", "contacts of blades disabled"),
+            said(self.relaxed, "organ relaxed", "organs relaxed"),
+        ];
+        let all: Vec<String> = all.into_iter().flatten().collect();
+        (!all.is_empty()).then(|| all.join(", "))
+    }
+
+    /// When `stage` passed (s).
     pub fn passed_at(&self, stage: Stage) -> Option<f64> {
         self.progress.stages.iter().find(|s| s.stage == stage).and_then(|s| s.time_s)
     }
+}
+
+/// The task's channels at the top of the last grasp: the last row in which the jaws were within 5%
+/// of the greatest lift that they had with it.
+fn top_of_last_grasp(rows: &[Channels]) -> Option<TaskChannels> {
+    let end = rows.iter().rposition(|c| c.task.grasped > 0.0)?;
+    let start = rows[..end].iter().rposition(|c| c.task.grasped == 0.0).map_or(0, |k| k + 1);
+    let grasp = &rows[start..=end];
+    let most = grasp.iter().map(|c| c.task.jaw_lift_mm).fold(f64::NEG_INFINITY, f64::max);
+    let top = grasp.iter().rfind(|c| c.task.jaw_lift_mm >= most - TOP_SHARE * most.abs());
+    top.map(|c| c.task)
 }
 
 /// `x`, or a very large number where it is none.
@@ -168,7 +251,9 @@ fn arm(name: &str, rows: &[Channels]) -> ArmSummary {
         peak_constraint_n: most(ArmChannels::constraint_n),
         peak_jaw_n: most(|a| a.jaw_force_n),
         tilt_max_deg: most(|a| a.tilt_deg),
-        unhooked: all.iter().filter(|a| a.unhooked > 0.0).count(),
+        contact_disabled: all.iter().filter(|a| a.contact_disabled > 0.0).count(),
+        blades_disabled: all.iter().filter(|a| a.blades_disabled > 0.0).count(),
+        guarded: all.iter().filter(|a| a.guarded > 0.0).count(),
     }
 }
 
@@ -181,13 +266,14 @@ pub(crate) fn quantile(sorted: &[f64], share: f64) -> f64 {
     sorted[k] + (at - k as f64) * (sorted[next] - sorted[k])
 }
 
-/// Root mean square distance [m] of the measured tips from those commanded `lag` [s] before, over the rows `of`.
+/// Root mean square distance (m) of the measured tips from those commanded `lag` (s) before, over
+/// the rows `of`.
 fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool) -> f64 {
     let tip = |a: &ArmChannels| glam::DVec3::new(a.tip_x_m, a.tip_y_m, a.tip_z_m);
     let commanded = |a: &ArmChannels| glam::DVec3::new(a.commanded_x_m, a.commanded_y_m, a.commanded_z_m);
     let back = if period > 0.0 { lag / period } else { 0.0 };
     // The same rows for every lag, so that lags compare.
-    let first = if period > 0.0 { (LONGEST_LAG / period).ceil() as usize } else { 0 };
+    let first = if period > 0.0 { (MAX_LAG / period).ceil() as usize } else { 0 };
     let (mut sum, mut count) = (0.0, 0_usize);
     for k in (first.max(1)..all.len()).filter(|k| of(*k)) {
         let at = (k as f64 - back).max(0.0);
@@ -199,9 +285,9 @@ fn off_by(all: &[ArmChannels], lag: f64, period: f64, of: &dyn Fn(usize) -> bool
     if count == 0 { 0.0 } else { (sum / count as f64).sqrt() }
 }
 
-/// The lag [s] with the least distance, and that distance [m].
+/// The lag (s) with the least distance, and that distance (m).
 fn lag(all: &[ArmChannels], period: f64, of: &dyn Fn(usize) -> bool) -> (f64, f64) {
-    let steps = (LONGEST_LAG / LAG_STEP) as usize;
+    let steps = (MAX_LAG / LAG_STEP) as usize;
     let tried = (0..=steps).map(|k| k as f64 * LAG_STEP).map(|lag| (lag, off_by(all, lag, period, of)));
     tried.fold((0.0, f64::INFINITY), |best, next| if next.1 < best.1 { next } else { best })
 }

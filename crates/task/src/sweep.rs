@@ -1,6 +1,8 @@
 //! Gate sweeps: stored channels judged anew over thresholds, without simulating (SPEC E2).
 //!
-//! An episode ends when it has passed all its stages at the scene's gates, so stricter gates see no more of it than there was: a count at a stricter gate is what is shown, not what might have been.
+//! An episode ends when it has passed all its stages at the scene's gates, so stricter gates see no
+//! more of it than there was: a count at a stricter gate is what is shown, not what might have
+//! been.
 
 use crate::stages::{Tracker, with_gate};
 use crate::storage::ChannelsInfo;
@@ -97,7 +99,8 @@ pub struct Sweep {
 /// `watch` is asked before each combination and returns false to stop.
 ///
 /// # Errors
-/// No episodes, episodes of different tasks, a gate named twice, too many combinations; [`trocar_cell::Error::Interrupted`] when `watch` stops it.
+/// No episodes, episodes of different tasks, a gate named twice, too many combinations;
+/// [`trocar_cell::Error::Interrupted`] when `watch` stops it.
 pub fn sweep(
     episodes: &[(ChannelsInfo, Vec<Channels>)],
     ranges: &[GateRange],

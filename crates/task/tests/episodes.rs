@@ -1,4 +1,5 @@
-//! Episodes around a small tube: the scripted baseline passes, resets and replays are exact, files are checked.
+//! Episodes around a small tube: the scripted baseline passes, resets and replays are exact, files
+//! are checked.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
@@ -7,8 +8,7 @@ mod common;
 
 use common::{ONE_END, resection, two_tubes};
 use std::path::Path;
-use trocar_cell::{Action, CellEvent};
-use trocar_robot::instrument::Coordinates;
+use trocar_cell::{Action, CellEvent, Setpoint};
 use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::{
@@ -129,8 +129,8 @@ fn a_reset_gives_the_same_bits_whatever_was_before() {
     // A saved state goes on to the bit, in another episode too.
     let saved = new.save();
     let stay = |e: &Episode| {
-        let at: Vec<Coordinates> = e.cell().observe().iter().map(|a| a.commanded).collect();
-        Action::pivots(&at)
+        let at: Vec<Setpoint> = e.cell().observe().iter().map(|a| a.commanded).collect();
+        Action::targets(&at)
     };
     let after = |e: &mut Episode| {
         for _ in 0..5 {
@@ -229,18 +229,20 @@ fn a_strong_cutter_closes_through_tissue_and_harms_nothing_else() {
         let s = &recording.summary;
         println!("sever {sever}: {} N at the blades, {s:?}", worst(|c| c.right.jaw_force_n));
         assert!(s.passed && !s.diverged && s.inverted_peak == 0, "{s:?}");
-        // Blades that close through tissue shear it: nothing is pressed from one period after they begin to.
+        // Blades that close through tissue shear it: nothing is pressed from one period after they
+        // begin to.
         let open = recording.channels.iter().position(|c| c.task.cut_jaw > 0.99).unwrap();
         let closing = recording.channels[open..].iter().filter(|c| c.task.cut_jaw < 0.8);
         let pressing: Vec<f64> = closing.map(|c| c.right.jaw_force_n).collect();
         assert!(!pressing.is_empty() && pressing.iter().all(|f| *f == 0.0), "{pressing:?}");
-        assert!(worst(|c| c.right.unhooked) == 0.0 && s.arms.iter().all(|a| a.unhooked == 0));
+        assert!(worst(|c| c.right.contact_disabled) == 0.0 && s.suspensions().is_none());
     }
 }
 
 #[test]
 fn an_offset_is_the_same_in_every_phase() {
-    // The other arm stays where it is while the first approaches, enters and closes: what is told to it must not wander off by the offset again with each of these phases.
+    // The other arm stays where it is while the first approaches, enters and closes: what is told
+    // to it must not wander off by the offset again with each of these phases.
     let mut episode = Episode::new(&resection(), &specimen(), 1).unwrap();
     episode.reset(5).unwrap();
     let start = episode.cell().observe()[1].commanded;
@@ -254,7 +256,7 @@ fn an_offset_is_the_same_in_every_phase() {
         }
     }
     assert!(told.iter().all(|numbers| *numbers == told[0]), "{:?} {:?}", told[0], told[99]);
-    let [a, b, deeper] = [told[0][0] - start.pivots[0], told[0][1] - start.pivots[1], told[0][2] - start.insertion];
+    let [a, b, deeper] = [told[0][0] - start.0[0], told[0][1] - start.0[1], told[0][2] - start.0[2]];
     let way = (0.12 * a).hypot(0.12 * b).hypot(deeper);
     assert!((way - 1e-3 * policy::OFFSET_MM).abs() < 1e-4, "{way} m");
 }

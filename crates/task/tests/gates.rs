@@ -159,7 +159,8 @@ fn sweeps_agree_with_the_gates_and_refuse_what_is_none() {
             .contains("grasp-lift")
     );
     assert!(sweep(&[], &ranges, &mut || true).is_err());
-    // Lost in the period of the last gate, which is not passed then: tissue that diverged, an arm out of its port.
+    // Lost in the period of the last gate, which is not passed then: tissue that diverged, an arm
+    // out of its port.
     let last = |change: fn(&mut Channels)| {
         let mut rows = good();
         rows.iter_mut().next_back().map(change);

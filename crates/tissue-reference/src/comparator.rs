@@ -12,7 +12,7 @@ pub struct Comparator {
     method: Method,
     mechanics: Mechanics,
     particles: Particles,
-    /// Of gravity and loads [m/s2].
+    /// Of gravity and loads (m/s2).
     accelerations: Vec<DVec3>,
     fixed: Vec<bool>,
     targets: Vec<DVec3>,

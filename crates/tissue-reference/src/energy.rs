@@ -1,14 +1,14 @@
-//! Mechanical energy of a state: what motion without work may never gain.
+//! Mechanical energy of a state. Motion without work may never gain any.
 
 use crate::oracle::{OracleState, elastic_energy};
 use trocar_tissue::Model;
 
-/// Mechanical energies of all bodies [J], in double precision.
+/// Mechanical energies of all bodies (J), in double precision.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Of motion.
     pub kinetic: f64,
-    /// Stored in the tissue; 0 at rest. Not a number where corotated tissue is inverted.
+    /// Stored in the tissue; 0 at rest. NaN where corotated tissue is inverted.
     pub elastic: f64,
     /// Of the masses in gravity's field; 0 for a mass at the world's origin.
     pub gravity: f64,
@@ -41,7 +41,7 @@ impl Energy {
         sum
     }
 
-    /// All of it [J].
+    /// All of it (J).
     pub fn total(&self) -> f64 {
         self.kinetic + self.elastic + self.gravity + self.supports
     }

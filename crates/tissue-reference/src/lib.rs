@@ -1,4 +1,5 @@
-//! Reference integrators for deformable tissue: what `trocar-tissue` is judged by and compared with.
+//! Reference integrators for deformable tissue: what `trocar-tissue` is judged by and compared
+//! with.
 //!
 //! [`Oracle`] finds the step of implicit Euler and the static equilibrium to double precision,
 //! slowly. [`SemiImplicit`] and [`Xpbd`] are the methods that the paper compares with, each in its

@@ -1,4 +1,4 @@
-//! What the comparators know of a body and what of it moves, in double precision.
+//! A body as the comparators see it, in double precision.
 //!
 //! Vertices have the solvers' numbers ([`Body::solver_numbers`]).
 
@@ -9,37 +9,37 @@ use trocar_tissue::{Body, SPEED_LIMIT, Support};
 /// A body's constants, vertices by the solvers' numbers, positions relative to the body's origin.
 pub(crate) struct Mechanics {
     pub tets: Vec<[u32; 4]>,
-    /// Rest gradients of the shape functions [1/m].
+    /// Rest gradients of the shape functions (1/m).
     pub gradients: Vec<[DVec3; 4]>,
-    /// Rest volumes [m3].
+    /// Rest volumes (m3).
     pub volumes: Vec<f64>,
-    /// [kg]
+    /// (kg)
     pub masses: Vec<f64>,
-    /// Edges with a dashpot: vertices and coefficient [N s/m].
+    /// Edges with a dashpot: vertices and coefficient (N s/m).
     pub dashpots: Vec<([u32; 2], f64)>,
     pub supports: Vec<Support>,
-    /// World position of the body's origin [m]: supports stand in the world.
+    /// World position of the body's origin (m); supports are in world coordinates.
     pub origin: DVec3,
-    /// [N/m]
+    /// (N/m)
     pub contact_stiffness: Vec<f64>,
 }
 
-/// Positions [m] and velocities [m/s].
+/// Positions (m) and velocities (m/s).
 pub(crate) struct Particles {
     pub x: Vec<DVec3>,
     pub v: Vec<DVec3>,
 }
 
-/// A stretch of time, and where fixed vertices are at its end.
+/// A time span, and where fixed vertices are at its end.
 #[derive(Clone, Copy)]
 pub(crate) struct Span<'a> {
-    /// [s]
+    /// (s)
     pub dt: f64,
-    /// Of gravity and loads, by vertex [m/s2].
+    /// Of gravity and loads, by vertex (m/s2).
     pub accelerations: &'a [DVec3],
     /// Pinned or held vertices.
     pub fixed: &'a [bool],
-    /// Read for fixed vertices only [m].
+    /// Targets; read for fixed vertices only (m).
     pub targets: &'a [DVec3],
 }
 
@@ -82,8 +82,9 @@ impl Mechanics {
         f
     }
 
-    /// Lets the dashpots act on velocities for a time of `h` [s], pair by pair, each as implicit Euler has it for the pair alone: they take energy at any `h` and keep both
-    /// momenta. Fixed vertices keep their velocities.
+    /// Applies the dashpots to velocities for a time of `h` (s), pair by pair, each as implicit
+    /// Euler treats the pair alone: they take energy at any `h` and keep both momenta. Fixed
+    /// vertices keep their velocities.
     pub fn damp(&self, h: f64, x: &[DVec3], v: &mut [DVec3], fixed: &[bool]) {
         for ([i, j], coefficient) in &self.dashpots {
             let (i, j) = (*i as usize, *j as usize);
@@ -104,7 +105,7 @@ impl Span<'_> {
     }
 }
 
-/// Whether a free vertex is at the speed limit, or has no speed at all.
+/// Whether a free vertex reaches the speed limit, or its speed is NaN.
 pub(crate) fn too_fast(v: &[DVec3], fixed: &[bool]) -> bool {
     v.iter().zip(fixed).any(|(v, fixed)| {
         let squared = v.length_squared();

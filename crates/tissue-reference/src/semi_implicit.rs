@@ -1,16 +1,19 @@
-//! Semi-implicit (symplectic) Euler: velocities from the forces at the positions, then positions from the velocities.
+//! Semi-implicit (symplectic) Euler: velocities from the forces at the positions, then positions
+//! from the velocities.
 //!
-//! Masses are lumped, and the elastic forces are the material's own. Two parts of it are stiffer than elements and are taken so that they bound no step:
-//! a dashpot acts as the impulse that implicit Euler gives its pair of vertices alone, one after another (it takes energy at any step and keeps both
-//! momenta), and friction stops at most the sliding that there is. What remains bounds the step at 2/omega of the stiffest mode
-//! ([`stable_explicit_step`]): beyond it the method grows without limit, and that is the method, not a setting of it.
+//! Masses are lumped, and the elastic forces are the material's own. Two parts are stiffer than
+//! elements and are treated so that they do not limit the step: a dashpot acts as the impulse that
+//! implicit Euler gives its pair of vertices alone, one after another (it takes energy at any step
+//! and keeps both momenta), and friction stops at most the sliding that there is. The rest limits
+//! the step to 2/omega of the stiffest mode ([`stable_explicit_step`]): beyond it the method grows
+//! without limit, whatever its settings.
 
 use crate::mechanics::{Mechanics, Particles, Span, too_fast};
 use crate::stable_step::stable_explicit_step;
 use glam::{DMat3, DVec3};
 use trocar_tissue::{ConstitutiveModel, Corotated, Hyperelastic, Material, Model, StVenantKirchhoff, StableNeoHookean};
 
-/// Semi-implicit Euler in so many steps a frame.
+/// Settings of semi-implicit Euler.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SemiImplicit {
     /// Steps a frame.
@@ -20,22 +23,24 @@ pub struct SemiImplicit {
 /// Share of the stable step that is used: tissue under load is stiffer than at rest.
 const USED_SHARE: f64 = 0.7;
 
-/// Least volume ratio that a stress is taken at: the volume barrier is infinite at 0 and an explicit step may well go there.
-const FLAT: f64 = 0.02;
+/// Least volume ratio at which a stress is evaluated: the volume barrier is infinite at 0, and an
+/// explicit step may go there.
+const MIN_VOLUME_RATIO: f64 = 0.02;
 
 impl SemiImplicit {
     /// The paper's substeps: 8 a frame.
     pub const PAPER: Self = Self { substeps: 8 };
 
-    /// As many steps as a frame of `dt` [s] of `model` needs to stay bounded: 0.7 of [`stable_explicit_step`] each.
+    /// As many steps as a frame of `dt` (s) of `model` needs to stay bounded: 0.7 of
+    /// [`stable_explicit_step`] each.
     pub fn stable(model: &Model, dt: f64) -> Self {
         let step = USED_SHARE * stable_explicit_step(model);
         Self { substeps: ((dt / step).ceil() as usize).max(1) }
     }
 }
 
-/// Advances a body by `span` in `substeps` steps; `force` is scratch. False: a vertex reached the speed limit, and the body is left
-/// as it was at that instant.
+/// Advances a body by `span` in `substeps` steps; `force` is scratch. Returns false if a vertex
+/// reached the speed limit; the body is then as it was at that instant.
 pub(crate) fn advance(
     mechanics: &Mechanics,
     material: &Material,
@@ -53,7 +58,8 @@ pub(crate) fn advance(
     }
 }
 
-/// Stable neo-Hookean tissue whose volume barrier goes on with its last slope below a volume ratio of [`FLAT`], and inverted elements have stresses.
+/// Stable neo-Hookean tissue whose volume barrier continues with its last slope below a volume
+/// ratio of [`MIN_VOLUME_RATIO`], so that inverted elements have stresses.
 struct Unbarred(StableNeoHookean);
 
 impl Unbarred {
@@ -67,12 +73,12 @@ impl Stress for Unbarred {
         let [a, b, c] = [f.x_axis, f.y_axis, f.z_axis];
         let cofactor = DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b));
         let j = a.dot(cofactor.x_axis);
-        let slope = self.0.volume_term(j.max(FLAT)).1 + self.0.lambda * (j - j.max(FLAT));
+        let slope = self.0.volume_term(j.max(MIN_VOLUME_RATIO)).1 + self.0.lambda * (j - j.max(MIN_VOLUME_RATIO));
         f * self.0.mu + cofactor * slope
     }
 }
 
-/// First Piola-Kirchhoff stress [Pa].
+/// First Piola-Kirchhoff stress (Pa).
 trait Stress {
     fn stress(&self, f: DMat3) -> DMat3;
 }

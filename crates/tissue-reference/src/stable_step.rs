@@ -1,26 +1,29 @@
-//! The longest step that explicit integration of a model can stand.
+//! The longest stable step of explicit integration.
 
 use crate::mechanics::Mechanics;
 use glam::{DMat3, DVec3};
 use trocar_tissue::{Body, Model};
 
 /// Power iterations; the greatest frequency is then known to about a percent.
-const ITERATIONS: usize = 300;
+const POWER_ITERATIONS: usize = 300;
 
-/// The longest stable step of semi-implicit Euler near rest [s]: 2/omega of the model's stiffest mode, free vertices, lumped masses, dashpots left out. It is estimated by power
-/// iteration on M^-1 K from a fixed start, which comes from above: the true one is about a percent shorter.
+/// The longest stable step of semi-implicit Euler near rest (s): 2/omega of the model's stiffest
+/// mode, for free vertices and lumped masses, without dashpots. It is estimated by power iteration
+/// on M^-1 K from a fixed start, which converges from above: the true one is about a percent
+/// shorter.
 pub fn stable_explicit_step(model: &Model) -> f64 {
     model.bodies().iter().map(|body| 2.0 / greatest_frequency(body)).fold(f64::INFINITY, f64::min)
 }
 
-/// [rad/s]
+/// (rad/s)
 fn greatest_frequency(body: &Body) -> f64 {
     let m = Mechanics::new(body);
     let law = body.material().hyperelastic();
     let mut pinned = vec![false; body.len()];
     body.solver_numbers().iter().zip(body.pinned()).for_each(|(i, is)| pinned[*i as usize] = *is);
     let fixed = |i: usize| pinned[i];
-    // A start without symmetry, the same every time; u is M^(1/2) x, so that the matrix is symmetric.
+    // A start without symmetry, the same every time; u is M^(1/2) x, so that the matrix is
+    // symmetric.
     let mut u: Vec<DVec3> = (0..body.len())
         .map(|i| {
             let noise =
@@ -30,7 +33,7 @@ fn greatest_frequency(body: &Body) -> f64 {
         .collect();
     let mut force = vec![DVec3::ZERO; body.len()];
     let mut squared = 0.0;
-    for _ in 0..ITERATIONS {
+    for _ in 0..POWER_ITERATIONS {
         let norm = u.iter().map(|u| u.length_squared()).sum::<f64>().sqrt();
         if norm == 0.0 {
             return 0.0;

@@ -1,10 +1,12 @@
 //! Extended position-based dynamics.
 //!
-//! Macklin, Mueller and Chentanez, "XPBD", 2016; small steps of one iteration each, Macklin and others, "Small steps in physics simulation", 2019; stable neo-Hookean
-//! tissue as two constraints an element, Macklin and Mueller, "A constraint-based formulation of stable neo-Hookean materials", 2021, solved together (Ton-That,
-//! Kry and Andrews, "Parallel block neo-Hookean XPBD using graph clustering", 2023). Support planes
-//! are constraints too. Dashpots act on the velocities after each substep, each pair by itself: as constraints among the others they are a hundred times stiffer than the
-//! elements and undo their corrections, and the same meshes diverge.
+//! Macklin, Mueller and Chentanez, "XPBD", 2016; small steps of one iteration each, Macklin and
+//! others, "Small steps in physics simulation", 2019; stable neo-Hookean tissue as two constraints
+//! an element, Macklin and Mueller, "A constraint-based formulation of stable neo-Hookean
+//! materials", 2021, solved together (Ton-That, Kry and Andrews, "Parallel block neo-Hookean XPBD
+//! using graph clustering", 2023). Support planes are constraints too. Dashpots act on the
+//! velocities after each substep, each pair by itself: as constraints they are a hundred times
+//! stiffer than the elements and undo their corrections, and the same meshes diverge.
 
 use crate::mechanics::{Mechanics, Particles, Span, too_fast};
 use crate::xpbd_constraints::{Elements, Multipliers, Planes};
@@ -37,7 +39,8 @@ impl Scratch {
     }
 }
 
-/// Advances a body by `span`. False: a vertex reached the speed limit, and the body is left as it was at that instant.
+/// Advances a body by `span`. Returns false if a vertex reached the speed limit; the body is then
+/// as it was at that instant.
 pub(crate) fn advance(
     settings: &Xpbd,
     mechanics: &Mechanics,
@@ -56,7 +59,7 @@ pub(crate) fn advance(
     }
     for substep in 1..=settings.substeps {
         start.copy_from_slice(x);
-        // What is left of a fixed vertex's way is spread over what is left of the span.
+        // The remaining way of a fixed vertex is spread over the rest of the span.
         let share = 1.0 / (settings.substeps + 1 - substep) as f64;
         for (i, x) in x.iter_mut().enumerate() {
             *x = if span.fixed[i] {

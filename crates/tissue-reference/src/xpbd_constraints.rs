@@ -1,7 +1,8 @@
 //! XPBD's constraints: elements and support planes.
 //!
-//! A constraint C of compliance a (its energy is C^2/(2a)) has a multiplier l, 0 at a substep's beginning, which a correction changes by
-//! (-C - a l/h^2) / (grad C M^-1 grad C + a/h^2); the vertices move by M^-1 grad C times that (XPBD, equations 17 and 18).
+//! A constraint C of compliance a (its energy is C^2/(2a)) has a multiplier l, 0 at a substep's
+//! beginning. A correction changes it by (-C - a l/h^2) / (grad C M^-1 grad C + a/h^2), and moves
+//! the vertices by M^-1 grad C times that (XPBD, equations 17 and 18).
 
 use crate::mechanics::Mechanics;
 use crate::xpbd_settings::XpbdConstraints;
@@ -14,10 +15,11 @@ type Gradients = [DVec3; 4];
 /// Multipliers of an element, one a constraint.
 pub(crate) type Multipliers = [f64; 6];
 
-/// Volume ratio below which Hooke's law stands for the material's, whose stress has no strain to act on in a flat element.
-const FLAT: f64 = 0.05;
+/// Volume ratio below which Hooke's law replaces the material's: in a flat element a stress has no
+/// strain to act on.
+const MIN_VOLUME_RATIO: f64 = 0.05;
 
-/// What the elements are held by.
+/// The constraints of an element.
 enum Law {
     /// Six Green strains with the elastic compliance, their stress the material's.
     Strains { law: Box<dyn Hyperelastic>, hooke: Hooke },
@@ -31,7 +33,7 @@ enum Law {
 pub(crate) struct Elements<'a> {
     mechanics: &'a Mechanics,
     law: Law,
-    /// 1/h^2 [1/s2].
+    /// 1/h^2 (1/s2).
     rate: f64,
 }
 
@@ -71,7 +73,7 @@ impl<'a> Elements<'a> {
         }
     }
 
-    /// Changes an element's multipliers and says how its corners move.
+    /// Changes an element's multipliers. Returns how its corners move.
     fn correct(&self, t: usize, x: &[DVec3], w: &[f64], relaxation: f64, multipliers: &mut Multipliers) -> Gradients {
         let m = self.mechanics;
         let f = m.deformation(t, x);
@@ -179,7 +181,7 @@ fn voigt(m: DMat3) -> [f64; 6] {
 /// Second Piola-Kirchhoff stress F^-1 P.
 fn second_stress(f: DMat3, law: &dyn Hyperelastic, hooke: &Hooke) -> [f64; 6] {
     let (j, cofactor) = volume_ratio(f);
-    if j > FLAT {
+    if j > MIN_VOLUME_RATIO {
         return voigt(cofactor.transpose() * law.stress(f) * (1.0 / j));
     }
     let mut strain = voigt((f.transpose() * f - DMat3::IDENTITY) * 0.5);
@@ -243,10 +245,11 @@ fn volume_ratio(f: DMat3) -> (f64, DMat3) {
     (a.dot(cofactor.x_axis), cofactor)
 }
 
-/// The support planes: depth with compliance 1/k, and friction that takes back at most its share of the sliding.
+/// The support planes: depth with compliance 1/k, and friction that takes back at most its share of
+/// the sliding.
 pub(crate) struct Planes<'a> {
     pub mechanics: &'a Mechanics,
-    /// Substep [s].
+    /// Substep (s).
     pub h: f64,
 }
 

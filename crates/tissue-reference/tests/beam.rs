@@ -9,8 +9,9 @@ use common::{GRAVITY, block, nodes, tissue};
 use trocar_tissue::{BodyDescription, ConstitutiveModel, MassFloor, Material, ModelBuilder};
 use trocar_tissue_reference::{Oracle, OracleState};
 
-/// Tip deflection over Timoshenko's, w L^4/(8 E I) + w L^2/(2 k G A) with k = 5/6, for the beam's own weight w per length; `n` elements over half its height. nu = 0: the
-/// clamp then holds no lateral contraction, of which beam theory knows nothing.
+/// Tip deflection over Timoshenko's, w L^4/(8 E I) + w L^2/(2 k G A) with k = 5/6, for the beam's
+/// own weight w per length; `n` elements over half its height. nu = 0: the clamp then holds no
+/// lateral contraction, of which beam theory knows nothing.
 fn deflection(constitutive: ConstitutiveModel, n: usize) -> f64 {
     let (length, height, width): (f64, f64, f64) = (32e-3, 4e-3, 2e-3);
     // Stiff: the tip falls by a 500th of the height.
@@ -31,7 +32,8 @@ fn deflection(constitutive: ConstitutiveModel, n: usize) -> f64 {
     sag / tip.len() as f64 / (bending + shear)
 }
 
-/// Linear tetrahedra are too stiff in bending by an error of second order in their size: it falls with the square of the size, towards theory.
+/// Linear tetrahedra are too stiff in bending by an error of second order in their size: it falls
+/// with the square of the size, towards theory.
 #[test]
 fn a_beam_bends_as_theory_says_at_second_order() {
     for constitutive in ConstitutiveModel::ALL {
@@ -40,7 +42,8 @@ fn a_beam_bends_as_theory_says_at_second_order() {
         let orders: Vec<f64> = off.windows(2).map(|d| (d[0] / d[1]).log2()).collect();
         println!("{constitutive:?}: too stiff by {off:.4?}, orders {orders:.2?}");
         assert!(off.iter().all(|d| *d > 0.0), "{constitutive:?} is too soft: {off:?}");
-        // A relative error d of a stiff beam is d/(1 - d) of its compliance: far from theory the order shows late.
+        // A relative error d of a stiff beam is d/(1 - d) of its compliance: far from theory the
+        // order shows late.
         assert!(orders[0] > 1.2, "{constitutive:?}: {orders:?}");
         if let [.., a, b] = off[..]
             && off.len() > 2

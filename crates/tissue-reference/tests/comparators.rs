@@ -77,16 +77,19 @@ fn momenta_are_kept() {
             let before = momenta(&state);
             assert_eq!(run(&model, scheme, &mut state, 6).divergence, None, "{scheme:?}");
             let after = momenta(&state);
-            // One vertex' mass at a tenth of a metre a second is 5e-6 kg m/s; the state is rounded to f32 between frames.
+            // One vertex' mass at a tenth of a metre a second is 5e-6 kg m/s; the state is rounded
+            // to f32 between frames.
             assert!((after.0 - before.0).length() < 1e-5 * before.0.length(), "{scheme:?}: {before:?} {after:?}");
-            // XPBD's pushes have no moment about where the vertices were, but a small one about where they end.
+            // XPBD's pushes have no moment about where the vertices were, but a small one about
+            // where they end.
             let tolerance = if matches!(scheme, Scheme::Xpbd(_)) { 0.05 } else { 1e-4 };
             assert!((after.1 - before.1).length() < tolerance * before.1.length(), "{scheme:?}: {before:?} {after:?}");
         }
     }
 }
 
-/// With short enough steps XPBD's and semi-implicit Euler's column stands as the theory says (nu = 0), rho g L^2/(2E) lower at its top.
+/// With short enough steps XPBD's and semi-implicit Euler's column stands as the theory says (nu =
+/// 0), rho g L^2/(2E) lower at its top.
 #[test]
 fn a_column_sags_under_its_weight() {
     let mesh = block([2, 2, 6], 2e-3);
@@ -108,7 +111,8 @@ fn a_column_sags_under_its_weight() {
     }
 }
 
-/// Newton's law for XPBD (the engine's) has no shear stiffness at small strains: the same column sags far more.
+/// Newton's law for XPBD (the engine's) has no shear stiffness at small strains: the same column
+/// sags far more.
 #[test]
 fn strain_traces_do_not_hold_a_column() {
     let mesh = block([2, 2, 6], 2e-3);
@@ -123,7 +127,8 @@ fn strain_traces_do_not_hold_a_column() {
     assert!(traces > 5.0 * material, "{:.4} mm and {:.4} mm", traces * 1e3, material * 1e3);
 }
 
-/// Below its stable step semi-implicit Euler's energy stays where it was; above, the body reaches the speed limit, and says so.
+/// Below its stable step semi-implicit Euler's energy stays where it was; above, the body reaches
+/// the speed limit, and says so.
 #[test]
 fn the_stable_step_is_where_it_is_said_to_be() {
     let mesh = block([3, 3, 3], 2e-3);

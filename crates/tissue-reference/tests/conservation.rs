@@ -12,7 +12,7 @@ use trocar_tissue::{
 };
 use trocar_tissue_reference::{Energy, Oracle, OracleState};
 
-/// Momentum [kg m/s] and angular momentum about the centre of mass [kg m2/s].
+/// Momentum (kg m/s) and angular momentum about the centre of mass (kg m2/s).
 fn momenta(model: &Model, state: &OracleState) -> (DVec3, DVec3) {
     let (x, v) = (state.positions(0), state.velocities(0));
     let masses: Vec<f64> = (0..x.len()).map(|i| model.bodies()[0].mass(i)).collect();
@@ -38,8 +38,9 @@ fn thrown(model: &Model, spin: f64) -> State {
     state
 }
 
-/// Inner forces have no sum: momentum is kept as well as the solver is converged, and so is angular momentum, of which implicit Euler itself loses some: h w/2 of it for each
-/// radian (the oracle says how much).
+/// Inner forces have no sum: momentum is kept as well as the solver is converged, and so is angular
+/// momentum, of which implicit Euler itself loses some: h w/2 of it for each radian (the oracle
+/// says how much).
 #[test]
 fn momenta_are_kept_in_free_flight() {
     let mesh = block([4, 3, 2], 2e-3);
@@ -77,7 +78,8 @@ fn momenta_are_kept_in_free_flight() {
     }
 }
 
-/// The greatest gain of energy in a frame, over the largest kinetic energy; infinite if the run diverges.
+/// The greatest gain of energy in a frame, over the largest kinetic energy; infinite if the run
+/// diverges.
 fn gain(model: &Model, mut state: State, schedule: SolverSettings, frames: usize) -> f64 {
     let mut stepper = Stepper::new(model, schedule, FRAME, 1).unwrap();
     let mut energies = vec![Energy::of(model, &seen(model, &state)).total()];

@@ -45,8 +45,9 @@ fn mean_height_of_the_top(mesh: &TetMesh, x: &[DVec3], top: f64) -> f64 {
     sum / faces
 }
 
-/// A column that stands on its foot sags by rho g L^2/(2E) at its top (nu = 0). Raised masses add up to a percent to its weight; with the model's own masses
-/// the sag is sum m g z/(E A), which linear elements reproduce exactly.
+/// A column that stands on its foot sags by rho g L^2/(2E) at its top (nu = 0). Raised masses add
+/// up to a percent to its weight; with the model's own masses the sag is sum m g z/(E A), which
+/// linear elements reproduce exactly.
 #[test]
 fn a_column_sags_by_its_weight() {
     let (length, section, young_modulus) = (0.02, 64e-6, 12e6);
@@ -106,8 +107,8 @@ fn busy(constitutive: ConstitutiveModel, viscosity: f64, friction: f64, mesh: &T
     (model, state)
 }
 
-/// The stepper and the oracle minimise the same function: with sweeps enough they agree to the rounding of `f32`, in every material, with
-/// dashpots, a rough plane and a grasp.
+/// The stepper and the oracle minimise the same function: with sweeps enough they agree to the
+/// rounding of `f32`, in every material, with dashpots, a rough plane and a grasp.
 #[test]
 fn sweeps_converge_to_the_oracles_step() {
     let mesh = block([6, 3, 3], 2e-3);
@@ -199,7 +200,8 @@ fn the_same_bits_twice() {
     assert_eq!(bits(&a), bits(&b));
 }
 
-/// Large motions of held nodes are taken in parts; those that no tissue can follow are refused, and nothing is changed then.
+/// Large motions of held nodes are taken in parts; those that no tissue can follow are refused, and
+/// nothing is changed then.
 #[test]
 fn held_nodes_go_far_or_are_refused() {
     let mesh = block([3, 3, 5], 2e-3);

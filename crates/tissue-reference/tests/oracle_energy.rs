@@ -11,7 +11,8 @@ use trocar_tissue_reference::{Oracle, OracleState};
 
 const SUBSTEP: f64 = FRAME / 8.0;
 
-/// Moved as a whole from the predictor, a body has only the energy of inertia, 1/2 M d^2/dt^2; the exact step has less than any other.
+/// Moved as a whole from the predictor, a body has only the energy of inertia, 1/2 M d^2/dt^2; the
+/// exact step has less than any other.
 #[test]
 fn energies_are_inertias_where_nothing_is_strained_and_least_at_the_step() {
     let mesh = block([2, 2, 2], 4e-3);

@@ -1,4 +1,5 @@
-//! A block that hangs from a wall, against scikit-fem on the same mesh (`oracles/skfem_block.py` makes the fixture).
+//! A block that hangs from a wall, against scikit-fem on the same mesh (`oracles/skfem_block.py`
+//! makes the fixture).
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -13,7 +14,7 @@ use trocar_tissue::{
 use trocar_tissue_reference::oracle::Precision;
 use trocar_tissue_reference::{Oracle, OracleState};
 
-/// The fixture's displacements [m] of one solution.
+/// The fixture's displacements (m) of one solution.
 fn solution(name: &str) -> Vec<DVec3> {
     let lines = include_str!("fixtures/skfem_block.txt").lines().skip_while(|line| *line != name).skip(1);
     let vector = |line: &str| -> Option<DVec3> {
@@ -61,7 +62,7 @@ fn the_oracle_sags_as_scikit_fem() {
     }
 }
 
-/// The default schedule at rest is there too, as near as SPEC T2 asks.
+/// The default solver at rest is there too, within the tolerance of the test.
 #[test]
 fn the_default_schedule_sags_as_scikit_fem() {
     let model = hanging(ConstitutiveModel::StableNeoHookean, GRAVITY);

@@ -1,4 +1,5 @@
-//! Conforming supports: an organ lies in its imprint without being pushed, and on it as on any support.
+//! Conforming supports: an organ lies in its imprint without being pushed, and on it as on any
+//! support.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -39,7 +40,8 @@ fn the_imprint_touches_the_underside_and_pushes_nothing() {
         let field: Support = SupportField::under(&mesh, up, 1e-3, 0.5).unwrap().into();
         let heights: Vec<f64> = mesh.vertices.iter().map(|p| field.height(*p)).collect();
         assert!(heights.iter().all(|h| *h >= 0.0), "{:?}", heights.iter().copied().fold(0.0, f64::min));
-        // Under the middle of the foot, away from the outline, the gap is far below the imprint's depth.
+        // Under the middle of the foot, away from the outline, the gap is far below the imprint's
+        // depth.
         let foot = mesh.vertices.iter().zip(&heights).take(13 * 11);
         let inner = foot.filter(|(p, _)| (p.x - 12e-3).abs() < 8e-3 && (p.y - 10e-3).abs() < 6e-3);
         let widest = inner.map(|(_, h)| *h).fold(0.0, f64::max);
@@ -59,7 +61,8 @@ fn the_imprint_touches_the_underside_and_pushes_nothing() {
     assert!(moved < 2e-8, "{moved} m: the support pushes");
 }
 
-/// An organ moves far less into its imprint than on a plane, and the sweeps find the oracle's place.
+/// An organ moves far less into its imprint than on a plane, and the sweeps find the oracle's
+/// place.
 #[test]
 fn an_organ_rests_in_its_imprint() {
     let mesh = cushion();

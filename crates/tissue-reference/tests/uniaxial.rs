@@ -1,15 +1,18 @@
 //! A bar pulled and pressed against each material's closed form.
 //!
-//! Under a stretch s along x and t across, F = diag(s, t, t), J = s t^2, and the sides are free of stress:
+//! Under a stretch s along x and t across, F = diag(s, t, t), J = s t^2, and the sides are free of
+//! stress:
 //!
-//! - St. Venant-Kirchhoff: 2 mu E2 + lambda (E1 + 2 E2) = 0 for Green's strains E1 = (s^2 - 1)/2, E2 = (t^2 - 1)/2, so E2 = -nu E1,
-//!   t^2 = 1 - nu (s^2 - 1), and P1 = s (2 mu E1 + lambda (E1 + 2 E2)) = E s (s^2 - 1)/2;
-//! - stable neo-Hookean: mu t + l (J - a) s t = 0 with l = lambda + mu and a = 1 + mu/l, so J = a - mu/(l s), t^2 = J/s, and
-//!   P1 = mu s + l (J - a) t^2 = mu (s - t^2/s);
-//! - corotated: 2 mu (t - 1) + lambda (J - 1) s t = 0, a cubic in t with one root between 0 and (1 + 1/s), found by halving, and
-//!   P1 = 2 mu (s - 1) + lambda (J - 1) t^2.
+//! - St. Venant-Kirchhoff: 2 mu E2 + lambda (E1 + 2 E2) = 0 for Green's strains E1 = (s^2 - 1)/2,
+//!   E2 = (t^2 - 1)/2, so E2 = -nu E1, t^2 = 1 - nu (s^2 - 1), and P1 = s (2 mu E1 + lambda (E1 + 2
+//!   E2)) = E s (s^2 - 1)/2;
+//! - stable neo-Hookean: mu t + l (J - a) s t = 0 with l = lambda + mu and a = 1 + mu/l, so J = a -
+//!   mu/(l s), t^2 = J/s, and P1 = mu s + l (J - a) t^2 = mu (s - t^2/s);
+//! - corotated: 2 mu (t - 1) + lambda (J - 1) s t = 0, a cubic in t with one root between 0 and (1
+//!   + 1/s), found by halving, and P1 = 2 mu (s - 1) + lambda (J - 1) t^2.
 //!
-//! Stretches go from 0.6 to 1.8; of St. Venant-Kirchhoff tissue from 0.8, since a pressed bar of it gives way sideways, element against element, at less than 0.7.
+//! Stretches go from 0.6 to 1.8; of St. Venant-Kirchhoff tissue from 0.8, since a pressed bar of it
+//! gives way sideways, element against element, at less than 0.7.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -21,7 +24,7 @@ use glam::DVec3;
 use trocar_tissue::{BodyDescription, ConstitutiveModel, MassFloor, Material, ModelBuilder};
 use trocar_tissue_reference::{Energy, Held, Oracle, OracleState};
 
-/// Stretch across and nominal stress [Pa].
+/// Stretch across and nominal stress (Pa).
 fn closed_form(material: &Material, s: f64) -> (f64, f64) {
     let (mu, lambda) = material.lame();
     match material.model {
@@ -46,7 +49,8 @@ fn closed_form(material: &Material, s: f64) -> (f64, f64) {
     }
 }
 
-/// The ends are held as the closed form says; the sides and the inside then find it by themselves, and the energy's derivative is the force.
+/// The ends are held as the closed form says; the sides and the inside then find it by themselves,
+/// and the energy's derivative is the force.
 #[test]
 fn a_bar_pulls_and_pushes_as_its_energy_says() {
     let (cells, edge) = ([5, 3, 3], 2e-3);

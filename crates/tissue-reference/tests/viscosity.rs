@@ -32,7 +32,8 @@ fn lattice(half: DVec3, cell: f64) -> TetMesh {
     LatticeMesher::uniform(cell).mesh_shape(&Box3(half), (-half, half)).unwrap()
 }
 
-/// Power that a rate of strain D dissipates in the mesh, over the Newtonian 2 eta D:D + (bulk - 2 eta/3) tr(D)^2 of its volume.
+/// Power that a rate of strain D dissipates in the mesh, over the Newtonian 2 eta D:D + (bulk - 2
+/// eta/3) tr(D)^2 of its volume.
 fn power(mesh: &TetMesh, rate: DMat3, bulk: f64) -> f64 {
     let model = model(mesh, fluid(), vec![], DVec3::ZERO);
     let (mut state, dt) = (OracleState::new(&model), 1e-7);

@@ -1,6 +1,8 @@
-//! What a cut costs: severing a tube, and the stepper's way over to the new model. `cargo bench -p trocar-tissue --bench cutting`.
+//! Cost of a cut: severing a tube, and changing the stepper to the new model.
+//!
+//! `cargo bench -p trocar-tissue --bench cutting`
 
-#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a program that tells its figures")]
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "a benchmark prints")]
 
 #[path = "../tests/common/mod.rs"]
 mod common;

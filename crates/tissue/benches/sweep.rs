@@ -1,4 +1,5 @@
-//! What a sweep of Vertex Block Descent costs on a specimen of six organs: one table, minima over many repetitions.
+//! Cost of a sweep of Vertex Block Descent on a specimen of six organs: one table, minima over many
+//! repetitions.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "a benchmark stops where it cannot go on, and prints")]
 
 use glam::DVec3;

@@ -1,14 +1,14 @@
-//! Builds models; everything that can be wrong is found here.
+//! Builds models. Every error of a model is found here.
 
 mod check;
 
 use crate::assembly::{SEEN_FROM, shape_gradients};
+use crate::body::coloring::color;
+use crate::body::element_lanes::ElementLanes;
+use crate::body::groups::Groups;
+use crate::body::strip::{Push, strip};
+use crate::body::surface::Surface;
 use crate::body::{BodyData, Corner, Edge, Vertex};
-use crate::contact::surface::Surface;
-use crate::descent::coloring::color;
-use crate::descent::elements::Elements;
-use crate::descent::groups::Groups;
-use crate::descent::strip::{Push, strip};
 use crate::{
     Body, BodyContact, Collider, ConstitutiveModel, Error, Material, Model, Result, StableNeoHookean, Support,
 };
@@ -20,17 +20,17 @@ use trocar_geometry::{TetMesh, TetQuality};
 pub struct BodyDescription<'a> {
     /// Name, for messages.
     pub name: String,
-    /// Rest shape [m].
+    /// Rest shape (m).
     pub mesh: &'a TetMesh,
     /// Material.
     pub material: Material,
     /// Nodes that never move.
     pub pinned: Vec<u32>,
-    /// What it rests on.
+    /// Surfaces that it rests on.
     pub supports: Vec<Support>,
 }
 
-/// Below which mass a node's mass is raised.
+/// The mass below which a node's mass is raised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MassFloor {
     /// Masses stay as they are.
@@ -40,19 +40,21 @@ pub enum MassFloor {
 }
 
 impl Default for MassFloor {
-    /// A quarter of the median (SPEC T5).
+    /// A quarter of the median.
     fn default() -> Self {
         Self::MedianShare(0.25)
     }
 }
 
-/// Stiffness of contacts against a vertex, over Young's modulus times the vertex's size (the cube root of its share of the volume).
+/// Stiffness of contacts against a vertex, over Young's modulus times the vertex's size (the cube
+/// root of its share of the volume).
 const CONTACT_STIFFNESS: f64 = 20.0;
 
-/// Contacts stiffer than this are beyond `f32`.
-const MOST_CONTACT_STIFFNESS: f64 = 1e5;
+/// Greatest such factor: stiffer contacts exceed `f32`.
+const MAX_CONTACT_STIFFNESS: f64 = 1e5;
 
-/// Dashpots along edges of all directions dissipate 2/15 of (strain rate)^2 under shear, a viscous body 2.
+/// Factor of the dashpots: along edges of all directions they dissipate 2/15 of (strain rate)^2
+/// under shear, a viscous body 2.
 const DASHPOTS: f64 = 15.0;
 
 /// Collects bodies and boundary conditions.
@@ -87,20 +89,22 @@ impl ModelBuilder {
         }
     }
 
-    /// Sets the gravitational acceleration [m/s2].
+    /// Sets the gravitational acceleration (m/s2).
     pub fn gravity(mut self, gravity: DVec3) -> Self {
         self.gravity = gravity;
         self
     }
 
-    /// Sets the mass floor of the bodies that are added from now on; [`MassFloor::default`] otherwise.
+    /// Sets the mass floor of the bodies that are added after this; [`MassFloor::default`]
+    /// otherwise.
     pub fn mass_floor(mut self, floor: MassFloor) -> Self {
         self.mass_floor = floor;
         self
     }
 
-    /// Sets the stiffness of contacts against the nodes of the bodies that are added from now on, over Young's modulus times a node's size (the cube root of its share of the
-    /// volume); 20 otherwise. Contacts give way by the pressure over this.
+    /// Sets the stiffness of contacts against the nodes of the bodies that are added after this,
+    /// over Young's modulus times a node's size (the cube root of its share of the volume); 20
+    /// otherwise. A contact yields by the pressure over this stiffness.
     pub fn contact_stiffness(mut self, over_tissue: f64) -> Self {
         self.contact_stiffness = over_tissue;
         self
@@ -109,19 +113,21 @@ impl ModelBuilder {
     /// Adds a body; returns its index.
     ///
     /// # Errors
-    /// Refuses, naming the body and the element, node or parameter: zero or negative volumes, elements that are flat beside their edges, isolated nodes, numbers that
-    /// are not finite, extents outside 1 mm to 2 m, moduli outside 1 Pa to 1 GPa, Poisson ratios outside 0 to 0.4999, densities outside 1 to 30,000 kg/m3, negative
-    /// viscosities, pins out of range or named twice, supports that are none, mass floors outside 0 to 1.
+    /// The error names the body and the element, node or parameter. Refused are: zero or negative
+    /// volumes, elements that are flat beside their edges, isolated nodes, numbers that are not
+    /// finite, extents outside 1 mm to 2 m, moduli outside 1 Pa to 1 GPa, Poisson ratios outside 0
+    /// to 0.4999, densities outside 1 to 30,000 kg/m3, negative viscosities, pins out of range or
+    /// named twice, invalid supports, and mass floors outside 0 to 1.
     pub fn body(&mut self, body: BodyDescription<'_>) -> Result<usize> {
         check::check(&body).map_err(|reason| Error::Body { body: body.name.clone(), reason })?;
         if let MassFloor::MedianShare(share) = self.mass_floor
             && !(0.0..=1.0).contains(&share)
         {
-            return Err(Error::Model(format!("a mass floor of {share} of the median; 0 to 1 make sense")));
+            return Err(Error::Model(format!("a mass floor of {share} of the median; must be in [0, 1]")));
         }
-        if !(self.contact_stiffness > 0.0 && self.contact_stiffness <= MOST_CONTACT_STIFFNESS) {
+        if !(self.contact_stiffness > 0.0 && self.contact_stiffness <= MAX_CONTACT_STIFFNESS) {
             return Err(Error::Model(format!(
-                "a contact stiffness of {} times the tissue's; above 0 and at most {MOST_CONTACT_STIFFNESS} make sense",
+                "a contact stiffness of {} times the tissue's; must be in (0, {MAX_CONTACT_STIFFNESS}]",
                 self.contact_stiffness
             )));
         }
@@ -129,13 +135,15 @@ impl ModelBuilder {
         Ok(self.bodies.len() - 1)
     }
 
-    /// Makes the bodies touch each other, but for the pairs that are filtered. Without it they pass through each other. Solvers that are there to compare with and the oracle know nothing of it.
+    /// Makes the bodies touch each other, except for filtered pairs. Without it they pass through
+    /// each other. Integrators from outside this crate ([`crate::Integrator`]) ignore it.
     pub fn body_contact(mut self, contact: BodyContact) -> Self {
         self.body_contact = Some(contact);
         self
     }
 
-    /// Says that bodies `a` and `b` do not collide; `a` may be `b`, which then does not collide with itself.
+    /// Excludes the pair of bodies `a` and `b` from contact. If `a` is `b`, the body does not touch
+    /// itself.
     ///
     /// # Errors
     /// Refuses bodies that have not been added.
@@ -154,7 +162,8 @@ impl ModelBuilder {
     /// Adds a part of a tool that no body may enter; returns its index.
     ///
     /// # Errors
-    /// Refuses, naming the collider: shapes without extent or with numbers that are not finite, friction below 0, rest offsets outside 0 to 10 mm.
+    /// The error names the collider. Refused are: shapes without extent or with numbers that are
+    /// not finite, friction below 0, and rest offsets outside 0 to 10 mm.
     pub fn collider(&mut self, collider: Collider) -> Result<usize> {
         collider.check().map_err(|reason| Error::Model(format!("collider '{}': {reason}", collider.name)))?;
         self.colliders.push(collider);
@@ -164,13 +173,17 @@ impl ModelBuilder {
     /// Finishes the model.
     ///
     /// # Errors
-    /// Refuses a model without bodies, gravity that is not finite or above 100 m/s2, and a contact between bodies whose numbers make no sense.
+    /// Refused are: a model without bodies, gravity that is not finite or above 100 m/s2, and a
+    /// contact between bodies with numbers out of range.
     pub fn build(self) -> Result<Model> {
         if self.bodies.is_empty() {
             return Err(Error::Model("a model needs a body".to_owned()));
         }
         if !(self.gravity.is_finite() && self.gravity.length() <= 100.0) {
-            return Err(Error::Model(format!("gravity is {} m/s2; the earth's is 9.8", self.gravity)));
+            return Err(Error::Model(format!(
+                "gravity is {} m/s2; must be finite and at most 100 m/s2 (the earth's is 9.8)",
+                self.gravity
+            )));
         }
         if let Some(contact) = &self.body_contact {
             contact.check().map_err(|reason| Error::Model(format!("contact between bodies: {reason}")))?;
@@ -185,17 +198,18 @@ impl ModelBuilder {
     }
 }
 
-/// What a piece of a body has from the whole, so that its positions and its mass stay what they were to the bit.
+/// What a piece of a body inherits from the whole, so that its positions and masses keep every bit.
 pub(crate) struct Inherited {
-    /// World position of the whole body's own origin [m].
+    /// World position of the whole body's own origin (m).
     pub origin: DVec3,
-    /// Mass of each node [kg].
+    /// Mass of each node (kg).
     pub masses: Vec<f64>,
-    /// How many of them were raised.
+    /// Number of nodes whose mass was raised.
     pub raised: usize,
 }
 
-/// Lays a checked body out for the sweeps; a piece of another takes what it has `inherited`, and no mass floor.
+/// Lays out a checked body for the sweeps. A piece of another body takes what it has `inherited`,
+/// and no mass floor.
 pub(crate) fn lay_out(
     description: BodyDescription<'_>,
     mass_floor: MassFloor,
@@ -222,7 +236,8 @@ pub(crate) fn lay_out(
             incident[*i as usize].push((t, k));
         }
     }
-    // Pinned vertices are never swept and have no colour. Vertices of a colour are sorted by the work they are, so that those next to each other are alike.
+    // Pinned vertices are never swept and have no colour. Vertices of a colour are sorted by their
+    // amount of work, so that adjacent ones are alike.
     let (colors, color_count) = color(&neighbours, &pinned);
     let strips: Vec<Vec<Push>> = match material.model {
         ConstitutiveModel::StableNeoHookean => {
@@ -295,18 +310,19 @@ pub(crate) fn lay_out(
             v.laplacian = laplacian;
         }
     }
-    body.elements = Elements::new(&body.tets, &body.volumes, |i| body.vertices[i as usize].pinned, nodes);
+    body.elements = ElementLanes::new(&body.tets, &body.volumes, |i| body.vertices[i as usize].pinned, nodes);
     let mut body = Body::from(body);
     if material.model == ConstitutiveModel::StableNeoHookean {
         let inside = |push: &Push| Push { to: body.internal[push.to as usize], ..*push };
         let strips: Vec<Vec<Push>> = order.iter().map(|i| strips[*i as usize].iter().map(inside).collect()).collect();
-        let groups = Groups::new(&body, &strips);
+        let groups = Groups::new(&body.vertex_table(), &strips, material.viscosity > 0.0);
         body.groups = groups;
     }
     body
 }
 
-/// Masses lumped from the nodes' shares of the volume, none below the floor; and how many were raised.
+/// Masses lumped from the nodes' shares of the volume, none below the floor; and the number of
+/// raised ones.
 fn lumped_masses(share: &[f64], density: f64, floor: MassFloor) -> (Vec<f64>, usize) {
     let mut sorted = share.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -318,7 +334,7 @@ fn lumped_masses(share: &[f64], density: f64, floor: MassFloor) -> (Vec<f64>, us
     (share.iter().map(|v| density * v.max(least)).collect(), raised)
 }
 
-/// Number of pieces that hang together by shared nodes.
+/// Number of pieces that are connected by shared nodes.
 fn count_parts(neighbours: &[Vec<u32>]) -> usize {
     let mut seen = vec![false; neighbours.len()];
     let mut parts = 0;
@@ -337,7 +353,7 @@ fn count_parts(neighbours: &[Vec<u32>]) -> usize {
     parts
 }
 
-/// The faces opposite a node in its elements, turned as its corners are.
+/// The faces opposite a node in its elements, oriented as its corners are.
 fn faces(mesh: &TetMesh, incident: &[(usize, usize)]) -> Vec<[u32; 3]> {
     incident.iter().map(|(t, k)| SEEN_FROM[*k].map(|c| mesh.tets[*t][c])).collect()
 }

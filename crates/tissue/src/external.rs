@@ -4,12 +4,12 @@
 //! Such an integrator knows pins, grasps (all of them rigid), loads and supports. Bodies that it
 //! steps pass through each other and through tools.
 
-use crate::contact::{Anchor, Contacts, Source};
-use crate::integrator::{Frame, Solver, Worker};
+use crate::body_slot::{BodySlot, IslandFrame, Solver};
+use crate::frame::Frame;
 use crate::report::Divergence;
-use crate::state::BodyState;
+use crate::state::BodyMotion;
 use crate::{Body, Grasp};
-use glam::{DVec3, Vec3A};
+use glam::DVec3;
 
 /// An integrator of one body from outside this crate ([`crate::Stepper::with_integrator`]).
 pub trait Integrator: Send + Sync {
@@ -24,18 +24,6 @@ pub struct Outcome {
     pub iterations: usize,
     /// Whether it gave up: the frame's report then says [`Divergence::Unsolved`].
     pub unsolved: bool,
-}
-
-/// The motion of a body in double precision, in node order.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct BodyMotion {
-    /// Positions relative to [`Body::origin`] (m).
-    pub positions: Vec<DVec3>,
-    /// Velocities (m/s).
-    pub velocities: Vec<DVec3>,
-    /// Where friction holds each node at each support, relative to [`Body::origin`] (m), support by
-    /// support; empty if it holds none.
-    pub anchors: Vec<Option<DVec3>>,
 }
 
 /// What acts on a body during a frame.
@@ -84,45 +72,6 @@ impl BodyFrame<'_> {
     }
 }
 
-impl BodyMotion {
-    /// Takes the motion over from a body's state.
-    pub(crate) fn load(&mut self, body: &Body, state: &BodyState) {
-        let vertices = || body.internal.iter().map(|i| *i as usize);
-        self.positions.clear();
-        self.positions.extend(vertices().map(|i| state.x[i].as_dvec3()));
-        self.velocities.clear();
-        self.velocities.extend(vertices().map(|i| state.v[i].as_dvec3()));
-        let nodes = body.nodes_of_vertices();
-        self.anchors.clear();
-        self.anchors.resize(body.supports.len() * body.len(), None);
-        for anchor in &state.anchors {
-            if let Source::Support(s) = anchor.source {
-                let k = s as usize * body.len() + nodes[anchor.vertex as usize];
-                self.anchors[k] = Some(anchor.place.as_dvec3());
-            }
-        }
-    }
-
-    /// Gives the motion to a body's state, rounded to single precision.
-    pub(crate) fn store(&self, body: &Body, state: &mut BodyState) {
-        for (node, i) in body.internal.iter().enumerate() {
-            let i = *i as usize;
-            state.x[i] = self.positions[node].as_vec3a();
-            state.v[i] = self.velocities[node].as_vec3a();
-            state.falling[i] = 0.0;
-        }
-        state.anchors.retain(|anchor| !matches!(anchor.source, Source::Support(_)));
-        for (k, place) in self.anchors.iter().enumerate() {
-            if let Some(place) = place {
-                let (vertex, source) = (body.internal[k % body.len()], Source::Support((k / body.len()) as u32));
-                let place: Vec3A = place.as_vec3a();
-                state.anchors.push(Anchor { vertex, source, place });
-            }
-        }
-        state.anchors.sort_unstable_by_key(|anchor| (anchor.vertex, anchor.source));
-    }
-}
-
 /// An integrator from outside as a solver of the stepper.
 pub(crate) struct ExternalSolver {
     integrator: Box<dyn Integrator>,
@@ -136,22 +85,21 @@ impl ExternalSolver {
 }
 
 impl Solver for ExternalSolver {
+    type Shared = ();
     const COUPLES: bool = false;
 
-    fn advance(island: &mut [Worker<Self>], frame: &Frame<'_>) {
-        for Worker { index, body, solver, state, report, .. } in island {
+    fn new_shared(&self) {}
+
+    fn advance(island: IslandFrame<'_, Self>) {
+        for BodySlot { index, body, solver, state, report, .. } in island.slots {
             let Self { integrator, motion } = solver;
             motion.load(body, state);
-            let outcome = integrator.advance(&BodyFrame { body, frame: frame.of(*index) }, motion);
+            let outcome = integrator.advance(&BodyFrame { body, frame: island.frame.of(*index) }, motion);
             motion.store(body, state);
             report.iterations += outcome.iterations;
             if outcome.unsolved {
                 report.divergence = Some(Divergence::Unsolved { body: *index });
             }
         }
-    }
-
-    fn contacts(&self) -> Option<&Contacts> {
-        None
     }
 }

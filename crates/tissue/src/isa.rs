@@ -10,12 +10,12 @@ pub enum Isa {
     Avx512,
     /// 8 lanes: AVX2.
     Avx2,
-    /// Whatever the program was compiled for; 4 lanes of SSE2 on x86-64.
+    /// The instruction set that the program was compiled for; 4 lanes of SSE2 on x86-64.
     Portable,
 }
 
-/// Place in [`Isa::ALL`] of the best that may be used.
-static MOST: AtomicUsize = AtomicUsize::new(0);
+/// Index in [`Isa::ALL`] of the best set that may be used.
+static FASTEST_ALLOWED: AtomicUsize = AtomicUsize::new(0);
 
 impl Isa {
     /// All of them, the fastest first.
@@ -23,14 +23,14 @@ impl Isa {
 
     /// The fastest one that this machine has, and that [`Self::limit`] allows.
     pub fn detect() -> Self {
-        let most = MOST.load(Ordering::Relaxed);
+        let most = FASTEST_ALLOWED.load(Ordering::Relaxed);
         Self::ALL.into_iter().skip(most).find(|isa| isa.is_available()).unwrap_or(Self::Portable)
     }
 
-    /// Makes [`Self::detect`] in this process find nothing better than `isa`, for benchmarks and tests: results do not depend on it. Steppers keep what they found
-    /// when they were made.
+    /// Limits [`Self::detect`] in this process to `isa`, for benchmarks and tests: results do not
+    /// depend on it. Steppers keep the set that they found when they were made.
     pub fn limit(isa: Self) {
-        MOST.store(Self::ALL.iter().position(|i| *i == isa).unwrap_or(0), Ordering::Relaxed);
+        FASTEST_ALLOWED.store(Self::ALL.iter().position(|i| *i == isa).unwrap_or(0), Ordering::Relaxed);
     }
 
     /// Whether this machine has it.

@@ -1,6 +1,8 @@
-//! Sixteen of something at once: vectors and matrices whose entries are SIMD lanes, and rows of four floats gathered into them.
+//! Sixteen of something at once: vectors and matrices whose entries are SIMD lanes, and rows of
+//! four floats gathered into them.
 //!
-//! Every operation is one IEEE operation a lane, none is fused and sums have a fixed order: all instruction sets give the same bits.
+//! Every operation is one IEEE operation a lane, none is fused, and sums have a fixed order: all
+//! instruction sets give the same bits.
 
 use fearless_simd::{Simd, SimdBase, SimdCombine, f32x4, f32x16};
 use std::ops::{Add, Mul, Sub};
@@ -120,7 +122,8 @@ pub(crate) fn cofactor<S: Simd>(f: &Mat3L<S>) -> Mat3L<S> {
     [cross(f[1], f[2]), cross(f[2], f[0]), cross(f[0], f[1])]
 }
 
-/// The rotations in F = R S by Newton's iteration with scaling (Higham, "Computing the polar decomposition", 1986); the identity where det F is below `least`.
+/// The rotations in F = R S by Newton's iteration with scaling (Higham, "Computing the polar
+/// decomposition", 1986); the identity where det F is below `least`.
 #[inline(always)]
 pub(crate) fn rotation<S: Simd>(simd: S, f: &Mat3L<S>, least: f32) -> Mat3L<S> {
     let (zero, one, half) = (splat(simd, 0.0), splat(simd, 1.0), splat(simd, 0.5));
@@ -131,11 +134,11 @@ pub(crate) fn rotation<S: Simd>(simd: S, f: &Mat3L<S>, least: f32) -> Mat3L<S> {
             x[c][r] = simd.select_f32x16(flat, if c == r { one } else { zero }, x[c][r]);
         }
     }
-    for round in 0..ROUNDS {
+    for round in 0..POLAR_ROUNDS {
         let cofactor = cofactor(&x);
         let inverse = one / dot(x[0], cofactor[0]);
         let (mut near, mut far) = (half, half * inverse);
-        if round < SCALED {
+        if round < SCALED_POLAR_ROUNDS {
             let size = dot(x[0], x[0]) + dot(x[1], x[1]) + dot(x[2], x[2]);
             let other = dot(cofactor[0], cofactor[0]) + dot(cofactor[1], cofactor[1]) + dot(cofactor[2], cofactor[2]);
             let ratio = simd.sqrt_f32x16(simd.sqrt_f32x16(other * inverse * inverse / size));
@@ -149,9 +152,10 @@ pub(crate) fn rotation<S: Simd>(simd: S, f: &Mat3L<S>, least: f32) -> Mat3L<S> {
     x
 }
 
-/// Rounds of the polar decomposition, the first of them scaled: condition numbers up to a thousand.
-const ROUNDS: usize = 8;
-const SCALED: usize = 3;
+/// Rounds of the polar decomposition, and how many of them are scaled: enough for condition numbers
+/// up to a thousand.
+const POLAR_ROUNDS: usize = 8;
+const SCALED_POLAR_ROUNDS: usize = 3;
 
 /// Sum of the products of two vectors of rows; as many rows as a multiple of 4.
 #[inline(always)]

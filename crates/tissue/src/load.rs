@@ -1,33 +1,23 @@
-//! Forces from outside on single nodes: what pushes or pulls tissue that is no tool, and what contact did in another run.
+//! Forces from outside on single nodes: pushes and pulls that no tool makes, or contact forces of
+//! another run.
 
 use crate::Model;
-use crate::integrator::Frame;
 use glam::DVec3;
 
-/// A force on a node throughout a frame. What pins or tools hold rigidly does not feel it.
+/// A force on a node throughout a frame. Nodes that are pinned or held rigidly do not feel it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Load {
     /// The body's index in the model.
     pub body: usize,
-    /// The node's in the body.
+    /// The node's index in the body.
     pub node: usize,
-    /// [N], in the world's frame.
+    /// The force in world axes (N).
     pub force: DVec3,
 }
 
 impl Load {
-    /// Whether `model` has such a node, and the force is one.
+    /// Whether `model` has the node, and the force is finite.
     pub(crate) fn fits(&self, model: &Model) -> bool {
         self.force.is_finite() && model.bodies.get(self.body).is_some_and(|body| self.node < body.len())
-    }
-}
-
-impl Frame<'_> {
-    /// Calls `act` for every load on the body, with the vertex and the force [N].
-    #[inline(always)]
-    pub fn for_loads(&self, body: &crate::Body, mut act: impl FnMut(usize, DVec3)) {
-        for load in self.loads.iter().filter(|load| load.body == self.index) {
-            act(body.internal[load.node] as usize, load.force);
-        }
     }
 }

@@ -2,7 +2,8 @@
 
 use glam::DVec3;
 
-/// The lowest `share` (0..=1) of `nodes` along `up`; ties by index. round(share * n) indices, ascending.
+/// The lowest `share` (0..=1) of `nodes` along `up`; ties by index. round(share * n) indices,
+/// ascending.
 pub fn lowest_band(nodes: &[DVec3], up: DVec3, share: f64) -> Vec<u32> {
     let mut all: Vec<u32> = (0..nodes.len() as u32).collect();
     lowest(&mut all, nodes, up, share)
@@ -10,8 +11,9 @@ pub fn lowest_band(nodes: &[DVec3], up: DVec3, share: f64) -> Vec<u32> {
 
 /// One end of a tubular organ and a band along the part next to it.
 ///
-/// `s` is the organ coordinate of each node. Every node within `length` of the base (or of the tip) is chosen, and of the nodes in the next
-/// `band_length` the lowest `band_share` along `up`. Ascending.
+/// `s` is the organ coordinate of each node. Every node within `length` of the base (or of the tip)
+/// is chosen, and of the nodes in the next `band_length` the lowest `band_share` along `up`.
+/// Ascending.
 pub fn end(
     nodes: &[DVec3],
     s: &[f64],

@@ -1,8 +1,11 @@
-//! The sweeps' numbers: blocks of sixteen, which the machine's widest registers take whole and narrower ones in parts.
+//! Numbers of the sweeps: blocks of sixteen, which the machine's widest registers hold whole and
+//! narrower ones in parts.
 //!
-//! A sweep keeps some twenty vectors at once: sixteen lanes of each would not fit into the registers of AVX2. So its kernels are written over [`Simd::f32s`]. Lanes never meet and
-//! nothing is fused: all instruction sets give the same bits. What kernels call in their inner loops must be `#[inline(always)]`, and neither closures nor iterators'
-//! adaptors that take one: only what is inlined for certain is compiled with the registers' instructions.
+//! A sweep keeps some twenty vectors at once: sixteen lanes of each would not fit into the
+//! registers of AVX2. So its kernels are written over [`Simd::f32s`]. Lanes never meet and nothing
+//! is fused: all instruction sets give the same bits. Functions that kernels call in their inner
+//! loops must be `#[inline(always)]`, and neither closures nor iterators' adaptors that take one:
+//! only functions that are certainly inlined are compiled with the registers' instructions.
 
 #[cfg(target_arch = "x86_64")]
 use fearless_simd::SimdInto;
@@ -12,7 +15,7 @@ use glam::Vec3A;
 /// Lanes of a [`Block`].
 pub(crate) const BLOCK: usize = 16;
 
-/// As many numbers as the widest registers hold.
+/// The numbers of the widest register.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(C, align(64))]
 pub(crate) struct Block<T>(pub [T; BLOCK]);
@@ -20,7 +23,7 @@ pub(crate) struct Block<T>(pub [T; BLOCK]);
 /// A register, and three.
 pub(crate) type Reg<S> = <S as Simd>::f32s;
 pub(crate) type Reg3<S> = [Reg<S>; 3];
-/// Lanes of a register in which something is so.
+/// A condition for each lane of a register.
 pub(crate) type Mask<S> = <S as Simd>::mask32s;
 
 /// Lanes of a register.
@@ -88,7 +91,8 @@ pub(crate) fn bits<S: Simd>(mask: Mask<S>) -> u16 {
     mask.to_bitmask() as u16
 }
 
-/// The points that a part of `at` names, turned from rows into registers; zeros if there are none.
+/// The points that a part of `at` names, transposed from rows into registers; zeros if there are
+/// none.
 #[inline(always)]
 pub(crate) fn rows<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, part: usize) -> Reg3<S> {
     if points.is_empty() {
@@ -104,7 +108,7 @@ pub(crate) fn rows<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, part: us
     [xz0.unzip_low(xz1), yw0.unzip_low(yw1), xz0.unzip_high(xz1)]
 }
 
-/// As many rows as fill a register, one after the other.
+/// The rows that fill a register, one after the other.
 #[inline(always)]
 fn some<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, k: usize) -> Reg<S> {
     match width::<S>() {
@@ -121,10 +125,11 @@ fn some<S: Simd>(simd: S, points: &[Vec3A], at: &Block<u32>, k: usize) -> Reg<S>
     }
 }
 
-/// A point and whatever stands beside it.
+/// A point and the number beside it.
 #[inline(always)]
 fn row<S: Simd>(simd: S, points: &[Vec3A], at: u32) -> f32x4<S> {
-    // All places are in range. To say so costs less than to ask: a check a row, each with an error of its own, made a sweep a seventh slower.
+    // All places are in range. The clamp says so at less cost than a check with an error for each
+    // row, which made a sweep a seventh slower.
     as_row(simd, points[(at as usize).min(points.len() - 1)])
 }
 

@@ -13,7 +13,7 @@ const STRETCH_LIMIT: f32 = 10.0;
 /// Why a run is over.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Divergence {
-    /// A position or velocity is not finite; the state is the last finite frame's.
+    /// A position or velocity is not finite. The state is that of the last finite frame.
     NonFinite {
         /// The body.
         body: usize,
@@ -23,16 +23,18 @@ pub enum Divergence {
         /// The body.
         body: usize,
     },
-    /// The state or the model is not the one that the stepper was made for, or a grasp holds nodes that the model lacks; nothing was stepped.
+    /// The state or the model is not the one that the stepper was made for, or a grasp holds nodes
+    /// that the model lacks. Nothing was stepped.
     OtherModel,
-    /// A load is on a node that the model lacks, or not finite; nothing was stepped.
+    /// A load is on a node that the model lacks, or not finite. Nothing was stepped.
     WrongLoad,
     /// An edge is longer than 10 times its rest length.
     OverStretch {
         /// The body.
         body: usize,
     },
-    /// Newton's method found no minimum in a substep; the body is where it was at its beginning.
+    /// An integrator from outside this crate found no solution of a substep. The body is where the
+    /// substep began.
     Unsolved {
         /// The body.
         body: usize,
@@ -57,17 +59,18 @@ impl std::fmt::Display for Divergence {
 /// What happened in one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
-    /// Largest node speed at the end of the frame [m/s].
+    /// Largest node speed at the end of the frame (m/s).
     pub max_speed: f64,
     /// Elements with signed volume at or below 0 at the end of the frame.
     pub inverted: usize,
     /// Smallest ratio of an element's volume to its rest volume.
     pub min_volume_ratio: f64,
-    /// Substeps in which held nodes could not follow the tool without inverting or overstretching an element; they catch up later.
+    /// Substeps in which held nodes could not follow the tool without inverting or overstretching
+    /// an element. They catch up later.
     pub grasp_limited: usize,
     /// Iterations of all bodies and substeps: sweeps, or quasi-Newton steps.
     pub iterations: usize,
-    /// Substeps in which the quasi-Newton solver gave a body up to sweeps.
+    /// Substeps in which the quasi-Newton search failed and sweeps took over, summed over bodies.
     pub fallbacks: usize,
     /// The event that ended the run, if any.
     pub divergence: Option<Divergence>,
@@ -87,7 +90,7 @@ impl Default for StepReport {
     }
 }
 
-/// What was seen of a body, and where it was then.
+/// What was measured of a body, and where it was then.
 pub(crate) struct Measured {
     x: Vec<Vec3A>,
     v: Vec<Vec3A>,
@@ -103,7 +106,7 @@ impl Measured {
 }
 
 impl StepReport {
-    /// Both together.
+    /// The sum of both.
     pub(crate) fn with(self, other: &Self) -> Self {
         Self {
             max_speed: self.max_speed.max(other.max_speed),
@@ -120,7 +123,8 @@ impl StepReport {
         }
     }
 
-    /// Fills in what is seen of a body at the end of the frame; `last` remembers it for a body that stays where it is.
+    /// Fills in what is measured of a body at the end of the frame. `last` keeps it for a body that
+    /// stays where it is.
     pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState, last: &mut Measured) {
         if last.seen.divergence.is_some() || state.x != last.x || state.v != last.v {
             let mut seen = Self::default();
@@ -150,7 +154,7 @@ impl StepReport {
             let too_long = |length: f32, j: u32| {
                 (state.x[j as usize] - state.x[i]).length_squared() > (STRETCH_LIMIT * length).powi(2)
             };
-            // Every edge is met from both its ends.
+            // Every edge appears at both its ends.
             body.edges_of(i).iter().any(|e| e.to as usize > i && too_long(e.length, e.to))
         });
         if self.max_speed >= SPEED_LIMIT {

@@ -1,4 +1,4 @@
-//! How a frame is integrated: which solver, and how the frame is cut.
+//! How a frame is integrated: the solver, and its substeps and iterations.
 
 use crate::{Error, Isa, Result};
 
@@ -7,12 +7,13 @@ use crate::{Error, Isa, Result};
 pub enum Start {
     /// The inertial predictor y = x + dt v + dt2 M^-1 f (the paper's).
     Inertial,
-    /// VBD's adaptive start: the predictor with only that share of the external acceleration that the last substep showed.
-    /// A body that nothing holds or touches starts from the inertial predictor, which is its exact motion.
+    /// The adaptive start of Vertex Block Descent: the predictor with only the share of the
+    /// external acceleration that the last substep showed. A body that nothing holds or touches
+    /// starts from the inertial predictor, which is its exact motion.
     Adaptive,
 }
 
-/// Vertex Block Descent (Chen et al. 2024): a local smoother, a fixed number of sweeps a substep.
+/// Vertex Block Descent (Chen et al. 2024): a local smoother, a fixed number of sweeps per substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Descent {
     /// Substeps a frame.
@@ -28,17 +29,19 @@ pub struct Descent {
 pub struct QuasiNewton {
     /// Substeps a frame.
     pub substeps: usize,
-    /// Most iterations a substep.
+    /// Greatest number of iterations a substep.
     pub iterations: usize,
-    /// Pairs that L-BFGS remembers.
+    /// Pairs that L-BFGS keeps.
     pub memory: usize,
-    /// A correction this small ends a substep [m]; a body whose first one is no larger is at rest.
+    /// A correction this small ends a substep (m). A body whose first correction is no larger is at
+    /// rest.
     pub tolerance: f64,
-    /// A correction this small over how far the substep's corrections went so far ends it, too.
+    /// A correction this small over the way that the substep's corrections went so far ends it,
+    /// too.
     pub relative: f64,
 }
 
-/// A solver and how it cuts a frame.
+/// A solver with its settings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum SolverSettings {
     /// The quasi-Newton method.
@@ -54,10 +57,11 @@ const MAX_COUNT: usize = 1_000_000;
 const MAX_PAIRS: usize = 64;
 
 impl SolverSettings {
-    /// The paper's: Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor, with our inversion guard.
+    /// The paper's solver: Vertex Block Descent, 8 substeps of 10 sweeps from the inertial
+    /// predictor, with our inversion guard.
     pub const PAPER: Self = Self::Descent(Descent { substeps: 8, iterations: 10, start: Start::Inertial });
 
-    /// The default: two substeps of as many quasi-Newton iterations as it takes, at most forty.
+    /// The default: two substeps of at most forty quasi-Newton iterations.
     pub const FAST: Self =
         Self::QuasiNewton(QuasiNewton { substeps: 2, iterations: 40, memory: 8, tolerance: 3e-8, relative: 1e-2 });
 

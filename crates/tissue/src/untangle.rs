@@ -1,24 +1,28 @@
-//! Puts a body right whose elements are inverted.
+//! Repairs a body with inverted elements.
 //!
-//! The solvers let no element invert, but a state can be set so. No energy of a material leads back from everywhere: random places are full of local minima, and
-//! barrier and guard keep what is inverted outside. So the body is first relaxed under another energy, sum L |(x_j - x_i) - R (X_j - X_i)|^2 over its edges (rest length L, rest
-//! positions X, R the rotation that fits the body best). It is convex, and where nothing holds the body its only minimum is the rest shape, turned by R.
+//! The solvers let no element invert, but a state can be set so. No energy of a material leads back
+//! from everywhere: random positions are full of local minima, and barrier and guard keep inverted
+//! elements inverted. So the body is first relaxed under another energy, sum L |(x_j - x_i) - R
+//! (X_j - X_i)|^2 over its edges (rest length L, rest positions X, R the rotation that fits the
+//! body best). This energy is convex. Where nothing holds the body, its only minimum is the rest
+//! shape, turned by R.
 
 use crate::Body;
-use crate::descent::volume_ratio;
-use crate::integrator::Frame;
+use crate::frame::Frame;
+use crate::inversion_guard::volume_ratio;
 use crate::state::BodyState;
 use glam::{DMat3, DVec3, Mat3A, Vec3A};
 
-/// Volume ratio of every element at which the material's energy takes over: near enough to the rest shape to end in it.
-const RIGHT: f32 = 0.6;
+/// Volume ratio that every element must have before the material's energy takes over: near enough
+/// to the rest shape to end in it.
+const REPAIRED_VOLUME_RATIO: f32 = 0.6;
 
-/// Stretch of every edge at which it does where the body was to be relaxed.
-const SHORT: f32 = 1.5;
+/// Greatest stretch of an edge then, if the body was to be relaxed.
+const REPAIRED_STRETCH: f32 = 1.5;
 
-/// Sweeps between two looks at the elements, and most looks a frame.
-const SWEEPS: usize = 5;
-const LOOKS: usize = 100;
+/// Sweeps between two checks of the elements, and greatest number of checks a frame.
+const SWEEPS_PER_CHECK: usize = 5;
+const MAX_CHECKS: usize = 100;
 
 /// A body's rest shape and scratch memory.
 pub(crate) struct Untangler {
@@ -27,20 +31,21 @@ pub(crate) struct Untangler {
 }
 
 impl Untangler {
-    /// Of a body that is at `rest`.
+    /// For a body that is at `rest`.
     pub fn new(rest: &BodyState) -> Self {
         Self { rest: rest.x.clone(), fixed: vec![false; rest.x.len()] }
     }
 
-    /// Puts a disturbed body right if an element of it is inverted or it was asked for, as far as one frame's effort goes; it is still then. Pinned and held nodes stay.
+    /// Repairs a disturbed body if one of its elements is inverted or it is to be relaxed, as far
+    /// as one frame's effort goes. The body is at rest afterwards. Pinned and held nodes stay.
     pub fn untangle(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
-        if !state.disturbed {
+        if !state.repair.disturbed {
             return;
         }
-        state.disturbed = false;
-        let relaxes = std::mem::take(&mut state.relaxes);
+        state.repair.disturbed = false;
+        let relaxes = std::mem::take(&mut state.repair.relax);
         let wrong = relaxes || least_ratio(body, &state.x) <= 0.0;
-        // Numbers that are not finite are the report's.
+        // The report finds numbers that are not finite.
         if !(wrong && state.x.iter().all(|x| x.is_finite())) {
             return;
         }
@@ -51,24 +56,24 @@ impl Untangler {
             grasp.nodes.iter().for_each(|i| self.fixed[body.internal[*i as usize] as usize] = true);
         }
         let turn = self.rotation(body, &state.x);
-        for _ in 0..LOOKS {
-            (0..SWEEPS).for_each(|_| self.sweep(body, turn, &mut state.x));
-            if least_ratio(body, &state.x) > RIGHT && !(relaxes && is_stretched(body, &state.x)) {
+        for _ in 0..MAX_CHECKS {
+            (0..SWEEPS_PER_CHECK).for_each(|_| self.sweep(body, turn, &mut state.x));
+            if least_ratio(body, &state.x) > REPAIRED_VOLUME_RATIO && !(relaxes && is_stretched(body, &state.x)) {
                 break;
             }
         }
         state.v.fill(Vec3A::ZERO);
-        state.falling.fill(0.0);
+        state.warm.falling.fill(0.0);
         if relaxes {
             // Friction does not pull back to where the tissue was.
             state.anchors.clear();
             state.stretches.clear();
         }
-        // What one frame did not put right goes on in the next.
-        state.disturbed = least_ratio(body, &state.x) <= 0.0;
+        // What one frame did not repair continues in the next.
+        state.repair.disturbed = least_ratio(body, &state.x) <= 0.0;
     }
 
-    /// Each vertex in turn to its minimum: the mean of where its neighbours want it.
+    /// Moves each vertex in turn to its minimum: the mean of where its neighbours want it.
     fn sweep(&self, body: &Body, turn: Mat3A, x: &mut [Vec3A]) {
         for i in (0..x.len()).filter(|i| !self.fixed[*i]) {
             let (mut sum, mut weights) = (Vec3A::ZERO, 0.0);
@@ -81,7 +86,8 @@ impl Untangler {
         }
     }
 
-    /// The rotation that turns the rest shape nearest to x, from some fixed nodes if they span a plane and from all nodes otherwise.
+    /// The rotation that brings the rest shape nearest to x: of the fixed nodes if there are more
+    /// than two, of all nodes otherwise.
     fn rotation(&self, body: &Body, x: &[Vec3A]) -> Mat3A {
         if self.fixed.iter().filter(|fixed| **fixed).count() > 2 {
             return fit(body, &self.rest, x, |i| self.fixed[i]);
@@ -90,7 +96,8 @@ impl Untangler {
     }
 }
 
-/// Davenport's quaternion by power iteration on the shifted matrix (Horn 1987): always a rotation, whatever is inverted.
+/// Davenport's quaternion by power iteration on the shifted matrix (Horn 1987): always a rotation,
+/// even if elements are inverted.
 fn fit(body: &Body, rest: &[Vec3A], x: &[Vec3A], counts: impl Fn(usize) -> bool) -> Mat3A {
     let (mut mass, mut from, mut to) = (0.0, DVec3::ZERO, DVec3::ZERO);
     let chosen = || (0..x.len()).filter(|i| counts(*i));
@@ -127,10 +134,11 @@ fn fit(body: &Body, rest: &[Vec3A], x: &[Vec3A], counts: impl Fn(usize) -> bool)
     Mat3A::from_quat(glam::DQuat::from_xyzw(x, y, z, w).as_quat())
 }
 
-/// Whether an edge is longer than [`SHORT`] times its rest length.
+/// Whether an edge is longer than [`REPAIRED_STRETCH`] times its rest length.
 fn is_stretched(body: &Body, x: &[Vec3A]) -> bool {
     let too_long = |i: usize| {
-        let long = |e: &crate::body::Edge| (x[e.to as usize] - x[i]).length_squared() > (SHORT * e.length).powi(2);
+        let long =
+            |e: &crate::body::Edge| (x[e.to as usize] - x[i]).length_squared() > (REPAIRED_STRETCH * e.length).powi(2);
         body.edges_of(i).iter().any(long)
     };
     (0..x.len()).any(too_long)
@@ -158,13 +166,13 @@ mod tests {
             tools: &[],
             loads: &[],
             colliders: &[],
-            alone: true,
+            single_thread: true,
         };
         let body = &model.bodies[0];
         let rest = State::new(&model);
         let mut stretched = rest.bodies[0].clone();
         stretched.x.iter_mut().for_each(|x| x.x *= 6.0);
-        stretched.disturbed = true;
+        stretched.repair.disturbed = true;
         let mut untangler = Untangler::new(&rest.bodies[0]);
         let mut left = stretched.clone();
         untangler.untangle(&frame, body, &mut left);
@@ -174,7 +182,12 @@ mod tests {
         state.relax(0);
         untangler.untangle(&frame, body, &mut state.bodies[0]);
         let now = &state.bodies[0];
-        assert!(!is_stretched(body, &now.x) && least_ratio(body, &now.x) > RIGHT && !now.disturbed && !now.relaxes);
+        assert!(
+            !is_stretched(body, &now.x)
+                && least_ratio(body, &now.x) > REPAIRED_VOLUME_RATIO
+                && !now.repair.disturbed
+                && !now.repair.relax
+        );
     }
 
     fn tet() -> crate::Model {

@@ -56,7 +56,7 @@ fn stepping_bodies_that_touch_allocates_nothing() {
     for schedule in [SolverSettings::FAST, SolverSettings::PAPER] {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
-        // Lists grow to what they hold at most.
+        // Lists grow to their greatest length.
         (0..30).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
         let before = ALLOCATIONS.load(Ordering::Relaxed);
         (0..FRAMES).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
@@ -103,6 +103,7 @@ fn stepping_allocates_nothing() {
         stepper.step_with_loads(&model, &mut state, &[still], &[load]);
     }
     let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
-    // The thread pool's queue takes a new block now and then, once in dozens of frames; our own code would show in every frame.
+    // The thread pool's queue takes a new block now and then, once in dozens of frames; our own
+    // code would show in every frame.
     assert!(during < FRAMES / 4, "{during} allocations in {FRAMES} frames");
 }

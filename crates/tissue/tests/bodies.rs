@@ -1,4 +1,5 @@
-//! Bodies that touch each other: how deep, with what force, and that nothing is gained or lost by it.
+//! Bodies that touch each other: how deep, with what force, and that nothing is gained or lost by
+//! it.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -13,7 +14,7 @@ use trocar_tissue::{
     Stepper, ToolMotion,
 };
 
-/// A ball of `cells` cubes across, of radius `radius` [m], round `centre`.
+/// A ball of `cells` cubes across, of radius `radius` (m), round `centre`.
 fn ball(cells: usize, radius: f64, centre: DVec3) -> TetMesh {
     let mut mesh = block([cells; 3], 2.0 / cells as f64);
     for p in &mut mesh.vertices {
@@ -58,7 +59,8 @@ fn momentum(model: &Model, state: &State) -> DVec3 {
     model.bodies().iter().enumerate().map(|(b, body)| of(b, body)).sum()
 }
 
-/// How deep the deepest node of a body is inside another: brute force over all elements and boundary triangles, in double precision.
+/// How deep the deepest node of a body is inside another: brute force over all elements and
+/// boundary triangles, in double precision.
 fn depth(model: &Model, state: &State, [a, b]: [usize; 2], meshes: [&TetMesh; 2]) -> f64 {
     let x = state.positions(model, b);
     let (boundary, at) = meshes[1].boundary();
@@ -91,7 +93,9 @@ fn distance(p: DVec3, [a, b, c]: [DVec3; 3]) -> f64 {
     edge(a, b).min(edge(b, c)).min(edge(c, a))
 }
 
-/// One organ falls 20 mm onto another that lies on pins: neither enters the other by more than the contact offset, ever. The fast solver's comes to rest on it; the paper's sweeps lose momentum, and it slides off.
+/// One organ falls 20 mm onto another that lies on pins: neither enters the other by more than the
+/// contact offset, ever. The fast solver's comes to rest on it; the paper's sweeps lose momentum,
+/// and it slides off.
 #[test]
 fn dropped_on_each_other_they_stay_outside() {
     let (radius, contact) = (12e-3, BodyContact::default());
@@ -138,7 +142,8 @@ fn dropped_on_each_other_they_stay_outside() {
     }
 }
 
-/// Two that fly into each other, off centre, keep their momentum, and gain no energy: by the fast solver. Ten sweeps a substep do neither; 150 lose 4% of the momentum.
+/// Two that fly into each other, off centre, keep their momentum, and gain no energy: by the fast
+/// solver. Ten sweeps a substep do neither; 150 lose 4% of the momentum.
 #[test]
 fn momentum_is_kept() {
     for judged in schedules() {
@@ -278,7 +283,8 @@ fn two_blocks_press_as_one() {
     assert!((below - expected).abs() < 0.02 * pressed, "{below} m, {expected} m expected");
 }
 
-/// A soft flap that hangs over another part of its own body sinks onto it, and through it if folds are not looked for.
+/// A soft flap that hangs over another part of its own body sinks onto it, and through it if folds
+/// are not looked for.
 #[test]
 fn folded_tissue_touches_itself() {
     let edge = 2.5e-3;
@@ -342,7 +348,8 @@ fn a_rigid_body_is_an_obstacle() {
     }
 }
 
-/// In a row of bodies at rest that touch, a blow to the first is felt by the last, and no momentum is lost on the way.
+/// In a row of bodies at rest that touch, a blow to the first is felt by the last, and no momentum
+/// is lost on the way.
 #[test]
 fn a_blow_goes_through_a_row() {
     let contact = BodyContact::default();
@@ -367,7 +374,8 @@ fn a_blow_goes_through_a_row() {
     assert!(last > 0.05, "the last goes at {last} m/s");
 }
 
-/// At 30 frames a second a block that is just out of reach falls through the whole offset in one: it is found all the same.
+/// At 30 frames a second a block that is just out of reach falls through the whole offset in one:
+/// it is found all the same.
 #[test]
 fn long_frames_find_what_falls() {
     let low = block([6, 6, 4], 2.5e-3);
@@ -386,7 +394,7 @@ fn long_frames_find_what_falls() {
     }
 }
 
-/// A tool that holds one body rigidly bears what another lays on it: the weight of both, and no more.
+/// A tool that holds one body rigidly feels the weight of a body that lies on it, too, and no more.
 #[test]
 fn tools_feel_what_presses_what_they_hold() {
     let low = block([4, 4, 2], 2.5e-3);
@@ -434,7 +442,8 @@ fn another_contact_is_another_model() {
     }
 }
 
-/// Bodies of a filtered pair, and bodies of a model without contact between them, pass through each other.
+/// Bodies of a filtered pair, and bodies of a model without contact between them, pass through each
+/// other.
 #[test]
 fn only_pairs_that_collide_touch() {
     let parts = [ball(5, 8e-3, DVec3::ZERO), ball(5, 8e-3, DVec3::Z * 20e-3)];
@@ -466,11 +475,12 @@ fn only_pairs_that_collide_touch() {
         let (name, mesh, material) = ("part".to_owned(), &parts[0], tissue(8e3));
         builder.body(BodyDescription { name, mesh, material, pinned: vec![], supports: vec![] }).unwrap();
         let said = builder.build().unwrap_err().to_string();
-        assert!(said.starts_with("contact between bodies: ") && said.contains("make"), "{said}");
+        assert!(said.starts_with("contact between bodies: ") && said.contains("must be"), "{said}");
     }
 }
 
-/// The same bits on one thread and on two, and after a state was put back, in the same stepper and in another.
+/// The same bits on one thread and on two, and after a state was put back, in the same stepper and
+/// in another.
 #[test]
 fn bits_repeat() {
     let meshes = [
@@ -507,7 +517,8 @@ fn bits_repeat() {
     }
 }
 
-/// Bodies that rest and are woken by a push go on as if the stepper had never seen them before: what they had learnt when they last moved is of another time.
+/// Bodies at rest that a push wakes continue as if the stepper had never seen them before: steps
+/// that they recorded when they last moved are of another time.
 #[test]
 fn bodies_that_wake_remember_nothing() {
     let gap = 10e-3 + 1.2e-3;

@@ -1,4 +1,4 @@
-//! What the builder refuses, and what a built model tells.
+//! Errors of the builder, and properties of a built model.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 

@@ -1,4 +1,5 @@
-//! Contact with tools and supports: Hertz, Coulomb, nothing creeps, nothing is passed through, whatever the speed and the stiffness.
+//! Contact with tools and supports: Hertz, Coulomb, nothing creeps, nothing is passed through,
+//! whatever the speed and the stiffness.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -46,8 +47,9 @@ fn centroid(model: &Model, state: &State) -> DVec3 {
     x.iter().sum::<DVec3>() / x.len() as f64
 }
 
-/// A rigid sphere pressed into soft tissue: Hertz's force, with what a layer of finite thickness bonded to its ground adds (Dimitriadis and others 2002, Determination of elastic moduli of thin layers of soft
-/// material using the atomic force microscope, equation 3).
+/// A rigid sphere pressed into soft tissue: Hertz's force, with what a layer of finite thickness
+/// bonded to its ground adds (Dimitriadis and others 2002, Determination of elastic moduli of thin
+/// layers of soft material using the atomic force microscope, equation 3).
 #[test]
 fn a_sphere_is_pushed_back_as_hertz_says() {
     // Finer towards the place of contact.
@@ -58,7 +60,8 @@ fn a_sphere_is_pushed_back_as_hertz_says() {
     for p in &mut mesh.vertices {
         *p = DVec3::new(graded(p.x / middle - 1.0), graded(p.y / middle - 1.0), graded(p.z / (middle + 3.0) - 1.0));
     }
-    // Linear tetrahedra of nearly incompressible tissue are too stiff where they are long and thin: that is not what is tested.
+    // Linear tetrahedra of nearly incompressible tissue are too stiff where they are long and thin:
+    // that is not what is tested.
     let nu: f64 = 0.3;
     let material = Material { viscosity: 40.0, poisson_ratio: nu, ..tissue(12e3) };
     let pinned = nodes(&mesh, |p| p.z < -0.99 * half);
@@ -84,7 +87,8 @@ fn a_sphere_is_pushed_back_as_hertz_says() {
     }
 }
 
-/// A block on an incline stays where it is below the angle of friction, for a minute and to the micrometre, and slides as it should above.
+/// A block on an incline stays where it is below the angle of friction, for a minute and to the
+/// micrometre, and slides as it should above.
 #[test]
 fn a_block_on_an_incline_sticks_and_slides_at_the_right_angle() {
     let mesh = block([4, 4, 2], 3e-3);
@@ -122,7 +126,8 @@ fn a_block_on_an_incline_sticks_and_slides_at_the_right_angle() {
     }
 }
 
-/// A bar at half a metre a second through a column: the column gives way, no point of it is ever inside the bar, and it comes back.
+/// A bar at half a metre a second through a column: the column gives way, no point of it is ever
+/// inside the bar, and it comes back.
 #[test]
 fn nothing_is_passed_through_at_half_a_metre_a_second() {
     let mesh = block([4, 4, 10], 2e-3);
@@ -165,7 +170,8 @@ fn nothing_is_passed_through_at_half_a_metre_a_second() {
     }
 }
 
-/// A capsule pressed deep into tissue that is pinned right below: no blow-up, no inverted element, and a force that only grows.
+/// A capsule pressed deep into tissue that is pinned right below: no blow-up, no inverted element,
+/// and a force that only grows.
 #[test]
 fn a_capsule_pressed_into_pinned_tissue_is_held_back() {
     let mesh = block([12, 8, 4], 2e-3);

@@ -1,4 +1,5 @@
-//! Distances of convex shapes against parry3d, which has them of its own, and their gradients against finite differences.
+//! Distances of convex shapes against parry3d, which has them of its own, and their gradients
+//! against finite differences.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 mod common;

@@ -34,8 +34,9 @@ fn pinned_block(mesh: &TetMesh) -> Model {
     builder.build().unwrap()
 }
 
-/// A node of the top is pressed inwards until an element is nearly flat, and goes on inwards when it is let go: it cannot go where it goes by itself, and the flat element's barrier presses on it a thousand times
-/// harder than the stiffness at rest explains.
+/// A node of the top is pressed inwards until an element is nearly flat, and goes on inwards when
+/// it is let go: it cannot go where it goes by itself, and the flat element's barrier presses on it
+/// a thousand times harder than the stiffness at rest explains.
 #[test]
 fn nodes_of_crushed_elements_are_not_thrown_out() {
     let mesh = block([4, 4, 3], 2e-3);

@@ -1,4 +1,4 @@
-//! Bodies that are cut: what falls off falls, what is held stays, and nothing else changes.
+//! Cut bodies: what falls off falls, held parts stay, and nothing else changes.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -31,7 +31,7 @@ fn run(stepper: &mut Stepper, model: &Model, state: &mut State, frames: usize) {
     }
 }
 
-/// Volume of a body as it lies [m3], its mass [kg].
+/// Volume of a body as it lies (m3), its mass (kg).
 fn volume_and_mass(model: &Model, state: &State, body: usize) -> (f64, f64) {
     let b = &model.bodies()[body];
     let mesh = TetMesh { vertices: state.positions(model, body), tets: b.tets().to_vec() };
@@ -53,7 +53,7 @@ fn organs() -> [(&'static str, TetMesh, f64); 2] {
     [("beam", block([24, 4, 4], 2e-3), 24e-3), ("tube", appendix(2.6e-3), 40e-3)]
 }
 
-/// Lets an organ hang for a while, cuts it through where its middle is, and lets the parts go on.
+/// Lets an organ hang for a while, cuts it through its middle, and steps the parts.
 fn cut_through(mesh: &TetMesh, at: f64, schedule: SolverSettings, threads: usize) -> (Severed, State) {
     let model = one_body(mesh, nodes(mesh, |p| p.x < 6e-3));
     let mut state = State::new(&model);
@@ -195,7 +195,8 @@ fn a_grasp_across_a_cut_holds_both_parts() {
     let compliance =
         Compliance { stiffness: 50.0, closing: DVec3::Z, jaw_force: 6.0, friction: 0.5, tear_force: 3.0, blades: None };
     let capture = |state: &State, held: &[u32]| Grasp::capture(&model, state, 0, held, 0, &Pose::IDENTITY);
-    // Across the cut, more of it on the right; only on the cut; off it to the right, and one layer on it.
+    // Across the cut, more of it on the right; only on the cut; off it to the right, and one layer
+    // on it.
     let across = nodes(&mesh, |p| p.x > 21e-3 && p.x < 29e-3);
     let on_it = nodes(&mesh, |p| p.x == 24e-3);
     let beside = nodes(&mesh, |p| p.x > 23e-3 && p.x < 29e-3);
@@ -206,7 +207,8 @@ fn a_grasp_across_a_cut_holds_both_parts() {
     let cut = sever(&model, &state, &Cut::through(0, DVec3::X * 24e-3, DVec3::X)).unwrap();
     let grasps: Vec<(usize, usize)> = cut.state.grasps.iter().map(|g| (g.body, g.nodes.len())).collect();
     let beside_is = cut.pieces.iter().position(|p| p.nodes.contains(&beside[2])).unwrap();
-    // Layers of 25: one and the copies of the one on the cut to the left, three and the copies to the right.
+    // Layers of 25: one and the copies of the one on the cut to the left, three and the copies to
+    // the right.
     let mut expected = vec![(0, 50), (1, 75), (0, 25), (1, 25), (beside_is, 75)];
     if grasps[0].1 == 75 {
         expected[..2].copy_from_slice(&[(0, 75), (1, 50)]);

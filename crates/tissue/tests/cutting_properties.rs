@@ -1,4 +1,4 @@
-//! What holds for every cut, on random planes and rectangles.
+//! Properties of every cut, on random planes and rectangles.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -31,7 +31,8 @@ fn mesh_of(model: &Model, state: &State, body: usize) -> TetMesh {
     TetMesh { vertices: state.positions(model, body), tets: model.bodies()[body].tets().to_vec() }
 }
 
-/// Number of elements of each part that hangs together by faces; `open` says which faces do not join.
+/// Number of elements of each part that hangs together by faces; `open` says which faces do not
+/// join.
 fn sizes(mesh: &TetMesh, open: impl Fn(usize, usize) -> bool) -> Vec<usize> {
     let neighbours = mesh.neighbours();
     let mut seen = vec![false; mesh.tets.len()];

@@ -14,7 +14,8 @@ use trocar_tissue::{
 
 const FRAMES: usize = 600;
 
-/// Three small bodies: one grasped, one dropped on a plane, one on a field. (A body that several threads sweep at once is in robustness.rs.)
+/// Three small bodies: one grasped, one dropped on a plane, one on a field. (A body that several
+/// threads sweep at once is in robustness.rs.)
 fn scene() -> (Model, Vec<u32>) {
     let (large, small) = (block([2, 2, 4], 2e-3), block([2, 1, 1], 2e-3));
     let mut builder = ModelBuilder::new().gravity(GRAVITY);
@@ -67,7 +68,8 @@ fn same_bits(schedule: SolverSettings, name: &str) -> u64 {
     for threads in [1, 2, 3, 4] {
         assert_eq!(one, whole(threads), "{name}: {threads} threads");
     }
-    // Saved in the middle; the stepper goes astray, and what was saved goes on in it and in a new one.
+    // Saved in the middle: the stepper continues elsewhere, and the saved state continues in it and
+    // in a new stepper.
     let mut state = start(&model, &held);
     let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
     run(&model, &mut stepper, &mut state, 0..FRAMES / 2);

@@ -180,7 +180,7 @@ fn crushed_block() {
     check("crushed block", found, [0x702749a6c8ffd247, 0x620b3e260120d92c, 0x32957035f139cad0]);
 }
 
-/// A block crushed beyond what it bears, on a plane, hit by a ball.
+/// A block on a plane, crushed and hit by a ball.
 #[test]
 fn struck_block() {
     let mesh = block([4, 4, 3], 2e-3);
@@ -229,7 +229,8 @@ fn flat_elements() {
     check("flat elements", found, [0xc396ce6475d735a9, 0xd891a3b68a92f4b4, 0xd73a2e11f92afe59]);
 }
 
-/// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the whole island.
+/// A spring of negative stiffness: the matrix has no Cholesky factor, and sweeps take over in the
+/// whole island.
 #[test]
 fn fallback_to_sweeps() {
     let (model, mut state) = touching_bodies();

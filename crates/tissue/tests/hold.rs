@@ -1,4 +1,5 @@
-//! The compliant grasp: what is held stays held, slips where Coulomb says so, tears once, and is free when it is let go.
+//! The compliant grasp: held tissue stays held, slips at Coulomb's limit, tears once, and is free
+//! after release.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
@@ -37,7 +38,8 @@ fn viscous(young_modulus: f64) -> Material {
     Material { viscosity: 0.006 * young_modulus, ..tissue(young_modulus) }
 }
 
-/// A pull below 2 mu N is borne without creep, one above is not: the threshold is within 5% of Coulomb's law.
+/// A pull below 2 mu N is held without creep, one above is not: the threshold is within 5% of
+/// Coulomb's law.
 #[test]
 fn the_grasp_slips_at_twice_mu_times_the_jaw_force() {
     let mesh = strip();
@@ -74,7 +76,7 @@ fn the_grasp_slips_at_twice_mu_times_the_jaw_force() {
     }
 }
 
-/// A tool that does not say where it is stays where it is, and so does what hangs on it.
+/// A tool without a motion stays where it is, and so do its nodes.
 #[test]
 fn what_hangs_on_a_tool_without_motion_stays() {
     let mesh = strip();
@@ -94,7 +96,7 @@ fn what_hangs_on_a_tool_without_motion_stays() {
     assert_eq!(report.divergence, Some(Divergence::OtherModel));
 }
 
-/// The wrench that is reported is what hangs on the tool.
+/// The reported wrench is the weight that hangs on the tool.
 #[test]
 fn the_tool_feels_the_weight() {
     let mesh = strip();
@@ -119,7 +121,8 @@ fn the_tool_feels_the_weight() {
     }
 }
 
-/// Pulled beyond what it bears, tissue tears out of the jaws; that is told once, and the nodes are free.
+/// Tissue that is pulled too hard tears out of the jaws. That is reported once, and the nodes are
+/// free.
 #[test]
 fn a_tear_is_told_once() {
     let mesh = strip();

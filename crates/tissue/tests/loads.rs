@@ -1,4 +1,5 @@
-//! Forces on nodes: Newton's second law, a pulled column against its analytic length, and contact that is done over again by its own forces.
+//! Forces on nodes: Newton's second law, a pulled column against its analytic length, and contact
+//! that is repeated by its own forces.
 
 mod common;
 
@@ -10,7 +11,8 @@ use trocar_tissue::{
     State, Stepper, ToolMotion,
 };
 
-/// A free block whose nodes are pushed by their mass times an acceleration has that acceleration, in every solver.
+/// A free block whose nodes are pushed by their mass times an acceleration has that acceleration,
+/// in every solver.
 #[test]
 fn a_load_accelerates() {
     let mesh = block([2, 2, 2], 2e-3);
@@ -68,7 +70,8 @@ fn a_pulled_column_stretches() {
     }
 }
 
-/// A ball pressed slowly into a pinned block, and the same block under the forces that the ball did: both come to the same dent.
+/// A ball pressed slowly into a pinned block, and the same block under the forces that the ball
+/// did: both come to the same dent.
 #[test]
 fn contact_is_done_over_by_its_forces() {
     let mesh = block([8, 8, 4], 2e-3);
@@ -115,7 +118,7 @@ fn contact_is_done_over_by_its_forces() {
     assert!(dent > 1e-3 && off < 0.01 * dent, "{:.4} mm off in a dent of {:.4} mm", off * 1e3, dent * 1e3);
 }
 
-/// A load on what is not there, or that is no force, stops the step, and nothing has moved.
+/// A load on a missing node, or with a force that is not finite, stops the step, and nothing moves.
 #[test]
 fn a_load_on_no_node_is_refused() {
     let mesh = block([1, 1, 1], 2e-3);
@@ -130,7 +133,8 @@ fn a_load_on_no_node_is_refused() {
     assert_eq!(state.hash(), before);
 }
 
-/// A block that falls on a pinned one: what they do to each other adds up to nothing, bears the block, and moves both alike as loads.
+/// A block that falls on a pinned one: what they do to each other adds up to nothing, bears the
+/// block, and moves both alike as loads.
 #[test]
 fn what_bodies_do_to_each_other_is_equal_and_opposite() {
     let low = block([6, 6, 3], 2.5e-3);

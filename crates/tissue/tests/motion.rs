@@ -9,8 +9,8 @@ use trocar_tissue::{
     SupportPlane,
 };
 
-/// SPEC T2: free fall matches g t^2/2 and g t to four digits, with damping, in all materials; the paper's schedule follows
-/// implicit Euler's own law g t (t + h)/2.
+/// Free fall matches g t^2/2 and g t to four digits, with damping, in all materials; the
+/// paper's schedule follows implicit Euler's own law g t (t + h)/2.
 #[test]
 fn free_fall() {
     let mesh = block([3, 3, 3], 2e-3);
@@ -35,7 +35,8 @@ fn free_fall() {
     }
 }
 
-/// A column that stands on its pinned foot sags by rho g L^2/(2E) at its top (nu = 0: no foot effect).
+/// A column that stands on its pinned foot sags by rho g L^2/(2E) at its top (nu = 0: no foot
+/// effect).
 #[test]
 fn a_column_sags_under_its_weight() {
     let (cells, edge) = ([4, 4, 10], 2e-3);
@@ -89,7 +90,8 @@ fn dashpots_do_not_brake_rotation() {
     assert!(kept[0] > 0.9, "kept {}", kept[0]);
 }
 
-/// A block dropped on the plane comes to rest on it; one pushed along it is stopped by friction after about v^2/(2 mu g).
+/// A block dropped on the plane comes to rest on it; one pushed along it is stopped by friction
+/// after about v^2/(2 mu g).
 #[test]
 fn the_plane_supports_and_holds() {
     let mesh = block([4, 4, 2], 3e-3);
@@ -107,8 +109,8 @@ fn the_plane_supports_and_holds() {
         .unwrap();
     let model = builder.build().unwrap();
     let mut state = State::new(&model);
-    // Ten sweeps do not carry the friction of the foot through the block, which then slides several times too far; the law itself is
-    // tested with enough of them.
+    // Ten sweeps do not carry the friction of the foot through the block, which then slides several
+    // times too far; the law itself is tested with enough of them.
     let schedule = SolverSettings::Descent(Descent { substeps: 8, iterations: 150, start: Start::Adaptive });
     let mut stepper = Stepper::new(&model, schedule, FRAME, 0).unwrap();
     let all: Vec<u32> = (0..mesh.vertices.len() as u32).collect();

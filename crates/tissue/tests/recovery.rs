@@ -8,7 +8,8 @@ use common::{FRAME, block, model, nodes, noise, tissue};
 use glam::DVec3;
 use trocar_tissue::{ConstitutiveModel, Divergence, Material, SolverSettings, State, Stepper};
 
-/// Nodes at random places inside the bounding box find back until no element is inverted. They are near their rest shape then, and end in it.
+/// Nodes at random places inside the bounding box find back until no element is inverted. They are
+/// near their rest shape then, and end in it.
 fn recovers(name: &str, schedule: SolverSettings) {
     let mesh = block([3, 3, 3], 2e-3);
     let high = DVec3::splat(6e-3);

@@ -17,7 +17,8 @@ fn lifted(height: f64) -> Pose {
     Pose { translation: DVec3::Z * height, ..Pose::IDENTITY }
 }
 
-/// Grasps the top of a block pinned at its foot and moves it by `travel` in `frames` frames; returns the most elements inverted in any frame.
+/// Grasps the top of a block pinned at its foot and moves it by `travel` in `frames` frames;
+/// returns the most elements inverted in any frame.
 fn drag(model: &Model, mesh: &TetMesh, top: f64, travel: f64, frames: usize) -> (usize, State) {
     let mut state = State::new(model);
     let mut stepper = Stepper::new(model, SolverSettings::default(), FRAME, 0).unwrap();

@@ -1,11 +1,12 @@
 //! The demonstration: record, reconstruct, grasp-lift and report in a row.
 
-use crate::workflow::{REPORT, Reconstructed, reconstruct_recording, simulate_specimen};
+use crate::lift::Lift;
+use crate::lifted::LiftResult;
+use crate::workflow::{Reconstructed, reconstruct_recording};
 use crate::{Result, pages};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
-use trocar_cell::{GraspLift, Summary};
 use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_reconstruct::Settings;
@@ -30,13 +31,11 @@ pub struct DemoResult {
     pub watertight: usize,
     /// The grasp-lift (inverted_rest, lift_mm, slip_mm, snap_mm, inverted_peak, diverged, ...).
     #[serde(flatten)]
-    pub summary: Summary,
+    pub lift: LiftResult,
     /// The reconstruction.
     pub reconstructed: Reconstructed,
     /// Wall time of everything [s].
     pub seconds: f64,
-    /// The report's path.
-    pub report: String,
 }
 
 impl Demo {
@@ -52,15 +51,14 @@ impl Demo {
         let (reconstructed, reconstruction) =
             reconstruct_recording(&recording, &Settings::default(), &specimen, progress)?;
         let before = pages::reconstruction_sections(&reconstruction)?;
-        let task = GraspLift { threads: self.threads, ..GraspLift::default() };
-        let lifted = simulate_specimen(&reconstruction.specimen, &task, Some(&before), &run, progress)?;
+        let lift = Lift { threads: self.threads, ..Lift::default() };
+        let lifted = lift.write_specimen(&reconstruction.specimen, &specimen, Some(&before), &run, progress)?;
         Ok(DemoResult {
             organs: reconstructed.organs.len(),
             watertight: reconstructed.organs.iter().filter(|o| o.facts.watertight).count(),
-            summary: lifted.summary,
+            lift: lifted.result,
             reconstructed,
             seconds: clock.elapsed().as_secs_f64(),
-            report: run.join(REPORT).display().to_string(),
         })
     }
 }

@@ -10,7 +10,8 @@ use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::{
-    Episode, EpisodeFile, EpisodeResult, GateRange, RESULT_FILE, Sweep, Verdict, policy, read_channels, run, sweep,
+    CHANNELS_FILE, EPISODE_FILE, Episode, EpisodeFile, EpisodeResult, GateRange, RESULT_FILE, Sweep, Verdict, policy,
+    read_channels, run, sweep,
 };
 
 /// One episode of a scene by a policy.
@@ -74,12 +75,17 @@ impl EpisodeRun {
     }
 }
 
-/// The episode in a file.
+/// `name` in the folder `path`, or `path` itself where it is no folder.
+fn inside(path: &Path, name: &str) -> PathBuf {
+    if path.is_dir() { path.join(name) } else { path.to_owned() }
+}
+
+/// The episode in a file, or in an episode's folder.
 ///
 /// # Errors
-/// A file that is damaged.
-pub fn read_episode(file: &Path) -> Result<EpisodeFile> {
-    Ok(EpisodeFile::read(file)?)
+/// A file that is missing or damaged.
+pub fn read_episode(path: &Path) -> Result<EpisodeFile> {
+    Ok(EpisodeFile::read(&inside(path, EPISODE_FILE))?)
 }
 
 /// Does the episode in `file` again and compares every step. The specimen is the scene's, or that in the folder `specimen`.
@@ -93,7 +99,7 @@ pub fn replay(
     threads: usize,
     progress: &dyn Progress,
 ) -> Result<Verdict> {
-    let episode = EpisodeFile::read(file)?;
+    let episode = read_episode(file)?;
     let scene = episode.scene(specimen)?;
     let specimen = match specimen {
         Some(folder) => Specimen::read(folder)?,
@@ -117,9 +123,10 @@ pub fn sweep_files(files: &[PathBuf], ranges: &[String], progress: &dyn Progress
     if let Some((_, twice)) = files.iter().enumerate().find(|(k, f)| files[..*k].contains(f)) {
         return Err(Error::Mismatch(format!("{}: named twice; it would count twice", twice.display())));
     }
+    let files: Vec<PathBuf> = files.iter().map(|f| inside(f, CHANNELS_FILE)).collect();
     progress.begin("channels", files.len() as u64);
     let mut episodes = Vec::with_capacity(files.len());
-    for file in files {
+    for file in &files {
         if progress.interrupted() {
             return Err(Error::Interrupted);
         }

@@ -27,12 +27,9 @@ pub enum Error {
         /// Why it stays.
         reason: String,
     },
-    /// A moving picture was asked of a run that kept no snapshots.
-    #[error("the run kept no snapshots, so there is nothing to animate; set `snapshot_every` to 4 or so")]
-    NoSnapshots,
-    /// The moving picture could not be encoded.
-    #[error("the moving picture cannot be encoded: {0}")]
-    Gif(#[from] gif::EncodingError),
+    /// A moving picture has no frames.
+    #[error("the moving picture has no frames")]
+    NoFrames,
     /// An image or camera is unusable.
     #[error(transparent)]
     Camera(#[from] trocar_camera::Error),
@@ -103,11 +100,30 @@ pub enum Error {
     Tissue(#[from] trocar_tissue::Error),
     /// An episode cannot be run, or its files are unusable.
     #[error(transparent)]
-    Task(#[from] trocar_task::Error),
+    Task(trocar_task::Error),
     /// A camera of the cell cannot see.
     #[error(transparent)]
     Sensors(#[from] trocar_sensors::Error),
     /// A task cannot be run.
     #[error(transparent)]
-    Cell(#[from] trocar_cell::Error),
+    Cell(trocar_cell::Error),
+}
+
+/// What was interrupted inside is interrupted outside.
+impl From<trocar_cell::Error> for Error {
+    fn from(error: trocar_cell::Error) -> Self {
+        match error {
+            trocar_cell::Error::Interrupted => Self::Interrupted,
+            other => Self::Cell(other),
+        }
+    }
+}
+
+impl From<trocar_task::Error> for Error {
+    fn from(error: trocar_task::Error) -> Self {
+        match error {
+            trocar_task::Error::Cell(inner) => inner.into(),
+            other => Self::Task(other),
+        }
+    }
 }

@@ -126,7 +126,7 @@ impl Drop for Moving {
 /// # Errors
 /// Frames that cannot be encoded.
 pub fn webp(frames: &[(ColorImage, i32)]) -> Result<Vec<u8>> {
-    let Some((first, _)) = frames.first() else { return Err(Error::NoSnapshots) };
+    let Some((first, _)) = frames.first() else { return Err(Error::NoFrames) };
     let failed = |why: &str| Error::Format(format!("the moving picture cannot be encoded: {why}"));
     let mut config = WebPConfig::new().map_err(|()| failed("libwebp has another version"))?;
     config.quality = QUALITY;

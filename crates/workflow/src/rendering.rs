@@ -1,13 +1,13 @@
 //! `trocar render`: what a camera sees of a specimen, of a scene or of an episode, as a picture or as a moving picture of the scripted grasp-lift or of the episode.
 
-mod colors;
+pub(crate) mod colors;
 mod play;
 mod rendered;
 mod script;
 
 pub(crate) use colors::{averaged, label_color, shown};
 pub use rendered::{Rendered, Seen};
-pub use script::Script;
+pub use script::ScriptedLift;
 
 use play::Play;
 use rendered::seen;
@@ -19,7 +19,6 @@ use crate::{Error, Result};
 use glam::DVec3;
 use std::path::{Path, PathBuf};
 use trocar_camera::ColorImage;
-use trocar_cell::Cell;
 use trocar_core::Progress;
 use trocar_render::{Picture, RenderSettings};
 use trocar_scene::Scene;
@@ -117,9 +116,9 @@ impl Rendering {
         let scene = Scene::read(&self.source)?;
         let film = begin()?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
-        let cell = Cell::new(&scene, &specimen, self.threads)?;
-        let sight = CameraRig::new(&scene, &specimen, &cell)?;
-        self.play(&mut Script::new(&scene, cell)?, sight, (self.at.or(Some(0.0)), film), output, progress)
+        let mut lift = ScriptedLift::new(&scene, &specimen, self.threads)?;
+        let sight = CameraRig::new(&scene, &specimen, lift.cell())?;
+        self.play(&mut lift, sight, (self.at.or(Some(0.0)), film), output, progress)
     }
 
     /// An episode, done again from its file.
@@ -254,7 +253,7 @@ impl Rendering {
         let even = |n: usize| n & !1;
         let size = self.size.unwrap_or([even(small(width)), even(small(height))]);
         let hz = frame_rate(play.cell().period(), most);
-        let (mut frames, mut render_s) = (0, 0.0);
+        let (mut frames, mut render_s) = (0_u32, 0.0);
         let mut picture = Picture::new(size[0], size[1]);
         play::stage(progress, "film", play.periods().unwrap_or(1) as u64, || {
             loop {

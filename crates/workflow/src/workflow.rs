@@ -5,7 +5,6 @@ use crate::{Error, Result, pages};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Instant;
-use trocar_cell::{GraspLift, GraspLiftRun, Summary};
 use trocar_core::Progress;
 use trocar_geometry::io::Unit;
 use trocar_reconstruct::{Reconstruction, Settings};
@@ -14,12 +13,6 @@ use trocar_specimen::{OrganFacts, Specimen, StagedFolder};
 
 /// The report's name in every folder.
 pub const REPORT: &str = "report.html";
-
-/// The file that makes a folder a run.
-const RUN_MARKER: &str = "result.json";
-
-/// Frames between snapshots of a run's moving picture.
-const SNAPSHOT_EVERY: usize = 8;
 
 /// A reconstructed specimen in figures.
 #[derive(Clone, Debug, Serialize)]
@@ -93,16 +86,6 @@ impl CompositeFigures {
     }
 }
 
-/// A run that was made, in figures.
-#[derive(Clone, Debug, Serialize)]
-pub struct SimulatedRun {
-    /// The measurements.
-    #[serde(flatten)]
-    pub summary: Summary,
-    /// The report's path.
-    pub report: String,
-}
-
 /// Reconstructs the recording in folder `recording` into the specimen folder `output`, with its
 /// report.
 ///
@@ -155,56 +138,6 @@ pub fn reconstruct_surface(
         ));
     }
     Ok(figures(&specimen, None, notes, output, clock))
-}
-
-/// Runs `task` on the specimen folder `specimen` into the run folder `output`: figures, channels
-/// and report.
-///
-/// # Errors
-/// One line that names the file, organ or option; `output` is then left as it was.
-pub fn simulate(specimen: &Path, task: &GraspLift, output: &Path, progress: &dyn Progress) -> Result<SimulatedRun> {
-    refuse_overlap(specimen, output)?;
-    let run = simulate_specimen(&Specimen::read(specimen)?, task, None, output, progress)?;
-    Ok(SimulatedRun { summary: run.summary, report: output.join(REPORT).display().to_string() })
-}
-
-/// Runs the grasp-lift with pictures and writes it to the folder `output`; `before` goes first in
-/// the report.
-pub fn simulate_specimen(
-    specimen: &Specimen,
-    task: &GraspLift,
-    before: Option<&str>,
-    output: &Path,
-    progress: &dyn Progress,
-) -> Result<GraspLiftRun> {
-    let staged = StagedFolder::create(output, RUN_MARKER)?;
-    let run = GraspLift { snapshot_every: SNAPSHOT_EVERY, ..task.clone() }.run(specimen, progress)?;
-    write_run(staged, specimen, &run, before, progress)?;
-    Ok(run)
-}
-
-fn write_run(
-    staged: StagedFolder,
-    specimen: &Specimen,
-    run: &GraspLiftRun,
-    before: Option<&str>,
-    progress: &dyn Progress,
-) -> Result<()> {
-    let folder = staged.path();
-    let write = |name: &str, bytes: &[u8]| {
-        let path = folder.join(name);
-        std::fs::write(&path, bytes).map_err(|source| Error::Io { path, source })
-    };
-    let summary = serde_json::to_vec_pretty(&run.summary).map_err(|e| Error::Format(e.to_string()))?;
-    write(RUN_MARKER, &summary)?;
-    let mut table = csv::Writer::from_writer(Vec::new());
-    for sample in &run.samples {
-        table.serialize(sample).map_err(|e| Error::Format(e.to_string()))?;
-    }
-    write("channels.csv", &table.into_inner().map_err(|e| Error::Format(e.to_string()))?)?;
-    write(REPORT, pages::grasp_lift(specimen, run, before)?.as_bytes())?;
-    stop_if_asked(progress)?;
-    Ok(staged.commit()?)
 }
 
 fn finish(staged: StagedFolder, specimen: &Specimen, html: &str, progress: &dyn Progress) -> Result<()> {

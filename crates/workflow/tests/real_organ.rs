@@ -1,11 +1,11 @@
 //! A real organ model becomes a body, settles, and is lifted.
 
 use std::path::Path;
-use trocar_cell::{GraspDesign, GraspLift};
 use trocar_core::Silent;
 use trocar_geometry::io::Unit;
 use trocar_reconstruct::Settings;
-use trocar_workflow::{reconstruct_surface, simulate};
+use trocar_scene::GraspDesignName;
+use trocar_workflow::{Lift, reconstruct_surface};
 
 #[test]
 fn a_gallbladder_is_lifted() {
@@ -25,9 +25,9 @@ fn a_gallbladder_is_lifted() {
     // What the model's own triangles enclose.
     assert!((facts.volume_cm3 / 35.95 - 1.0).abs() < 0.05, "{} cm3", facts.volume_cm3);
     // Jaws of half a newton do not hold a gallbladder by friction.
-    let task = GraspLift { design: GraspDesign::LivePose, ..GraspLift::default() };
-    let lifted = simulate(&specimen, &task, &run, &Silent).unwrap();
-    let s = &lifted.summary;
-    assert!(s.held && s.settled && !s.diverged && s.inverted_peak == 0, "{s:?}");
+    let lift = Lift { design: Some(GraspDesignName::LivePose), ..Lift::default() };
+    let lifted = lift.run_specimen(&specimen, &run, &Silent).unwrap();
+    let s = &lifted.episode.summary;
+    assert!(s.held && s.details.settling.settled && !s.diverged && s.inverted_peak == 0, "{s:?}");
     assert!(run.join("report.html").is_file());
 }

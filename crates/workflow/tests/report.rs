@@ -3,16 +3,14 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)] // the helpers are test code too
 
 use base64::{Engine, engine::general_purpose::STANDARD};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
-use trocar_cell::{GraspLift, GraspLiftRun, Gripper, Phase, Sample, SeverAt, Snapshot, Summary};
 use trocar_core::Pose;
-use trocar_core::Silent;
 use trocar_geometry::{RepairReport, TetMesh, TetQuality, TriMesh};
 use trocar_reconstruct::{CompositeTimes, OrganView, Reconstruction};
 use trocar_render::phong::{Instance, PhongScene, Shading};
-use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
+use trocar_specimen::{Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 use trocar_workflow::pages as report;
 
 /// A name that would break a page that does not escape it.
@@ -191,91 +189,6 @@ fn reconstruction() -> Reconstruction {
     }
 }
 
-fn run(specimen: &Specimen, snapshots: usize) -> GraspLiftRun {
-    let samples: Vec<Sample> = (0..480)
-        .map(|i| {
-            let t = f64::from(i) / 60.0;
-            let (phase, lift) = match t {
-                t if t < 2.0 => ("settle", 0.0),
-                t if t < 3.0 => ("approach", 0.0),
-                t if t < 3.5 => ("close", 0.0),
-                t if t < 4.5 => ("lift", 15.0 * (t - 3.5)),
-                t if t < 5.5 => ("hold", 15.0),
-                t if t < 6.5 => ("lower", 15.0 * (6.5 - t)),
-                t if t < 7.0 => ("open", 0.0),
-                _ => ("recover", 0.0),
-            };
-            Sample {
-                time_s: t,
-                phase,
-                jaw_lift_mm: lift,
-                tissue_lift_mm: 0.96 * lift,
-                slip_mm: 0.04 * lift,
-                jaw_angle_deg: 40.0,
-                jaw_force_n: 1.0,
-                contact_n: 0.5,
-                constraint_n: 0.2,
-                max_speed_m_s: 1e-5 + 0.02 * (-(t - 4.0) * (t - 4.0)).exp(),
-                inverted: 0,
-                min_volume_ratio: 1.0 - 0.01 * lift,
-            }
-        })
-        .collect();
-    let snapshot = |k: usize| {
-        let t = 8.0 * k as f64 / snapshots.max(2) as f64;
-        let lift = samples[(t * 60.0) as usize].tissue_lift_mm * 1e-3;
-        let bend = |p: &DVec3| *p + specimen.up * lift * (-((p.x - 0.005) / 0.02).powi(2)).exp();
-        let mut nodes: Vec<Vec<DVec3>> = specimen.organs.iter().map(|o| o.body.vertices.clone()).collect();
-        nodes[2] = nodes[2].iter().map(bend).collect();
-        let rotation = DQuat::from_rotation_arc(DVec3::X, -specimen.up);
-        let translation = DVec3::new(0.005, 0.026, 0.178) + specimen.up * (0.012 + lift);
-        Snapshot {
-            time_s: t,
-            phase: Phase::Lift,
-            nodes,
-            gripper: Gripper { pose: Pose { rotation, translation }, jaw_angle: 0.3 },
-            cutter: None,
-            cut: false,
-        }
-    };
-    GraspLiftRun {
-        summary: Summary {
-            organ: "appendix".into(),
-            at: 0.5,
-            design: "live-pose",
-            jaw_force_n: 1.0,
-            attached: true,
-            held_nodes: 23,
-            lift_mm: 14.4,
-            follow_ratio: 0.96,
-            slip_mm: 0.6,
-            snap_mm: 0.0,
-            activation_step_mm: 0.02,
-            held: true,
-            inverted_rest: 0,
-            inverted_peak: 0,
-            min_volume_ratio: 0.85,
-            peak_speed_m_s: 0.02,
-            settled_speed_m_s: 2e-5,
-            settled: true,
-            calmed_s: 0.0,
-            resting_speed_m_s: 1e-5,
-            yielded_substeps: 0,
-            pin_drift_mm: 0.0,
-            diverged: false,
-            divergence: Some(HOSTILE.into()),
-            simulated_s: 8.0,
-            wall_s: 2.0,
-            real_time_factor: 4.0,
-            state_hash: "0123456789abcdef".into(),
-            ..Summary::default()
-        },
-        samples: samples.clone(),
-        snapshots: (0..snapshots).map(snapshot).collect(),
-        cut: None,
-    }
-}
-
 fn keep(name: &str, html: &str) {
     std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name), html).unwrap();
 }
@@ -365,72 +278,6 @@ fn a_surface_and_its_repair_are_shown() {
     assert_eq!(check(&html), 4);
     assert!(html.contains("1\u{202f}234 edges") && html.contains("rebuilt"));
     assert!(!html.contains("14\u{202f}914"), "the paper's figures belong to recordings only");
-}
-
-#[test]
-fn a_run_is_shown_with_its_lift() {
-    let s = specimen();
-    let run = run(&s, 60);
-    let html = report::grasp_lift(&s, &run, Some("<section><h2>Before</h2></section>")).unwrap();
-    keep("run.html", &html);
-    assert_eq!(check(&html), 4);
-    for text in ["time [s]", "lift [mm]", "slip [mm]", "speed [m/s]", "volume ratio [1]", "Before", "0.960", "hold"] {
-        assert!(html.contains(text), "{text}");
-    }
-    let gif = report::lift_gif(&s, &run).unwrap();
-    let mut decoder = gif::DecodeOptions::new().read_info(gif.as_slice()).unwrap();
-    assert_eq!((decoder.width(), decoder.height(), decoder.repeat()), (480, 300, gif::Repeat::Infinite));
-    let mut frames = 0;
-    while let Some(frame) = decoder.read_next_frame().unwrap() {
-        assert_eq!(frame.buffer.len(), 480 * 300);
-        frames += 1;
-    }
-    assert_eq!(frames, 45);
-}
-
-#[test]
-fn a_cut_is_shown_with_its_pieces() {
-    let mut s = specimen();
-    s.name = "tube".into();
-    s.organs.swap(0, 2);
-    s.organs.truncate(1);
-    // Its base is at the far left.
-    s.organs[0].base -= 0.036 * DVec3::X;
-    s.organs[0].pins = Pins::End { end: End::Base, length: 0.2, band_length: 0.0, band_share: 0.0 };
-    let task = GraspLift { at: 0.8, sever: Some(SeverAt::Between), snapshot_every: 20, ..GraspLift::default() };
-    let run = task.run(&s, &Silent).unwrap();
-    let sever = run.summary.sever.as_ref().unwrap();
-    assert_eq!(sever.outcome, "severed", "{sever:?}");
-    let html = report::grasp_lift(&s, &run, None).unwrap();
-    keep("severed.html", &html);
-    // 4 of the organs, 4 of the lift, 4 of the cut.
-    assert_eq!(check(&html), 12);
-    for text in ["The cut", "appendix.1", "Dark red", "Close up", "lift and cut", "snip"] {
-        assert!(html.contains(text), "{text}");
-    }
-    let mut torn = run.clone();
-    torn.snapshots.last_mut().unwrap().nodes[0].pop();
-    assert!(report::grasp_lift(&s, &torn, None).unwrap_err().to_string().contains("not of specimen"));
-}
-
-#[test]
-fn a_run_without_samples_or_snapshots_is_still_a_page() {
-    let s = specimen();
-    let mut run = run(&s, 0);
-    run.samples.clear();
-    run.summary.follow_ratio = f64::NAN;
-    let html = report::grasp_lift(&s, &run, None).unwrap();
-    assert_eq!(check(&html), 4);
-    assert!(html.contains("Nothing to plot") && html.contains("no snapshots"));
-    assert!(report::lift_gif(&s, &run).is_err());
-}
-
-#[test]
-fn snapshots_of_another_specimen_are_refused() {
-    let s = specimen();
-    let mut run = run(&s, 2);
-    run.snapshots[1].nodes[0].pop();
-    assert!(report::grasp_lift(&s, &run, None).unwrap_err().to_string().contains("not of specimen"));
 }
 
 /// Beside a warning nothing is shown as good, and the warning stands out above the figures.

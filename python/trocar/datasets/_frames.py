@@ -1,4 +1,4 @@
-"""What writers of demonstrations share: features, the frames of an episode under way, files that appear whole."""
+"""Shared by the writers: features, frames of the current episode, atomic replacement of files."""
 
 from __future__ import annotations
 
@@ -9,15 +9,28 @@ from typing import Any
 
 import numpy as np
 
-#: A feature: `{"dtype": "float32" | "int64" | ... | "video", "shape": (...), "names": [...] | None}`.
+#: A feature: `{"dtype": "float32" | ... | "video", "shape": (...), "names": [...] | None}`.
 Feature = dict[str, Any]
 
-#: Types of numbers that a feature may have.
-NUMBERS = ("bool", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64", "float16", "float32", "float64")
+#: Numeric types of features.
+NUMBERS = (
+    "bool",
+    "int8",
+    "int16",
+    "int32",
+    "int64",
+    "uint8",
+    "uint16",
+    "uint32",
+    "uint64",
+    "float16",
+    "float32",
+    "float64",
+)
 
 
 class Frames:
-    """The frames of one episode: checked against their features as they come."""
+    """The frames of one episode, checked against their features."""
 
     def __init__(self, features: dict[str, Feature]):
         self.features = features
@@ -25,34 +38,50 @@ class Frames:
         self.clear()
 
     def clear(self) -> None:
+        """Removes all frames."""
         self.columns = {key: [] for key in self.features}
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()), []))
 
     def add(self, frame: dict[str, Any]) -> None:
-        """Takes a frame. What is wrong with it is told by the feature's name, and nothing of it is kept."""
+        """Adds a frame. A wrong one is a ValueError with the feature's name, and is not added."""
         for key, value in checked_values("frame", frame, self.features).items():
             self.columns[key].append(value)
 
 
 def check_dtypes(features: dict[str, Feature], pictures: tuple[str, ...]) -> None:
-    """Raises a `ValueError` that names the first feature that is neither of numbers nor of one of the kinds of `pictures`."""
+    """ValueError that names the first feature whose type is no number and not in `pictures`."""
     for key, feature in features.items():
         dtype = feature.get("dtype")
         if dtype not in NUMBERS and dtype not in pictures:
-            raise ValueError(f"features: {key} has dtype '{dtype}', which cannot be written; it must be one of {', '.join((*pictures, *NUMBERS))}")
+            raise ValueError(
+                f"features: {key} has dtype '{dtype}'; "
+                f"it must be one of {', '.join((*pictures, *NUMBERS))}"
+            )
         if dtype in pictures and len(feature["shape"]) != 3:
-            raise ValueError(f"features: {key} has shape {tuple(feature['shape'])}; pictures are (height, width, channels)")
+            raise ValueError(
+                f"features: {key} has shape {tuple(feature['shape'])}; "
+                "it must be (height, width, channels)"
+            )
 
 
-def checked_values(what: str, values: dict[str, Any], features: dict[str, Feature]) -> dict[str, np.ndarray]:
-    """`values` as arrays of the features' types and shapes, one for each; `what` is what errors call them."""
+def checked_values(
+    what: str, values: dict[str, Any], features: dict[str, Feature]
+) -> dict[str, np.ndarray]:
+    """`values` as arrays of the features' types and shapes. `what` names them in errors."""
     missing, unknown = features.keys() - values.keys(), values.keys() - features.keys()
     if missing or unknown:
-        words = [f"{', '.join(sorted(keys))} {how}" for keys, how in ((missing, "missing"), (unknown, "unknown")) if keys]
+        words = [
+            f"{', '.join(sorted(keys))} {how}"
+            for keys, how in ((missing, "missing"), (unknown, "unknown"))
+            if keys
+        ]
         raise ValueError(f"{what}: {'; '.join(words)}; the features are {', '.join(features)}")
-    return {key: _checked_value(f"{what}: {key}", values[key], feature) for key, feature in features.items()}
+    return {
+        key: _checked_value(f"{what}: {key}", values[key], feature)
+        for key, feature in features.items()
+    }
 
 
 def _checked_value(name: str, value: Any, feature: Feature) -> np.ndarray:
@@ -65,20 +94,20 @@ def _checked_value(name: str, value: Any, feature: Feature) -> np.ndarray:
     if kind == "uint8" and array.dtype != np.uint8:
         raise ValueError(f"{name} is {array.dtype}; pictures are uint8")
     if array.dtype.kind == "f" and not np.isfinite(array).all():
-        raise ValueError(f"{name} holds a number that is not finite")
+        raise ValueError(f"{name} has a number that is not finite")
     if not np.can_cast(array.dtype, kind, casting="same_kind"):
         raise ValueError(f"{name} is {array.dtype}; it must be {kind}")
-    # A copy: environments write the next observation into the same array.
+    # A copy, because environments write the next observation into the same array.
     return np.array(array, dtype=kind).reshape(shape)
 
 
 def write_json(path: Path, value: Any) -> None:
-    """Writes JSON whole or not at all."""
+    """Replaces a file by JSON atomically."""
     replace(path, json.dumps(value, indent=4).encode())
 
 
 def replace(path: Path, content: bytes) -> None:
-    """Writes a file whole or not at all."""
+    """Replaces a file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + ".partial")
     partial.write_bytes(content)

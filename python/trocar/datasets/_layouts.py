@@ -1,11 +1,15 @@
-"""How LeRobot datasets lie on disk, v3.0 and v2.1: which file an episode goes into, and what goes again of one that was not finished."""
+"""The layouts of LeRobot datasets, v3.0 and v2.1: the files of an episode.
+
+They also remove the files of an unfinished episode.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+from abc import ABC, abstractmethod
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pandas as pd
 import pyarrow as pa
@@ -15,36 +19,87 @@ import pyarrow.parquet as pq
 from . import _stats
 from ._frames import replace, write_json
 
-#: Files in a folder ("chunk"), at most.
+#: Maximum number of files in a folder ("chunk").
 CHUNK = 1000
-#: Size of a data file from which on a new one begins [MB]. It is written again with every episode, so it is less than LeRobot's 100.
+#: Size at which a data file is full (MiB). LeRobot has 100; a file is written again with every
+#: episode, so this is less.
 DATA_FILE_MB = 16
 
 
-class V3:
-    """Version 3.0: episodes share data files; what is known of each is a row of `meta/episodes`. Here each episode has videos of its own."""
+class Layout(ABC):
+    """Files of a dataset in the folder `root`, except `meta/info.json`."""
 
-    PATHS = {
-        "data_files_size_in_mb": DATA_FILE_MB,
-        "video_files_size_in_mb": 200,
-        "data_path": "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet",
-        "video_path": "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4",
-    }
-    EPISODES = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+    #: Paths and sizes in `info.json`.
+    PATHS: ClassVar[dict[str, Any]]
 
     def __init__(self, root: Path):
         self.root = root
 
+    @abstractmethod
+    def video_path(self, key: str, episode: int) -> Path:
+        """The video of the feature `key` in an episode."""
+
+    @abstractmethod
+    def read_tasks(self) -> list[str]:
+        """The tasks in words, by index."""
+
+    @abstractmethod
+    def write_tasks(self, tasks: list[str]) -> None:
+        """Writes the tasks in words."""
+
+    @abstractmethod
+    def read_stats(self, episodes: int, frames: int) -> dict[str, _stats.Stats]:
+        """Statistics of all `episodes`, which have `frames` frames, by feature."""
+
+    @abstractmethod
+    def write_stats(self, stats: dict[str, _stats.Stats]) -> None:
+        """Writes the statistics of all episodes."""
+
+    @abstractmethod
+    def remove_from(self, episodes: int, frames: int) -> None:
+        """Removes the rows of episode number `episodes` and of frame number `frames` and later."""
+
+    @abstractmethod
+    def write_episode(
+        self,
+        table: pa.Table,
+        row: dict[str, Any],
+        stats: dict[str, _stats.Stats],
+        videos: dict[str, float],
+        first: int,
+    ) -> None:
+        """Writes an episode: a row of `table` a frame, the first of which has the index `first`.
+
+        `row`: what readers know about the episode. `videos`: duration (s) by feature.
+        """
+
+
+class V3(Layout):
+    """Version 3.0: episodes share data files, and `meta/episodes` has a row for each.
+
+    Here each episode has videos of its own.
+    """
+
+    DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+    VIDEO = "videos/{video_key}/chunk-{chunk_index:03d}/file-{file_index:03d}.mp4"
+    PATHS: ClassVar[dict[str, Any]] = {
+        "data_files_size_in_mb": DATA_FILE_MB,
+        "video_files_size_in_mb": 200,
+        "data_path": DATA,
+        "video_path": VIDEO,
+    }
+    EPISODES = "meta/episodes/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
+
     def video_path(self, key: str, episode: int) -> Path:
         chunk, file = divmod(episode, CHUNK)
-        return self.root / self.PATHS["video_path"].format(video_key=key, chunk_index=chunk, file_index=file)
+        return self.root / self.VIDEO.format(video_key=key, chunk_index=chunk, file_index=file)
 
     def read_tasks(self) -> list[str]:
         path = self.root / "meta/tasks.parquet"
         return list(pd.read_parquet(path).index) if path.exists() else []
 
     def read_stats(self, episodes: int, frames: int) -> dict[str, _stats.Stats]:
-        """Statistics of all episodes: those on disk, or, where these are of an unfinished episode too, the episodes' own once more."""
+        """Those on disk, or merged from each episode's if the former include an unfinished one."""
         path = self.root / "meta/stats.json"
         if episodes == 0:
             path.unlink(missing_ok=True)
@@ -56,13 +111,16 @@ class V3:
         for file in self._files(self.EPISODES):
             for row in pq.read_table(file).to_pylist():
                 own = self._stats_of(row)
-                whole = {key: _stats.merged(whole[key], s) if key in whole else s for key, s in own.items()}
+                whole = {
+                    key: _stats.merged(whole[key], s) if key in whole else s
+                    for key, s in own.items()
+                }
         self.write_stats(whole)
         return whole
 
     @staticmethod
     def _stats_of(row: dict[str, Any]) -> dict[str, _stats.Stats]:
-        """An episode's statistics out of its row; features have no slash in their names."""
+        """An episode's statistics from its row. Names of features have no slash."""
         own: dict[str, dict[str, Any]] = {}
         for key, value in row.items():
             if key.startswith("stats/"):
@@ -73,9 +131,12 @@ class V3:
     def write_stats(self, stats: dict[str, _stats.Stats]) -> None:
         write_json(self.root / "meta/stats.json", _stats.plain(stats))
 
-    def forget(self, episodes: int, frames: int) -> None:
-        """Removes rows of episodes from number `episodes` and of frames from number `frames` on; only the last files have any."""
-        for pattern, key, first in ((self.PATHS["data_path"], "index", frames), (self.EPISODES, "episode_index", episodes)):
+    def remove_from(self, episodes: int, frames: int) -> None:
+        # Only the last files have any.
+        for pattern, key, first in (
+            (self.DATA, "index", frames),
+            (self.EPISODES, "episode_index", episodes),
+        ):
             for path in reversed(self._files(pattern)):
                 table = pq.ParquetFile(path).read()
                 kept = table.filter(pc.less(table[key], first))
@@ -87,9 +148,11 @@ class V3:
                     path.unlink()
 
     def _files(self, pattern: str) -> list[Path]:
-        """The files of `pattern` that are there, in order."""
+        """The existing files of `pattern`, in order."""
         found, place = [], (0, 0)
-        while (path := self.root / pattern.format(chunk_index=place[0], file_index=place[1])).exists():
+        while (
+            path := self.root / pattern.format(chunk_index=place[0], file_index=place[1])
+        ).exists():
             found.append(path)
             place = (place[0] + (place[1] + 1) // CHUNK, (place[1] + 1) % CHUNK)
         return found
@@ -102,9 +165,14 @@ class V3:
         os.replace(path.with_name("tasks.partial"), path)
 
     def write_episode(
-        self, table: pa.Table, row: dict[str, Any], stats: dict[str, _stats.Stats], videos: dict[str, float], first: int
+        self,
+        table: pa.Table,
+        row: dict[str, Any],
+        stats: dict[str, _stats.Stats],
+        videos: dict[str, float],
+        first: int,
     ) -> None:
-        data = self._append(self.PATHS["data_path"], table, "index", first)
+        data = self._append(self.DATA, table, "index", first)
         row |= {"data/chunk_index": data[0], "data/file_index": data[1]}
         row |= {"dataset_from_index": first, "dataset_to_index": first + row["length"]}
         for key, seconds in videos.items():
@@ -115,16 +183,18 @@ class V3:
             row |= {f"stats/{key}/{name}": value for name, value in of.items()}
         place = self._last(self.EPISODES)
         row |= {"meta/episodes/chunk_index": place[0], "meta/episodes/file_index": place[1]}
-        self._append(self.EPISODES, pa.Table.from_pylist([row]), "episode_index", row["episode_index"])
+        self._append(
+            self.EPISODES, pa.Table.from_pylist([row]), "episode_index", row["episode_index"]
+        )
 
     def _last(self, pattern: str) -> tuple[int, int]:
-        """The file that the next rows go into: the last one, or the next if that is full."""
+        """The file of the next rows: the last one, or a new one if that is full."""
         files = self._files(pattern)
         full = bool(files) and files[-1].stat().st_size >= DATA_FILE_MB * 2**20
         return divmod(max(0, len(files) - 1) + int(full), CHUNK)
 
     def _append(self, pattern: str, table: pa.Table, key: str, first: int) -> tuple[int, int]:
-        """Adds rows to the last file. Rows from `first` on are of an episode that could not be written whole, and go."""
+        """Adds rows to the last file. Replaces rows from `first` on, of an unfinished episode."""
         place = self._last(pattern)
         path = self.root / pattern.format(chunk_index=place[0], file_index=place[1])
         if path.exists():
@@ -136,61 +206,75 @@ class V3:
 
 
 def _write(path: Path, table: pa.Table) -> None:
-    """Writes a Parquet file whole or not at all."""
+    """Replaces a Parquet file atomically."""
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_suffix(".partial")
     pq.write_table(table, partial, compression="snappy")
     os.replace(partial, path)
 
 
-class V21:
-    """Version 2.1: a data file and a video per camera for each episode; what is known of each is a line of JSON."""
+class V21(Layout):
+    """Version 2.1: each episode has a data file, a video a camera and a line of JSON."""
 
-    PATHS = {
-        "data_path": "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet",
-        "video_path": "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4",
+    DATA = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"
+    VIDEO = "videos/chunk-{episode_chunk:03d}/{video_key}/episode_{episode_index:06d}.mp4"
+    PATHS: ClassVar[dict[str, Any]] = {
+        "data_path": DATA,
+        "video_path": VIDEO,
     }
 
-    def __init__(self, root: Path):
-        self.root = root
-
     def _path(self, pattern: str, episode: int, key: str = "") -> Path:
-        return self.root / pattern.format(episode_chunk=episode // CHUNK, episode_index=episode, video_key=key)
+        return self.root / pattern.format(
+            episode_chunk=episode // CHUNK, episode_index=episode, video_key=key
+        )
 
     def video_path(self, key: str, episode: int) -> Path:
-        return self._path(self.PATHS["video_path"], episode, key)
+        return self._path(self.VIDEO, episode, key)
 
     def read_tasks(self) -> list[str]:
         return [line["task"] for line in self._lines("tasks")]
 
     def read_stats(self, episodes: int, frames: int) -> dict[str, _stats.Stats]:
-        """None: each episode has its own, and readers join them."""
+        """None: each episode has its own, and readers merge them."""
         del episodes, frames
         return {}
 
     def write_stats(self, stats: dict[str, _stats.Stats]) -> None:
         """Nothing: see `read_stats`."""
 
-    def forget(self, episodes: int, frames: int) -> None:
-        """Removes what was written of episode number `episodes`; there is at most one beyond the last."""
+    def remove_from(self, episodes: int, frames: int) -> None:
+        # There is at most one unfinished episode.
         del frames
         for name in ("episodes", "episodes_stats"):
             lines = self._lines(name)
             kept = [line for line in lines if line["episode_index"] < episodes]
             if len(kept) < len(lines):
                 self._write_lines(name, kept)
-        self._path(self.PATHS["data_path"], episodes).unlink(missing_ok=True)
+        self._path(self.DATA, episodes).unlink(missing_ok=True)
 
     def write_tasks(self, tasks: list[str]) -> None:
-        self._write_lines("tasks", [{"task_index": k, "task": task} for k, task in enumerate(tasks)])
+        self._write_lines(
+            "tasks", [{"task_index": k, "task": task} for k, task in enumerate(tasks)]
+        )
 
     def write_episode(
-        self, table: pa.Table, row: dict[str, Any], stats: dict[str, _stats.Stats], videos: dict[str, float], first: int
+        self,
+        table: pa.Table,
+        row: dict[str, Any],
+        stats: dict[str, _stats.Stats],
+        videos: dict[str, float],
+        first: int,
     ) -> None:
         del videos, first
-        _write(self._path(self.PATHS["data_path"], row["episode_index"]), table)
-        # Lines of an episode that could not be written whole go.
-        for name, line in (("episodes", row), ("episodes_stats", {"episode_index": row["episode_index"], "stats": _stats.plain(stats)})):
+        _write(self._path(self.DATA, row["episode_index"]), table)
+        # Lines of an unfinished episode are removed.
+        for name, line in (
+            ("episodes", row),
+            (
+                "episodes_stats",
+                {"episode_index": row["episode_index"], "stats": _stats.plain(stats)},
+            ),
+        ):
             kept = [old for old in self._lines(name) if old["episode_index"] < row["episode_index"]]
             self._write_lines(name, [*kept, line])
 
@@ -199,4 +283,7 @@ class V21:
         return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
     def _write_lines(self, name: str, lines: list[dict[str, Any]]) -> None:
-        replace(self.root / f"meta/{name}.jsonl", "".join(json.dumps(line) + "\n" for line in lines).encode())
+        replace(
+            self.root / f"meta/{name}.jsonl",
+            "".join(json.dumps(line) + "\n" for line in lines).encode(),
+        )

@@ -1,10 +1,12 @@
 """A large file that is only ever replaced whole, at the cost of what is added to it.
 
-HDF5 files are changed in place: who is killed amid a change may leave a file that cannot be read. Changing a copy and putting that in
-the file's place is safe, but copying all for each change takes time that grows with the square of what is recorded. So there are two
-files that take turns: the file, which is never touched, and its spare beside it, which is one change behind. The spare is brought up
-to the file, changed, and changes places with it. Each change is then written twice, and while a `Spare` is kept the disk holds the
-file twice; the file itself is always one file and whole, for readers and for whoever copies it.
+HDF5 files are changed in place: a process killed during a change may leave a file that cannot be
+read. Changing a copy and putting the copy in the file's place is safe, but copying the file for
+each change takes time that grows with the square of the recorded length. So there are two files
+that alternate: the file, which is never changed, and its spare beside it, which is one change
+behind. The spare is brought up to date, changed, and swapped with the file. Each change is then
+written twice, and while a `Spare` exists the disk holds the file twice. The file itself is complete
+at any time, for readers and for copies.
 """
 
 from __future__ import annotations
@@ -15,52 +17,59 @@ import shutil
 import weakref
 from pathlib import Path
 
-from ._turns import SAVING_SECONDS, alone
+from ._lock import MAX_WAIT_S, locked
 
-#: What a file's state is known again by: its inode, its size [bytes], when it was written [ns].
+#: Identifies a file's state: its inode, its size (bytes), the time of its last change (ns).
 Mark = tuple[int, int, int]
 
 
 class Spare:
-    """The spare of the file `path`, in whose folder writers take turns. `discard` removes it, or the end of this object or of the program."""
+    """The spare of the file `path`. Writers lock its folder.
+
+    `discard`, or the end of this object or of the program, removes it.
+    """
 
     def __init__(self, path: Path):
-        # A link stays a link: what it points at is replaced.
+        # A link stays a link: its target is replaced.
         self.file = path.resolve()
         self.path = self.file.with_name(self.file.name + ".spare.partial")
         self._older = self.file.with_name(self.file.name + ".older.partial")
         self._marks: tuple[Mark, Mark] | None = None
         weakref.finalize(self, _discard, os.getpid(), self.path, self._older)
 
-    def alone(self, seconds: float = SAVING_SECONDS) -> contextlib.AbstractContextManager[None]:
-        """Has the file and its spare to itself: all that follows wants that, but `discard`."""
-        return alone(self.file.parent, seconds)
+    def locked(self, max_wait_s: float = MAX_WAIT_S) -> contextlib.AbstractContextManager[None]:
+        """Locks the file and its spare. All methods below need the lock, except `discard`."""
+        return locked(self.file.parent, max_wait_s)
 
     def take(self) -> Path:
-        """The spare: equal to the file, or one change behind it. Where another has changed either, it is made anew by copying."""
+        """Returns the spare: equal to the file, or one change behind it.
+
+        If another writer has changed either, the spare is copied from the file.
+        """
         known = self._marks
-        # From here on what it holds is not known, until it is put in the file's place.
+        # Its content is unknown until it is swapped with the file.
         self._marks = None
         if known is None or not self.path.exists() or known != (_mark(self.file), _mark(self.path)):
             self.copy()
         return self.path
 
     def copy(self) -> Path:
-        """Makes the spare anew as a copy of the file."""
+        """Copies the file to the spare."""
         self.drop()
         shutil.copy(self.file, self.path)
         return self.path
 
     def swap(self) -> None:
-        """Puts the spare in the file's place, and what was there in the spare's. The file has one state or the other at any time."""
-        # Windows wants a file that is open for writing here.
+        """Swaps the spare with the file. The file has one state or the other at any time."""
+        # Windows needs a file that is open for writing here.
         _to_disk(self.path, os.O_RDWR)
         self._older.unlink(missing_ok=True)
-        # A second name keeps the old state. Where the file system has no such thing it is lost, and the next `take` copies.
+        # A second name keeps the old state. On a file system without hard links it is lost, and the
+        # next `take` copies.
         with contextlib.suppress(OSError):
             os.link(self.file, self._older)
         os.replace(self.path, self.file)
-        # The change is made; what fails from here on costs a copy at most.
+        # The change is done. A failure from here on costs a copy at most.
         with contextlib.suppress(OSError):
             _to_disk(self.file.parent, os.O_RDONLY)
         with contextlib.suppress(OSError):
@@ -68,20 +77,20 @@ class Spare:
             self._marks = _mark(self.file), _mark(self.path)
 
     def drop(self) -> None:
-        """Removes the spare, and what one who was killed has left of his."""
+        """Removes the spare, and files of a killed writer."""
         self._marks = None
         _remove(self.path, self._older)
 
     def discard(self) -> None:
-        """`drop`, unless another writer is at work: then it is that one's."""
+        """Removes the spare, unless another writer holds the lock."""
         self._marks = None
         _discard(os.getpid(), self.path, self._older)
 
 
 def _discard(process: int, spare: Path, older: Path) -> None:
-    # A fork's end is not the end of the writer it is a copy of.
+    # The end of a forked child is not the end of its parent's writer.
     if process == os.getpid():
-        with contextlib.suppress(OSError, RuntimeError), alone(spare.parent, 0.0):
+        with contextlib.suppress(OSError, RuntimeError), locked(spare.parent, 0.0):
             _remove(spare, older)
 
 
@@ -96,7 +105,7 @@ def _remove(*paths: Path) -> None:
 
 
 def _to_disk(path: Path, flags: int) -> None:
-    """Waits until a file's contents, or a folder's names, are on the disk."""
+    """Waits until a file's content, or a folder's names, are on the disk."""
     opened = os.open(path, flags)
     try:
         os.fsync(opened)

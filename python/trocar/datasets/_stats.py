@@ -1,4 +1,4 @@
-"""Statistics of features as LeRobot datasets keep them: least, most, mean, standard deviation, quantiles."""
+"""Statistics of features in LeRobot datasets: minimum, maximum, mean, deviation, quantiles."""
 
 from __future__ import annotations
 
@@ -8,12 +8,13 @@ import numpy as np
 
 QUANTILES = {"q01": 0.01, "q10": 0.10, "q50": 0.50, "q90": 0.90, "q99": 0.99}
 
-#: Statistics of one feature by name; arrays have the feature's shape, (3, 1, 1) for pictures, `count` is (1,).
+#: Statistics of one feature by name. Arrays have the feature's shape, (3, 1, 1) for pictures;
+#: `count` is (1,).
 Stats = dict[str, np.ndarray]
 
-#: Pictures of an episode that its statistics are taken from, at most.
+#: Maximum number of pictures of an episode that its statistics use.
 SAMPLED_PICTURES = 64
-#: Pixels along each edge of a picture that they are taken from, at most.
+#: Maximum number of pixels along each edge of a picture that they use.
 SAMPLED_PIXELS = 112
 
 
@@ -26,13 +27,21 @@ def of_numbers(values: np.ndarray) -> Stats:
 
 
 def of_pictures(pictures: list[np.ndarray]) -> Stats:
-    """Statistics per channel of 8-bit pictures (height, width, 3), with white as 1, from some of them and every few pixels."""
+    """Statistics per channel of uint8 pictures (height, width, 3), scaled so that white is 1.
+
+    They are taken from a subset of the pictures and pixels.
+    """
     step = max(1, len(pictures) // SAMPLED_PICTURES)
     chosen = pictures[::step]
     edge = max(1, max(chosen[0].shape[:2]) // SAMPLED_PIXELS)
-    pixels = np.concatenate([p[::edge, ::edge].reshape(-1, 3) for p in chosen]).astype(np.float64) / 255.0
+    pixels = (
+        np.concatenate([p[::edge, ::edge].reshape(-1, 3) for p in chosen]).astype(np.float64)
+        / 255.0
+    )
     stats = _of(pixels, axis=0, count=len(chosen))
-    return {key: value if key == "count" else value.reshape(3, 1, 1) for key, value in stats.items()}
+    return {
+        key: value if key == "count" else value.reshape(3, 1, 1) for key, value in stats.items()
+    }
 
 
 def _of(values: np.ndarray, axis: int, count: int) -> Stats:
@@ -43,17 +52,21 @@ def _of(values: np.ndarray, axis: int, count: int) -> Stats:
         "std": values.std(axis),
         "count": np.array([count]),
     }
-    for name, value in zip(QUANTILES, np.quantile(values, list(QUANTILES.values()), axis=axis)):
-        stats[name] = value
-    return stats
+    quantiles = np.quantile(values, list(QUANTILES.values()), axis=axis)
+    return stats | dict(zip(QUANTILES, quantiles))
 
 
 def merged(a: Stats, b: Stats) -> Stats:
-    """Statistics of what `a` and `b` are of together. Moments are exact; quantiles are means weighted by the counts, which is how LeRobot merges them."""
+    """Statistics of the union of two sets of values.
+
+    Moments are exact. Quantiles are means weighted by the counts, as LeRobot merges them.
+    """
     n, m = float(a["count"][0]), float(b["count"][0])
     wa, wb = n / (n + m), m / (n + m)
     mean = wa * a["mean"] + wb * b["mean"]
-    variance = wa * (a["std"] ** 2 + (a["mean"] - mean) ** 2) + wb * (b["std"] ** 2 + (b["mean"] - mean) ** 2)
+    variance = wa * (a["std"] ** 2 + (a["mean"] - mean) ** 2) + wb * (
+        b["std"] ** 2 + (b["mean"] - mean) ** 2
+    )
     stats = {
         "min": np.minimum(a["min"], b["min"]),
         "max": np.maximum(a["max"], b["max"]),
@@ -71,4 +84,6 @@ def plain(stats: dict[str, Stats]) -> dict[str, Any]:
 
 def from_plain(stats: dict[str, Any]) -> dict[str, Stats]:
     """The inverse of `plain`."""
-    return {key: {name: np.asarray(value) for name, value in of.items()} for key, of in stats.items()}
+    return {
+        key: {name: np.asarray(value) for name, value in of.items()} for key, of in stats.items()
+    }

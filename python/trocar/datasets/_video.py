@@ -11,24 +11,29 @@ import numpy as np
 
 
 def check_shape(key: str, shape: tuple[int, ...]) -> None:
-    """Raises a `ValueError` if pictures of this shape make no video; `key` is what it calls them."""
+    """ValueError if pictures of this shape cannot be a video. `key` names them in errors."""
     height, width, channels = shape
     if channels != 3:
-        raise ValueError(f"features: {key} has {channels} channels; a video needs 3")
+        raise ValueError(f"features: {key} has {channels} channels; a video must have 3")
     if height % 2 or width % 2:
-        raise ValueError(f"features: {key} is {width}x{height}; a video needs even numbers of pixels")
+        raise ValueError(
+            f"features: {key} is {width}x{height}; the edges of a video must be even (px)"
+        )
 
 
-def write(path: Path, pictures: list[np.ndarray], fps: int, *, codec: str = "libx264", crf: int = 18) -> dict[str, Any]:
-    """Writes 8-bit RGB pictures (height, width, 3) as a video with a key frame every two frames, so that any frame is found quickly.
+def write(
+    path: Path, pictures: list[np.ndarray], fps: int, *, codec: str = "libx264", crf: int = 18
+) -> dict[str, Any]:
+    """Writes uint8 RGB pictures (height, width, 3) as a video.
 
-    The file appears whole or not at all. Returns what a LeRobot dataset's `info` says of a video.
+    Every second frame is a key frame, so that readers find any frame quickly. The file is replaced
+    atomically. Returns the `info` of the video in a LeRobot dataset.
     """
     height, width, _ = pictures[0].shape
     path.parent.mkdir(parents=True, exist_ok=True)
     partial = path.with_name(path.name + ".partial")
     with av.open(str(partial), "w", format="mp4") as output:
-        # One thread: the same pictures give the same file.
+        # With one thread the same pictures give the same file.
         stream = output.add_stream(codec, fps, options={"crf": str(crf), "g": "2", "threads": "1"})
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         for picture in pictures:
@@ -51,6 +56,6 @@ def write(path: Path, pictures: list[np.ndarray], fps: int, *, codec: str = "lib
 
 
 def read(path: Path) -> np.ndarray:
-    """All frames of a video: (frames, height, width, 3), 8 bits."""
+    """All frames of a video: uint8 (frames, height, width, 3)."""
     with av.open(str(path)) as video:
         return np.stack([frame.to_ndarray(format="rgb24") for frame in video.decode(video=0)])

@@ -1,7 +1,7 @@
-"""LeRobot datasets, v3.0 and v2.1, videos included, without LeRobot itself (which brings PyTorch).
+"""LeRobot datasets, v3.0 and v2.1, videos included, without LeRobot itself (which needs PyTorch).
 
-A dataset is a folder. Both layouts hold the same: numbers of every frame as Parquet, a video per camera, and under `meta` what the
-features are, how long each episode is, what was asked for in it, and statistics.
+A dataset is a folder. Both layouts hold the same: the numbers of every frame as Parquet, a video a
+camera, and under `meta` the features, the length and task of each episode, and statistics.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ import pyarrow as pa
 
 from . import _stats, _video
 from ._frames import Feature, Frames, check_dtypes, write_json
-from ._layouts import CHUNK, V3, V21
-from ._turns import SAVING_SECONDS, alone
+from ._layouts import CHUNK, V3, V21, Layout
+from ._lock import MAX_WAIT_S, locked
 
 VERSIONS = ("v3.0", "v2.1")
 
-#: Lies in the folder while an episode is written, so that other writers see that one was not finished.
-UNDER_WAY = "meta/under-way.partial"
+#: Exists while an episode is written. A writer that finds it knows that one is unfinished.
+UNFINISHED = "meta/unfinished.partial"
 
-#: What every frame has besides the features.
+#: Columns of every frame besides the features.
 INDICES: dict[str, Feature] = {
     "timestamp": {"dtype": "float32", "shape": (1,), "names": None},
     "frame_index": {"dtype": "int64", "shape": (1,), "names": None},
@@ -38,11 +38,15 @@ INDICES: dict[str, Feature] = {
 class LeRobotWriter:
     """Writes a LeRobot dataset, an episode at a time.
 
-    `features` maps names such as `observation.state`, `action` or `observation.images.endoscope` to `{"dtype", "shape", "names"}`;
-    a feature with dtype `video` takes 8-bit pictures (height, width, 3), height and width even; other types are those of numbers
-    (`float32`, `int64`, `bool`), and anything else (`image`, `string`) is a `ValueError`. A folder with the same features is gone on
-    with. An episode is in the dataset once `save_episode` has returned: a process that dies later takes nothing back, and what one
-    that dies earlier has left of an episode goes when the folder is opened again. Of several writers of a folder one saves at a time.
+    `features` maps names such as `observation.state`, `action` or `observation.images.endoscope` to
+    `{"dtype", "shape", "names"}`. A feature with dtype `video` takes uint8 pictures (height, width,
+    3), height and width even. Other dtypes are numeric (`float32`, `int64`, `bool`); anything else
+    (`image`, `string`) is a ValueError.
+
+    A folder that holds a dataset with the same features is continued. An episode is in the dataset
+    once `save_episode` has returned: a process that ends later loses nothing, and the files of an
+    unfinished episode are removed when the folder is opened again. Of several writers of a folder
+    one saves at a time.
 
     >>> writer = LeRobotWriter("lifts", fps=30, features=features)
     >>> for frame in episode:
@@ -62,27 +66,35 @@ class LeRobotWriter:
         crf: int = 18,
     ):
         if version not in VERSIONS:
-            raise ValueError(f"version: '{version}' is unknown; {' and '.join(VERSIONS)} can be written")
+            raise ValueError(f"version: '{version}' is unknown; it must be {' or '.join(VERSIONS)}")
         reserved = INDICES.keys() & features.keys()
         if reserved:
-            raise ValueError(f"features: {', '.join(sorted(reserved))} are written by themselves")
+            raise ValueError(
+                f"features: {', '.join(sorted(reserved))}: the writer adds these itself"
+            )
         slashed = [key for key in features if "/" in key]
         if slashed:
-            raise ValueError(f"features: '{slashed[0]}' has a slash in its name; LeRobot joins words by dots")
+            raise ValueError(
+                f"features: '{slashed[0]}' must not have a slash in its name; "
+                "LeRobot joins words by dots"
+            )
         if fps <= 0 or fps != int(fps):
-            raise ValueError(f"fps: {fps} is no whole number of frames a second")
-        # What only saving would find out is found out before anything is recorded.
+            raise ValueError(f"fps: {fps} must be a positive integer")
+        # Checked before anything is recorded, not only when an episode is saved.
         check_dtypes(features, ("video",))
         for key, feature in features.items():
             if feature["dtype"] == "video":
                 _video.check_shape(key, feature["shape"])
         self.root, self.fps, self.version = Path(root), int(fps), version
         self.codec, self.crf = codec, crf
-        self.features = {key: dict(f, shape=tuple(f["shape"]), names=f.get("names")) for key, f in features.items()}
+        self.features = {
+            key: dict(f, shape=tuple(f["shape"]), names=f.get("names"))
+            for key, f in features.items()
+        }
         self._frames = Frames(self.features)
-        layout = V3 if version == "v3.0" else V21
+        layout: type[Layout] = V3 if version == "v3.0" else V21
         self._layout = layout(self.root)
-        self._info = {
+        self._info: dict[str, Any] = {
             "codebase_version": version,
             "robot_type": robot_type,
             "total_episodes": 0,
@@ -98,49 +110,56 @@ class LeRobotWriter:
             self._info["video_path"] = None
         self._tasks: list[str] = []
         self._stats: dict[str, _stats.Stats] = {}
-        #: What the folder holds has to be taken up, and what was not finished taken away, before anything is written.
-        self._torn = False
+        #: Whether the folder must be read, and unfinished files removed, before a write.
+        self._needs_recovery = False
         if (self.root / "meta/info.json").exists():
             self._read_info()
-            # Where another writer is at work it is for the first save: that one may end well, or die.
-            self._torn = True
-            with contextlib.suppress(RuntimeError), self._alone(0.0):
-                self._go_on()
-                self._torn = False
+            # If another writer holds the lock, the first save recovers.
+            self._needs_recovery = True
+            with contextlib.suppress(RuntimeError), self._locked(0.0):
+                self._recover()
+                self._needs_recovery = False
         elif any(path.is_file() and path.suffix != ".partial" for path in self.root.rglob("*")):
-            raise FileExistsError(f"{self.root} is not empty and is no LeRobot dataset (meta/info.json is missing)")
+            raise FileExistsError(
+                f"{self.root} is not empty and not a LeRobot dataset (meta/info.json is missing)"
+            )
 
     def _video_keys(self) -> list[str]:
         return [key for key, f in self.features.items() if f["dtype"] == "video"]
 
-    def _alone(self, seconds: float = SAVING_SECONDS) -> contextlib.AbstractContextManager[None]:
-        """Has the folder to itself; it is made if it is missing."""
+    def _locked(self, max_wait_s: float = MAX_WAIT_S) -> contextlib.AbstractContextManager[None]:
+        """Locks the folder. Makes it if it is missing."""
         self.root.mkdir(parents=True, exist_ok=True)
-        return alone(self.root, seconds)
+        return locked(self.root, max_wait_s)
 
     def _read_info(self) -> None:
-        """Reads what a dataset already holds, and changes nothing."""
+        """Reads `info.json` of an existing dataset. Changes nothing."""
         info = json.loads((self.root / "meta/info.json").read_text())
         if info.get("codebase_version") != self.version:
-            raise ValueError(f"{self.root} is a dataset of version {info.get('codebase_version')}, not {self.version}")
+            raise ValueError(
+                f"{self.root} is a dataset of version {info.get('codebase_version')}, "
+                f"not {self.version}"
+            )
 
-        def meant(features: dict[str, Feature]) -> dict[str, tuple[str, tuple[int, ...]]]:
+        def kinds(features: dict[str, Feature]) -> dict[str, tuple[str, tuple[int, ...]]]:
             return {key: (f["dtype"], tuple(f["shape"])) for key, f in features.items()}
 
-        if meant(info["features"]) != meant(self._info["features"]) or info["fps"] != self.fps:
-            raise ValueError(f"{self.root} has other features or another rate; write into another folder")
+        if kinds(info["features"]) != kinds(self._info["features"]) or info["fps"] != self.fps:
+            raise ValueError(
+                f"{self.root} has other features or another rate; choose another folder"
+            )
         self._info = info
 
-    def _go_on(self) -> None:
-        """Takes up what a dataset already holds."""
+    def _recover(self) -> None:
+        """Reads an existing dataset and removes the files of an unfinished episode."""
         self._read_info()
         info = self._info
-        # `info` is written last. What lies there beyond it is of an episode that was not finished.
+        # `info.json` is written last. Anything beyond it is of an unfinished episode.
         for path in self.root.rglob("*.partial"):
             path.unlink()
         for key in self._video_keys():
             self._layout.video_path(key, self.episodes).unlink(missing_ok=True)
-        self._layout.forget(self.episodes, info["total_frames"])
+        self._layout.remove_from(self.episodes, info["total_frames"])
         tasks = self._layout.read_tasks()
         self._tasks = tasks[: info["total_tasks"]]
         if len(tasks) > len(self._tasks):
@@ -149,38 +168,45 @@ class LeRobotWriter:
 
     @property
     def episodes(self) -> int:
-        """Episodes in the dataset."""
-        return self._info["total_episodes"]
+        """Number of episodes in the dataset."""
+        episodes: int = self._info["total_episodes"]
+        return episodes
 
     def add_frame(self, frame: dict[str, Any]) -> None:
-        """Takes a frame of the episode under way: a value for every feature. A wrong one is named, and nothing of it is kept."""
+        """Adds a frame to the current episode: a value for every feature.
+
+        A wrong one is a ValueError that names the feature, and nothing is added.
+        """
         self._frames.add(frame)
 
     def discard_episode(self) -> None:
-        """Forgets the episode under way."""
+        """Removes the frames of the current episode."""
         self._frames.clear()
 
     def save_episode(self, task: str) -> int:
-        """Writes the episode under way, in which `task` was asked for, and returns its index. An episode without frames is an error.
+        """Writes the current episode with its `task` in words, and returns its index.
 
-        What cannot be written (a disk that is full) is told; the frames are kept, so that it may be tried again.
+        ValueError without frames. After an OSError (a full disk) the frames are kept, so that the
+        caller can try again.
         """
         if len(self._frames) == 0:
             raise ValueError("the episode has no frames")
-        with self._alone():
+        with self._locked():
             return self._save(task)
 
     def _save(self, task: str) -> int:
-        known, mark = self.root / "meta/info.json", self.root / UNDER_WAY
-        if known.exists() and (
-            self._torn or mark.exists() or json.loads(known.read_text())["total_episodes"] != self.episodes
+        info_path, mark = self.root / "meta/info.json", self.root / UNFINISHED
+        if info_path.exists() and (
+            self._needs_recovery
+            or mark.exists()
+            or json.loads(info_path.read_text())["total_episodes"] != self.episodes
         ):
-            self._go_on()
+            self._recover()
         length, episode = len(self._frames), self.episodes
         if episode == 0:
-            # From now on the folder is a dataset, whatever happens.
-            write_json(known, self._info)
-        self._torn = True
+            # From now on the folder is a dataset, even if this save fails.
+            write_json(info_path, self._info)
+        self._needs_recovery = True
         mark.touch()
         if task not in self._tasks:
             self._tasks.append(task)
@@ -197,8 +223,10 @@ class LeRobotWriter:
         for key, feature in self.features.items():
             if feature["dtype"] == "video":
                 path = self._layout.video_path(key, episode)
-                said = _video.write(path, columns[key], self.fps, codec=self.codec, crf=self.crf)
-                self._info["features"][key].setdefault("info", said)
+                video_info = _video.write(
+                    path, columns[key], self.fps, codec=self.codec, crf=self.crf
+                )
+                self._info["features"][key].setdefault("info", video_info)
                 stats[key] = _stats.of_pictures(columns[key])
                 videos[key] = length / self.fps
             else:
@@ -208,14 +236,20 @@ class LeRobotWriter:
             stats[key] = _stats.of_numbers(values)
         table = pa.table(
             {key: _column(values, self.features[key]) for key, values in arrays.items()}
-            | {key: pa.array(values, pa.type_for_alias(INDICES[key]["dtype"])) for key, values in indices.items()}
+            | {
+                key: pa.array(values, pa.type_for_alias(INDICES[key]["dtype"]))
+                for key, values in indices.items()
+            }
         )
         row = {"episode_index": episode, "tasks": [task], "length": length}
         self._layout.write_episode(table, row, stats, videos, first)
         self._layout.write_tasks(self._tasks)
-        self._stats = {key: _stats.merged(self._stats[key], s) if key in self._stats else s for key, s in stats.items()}
+        self._stats = {
+            key: _stats.merged(self._stats[key], s) if key in self._stats else s
+            for key, s in stats.items()
+        }
         self._layout.write_stats(self._stats)
-        # What counts is written last: an episode is in the dataset when `info` says so.
+        # Written last: an episode is in the dataset when `info.json` counts it.
         self._info["total_episodes"] = episode + 1
         self._info["total_frames"] = first + length
         self._info["total_tasks"] = len(self._tasks)
@@ -223,21 +257,25 @@ class LeRobotWriter:
         if self.version == "v2.1":
             self._info["total_videos"] = (episode + 1) * len(videos)
             self._info["total_chunks"] = episode // CHUNK + 1
-        write_json(self.root / "meta/info.json", self._info)
+        write_json(info_path, self._info)
         self._frames.clear()
         mark.unlink(missing_ok=True)
-        self._torn = False
+        self._needs_recovery = False
         return episode
 
 
 def _column(values: np.ndarray, feature: Feature) -> pa.Array:
-    """Values (frames, ...) as a Parquet column: plain numbers for shape (1,), lists of fixed length otherwise."""
+    """Values (frames, ...) as a Parquet column: numbers for shape (1,), lists otherwise."""
     kind = pa.type_for_alias(feature["dtype"])
     if feature["shape"] == (1,):
         return pa.array(values.reshape(-1), kind)
     column: pa.Array = pa.array(values.reshape(-1), kind)
     for size in reversed(feature["shape"]):
-        column = pa.FixedSizeListArray.from_arrays(column, size) if len(feature["shape"]) == 1 else _list(column, size)
+        column = (
+            pa.FixedSizeListArray.from_arrays(column, size)
+            if len(feature["shape"]) == 1
+            else _list(column, size)
+        )
     return column
 
 

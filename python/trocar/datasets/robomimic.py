@@ -1,4 +1,4 @@
-"""HDF5 files as robomimic reads them: `data/demo_N` with actions, rewards, dones, observations and the next ones."""
+"""HDF5 files for robomimic: `data/demo_N` with actions, rewards, dones, (next) observations."""
 
 from __future__ import annotations
 
@@ -14,32 +14,39 @@ import numpy as np
 from ._frames import Feature, Frames, check_dtypes, checked_values
 from ._spare import Spare
 
-#: Which of robomimic's kinds of environments it is: `EnvType.GYM_TYPE`, made by `gym.make(env_name, **env_kwargs)`.
+#: robomimic's `EnvType.GYM_TYPE`: an environment of `gym.make(env_name, **env_kwargs)`.
 GYM_TYPE = 2
-#: Every so many-th demonstration is for validation (`mask/valid`), the others are for training (`mask/train`).
-VALIDATION = 10
+#: One demonstration in this many is for validation (`mask/valid`), the others for training
+#: (`mask/train`).
+VALIDATION_INTERVAL = 10
 
 
 class RobomimicWriter:
     """Writes a robomimic file, a demonstration at a time.
 
-    `observations` maps names to features as in `LeRobotWriter` (`video` or `image` for pictures, kept as 8-bit arrays and compressed
-    without loss); frames have those, `actions` (as many numbers as `actions` says) and `rewards`. robomimic's policies give actions
-    from -1 to 1: make the environment with `normalize=True`.
+    `observations` maps names to features as in `LeRobotWriter`; `video` and `image` features are
+    uint8 arrays, compressed without loss. A frame has these, `actions` (float64 (`actions`,)) and
+    `rewards`. robomimic's policies return actions in [-1, 1]: make the environment with
+    `normalize=True`.
 
-    `env_name` and `env_kwargs` say how the environment is made anew: `gym.make(env_name, **env_kwargs)`; `robomimic_environment`
-    takes them from one. robomimic's own `EnvGym` speaks the old `gym` (four values a step, no seed, one flat observation), not
-    Gymnasium: train with its rollouts turned off and evaluate here. Every tenth demonstration is in `mask/valid`, the others are in
-    `mask/train`; robomimic's `split_train_val.py` makes other masks.
+    `env_name` and `env_kwargs` make the environment again, by `gym.make(env_name, **env_kwargs)`;
+    `robomimic_environment` reads them from one. robomimic's own `EnvGym` needs the old `gym` (four
+    values a step, no seed, one flat observation), not Gymnasium: train with its rollouts turned off
+    and evaluate here. Every tenth demonstration is in `mask/valid`, the others are in `mask/train`;
+    robomimic's `split_train_val.py` makes other masks.
 
-    A file that is there is gone on with if it has the same observations, actions and environment (`ValueError` otherwise). A
-    demonstration is in the file once `save_episode` has returned, and the file is whole at any time, however this process ends. It
-    is never changed in place: a spare beside it (`FILE.spare.partial`) takes each demonstration and then changes places with it, so
-    saving costs the same however long the file is, but the disk needs room for two. (External links to a file for each demonstration
-    would need it once, and would lose the data of whoever copies the one file; what is merged only at the end is missing after a
-    kill.) `close`, the end of a `with` or of the program removes the spare. Of several writers of a file one saves at a time.
+    An existing file is continued if it has the same observations, actions and environment
+    (ValueError otherwise). A demonstration is in the file once `save_episode` has returned, and the
+    file is complete at any time, even if the process is killed. The file is never changed in place:
+    a spare beside it (`FILE.spare.partial`) gets each demonstration and is then swapped with it. So
+    the cost of saving does not depend on the length of the file, but the disk needs room for two.
+    (External links to a file a demonstration would need half the room, and would lose the data of a
+    user who copies only the main file. Merging at the end would lose all after a kill.) `close`,
+    the end of a `with` block or of the program removes the spare. Of several writers of a file one
+    saves at a time.
 
-    >>> with RobomimicWriter("lifts.hdf5", observations=robomimic_observations(env), actions=10, **robomimic_environment(env)) as writer:
+    >>> options = {"observations": robomimic_observations(env), **robomimic_environment(env)}
+    >>> with RobomimicWriter("lifts.hdf5", actions=10, **options) as writer:
     ...     for frame in episode:
     ...         writer.add_frame(frame)
     ...     writer.save_episode(last, success=True)
@@ -57,9 +64,14 @@ class RobomimicWriter:
         check_dtypes(observations, ("video", "image"))
         reserved = {"actions", "rewards"} & observations.keys()
         if reserved:
-            raise ValueError(f"observations: {', '.join(sorted(reserved))} are written by themselves")
+            raise ValueError(
+                f"observations: {', '.join(sorted(reserved))}: the writer adds these itself"
+            )
         self.path = Path(path)
-        self._observations = {key: dict(feature, shape=tuple(feature["shape"])) for key, feature in observations.items()}
+        self._observations = {
+            key: dict(feature, shape=tuple(feature["shape"]))
+            for key, feature in observations.items()
+        }
         self._frames = Frames(
             self._observations
             | {
@@ -70,7 +82,7 @@ class RobomimicWriter:
         self._env_args = _env_args(env_name, env_kwargs or {})
         self.path.parent.mkdir(parents=True, exist_ok=True)
         self._spare = Spare(self.path)
-        # What a killed writer has left goes, unless another one is at work here.
+        # Removes files of a killed writer, unless another writer is active.
         self._spare.discard()
         if not self.path.exists():
             self._begin()
@@ -83,13 +95,16 @@ class RobomimicWriter:
         self.close()
 
     def close(self) -> None:
-        """Removes the spare; the episode under way is forgotten. Whoever saves again has another one made, by copying the file."""
+        """Removes the spare and the frames of the current episode.
+
+        A later save copies the file to a new spare.
+        """
         self.discard_episode()
         self._spare.discard()
 
     def _begin(self) -> None:
-        """Makes the file, without demonstrations, if no other writer was faster."""
-        with self._spare.alone():
+        """Makes the file, without demonstrations, unless another writer has made it."""
+        with self._spare.locked():
             if self.path.exists():
                 return
             with _open(self._spare.path, "w") as file:
@@ -99,44 +114,62 @@ class RobomimicWriter:
             self._spare.swap()
 
     def _check(self) -> None:
-        """Raises a `ValueError` if the file that is there holds something else."""
+        """ValueError if the existing file has other observations, actions or environment."""
         with _open(self._spare.file, "r") as file:
             if "data" not in file or "env_args" not in file["data"].attrs:
-                raise ValueError(f"{self.path} is no robomimic file (it has no group 'data' with 'env_args')")
+                raise ValueError(
+                    f"{self.path} is not a robomimic file (it has no group 'data' with 'env_args')"
+                )
             data = file["data"]
             if json.loads(data.attrs["env_args"]) != self._env_args:
-                raise ValueError(f"{self.path} was recorded in another environment, {data.attrs['env_args']}; write into another file")
-            wanted = {key: tuple(feature["shape"]) for key, feature in self._frames.features.items() if key != "rewards"}
+                raise ValueError(
+                    f"{self.path} was recorded in another environment, "
+                    f"{data.attrs['env_args']}; choose another file"
+                )
+            wanted = {
+                key: tuple(feature["shape"])
+                for key, feature in self._frames.features.items()
+                if key != "rewards"
+            }
             for name in _demos(data)[-1:]:
                 demo = data[name]
-                held = {key: values.shape[1:] for key, values in demo["obs"].items()} | {"actions": demo["actions"].shape[1:]}
+                held = {key: values.shape[1:] for key, values in demo["obs"].items()} | {
+                    "actions": demo["actions"].shape[1:]
+                }
                 if held != wanted:
-                    raise ValueError(f"{self.path} has other observations or actions, {held}; write into another file")
+                    raise ValueError(
+                        f"{self.path} has other observations or actions, "
+                        f"{held}; choose another file"
+                    )
 
     @property
     def episodes(self) -> int:
-        """Episodes in the file."""
+        """Number of episodes in the file."""
         with _open(self._spare.file, "r") as file:
             return len(_demos(file["data"]))
 
     def add_frame(self, frame: dict[str, Any]) -> None:
-        """Takes a frame of the episode under way. A wrong one is named, and nothing of it is kept."""
+        """Adds a frame to the current episode.
+
+        A wrong one is a ValueError that names the feature, and nothing is added.
+        """
         self._frames.add(frame)
 
     def discard_episode(self) -> None:
-        """Forgets the episode under way."""
+        """Removes the frames of the current episode."""
         self._frames.clear()
 
     def save_episode(self, last: dict[str, Any], *, success: bool = False) -> int:
-        """Writes the episode under way and returns its index; `last` is the observation after its last action.
+        """Writes the current episode and returns its index.
 
-        A wrong `last` is a `ValueError` that names what is wrong. Then, and if it cannot be written (a disk that is full), the file
-        is as it was, and the frames are kept, so that it may be tried again.
+        `last` is the observation after the last action; a wrong one is a ValueError that names the
+        feature. After a ValueError or an OSError (a full disk) the file is unchanged and the frames
+        are kept, so that the caller can try again.
         """
         if len(self._frames) == 0:
             raise ValueError("the episode has no frames")
         last = checked_values("last", last, self._observations)
-        with self._spare.alone():
+        with self._spare.locked():
             try:
                 index = self._append(last, success)
                 self._spare.swap()
@@ -147,7 +180,7 @@ class RobomimicWriter:
         return index
 
     def _append(self, last: dict[str, Any], success: bool) -> int:
-        """Brings the spare up to the file and adds the episode under way to it."""
+        """Brings the spare up to date and adds the current episode to it."""
         with self._open_spare() as spare, _open(self._spare.file, "r") as file:
             data, names = spare["data"], _demos(file["data"])
             for name in sorted(set(names) - set(_demos(data)), key=_number):
@@ -163,7 +196,7 @@ class RobomimicWriter:
         try:
             return _open(spare, "r+")
         except OSError:
-            # Whoever opened the file when this was the file still reads it, and keeps it.
+            # A reader still has it open from the time when it was the file.
             return _open(self._spare.copy(), "r+")
 
     def _write(self, demo: h5py.Group, last: dict[str, Any], success: bool) -> None:
@@ -176,7 +209,11 @@ class RobomimicWriter:
         for key in self._observations:
             now = columns[key]
             following = np.concatenate([now[1:], last[key][None]])
-            packed = {"compression": "gzip", "compression_opts": 1, "chunks": (1, *now.shape[1:])} if now.ndim > 2 else {}
+            packed = (
+                {"compression": "gzip", "compression_opts": 1, "chunks": (1, *now.shape[1:])}
+                if now.ndim > 2
+                else {}
+            )
             demo.create_dataset(f"obs/{key}", data=now, **packed)
             demo.create_dataset(f"next_obs/{key}", data=following, **packed)
         demo.attrs["num_samples"] = len(self._frames)
@@ -184,11 +221,13 @@ class RobomimicWriter:
 
 
 def _env_args(env_name: str, env_kwargs: dict[str, Any]) -> dict[str, Any]:
-    """What robomimic makes an environment by, as it comes back out of JSON."""
+    """Robomimic's description of the environment, as it is read back from JSON."""
+    content = {"env_name": env_name, "type": GYM_TYPE, "env_kwargs": env_kwargs}
     try:
-        return json.loads(json.dumps({"env_name": env_name, "type": GYM_TYPE, "env_kwargs": env_kwargs}))
+        description: dict[str, Any] = json.loads(json.dumps(content))
     except (TypeError, ValueError) as why:
-        raise ValueError(f"env_kwargs: {why}; they are kept as JSON") from why
+        raise ValueError(f"env_kwargs: {why}; they must be JSON values") from why
+    return description
 
 
 def _open(path: Path, mode: str) -> h5py.File:
@@ -203,20 +242,31 @@ def _number(name: str) -> int:
 
 
 def _demos(data: h5py.Group) -> list[str]:
-    """Names of the demonstrations, in the order in which they were recorded."""
+    """Names of the demonstrations, in the order of their recording."""
     return sorted((name for name in data if re.fullmatch(r"demo_\d+", name)), key=_number)
 
 
 def _enter(file: h5py.File, name: str) -> None:
-    """Counts a demonstration that has been added, and puts it into its mask."""
+    """Adds a written demonstration to the total and to its mask."""
     data = file["data"]
     data.attrs.modify("total", data.attrs["total"] + data[name].attrs["num_samples"])
-    mask = "mask/valid" if _number(name) % VALIDATION == VALIDATION - 1 else "mask/train"
-    names = file[mask] if mask in file else None
-    # Names are added in place; a mask that robomimic's script has made cannot grow, and is made anew.
+    mask = (
+        "mask/valid"
+        if _number(name) % VALIDATION_INTERVAL == VALIDATION_INTERVAL - 1
+        else "mask/train"
+    )
+    names = file.get(mask)
+    # Names are added in place. A mask of robomimic's script cannot grow and is replaced.
     if names is None or names.maxshape != (None,) or names.dtype.itemsize < len(name):
         held = [] if names is None else names[:].tolist()
         file.pop(mask, None)
-        names = file.create_dataset(mask, data=np.array(held, dtype="S16"), dtype="S16", shape=(len(held),), maxshape=(None,), chunks=(1024,))
+        names = file.create_dataset(
+            mask,
+            data=np.array(held, dtype="S16"),
+            dtype="S16",
+            shape=(len(held),),
+            maxshape=(None,),
+            chunks=(1024,),
+        )
     names.resize((len(names) + 1,))
     names[-1] = name.encode()

@@ -1,30 +1,41 @@
 """Gymnasium environments of the two-arm cell.
 
-| name | task | passes when |
+| id | task | passed when |
 |---|---|---|
-| `trocar/AppendixResection-v0` | `appendix-resection` | grasp, lift, positioning, jaw on tissue and cut are done, in this order |
+| `trocar/AppendixResection-v0` | `appendix-resection` | the five stages are done in order |
 | `trocar/GraspLift-v0` | `grasp-lift` | the appendix is grasped, lifted and held |
-| `trocar/PortReach-v0` | `port-reach` | both instruments have been at three places each, in free motion |
+| `trocar/PortReach-v0` | `port-reach` | both tips have reached three places each, free of tissue |
 
-`TrocarEnv` is one cell, `TrocarVectorEnv` many in one process, which is what `gymnasium.make_vec` makes. Both take
+The stages of `appendix-resection` are grasp, lift, positioning, jaw on tissue and cut.
 
-- `scene`: a built-in scene or a scene file (`cell-a`).
-- `obs`: what is observed, joined by `+`: `state`, `rgb`, `depth`. `state` alone gives one array, otherwise a dict gives
-  `agent_pos` (the state), `pixels` (per camera height x width x 3, 8 bits) and `depth` (per camera height x width x 1, z [m], 0
-  where nothing is). `agent_pos` is the state in a dict even where it is alone, as LeRobot wants it.
-- `cameras`: which are seen; all of the scene's but the recording one if not given. `image_size`: height and width [px], the scene's
-  `policy_size_px` if not given. `sensor_noise`: colours and measured depth have the noise of their sensors, by the episode's seed.
-- `render_mode="rgb_array"`: `render()` gives the endoscope's picture.
-- `actions`: `pivots` for absolute targets (two pivots [rad], insertion [m], roll [rad], jaw opening 0 to 1, for each arm), `tip` for
-  steps of the tip ([m], roll [rad], jaw opening). With `normalize=True` every number is -1 to 1.
-- `episode_s`: longest episode [s], the scene's if not given.
-- `threads`: 0 for as many as the machine has, at most 1024. Results do not depend on it.
+`TrocarEnv` is one cell. `TrocarVectorEnv` is many cells in one process; `gymnasium.make_vec` makes
+one. Both take these options:
 
-`gym.make` gives a `TrocarEnv` without wrappers. Seeds are 0 to 2^63 - 1. An environment belongs to the process that made it: a child
-made by `fork` is refused with a RuntimeError and makes its own.
+- `scene`: a built-in scene or a scene file (default `cell-a`).
+- `obs`: the observations, joined by `+`: `state`, `rgb`, `depth`. `state` alone is one float32
+  array. Otherwise the observation is a dict of `agent_pos` (the state), `pixels` (one
+  (height, width, 3) uint8 array a camera) and `depth` (one (height, width, 1) float32 array a
+  camera: z (m), 0 where nothing is seen). `agent_pos` is the state in a dict even when it is alone,
+  as LeRobot expects.
+- `cameras`: the observed cameras (default: all of the scene except `recording`).
+- `image_size`: height and width (px) of pictures (default: the scene's `policy_size_px`).
+- `sensor_noise`: adds the sensors' noise to colours and depth, seeded by the episode's seed.
+- `render_mode="rgb_array"`: `render()` returns the endoscope's picture.
+- `actions`: `pivots` for absolute targets, five numbers an arm: two pivot angles (rad), insertion
+  (m), roll (rad), jaw opening in [0, 1]. `tip` for increments of the tip (m), of the roll (rad) and
+  of the jaw opening.
+- `normalize`: every number of an action is in [-1, 1].
+- `episode_s`: maximum duration of an episode (s) (default: the scene's).
+- `threads`: 0 for one a core, at most 1024. Results do not depend on it.
+- `privileged`: `info["channels"]` holds the privileged channels.
 
-The reward is the gain in stages, parts of stages included: an episode that passes gives as much as its task has stages. What is
-privileged (tissue, channels) is in `info` alone, and only with `privileged=True`.
+`gym.make` returns a `TrocarEnv` without wrappers. Seeds are in [0, 2^63 - 1]. An environment
+belongs to the process that made it: a child made by `fork` gets a RuntimeError and must make its
+own.
+
+The reward is the increase of the task's score, partial stages included: a passed episode returns
+the number of stages of its task. Privileged information (tissue, channels) is only in `info`, and
+only with `privileged=True`.
 """
 
 from .single import TrocarEnv

@@ -1,44 +1,50 @@
 //! From a scene to the arms of its cell.
 
-use super::station::{Fixed, Moving, Station};
+use super::arm::{ArmModel, ArmState, ArmUnit};
+use super::drive::Drive;
+use super::setpoint::Setpoint;
+use super::workspace::{FreeSpace, PortSpace, Workspace};
 use crate::blades::{Blades, Tools};
 use crate::{Error, GraspDesign, Jaw, Result, Scissors};
 use glam::DVec3;
 use trocar_robot::chain::{InverseOptions, Joints, MassProperties, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument, Jaw as JawDrive, Limits};
-use trocar_robot::manipulator::{Manipulator, ModelError, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Manipulator, ModelError};
 use trocar_robot::port::Port;
-use trocar_scene::{ArmModel, GraspDesignName, InstrumentKind, Scene, ScheduleName};
-use trocar_tissue::{Descent, SolverSettings, Start};
+use trocar_scene::{
+    ArmModel as Source, Drive as DriveKind, GraspDesignName, InstrumentKind, Scene, ScheduleName, Start, Tool,
+};
+use trocar_tissue::{Descent, SolverSettings, Start as SolverStart};
 
-/// Clearance that a tilt at the limit leaves [m].
-const LEAST_CLEARANCE: f64 = 2e-5;
+/// Clearance that a tilt at the limit leaves (m).
+const MIN_CLEARANCE: f64 = 2e-5;
 
-/// Least way of the jaw's pivot into the body and of the shaft's base out of it [m].
+/// Least way of the jaw's pivot into the body and of the shaft's base out of it (m).
 const MARGIN: f64 = 0.02;
 
-/// The blades' tips stay this far above the lowest tissue [m].
+/// The blades' tips stay this far above the lowest tissue (m).
 const ABOVE_FLOOR: f64 = 0.001;
 
-/// Radius and length of what an instrument's mass is spread over [m]: about its motor's housing. Only the moments of inertia depend on it, and they are small beside the arm's.
+/// Radius and length of what an instrument's mass is spread over (m): about its motor's housing.
+/// Only the moments of inertia depend on it, and they are small beside the arm's.
 const HOUSING: [f64; 2] = [0.028, 0.09];
 
-/// Time that a grasper's and a cutter's jaws take from open to closed [s].
+/// Time that a grasper's and a cutter's jaws take from open to closed (s).
 const CLOSING: [f64; 2] = [0.3, 0.2];
 
-/// Kept from the end of the wrist [rad].
-const MARGIN_OF_ROLL: f64 = 0.2;
+/// Kept from the end of the wrist (rad).
+const ROLL_MARGIN: f64 = 0.2;
 
-/// Tilt up to which all rolls are reached [rad]: the task's.
+/// Tilt up to which all rolls are reached (rad): the task's.
 const LEAN: f64 = 0.35;
 
 /// Postures from which the start is searched, and steps of a way along which arms are followed.
-const STARTS: usize = 24;
-/// See there.
-const WALK: u32 = 24;
+const START_SEARCHES: usize = 24;
+/// Steps of that way.
+const WALK_STEPS: u32 = 24;
 
-/// Shaft that tissue may touch [m]: more than goes into the body.
-const TOUCHING_SHAFT: f64 = 0.2;
+/// Shaft that tissue may touch (m): more than goes into the body.
+const MAX_TOUCHED_SHAFT: f64 = 0.2;
 
 /// The schedule of that name.
 pub(super) fn schedule(name: ScheduleName) -> SolverSettings {
@@ -46,7 +52,7 @@ pub(super) fn schedule(name: ScheduleName) -> SolverSettings {
         ScheduleName::Fast => SolverSettings::FAST,
         ScheduleName::Paper => SolverSettings::PAPER,
         ScheduleName::Adaptive => {
-            SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: Start::Adaptive })
+            SolverSettings::Descent(Descent { substeps: 8, iterations: 10, start: SolverStart::Adaptive })
         }
     }
 }
@@ -61,51 +67,88 @@ pub(super) fn design(name: GraspDesignName) -> GraspDesign {
     }
 }
 
-/// The arms of a scene, the left one first, over tissue whose lowest node is at height `floor` [m].
-pub(super) fn stations(scene: &Scene, floor: f64) -> Result<Vec<Station>> {
-    let all = scene.stations().into_iter().enumerate();
-    all.map(|(k, (arm, port, instrument))| station(scene, k, arm, port, instrument, floor)).collect()
+/// The arms of a scene, the left one first, over tissue whose lowest node is at height `floor` (m).
+pub(super) fn arms(scene: &Scene, floor: f64) -> Result<Vec<ArmUnit>> {
+    scene.tools().iter().enumerate().map(|(k, tool)| arm(scene, k, tool, floor)).collect()
 }
 
-fn station(
-    scene: &Scene,
-    k: usize,
-    arm: &trocar_scene::Arm,
-    port: &trocar_scene::Port,
-    held: &trocar_scene::Instrument,
-    floor: f64,
-) -> Result<Station> {
-    let hole = hole(port)?;
+fn arm(scene: &Scene, k: usize, tool: &Tool<'_>, floor: f64) -> Result<ArmUnit> {
+    let (arm, held) = (tool.arm, tool.instrument);
     let closing = CLOSING[usize::from(held.kind == InstrumentKind::Cutter)];
-    let instrument = described(held, closing);
-    instrument.check()?;
     let blades = Blades {
         length: 1e-3 * held.blade_length_mm,
         ridges: if held.kind == InstrumentKind::Cutter { 1 } else { 3 },
         max_angle: held.jaw_max_angle_deg.to_radians(),
         shaft_radius: 0.5e-3 * held.shaft_diameter_mm,
-        shaft_length: (1e-3 * held.shaft_length_mm).min(TOUCHING_SHAFT),
+        shaft_length: (1e-3 * held.shaft_length_mm).min(MAX_TOUCHED_SHAFT),
         rest_offset: 1e-3 * scene.tissue.tip_rest_offset_mm,
         friction: scene.tissue.friction,
     };
-    let floor = floor + ABOVE_FLOOR;
-    let mut limits = limits(&hole, &instrument, &blades, floor)?;
-    let period = 1.0 / f64::from(scene.rates.control_hz);
-    let wrong = |field: &str, reason: String| Error::Scene {
-        scene: scene.name.clone(),
-        field: format!("arm '{}', {field}", arm.name.name()),
-        reason,
+    let mut workspace = workspace(tool, closing, &blades, floor)?;
+    let start = checked_start(scene, tool, &workspace)?;
+    let drive = match (&mut workspace, arm.drive) {
+        (Workspace::Port(space), DriveKind::Dynamics) => dynamic(scene, arm, space, &start)?,
+        _ => {
+            let steps = scene.rates.physics_hz / scene.rates.control_hz;
+            Drive::ideal(workspace.clone(), start, steps)
+        }
     };
-    let start = start(&arm.start, port, &hole, &blades);
-    let (start, beyond) = limits.clamp(&start);
+    let gates = &scene.task.gates;
+    let scissors = Scissors::new(gates.cut_open * blades.max_angle, gates.cut_closed * blades.max_angle);
+    let jaw = Jaw::sized(held.jaw_force_n, blades.max_angle, closing);
+    let model = ArmModel {
+        side: arm.name,
+        kind: held.kind,
+        workspace,
+        tools: Tools::of(k),
+        blades,
+        parts: blades.colliders(Tools::of(k)),
+        force_limit: scene.safety.force_limit_n,
+        rcm_limits: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
+        period: 1.0 / f64::from(scene.rates.control_hz),
+        design: design(scene.task.grasp),
+    };
+    let first_design = design(scene.task.first_grasp.unwrap_or(scene.task.grasp));
+    let state = ArmState::new(drive.tip(), &model, start, first_design, jaw, scissors);
+    Ok(ArmUnit { model, drive, state })
+}
+
+/// Where the instrument may be, as its port or the box around its start lets it.
+fn workspace(tool: &Tool<'_>, closing: f64, blades: &Blades, floor: f64) -> Result<Workspace> {
+    let Some(port) = tool.port else {
+        let start = DVec3::from(tool.arm.start.position_m.unwrap_or_default());
+        let direction = tool.arm.direction.map_or(-DVec3::Z, DVec3::from);
+        return Ok(Workspace::Free(FreeSpace::around(start, direction)));
+    };
+    let hole = hole(port)?;
+    let instrument = described(tool.instrument, closing);
+    instrument.check()?;
+    let floor = floor + ABOVE_FLOOR;
+    let limits = limits(&hole, &instrument, blades, floor)?;
+    let blade_length = blades.length;
+    Ok(Workspace::Port(Box::new(PortSpace { port: hole, instrument, limits, floor, blade_length })))
+}
+
+/// The start, within the limits.
+fn checked_start(scene: &Scene, tool: &Tool<'_>, workspace: &Workspace) -> Result<Setpoint> {
+    let start = start(&tool.arm.start, tool.port, workspace);
+    let Workspace::Port(space) = workspace else { return Ok(workspace.clamp(&start)) };
+    let (start, beyond) = space.limits.clamp(&start.in_port());
     if let Some((limit, excess)) = beyond.binding().next() {
         let reason =
             format!("is beyond the {limit} that the port and the tissue below it allow, by {excess:.4} (m or rad)");
-        return Err(wrong("start", reason));
+        let field = format!("arm '{}', start", tool.arm.name.name());
+        return Err(Error::Scene { scene: scene.name.clone(), field, reason });
     }
+    Ok(start.into())
+}
+
+/// The controlled arm of a scene. Narrows the rolls of `space` to those that it reaches.
+fn dynamic(scene: &Scene, arm: &trocar_scene::Arm, space: &mut PortSpace, start: &Setpoint) -> Result<Drive> {
+    let start = start.in_port();
     let chain = chain(scene, arm)?;
-    limits.roll = roll_of(&chain, &hole, &instrument, &limits, &start)?;
-    let mut settings = Settings::named(&arm.controller.name, &arm.controller.gains)?;
+    space.limits.roll = roll_of(&chain, &space.port, &space.instrument, &space.limits, &start)?;
+    let mut settings = ControllerSettings::named(&arm.controller.name, &arm.controller.gains)?;
     let error = scene.gravity_error;
     settings.error = ModelError {
         links: error.link_mass_share,
@@ -113,27 +156,9 @@ fn station(
         friction: Some(error.joint_friction_nm),
     };
     settings.command_rate = f64::from(scene.rates.control_hz);
-    settings.limits = Some(limits);
-    let fixed = Fixed {
-        side: arm.name,
-        kind: held.kind,
-        port: hole,
-        instrument: instrument.clone(),
-        limits,
-        tools: Tools::of(k),
-        blades,
-        parts: blades.colliders(Tools::of(k)),
-        floor,
-        force_limit: scene.safety.force_limit_n,
-        rcm: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
-        period,
-    };
-    let manipulator = Manipulator::new(chain, instrument, hole, settings, start)?;
-    let gates = &scene.task.gates;
-    let scissors = Scissors::new(gates.cut_open * blades.max_angle, gates.cut_closed * blades.max_angle);
-    let jaw = Jaw::sized(held.jaw_force_n, blades.max_angle, closing);
-    let now = Moving::new(manipulator.measured_cp(), &fixed, start, design(scene.task.grasp), jaw, scissors);
-    Ok(Station { fixed, manipulator, now })
+    settings.limits = Some(space.limits);
+    let manipulator = Manipulator::new(chain, space.instrument.clone(), space.port, settings, start)?;
+    Ok(Drive::Dynamic(Box::new(manipulator)))
 }
 
 /// The scene's port for the arm: normal into the body.
@@ -163,7 +188,7 @@ fn described(held: &trocar_scene::Instrument, closing: f64) -> Instrument {
 
 /// The limits of the port, and of the tissue's floor where the shaft leans as far as it may.
 fn limits(port: &Port, instrument: &Instrument, blades: &Blades, floor: f64) -> Result<Limits> {
-    let mut limits = port.limits(instrument, LEAST_CLEARANCE, MARGIN)?;
+    let mut limits = port.limits(instrument, MIN_CLEARANCE, MARGIN)?;
     let down = port.normal().dot(-DVec3::Z);
     if down > 0.1 {
         let room = (port.centre().z - floor) / (down * limits.tilt.cos()) - blades.length;
@@ -172,23 +197,30 @@ fn limits(port: &Port, instrument: &Instrument, blades: &Blades, floor: f64) -> 
     Ok(limits)
 }
 
-/// The start pose as coordinates.
-pub(super) fn start(
-    start: &trocar_scene::Start,
-    port: &trocar_scene::Port,
-    hole: &Port,
-    blades: &Blades,
-) -> Coordinates {
-    let u = hole.pose.rotation.inverse() * start.direction(port);
-    // The pivots turn the port's z first about x, then about the y that the first has turned.
-    let pivots = [(-u.y).atan2(u.z), u.x.atan2(u.y.hypot(u.z))];
+/// The numbers of a start pose.
+pub(super) fn start(start: &Start, port: Option<&trocar_scene::Port>, workspace: &Workspace) -> Setpoint {
     let roll = start.roll_deg.to_radians();
     let roll = roll - std::f64::consts::TAU * (roll / std::f64::consts::TAU).round();
-    Coordinates { pivots, insertion: 1e-3 * start.insertion_mm - blades.length, roll, jaw: start.jaw }
+    match workspace {
+        Workspace::Port(space) => {
+            let direction = port.map_or(-DVec3::Z, |port| start.direction(port));
+            let u = space.port.pose.rotation.inverse() * direction;
+            // The pivots turn the port's z first about x, then about the y that the first has
+            // turned.
+            let pivots = [(-u.y).atan2(u.z), u.x.atan2(u.y.hypot(u.z))];
+            let insertion = 1e-3 * start.insertion_mm - space.blade_length;
+            Coordinates { pivots, insertion, roll, jaw: start.jaw }.into()
+        }
+        Workspace::Free(_) => {
+            let [x, y, z] = start.position_m.unwrap_or_default();
+            Setpoint([x, y, z, roll, start.jaw])
+        }
+    }
 }
 
-/// The rolls [rad] to which an arm gets from its start without a joint at a limit, wherever the shaft leans by up to [`LEAN`]: the wrist's range less what the shaft's turn takes of it. Where the arm does not get
-/// even at the start's roll is left out: commands there are held back.
+/// The rolls (rad) to which an arm gets from its start without a joint at a limit, wherever the
+/// shaft leans by up to [`LEAN`]: the wrist's range less what the shaft's turn takes of it. Where
+/// the arm does not get even at the start's roll is left out: commands there are held back.
 fn roll_of(
     arm: &SerialArm,
     port: &Port,
@@ -197,14 +229,15 @@ fn roll_of(
     start: &Coordinates,
 ) -> Result<[f64; 2]> {
     let options = InverseOptions { tolerance: [1e-6, 1e-5], posture_tolerance: 1e-2, ..InverseOptions::default() };
-    let first = InverseOptions { restarts: STARTS, ..options };
+    let first = InverseOptions { restarts: START_SEARCHES, ..options };
     let posture = arm.inverse(&port.flange(instrument, start), &arm.home(), &first)?;
     let mut range = limits.roll;
-    // Steps towards `to`, each from the posture of the one before: the last posture, and the share of the way that was gone.
+    // Steps towards `to`, each from the posture of the one before: the last posture, and the share
+    // of the way that was gone.
     let walk = |from: &Coordinates, q: &Joints, to: &Coordinates| -> Result<(Joints, f64)> {
         let (mut q, mut share) = (*q, 0.0);
-        for step in 1..=WALK {
-            let s = f64::from(step) / f64::from(WALK);
+        for step in 1..=WALK_STEPS {
+            let s = f64::from(step) / f64::from(WALK_STEPS);
             let mix = |a: f64, b: f64| a + s * (b - a);
             let at = Coordinates {
                 pivots: [mix(from.pivots[0], to.pivots[0]), mix(from.pivots[1], to.pivots[1])],
@@ -237,17 +270,18 @@ fn roll_of(
             }
         }
     }
-    // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now and then.
-    let ends = [0, 1]
-        .map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - MARGIN_OF_ROLL.copysign(range[k]) });
+    // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now
+    // and then.
+    let ends =
+        [0, 1].map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - ROLL_MARGIN.copysign(range[k]) });
     Ok([ends[0].min(start.roll), ends[1].max(start.roll)])
 }
 
 fn chain(scene: &Scene, arm: &trocar_scene::Arm) -> Result<SerialArm> {
     let flange = arm.flange.as_deref();
     let model = match arm.source() {
-        Some(ArmModel::Urdf(file)) => SerialArm::from_urdf(&scene.resolve(file), None, flange)?,
-        Some(ArmModel::Mjcf(file)) => {
+        Some(Source::Urdf(file)) => SerialArm::from_urdf(&scene.resolve(file), None, flange)?,
+        Some(Source::Mjcf(file)) => {
             let tip = flange.ok_or_else(|| Error::Scene {
                 scene: scene.name.clone(),
                 field: format!("arm '{}', flange", arm.name.name()),
@@ -255,9 +289,9 @@ fn chain(scene: &Scene, arm: &trocar_scene::Arm) -> Result<SerialArm> {
             })?;
             SerialArm::from_mjcf(&scene.resolve(file), tip)?
         }
-        Some(ArmModel::FrankaFr3) | None => SerialArm::franka_fr3()?,
+        Some(Source::FrankaFr3) | None => SerialArm::franka_fr3()?,
     };
     let posture: Vec<f64> = arm.posture_deg.iter().map(|d| d.to_radians()).collect();
     let model = if posture.is_empty() { model } else { model.with_home(&posture)? };
-    Ok(model.with_base(arm.base.pose())?)
+    Ok(model.with_base(arm.base.unwrap_or_default().pose())?)
 }

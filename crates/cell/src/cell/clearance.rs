@@ -1,15 +1,17 @@
-//! How near two instruments are to each other. They do not push each other: what would have touched is told.
+//! How near two instruments are to each other. They do not push each other: what would have touched
+//! is told.
 
 use glam::DVec3;
 
-/// A convex part that is all points within `radius` [m] of a segment.
+/// A convex part that is all points within `radius` (m) of a segment.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rod {
     pub ends: [DVec3; 2],
     pub radius: f64,
 }
 
-/// The least gap between any of two instruments' rods [m]: negative where they are inside each other; infinite where one has none.
+/// The least gap between any of two instruments' rods (m): negative where they are inside each
+/// other; infinite where one has none.
 pub(super) fn clearance(one: &[Rod], other: &[Rod]) -> f64 {
     let gap = |a: &Rod, b: &Rod| distance(&a.ends, &b.ends) - a.radius - b.radius;
     one.iter().flat_map(|a| other.iter().map(move |b| gap(a, b))).fold(f64::INFINITY, f64::min)

@@ -1,55 +1,60 @@
 //! What tissue does to an instrument between two of its frames.
 //!
-//! Tissue is stepped 60 times a second, arms 480 times. Tissue sees the tip go from where it was measured at a frame's beginning to where it is at the end; the arm feels, over the
-//! next frame, what tissue did at that frame's end. Taken as it is, such a force is a spring that is late by a frame, and a late spring of stiffness k does work: it makes an arm
-//! swing unless the arm damps with more than about k T / 2, T being the frame (Colgate and Schenkel 1997). So the force is carried on with the tip: it changes by the stiffness seen so far, a
-//! secant as the jaw's drive has it ([`crate::Jaw`]), times the way the tip has gone since, at every step of the arm. Where the secant is right, the arm feels the spring as it is; where it is
-//! too large, the difference resists every motion and vanishes at the next frame: it damps. Where the tip rests, nothing is added.
+//! Tissue is stepped 60 times a second, arms 480 times. Tissue sees the tip go from where it was
+//! measured at a frame's beginning to where it is at the end; the arm feels, over the next frame,
+//! what tissue did at that frame's end. Taken as it is, such a force is a spring that is late by a
+//! frame, and a late spring of stiffness k does work: it makes an arm swing unless the arm damps
+//! with more than about k T / 2, T being the frame (Colgate and Schenkel 1997). So the force is
+//! carried on with the tip: it changes by the stiffness seen so far, a secant as the jaw's drive
+//! has it ([`crate::Jaw`]), times the way the tip has gone since, at every step of the arm. Where
+//! the secant is right, the arm feels the spring as it is; where it is too large, the difference
+//! resists every motion and vanishes at the next frame: it damps. Where the tip rests, nothing is
+//! added.
 
 use glam::DVec3;
 use trocar_core::Wrench;
 use trocar_tissue::ToolForce;
 
-/// The most that tissue is taken to push or pull [N]: beyond, a joint of the wrist would give way.
-pub const MOST_LOAD: f64 = 40.0;
+/// The most that tissue is taken to push or pull (N): beyond, a joint of the wrist would give way.
+pub const MAX_LOAD: f64 = 40.0;
 
-/// Stiffest that tissue is taken to be [N/m].
-const MOST_STIFFNESS: f64 = 2e4;
+/// Stiffest that tissue is taken to be (N/m).
+const MAX_STIFFNESS: f64 = 2e4;
 
 /// What is left of the stiffness seen from one frame to the next.
 const FORGETTING: f64 = 0.8;
 
-/// Least motion that gives a secant [m]; with less, creep would be taken for stiffness.
+/// Least motion that gives a secant (m); with less, creep would be taken for stiffness.
 const LEAST_MOTION: f64 = 2e-5;
 
 /// The last frame's force on an instrument, and how it goes on.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Exchange {
-    /// Force [N] and torque about the tip [N m] in the cell frame at the end of the last frame.
+    /// Force (N) and torque about the tip (N m) in the cell frame at the end of the last frame.
     load: Wrench,
-    /// Where the tip was then [m].
+    /// Where the tip was then (m).
     at: DVec3,
-    /// Force gained a way gone [N/m].
+    /// Force gained a way gone (N/m).
     stiffness: f64,
-    /// The last frame's force was more than [`MOST_LOAD`].
+    /// The last frame's force was more than [`MAX_LOAD`].
     pub limited: bool,
 }
 
 impl Exchange {
-    /// Nothing touches a tip at `at` [m].
+    /// Nothing touches a tip at `at` (m).
     pub fn new(at: DVec3) -> Self {
         Self { at, ..Self::default() }
     }
 
-    /// A frame is over: the tip is at `at` [m] and its tools feel `forces`.
-    pub fn after_frame(&mut self, at: DVec3, forces: &[ToolForce; 3]) {
+    /// A frame is over: the tip is at `at` (m) and its tools feel `forces`.
+    pub fn end_frame(&mut self, at: DVec3, forces: &[ToolForce; 3]) {
         let mut load = Wrench::default();
         for force in forces {
             for part in [force.contact, force.constraint] {
                 load += part;
             }
         }
-        let over = load.force.length() / MOST_LOAD;
+        let over = load.force.length() / MAX_LOAD;
         self.limited = over > 1.0;
         if self.limited {
             load = Wrench { force: load.force / over, torque: load.torque / over };
@@ -58,26 +63,27 @@ impl Exchange {
         self.stiffness *= FORGETTING;
         if way.length() > LEAST_MOTION {
             let secant = (self.load.force - load.force).dot(way) / way.length_squared();
-            self.stiffness = self.stiffness.max(secant).min(MOST_STIFFNESS);
+            self.stiffness = self.stiffness.max(secant).min(MAX_STIFFNESS);
         }
         (self.load, self.at) = (load, at);
     }
 
-    /// The force at the end of the last frame [N].
+    /// The force at the end of the last frame (N).
     pub fn force(&self) -> DVec3 {
         self.load.force
     }
 
-    /// What a tip that has come to `at` [m] feels.
+    /// What a tip that has come to `at` (m) feels.
     pub fn load(&self, at: DVec3) -> Wrench {
         let force = self.load.force - self.stiffness * (at - self.at);
-        Wrench { force: force.clamp_length_max(MOST_LOAD), torque: self.load.torque }
+        Wrench { force: force.clamp_length_max(MAX_LOAD), torque: self.load.torque }
     }
 
     /// The numbers of the state.
-    pub fn numbers(&self) -> impl Iterator<Item = f64> {
-        let vectors = [self.load.force, self.load.torque, self.at].map(|v| v.to_array());
-        vectors.into_iter().flatten().chain([self.stiffness, f64::from(u8::from(self.limited))])
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let Self { load, at, stiffness, limited } = *self;
+        let vectors = [load.force, load.torque, at].map(|v| v.to_array());
+        vectors.into_iter().flatten().chain([stiffness, f64::from(u8::from(limited))])
     }
 }
 
@@ -85,8 +91,9 @@ impl Exchange {
 mod tests {
     use super::*;
 
-    /// A tip of `mass` [kg] with `damping` [N s/m], held at x = 0 by a spring of 3000 N/m and let go 1 mm inside a wall of `stiffness` [N/m] that answers 60 times a second: the
-    /// greatest distance from the balance in the last of three seconds [m].
+    /// A tip of `mass` (kg) with `damping` (N s/m), held at x = 0 by a spring of 3000 N/m and let
+    /// go 1 mm inside a wall of `stiffness` (N/m) that answers 60 times a second: the greatest
+    /// distance from the balance in the last of three seconds (m).
     fn swing(mass: f64, damping: f64, stiffness: f64, carried_on: bool) -> f64 {
         let (mut x, mut v, dt) = (0.001, 0.0, 1.0 / 480.0);
         let mut exchange = Exchange::new(DVec3::ZERO);
@@ -95,7 +102,7 @@ mod tests {
             if step % 8 == 0 {
                 let mut forces = [ToolForce::default(); 3];
                 forces[1].contact.force.x = -stiffness * x;
-                exchange.after_frame(x * DVec3::X, &forces);
+                exchange.end_frame(x * DVec3::X, &forces);
             }
             let at = if carried_on { x * DVec3::X } else { exchange.at };
             v += dt * (exchange.load(at).force.x - damping * v - 3000.0 * x) / mass;
@@ -123,10 +130,10 @@ mod tests {
         forces[0].constraint.force = DVec3::new(0.0, 0.3, -0.4);
         forces[2].contact.force = DVec3::Y;
         let mut exchange = Exchange::new(DVec3::ZERO);
-        exchange.after_frame(DVec3::X, &forces);
+        exchange.end_frame(DVec3::X, &forces);
         assert_eq!(exchange.load(DVec3::X).force, DVec3::new(0.0, 1.3, -0.4));
         forces[2].contact.force = 1e4 * DVec3::Y;
-        exchange.after_frame(DVec3::X, &forces);
-        assert!(exchange.limited && exchange.load(DVec3::X).force.length() <= MOST_LOAD + 1e-9);
+        exchange.end_frame(DVec3::X, &forces);
+        assert!(exchange.limited && exchange.load(DVec3::X).force.length() <= MAX_LOAD + 1e-9);
     }
 }

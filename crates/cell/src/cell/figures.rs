@@ -1,65 +1,96 @@
-//! What tasks measure of a cell beside its observations: what jaws carry and what is between blades.
+//! What tasks measure of a cell besides its observations: what jaws carry and what is between
+//! blades.
 
 use super::Cell;
-use crate::gripper::{BLADE_WIDTH, MOUTH_BEGIN};
-use crate::{Mouthful, Result};
+use crate::gripper::{BLADE_WIDTH, JAW_REGION_BEGIN};
+use crate::{Result, TissueInJaws};
 use glam::DVec3;
 use trocar_scene::{InstrumentKind, Side};
 
-/// Tissue that jaws hold, and how it has moved since they closed on it (SPEC, lift and slip).
+/// Tissue that jaws hold, and how it has moved since they closed on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carried {
     /// Body of the tissue.
     pub organ: usize,
     /// Organ coordinate of the attached cluster.
     pub s: f64,
-    /// Rise of the jaws [m].
+    /// Rise of the jaws (m).
     pub jaw_lift: f64,
-    /// Rise of the tissue's centroid [m].
+    /// Rise of the tissue's centroid (m).
     pub tissue_lift: f64,
-    /// Distance of that centroid in the jaws' frame from where it was [m].
+    /// Distance of that centroid in the jaws' frame from where it was (m).
     pub slip: f64,
 }
 
 impl Cell {
     /// The arms in the order of observations and actions, with what their instruments are.
     pub fn arms(&self) -> Vec<(Side, InstrumentKind)> {
-        self.stations.iter().map(|s| (s.fixed.side, s.fixed.kind)).collect()
+        self.arms.iter().map(|s| (s.model.side, s.model.kind)).collect()
     }
 
     /// What the arm at place `k` holds; None where there is no such arm or it holds nothing.
     pub fn carried(&self, k: usize) -> Option<Carried> {
-        let station = self.stations.get(k)?;
-        let held = station.now.held.as_ref()?;
-        let moved = station.moved(&self.world)?;
+        let arm = self.arms.get(k)?;
+        let held = arm.state.held.as_ref()?;
+        let moved = arm.moved(&self.world)?;
         let (organ, s) = (held.organ, held.s);
         Some(Carried { organ, s, jaw_lift: moved.jaw_lift, tissue_lift: moved.tissue_lift, slip: moved.slip })
     }
 
-    /// Tissue of body `organ` between the blades of the arm at place `k` (SPEC C3), and its share of the wedge between them; None where there is none.
-    pub fn between_blades(&self, k: usize, organ: usize) -> Option<(Mouthful, f64)> {
-        let station = self.stations.get(k)?;
-        let tissue = station.mouth().tissue_of(&self.world, organ)?;
-        let (angle, length) = (station.now.gripper.jaw_angle, station.fixed.blades.length);
+    /// Organ coordinates of the nodes that the arm at place `k` holds or follows; empty where it
+    /// holds nothing.
+    pub fn carried_coordinates(&self, k: usize) -> Vec<f64> {
+        let held = self.arms.get(k).and_then(|arm| arm.state.held.as_ref());
+        held.map_or_else(Vec::new, |held| {
+            let (organ, nodes) = held.hold.tissue();
+            nodes.iter().map(|i| self.world.axes[organ].s[*i as usize]).collect()
+        })
+    }
+
+    /// Tissue of body `organ` between the blades of the arm at place `k`, and its share of the
+    /// region between them; None where there is none.
+    pub fn between_blades(&self, k: usize, organ: usize) -> Option<(TissueInJaws, f64)> {
+        let arm = self.arms.get(k)?;
+        let tissue = arm.jaw_region().tissue_of(&self.world, organ)?;
+        let (angle, length) = (arm.state.gripper.jaw_angle, arm.model.blades.length);
         // A sector of a ring, as wide as the blades.
-        let wedge = 0.5 * angle * (length * length - MOUTH_BEGIN * MOUTH_BEGIN) * BLADE_WIDTH;
+        let wedge = 0.5 * angle * (length * length - JAW_REGION_BEGIN * JAW_REGION_BEGIN) * BLADE_WIDTH;
         Some((tissue, if wedge > 0.0 { (tissue.volume / wedge).min(1.0) } else { 0.0 }))
     }
 
-    /// Tip of an arm's closed blades in the cell [m].
+    /// Tip of an arm's closed blades in the cell (m).
     ///
     /// # Errors
-    /// An arm that is not there.
+    /// An arm that the cell does not have.
     pub fn blade_tip(&self, arm: &str) -> Result<DVec3> {
-        let station = self.arm(arm)?;
-        Ok(station.manipulator.measured_cp().transform(station.fixed.blades.length * DVec3::X))
+        let arm = self.arm(arm)?;
+        Ok(arm.drive.tip().transform(arm.model.blades.length * DVec3::X))
     }
 
-    /// Whether an arm's instrument has hooked or crushed tissue and passes through it until it has come back.
+    /// Whether contact of an arm's instrument with tissue is disabled, and whether that of its
+    /// blades is.
     ///
     /// # Errors
-    /// An arm that is not there.
-    pub fn unhooked(&self, arm: &str) -> Result<bool> {
-        Ok(self.arm(arm)?.now.unhooked)
+    /// An arm that the cell does not have.
+    pub fn disabled_contact(&self, arm: &str) -> Result<(bool, bool)> {
+        let state = &self.arm(arm)?.state;
+        Ok((state.contact_disabled, state.blades_disabled))
+    }
+
+    /// Largest distance of a pinned node from where it was recorded (m).
+    pub fn pin_drift(&self) -> f64 {
+        let (model, state) = (&self.world.model, &self.world.state);
+        let drift = model.bodies().iter().enumerate().flat_map(|(k, body)| {
+            let pinned = (0..body.len()).filter(|i| body.pinned()[*i]);
+            pinned.map(move |i| state.position(model, k, i).distance(body.rest_positions()[i]))
+        });
+        drift.fold(0.0, f64::max)
+    }
+
+    /// Weight of the tissue of `bodies` (N).
+    pub fn weight(&self, bodies: &[usize]) -> f64 {
+        let all = self.world.model.bodies();
+        let mass = bodies.iter().flat_map(|k| (0..all[*k].len()).map(|i| all[*k].mass(i))).sum::<f64>();
+        crate::world::GRAVITY * mass
     }
 }

@@ -15,7 +15,7 @@ pub struct Placed {
     pub specimen: Specimen,
     /// Contact, filtered pairs and the bed.
     pub surroundings: Surroundings,
-    /// Height of the lowest node [m].
+    /// Height of the lowest node (m).
     pub floor: f64,
 }
 
@@ -85,11 +85,14 @@ fn move_organ(organ: &mut Organ, pose: &Pose) {
     }
 }
 
-/// The end of `organ` that is farther from the port of the arm that grasps; found only where the rule asks for it.
+/// The end of `organ` that is farther from the port of the arm that grasps; found only where the
+/// rule asks for it.
 fn far_end(scene: &Scene, organ: &Organ, rule: Option<&PinRule>) -> Result<End> {
-    let port = scene.grasping_arm().and_then(|arm| scene.port(&arm.port));
-    let (Some(PinRule::End { end: PinEnd::Far, .. }), Some(port)) = (rule, port) else { return Ok(End::Tip) };
+    // Of an arm without a port, where it starts.
+    let from_port = |port: &String| scene.port(port).map(|port| port.centre_m);
+    let place = scene.grasping_arm().and_then(|arm| arm.port.as_ref().map_or(arm.start.position_m, from_port));
+    let (Some(PinRule::End { end: PinEnd::Far, .. }), Some(place)) = (rule, place) else { return Ok(End::Tip) };
     let axis = OrganAxis::of(&organ.body, organ.base)?;
-    let from = |s: f64| axis.point_at(s).distance(port.centre_m.into());
+    let from = |s: f64| axis.point_at(s).distance(place.into());
     Ok(if from(0.0) > from(1.0) { End::Base } else { End::Tip })
 }

@@ -1,9 +1,12 @@
 //! What a step of the cell reports: the observation of each arm, of the tissue, and what happened.
 
+use super::rule_counts::RuleCounts;
+use super::setpoint::Setpoint;
+use crate::severance::Severance;
 use glam::DVec3;
 use serde::Serialize;
-use trocar_core::{Pose, Wrench};
-use trocar_robot::instrument::Coordinates;
+use trocar_core::Pose;
+use trocar_core::Wrench;
 use trocar_robot::wrench::ForceKind;
 use trocar_scene::Side;
 use trocar_tissue::{Divergence, StepReport};
@@ -22,37 +25,41 @@ pub struct TaggedForce {
 pub struct ArmObservation {
     /// Which arm.
     pub side: Side,
-    /// Measured coordinates of the instrument in its port, jaw included.
-    pub coordinates: Coordinates,
-    /// Their rates: two pivots [rad/s], insertion [m/s], roll [rad/s], jaw [1/s].
+    /// Measured numbers, as in an action of absolute targets.
+    pub measured: Setpoint,
+    /// Their rates (1/s).
     pub rates: [f64; 5],
     /// Measured pose of the tip frame in the cell.
     pub tip: Pose,
-    /// RCM deviation [m]: from the port's centre to the shaft's axis, in the port's plane.
+    /// RCM deviation (m): from the port's centre to the shaft's axis, in the port's plane.
     pub rcm_deviation: f64,
-    /// Largest RCM deviation over the period's physics steps [m].
+    /// Largest RCM deviation over the period's physics steps (m).
     pub rcm_peak: f64,
     /// The peak is beyond the scene's threshold (3 mm).
     pub rcm_over_threshold: bool,
     /// The peak is beyond the deviation at which hardware stops (5 mm).
     pub rcm_over_abort: bool,
-    /// Angle between shaft and port normal [rad].
+    /// Angle between shaft and port normal (rad).
     pub tilt: f64,
     /// What was commanded for the end of the period.
-    pub commanded: Coordinates,
-    /// What is left of the wanted orientation: axis times angle [rad] in the cell of the turn from the commanded to the wanted one.
+    pub commanded: Setpoint,
+    /// What is left of the wanted orientation: axis times angle (rad) in the cell of the turn from
+    /// the commanded to the wanted one.
     pub rejected_rotation: DVec3,
-    /// The command stops short of what was asked: it was too far for one period, below the cell's floor, or against a force near the limit.
+    /// The command stops short of what was asked: it was too far for one period, below the cell's
+    /// floor, or against a force near the limit.
     pub held_back: bool,
-    /// It was the force: the scene's `safety.force_limit_n` shortened the last command, or turned it back.
+    /// It was the force: the scene's `safety.force_limit_n` shortened the last command, or turned
+    /// it back.
     pub guarded: bool,
-    /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is latched its constraint force, otherwise contact.
+    /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is
+    /// latched its constraint force, otherwise contact.
     pub force: TaggedForce,
-    /// Contact force on shaft and blades [N], whether a grasp is latched or not.
+    /// Contact force on shaft and blades (N), whether a grasp is latched or not.
     pub contact: DVec3,
-    /// Constraint force of a latched grasp [N].
+    /// Constraint force of a latched grasp (N).
     pub constraint: DVec3,
-    /// Force with which tissue pushes the blades apart [N].
+    /// Force with which tissue pushes the blades apart (N).
     pub jaw_force: f64,
     /// Tissue pushed with more than an arm bears, and the arm felt only so much.
     pub load_limited: bool,
@@ -63,7 +70,7 @@ pub struct ArmObservation {
 /// What is measured of the tissue: privileged, no policy sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TissueObservation {
-    /// Largest node speed at the end [m/s].
+    /// Largest node speed at the end (m/s).
     pub max_speed: f64,
     /// Most inverted elements in any frame.
     pub inverted: usize,
@@ -116,8 +123,16 @@ pub enum CellEvent {
         s: f64,
         /// Nodes that the grasp holds; 0 for friction.
         nodes: usize,
-        /// Largest distance between where the grasp first prescribes a node and where it was [mm].
+        /// Largest distance between where the grasp first prescribes a node and where it was (mm).
         snap_mm: f64,
+        /// Mean of that distance over the nodes (mm).
+        snap_mean_mm: f64,
+        /// Mean distance of the nodes from their places at rest (mm).
+        displaced_mm: f64,
+        /// Gap between the blades in the middle of that tissue (mm).
+        gap_mm: f64,
+        /// Force with which tissue pushed the blades apart (N).
+        closing_force_n: f64,
     },
     /// Jaws opened, or what was between them is no longer.
     Released {
@@ -133,7 +148,7 @@ pub enum CellEvent {
     Torn {
         /// The arm.
         arm: Side,
-        /// Pull at which it tore [N].
+        /// Pull at which it tore (N).
         force_n: f64,
     },
     /// A cutter closed through tissue.
@@ -144,9 +159,13 @@ pub enum CellEvent {
         organ: String,
         /// Pieces that the organ now is in: 1 where the scene parts nothing.
         pieces: usize,
+        /// The cut in figures, where the scene parts tissue.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        parted: Option<Box<Severance>>,
     },
-    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears: it let go of it, and passes through until it is out and the tissue has come back.
-    Unhooked {
+    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears. It lets go,
+    /// and its contact is disabled until it is out and the tissue has come back.
+    ContactDisabled {
         /// The arm.
         arm: Side,
         /// Name of the organ.
@@ -156,8 +175,9 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// Tissue was hooked or crushed beyond what it bears by jaws that hold it: they keep their hold, but their blades are not felt until they let go.
-    Bared {
+    /// Jaws that hold tissue had strained it beyond what it bears. They keep their hold, but
+    /// contact of their blades is disabled until they let go.
+    BladesDisabled {
         /// The arm.
         arm: Side,
         /// Name of the organ.
@@ -167,7 +187,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// An organ was folded so that it would not come back by itself: it was put right, without regard to time and forces.
+    /// An organ stayed folded with no instrument at it: it was relaxed without regard to time and
+    /// forces.
     Relaxed {
         /// Name of the organ.
         organ: String,
@@ -180,26 +201,27 @@ pub enum CellEvent {
     ForceLimit {
         /// The arm.
         arm: Side,
-        /// The force [N].
+        /// The force (N).
         force_n: f64,
     },
-    /// The instruments came into each other, which real ones would not: they do not push each other here.
+    /// The instruments came into each other, which real ones would not: they do not push each other
+    /// here.
     InstrumentsTouch {
-        /// How deep [mm].
+        /// How deep (mm).
         depth_mm: f64,
     },
     /// The RCM deviation went beyond the scene's threshold.
     RcmThreshold {
         /// The arm.
         arm: Side,
-        /// The deviation [mm].
+        /// The deviation (mm).
         deviation_mm: f64,
     },
     /// The RCM deviation went beyond that at which the hardware stops.
     RcmAbort {
         /// The arm.
         arm: Side,
-        /// The deviation [mm].
+        /// The deviation (mm).
         deviation_mm: f64,
     },
 }
@@ -207,7 +229,7 @@ pub enum CellEvent {
 impl std::fmt::Display for CellEvent {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match self {
-            Self::Attached { arm, organ, s, nodes, snap_mm } => write!(
+            Self::Attached { arm, organ, s, nodes, snap_mm, .. } => write!(
                 f,
                 "the {} jaws took hold of the {organ} at s = {s:.2}: {nodes} nodes, a snap of {snap_mm:.2} mm",
                 arm.name()
@@ -217,25 +239,28 @@ impl std::fmt::Display for CellEvent {
             Self::Torn { arm, force_n } => {
                 write!(f, "tissue tore out of the {} jaws at {force_n:.2} N", arm.name())
             }
-            Self::Cut { arm, organ, pieces } => {
+            Self::Cut { arm, organ, pieces, .. } => {
                 let into = if *pieces == 1 { "without parting it".to_owned() } else { format!("into {pieces} pieces") };
                 write!(f, "the {} blades closed through the {organ}, {into}", arm.name())
             }
-            Self::Unhooked { arm, organ, stretch, volume } => write!(
+            Self::ContactDisabled { arm, organ, stretch, volume } => write!(
                 f,
-                "the {} instrument let go of the {organ}, which was stretched {stretch:.1} times and crushed to {:.1}%",
+                "contact of the {} instrument is disabled: it had pierced or strained the {organ} (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
                 arm.name(),
                 1e2 * volume
             ),
-            Self::Bared { arm, organ, stretch, volume } => write!(
+            Self::BladesDisabled { arm, organ, stretch, volume } => write!(
                 f,
-                "the {} jaws hold the {organ} without pressing it: an edge was stretched {stretch:.1} times, an element had {:.1}% of its volume",
+                "contact of the {} blades is disabled: they hold the {organ} and had strained it (stretch {stretch:.1}, smallest element {:.1}% of its volume)",
                 arm.name(),
                 1e2 * volume
             ),
             Self::Relaxed { organ, stretch, volume } => {
                 let volume = 1e2 * volume;
-                write!(f, "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was put right")
+                write!(
+                    f,
+                    "the {organ}, stretched {stretch:.1} times and crushed to {volume:.1}%, was relaxed outside of time"
+                )
             }
             Self::InstrumentsTouch { depth_mm } => write!(f, "the instruments are {depth_mm:.2} mm inside each other"),
             Self::ForceLimit { arm, force_n } => {
@@ -251,17 +276,32 @@ impl std::fmt::Display for CellEvent {
     }
 }
 
+/// What happens in a control period while it goes on.
+#[derive(Debug, Default)]
+pub(super) struct PeriodLog {
+    pub events: Vec<CellEvent>,
+    pub tissue: TissueObservation,
+    pub rules: RuleCounts,
+    /// Largest motion of a node in the first frame of a grasp (m).
+    pub activation_step: f64,
+}
+
 /// What a control period reports.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellReport {
-    /// Time at its end [s].
+    /// Time at its end (s).
     pub time: f64,
     /// The arms, the left one first.
     pub arms: Vec<ArmObservation>,
-    /// Gap between the two instruments at its end [m]: negative where they are inside each other, for they do not push each other.
+    /// Gap between the two instruments at its end (m): negative where they are inside each other,
+    /// for they do not push each other.
     pub clearance: f64,
     /// The tissue.
     pub tissue: TissueObservation,
     /// What happened, in order.
     pub events: Vec<CellEvent>,
+    /// How often each safety rule acted.
+    pub rules: RuleCounts,
+    /// Largest motion of a node in the first frame after jaws took hold (m); 0 where none did.
+    pub activation_step: f64,
 }

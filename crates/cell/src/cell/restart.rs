@@ -1,38 +1,42 @@
-//! Another start for a cell that is there already: arms elsewhere, tissue as it was saved, time at zero.
+//! Another start for a cell that is there already: arms elsewhere, tissue as it was saved, time
+//! zero.
 
-use super::station::Moving;
+use super::arm::ArmState;
+use super::setpoint::Setpoint;
 use super::{Cell, CellState, build};
 use crate::{Error, Result};
-use trocar_robot::instrument::Coordinates;
 use trocar_scene::{Port, Start};
 
 impl Cell {
-    /// Coordinates of the arm at place `k` that stands as `start` says in the scene's `port`, as near as its limits let it.
-    pub fn start_coordinates(&self, k: usize, start: &Start, port: &Port) -> Coordinates {
-        let fixed = &self.stations[k].fixed;
-        fixed.limits.clamp(&build::start(start, port, &fixed.port, &fixed.blades)).0
+    /// The setpoint of the arm at place `k` whose instrument stands as `start` says, as near as its
+    /// limits let it; `port` is the scene's port of that arm.
+    pub fn start_setpoint(&self, k: usize, start: &Start, port: Option<&Port>) -> Setpoint {
+        let space = &self.arms[k].model.workspace;
+        space.clamp(&build::start(start, port, space))
     }
 
-    /// Takes the tissue and the grasp designs of `state`, lets go of all, puts the arms at rest at `starts`, one an arm, and begins at time zero. The same state and starts give the same bits
-    /// whatever the cell did before.
+    /// Takes the tissue of `state`, lets go of all, puts the arms at rest at `starts`, one an arm,
+    /// and begins at time zero. The same state and starts give the same bits whatever the cell did
+    /// before.
     ///
     /// # Errors
-    /// A state of another cell, or a start that an arm does not reach: the cell is then to be restored or restarted.
-    pub fn restart(&mut self, state: &CellState, starts: &[Coordinates]) -> Result<()> {
-        if starts.len() != self.stations.len() {
-            let (given, here) = (starts.len(), self.stations.len());
+    /// A state of another cell, or a start that an arm does not reach: the cell has then to be
+    /// restored or restarted.
+    pub fn restart(&mut self, state: &CellState, starts: &[Setpoint]) -> Result<()> {
+        if starts.len() != self.arms.len() {
+            let (given, here) = (starts.len(), self.arms.len());
             return Err(Error::Option(format!("{given} starts; the cell has {here} arms")));
         }
         self.restore(state)?;
-        for (station, start) in self.stations.iter_mut().zip(starts) {
-            station.manipulator.restart(start)?;
-            let tool = station.fixed.tools.gripper;
+        for (arm, start) in self.arms.iter_mut().zip(starts) {
+            arm.drive.restart(start)?;
+            let tool = arm.model.tools.gripper;
             self.world.state.grasps.retain(|g| g.tool != tool);
-            let (mut jaw, mut scissors) = (station.now.jaw, station.now.scissors());
+            let (mut jaw, mut scissors) = (arm.state.jaw, arm.state.scissors);
             jaw.turn_to(0.0, 0.0);
             scissors.rest();
-            let (pose, design) = (station.manipulator.measured_cp(), station.now.design);
-            station.now = Moving::new(pose, &station.fixed, *start, design, jaw, scissors);
+            let (pose, design) = (arm.drive.tip(), arm.state.design);
+            arm.state = ArmState::new(pose, &arm.model, *start, design, jaw, scissors);
         }
         self.periods = 0;
         Ok(())

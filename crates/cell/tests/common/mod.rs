@@ -52,7 +52,8 @@ pub fn meshed(pins: Pins, edge: f64) -> Specimen {
     }
 }
 
-/// The tube in elements of edge `edge` [m], and a second one, 25 mm beside it and 12 mm lower, which keeps the cell's floor away from the first.
+/// The tube in elements of edge `edge` [m], and a second one, 25 mm beside it and 12 mm lower,
+/// which keeps the cell's floor away from the first.
 pub fn two_tubes(pins: Pins, edge: f64) -> Specimen {
     let mut both = meshed(pins, edge);
     let mut low = meshed(Pins::Band { share: 0.42 }, 4e-3).organs.remove(0);

@@ -29,7 +29,7 @@ pub struct Episode {
 /// Arguments of `replay`.
 #[derive(Debug, Args)]
 pub struct Replay {
-    /// Episode file.
+    /// Episode folder, or the episode file in it.
     pub file: PathBuf,
     /// Do the episode again and compare the state after every step.
     #[arg(long)]
@@ -49,7 +49,7 @@ pub struct Replay {
 /// Arguments of `sweep`.
 #[derive(Debug, Args)]
 pub struct Sweep {
-    /// Channels of episodes: channels.parquet files.
+    /// Episode folders, or their channels.parquet files.
     #[arg(required = true)]
     pub channels: Vec<PathBuf>,
     /// A gate and its values: lift_mm=4..12 (nine values), lift_mm=4..12:0.5 or cut_closed=0.15,0.3; several for every combination.

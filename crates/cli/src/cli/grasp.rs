@@ -2,9 +2,9 @@
 
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
-use trocar_cell::GraspDesign;
 use trocar_phantom::RecordOptions;
-use trocar_studies::AppendixSource;
+use trocar_scene::GraspDesignName;
+use trocar_studies::{AppendixSource, Condition};
 
 /// Grasp designs by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -19,13 +19,35 @@ pub enum DesignName {
     Compliant,
 }
 
-impl From<DesignName> for GraspDesign {
+impl From<DesignName> for GraspDesignName {
     fn from(name: DesignName) -> Self {
         match name {
             DesignName::Friction => Self::Friction,
             DesignName::RestPose => Self::RestPose,
             DesignName::LivePose => Self::LivePose,
             DesignName::Compliant => Self::Compliant,
+        }
+    }
+}
+
+/// In what the appendix is lifted.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ConditionName {
+    /// In the whole cell: organs touch each other, and a dynamic arm works through its port.
+    Cell,
+    /// The appendix alone, lifted by an ideal arm without a port.
+    Appendix,
+    /// Both, one after the other.
+    Both,
+}
+
+impl ConditionName {
+    /// The conditions of this name.
+    pub fn conditions(self) -> Vec<Condition> {
+        match self {
+            Self::Cell => vec![Condition::Cell],
+            Self::Appendix => vec![Condition::Appendix],
+            Self::Both => vec![Condition::Cell, Condition::Appendix],
         }
     }
 }
@@ -62,7 +84,10 @@ impl From<&AppendixChoice> for AppendixSource {
 pub struct GraspDesignsExperiment {
     #[command(flatten)]
     pub appendix: AppendixChoice,
-    /// Lift of the jaws [mm].
+    /// In what the appendix is lifted: the whole cell, alone, or both.
+    #[arg(long, value_enum, default_value_t = ConditionName::Both)]
+    pub condition: ConditionName,
+    /// Lift of the jaws (mm).
     #[arg(long, default_value_t = 15.0)]
     pub lift: f64,
     /// Force with which the jaws close [N].
@@ -82,9 +107,16 @@ pub struct GraspDesignsExperiment {
 pub struct ElementQualityExperiment {
     #[command(flatten)]
     pub appendix: AppendixChoice,
-    /// Force with which the jaws close on tissue of 12 kPa [N]; on other tissue in proportion to its modulus.
+    /// In what the appendix is lifted: the whole cell, alone, or both.
+    #[arg(long, value_enum, default_value_t = ConditionName::Both)]
+    pub condition: ConditionName,
+    /// Force with which the jaws close (N), the same for all moduli.
     #[arg(long, default_value_t = trocar_cell::JAW_FORCE)]
     pub jaw_force: f64,
+    /// Run all cases a second time with a jaw force in proportion to the modulus (--jaw-force at 12 kPa), so that
+    /// tissue of every modulus is squeezed alike: a second table.
+    #[arg(long)]
+    pub scaled_force: bool,
     /// Cases at once; as many as the machine has threads by default. The figures do not depend on it.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,

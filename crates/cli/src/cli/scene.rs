@@ -23,6 +23,17 @@ pub enum SceneAction {
         #[arg(long)]
         canonical: bool,
     },
+    /// Write a scene file for a specimen: the paper's cell with the specimen placed so that both tools reach its organ.
+    New {
+        /// Specimen folder.
+        specimen: std::path::PathBuf,
+        /// Organ of the task; the appendix, or else the first, by default.
+        #[arg(long)]
+        organ: Option<String>,
+        /// Scene file to write; printed by default.
+        #[arg(short, long)]
+        output: Option<std::path::PathBuf>,
+    },
     /// Say whether a scene file is in order, or else what is wrong, where, and what would be right.
     Check {
         /// A scene file, or a built-in scene.

@@ -33,6 +33,15 @@ pub enum SolverName {
 }
 
 impl SolverName {
+    /// The schedule of a scene of this name.
+    pub fn schedule(&self) -> trocar_scene::ScheduleName {
+        match self {
+            Self::Paper => trocar_scene::ScheduleName::Paper,
+            Self::Fast => trocar_scene::ScheduleName::Fast,
+            Self::Adaptive => trocar_scene::ScheduleName::Adaptive,
+        }
+    }
+
     /// The name by which the work knows it.
     pub fn name(self) -> String {
         match self {

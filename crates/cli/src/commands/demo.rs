@@ -14,13 +14,13 @@ pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result
         format!(
             "{}\n\n{}\n\nall of it in {:.0} s; report {}",
             reconstruct::text(&r.reconstructed),
-            simulate::text(&r.summary),
+            simulate::text(&r.lift),
             r.seconds,
-            r.report
+            r.lift.report
         )
     });
     if !arguments.no_open && !json && std::env::var_os("CI").is_none() {
-        open(Path::new(&result.report));
+        open(Path::new(&result.lift.report));
     }
     Ok(())
 }

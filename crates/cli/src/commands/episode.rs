@@ -76,9 +76,16 @@ fn text(made: &EpisodeMade) -> String {
             a.arm, a.rcm_median_mm, a.rcm_p95_mm, a.rcm_max_mm, a.lag_ms, a.peak_contact_n, a.peak_constraint_n
         )
     });
+    let mut remarks = String::new();
+    for said in [&s.why, &s.advice].into_iter().flatten() {
+        remarks += &format!("\n{said}");
+    }
+    if let Some(said) = s.suspensions() {
+        remarks += &format!("\nsuspensions of physics: {said}");
+    }
     let grasp = s.grasp_at.map_or("no grasp".to_owned(), |at| format!("grasp at s = {at:.2}"));
     format!(
-        "{}, {} by {} with seed {}: {} ({} of {} stages)\n{}\n{grasp}, lift {:.1} mm, slip {:.2} mm, {}; {} inverted at worst\n{}\n{:.1} s simulated in {:.1} s ({:.2}x real time), state {}\nfolder {}",
+        "{}, {} by {} with seed {}: {} ({} of {} stages)\n{}\n{grasp}, lift {:.1} mm, slip {:.2} mm, {}; {} inverted at worst{remarks}\n{}\n{:.1} s simulated in {:.1} s ({:.2}x real time), state {}\nfolder {}",
         r.scene,
         r.task,
         r.policy,

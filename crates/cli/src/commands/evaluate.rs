@@ -41,6 +41,7 @@ fn text(r: &CampaignResult) -> String {
                 or_dash(p.rcm_max_mm, 3),
                 p.ends[3].to_string(),
                 p.ends[4].to_string(),
+                p.suspensions(),
             ]
         })
         .collect();
@@ -48,8 +49,20 @@ fn text(r: &CampaignResult) -> String {
         .policies
         .first()
         .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage).collect::<Vec<_>>().join(", "));
-    let header =
-        ["policy", "passed", "95%", "by stage", "score", "held", "lift mm", "RCM mm", "max", "diverged", "failed"];
+    let header = [
+        "policy",
+        "passed",
+        "95%",
+        "by stage",
+        "score",
+        "held",
+        "lift mm",
+        "RCM mm",
+        "max",
+        "diverged",
+        "failed",
+        "suspended",
+    ];
     let failed: String = r
         .policies
         .iter()

@@ -2,13 +2,14 @@
 
 use crate::cli::{Simulate, Task};
 use crate::output;
-use trocar_cell::{CellLift, GraspDesign, GraspLift, JAW_FORCE, SeverAt, Severance, Summary};
 use trocar_core::Progress;
 use trocar_scene::Builtin;
-use trocar_workflow::solver_named;
-use trocar_workflow::{CellRun, CellSimulation, Error, Result, SimulatedRun, simulate};
+use trocar_task::Severed;
+use trocar_task::policy::{AfterHold, CutAt, Script};
+use trocar_workflow::{Lift, LiftResult, Result};
 
-/// Organ coordinate of the grasp unless the user says otherwise, and where a cut needs room on the base's side.
+/// Organ coordinate of the grasp unless the user says otherwise, and where a cut needs room on the base's
+/// side.
 const AT: f64 = 0.5;
 const AT_WITH_CUT: f64 = 0.7;
 
@@ -16,111 +17,100 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
     let Task::GraspLift = arguments.task;
     // A specimen is a folder; what is none is a scene.
     let name = arguments.specimen.to_string_lossy();
-    if !arguments.specimen.is_dir() && (arguments.specimen.is_file() || Builtin::named(&name).is_some()) {
-        return in_cell(arguments, &name, json, progress);
-    }
-    let schedule = arguments.schedule.unwrap_or(crate::cli::SolverName::Fast);
-    let task = GraspLift {
-        organ: arguments.organ.clone(),
-        at: arguments.at.unwrap_or(if arguments.sever.is_some() { AT_WITH_CUT } else { AT }),
-        lift: arguments.lift * 1e-3,
-        design: arguments.design.map_or_else(GraspDesign::default, Into::into),
-        jaw_force: arguments.jaw_force.unwrap_or(JAW_FORCE),
-        approach_offset: arguments.approach_offset * 1e-3,
-        regrasp: arguments.regrasp.map(|drag| drag * 1e-3),
-        sever: arguments.sever.map(|at| at.map_or(SeverAt::Between, SeverAt::S)),
-        schedule: solver_named(&schedule.name())?,
-        threads: arguments.threads,
-        ..GraspLift::default()
+    let scene = !arguments.specimen.is_dir() && (arguments.specimen.is_file() || Builtin::named(&name).is_some());
+    let after = match arguments.sever {
+        Some(at) => AfterHold::Cut(at.map_or(CutAt::Between, CutAt::S)),
+        None if scene => AfterHold::Finish,
+        None => AfterHold::Lower,
     };
-    let run = simulate(&arguments.specimen, &task, &arguments.output, progress)?;
-    output::print(json, &run, |r: &SimulatedRun| format!("{}\nreport {}", text(&r.summary), r.report));
-    Ok(())
-}
-
-/// The same task in the two-arm cell of a scene.
-fn in_cell(arguments: &Simulate, scene: &str, json: bool, progress: &dyn Progress) -> Result<()> {
-    let refused = |option: &str, instead: &str| Err(Error::Mismatch(format!("{option} is for specimens; {instead}")));
-    if arguments.schedule.is_some() {
-        return refused("--schedule", "a scene says it in tissue.schedule");
-    }
-    if arguments.sever.is_some() || arguments.approach_offset != 0.0 {
-        return refused("--sever or --approach-offset", "the cell's script grasps and lifts only");
-    }
-    let simulation = CellSimulation {
-        scene: scene.to_owned(),
-        task: CellLift {
-            organ: arguments.organ.clone(),
-            at: arguments.at.unwrap_or(AT),
+    let lift = Lift {
+        script: Script {
+            at: arguments.at.unwrap_or(if arguments.sever.is_some() { AT_WITH_CUT } else { AT }),
+            approach_offset: arguments.approach_offset * 1e-3,
             lift: arguments.lift * 1e-3,
-            design: arguments.design.map(Into::into),
             regrasp: arguments.regrasp.map(|drag| drag * 1e-3),
-            ..CellLift::default()
+            retries: 0,
+            after,
         },
+        organ: arguments.organ.clone(),
+        design: arguments.design.map(Into::into),
         jaw_force: arguments.jaw_force,
+        schedule: arguments.schedule.as_ref().map(crate::cli::SolverName::schedule),
         threads: arguments.threads,
-        phantoms: arguments.phantoms.clone(),
     };
-    let run = simulation.run(&arguments.output, progress)?;
-    output::print(json, &run, |r: &CellRun| format!("{}\nreport {}", cell_text(r), r.report));
+    let result = match scene {
+        true => lift.run_scene(&name, &arguments.phantoms, &arguments.output, progress)?,
+        false => lift.run_specimen(&arguments.specimen, &arguments.output, progress)?,
+    };
+    output::print(json, &result, |r: &LiftResult| format!("{}\nreport {}", text(r), r.report));
     Ok(())
-}
-
-/// A run in the cell in a few lines for people.
-fn cell_text(run: &CellRun) -> String {
-    let s = &run.summary;
-    format!(
-        "{}: {} arm, {} at s = {:.2}, {} grasp, {} nodes held: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm: {}\n\
-         RCM deviation under load {:.3} mm median, {:.3} mm at most, {:.3} mm in the whole run; {:.3} mm before the grasp, {:.3} mm after; peaks of {:.2} N contact, {:.2} N constraint\n\
-         {} inverted at worst, smallest volume {:.0}% of rest; yields in {} substeps; {}\n\
-         {:.1} s simulated in {:.1} s ({:.2}x real time), state {}",
-        run.scene,
-        s.arm,
-        s.organ,
-        s.at,
-        s.design,
-        s.held_nodes,
-        s.lift_mm,
-        100.0 * s.follow_ratio,
-        s.slip_mm,
-        s.snap_mm,
-        if s.held { "held" } else { "NOT held" },
-        s.rcm_median_mm,
-        s.rcm_max_mm,
-        s.rcm_run_max_mm,
-        s.rcm_before_grasp_mm,
-        s.rcm_after_grasp_mm,
-        s.peak_contact_n,
-        s.peak_constraint_n,
-        s.inverted_peak,
-        100.0 * s.min_volume_ratio,
-        s.yielded_substeps,
-        s.divergence.as_deref().map_or("no divergence".to_owned(), |why| format!("DIVERGED: {why}")),
-        s.simulated_s,
-        s.wall_s,
-        s.real_time_factor,
-        s.state_hash
-    )
 }
 
 /// A run in a few lines for people.
-pub fn text(s: &Summary) -> String {
-    let mut text = figures(s);
-    if let Some(advice) = s.force_advice() {
-        text += &format!("\n{advice}");
+pub fn text(r: &LiftResult) -> String {
+    let s = &r.episode.summary;
+    let d = &s.details;
+    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
+    let mut text = format!(
+        "{}: {} at s = {:.2}, {} grasp, {} nodes held, jaws closed on {:.1} mm with {:.2} N{}: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm, activation step {:.3} mm: {}\n\
+         peaks of {:.2} N contact, {:.2} N constraint; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}",
+        r.episode.scene,
+        d.organ,
+        r.at,
+        d.design,
+        d.held_nodes,
+        d.gap_mm,
+        d.closing_force_n,
+        if s.attached { "" } else { " (nothing between them)" },
+        s.lift_mm,
+        100.0 * s.follow_ratio,
+        s.slip_mm,
+        d.snap_mm,
+        d.activation_step_mm,
+        if s.held { "held" } else { "NOT held" },
+        peak(|a| a.peak_contact_n),
+        peak(|a| a.peak_constraint_n),
+        d.settling.settled_speed_m_s,
+        d.settling.calmed_s,
+        d.settling.resting_speed_m_s,
+        d.inverted_rest,
+        s.inverted_peak,
+        100.0 * s.min_volume_ratio,
+        d.pin_drift_mm,
+        if s.diverged {
+            format!("DIVERGED: {}", s.end.as_ref().map_or(String::new(), ToString::to_string))
+        } else {
+            "no divergence".to_owned()
+        },
+    );
+    for arm in s.arms.iter().filter(|a| a.rcm_peak_mm > 0.0) {
+        text += &format!(
+            "\n{}: RCM deviation under load {:.3} mm median, {:.3} mm at most, {:.3} mm in the whole run",
+            arm.arm, arm.rcm_median_mm, arm.rcm_max_mm, arm.rcm_peak_mm
+        );
     }
-    if let Some(sever) = &s.sever {
+    if let Some(said) = s.suspensions() {
+        text += &format!("\nsuspensions of physics: {said}");
+    }
+    for said in [&s.why, &s.advice].into_iter().flatten() {
+        text += &format!("\n{said}");
+    }
+    if let Some(sever) = &d.sever {
         text += &format!("\n{}", cut(sever));
     }
-    text
+    text + &format!(
+        "\n{:.1} s simulated in {:.1} s ({:.2}x real time), state {}",
+        r.simulated_s, r.wall_s, r.real_time_factor, r.episode.state_hash
+    )
 }
 
 /// A cut in a few lines for people.
-fn cut(s: &Severance) -> String {
-    if s.pieces.is_empty() {
-        return s.said.clone();
+fn cut(s: &Severed) -> String {
+    let c = &s.cut;
+    if c.pieces.is_empty() {
+        return c.said.clone();
     }
-    let pieces: Vec<String> = s
+    let pieces: Vec<String> = c
         .pieces
         .iter()
         .map(|p| {
@@ -131,54 +121,20 @@ fn cut(s: &Severance) -> String {
         })
         .collect();
     format!(
-        "{}: s = {:.2} to {:.2}, {:.2} s into the run, {:.2} to {:.2} rad; volume {:.1} mm3 before, {:.1} after (off by {:.0e} of it); {} inverted; jaws went up {:.1} mm, tissue in them {:.1} mm: {}\n{}",
-        s.said,
-        s.at_least,
-        s.at_most,
+        "{}: s = {:.2} to {:.2}, {:.2} s into the episode, {:.2} to {:.2} rad; volume {:.1} mm3 before, {:.1} after (difference {:.0e}); {} inverted; jaws went up {:.1} mm, tissue in them {:.1} mm: {}\n{}",
+        c.said,
+        c.at_least,
+        c.at_most,
         s.time_s,
-        s.opened_rad,
-        s.closed_rad,
-        s.volume_before_mm3,
-        s.volume_after_mm3,
-        s.volume_error,
-        s.inverted_after.max(s.inverted_peak),
+        c.opened_rad,
+        c.closed_rad,
+        c.volume_before_mm3,
+        c.volume_after_mm3,
+        c.volume_error,
+        c.inverted_after.max(s.inverted_peak),
         s.jaw_rise_mm,
         s.held_rise_mm,
         if s.held { "held" } else { "NOT held" },
         pieces.join("\n")
-    )
-}
-
-/// The lift in figures.
-fn figures(s: &Summary) -> String {
-    format!(
-        "{} at s = {:.2}, {} grasp, {} nodes held, jaws closed on {:.1} mm with {:.2} N{}: lift {:.2} mm (follows {:.0}%), slip {:.3} mm, snap {:.3} mm: {}\n\
-         {:.4} m/s after 1 s, calmed for {:.2} s to {:.4} m/s, peak {:.3} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {} mm; {}\n\
-         {:.1} s simulated in {:.1} s ({:.2}x real time), state {}",
-        s.organ,
-        s.at,
-        s.design,
-        s.held_nodes,
-        s.gap_mm,
-        s.closing_force_n,
-        if s.attached { "" } else { " (nothing between them)" },
-        s.lift_mm,
-        100.0 * s.follow_ratio,
-        s.slip_mm,
-        s.snap_mm,
-        if s.held { "held" } else { "NOT held" },
-        s.settled_speed_m_s,
-        s.calmed_s,
-        s.resting_speed_m_s,
-        s.peak_speed_m_s,
-        s.inverted_rest,
-        s.inverted_peak,
-        100.0 * s.min_volume_ratio,
-        s.pin_drift_mm,
-        s.divergence.as_deref().map_or("no divergence".to_owned(), |why| format!("DIVERGED: {why}")),
-        s.simulated_s,
-        s.wall_s,
-        s.real_time_factor,
-        s.state_hash
     )
 }

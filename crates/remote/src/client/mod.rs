@@ -15,9 +15,9 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// How often pings are looked for between requests. Python's servers give up 20 s after one.
-const TEND: Duration = Duration::from_millis(500);
-/// What a RoboArena server answers to a reset.
+/// Interval at which pings are answered between requests. Python's servers wait 20 s for an answer.
+const PING_INTERVAL: Duration = Duration::from_millis(500);
+/// The reply of a RoboArena server to a reset.
 const RESET_DONE: &str = "reset successful";
 
 /// An answer to an observation.
@@ -25,15 +25,15 @@ const RESET_DONE: &str = "reset successful";
 pub struct Reply {
     /// The chunk of actions.
     pub actions: Actions,
-    /// What the server says that the policy took [ms].
+    /// Time of the policy as reported by the server (ms).
     pub server_ms: Option<f64>,
-    /// From packing the observation to having the actions [ms].
+    /// Time from the observation to the actions, packing included (ms).
     pub round_trip_ms: f64,
     /// The reply's other fields.
     pub fields: Map,
 }
 
-/// A connection, or why there is none any more.
+/// A connection, or the reason why it was lost.
 enum Link {
     Open(Box<Socket>),
     Lost(String),
@@ -41,15 +41,16 @@ enum Link {
 
 /// A client of a policy server.
 ///
-/// A request is sent once: a policy may keep a history, so after an error of the connection only [`Client::reconnect`] or
-/// [`Client::reset`] bring it back. Replies that are whole but wrong (malformed, not finite, ...) leave the connection as it is.
+/// A request is sent once, because a policy may keep a history. After a connection error only
+/// [`Client::reconnect`] or [`Client::reset`] connect again. A complete but invalid reply
+/// (malformed, not finite, ...) leaves the connection open.
 pub struct Client {
     endpoint: Endpoint,
     url: String,
     link: Arc<Mutex<Link>>,
     metadata: Map,
     dialect: Dialect,
-    keeper: Option<(Sender<()>, JoinHandle<()>)>,
+    ping_thread: Option<(Sender<()>, JoinHandle<()>)>,
 }
 
 impl std::fmt::Debug for Client {
@@ -59,37 +60,38 @@ impl std::fmt::Debug for Client {
 }
 
 impl Client {
-    /// Connects, and waits for the server's metadata.
+    /// Connects and waits for the server's metadata.
     ///
     /// # Errors
-    /// [`Error::Endpoint`], [`Error::CannotConnect`], [`Error::KeyRefused`], [`Error::Handshake`], [`Error::Tls`],
-    /// [`Error::TimedOut`], [`Error::Closed`], [`Error::Server`], [`Error::TooLarge`], [`Error::Protocol`],
-    /// [`Error::Interrupted`], and those of [`unpack`] for the metadata.
+    /// [`Error::Endpoint`], [`Error::CannotConnect`], [`Error::KeyRefused`], [`Error::Handshake`],
+    /// [`Error::Tls`], [`Error::TimedOut`], [`Error::Closed`], [`Error::Server`],
+    /// [`Error::TooLarge`], [`Error::Protocol`], [`Error::Interrupted`], and those of [`unpack`]
+    /// for the metadata.
     pub fn connect(endpoint: &Endpoint) -> Result<Self> {
         let (socket, metadata) = dial(endpoint)?;
         let dialect = dialect_of(endpoint, &metadata);
         let link = Arc::new(Mutex::new(Link::Open(Box::new(socket))));
-        let keeper = keep(Arc::clone(&link))?;
+        let ping_thread = answer_pings(Arc::clone(&link))?;
         let url = endpoint.shown();
-        Ok(Self { endpoint: endpoint.clone(), url, link, metadata, dialect, keeper: Some(keeper) })
+        Ok(Self { endpoint: endpoint.clone(), url, link, metadata, dialect, ping_thread: Some(ping_thread) })
     }
 
-    /// What the server said of itself when it was connected to.
+    /// The metadata that the server sent after the connection.
     pub fn metadata(&self) -> &Map {
         &self.metadata
     }
 
-    /// What the server understands; never [`Dialect::Auto`].
+    /// The protocol of the server; never [`Dialect::Auto`].
     pub fn dialect(&self) -> Dialect {
         self.dialect
     }
 
-    /// The server's address, without passwords.
+    /// The server's label or address, without passwords.
     pub fn url(&self) -> &str {
         &self.url
     }
 
-    /// What a RoboArena server asks for; none where it is another server.
+    /// The requirements of a RoboArena server; `None` for other servers.
     ///
     /// # Errors
     /// As [`ServerConfig::from_metadata`].
@@ -100,13 +102,14 @@ impl Client {
         ServerConfig::from_metadata(&self.metadata).map(Some).map_err(|e| e.within(&format!("{}: metadata", self.url)))
     }
 
-    /// Sends an observation and waits for the chunk of actions.
+    /// Sends an observation and waits for a chunk of actions.
     ///
     /// # Errors
-    /// Those of [`pack`] for the observation; [`Error::TimedOut`], [`Error::Closed`], [`Error::Server`], [`Error::TooLarge`],
-    /// [`Error::Protocol`] and [`Error::Interrupted`], which end the connection; those of [`unpack`] and
-    /// [`Error::WrongField`], [`Error::WrongDimension`], [`Error::EmptyChunk`], [`Error::LongChunk`], [`Error::NotFinite`] for the
-    /// reply; [`Error::NotConnected`] after an earlier one.
+    /// Those of [`pack`] for the observation; [`Error::TimedOut`], [`Error::Closed`],
+    /// [`Error::Server`], [`Error::TooLarge`], [`Error::Protocol`] and [`Error::Interrupted`],
+    /// which end the connection; those of [`unpack`] and [`Error::WrongField`],
+    /// [`Error::WrongDimension`], [`Error::EmptyChunk`], [`Error::LongChunk`], [`Error::NotFinite`]
+    /// for the reply; [`Error::NotConnected`] after an earlier one.
     pub fn infer(&mut self, observation: &Observation) -> Result<Reply> {
         let start = Instant::now();
         let request = self.request(observation, "infer")?;
@@ -129,8 +132,8 @@ impl Client {
         Ok(Reply { actions, server_ms, round_trip_ms: start.elapsed().as_secs_f64() * 1e3, fields })
     }
 
-    /// Begins an episode: connects anew where the connection was lost, and tells a RoboArena server, with `info` (such as its
-    /// `session_id`), to forget the last one. openpi's protocol has no such message.
+    /// Starts an episode: reconnects if the connection was lost, and resets a RoboArena server with
+    /// `info` (such as `session_id`). openpi's protocol has no such message.
     ///
     /// # Errors
     /// As [`Client::connect`] and [`Client::infer`].
@@ -145,17 +148,17 @@ impl Client {
         match self.exchange(request, "a reset")? {
             Incoming::Text(text) if text.trim_start().starts_with(RESET_DONE) => Ok(()),
             Incoming::Text(text) => Err(self.lose(server_error(&self.url, &text))),
-            // Servers made after RoboArena's answer in their own ways.
+            // Servers derived from RoboArena's send other replies.
             Incoming::Binary(_) => Ok(()),
         }
     }
 
-    /// Whether the connection was good when it was last looked at.
+    /// Whether the connection was open at its last use.
     pub fn is_connected(&self) -> bool {
         matches!(*self.lock(), Link::Open(_))
     }
 
-    /// Connects anew, with new metadata.
+    /// Connects again and reads new metadata.
     ///
     /// # Errors
     /// As [`Client::connect`].
@@ -163,7 +166,7 @@ impl Client {
         if let Link::Open(old) = &mut *self.lock() {
             old.close();
         }
-        *self.lock() = Link::Lost("it was given up for another".into());
+        *self.lock() = Link::Lost("it was replaced by a new connection".into());
         let (socket, metadata) = dial(&self.endpoint)?;
         self.dialect = dialect_of(&self.endpoint, &metadata);
         self.metadata = metadata;
@@ -171,7 +174,7 @@ impl Client {
         Ok(())
     }
 
-    /// A message of `map`, with RoboArena's `endpoint` where it is needed.
+    /// Packs `map`, with the field `endpoint` for a RoboArena server.
     fn request(&self, map: &Map, endpoint: &str) -> Result<Vec<u8>> {
         if self.dialect != Dialect::RoboArena {
             return pack(map).map_err(|e| e.within("observation"));
@@ -181,7 +184,7 @@ impl Client {
         pack(&map).map_err(|e| e.within("observation"))
     }
 
-    /// Sends a message and waits for the next one.
+    /// Sends a message and waits for the reply.
     fn exchange(&mut self, request: Vec<u8>, what: &'static str) -> Result<Incoming> {
         let wait = Wait::new(what, self.endpoint.timeouts.infer);
         let mut link = self.lock();
@@ -189,13 +192,13 @@ impl Client {
             Link::Lost(reason) => {
                 return Err(Error::NotConnected { url: self.url.clone(), reason: reason.clone() });
             }
-            // What came before the request is no answer to it.
+            // A message from before the request is not its reply.
             Link::Open(socket) => {
-                socket.tend().and_then(|()| socket.send(request, wait)).and_then(|()| socket.receive(wait))
+                socket.read_pending().and_then(|()| socket.send(request, wait)).and_then(|()| socket.receive(wait))
             }
         };
         if let Err(e) = &outcome {
-            // A late answer must not be taken for that of the next request.
+            // A late reply must not be taken for the reply to the next request.
             *link = Link::Lost(e.to_string());
         }
         outcome
@@ -214,7 +217,7 @@ impl Client {
 
 impl Drop for Client {
     fn drop(&mut self) {
-        if let Some((sender, thread)) = self.keeper.take() {
+        if let Some((sender, thread)) = self.ping_thread.take() {
             drop(sender);
             let _ = thread.join();
         }
@@ -228,14 +231,14 @@ fn lock(link: &Mutex<Link>) -> MutexGuard<'_, Link> {
     link.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Answers the server's pings between requests, however long the simulation takes for its frames.
-fn keep(link: Arc<Mutex<Link>>) -> Result<(Sender<()>, JoinHandle<()>)> {
+/// Starts a thread that answers the server's pings between requests, which may be long apart.
+fn answer_pings(link: Arc<Mutex<Link>>) -> Result<(Sender<()>, JoinHandle<()>)> {
     let (sender, receiver) = mpsc::channel::<()>();
     let work = move || {
-        while receiver.recv_timeout(TEND) == Err(RecvTimeoutError::Timeout) {
+        while receiver.recv_timeout(PING_INTERVAL) == Err(RecvTimeoutError::Timeout) {
             let mut link = lock(&link);
             if let Link::Open(socket) = &mut *link
-                && let Err(e) = socket.tend()
+                && let Err(e) = socket.read_pending()
             {
                 *link = Link::Lost(e.to_string());
             }
@@ -251,19 +254,19 @@ fn dialect_of(endpoint: &Endpoint, metadata: &Map) -> Dialect {
     match endpoint.dialect {
         Dialect::Auto if ServerConfig::is_in(metadata) => Dialect::RoboArena,
         Dialect::Auto => Dialect::OpenPi,
-        told => told,
+        chosen => chosen,
     }
 }
 
-/// Connects, with as many attempts as it takes and are allowed.
+/// Connects, with repeated attempts.
 fn dial(endpoint: &Endpoint) -> Result<(Socket, Map)> {
     let (uri, key) = endpoint.parts()?;
-    let mut pause = endpoint.retry.first;
+    let mut pause = endpoint.retry.first_pause;
     let mut attempt = 1;
     let (socket, first) = loop {
         match Socket::connect(endpoint, &uri, key.as_ref()) {
             Err(Error::CannotConnect { .. }) if attempt < endpoint.retry.attempts => {
-                rest(endpoint, pause.min(endpoint.retry.most))?;
+                pause_for(endpoint, pause.min(endpoint.retry.max_pause))?;
                 pause = pause.saturating_mul(2);
                 attempt += 1;
             }
@@ -278,12 +281,12 @@ fn dial(endpoint: &Endpoint) -> Result<(Socket, Map)> {
     let place = format!("{url}: metadata");
     match unpack(&bytes).map_err(|e| e.within(&place))? {
         Value::Map(metadata) => Ok((socket, metadata)),
-        other => Err(Error::WrongField { at: place, reason: format!("must be a map, is {}", other.kind()) }),
+        other => Err(Error::WrongField { at: place, reason: format!("must be a map, not {}", other.kind()) }),
     }
 }
 
-/// Waits, unless interrupted.
-fn rest(endpoint: &Endpoint, pause: Duration) -> Result<()> {
+/// Sleeps, unless interrupted.
+fn pause_for(endpoint: &Endpoint, pause: Duration) -> Result<()> {
     let start = Instant::now();
     loop {
         if endpoint.interrupted() {
@@ -293,6 +296,6 @@ fn rest(endpoint: &Endpoint, pause: Duration) -> Result<()> {
         if left.is_zero() {
             return Ok(());
         }
-        std::thread::sleep(left.min(stream::GLANCE));
+        std::thread::sleep(left.min(stream::POLL_INTERVAL));
     }
 }

@@ -1,6 +1,7 @@
-//! A WebSocket to a server: connecting, sending, receiving, each until a deadline, and what their failures are called.
+//! A WebSocket connection: connects, sends and receives, each until a deadline, and maps failures
+//! to errors.
 
-use super::stream::{Control, GLANCE, Halt, Timed};
+use super::stream::{Control, Halt, POLL_INTERVAL, Timed};
 use crate::endpoint::Endpoint;
 use crate::error::{Error, Result, one_line};
 use std::net::{TcpStream, ToSocketAddrs};
@@ -14,12 +15,12 @@ use tungstenite::protocol::{CloseFrame, WebSocketConfig, frame::coding::CloseCod
 use tungstenite::stream::MaybeTlsStream;
 use tungstenite::{Bytes, Message, WebSocket};
 
-/// Longest that is read between requests from a server that always has something to say.
-const FLOOD: Duration = Duration::from_millis(100);
-/// Most of a traceback that is kept [bytes].
-const TRACEBACK: usize = 64 << 10;
+/// Maximum time to read between requests from a server that sends without a pause.
+const MAX_PENDING_READ: Duration = Duration::from_millis(100);
+/// Maximum kept size of a traceback (bytes).
+const MAX_TRACEBACK: usize = 64 << 10;
 
-/// A wait: what for, and until when.
+/// The purpose and the deadline of a wait.
 #[derive(Clone, Copy)]
 pub(crate) struct Wait {
     pub what: &'static str,
@@ -30,13 +31,13 @@ pub(crate) struct Wait {
 impl Wait {
     pub fn new(what: &'static str, allowed: Duration) -> Self {
         let now = Instant::now();
-        // A hundred years are for ever; more may not fit.
+        // 100 years, if the duration does not fit.
         let deadline = now.checked_add(allowed).unwrap_or(now + Duration::from_secs(3_200_000_000));
         Self { what, allowed, deadline }
     }
 
-    /// The same wait for something else.
-    fn now_for(self, what: &'static str) -> Self {
+    /// The same deadline with another purpose.
+    fn with_purpose(self, what: &'static str) -> Self {
         Self { what, ..self }
     }
 
@@ -45,7 +46,7 @@ impl Wait {
     }
 }
 
-/// What a server sends.
+/// A message of the server.
 pub(crate) enum Incoming {
     Binary(Bytes),
     Text(String),
@@ -60,13 +61,13 @@ pub(crate) struct Socket {
 }
 
 impl Socket {
-    /// One attempt to connect; gives the first message too, which is the server's metadata.
+    /// Attempts to connect once. Also returns the first message, the server's metadata.
     pub fn connect(endpoint: &Endpoint, uri: &Uri, key: Option<&HeaderValue>) -> Result<(Self, Incoming)> {
         let url = endpoint.shown();
         let wait = Wait::new("a connection", endpoint.timeouts.connect);
-        let tcp = reach(endpoint, uri, &url, wait)?;
-        let wait = wait.now_for("the WebSocket handshake");
-        // Small messages are not held back for larger ones.
+        let tcp = connect_tcp(endpoint, uri, &url, wait)?;
+        let wait = wait.with_purpose("the WebSocket handshake");
+        // Sends small messages at once (no Nagle delay).
         let _ = tcp.set_nodelay(true);
         let (stream, control) = Timed::new(tcp, wait.deadline, endpoint.interrupt.clone());
         let mut request = uri.clone().into_client_request().map_err(|e| handshake(&url, &e.to_string()))?;
@@ -75,7 +76,7 @@ impl Socket {
         }
         let limit = endpoint.max_message;
         let config = WebSocketConfig::default().max_message_size(Some(limit)).max_frame_size(Some(limit));
-        // A process can have one provider only; any will do.
+        // A process can have only one provider; any is fine.
         #[cfg(feature = "rustls")]
         let _ = rustls::crypto::ring::default_provider().install_default();
         #[cfg(feature = "rustls")]
@@ -88,7 +89,7 @@ impl Socket {
             Err(HandshakeError::Failure(e)) => return Err(refusal(e, &url, limit, key.is_some(), wait)),
         };
         let mut socket = Self { web, control, url, limit };
-        match socket.receive(wait.now_for("the server's metadata")) {
+        match socket.receive(wait.with_purpose("the server's metadata")) {
             Ok(first) => Ok((socket, first)),
             Err(e) => Err(e),
         }
@@ -108,22 +109,23 @@ impl Socket {
                 Ok(Message::Binary(bytes)) => return Ok(Incoming::Binary(bytes)),
                 Ok(Message::Text(text)) => return Ok(Incoming::Text(text.as_str().to_owned())),
                 Ok(Message::Close(frame)) => return Err(closed(&self.url, wait.what, frame.as_ref())),
-                // Pings are answered by the crate with the next read.
+                // tungstenite answers pings with the next read.
                 Ok(Message::Ping(_) | Message::Pong(_) | Message::Frame(_)) => {}
                 Err(e) => return Err(failure(e, &self.url, self.limit, wait)),
             }
         }
     }
 
-    /// Answers pings and learns of a close, without waiting. Between requests nothing else may come.
-    pub fn tend(&mut self) -> Result<()> {
+    /// Answers pings and notices a close, without waiting. Any other message between requests is an
+    /// error.
+    pub fn read_pending(&mut self) -> Result<()> {
         let wait = Wait::new("a request", Duration::from_millis(1));
-        let end = Instant::now() + FLOOD;
+        let end = Instant::now() + MAX_PENDING_READ;
         self.control.at_once(end);
         loop {
             let read = self.web.read();
             if Instant::now() >= end {
-                let reason = "it sends without a pause and lets no request through".into();
+                let reason = "the server sends without a pause".into();
                 return Err(Error::Protocol { url: self.url.clone(), reason });
             }
             match read {
@@ -131,7 +133,7 @@ impl Socket {
                 Ok(Message::Close(frame)) => return Err(closed(&self.url, wait.what, frame.as_ref())),
                 Ok(Message::Text(text)) => return Err(server_error(&self.url, text.as_str())),
                 Ok(Message::Binary(_)) => {
-                    let reason = "a message that nobody asked for".into();
+                    let reason = "a message without a request".into();
                     return Err(Error::Protocol { url: self.url.clone(), reason });
                 }
                 Err(tungstenite::Error::Io(e)) if e.kind() == std::io::ErrorKind::WouldBlock => return Ok(()),
@@ -140,7 +142,7 @@ impl Socket {
         }
     }
 
-    /// Says goodbye, briefly.
+    /// Closes the connection, within 100 ms.
     pub fn close(&mut self) {
         self.control.until(Instant::now() + Duration::from_millis(100));
         let _ = self.web.close(None);
@@ -148,8 +150,9 @@ impl Socket {
     }
 }
 
-/// A TCP connection. Names are resolved and addresses tried on a thread of its own, because neither can be interrupted.
-fn reach(endpoint: &Endpoint, uri: &Uri, url: &str, wait: Wait) -> Result<TcpStream> {
+/// Opens a TCP connection. Another thread resolves the name and tries the addresses, because
+/// neither can be interrupted.
+fn connect_tcp(endpoint: &Endpoint, uri: &Uri, url: &str, wait: Wait) -> Result<TcpStream> {
     let cannot = |reason: String| Error::CannotConnect { url: url.to_owned(), reason };
     let host = uri.host().unwrap_or("").trim_start_matches('[').trim_end_matches(']').to_owned();
     let port = uri.port_u16().unwrap_or(if uri.scheme_str() == Some("wss") { 443 } else { 80 });
@@ -166,17 +169,17 @@ fn reach(endpoint: &Endpoint, uri: &Uri, url: &str, wait: Wait) -> Result<TcpStr
             }
             Err(last)
         });
-        // Nobody listens any more after an interruption.
+        // The receiver is gone after an interruption.
         let _ = sender.send(outcome);
     };
     std::thread::Builder::new().name("connect".into()).spawn(try_all).map_err(|e| cannot(one_line(&e.to_string())))?;
     loop {
         let left = wait.deadline.saturating_duration_since(Instant::now());
-        match receiver.recv_timeout(left.min(GLANCE)) {
+        match receiver.recv_timeout(left.min(POLL_INTERVAL)) {
             Ok(Ok(socket)) => return Ok(socket),
             Ok(Err(e)) if e.kind() == std::io::ErrorKind::TimedOut => return Err(wait.timed_out(url)),
             Ok(Err(e)) => return Err(cannot(one_line(&e.to_string()))),
-            Err(RecvTimeoutError::Disconnected) => return Err(cannot("the attempt was given up".into())),
+            Err(RecvTimeoutError::Disconnected) => return Err(cannot("the attempt ended without a result".into())),
             Err(RecvTimeoutError::Timeout) if endpoint.interrupted() => return Err(Error::Interrupted),
             Err(RecvTimeoutError::Timeout) if left.is_zero() => return Err(wait.timed_out(url)),
             Err(RecvTimeoutError::Timeout) => {}
@@ -188,49 +191,49 @@ fn handshake(url: &str, reason: &str) -> Error {
     Error::Handshake { url: url.into(), reason: one_line(reason) }
 }
 
-/// Why there was no WebSocket.
+/// The error of a failed handshake.
 fn refusal(e: tungstenite::Error, url: &str, limit: usize, with_key: bool, wait: Wait) -> Error {
     match e {
         tungstenite::Error::Http(response) => {
             let status = response.status();
             let body = response.body().as_deref().map(String::from_utf8_lossy).unwrap_or_default();
-            let said = one_line(body.lines().next().unwrap_or(""));
-            let said = if said.is_empty() { status.to_string() } else { format!("{status}: {said}") };
+            let answer = one_line(body.lines().next().unwrap_or(""));
+            let answer = if answer.is_empty() { status.to_string() } else { format!("{status}: {answer}") };
             match status.as_u16() {
                 401 | 403 => {
-                    let reason = if with_key { said } else { format!("{said}; no key was sent") };
+                    let reason = if with_key { answer } else { format!("{answer}; no key was sent") };
                     Error::KeyRefused { url: url.into(), reason }
                 }
-                502..=504 => Error::CannotConnect { url: url.into(), reason: said },
-                300..=399 => handshake(url, &format!("{said}; redirections are not followed")),
-                _ => handshake(url, &said),
+                502..=504 => Error::CannotConnect { url: url.into(), reason: answer },
+                300..=399 => handshake(url, &format!("{answer}; redirects are not followed")),
+                _ => handshake(url, &answer),
             }
         }
         tungstenite::Error::Protocol(ProtocolError::HandshakeIncomplete) => {
-            handshake(url, "the connection was closed within the handshake")
+            handshake(url, "the connection was closed during the handshake")
         }
         tungstenite::Error::Capacity(CapacityError::TooManyHeaders) => handshake(url, "too many headers"),
-        tungstenite::Error::AttackAttempt => handshake(url, "a header that is too long or comes in crumbs"),
+        tungstenite::Error::AttackAttempt => handshake(url, "a header is too long or in too many parts"),
         tungstenite::Error::Protocol(e) => handshake(url, &e.to_string()),
         e => failure(e, url, limit, wait),
     }
 }
 
-/// What a failure of a connection is called.
+/// The error of a failed connection.
 fn failure(e: tungstenite::Error, url: &str, limit: usize, wait: Wait) -> Error {
     let closed = |reason: &str| Error::Closed { url: url.into(), what: wait.what, reason: one_line(reason) };
     match e {
         tungstenite::Error::Io(e) => match e.get_ref().and_then(|inner| inner.downcast_ref::<Halt>()) {
             Some(Halt::TimedOut) => wait.timed_out(url),
             Some(Halt::Interrupted) => Error::Interrupted,
-            // rustls speaks through I/O errors too.
+            // rustls reports its errors as I/O errors.
             None if e.kind() == std::io::ErrorKind::InvalidData => {
                 Error::Tls { url: url.into(), reason: one_line(&e.to_string()) }
             }
             None => closed(&e.to_string()),
         },
-        tungstenite::Error::ConnectionClosed | tungstenite::Error::AlreadyClosed => closed("without a reason"),
-        tungstenite::Error::Protocol(ProtocolError::ResetWithoutClosingHandshake) => closed("without a close frame"),
+        tungstenite::Error::ConnectionClosed | tungstenite::Error::AlreadyClosed => closed("no reason given"),
+        tungstenite::Error::Protocol(ProtocolError::ResetWithoutClosingHandshake) => closed("no close frame"),
         tungstenite::Error::Capacity(CapacityError::MessageTooLong { size, .. }) => {
             Error::TooLarge { url: url.into(), size, limit }
         }
@@ -239,10 +242,11 @@ fn failure(e: tungstenite::Error, url: &str, limit: usize, wait: Wait) -> Error 
     }
 }
 
-/// What a close frame says. 1008 and those around 4401 are how gateways refuse a key after the handshake.
+/// The error of a close frame. Gateways refuse a key after the handshake by 1008, 3000, 3003, 4401
+/// or 4403.
 fn closed(url: &str, what: &'static str, frame: Option<&CloseFrame>) -> Error {
     let Some(frame) = frame else {
-        return Error::Closed { url: url.into(), what, reason: "without a reason".into() };
+        return Error::Closed { url: url.into(), what, reason: "no reason given".into() };
     };
     let code = u16::from(frame.code);
     let reason = one_line(&format!("{code} {}", frame.reason.as_str()));
@@ -252,15 +256,15 @@ fn closed(url: &str, what: &'static str, frame: Option<&CloseFrame>) -> Error {
     Error::Closed { url: url.into(), what, reason }
 }
 
-/// The error of a text message, which is a traceback: its last line, and where that was raised.
+/// The error of a text message, which is a traceback: its last line and its innermost place.
 pub(crate) fn server_error(url: &str, text: &str) -> Error {
-    let end = (0..=text.len().min(TRACEBACK)).rev().find(|i| text.is_char_boundary(*i)).unwrap_or(0);
+    let end = (0..=text.len().min(MAX_TRACEBACK)).rev().find(|i| text.is_char_boundary(*i)).unwrap_or(0);
     let traceback = text[..end].to_owned();
-    // A long one is cut at its end for keeping, but the end is what matters.
+    // The kept traceback is cut at its end, but the message needs the end.
     let mut lines = text.trim_end().lines().rev();
     let mut last = one_line(lines.next().unwrap_or(""));
     if last.is_empty() {
-        last = "it gave no reason".into();
+        last = "no reason given".into();
     }
     let place = text.trim_end().lines().rev().take(20_000).find(|l| l.trim_start().starts_with("File \""));
     if let Some(place) = place {

@@ -1,4 +1,5 @@
-//! A TCP stream whose reads and writes end by a deadline or an interruption, whatever the other side does.
+//! A TCP stream whose reads and writes end at a deadline or an interruption, whatever the peer
+//! does.
 
 use std::io::{self, Read, Write};
 use std::net::TcpStream;
@@ -6,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// How often an interruption is looked for.
-pub(crate) const GLANCE: Duration = Duration::from_millis(20);
+/// Interval at which the interruption flag is checked.
+pub(crate) const POLL_INTERVAL: Duration = Duration::from_millis(20);
 
 /// Why a stream stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
@@ -15,41 +16,42 @@ pub(crate) enum Halt {
     /// The deadline passed.
     #[error("the deadline passed")]
     TimedOut,
-    /// The flag was set.
+    /// The interruption flag was set.
     #[error("interrupted")]
     Interrupted,
 }
 
-/// How long operations may last.
+/// The time limit of operations.
 #[derive(Clone, Copy, Debug)]
-enum Patience {
-    /// Until then.
+enum Limit {
+    /// They may wait until the deadline.
     Until(Instant),
-    /// What is not there at once is not waited for; what never ends is read until then.
+    /// They do not wait; a stream of data without end is read until the deadline.
     AtOnce(Instant),
 }
 
-/// The way to a stream that has been put into a WebSocket.
+/// Sets the limit of a stream that a WebSocket owns.
 #[derive(Clone, Debug)]
-pub(crate) struct Control(Arc<Mutex<Patience>>);
+pub(crate) struct Control(Arc<Mutex<Limit>>);
 
 impl Control {
-    /// Operations from here on end by `deadline`.
+    /// Later operations end at `deadline`.
     pub fn until(&self, deadline: Instant) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Patience::Until(deadline);
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Limit::Until(deadline);
     }
 
-    /// Operations from here on give [`io::ErrorKind::WouldBlock`] where they would wait, and end by `deadline` where there is always something.
+    /// Later operations return [`io::ErrorKind::WouldBlock`] instead of waiting, and end at
+    /// `deadline` if there is always data.
     pub fn at_once(&self, deadline: Instant) {
-        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Patience::AtOnce(deadline);
+        *self.0.lock().unwrap_or_else(PoisonError::into_inner) = Limit::AtOnce(deadline);
     }
 
-    fn now(&self) -> Patience {
+    fn now(&self) -> Limit {
         *self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// The stream.
+/// A stream with a time limit.
 #[derive(Debug)]
 pub(crate) struct Timed {
     socket: TcpStream,
@@ -58,33 +60,33 @@ pub(crate) struct Timed {
 }
 
 impl Timed {
-    /// Takes a blocking `socket`.
+    /// Wraps a blocking `socket`.
     pub fn new(socket: TcpStream, deadline: Instant, interrupt: Option<Arc<AtomicBool>>) -> (Self, Control) {
-        let control = Control(Arc::new(Mutex::new(Patience::Until(deadline))));
+        let control = Control(Arc::new(Mutex::new(Limit::Until(deadline))));
         (Self { socket, control: control.clone(), interrupt }, control)
     }
 
-    /// Repeats `operate` with the timeout that is left until it does something.
+    /// Repeats `operate` with the remaining timeout until it transfers data.
     fn wait(&mut self, mut operate: impl FnMut(&mut TcpStream, Duration) -> io::Result<usize>) -> io::Result<usize> {
         loop {
-            let patience = self.control.now();
-            // The flag and the deadline also end what always has something to read.
-            let left = match patience {
-                Patience::AtOnce(deadline) if Instant::now() < deadline => Duration::from_millis(1),
-                Patience::AtOnce(_) => Duration::ZERO,
-                Patience::Until(_) if self.interrupt.as_ref().is_some_and(|f| f.load(Ordering::Relaxed)) => {
+            let limit = self.control.now();
+            // Checked even if there is always data.
+            let left = match limit {
+                Limit::AtOnce(deadline) if Instant::now() < deadline => Duration::from_millis(1),
+                Limit::AtOnce(_) => Duration::ZERO,
+                Limit::Until(_) if self.interrupt.as_ref().is_some_and(|f| f.load(Ordering::Relaxed)) => {
                     return Err(io::Error::other(Halt::Interrupted));
                 }
-                Patience::Until(deadline) => deadline.saturating_duration_since(Instant::now()),
+                Limit::Until(deadline) => deadline.saturating_duration_since(Instant::now()),
             };
             if left.is_zero() {
                 return Err(io::Error::other(Halt::TimedOut));
             }
-            let pause = if self.interrupt.is_some() { left.min(GLANCE) } else { left };
+            let pause = if self.interrupt.is_some() { left.min(POLL_INTERVAL) } else { left };
             match operate(&mut self.socket, pause.max(Duration::from_millis(1))) {
                 Err(e) if e.kind() == io::ErrorKind::Interrupted => {}
                 Err(e) if matches!(e.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
-                    if matches!(patience, Patience::AtOnce(_)) {
+                    if matches!(limit, Limit::AtOnce(_)) {
                         return Err(io::ErrorKind::WouldBlock.into());
                     }
                 }

@@ -1,20 +1,21 @@
-//! Bytes to values. Nothing is allocated for what a header claims: only for bytes that are there.
+//! Decoding. Memory is allocated only for bytes that have arrived, never for sizes in headers.
 
-use super::{ARRAY, DEPTH, NUMBER, VALUES};
+use super::format::{ARRAY, MAX_DEPTH, MAX_VALUES, NUMBER};
 use crate::array::{Array, Dtype};
 use crate::error::{Error, Result, one_line};
 use crate::value::{Map, Value};
 use rmp::Marker;
 
-/// The value of a whole message.
+/// Decodes a message.
 ///
 /// # Errors
-/// [`Error::Malformed`], [`Error::TooDeep`], [`Error::TooMany`], [`Error::WrongDtype`], [`Error::WrongShape`].
+/// [`Error::Malformed`], [`Error::TooDeep`], [`Error::TooMany`], [`Error::WrongDtype`],
+/// [`Error::WrongShape`].
 pub fn unpack(bytes: &[u8]) -> Result<Value> {
-    let mut reader = Reader { bytes, at: 0, left: VALUES };
+    let mut reader = Reader { bytes, at: 0, left: MAX_VALUES };
     let value = reader.value(0)?;
     if reader.at < bytes.len() {
-        return reader.wrong(format!("{} bytes after the end of the message", bytes.len() - reader.at));
+        return reader.wrong(format!("{} bytes follow the end of the message", bytes.len() - reader.at));
     }
     Ok(value)
 }
@@ -22,7 +23,7 @@ pub fn unpack(bytes: &[u8]) -> Result<Value> {
 struct Reader<'a> {
     bytes: &'a [u8],
     at: usize,
-    /// Values that may still come.
+    /// Number of values that are still allowed.
     left: usize,
 }
 
@@ -40,7 +41,7 @@ impl<'a> Reader<'a> {
                 self.at += n;
                 Ok(taken)
             }
-            None => self.wrong(format!("{n} bytes expected, {} left", self.bytes.len() - self.at)),
+            None => self.wrong(format!("{n} bytes are expected; {} are left", self.bytes.len() - self.at)),
         }
     }
 
@@ -57,7 +58,7 @@ impl<'a> Reader<'a> {
     }
 
     fn value(&mut self, depth: usize) -> Result<Value> {
-        self.left = self.left.checked_sub(1).ok_or(Error::TooMany { at: String::new(), limit: VALUES })?;
+        self.left = self.left.checked_sub(1).ok_or(Error::TooMany { at: String::new(), limit: MAX_VALUES })?;
         let marker = Marker::from_u8(self.fixed::<1>()?[0]);
         Ok(match marker {
             Marker::Null => Value::Nil,
@@ -70,7 +71,7 @@ impl<'a> Reader<'a> {
             Marker::U32 => Value::Int(i64::from(u32::from_be_bytes(self.fixed()?))),
             Marker::U64 => match i64::try_from(u64::from_be_bytes(self.fixed()?)) {
                 Ok(n) => Value::Int(n),
-                Err(_) => return self.wrong("a whole number of 2^63 or more"),
+                Err(_) => return self.wrong("an integer of 2^63 or more"),
             },
             Marker::I8 => Value::Int(i64::from(self.fixed::<1>()?[0] as i8)),
             Marker::I16 => Value::Int(i64::from(i16::from_be_bytes(self.fixed()?))),
@@ -88,7 +89,7 @@ impl<'a> Reader<'a> {
                     Marker::Array16 => self.length(2)?,
                     _ => self.length(4)?,
                 };
-                self.room(n, 1, depth)?;
+                self.check_size(n, 1, depth)?;
                 let mut list = Vec::with_capacity(n.min(1024));
                 for i in 0..n {
                     list.push(self.value(depth + 1).map_err(|e| e.within(&i.to_string()))?);
@@ -101,26 +102,27 @@ impl<'a> Reader<'a> {
                     Marker::Map16 => self.length(2)?,
                     _ => self.length(4)?,
                 };
-                self.room(n, 2, depth)?;
+                self.check_size(n, 2, depth)?;
                 self.map(n, depth)?
             }
-            Marker::Reserved => return self.wrong("a byte that begins no value (0xc1)"),
+            Marker::Reserved => return self.wrong("a byte that starts no value (0xc1)"),
             // The extension types.
-            _ => return self.wrong("an extension type; none belongs to this protocol"),
+            _ => return self.wrong("an extension type; the protocol has none"),
         })
     }
 
-    /// Refuses a list or map of `n` items that take at least `each` bytes, before anything is made for it.
-    fn room(&self, n: usize, each: usize, depth: usize) -> Result<()> {
-        if depth >= DEPTH {
-            return Err(Error::TooDeep { at: String::new(), limit: DEPTH });
+    /// Refuses a list or map of `n` items of at least `each` bytes that cannot be in the message,
+    /// before memory is allocated for it.
+    fn check_size(&self, n: usize, each: usize, depth: usize) -> Result<()> {
+        if depth >= MAX_DEPTH {
+            return Err(Error::TooDeep { at: String::new(), limit: MAX_DEPTH });
         }
         let left = self.bytes.len() - self.at;
         if n > left / each {
-            return self.wrong(format!("{n} items expected, {left} bytes left"));
+            return self.wrong(format!("{n} items are expected; {left} bytes are left"));
         }
         if n > self.left {
-            return Err(Error::TooMany { at: String::new(), limit: VALUES });
+            return Err(Error::TooMany { at: String::new(), limit: MAX_VALUES });
         }
         Ok(())
     }
@@ -173,14 +175,14 @@ impl<'a> Reader<'a> {
             array |= binary && key == ARRAY;
             number |= binary && key == NUMBER;
             if !binary && (key == ARRAY || key == NUMBER) {
-                return self.wrong(format!("the key {key} as text; openpi's is a byte string"));
+                return self.wrong(format!("the key {key} is text; it must be a byte string"));
             }
             if binary && key == "nd" {
-                return self.wrong("an array of the package msgpack-numpy; openpi's has the key __ndarray__");
+                return self.wrong("an array of the package msgpack-numpy; it must have the key __ndarray__");
             }
             let value = self.value(depth + 1).map_err(|e| e.within(&key))?;
             if map.contains_key(&key) {
-                return self.wrong(format!("the key '{}' twice", one_line(&key)));
+                return self.wrong(format!("the key '{}' occurs twice", one_line(&key)));
             }
             map.insert(key, value);
         }
@@ -196,8 +198,8 @@ impl<'a> Reader<'a> {
 fn dtype_of(map: &mut Map, here: impl Fn(String) -> Error) -> Result<String> {
     match map.remove("dtype") {
         Some(Value::Text(name)) => Ok(name),
-        // Records are lists of fields.
-        Some(other) => Err(here(format!("an array's dtype that is {}, not text", other.kind()))),
+        // The dtype of a record is a list of fields.
+        Some(other) => Err(here(format!("an array's dtype is {}; it must be text", other.kind()))),
         None => Err(here("an array without dtype".into())),
     }
 }
@@ -205,27 +207,27 @@ fn dtype_of(map: &mut Map, here: impl Fn(String) -> Error) -> Result<String> {
 fn to_array(mut map: Map, here: impl Fn(String) -> Error) -> Result<Array> {
     let name = dtype_of(&mut map, &here)?;
     let Some((dtype, big_endian)) = Dtype::parse(&name) else {
-        let wanted = "truth values, whole numbers and floats of up to 8 bytes are taken";
+        let wanted = "must be boolean, integer or float of up to 8 bytes";
         return Err(Error::WrongDtype { at: String::new(), dtype: one_line(&name), wanted });
     };
     let mut bytes = match map.remove("data") {
         Some(Value::Bytes(bytes)) => bytes,
-        Some(other) => return Err(here(format!("an array's data that are {}, not bytes", other.kind()))),
+        Some(other) => return Err(here(format!("an array's data are {}; they must be bytes", other.kind()))),
         None => return Err(here("an array without data".into())),
     };
     let Some(Value::List(sides)) = map.remove("shape") else {
-        return Err(here("an array whose shape is missing or no list".into()));
+        return Err(here("an array's shape is missing or not a list".into()));
     };
     let mut shape = Vec::with_capacity(sides.len());
     for side in &sides {
         match side {
             Value::Int(n) if *n >= 0 => shape.push(usize::try_from(*n).unwrap_or(usize::MAX)),
-            _ => return Err(here("an array with a side that is no length".into())),
+            _ => return Err(here("an array's shape has a value that is not a length".into())),
         }
     }
-    // NumPy's own limit is 64.
+    // NumPy's limit is 64.
     if shape.len() > 64 {
-        return Err(here(format!("an array of {} dimensions", shape.len())));
+        return Err(here(format!("an array has {} dimensions; the maximum is 64", shape.len())));
     }
     if big_endian {
         bytes.chunks_exact_mut(dtype.size()).for_each(<[u8]>::reverse);
@@ -238,7 +240,7 @@ fn to_number(mut map: Map, here: impl Fn(String) -> Error) -> Result<Value> {
     match map.remove("data") {
         Some(value @ Value::Text(_)) if name.contains('U') => Ok(value),
         Some(value @ (Value::Bool(_) | Value::Int(_) | Value::Float(_))) if Dtype::parse(&name).is_some() => Ok(value),
-        Some(other) => Err(here(format!("a NumPy number of type '{}' that is {}", one_line(&name), other.kind()))),
+        Some(other) => Err(here(format!("a NumPy number of type '{}' is {}", one_line(&name), other.kind()))),
         None => Err(here("a NumPy number without data".into())),
     }
 }

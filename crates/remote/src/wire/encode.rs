@@ -1,34 +1,34 @@
-//! Values to bytes.
+//! Encoding.
 
-use super::ARRAY;
+use super::format::{ARRAY, MAX_DEPTH, MAX_VALUES};
 use crate::array::Array;
 use crate::error::{Error, Result};
 use crate::value::{Map, Value};
 use rmp::encode as msgpack;
 
-/// The message of a map, byte for byte what Python's packer makes of a dictionary in the order of its keys.
+/// Encodes a map, with the same bytes as Python's packer for a dictionary sorted by key.
 ///
 /// # Errors
-/// [`Error::TooDeep`] and [`Error::TooMany`] for what a server of this crate would not read either; [`Error::WrongField`] for text,
-/// bytes or lists of 4 GiB and more.
+/// [`Error::TooDeep`] and [`Error::TooMany`] beyond the limits of [`unpack`](crate::unpack);
+/// [`Error::WrongField`] for text, bytes or lists of 2^32 items and more.
 pub fn pack(map: &Map) -> Result<Vec<u8>> {
-    let mut writer = Writer { bytes: Vec::new(), left: super::VALUES - 1 };
+    let mut writer = Writer { bytes: Vec::new(), left: MAX_VALUES - 1 };
     writer.map(map, 1)?;
     Ok(writer.bytes)
 }
 
 struct Writer {
     bytes: Vec<u8>,
-    /// Values that may still come.
+    /// Number of values that are still allowed.
     left: usize,
 }
 
 impl Writer {
     fn value(&mut self, value: &Value, depth: usize) -> Result<()> {
-        let too_many = Error::TooMany { at: String::new(), limit: super::VALUES };
+        let too_many = Error::TooMany { at: String::new(), limit: MAX_VALUES };
         self.left = self.left.checked_sub(1).ok_or(too_many)?;
         let out = &mut self.bytes;
-        // Writing to memory cannot fail; what these functions return is only where it would have.
+        // Writing to memory cannot fail: the results are ignored.
         match value {
             Value::Nil => drop(msgpack::write_nil(out)),
             Value::Bool(b) => drop(msgpack::write_bool(out, *b)),
@@ -67,9 +67,9 @@ impl Writer {
     }
 
     fn array(&mut self, array: &Array, depth: usize) -> Result<()> {
-        // It is a map with a list in it, and is counted as that by who reads it.
+        // It counts as a map with a list in it, as in the decoder.
         deeper(depth + 1)?;
-        let too_many = Error::TooMany { at: String::new(), limit: super::VALUES };
+        let too_many = Error::TooMany { at: String::new(), limit: MAX_VALUES };
         self.left = self.left.checked_sub(4 + array.shape().len()).ok_or(too_many)?;
         let data = array.bytes();
         length(data.len())?;
@@ -92,10 +92,10 @@ impl Writer {
 }
 
 fn deeper(depth: usize) -> Result<()> {
-    if depth < super::DEPTH { Ok(()) } else { Err(Error::TooDeep { at: String::new(), limit: super::DEPTH }) }
+    if depth < MAX_DEPTH { Ok(()) } else { Err(Error::TooDeep { at: String::new(), limit: MAX_DEPTH }) }
 }
 
 fn length(n: usize) -> Result<u32> {
-    let reason = || format!("{n} bytes or items; MessagePack takes less than 2^32");
+    let reason = || format!("has {n} bytes or items; MessagePack allows less than 2^32");
     u32::try_from(n).map_err(|_| Error::WrongField { at: String::new(), reason: reason() })
 }

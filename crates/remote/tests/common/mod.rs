@@ -1,4 +1,4 @@
-//! Servers that misbehave, and messages written by hand.
+//! Misbehaving servers and hand-written messages.
 #![allow(dead_code, clippy::unwrap_used, reason = "helpers of tests; not every test uses all")]
 
 use std::io::{Read, Write};
@@ -16,7 +16,7 @@ pub struct Hostile {
 
 impl Drop for Hostile {
     fn drop(&mut self) {
-        // A test that failed may never have connected.
+        // A failed test may not have connected.
         if std::thread::panicking() {
             return;
         }
@@ -26,7 +26,8 @@ impl Drop for Hostile {
     }
 }
 
-/// Does `act` with the first connection. Reads of the server end after five seconds, so that no test hangs.
+/// Runs `act` with the first connection. Reads of the server end after five seconds, so that no
+/// test hangs.
 pub fn raw(act: impl FnOnce(TcpStream) + Send + 'static) -> Hostile {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let url = format!("ws://{}", listener.local_addr().unwrap());
@@ -38,12 +39,12 @@ pub fn raw(act: impl FnOnce(TcpStream) + Send + 'static) -> Hostile {
     Hostile { url, thread: Some(thread) }
 }
 
-/// The same after a WebSocket handshake.
+/// [`raw`] after a WebSocket handshake.
 pub fn web(act: impl FnOnce(WebSocket<TcpStream>) + Send + 'static) -> Hostile {
     raw(|socket| act(tungstenite::accept(socket).unwrap()))
 }
 
-/// The same after empty metadata were sent and a request was read; `act` gets the bare socket.
+/// [`web`] after empty metadata and a request; `act` gets the socket.
 pub fn after_request(act: impl FnOnce(WebSocket<TcpStream>) + Send + 'static) -> Hostile {
     web(|mut socket| {
         socket.send(Message::Binary(pack(&Map::new()).unwrap().into())).unwrap();
@@ -52,7 +53,7 @@ pub fn after_request(act: impl FnOnce(WebSocket<TcpStream>) + Send + 'static) ->
     })
 }
 
-/// Answers the first request with `reply`, and waits for the client to go.
+/// Answers the first request with `reply` and waits until the client closes.
 pub fn replies(reply: Vec<u8>) -> Hostile {
     after_request(|mut socket| {
         socket.send(Message::Binary(reply.into())).unwrap();
@@ -60,7 +61,7 @@ pub fn replies(reply: Vec<u8>) -> Hostile {
     })
 }
 
-/// Reads until the client goes.
+/// Reads until the client closes.
 pub fn linger(socket: &mut WebSocket<TcpStream>) {
     while socket.read().is_ok() {}
 }
@@ -76,7 +77,7 @@ pub fn head(socket: &mut TcpStream) {
     }
 }
 
-/// Answers the handshake with these bytes.
+/// Answers the handshake with `bytes`.
 pub fn answers(bytes: &'static [u8]) -> Hostile {
     raw(|mut socket| {
         head(&mut socket);
@@ -84,7 +85,7 @@ pub fn answers(bytes: &'static [u8]) -> Hostile {
     })
 }
 
-/// An endpoint of short waits.
+/// An endpoint with short timeouts.
 pub fn endpoint(url: &str) -> Endpoint {
     let mut endpoint = Endpoint::new(url);
     endpoint.timeouts.connect = Duration::from_millis(400);
@@ -93,7 +94,7 @@ pub fn endpoint(url: &str) -> Endpoint {
     endpoint
 }
 
-/// A small observation with all that one consists of.
+/// A small observation with all kinds of values.
 pub fn observation() -> Observation {
     let pixels: Vec<u8> = (0..4 * 5 * 3).collect();
     let images = Map::from([("cam_high".to_owned(), Array::from_u8(&[4, 5, 3], pixels).unwrap().into())]);
@@ -108,17 +109,17 @@ pub fn observation() -> Observation {
     ])
 }
 
-/// MessagePack text of less than 32 bytes.
+/// MessagePack of text of less than 32 bytes.
 pub fn text(text: &str) -> Vec<u8> {
     [&[0xa0 | text.len() as u8][..], text.as_bytes()].concat()
 }
 
-/// MessagePack bytes of less than 65536.
+/// MessagePack of less than 65536 bytes.
 pub fn bin(bytes: &[u8]) -> Vec<u8> {
     [&[0xc5][..], &(bytes.len() as u16).to_be_bytes(), bytes].concat()
 }
 
-/// MessagePack of a map of entries that are written already.
+/// MessagePack of a map of packed entries.
 pub fn map(entries: &[(Vec<u8>, Vec<u8>)]) -> Vec<u8> {
     let mut bytes = vec![0x80 | entries.len() as u8];
     entries.iter().for_each(|(k, v)| bytes.extend([k.as_slice(), v].concat()));
@@ -133,7 +134,7 @@ pub fn array(dtype: Vec<u8>, shape: &[u8], data: &[u8]) -> Vec<u8> {
     map(&entries)
 }
 
-/// A reply whose field `actions` is this.
+/// A reply with `value` as its field `actions`.
 pub fn actions(value: Vec<u8>) -> Vec<u8> {
     map(&[(text("actions"), value)])
 }

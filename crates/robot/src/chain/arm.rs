@@ -1,4 +1,4 @@
-//! What an arm is: its joints, limits and links, checked once.
+//! The description of an arm: joints, limits and links, validated on construction.
 
 use super::joints::{Joints, MAX_JOINTS};
 use super::mass::MassProperties;
@@ -7,28 +7,28 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_core::Pose;
 
-/// Standard gravity in a world with z up [m/s2], as most simulators have it.
+/// Gravity in a world with z up (m/s2), the value of most simulators.
 const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
-/// What a joint lets its link do.
+/// The motion of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum JointKind {
-    /// Turn about the axis; position in radians.
+    /// Rotation about the axis; the position is in radians.
     Revolute,
-    /// Slide along the axis; position in metres.
+    /// Translation along the axis; the position is in metres.
     Prismatic,
 }
 
-/// How far, how fast and how hard a joint may go. Infinite where nothing is known.
+/// Limits of a joint. Unknown ones are infinite.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct JointLimits {
-    /// Lowest and highest position [rad or m].
+    /// Minimum and maximum position (rad or m).
     pub position: [f64; 2],
-    /// Highest speed [rad/s or m/s].
+    /// Maximum speed (rad/s or m/s).
     pub velocity: f64,
-    /// Highest torque or force of the drive [N m or N].
+    /// Maximum torque or force of the drive (N m or N).
     pub effort: f64,
-    /// Highest acceleration that may be planned [rad/s2 or m/s2]. Nothing enforces it.
+    /// Maximum planned acceleration (rad/s2 or m/s2). It is not enforced.
     pub acceleration: f64,
 }
 
@@ -45,41 +45,43 @@ impl JointLimits {
 /// A joint with one degree of freedom.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Joint {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// What it lets its link do.
+    /// The motion.
     pub kind: JointKind,
-    /// Pose of its link in the parent's axes at position zero.
+    /// Pose of the joint's link in the parent's axes at position zero.
     pub placement: Pose,
-    /// Axis in its link's axes, through the link's origin. Any length but zero; kept as a unit vector.
+    /// Axis in the link's axes, through the link's origin. Any length but zero; stored as a unit
+    /// vector.
     pub axis: DVec3,
-    /// Its limits.
+    /// Limits.
     pub limits: JointLimits,
-    /// Inertia of the rotor as felt at the joint [kg m2, or kg].
+    /// Inertia of the rotor reflected to the joint (kg m2, or kg).
     pub armature: f64,
-    /// Viscous damping [N m s/rad, or N s/m].
+    /// Viscous damping (N m s/rad, or N s/m).
     pub damping: f64,
-    /// Coulomb friction, at rest and in motion [N m, or N].
+    /// Coulomb friction, at rest and in motion (N m, or N).
     pub friction: f64,
 }
 
-/// A joint and the link that it moves.
+/// A joint and its link.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
-    /// The link's name.
+    /// Name of the link.
     pub link: String,
-    /// What moves it.
+    /// The joint that moves the link.
     pub joint: Joint,
-    /// The link's mass, in its own axes.
+    /// Mass properties of the link, in its own axes.
     pub mass: MassProperties,
 }
 
-/// A chain of links, each moved by one joint, with a payload at its flange: a robot arm. Immutable; `with_*` make another one.
+/// A robot arm: a chain of links, each moved by one joint, with a payload at its flange. It is
+/// immutable; `with_*` return a changed copy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SerialArm {
     name: String,
     segments: Vec<Segment>,
-    /// Masses by link, the last with the payload.
+    /// Mass properties by link, the last with the payload.
     bodies: Vec<MassProperties>,
     payload: MassProperties,
     base: Pose,
@@ -89,17 +91,22 @@ pub struct SerialArm {
 }
 
 impl SerialArm {
-    /// An arm from its base outwards. `flange` is the pose of the flange in the last link's axes. The base is at the world's origin, gravity
-    /// 9.81 m/s2 along -z, the home posture zero or, where limits forbid that, the middle of the range.
+    /// An arm from its base outwards. `flange` is the pose of the flange in the last link's axes.
+    /// The base is at the world's origin, gravity is 9.81 m/s2 along -z, and the home posture is
+    /// zero or, outside the limits, the middle of the range.
     ///
     /// # Errors
-    /// No joint or more than [`MAX_JOINTS`]; an axis of no length; limits the wrong way round; a number that is negative or not finite where
-    /// it must not be; a body that cannot exist; links and armature so light that nothing resists a joint.
+    /// No joint or more than [`MAX_JOINTS`]; an axis of zero length; reversed limits; a number that
+    /// is negative or not finite; an impossible inertia; links and armature so light that the mass
+    /// matrix is singular.
     pub fn new(name: impl Into<String>, segments: Vec<Segment>, flange: Pose) -> Result<Self> {
         let name = name.into();
         let n = segments.len();
         if n == 0 || n > MAX_JOINTS {
-            return Err(Error::invalid(format!("arm '{name}'"), format!("{n} joints, must be 1 to {MAX_JOINTS}")));
+            return Err(Error::invalid(
+                format!("arm '{name}'"),
+                format!("has {n} joints; it must have 1 to {MAX_JOINTS}"),
+            ));
         }
         let mut segments = segments;
         for s in &mut segments {
@@ -125,22 +132,22 @@ impl SerialArm {
 
     fn checked(self) -> Result<Self> {
         if self.mass_matrix(&self.home).factor().is_none() {
-            let reason = "links and rotors are too light: the mass matrix is not positive definite at the home posture";
+            let reason = "the mass matrix is not positive definite in the home posture: links and rotors are too light";
             return Err(Error::invalid(format!("arm '{}'", self.name), reason));
         }
         Ok(self)
     }
 
-    /// The same arm with its base at `base` in the world.
+    /// This arm with its base at `base` in the world.
     ///
     /// # Errors
-    /// A pose that is not finite or whose rotation is none.
+    /// A pose that is not finite or whose rotation is not a unit quaternion.
     pub fn with_base(mut self, base: Pose) -> Result<Self> {
         self.base = check_pose(base, "base pose")?;
         Ok(self)
     }
 
-    /// The same arm under this gravity, in world axes [m/s2].
+    /// This arm under `gravity`, in world axes (m/s2).
     ///
     /// # Errors
     /// A vector that is not finite.
@@ -152,10 +159,10 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// The same arm with this fixed to its flange, in the flange's axes, in place of what was there.
+    /// This arm with another payload, in the flange's axes.
     ///
     /// # Errors
-    /// A body that cannot exist.
+    /// An impossible inertia.
     pub fn with_payload(mut self, payload: MassProperties) -> Result<Self> {
         payload.validate("payload")?;
         self.payload = payload;
@@ -163,20 +170,22 @@ impl SerialArm {
         self.checked()
     }
 
-    /// The same arm with another home posture: where it starts, and where [`SerialArm::inverse`] likes to have the elbow.
+    /// This arm with another home posture: the start, and the preferred posture of
+    /// [`SerialArm::inverse`].
     ///
     /// # Errors
-    /// Not a number a joint, or one beyond its limits.
+    /// Another number of joints, or a position outside the limits.
     pub fn with_home(mut self, home: &[f64]) -> Result<Self> {
         self.home = self.posture(home)?;
         Ok(self)
     }
 
-    /// The same arm with every link's mass and inertia times `links` and the payload's times `payload`: what a controller that is mistaken
-    /// believes. Rotors stay as they are.
+    /// This arm with the masses and inertias of its links scaled by `links` and those of the
+    /// payload by `payload`: the wrong model of a controller. Rotors are not scaled.
     ///
     /// # Errors
-    /// A factor that is not positive (the payload's may be zero) or so small that nothing resists a joint.
+    /// A factor that is not positive (the payload's may be zero), or so small that the mass matrix
+    /// is singular.
     pub fn with_mass_scaled(mut self, links: f64, payload: f64) -> Result<Self> {
         if !(links > 0.0 && links.is_finite() && payload >= 0.0 && payload.is_finite()) {
             return Err(Error::invalid("mass factor", "must be positive and finite"));
@@ -189,10 +198,11 @@ impl SerialArm {
         self.checked()
     }
 
-    /// The same arm with this Coulomb friction [N m or N] and viscous damping [N m s/rad or N s/m] in its joints.
+    /// This arm with other Coulomb friction (N m or N) and viscous damping (N m s/rad or N s/m) of
+    /// its joints.
     ///
     /// # Errors
-    /// Not a number a joint, or one that is negative or not finite.
+    /// Another number of joints, or a number that is negative or not finite.
     pub fn with_friction(mut self, friction: &[f64], damping: &[f64]) -> Result<Self> {
         self.check_count(friction.len(), "friction")?;
         self.check_count(damping.len(), "damping")?;
@@ -203,10 +213,10 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// The same arm with other limits.
+    /// This arm with other limits.
     ///
     /// # Errors
-    /// Not one a joint, or limits that [`SerialArm::new`] would refuse.
+    /// Another number of joints, or limits that [`SerialArm::new`] refuses.
     pub fn with_limits(mut self, limits: &[JointLimits]) -> Result<Self> {
         self.check_count(limits.len(), "limits")?;
         for (s, &l) in self.segments.iter_mut().zip(limits) {
@@ -219,7 +229,7 @@ impl SerialArm {
         Ok(self)
     }
 
-    /// Its name.
+    /// Name of the arm.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -244,12 +254,12 @@ impl SerialArm {
         self.flange
     }
 
-    /// Gravity in world axes [m/s2].
+    /// Gravity in world axes (m/s2).
     pub fn gravity(&self) -> DVec3 {
         self.gravity
     }
 
-    /// What is fixed to the flange, in its axes.
+    /// The payload, in the flange's axes.
     pub fn payload(&self) -> MassProperties {
         self.payload
     }
@@ -259,21 +269,21 @@ impl SerialArm {
         self.home
     }
 
-    /// Zeros, one a joint.
+    /// A zero for each joint.
     pub fn zeros(&self) -> Joints {
         Joints::zeros(self.dof())
     }
 
-    /// A posture of this arm.
+    /// A posture of this arm (rad or m).
     ///
     /// # Errors
-    /// Not a number a joint, one that is not finite or beyond its joint's limits.
+    /// Another number of joints, or a position that is not finite or outside the limits.
     pub fn posture(&self, q: &[f64]) -> Result<Joints> {
         self.check_count(q.len(), "posture")?;
         for (x, s) in q.iter().zip(&self.segments) {
             let [low, high] = s.joint.limits.position;
             if !(x.is_finite() && (low..=high).contains(x)) {
-                let reason = format!("a position of {x}, must be within {low} to {high}");
+                let reason = format!("its position is {x}; it must be in [{low}, {high}]");
                 return Err(Error::invalid(format!("joint '{}'", s.joint.name), reason));
             }
         }
@@ -283,14 +293,14 @@ impl SerialArm {
     /// A number for each joint of this arm.
     ///
     /// # Errors
-    /// Not a number a joint, or one that is not finite.
+    /// Another number of joints, or a number that is not finite.
     pub fn joints(&self, values: &[f64]) -> Result<Joints> {
         self.check_count(values.len(), "joint vector")?;
         let joints = Joints::new(values)?;
         if joints.is_finite() { Ok(joints) } else { Err(Error::NotFinite { what: "a joint's number" }) }
     }
 
-    /// Masses by link, the last with the payload.
+    /// Mass properties by link, the last with the payload.
     pub(super) fn bodies(&self) -> &[MassProperties] {
         &self.bodies
     }
@@ -299,7 +309,7 @@ impl SerialArm {
         if count == self.dof() {
             return Ok(());
         }
-        Err(Error::invalid(what, format!("{count} numbers, arm '{}' has {} joints", self.name, self.dof())))
+        Err(Error::invalid(what, format!("has {count} numbers; arm '{}' has {} joints", self.name, self.dof())))
     }
 
     fn weigh(&mut self) {
@@ -310,12 +320,12 @@ impl SerialArm {
     }
 }
 
-/// The pose with a rotation of unit length.
+/// The pose with its rotation normalized.
 fn check_pose(pose: Pose, what: &str) -> Result<Pose> {
     let length = pose.rotation.length();
-    // Not normalised at any length: a quaternion far from unit length is a mistake, not a rounding.
+    // A quaternion far from unit length is a mistake, not rounding.
     if !(pose.translation.is_finite() && (length - 1.0).abs() < 1e-3) {
-        return Err(Error::invalid(what, "must be finite, its rotation a unit quaternion"));
+        return Err(Error::invalid(what, "must be finite, with a unit quaternion as its rotation"));
     }
     Ok(Pose { rotation: pose.rotation.normalize(), ..pose })
 }
@@ -324,21 +334,21 @@ fn check_joint(joint: &mut Joint) -> Result<()> {
     let what = format!("joint '{}'", joint.name);
     joint.placement = check_pose(joint.placement, &format!("{what}: placement"))?;
     let Some(axis) = joint.axis.try_normalize().filter(|a| a.is_finite()) else {
-        return Err(Error::invalid(what, "the axis has no direction, must be a vector other than zero"));
+        return Err(Error::invalid(what, "the axis must not be zero"));
     };
     joint.axis = axis;
     let JointLimits { position: [low, high], velocity, effort, acceleration } = joint.limits;
     if low.is_nan() || high.is_nan() || low >= high {
-        return Err(Error::invalid(what, format!("position limits {low} to {high}, the first must be the lower")));
+        return Err(Error::invalid(what, format!("position limits are [{low}, {high}]; the first must be lower")));
     }
     for (value, name) in [(velocity, "velocity"), (effort, "effort"), (acceleration, "acceleration")] {
         if value.is_nan() || value <= 0.0 {
-            return Err(Error::invalid(what, format!("a {name} limit of {value}, must be positive")));
+            return Err(Error::invalid(what, format!("the {name} limit is {value}; it must be positive")));
         }
     }
     for (value, name) in [(joint.armature, "armature"), (joint.damping, "damping"), (joint.friction, "friction")] {
         if !(value >= 0.0 && value.is_finite()) {
-            return Err(Error::invalid(what, format!("{name} {value}, must be finite and not negative")));
+            return Err(Error::invalid(what, format!("{name} is {value}; it must be finite and not negative")));
         }
     }
     Ok(())

@@ -1,8 +1,9 @@
-//! What it takes to move an arm: mass matrix, bias forces, inverse and forward dynamics.
+//! Dynamics: mass matrix, bias forces, inverse and forward dynamics.
 //!
-//! The recursions run in world axes about each link's centre of mass, which for a chain costs little more than link axes and needs no
-//! transforms: Newton-Euler outwards and inwards (Lynch and Park 2017, section 8.3; Featherstone 2008, section 5.3) and composite rigid
-//! bodies (Featherstone 2008, section 6.2). A rotor adds its armature to its joint alone.
+//! The recursions run in world axes about each link's centre of mass. For a chain this costs little
+//! more than link axes and needs no transforms: Newton-Euler outwards and inwards (Lynch and Park
+//! 2017, section 8.3; Featherstone 2008, section 5.3) and composite rigid bodies (Featherstone
+//! 2008, section 6.2). A rotor adds its armature to its own joint only.
 
 use super::arm::SerialArm;
 use super::frames::Frames;
@@ -15,24 +16,24 @@ use glam::{DMat3, DVec3};
 /// An external force and torque on a link, in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LinkLoad {
-    /// The link, 0 the first that moves; beyond the last, the last.
+    /// Index of the link, 0 for the first moving link; an index beyond the last is the last.
     pub link: usize,
-    /// Where the force acts, in the world [m].
+    /// Point of the force, in the world (m).
     pub point: DVec3,
-    /// Force [N].
+    /// Force (N).
     pub force: DVec3,
-    /// Torque [N m].
+    /// Torque (N m).
     pub torque: DVec3,
 }
 
-/// What a controller or a step needs of an arm in one state: M(q) qdd + bias = torque.
+/// The dynamics of an arm in one state: M(q) qdd + bias = torque.
 #[derive(Clone, Copy, Debug)]
 pub struct Dynamics {
-    /// Where the links are.
+    /// Poses of the links.
     pub frames: Frames,
-    /// Mass matrix M(q), the rotors' armature in it [kg m2, kg m or kg].
+    /// Mass matrix M(q), with the rotors' armature (kg m2, kg m or kg).
     pub mass_matrix: JointMatrix,
-    /// Coriolis, centrifugal and gravity torques [N m or N].
+    /// Coriolis, centrifugal and gravity torques (N m or N).
     pub bias: Joints,
 }
 
@@ -43,7 +44,7 @@ struct Bodies {
 }
 
 impl SerialArm {
-    /// Frames, mass matrix and bias at position `q` and rates `qd`.
+    /// Frames, mass matrix and bias at positions `q` and rates `qd`.
     pub fn dynamics(&self, q: &Joints, qd: &Joints) -> Dynamics {
         let frames = self.frames(q);
         let bodies = self.place(&frames);
@@ -52,33 +53,35 @@ impl SerialArm {
         Dynamics { frames, mass_matrix, bias }
     }
 
-    /// Mass matrix M(q), the rotors' armature in it.
+    /// Mass matrix M(q), with the rotors' armature (kg m2, kg m or kg).
     pub fn mass_matrix(&self, q: &Joints) -> JointMatrix {
         let frames = self.frames(q);
         self.composite(&frames, &self.place(&frames))
     }
 
-    /// Coriolis, centrifugal and gravity torques at rates `qd`: what holds the joints at zero acceleration.
+    /// Coriolis, centrifugal and gravity torques at rates `qd`: they give zero acceleration (N m or
+    /// N).
     pub fn bias(&self, q: &Joints, qd: &Joints) -> Joints {
         self.inverse_dynamics(q, qd, &self.zeros())
     }
 
-    /// The torques that hold the arm still against gravity.
+    /// The torques that hold the arm against gravity (N m or N).
     pub fn gravity_torque(&self, q: &Joints) -> Joints {
         self.inverse_dynamics(q, &self.zeros(), &self.zeros())
     }
 
-    /// The torques that give the accelerations `qdd`. Damping and friction of the joints are not in it.
+    /// The torques for the accelerations `qdd`, without damping and friction of the joints (N m or
+    /// N).
     pub fn inverse_dynamics(&self, q: &Joints, qd: &Joints, qdd: &Joints) -> Joints {
         let frames = self.frames(q);
         self.newton_euler(&frames, &self.place(&frames), qd, qdd, self.gravity())
     }
 
-    /// The accelerations under joint torques and loads on links. Damping, friction and limits of the joints are not in it: see
-    /// [`SerialArm::step`].
+    /// The accelerations under joint torques and loads on links, without damping, friction and
+    /// limits of the joints (see [`SerialArm::step`]).
     ///
     /// # Errors
-    /// A mass matrix that is not positive definite, which a number that is not finite makes.
+    /// A mass matrix that is not positive definite, because of a number that is not finite.
     pub fn forward_dynamics(&self, q: &Joints, qd: &Joints, torque: &Joints, loads: &[LinkLoad]) -> Result<Joints> {
         let d = self.dynamics(q, qd);
         let mut drive = Joints::from_fn(self.dof(), |i| torque.at(i) - d.bias.at(i));
@@ -93,7 +96,7 @@ impl SerialArm {
         if qdd.is_finite() { Ok(qdd) } else { Err(Error::NotFinite { what: "an acceleration" }) }
     }
 
-    /// Kinetic and potential energy [J]; the latter is zero for masses at the world's origin.
+    /// Kinetic and potential energy (J); the latter is zero for masses at the world's origin.
     pub fn energy(&self, q: &Joints, qd: &Joints) -> (f64, f64) {
         let frames = self.frames(q);
         let bodies = self.place(&frames);
@@ -113,7 +116,8 @@ impl SerialArm {
         placed
     }
 
-    /// The torques for rates `qd` and accelerations `qdd`. Gravity is an acceleration of the base against it.
+    /// The torques for rates `qd` and accelerations `qdd`. Gravity is an acceleration of the base
+    /// against it.
     fn newton_euler(&self, frames: &Frames, bodies: &Bodies, qd: &Joints, qdd: &Joints, gravity: DVec3) -> Joints {
         let n = self.dof();
         let mut forces = [DVec3::ZERO; MAX_JOINTS];
@@ -142,7 +146,7 @@ impl SerialArm {
         let mut outer = DVec3::ZERO;
         for i in (0..n).rev() {
             let here = frames.link(i).translation;
-            // Force and moment of what is outside, from the next origin to this one.
+            // Moves force and moment of the outer links from the next origin to this one.
             moment += (outer - here).cross(force);
             moment += moments[i] + (bodies.centers[i] - here).cross(forces[i]);
             force += forces[i];
@@ -154,7 +158,7 @@ impl SerialArm {
         torque
     }
 
-    /// The mass matrix from the composite of all that each joint moves.
+    /// The mass matrix, from the composite body that each joint moves.
     fn composite(&self, frames: &Frames, bodies: &Bodies) -> JointMatrix {
         let n = self.dof();
         let mut m = JointMatrix::zeros(n);
@@ -168,7 +172,7 @@ impl SerialArm {
                 center += d * (added / sum);
             }
             mass = sum;
-            // Momentum of the composite at unit speed of joint j, angular about the composite's centre.
+            // Momentum of the composite at unit speed of joint j; angular about its centre.
             let z = frames.axis(j);
             let (p, l) = if frames.turns(j) {
                 (mass * z.cross(center - frames.link(j).translation), inertia * z)

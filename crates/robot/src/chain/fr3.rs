@@ -1,4 +1,4 @@
-//! The Franka Research 3, built in.
+//! The built-in Franka Research 3.
 
 use super::arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
 use super::mass::MassProperties;
@@ -7,19 +7,19 @@ use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_4};
 use trocar_core::Pose;
 
-/// A joint's figures and its link's.
+/// The parameters of a joint and its link.
 struct Row {
-    /// Position in the parent's axes [m], and turn about x [quarter turns].
+    /// Position in the parent's axes (m), and rotation about x (quarter turns).
     position: [f64; 3],
     quarters: f64,
-    /// Position limits [rad], speed [rad/s], torque [N m].
+    /// Limits of position (rad), speed (rad/s) and torque (N m).
     range: [f64; 2],
     velocity: f64,
     effort: f64,
-    /// Rotor inertia [kg m2] and Coulomb friction [N m].
+    /// Rotor inertia (kg m2) and Coulomb friction (N m).
     armature: f64,
     friction: f64,
-    /// Mass [kg], centre [m], inertia xx, xy, xz, yy, yz, zz about it [kg m2].
+    /// Mass (kg), centre of mass (m), inertia xx, xy, xz, yy, yz, zz about it (kg m2).
     mass: f64,
     center: [f64; 3],
     inertia: [f64; 6],
@@ -161,28 +161,31 @@ const ROWS: [Row; 7] = [
     },
 ];
 
-/// Viscous damping of every joint [N m s/rad].
+/// Viscous damping of every joint (N m s/rad).
 const DAMPING: f64 = 0.21;
-/// Highest acceleration of every joint [rad/s2].
+/// Maximum acceleration of every joint (rad/s2).
 const ACCELERATION: f64 = 10.0;
-/// From the last joint to the flange, along its axis [m].
+/// Distance from the last joint to the flange, along its axis (m).
 const FLANGE: f64 = 0.107;
-/// The posture in which the arm is delivered: elbow up, hand down.
+/// The posture of delivery: elbow up, hand down.
 const HOME: [f64; 7] = [0.0, 0.0, 0.0, -FRAC_PI_2, 0.0, FRAC_PI_2, -FRAC_PI_4];
 
 impl SerialArm {
     /// A Franka Research 3 without hand, its base at the world's origin.
     ///
-    /// Kinematics, masses, inertias and limits of position, speed and torque are those of the manufacturer's `franka_description`
-    /// (commit 566ba44, `robots/fr3`); the acceleration limit is that of the manufacturer's control interface. Rotor inertia, damping and Coulomb
-    /// friction, which the manufacturer does not publish as identified values, and the home posture are those of the MuJoCo Menagerie's
-    /// `franka_fr3`. (`franka_description` has 0.2 N m and 0.003 N m s/rad for every joint: see [`SerialArm::with_friction`].)
+    /// Kinematics, masses, inertias and limits of position, speed and torque come from the
+    /// manufacturer's `franka_description` (commit 566ba44, `robots/fr3`); the acceleration limit
+    /// comes from the manufacturer's control interface. Rotor inertia, damping and Coulomb
+    /// friction, for which the manufacturer publishes no identified values, and the home posture
+    /// come from the MuJoCo Menagerie's `franka_fr3`. (`franka_description` has 0.2 N m and 0.003 N
+    /// m s/rad for every joint: see [`SerialArm::with_friction`].)
     ///
-    /// The limits are the manufacturer's because they are what the real arm's controller enforces; some versions of the Menagerie's file have wider
-    /// ones. The speed limits are those of the description: the real arm's also depend on position.
+    /// The limits are the manufacturer's, which the real arm's controller enforces; some versions
+    /// of the Menagerie's file have wider ones. The speed limits are those of the description;
+    /// those of the real arm also depend on position.
     ///
     /// # Errors
-    /// None: the table is checked like any other.
+    /// None; the table passes the checks of [`SerialArm::new`].
     pub fn franka_fr3() -> Result<Self> {
         let segments = ROWS.iter().enumerate().map(|(i, row)| segment(i + 1, row)).collect();
         let flange = Pose { translation: DVec3::new(0.0, 0.0, FLANGE), ..Pose::IDENTITY };

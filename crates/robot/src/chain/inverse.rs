@@ -1,42 +1,44 @@
-//! Inverse kinematics: the posture that brings the flange to a pose.
+//! Inverse kinematics: the posture for a pose of the flange.
 //!
-//! Levenberg-Marquardt with the damping of Sugihara (2011), which is smooth whether or not the pose can be reached, in the joints' box by an active
-//! set; the motion that leaves the flange where it is (a seventh joint's) goes towards a preferred posture and away from limits.
+//! Levenberg-Marquardt with the damping of Sugihara (2011), which is smooth whether or not the pose
+//! can be reached. An active set keeps the joints within their limits. The null-space motion of a
+//! redundant arm goes towards a preferred posture and away from limits.
 
 use super::arm::SerialArm;
 use super::frames::Frames;
-use super::joints::{JointSet, Joints};
+use super::joints::{JointSet, Joints, MAX_JOINTS};
 use super::matrix::JointMatrix;
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 
-/// Rotations are weighed against translations as if at this distance [m]: about an instrument's length.
-pub(crate) const LEVER: f64 = 0.3;
-/// Damping that is always there [m2]: singular values below its root are not trusted.
-const FLOOR: f64 = 1e-6;
-/// The least share of the damping, after steps that went well.
-const CAUTION: f64 = 1e-2;
-/// No joint moves further in one iteration [rad or m].
-const STRIDE: f64 = 0.6;
+/// Lever arm that weighs rotations against translations (m): about the length of an instrument.
+pub(crate) const ROTATION_LEVER: f64 = 0.3;
+/// Minimum damping (m2): singular values below its root are ignored.
+const MIN_DAMPING: f64 = 1e-6;
+/// Minimum factor of the damping, after successful steps.
+const MIN_DAMPING_FACTOR: f64 = 1e-2;
+/// Maximum motion of a joint in an iteration (rad or m).
+const MAX_JOINT_STEP: f64 = 0.6;
 
-/// How [`SerialArm::inverse`] searches.
+/// Options of [`SerialArm::inverse`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseOptions {
-    /// Where the joints would like to be: it chooses the elbow. `None`: the arm's home.
+    /// The preferred posture, which chooses the elbow. `None`: the arm's home posture.
     pub preferred: Option<Joints>,
-    /// Joints are pushed off their limits from this far away [rad or m].
+    /// Distance from a limit at which joints are pushed away from it (rad or m).
     pub margin: f64,
-    /// Good enough: distance [m] and angle [rad] of the flange from its target.
+    /// Tolerances of the flange: distance (m) and angle (rad) from its target.
     pub tolerance: [f64; 2],
-    /// The elbow is left alone when it would move less than this in an iteration [rad or m].
+    /// The search ends when the null-space motion of an iteration is smaller than this (rad or m).
     pub posture_tolerance: f64,
-    /// Most iterations of one search.
+    /// Maximum number of iterations of one search.
     pub iterations: usize,
-    /// Other starts that are tried where the first does not reach the target: the preferred posture, then postures all over the range. Zero for
-    /// a smooth motion.
+    /// Number of other starts if the first does not reach the target: the preferred posture, then
+    /// postures throughout the range. Zero for a smooth motion.
     pub restarts: usize,
-    /// No joint ends further from its start than its highest speed takes it in this time [s]. Infinite: no bound.
+    /// No joint ends farther from its start than its maximum speed allows in this time (s).
+    /// Infinite: no bound.
     pub within: f64,
 }
 
@@ -54,42 +56,43 @@ impl Default for InverseOptions {
     }
 }
 
-/// What a search came to. The flange is at `frames(q).flange()`, whatever was asked for.
+/// The result of a search. The flange is at `frames(q).flange()`, whether or not this is the
+/// target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// The posture, within its limits.
+    /// The posture, within the limits (rad or m).
     pub q: Joints,
-    /// From the flange reached to its target, in world axes [m].
+    /// Translation from the reached pose to the target, in world axes (m).
     pub translation: DVec3,
-    /// The turn from the flange reached to its target, as axis times angle in world axes [rad].
+    /// Rotation from the reached pose to the target, as axis times angle in world axes (rad).
     pub rotation: DVec3,
     /// Whether both are within tolerance.
     pub reached: bool,
-    /// Joints that are at a limit.
+    /// Joints at a limit.
     pub at_limit: JointSet,
-    /// Iterations used, over all starts.
+    /// Number of iterations, over all starts.
     pub iterations: usize,
 }
 
 impl Reached {
-    /// Distance from the target [m], the angle at a lever of 0.3 m included.
+    /// Distance from the target (m), with the angle at [`ROTATION_LEVER`].
     fn cost(&self) -> f64 {
-        (self.translation.length_squared() + (LEVER * self.rotation).length_squared()).sqrt()
+        (self.translation.length_squared() + (ROTATION_LEVER * self.rotation).length_squared()).sqrt()
     }
 }
 
 impl SerialArm {
-    /// Looks for the posture whose flange is at `target` in the world, from the posture `start` on. Never fails to answer: where the pose cannot
-    /// be reached, the nearest posture that was found comes with what is missing.
+    /// Searches for the posture whose flange is at `target` in the world, starting at `start`. If
+    /// the pose cannot be reached, the result is the nearest posture found, with the remaining
+    /// error.
     ///
     /// # Errors
-    /// A target or start that is not finite, or not a number a joint.
+    /// A target or start that is not finite, or another number of joints.
     pub fn inverse(&self, target: &Pose, start: &Joints, options: &InverseOptions) -> Result<Reached> {
         let unit = (target.rotation.length() - 1.0).abs() < 1e-3;
         if !(target.translation.is_finite() && unit && start.is_finite()) {
-            return Err(Error::NotFinite {
-                what: "the target pose or the start, or the target's rotation is no rotation:",
-            });
+            let reason = "target and start must be finite, the target's rotation a unit quaternion";
+            return Err(Error::invalid("inverse kinematics", reason));
         }
         let preferred = options.preferred.unwrap_or(self.home());
         if start.len() != self.dof() || preferred.len() != self.dof() || !preferred.is_finite() {
@@ -104,13 +107,13 @@ impl SerialArm {
             if best.reached {
                 break;
             }
-            // The pose first, whatever the elbow: its wish would lead all starts to the same place.
+            // Without the preference for a posture, which would lead all starts to the same place.
             let other = search.run(&if k == 0 { preferred } else { search.scattered(k) }, false);
             used += other.iterations;
             if other.reached {
-                let nicer = search.run(&other.q, true);
-                used += nicer.iterations;
-                best = if nicer.reached { nicer } else { other };
+                let preferred = search.run(&other.q, true);
+                used += preferred.iterations;
+                best = if preferred.reached { preferred } else { other };
             } else if other.cost() < best.cost() {
                 best = other;
             }
@@ -119,7 +122,7 @@ impl SerialArm {
     }
 }
 
-/// One call's constants.
+/// The constants of a call.
 struct Search<'a> {
     arm: &'a SerialArm,
     options: &'a InverseOptions,
@@ -128,21 +131,21 @@ struct Search<'a> {
     start: Joints,
 }
 
-/// The rows of the task: three of translation, three of rotation at the lever's length.
-pub(crate) const TASK: usize = 6;
+/// Number of rows of the task: three of translation, three of rotation at [`ROTATION_LEVER`].
+pub(crate) const TASK_ROWS: usize = 6;
 
 impl Search<'_> {
-    /// The range that joint `i` may be in.
+    /// The allowed range of joint `i` (rad or m).
     fn range(&self, i: usize) -> [f64; 2] {
         let limits = &self.arm.segments()[i].joint.limits;
         let [low, high] = limits.position;
         let start = self.start[i].clamp(low, high);
-        // Infinite speed in no time is no bound.
+        // Infinite speed times zero time is NaN: no bound.
         let way = limits.velocity * self.options.within.max(0.0);
         if way.is_finite() { [low.max(start - way), high.min(start + way)] } else { [low, high] }
     }
 
-    /// A posture far from others: Halton's sequence over the range, a prime a joint.
+    /// Posture `k` of a Halton sequence over the range, with one prime a joint.
     fn scattered(&self, k: usize) -> Joints {
         const PRIMES: [usize; 16] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53];
         Joints::from_fn(self.arm.dof(), |i| {
@@ -158,26 +161,29 @@ impl Search<'_> {
         })
     }
 
-    /// What is missing to the target: translation [m] and turn [rad].
+    /// The remaining error to the target: translation (m) and rotation (rad).
     fn missing(&self, frames: &Frames) -> (DVec3, DVec3) {
         let flange = frames.flange();
-        (self.target.translation - flange.translation, turn(self.target.rotation * flange.rotation.inverse()))
+        (
+            self.target.translation - flange.translation,
+            rotation_vector(self.target.rotation * flange.rotation.inverse()),
+        )
     }
 
-    /// One descent; `elbow`: whether the preferred posture counts.
+    /// One descent. `elbow`: whether it uses the preferred posture.
     fn run(&self, from: &Joints, elbow: bool) -> Reached {
         let n = self.arm.dof();
-        let ranges: [[f64; 2]; super::MAX_JOINTS] =
-            std::array::from_fn(|i| if i < n { self.range(i) } else { [0.0; 2] });
+        let ranges: [[f64; 2]; MAX_JOINTS] = std::array::from_fn(|i| if i < n { self.range(i) } else { [0.0; 2] });
         let mut q = Joints::from_fn(n, |i| from[i].clamp(ranges[i][0], ranges[i][1]));
         let mut frames = self.arm.frames(&q);
         let mut missing = self.missing(&frames);
         let [close, straight] = self.options.tolerance;
         let near = |m: &(DVec3, DVec3)| m.0.length() <= close && m.1.length() <= straight;
-        let square = |m: &(DVec3, DVec3)| m.0.length_squared() + (LEVER * m.1).length_squared();
+        let square = |m: &(DVec3, DVec3)| m.0.length_squared() + (ROTATION_LEVER * m.1).length_squared();
         let mut wishes = elbow;
-        // How much shorter than usual the steps are to be, after one that led away; and for how many none came much nearer.
-        let (mut caution, mut stride, mut stalled) = (1.0, STRIDE, 0);
+        // Factor of the damping, which grows after a failed step; maximum step; number of steps
+        // without much progress.
+        let (mut caution, mut stride, mut stalled) = (1.0, MAX_JOINT_STEP, 0);
         let mut iterations = 0;
         while iterations < self.options.iterations {
             iterations += 1;
@@ -196,7 +202,7 @@ impl Search<'_> {
             let new_frames = self.arm.frames(&new);
             let new_missing = self.missing(&new_frames);
             let (before, after) = (square(&missing), square(&new_missing));
-            // A step of the elbow may cost a little, which the next one makes good.
+            // A null-space step may increase the error a little; the next step corrects it.
             let costs = if wishes { 1e-2 * longest.min(stride).powi(2) } else { 0.0 };
             if after > before + costs && !near(&new_missing) {
                 stride = (0.35 * longest.min(stride)).max(1e-6);
@@ -208,10 +214,10 @@ impl Search<'_> {
             }
             stalled = if after > 0.8 * before && !near(&new_missing) { stalled + 1 } else { 0 };
             (q, frames, missing) = (new, new_frames, new_missing);
-            stride = (2.0 * stride).min(STRIDE);
-            caution = f64::max(0.25 * caution, CAUTION);
+            stride = (2.0 * stride).min(MAX_JOINT_STEP);
+            caution = f64::max(0.25 * caution, MIN_DAMPING_FACTOR);
             if stalled > 4 && wishes {
-                // Near a singularity the wish pulls the flange along; the pose comes first.
+                // Near a singularity the preferred posture moves the flange. The pose has priority.
                 (wishes, stalled) = (false, 0);
             } else if stalled > 12 {
                 break;
@@ -228,7 +234,7 @@ impl Search<'_> {
         Reached { q, translation: missing.0, rotation: missing.1, reached, at_limit, iterations }
     }
 
-    /// The next step of the joints, and how far it moves them without moving the flange.
+    /// The next step of the joints (rad or m), and the size of its null-space part.
     fn advance(
         &self,
         q: &Joints,
@@ -240,20 +246,20 @@ impl Search<'_> {
     ) -> (Joints, f64) {
         let n = q.len();
         let jacobian = frames.flange_jacobian();
-        let mut rows = [Joints::zeros(n); TASK];
+        let mut rows = [Joints::zeros(n); TASK_ROWS];
         for i in 0..n {
-            let (linear, angular) = (jacobian.linear[i], LEVER * jacobian.angular[i]);
+            let (linear, angular) = (jacobian.linear[i], ROTATION_LEVER * jacobian.angular[i]);
             for a in 0..3 {
                 rows[a][i] = linear[a];
                 rows[3 + a][i] = angular[a];
             }
         }
-        let turn = LEVER * missing.1;
-        let error = [missing.0.x, missing.0.y, missing.0.z, turn.x, turn.y, turn.z];
+        let angle = ROTATION_LEVER * missing.1;
+        let error = [missing.0.x, missing.0.y, missing.0.z, angle.x, angle.y, angle.z];
         let square = error.iter().map(|e| e * e).sum::<f64>();
         let mut held = JointSet::default();
         let mut step = Joints::zeros(n);
-        // The flange first. Each pass holds at least one more joint at its bound.
+        // The flange first. Each pass fixes at least one more joint at its bound.
         for _ in 0..=n {
             let mut left = error;
             for i in held.iter() {
@@ -261,7 +267,7 @@ impl Search<'_> {
                     *l -= r[i] * step[i];
                 }
             }
-            let task = solve(&rows, held, left, caution * (FLOOR + 0.5 * square), 2);
+            let task = solve_task(&rows, held, left, caution * (MIN_DAMPING + 0.5 * square), 2);
             let mut over = false;
             for i in (0..n).filter(|&i| !held.contains(i)) {
                 let [low, high] = ranges[i];
@@ -270,7 +276,7 @@ impl Search<'_> {
                     step[i] = (q[i] + step[i]).clamp(low, high) - q[i];
                     held.insert(i);
                     over = true;
-                    // The others anew, without it.
+                    // Solves again for the other joints.
                     break;
                 }
             }
@@ -281,16 +287,17 @@ impl Search<'_> {
         if !wishes {
             return (step, 0.0);
         }
-        // Then what leaves it in place, as far as the room that is left allows: a wish must never push the flange away.
+        // Then the null space, within the remaining range: the preferred posture must not move the
+        // flange.
         let mut elbow = Joints::zeros(n);
         let room = |i: usize, way: f64| {
             let end = if way > 0.0 { ranges[i][1] } else { ranges[i][0] };
             (end - q[i] - step[i]) / way
         };
         for _ in 0..=n {
-            let wanted = Joints::from_fn(n, |i| if held.contains(i) { 0.0 } else { self.wish(i, q[i]) });
-            let moved: [f64; TASK] = std::array::from_fn(|a| rows[a].dot(&wanted));
-            let undo = solve(&rows, held, moved, FLOOR, 3);
+            let wanted = Joints::from_fn(n, |i| if held.contains(i) { 0.0 } else { self.preferred_motion(i, q[i]) });
+            let moved: [f64; TASK_ROWS] = std::array::from_fn(|a| rows[a].dot(&wanted));
+            let undo = solve_task(&rows, held, moved, MIN_DAMPING, 3);
             elbow = Joints::from_fn(n, |i| wanted[i] - undo[i]);
             let before = held;
             for i in 0..n {
@@ -310,8 +317,9 @@ impl Search<'_> {
         (step, elbow.max_abs())
     }
 
-    /// Where joint `i` would go if it were free: half way to the preferred posture, and off a limit that is near.
-    fn wish(&self, i: usize, q: f64) -> f64 {
+    /// Preferred motion of joint `i`: half the way to the preferred posture, and away from a near
+    /// limit (rad or m).
+    fn preferred_motion(&self, i: usize, q: f64) -> f64 {
         let [low, high] = self.arm.segments()[i].joint.limits.position;
         let margin = self.options.margin.max(0.0).min(0.25 * (high - low));
         let off = (low + margin - q).max(0.0) - (q - (high - margin)).max(0.0);
@@ -319,12 +327,12 @@ impl Search<'_> {
     }
 }
 
-/// J^T (J J^T + damping)^-1 e over the joints that are not held, made better `rounds - 1` times with what is still missing (iterated
-/// Tikhonov), so that damping costs accuracy only where the arm is singular.
-pub(crate) fn solve(
-    rows: &[Joints; TASK],
+/// J^T (J J^T + damping)^-1 e over the joints that are not held, refined `rounds - 1` times with
+/// the residual (iterated Tikhonov), so that damping reduces accuracy only near singularities.
+pub(crate) fn solve_task(
+    rows: &[Joints; TASK_ROWS],
     held: JointSet,
-    mut error: [f64; TASK],
+    mut error: [f64; TASK_ROWS],
     damping: f64,
     rounds: usize,
 ) -> Joints {
@@ -333,8 +341,8 @@ pub(crate) fn solve(
     for r in &mut free {
         held.iter().for_each(|i| r[i] = 0.0);
     }
-    let mut gram = JointMatrix::zeros(TASK);
-    for a in 0..TASK {
+    let mut gram = JointMatrix::zeros(TASK_ROWS);
+    for a in 0..TASK_ROWS {
         for b in 0..=a {
             gram.set(a, b, free[a].dot(&free[b]));
         }
@@ -343,8 +351,8 @@ pub(crate) fn solve(
     let mut step = Joints::zeros(n);
     let Some(factor) = gram.factor() else { return step };
     for _ in 0..rounds {
-        let y = factor.solve(&Joints::from_fn(TASK, |a| error[a]));
-        let part = Joints::from_fn(n, |i| (0..TASK).map(|a| free[a][i] * y[a]).sum::<f64>());
+        let y = factor.solve(&Joints::from_fn(TASK_ROWS, |a| error[a]));
+        let part = Joints::from_fn(n, |i| (0..TASK_ROWS).map(|a| free[a][i] * y[a]).sum::<f64>());
         for i in 0..n {
             step[i] += part[i];
         }
@@ -355,8 +363,8 @@ pub(crate) fn solve(
     step
 }
 
-/// A rotation as axis times angle, the short way [rad].
-pub(crate) fn turn(q: DQuat) -> DVec3 {
+/// A rotation as axis times angle, with an angle of at most pi (rad).
+pub(crate) fn rotation_vector(q: DQuat) -> DVec3 {
     let (v, w) = (DVec3::new(q.x, q.y, q.z), q.w);
     let (v, w) = if w < 0.0 { (-v, -w) } else { (v, w) };
     let s = v.length();

@@ -1,40 +1,41 @@
-//! Vectors and sets over an arm's joints, in place.
+//! Vectors and sets over an arm's joints, without allocation.
 
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::ops::{Deref, DerefMut};
 
-/// The most joints that an arm may have.
+/// Maximum number of joints of an arm.
 pub const MAX_JOINTS: usize = 16;
 
-/// A number for each joint of an arm: angles [rad] or displacements [m], their rates, torques [N m] or forces [N]. Reads as a slice.
+/// A number for each joint of an arm: angles (rad) or displacements (m), their rates, torques (N m)
+/// or forces (N). It dereferences to a slice.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<f64>", into = "Vec<f64>")]
 pub struct Joints {
     n: usize,
-    // What is beyond n is zero, so that a vector of another arm reads as zeros and not out of bounds.
+    // Zero beyond n: a vector of a smaller arm reads as zeros there.
     values: [f64; MAX_JOINTS],
 }
 
 impl Joints {
-    /// Zeros for `n` joints; for [`MAX_JOINTS`] where `n` is more.
+    /// Zeros for `n` joints, at most [`MAX_JOINTS`].
     pub const fn zeros(n: usize) -> Self {
         Self { n: if n < MAX_JOINTS { n } else { MAX_JOINTS }, values: [0.0; MAX_JOINTS] }
     }
 
-    /// These numbers, one a joint.
+    /// From a number for each joint.
     ///
     /// # Errors
     /// More than [`MAX_JOINTS`].
     pub fn new(values: &[f64]) -> Result<Self> {
         if values.len() > MAX_JOINTS {
-            let reason = format!("{} numbers, at most {MAX_JOINTS} are possible", values.len());
+            let reason = format!("has {} numbers; the maximum is {MAX_JOINTS}", values.len());
             return Err(Error::invalid("joint vector", reason));
         }
         Ok(Self::from_fn(values.len(), |i| values[i]))
     }
 
-    /// `f(i)` for each of `n` joints (at most [`MAX_JOINTS`]).
+    /// `f(i)` for each of `n` joints, at most [`MAX_JOINTS`].
     pub fn from_fn(n: usize, mut f: impl FnMut(usize) -> f64) -> Self {
         let mut joints = Self::zeros(n);
         for i in 0..joints.n {
@@ -43,17 +44,17 @@ impl Joints {
         joints
     }
 
-    /// The number of joint `i`, zero where there is none.
+    /// The number of joint `i`, zero beyond the last.
     pub(crate) const fn at(&self, i: usize) -> f64 {
         if i < MAX_JOINTS { self.values[i] } else { 0.0 }
     }
 
-    /// The sum of the products.
+    /// The scalar product.
     pub fn dot(&self, other: &Self) -> f64 {
         self.iter().zip(other.iter()).map(|(a, b)| a * b).sum()
     }
 
-    /// The largest magnitude; NaN where one is NaN.
+    /// The maximum magnitude; NaN if one is NaN.
     pub fn max_abs(&self) -> f64 {
         self.iter().fold(0.0, |m: f64, x| if x.is_nan() || m.is_nan() { f64::NAN } else { m.max(x.abs()) })
     }
@@ -92,34 +93,34 @@ impl From<Joints> for Vec<f64> {
     }
 }
 
-/// Some of an arm's joints.
+/// A set of joints of an arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JointSet(u16);
 
 impl JointSet {
-    /// Whether joint `i` is among them.
+    /// Whether it contains joint `i`.
     pub const fn contains(self, i: usize) -> bool {
         i < MAX_JOINTS && self.0 >> i & 1 == 1
     }
 
-    /// Whether there is none.
+    /// Whether it is empty.
     pub const fn is_empty(self) -> bool {
         self.0 == 0
     }
 
-    /// Joint `i` too.
+    /// Adds joint `i`.
     pub(crate) const fn insert(&mut self, i: usize) {
         if i < MAX_JOINTS {
             self.0 |= 1 << i;
         }
     }
 
-    /// The joints of both sets.
+    /// The union of both sets.
     pub const fn union(self, other: Self) -> Self {
         Self(self.0 | other.0)
     }
 
-    /// Their numbers, ascending.
+    /// The indices of its joints, ascending.
     pub fn iter(self) -> impl Iterator<Item = usize> {
         (0..MAX_JOINTS).filter(move |&i| self.contains(i))
     }

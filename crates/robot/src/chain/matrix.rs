@@ -1,4 +1,4 @@
-//! Small symmetric matrices over an arm's joints, and their Cholesky factor.
+//! Small symmetric matrices over an arm's joints, and their Cholesky factors.
 
 use super::joints::{Joints, MAX_JOINTS};
 
@@ -10,17 +10,17 @@ pub struct JointMatrix {
 }
 
 impl JointMatrix {
-    /// Zeros for `n` joints (at most [`MAX_JOINTS`]).
+    /// Zeros for `n` joints, at most [`MAX_JOINTS`].
     pub const fn zeros(n: usize) -> Self {
         Self { n: if n < MAX_JOINTS { n } else { MAX_JOINTS }, rows: [[0.0; MAX_JOINTS]; MAX_JOINTS] }
     }
 
-    /// Rows and columns.
+    /// Number of rows and columns.
     pub const fn size(&self) -> usize {
         self.n
     }
 
-    /// Row `i`, empty where there is none.
+    /// Row `i`; empty beyond the last.
     pub fn row(&self, i: usize) -> &[f64] {
         if i < self.n { &self.rows[i][..self.n] } else { &[] }
     }
@@ -53,7 +53,8 @@ impl JointMatrix {
         Joints::from_fn(self.n, |i| (0..self.n).map(|j| self.rows[i][j] * v.at(j)).sum())
     }
 
-    /// The Cholesky factor L, L L^T = self; `None` where the matrix is not positive definite (or not finite).
+    /// The Cholesky factor L with L L^T = self; `None` if the matrix is not positive definite or
+    /// not finite.
     pub fn factor(&self) -> Option<JointFactor> {
         let n = self.n;
         let mut l = JointFactor { n, rows: [[0.0; MAX_JOINTS]; MAX_JOINTS], inverse: [0.0; MAX_JOINTS] };
@@ -66,7 +67,7 @@ impl JointMatrix {
                 if j < i {
                     l.rows[i][j] = s * l.inverse[j];
                 } else {
-                    // Below that the pivot is rounding alone.
+                    // A smaller pivot is only rounding.
                     if !(s > 1e-14 * self.rows[i][i].abs() && s.is_finite()) {
                         return None;
                     }

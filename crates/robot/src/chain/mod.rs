@@ -1,11 +1,12 @@
-//! Serial arms: their description, kinematics and dynamics.
+//! Serial arms: description, kinematics and dynamics.
 //!
-//! A [`SerialArm`] is immutable: joints, links and what is fixed to the flange. [`Frames`] says where its links are at a posture,
-//! [`SerialArm::dynamics`] what it takes to move them, [`SerialArm::step`] moves an [`ArmState`] on in time and [`SerialArm::inverse`]
-//! finds the posture of a flange pose. Nothing of it allocates.
+//! A [`SerialArm`] is immutable: joints, links and a payload at the flange. [`Frames`] holds the
+//! poses of its links in a posture, [`SerialArm::dynamics`] computes mass matrix and bias,
+//! [`SerialArm::step`] integrates an [`ArmState`], and [`SerialArm::inverse`] finds the posture for
+//! a pose of the flange. None of them allocates.
 //!
-//! Everything is computed in world axes by the recursions of Featherstone, *Rigid Body Dynamics Algorithms* (2008) and of Lynch and
-//! Park, *Modern Robotics* (2017), which are cited where they are used.
+//! All computations are in world axes, with the recursions of Featherstone, *Rigid Body Dynamics
+//! Algorithms* (2008), and of Lynch and Park, *Modern Robotics* (2017), cited where they are used.
 
 mod arm;
 mod describe;
@@ -24,8 +25,8 @@ pub use describe::{Visual, VisualShape, mjcf_visuals, urdf_visuals};
 pub use dynamics::{Dynamics, LinkLoad};
 pub use frames::{Frames, Jacobian};
 pub use inverse::{InverseOptions, Reached};
-pub(crate) use inverse::{LEVER, TASK, solve, turn};
+pub(crate) use inverse::{ROTATION_LEVER, TASK_ROWS, rotation_vector, solve_task};
 pub use joints::{JointSet, Joints, MAX_JOINTS};
 pub use mass::MassProperties;
 pub use matrix::{JointFactor, JointMatrix};
-pub use step::{ArmState, Coupling, CouplingLaw, Drive, MAX_COUPLINGS, StepReport};
+pub use step::{ArmState, ArmStepReport, Coupling, CouplingLaw, Drive, MAX_COUPLINGS};

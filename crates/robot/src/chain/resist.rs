@@ -1,36 +1,39 @@
-//! The velocities after a step, under what resists them: Coulomb friction, stops and stiff contacts, all implicit.
+//! The joint velocities after a step with implicit Coulomb friction, stops and stiff contacts.
 //!
-//! They are the minimum of a convex function of the joint velocities v,
+//! They minimise a convex function of the joint velocities v,
 //!
 //! F(v) = v^T H v / 2 - b^T v + sum_i f_i |v_i| + sum_r phi_r(J_r v),  low_i <= v_i <= high_i,
 //!
-//! Gauss's principle of least constraint for one step of implicit Euler (Moreau's time stepping; Todorov 2014 writes it so). H is the mass matrix
-//! with the implicit damping, f_i the friction's impulse, phi_r the potential of a spring that may only push or may slip. In velocities,
-//! rather than in impulses, a joint that sticks has a velocity of exactly zero, so that it does not creep, and one that reaches a stop has
-//! exactly the velocity that brings it there.
+//! Gauss's principle of least constraint for one step of implicit Euler (Moreau's time stepping, in
+//! the form of Todorov 2014). H is the mass matrix with the implicit damping, f_i the impulse of
+//! friction, phi_r the potential of a spring that may be one-sided or may slip. The unknowns are
+//! velocities, not impulses: a joint that sticks has a velocity of exactly zero and does not creep,
+//! and a joint that reaches a stop has exactly the velocity that brings it there.
 //!
-//! A round is a sweep of exact proximal steps, joint by joint, which finds what sticks, and then a Newton step of the joints that move.
-//! Both go down, and F is convex, so the rounds converge; two or three are usual.
+//! A round is a sweep of exact proximal steps, joint by joint, which finds the sticking joints, and
+//! then a Newton step of the moving joints. Both decrease F, which is convex, so the rounds
+//! converge, usually after two or three.
 
 use super::joints::{JointSet, Joints, MAX_JOINTS};
 use super::matrix::JointMatrix;
 
-/// Most rounds: far more than are ever needed, so that nothing hangs.
-const ROUNDS: usize = 200;
-/// Changes of velocity below this share of the greatest do not matter.
+/// Maximum number of rounds, far more than needed.
+const MAX_ROUNDS: usize = 200;
+/// Changes of velocity below this share of the maximum are ignored.
 const TOLERANCE: f64 = 1e-12;
-/// Changes of impulse below this share of those that are summed are rounding.
+/// Changes of impulse below this share of the summed magnitudes are rounding.
 const ROUNDING: f64 = 64.0 * f64::EPSILON;
 
-/// A resistance along one direction in joint space: an impulse `-(offset + slope u)` at the speed u = row . v, within bounds.
+/// A resistance along one direction in joint space: the impulse `-(offset + slope u)` at the speed
+/// u = row . v, within bounds.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row {
     pub row: Joints,
-    /// Impulse a unit of speed, not negative.
+    /// Impulse per unit of speed, not negative.
     pub slope: f64,
-    /// Impulse against the row at no speed.
+    /// Impulse against the row at zero speed.
     pub offset: f64,
-    /// Lowest and highest impulse along the row.
+    /// Minimum and maximum impulse along the row.
     pub bounds: [f64; 2],
 }
 
@@ -42,18 +45,18 @@ impl Row {
         (-(self.offset + self.slope * self.row.dot(v))).max(self.bounds[0]).min(self.bounds[1])
     }
 
-    /// Whether the impulse changes with speed at `v`.
-    fn yields(&self, v: &Joints) -> bool {
+    /// Whether the impulse is inside its bounds at `v`, where it changes with speed.
+    fn is_free(&self, v: &Joints) -> bool {
         let p = -(self.offset + self.slope * self.row.dot(v));
         p > self.bounds[0] && p < self.bounds[1]
     }
 }
 
-/// The function to be minimised.
+/// The function to minimise.
 pub(super) struct Problem<'a> {
     pub h: &'a JointMatrix,
     pub b: &'a Joints,
-    /// Friction's impulse, one a joint.
+    /// Impulse of friction of each joint.
     pub friction: &'a Joints,
     pub low: &'a Joints,
     pub high: &'a Joints,
@@ -61,7 +64,7 @@ pub(super) struct Problem<'a> {
 }
 
 impl Problem<'_> {
-    /// Gradient of the smooth part, which at the minimum is the impulse of friction and stops.
+    /// Gradient of the smooth part. At the minimum it is the impulse of friction and stops.
     pub(super) fn gradient(&self, v: &Joints) -> Joints {
         let mut g = self.h.times(v);
         for (g, b) in g.iter_mut().zip(self.b.iter()) {
@@ -78,7 +81,7 @@ impl Problem<'_> {
         g
     }
 
-    /// The best velocity of joint `i` alone, if its curvature were `q`.
+    /// The velocity of joint `i` that minimises F for this joint alone, with the curvature `q`.
     fn proximal(&self, i: usize, v: f64, g: f64, q: f64) -> f64 {
         let (t, f) = (v - g / q, self.friction[i] / q);
         let shrunk = if t > f {
@@ -91,13 +94,13 @@ impl Problem<'_> {
         shrunk.max(self.low[i]).min(self.high[i])
     }
 
-    /// Moves `v` to the minimum; whether it was reached.
+    /// Moves `v` to the minimum. Returns whether it was reached.
     pub(super) fn minimise(&self, v: &mut Joints) -> bool {
         let n = v.len();
         for i in 0..n {
             v[i] = v[i].max(self.low[i]).min(self.high[i]);
         }
-        // An upper bound of the curvature along each joint: every row at work.
+        // An upper bound of the curvature along each joint: all rows are free.
         let curvature = Joints::from_fn(n, |i| {
             self.h.at(i, i) + self.rows.iter().map(|r| r.slope * r.row.at(i) * r.row.at(i)).sum::<f64>()
         });
@@ -105,7 +108,7 @@ impl Problem<'_> {
             let springs: f64 = self.rows.iter().map(|r| (r.offset * r.row.at(i)).abs()).sum();
             ROUNDING * (self.b[i].abs() + springs) / self.h.at(i, i)
         });
-        for _ in 0..ROUNDS {
+        for _ in 0..MAX_ROUNDS {
             let g = self.gradient(v);
             let slow = TOLERANCE * v.max_abs();
             let wrong = |i: usize| (self.proximal(i, v[i], g[i], curvature[i]) - v[i]).abs() > slow.max(rounding[i]);
@@ -118,7 +121,7 @@ impl Problem<'_> {
         false
     }
 
-    /// Once through the joints, each to its own minimum.
+    /// Moves each joint in turn to its own minimum.
     fn sweep(&self, v: &mut Joints, curvature: &Joints) {
         let mut g = self.gradient(v);
         for i in 0..v.len() {
@@ -139,7 +142,8 @@ impl Problem<'_> {
         }
     }
 
-    /// A Newton step of the joints that neither stick nor are stopped, as far as none of them sticks or is stopped on the way.
+    /// A Newton step of the joints that neither stick nor are at a stop, up to the first one that
+    /// sticks or reaches a stop.
     fn newton(&self, v: &mut Joints) {
         let n = v.len();
         let mut free = JointSet::default();
@@ -164,14 +168,14 @@ impl Problem<'_> {
                 h.set(a, b, self.h.at(list[a], list[b]));
             }
         }
-        for r in self.rows.iter().filter(|r| r.yields(v)) {
+        for r in self.rows.iter().filter(|r| r.is_free(v)) {
             h.add_outer(r.slope, &Joints::from_fn(m, |a| r.row.at(list[a])));
         }
         let slide = |i: usize, v: f64| if v == 0.0 { 0.0 } else { self.friction[i] * v.signum() };
         let down = Joints::from_fn(m, |a| -(g[list[a]] + slide(list[a], v[list[a]])));
         let Some(factor) = h.factor() else { return };
         let d = factor.solve(&down);
-        // The way to the first kink or stop.
+        // The step to the first kink or stop.
         let (mut reach, mut first) = (1.0, None);
         for a in 0..m {
             let (i, from) = (list[a], v[list[a]]);
@@ -185,7 +189,7 @@ impl Problem<'_> {
             }
         }
         let old = *v;
-        let go = |share: f64| {
+        let step_to = |share: f64| {
             let mut to = old;
             for a in 0..m {
                 to[list[a]] += share * d[a];
@@ -196,16 +200,16 @@ impl Problem<'_> {
             let g = self.gradient(to);
             (0..m).map(|a| (g[list[a]] + slide(list[a], old[list[a]])) * d[a]).sum::<f64>()
         };
-        let end = go(reach);
-        // Where rows begin or cease to yield on the way, the function is not the parabola that the step was made for: the minimum along it
-        // is searched by halving, the slope being monotone.
-        if self.rows.iter().any(|r| r.yields(&old) != r.yields(&end)) && slope(&end) > 0.0 {
+        let end = step_to(reach);
+        // If rows reach or leave their bounds on the way, the function is not the parabola of the
+        // Newton step. The minimum along the step is found by bisection: the slope is monotone.
+        if self.rows.iter().any(|r| r.is_free(&old) != r.is_free(&end)) && slope(&end) > 0.0 {
             let (mut low, mut high) = (0.0, reach);
             for _ in 0..30 {
                 let middle = 0.5 * (low + high);
-                if slope(&go(middle)) > 0.0 { high = middle } else { low = middle }
+                if slope(&step_to(middle)) > 0.0 { high = middle } else { low = middle }
             }
-            *v = go(low);
+            *v = step_to(low);
             return;
         }
         *v = end;

@@ -1,6 +1,7 @@
-//! An arm's state, and its motion through one physics step.
+//! An arm's state, and its integration over one physics step.
 //!
-//! Semi-implicit Euler: rigid-body forces at the step's beginning; damping, friction, stops and couplings at its end (`resist.rs`).
+//! Semi-implicit Euler: rigid-body forces at the start of the step; damping, friction, stops and
+//! couplings at its end (`resist.rs`).
 
 use super::arm::SerialArm;
 use super::joints::{JointSet, Joints};
@@ -8,110 +9,118 @@ use super::resist::{Problem, Row};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
-/// The most couplings a step may have.
+/// Maximum number of couplings in a step.
 pub const MAX_COUPLINGS: usize = 16;
-/// Rounds in which the limit of friction follows the force that presses.
-const FRICTION_ROUNDS: usize = 36;
+/// Maximum number of rounds in which the limit of friction follows the normal force.
+const MAX_FRICTION_ROUNDS: usize = 36;
 
-/// Where an arm's joints are and how fast they move. Plain data: a copy is an exact snapshot.
+/// Positions and rates of an arm's joints. A copy is an exact snapshot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ArmState {
-    /// Positions [rad or m].
+    /// Positions (rad or m).
     pub q: Joints,
-    /// Rates [rad/s or m/s].
+    /// Rates (rad/s or m/s).
     pub qd: Joints,
 }
 
 impl ArmState {
-    /// At rest.
+    /// At rest in the posture `q`.
     pub fn at_rest(q: Joints) -> Self {
         Self { q, qd: Joints::zeros(q.len()) }
     }
 }
 
-/// Which forces a coupling can exert.
+/// The forces that a coupling can exert.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CouplingLaw {
-    /// Pulls and pushes.
+    /// It pulls and pushes.
     Bilateral,
-    /// Only pushes along the row: a touch. A displacement above zero is a gap.
+    /// It only pushes along the row: a contact. A positive displacement is a gap.
     Push,
-    /// Coulomb friction: at most `coefficient` times the magnitude of the force of the coupling number `of`, which must be a
-    /// [`CouplingLaw::Bilateral`] or [`CouplingLaw::Push`] one.
+    /// Coulomb friction: at most `coefficient` times the magnitude of the force of coupling `of`,
+    /// which must be [`CouplingLaw::Bilateral`] or [`CouplingLaw::Push`].
     Friction {
-        /// The coupling that presses, by its place in the list.
+        /// Index of the coupling with the normal force.
         of: usize,
         /// Coefficient of friction.
         coefficient: f64,
     },
 }
 
-/// A stiff spring with a damper between the arm and the world along one direction: what a port's rim, a table or a hand does to it. It is
-/// implicit, so that no stiffness is too high for the step.
+/// A stiff spring with a damper between the arm and the world along one direction: the action of a
+/// port's rim, a table or a hand. It is implicit, so no stiffness is too high for the step.
 ///
-/// With u = row . qd the force along the row is -(stiffness x displacement + damping u), within what the law allows.
+/// With u = row . qd the force along the row is -(stiffness x displacement + damping u), limited by
+/// the law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Coupling {
-    /// Speed along the direction a unit of joint rate: a row of a Jacobian, from [`super::Jacobian::row`].
+    /// Speed along the direction per unit of joint rate: a row of a Jacobian, from
+    /// [`Jacobian::row`](super::frames::Jacobian::row).
     pub row: Joints,
-    /// How far the spring is stretched along the row [m or rad]. Given for the step's beginning; after it, for its end.
+    /// Extension of the spring along the row (m or rad), at the start of the step; after the step,
+    /// at its end.
     pub displacement: f64,
-    /// Stiffness [N/m or N m/rad].
+    /// Stiffness (N/m or N m/rad).
     pub stiffness: f64,
-    /// Damping [N s/m or N m s/rad]. A push may begin a little before the gap closes where this is not small beside stiffness times step.
+    /// Damping (N s/m or N m s/rad). Unless it is small compared to stiffness times step, a push
+    /// may start a little before the gap closes.
     pub damping: f64,
-    /// Which forces are possible.
+    /// The possible forces.
     pub law: CouplingLaw,
-    /// Filled in by the step: the mean force along the row over the step [N or N m].
+    /// Output: the mean force along the row over the step (N or N m).
     pub force: f64,
 }
 
 impl Coupling {
-    /// A spring of that displacement and stiffness without damping.
+    /// A spring without damping.
     pub fn new(row: Joints, displacement: f64, stiffness: f64, law: CouplingLaw) -> Self {
         Self { row, displacement, stiffness, damping: 0.0, law, force: 0.0 }
     }
 }
 
-/// What drives an arm through a step.
+/// The torques on an arm in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
-    /// Torques of the joints' drives [N m or N], kept within their limits by the step.
+    /// Torques of the drives (N m or N). The step limits them.
     pub torque: Joints,
-    /// Other torques at the joints, from forces on the links (J^T f): not limited.
+    /// Other torques at the joints, from forces on the links (J^T f) (N m or N). They are not
+    /// limited.
     pub external: Joints,
 }
 
-/// What happened in a step.
+/// Result of an arm's step.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepReport {
-    /// The torques of the drives that acted, after limiting [N m or N].
+pub struct ArmStepReport {
+    /// The torques of the drives after limiting (N m or N).
     pub torque: Joints,
-    /// Mean torque of friction and stops over the step [N m or N].
+    /// Mean torque of friction and stops over the step (N m or N).
     pub resisting: Joints,
-    /// Joints whose drive was asked for more than its limit.
+    /// Joints whose commanded torque exceeded the limit.
     pub torque_limited: JointSet,
     /// Joints that a position limit stopped.
     pub at_position_limit: JointSet,
-    /// Joints that ran at their highest speed.
+    /// Joints at their maximum speed.
     pub at_velocity_limit: JointSet,
-    /// Joints that friction held still at the end of the step.
+    /// Joints that friction held at the end of the step.
     pub stuck: JointSet,
-    /// Whether the velocities solved their equations to rounding in every sub-step. Where they did not, which takes touches of very
-    /// different stiffness, they are finite and within limits, and the step may be repeated with more sub-steps.
+    /// Whether the velocities solve their equations to rounding in every substep. Contacts of very
+    /// different stiffness may prevent this. The velocities are then finite and within limits, and
+    /// the caller may repeat the step with more substeps.
     pub converged: bool,
 }
 
 impl SerialArm {
-    /// Moves the state on by `dt` [s] in `substeps` equal parts. Allocates nothing; the same numbers give the same bits.
+    /// Integrates the state over `dt` (s) in `substeps` equal parts. It allocates nothing; the same
+    /// input gives the same bits.
     ///
-    /// Positions never leave their limits (a state that is outside is let in, not pulled in), speeds never exceed theirs. Rows of couplings hold
-    /// for the whole step, displacements advance in it. Friction is Coulomb's, the same at rest and in motion: a joint whose load is below it
-    /// stands still to the bit.
+    /// Positions never leave their limits (a state outside may enter but is not pulled in), and
+    /// speeds never exceed theirs. Rows of couplings are constant during the step; displacements
+    /// are integrated. Coulomb friction is the same at rest and in motion: a joint whose load is
+    /// below it does not move at all.
     ///
     /// # Errors
-    /// A length of step that is not positive, no substep, more than [`MAX_COUPLINGS`] or an impossible coupling, or a number that is not finite, be it
-    /// given or a result. State and couplings are then as before.
+    /// A step that is not positive, no substep, more than [`MAX_COUPLINGS`] couplings, an invalid
+    /// coupling, or an input or result that is not finite. State and couplings are then unchanged.
     pub fn step(
         &self,
         state: &mut ArmState,
@@ -119,10 +128,10 @@ impl SerialArm {
         couplings: &mut [Coupling],
         dt: f64,
         substeps: usize,
-    ) -> Result<StepReport> {
+    ) -> Result<ArmStepReport> {
         self.check_step(state, drive, couplings, dt, substeps)?;
         let n = self.dof();
-        let mut report = StepReport {
+        let mut report = ArmStepReport {
             torque: self.zeros(),
             resisting: self.zeros(),
             torque_limited: JointSet::default(),
@@ -167,7 +176,7 @@ impl SerialArm {
         Ok(report)
     }
 
-    #[expect(clippy::too_many_arguments, reason = "the parts of one step, kept on its stack")]
+    #[expect(clippy::too_many_arguments, reason = "the parts of one step, on its stack")]
     fn substep(
         &self,
         state: &mut ArmState,
@@ -176,7 +185,7 @@ impl SerialArm {
         displacements: &mut [f64; MAX_COUPLINGS],
         impulses: &mut [f64; MAX_COUPLINGS],
         h: f64,
-        report: &mut StepReport,
+        report: &mut ArmStepReport,
     ) -> Result<()> {
         let dynamics = self.dynamics(&state.q, &state.qd);
         let mut b = dynamics.mass_matrix.times(&state.qd);
@@ -204,14 +213,14 @@ impl SerialArm {
         }
         let rubs = couplings.iter().any(|c| matches!(c.law, CouplingLaw::Friction { .. }));
         let mut v = state.qd;
-        for round in 0..FRICTION_ROUNDS {
+        for round in 0..MAX_FRICTION_ROUNDS {
             let mut changed = false;
             for (k, c) in couplings.iter().enumerate() {
                 if let CouplingLaw::Friction { of, coefficient } = c.law {
                     let (last, now) = (rows[k].bounds[1], coefficient * rows[of].impulse(&v).abs());
                     changed |= (now - last).abs() > 1e-7 * now;
-                    // Half way where the two chase each other.
-                    let limit = if round < FRICTION_ROUNDS / 3 { now } else { 0.5 * (last + now) };
+                    // Damped by one half if the two forces oscillate.
+                    let limit = if round < MAX_FRICTION_ROUNDS / 3 { now } else { 0.5 * (last + now) };
                     rows[k].bounds = [-limit, limit];
                 }
             }
@@ -224,7 +233,7 @@ impl SerialArm {
             if !rubs {
                 break;
             }
-            report.converged &= round + 1 < FRICTION_ROUNDS;
+            report.converged &= round + 1 < MAX_FRICTION_ROUNDS;
         }
         let rows = &rows[..count];
         let resisting = Problem { h: &matrix, b: &b, friction: &friction, low: &low, high: &high, rows }.gradient(&v);
@@ -237,10 +246,10 @@ impl SerialArm {
             let limits = &s.joint.limits;
             let from = state.q[i];
             let to = from + h * v[i];
-            // Rounding must not carry it over the stop.
+            // Rounding must not move it past the stop.
             state.q[i] = to.max(limits.position[0].min(from)).min(limits.position[1].max(from));
             let stopped = (v[i] == low[i] && v[i] > -limits.velocity) || (v[i] == high[i] && v[i] < limits.velocity);
-            // At rest against a stop friction may be all that holds it.
+            // At rest against a stop, friction alone may hold it.
             if stopped && (v[i] != 0.0 || resisting[i].abs() > friction[i]) {
                 report.at_position_limit.insert(i);
             }
@@ -249,7 +258,7 @@ impl SerialArm {
             }
         }
         state.qd = v;
-        // A minimum that is none, of numbers too large, shows in the gradient.
+        // The gradient is not finite if the numbers are too large for a minimum.
         let solved = state.q.is_finite() && state.qd.is_finite() && resisting.is_finite();
         if !(solved && displacements.iter().all(|d| d.is_finite())) {
             return Err(Error::NotFinite { what: "the arm's state after the step" });
@@ -267,7 +276,7 @@ impl SerialArm {
     ) -> Result<()> {
         let n = self.dof();
         if [&state.q, &state.qd, &drive.torque, &drive.external].iter().any(|j| j.len() != n) {
-            return Err(Error::invalid("step", format!("state and drive must have {n} joints, as the arm has")));
+            return Err(Error::invalid("step", format!("state and drive must have {n} joints, like the arm")));
         }
         if !(dt > 0.0 && dt.is_finite() && substeps > 0) {
             return Err(Error::invalid("step", "dt must be positive and finite, substeps at least 1"));
@@ -276,19 +285,19 @@ impl SerialArm {
             return Err(Error::NotFinite { what: "a number of the state or the drive" });
         }
         if couplings.len() > MAX_COUPLINGS {
-            let reason = format!("{} given, at most {MAX_COUPLINGS} are possible", couplings.len());
+            let reason = format!("there are {}; the maximum is {MAX_COUPLINGS}", couplings.len());
             return Err(Error::invalid("couplings", reason));
         }
         for (k, c) in couplings.iter().enumerate() {
             let positive = |x: f64| x >= 0.0 && x.is_finite();
             if !(c.row.is_finite() && c.displacement.is_finite() && positive(c.stiffness) && positive(c.damping)) {
-                let reason = "must be finite, stiffness and damping not negative";
+                let reason = "must be finite, with stiffness and damping not negative";
                 return Err(Error::invalid(format!("coupling {k}"), reason));
             }
             if let CouplingLaw::Friction { of, coefficient } = c.law {
                 let presses = couplings.get(of).is_some_and(|o| !matches!(o.law, CouplingLaw::Friction { .. }));
                 if !(presses && positive(coefficient)) {
-                    let reason = "friction needs a coupling that presses and a coefficient that is not negative";
+                    let reason = "friction needs a coupling with a normal force and a coefficient that is not negative";
                     return Err(Error::invalid(format!("coupling {k}"), reason));
                 }
             }

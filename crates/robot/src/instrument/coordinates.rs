@@ -1,25 +1,25 @@
-//! An instrument's coordinates in its port, in the order of an action, and their limits.
+//! Coordinates of an instrument in its port, in the order of an action, and their limits.
 
 use crate::error::within;
 use crate::{Error, Result};
 use glam::DVec2;
 use serde::{Deserialize, Serialize};
 
-/// Where an instrument is in its port: what an arm is told, and what it reports.
+/// Coordinates of an instrument in its port: commands and measurements of an arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Coordinates {
-    /// The two pivots [rad]: the first turns about the port's x, the second about the y that the first has turned.
+    /// The two pivot angles (rad): the first about the port's x, the second about the rotated y.
     pub pivots: [f64; 2],
-    /// Distance from the port's centre to the jaw's pivot [m], along the shaft.
+    /// Distance from the port's centre to the jaw's pivot (m), along the shaft.
     pub insertion: f64,
-    /// Turn of the instrument about its shaft [rad].
+    /// Rotation of the instrument about its shaft (rad).
     pub roll: f64,
-    /// Jaw opening, 0 closed to 1 wide open.
+    /// Jaw opening, from 0 (closed) to 1 (open).
     pub jaw: f64,
 }
 
 impl Coordinates {
-    /// As five numbers of an action: pivots, insertion, roll, jaw.
+    /// The five numbers of an action: pivots (rad), insertion (m), roll (rad), jaw.
     pub fn to_action(&self) -> [f64; 5] {
         [self.pivots[0], self.pivots[1], self.insertion, self.roll, self.jaw]
     }
@@ -27,7 +27,7 @@ impl Coordinates {
     /// From five numbers of an action.
     ///
     /// # Errors
-    /// A number that is not finite; which one is said.
+    /// A number that is not finite, by its name.
     pub fn from_action(action: [f64; 5]) -> Result<Self> {
         const NAMES: [&str; 5] = ["first pivot", "second pivot", "insertion", "roll", "jaw"];
         if let Some(k) = action.iter().position(|a| !a.is_finite()) {
@@ -40,39 +40,41 @@ impl Coordinates {
         Ok(Self { pivots: [first, second], insertion, roll, jaw })
     }
 
-    /// Direction of the shaft in the port's frame: the pivots' turns of z.
+    /// Direction of the shaft in the port's frame: z rotated by the pivots.
     pub(crate) fn direction(pivots: [f64; 2]) -> glam::DVec3 {
         let (sa, ca) = pivots[0].sin_cos();
         let (sb, cb) = pivots[1].sin_cos();
         glam::DVec3::new(sb, -sa * cb, ca * cb)
     }
 
-    /// Angle between the shaft and the port's normal [rad].
+    /// Angle between the shaft and the port's normal (rad).
     pub fn tilt(&self) -> f64 {
         let u = Self::direction(self.pivots);
         DVec2::new(u.x, u.y).length().atan2(u.z)
     }
 }
 
-/// How far an instrument may go in a port. The pivots are limited together, by the tilt, as the round hole limits them.
+/// Limits of an instrument in a port. The tilt limits both pivots together, because the hole is
+/// round.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Limits {
-    /// Greatest tilt [rad].
+    /// Maximum tilt (rad).
     pub tilt: f64,
-    /// Least and greatest insertion [m].
+    /// Minimum and maximum insertion (m).
     pub insertion: [f64; 2],
-    /// Least and greatest roll [rad].
+    /// Minimum and maximum roll (rad).
     pub roll: [f64; 2],
 }
 
-/// By how much something lies outside its limits: 0 within, positive above the upper, negative below the lower.
+/// By how much coordinates exceed their limits: 0 inside, positive above the upper limit, negative
+/// below the lower one.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Excess {
-    /// Of the tilt [rad].
+    /// Of the tilt (rad).
     pub tilt: f64,
-    /// Of the insertion [m].
+    /// Of the insertion (m).
     pub insertion: f64,
-    /// Of the roll [rad].
+    /// Of the roll (rad).
     pub roll: f64,
     /// Of the jaw's opening.
     pub jaw: f64,
@@ -84,7 +86,7 @@ impl Excess {
         *self != Self::default()
     }
 
-    /// The limits that bind, by name, with the excess in SI units.
+    /// The names of the binding limits, with the excess in SI units.
     pub fn binding(&self) -> impl Iterator<Item = (&'static str, f64)> {
         let all = [("tilt", self.tilt), ("insertion", self.insertion), ("roll", self.roll), ("jaw", self.jaw)];
         all.into_iter().filter(|(_, excess)| *excess != 0.0)
@@ -92,10 +94,11 @@ impl Excess {
 }
 
 impl Limits {
-    /// Says whether the limits can be used.
+    /// Checks the limits.
     ///
     /// # Errors
-    /// A tilt of 0 or of 80 degrees and more (the second pivot is singular at 90), an empty range, an insertion that is not positive, a number that is not finite.
+    /// A tilt of 0, or of 80 degrees and more (the second pivot is singular at 90), an empty range,
+    /// an insertion that is not positive, a number that is not finite.
     pub fn check(&self) -> Result<()> {
         within("limits, tilt", self.tilt, 1e-3, 80_f64.to_radians(), "rad")?;
         within("limits, insertion[0]", self.insertion[0], 1e-3, 2.0, "m")?;
@@ -105,8 +108,9 @@ impl Limits {
         Ok(())
     }
 
-    /// The nearest coordinates within the limits, and what was cut off. Where the tilt is too great it is taken back towards the normal in its own
-    /// direction, so that coordinates that move continuously stay so. Numbers that are not finite are not made better.
+    /// The nearest coordinates within the limits, and the excess. Too large a tilt is reduced in
+    /// its own direction, so that continuous motions stay continuous. Numbers that are not finite
+    /// stay so.
     pub fn clamp(&self, wanted: &Coordinates) -> (Coordinates, Excess) {
         let mut excess = Excess::default();
         let mut clamped = *wanted;
@@ -117,20 +121,21 @@ impl Limits {
             let away = DVec2::new(u.x, u.y).try_normalize().unwrap_or(DVec2::X);
             clamped.pivots = pivots(away * self.tilt.sin(), self.tilt.cos());
         }
-        (clamped.insertion, excess.insertion) = cut(wanted.insertion, self.insertion);
-        (clamped.roll, excess.roll) = cut(wanted.roll, self.roll);
-        (clamped.jaw, excess.jaw) = cut(wanted.jaw, [0.0, 1.0]);
+        (clamped.insertion, excess.insertion) = clamp_with_excess(wanted.insertion, self.insertion);
+        (clamped.roll, excess.roll) = clamp_with_excess(wanted.roll, self.roll);
+        (clamped.jaw, excess.jaw) = clamp_with_excess(wanted.jaw, [0.0, 1.0]);
         (clamped, excess)
     }
 }
 
-/// `value` within `low` and `high`, and how far outside it was.
-pub(crate) fn cut(value: f64, [low, high]: [f64; 2]) -> (f64, f64) {
+/// `value` clamped to [`low`, `high`], and its excess.
+pub(crate) fn clamp_with_excess(value: f64, [low, high]: [f64; 2]) -> (f64, f64) {
     let kept = value.max(low).min(high);
     if value.is_nan() { (value, value) } else { (kept, value - kept) }
 }
 
-/// The pivots that turn the port's z to a direction (its part in the port's plane, its part along z > 0).
+/// The pivots that rotate the port's z to a direction, given by its part in the port's plane and
+/// its positive part along z.
 pub(crate) fn pivots(across: DVec2, along: f64) -> [f64; 2] {
     [(-across.y).atan2(along), across.x.atan2(across.y.hypot(along))]
 }
@@ -142,7 +147,7 @@ mod tests {
     const LIMITS: Limits = Limits { tilt: 0.5, insertion: [0.02, 0.3], roll: [-2.0, 2.0] };
 
     #[test]
-    fn within_limits_nothing_changes() {
+    fn coordinates_within_limits_do_not_change() {
         let c = Coordinates { pivots: [0.3, -0.2], insertion: 0.1, roll: -1.9, jaw: 0.5 };
         let (clamped, excess) = LIMITS.clamp(&c);
         assert_eq!((clamped, excess.any()), (c, false));
@@ -150,19 +155,19 @@ mod tests {
     }
 
     #[test]
-    fn what_is_beyond_is_cut_and_told() {
+    fn coordinates_beyond_limits_are_clamped_with_their_excess() {
         let c = Coordinates { pivots: [0.6, -0.5], insertion: 0.4, roll: -2.5, jaw: 1.2 };
         let (clamped, excess) = LIMITS.clamp(&c);
         assert!((clamped.tilt() - 0.5).abs() < 1e-12);
         let (a, b) = (Coordinates::direction(c.pivots), Coordinates::direction(clamped.pivots));
-        assert!((a.x * b.y - a.y * b.x).abs() < 1e-12, "the tilt's direction stays");
+        assert!((a.x * b.y - a.y * b.x).abs() < 1e-12, "the direction of the tilt stays");
         assert!((excess.tilt - (c.tilt() - 0.5)).abs() < 1e-12);
         assert!((excess.insertion - 0.1).abs() < 1e-12 && (excess.roll + 0.5).abs() < 1e-12);
         assert_eq!(excess.binding().map(|b| b.0).collect::<Vec<_>>(), ["tilt", "insertion", "roll", "jaw"]);
     }
 
     #[test]
-    fn bad_numbers_are_named() {
+    fn numbers_that_are_not_finite_are_named() {
         let e = Coordinates::from_action([0.0, 0.0, f64::NAN, 0.0, 0.0]).unwrap_err().to_string();
         assert!(e.contains("insertion"), "{e}");
         assert!(Limits { tilt: 1.5, ..LIMITS }.check().is_err());

@@ -1,13 +1,14 @@
-//! Laparoscopic instruments: shaft, jaw and what they weigh.
+//! Laparoscopic instruments: shaft, jaw and mass.
 //!
 //! ```text
-//!   flange        shaft base                                     shaft end   jaw pivot
-//!     |  motor head   |================= shaft =======================|---o<  blades
-//!     +---> z         +---> z (along the shaft)                           +---> x (along the closed blades)
+//!   flange       shaft base                        shaft end   jaw pivot
+//!     | motor head |============= shaft ===============|---o<  blades
+//!     +---> z      +---> z (along the shaft)               +---> x (along the closed blades)
 //! ```
 //!
-//! Three frames: the *flange* (the arm's tool mount), the *shaft frame* with its origin at the shaft's base and z along the shaft, and the *tip
-//! frame*, which is the gripper's of `trocar-cell`: origin at the jaw's pivot, x along the shaft, y across the closing plane, z along the hinge.
+//! There are three frames: the *flange* (the arm's tool mount); the *shaft frame*, with its origin
+//! at the shaft's base and z along the shaft; and the *tip frame*, with its origin at the jaw's
+//! pivot, x along the shaft, y across the closing plane and z along the hinge.
 
 pub(crate) mod coordinates;
 
@@ -21,52 +22,53 @@ use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_3, PI};
 use trocar_core::Pose;
 
-/// Standard gravity as all of Trocar uses it [m/s2].
+/// Standard gravity in all of Trocar (m/s2).
 pub const GRAVITY: f64 = 9.81;
 
-/// What the paper's instruments weigh [N] (SPEC C8).
+/// Weight of the paper's instruments (N).
 pub const WEIGHT: f64 = 4.7;
 
 /// An instrument on a tool mount.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Instrument {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Radius of the shaft [m].
+    /// Radius of the shaft (m).
     pub shaft_radius: f64,
-    /// Length of the shaft [m], from its base to its end.
+    /// Length of the shaft (m), from its base to its end.
     pub shaft_length: f64,
     /// Pose of the shaft frame in the flange's.
     pub mount: Pose,
-    /// Distance from the shaft's end to the jaw's pivot [m], along the shaft.
+    /// Distance from the shaft's end to the jaw's pivot, along the shaft (m).
     pub pivot_offset: f64,
     /// The jaw.
     pub jaw: Jaw,
-    /// Mass, its centre and inertia, in the shaft frame.
+    /// Mass properties in the shaft frame.
     pub mass: MassProperties,
 }
 
-/// A jaw of two blades.
+/// A jaw with two blades.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Jaw {
-    /// Full angle between the blades wide open [rad].
+    /// Angle between the open blades (rad).
     pub max_angle: f64,
-    /// Length of the blades beyond the pivot [m].
+    /// Length of the blades beyond the pivot (m).
     pub blade_length: f64,
-    /// Greatest speed of the angle between the blades [rad/s].
+    /// Maximum rate of the angle between the blades (rad/s).
     pub speed: f64,
 }
 
 impl Jaw {
-    /// The angle between the blades [rad] at an opening 0 to 1; openings outside are clamped, NaN is closed.
+    /// The angle between the blades (rad) at an opening, which is clamped to [0, 1]; NaN is closed.
     pub fn angle(&self, opening: f64) -> f64 {
-        self.max_angle * share(opening)
+        self.max_angle * clamp_unit(opening)
     }
 
-    /// The opening 0 to 1 after `seconds` on the way from `opening` to `target`, no faster than the jaw.
+    /// The opening in [0, 1] after `seconds` of motion from `opening` to `target` at the jaw's
+    /// maximum rate.
     pub fn toward(&self, opening: f64, target: f64, seconds: f64) -> f64 {
         let most = (self.speed * seconds / self.max_angle).max(0.0);
-        share(opening + (share(target) - opening).max(-most).min(most))
+        clamp_unit(opening + (clamp_unit(target) - opening).max(-most).min(most))
     }
 }
 
@@ -82,7 +84,7 @@ impl Instrument {
         match name {
             "grasper" => Ok(Self::grasper()),
             "cutter" => Ok(Self::cutter()),
-            _ => Err(Error::invalid(format!("instrument '{name}'"), "is not built in; grasper and cutter are")),
+            _ => Err(Error::invalid(format!("instrument '{name}'"), "is unknown; it must be grasper or cutter")),
         }
     }
 
@@ -92,7 +94,8 @@ impl Instrument {
         Self::motorised("grasper", &head, FRAC_PI_3 / 0.3)
     }
 
-    /// The motorised cutter of the right arm: as the grasper, with the motor farther to the side and a faster jaw.
+    /// The motorised cutter of the right arm: like the grasper, with the motor farther to the side
+    /// and a faster jaw.
     pub fn cutter() -> Self {
         let head = Head { radius: 0.026, length: 0.09, aside: 0.009 };
         Self::motorised("cutter", &head, FRAC_PI_3 / 0.2)
@@ -116,7 +119,7 @@ impl Instrument {
         }
     }
 
-    /// Distance from the shaft's base to the jaw's pivot [m].
+    /// Distance from the shaft's base to the jaw's pivot (m).
     pub fn reach(&self) -> f64 {
         self.shaft_length + self.pivot_offset
     }
@@ -127,30 +130,30 @@ impl Instrument {
         compose(&self.mount, &in_shaft)
     }
 
-    /// Pose of the tip in the cell for a flange's pose there.
+    /// Pose of the tip in the cell, from that of the flange.
     pub fn tip(&self, flange: &Pose) -> Pose {
         compose(flange, &self.tip_in_flange())
     }
 
-    /// Pose of the flange in the cell for a tip's pose there.
+    /// Pose of the flange in the cell, from that of the tip.
     pub fn flange(&self, tip: &Pose) -> Pose {
         compose(tip, &self.tip_in_flange().inverse())
     }
 
-    /// Mass, centre and inertia in the flange's frame.
+    /// Mass properties in the flange's frame.
     pub fn mass_in_flange(&self) -> MassProperties {
         self.mass.placed(&self.mount)
     }
 
-    /// Weight [N].
+    /// Weight (N).
     pub fn weight(&self) -> f64 {
         self.mass.mass * GRAVITY
     }
 
-    /// Says whether the description can be used.
+    /// Checks the instrument.
     ///
     /// # Errors
-    /// A length, angle or mass that is no instrument's, a number that is not finite, an inertia that no body has.
+    /// A length, angle or mass out of range, a number that is not finite, an impossible inertia.
     pub fn check(&self) -> Result<()> {
         let what = |field: &str| format!("instrument '{}', {field}", self.name);
         within(&what("shaft_radius"), self.shaft_radius, 5e-4, 0.02, "m")?;
@@ -160,10 +163,10 @@ impl Instrument {
         within(&what("jaw.blade_length"), self.jaw.blade_length, 1e-3, 0.2, "m")?;
         within(&what("jaw.speed"), self.jaw.speed, 1e-3, 1e3, "rad/s")?;
         if !self.mount.translation.is_finite() || self.mount.translation.length() > 1.0 {
-            return Err(Error::invalid(what("mount"), "its translation must be finite and under 1 m"));
+            return Err(Error::invalid(what("mount"), "its translation must be finite and shorter than 1 m"));
         }
         if !self.mount.rotation.is_normalized() {
-            return Err(Error::invalid(what("mount"), "its rotation must be a quaternion of length 1"));
+            return Err(Error::invalid(what("mount"), "its rotation must be a unit quaternion"));
         }
         within(&what("mass"), self.mass.mass, 1e-4, 100.0, "kg")?;
         if self.mass.center.length() > 2.0 {
@@ -173,25 +176,25 @@ impl Instrument {
     }
 }
 
-/// `value` within 0 and 1, NaN as 0.
-pub(crate) fn share(value: f64) -> f64 {
+/// `value` clamped to [0, 1]; NaN becomes 0.
+pub(crate) fn clamp_unit(value: f64) -> f64 {
     if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) }
 }
 
-/// The motor's housing, a cylinder behind the shaft.
+/// The motor housing, a cylinder behind the shaft.
 struct Head {
     radius: f64,
     length: f64,
-    /// How far its mass lies beside the shaft's axis [m].
+    /// Distance of its centre of mass from the shaft's axis (m).
     aside: f64,
 }
 
-/// Turns the tip's x to the shaft's z and keeps y.
+/// The rotation from the shaft frame to the tip frame: the tip's x is the shaft's z; y is the same.
 pub(crate) fn shaft_to_tip() -> DQuat {
     DQuat::from_rotation_y(-FRAC_PI_2)
 }
 
-/// `outer` after `inner`.
+/// The composition of two poses, normalized: `inner` is given in the axes of `outer`.
 pub(crate) fn compose(outer: &Pose, inner: &Pose) -> Pose {
     Pose { rotation: (outer.rotation * inner.rotation).normalize(), translation: outer.transform(inner.translation) }
 }
@@ -201,7 +204,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn built_ins_weigh_what_the_paper_says() {
+    fn built_in_instruments_have_the_papers_weight() {
         for name in Instrument::NAMES {
             let i = Instrument::named(name).unwrap();
             i.check().unwrap();
@@ -209,11 +212,11 @@ mod tests {
             assert!((i.jaw.angle(1.0).to_degrees() - 60.0).abs() < 1e-12);
             assert!(i.mass.center.z < 0.0, "the motor outweighs the shaft");
         }
-        assert!(Instrument::named("stapler").unwrap_err().to_string().contains("grasper and cutter"));
+        assert!(Instrument::named("stapler").unwrap_err().to_string().contains("grasper or cutter"));
     }
 
     #[test]
-    fn the_tip_is_the_grippers_frame() {
+    fn the_tip_has_the_grippers_frame() {
         let i = Instrument::grasper();
         let tip = i.tip(&Pose::IDENTITY);
         assert!((tip.rotation * DVec3::X - DVec3::Z).length() < 1e-15, "x runs along the shaft");
@@ -224,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn the_jaw_keeps_its_speed_and_its_ends() {
+    fn the_jaw_keeps_its_rate_and_range() {
         let jaw = Instrument::grasper().jaw;
         assert!((jaw.toward(0.0, 1.0, 0.03) - 0.1).abs() < 1e-12);
         assert_eq!(jaw.toward(0.95, 7.0, 1.0), 1.0);
@@ -233,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn unusable_descriptions_are_refused_by_name() {
+    fn invalid_instruments_are_refused_by_field() {
         let refused = |change: &dyn Fn(&mut Instrument), field: &str| {
             let mut i = Instrument::cutter();
             change(&mut i);

@@ -1,65 +1,71 @@
-//! The control laws: from reference and measured joints to torques.
+//! The control laws: torques from reference and measured joints.
 
 use super::reference::Reference;
-use super::settings::{Law, Settings};
-use crate::chain::{ArmState, Dynamics, JointSet, Joints, LEVER, SerialArm, TASK, solve, turn};
+use super::settings::{ControllerSettings, Law};
+use crate::chain::{
+    ArmState, Dynamics, JointSet, Joints, ROTATION_LEVER, SerialArm, TASK_ROWS, rotation_vector, solve_task,
+};
 use crate::instrument::Instrument;
 use crate::port::{Port, Shaft};
 use serde::{Deserialize, Serialize};
 
-/// Most torque that integral action or observer may add, as a share of the joint's limit: what is more is no error of a model.
-const CORRECTION_SHARE: f64 = 0.3;
-/// Integral action and observer leave a joint alone that stands still this near to its reference [rad or m; rad/s or m/s]: with friction they would wind up
-/// and move it to and fro for ever. A touch over 0.05 mm at the tip.
-const QUIET: [f64; 2] = [8e-5, 1e-4];
-/// They take it up again from here, or when its reference moves.
-const AWAKE: [f64; 2] = [1.6e-4, 1e-3];
+/// Maximum torque of integral action or observer, as a share of the joint's limit. A larger one is
+/// not a model error.
+const MAX_CORRECTION_SHARE: f64 = 0.3;
+/// Integral action and observer pause for a joint that stands still this near to its reference (rad
+/// or m; rad/s or m/s). With friction they would wind up and cause a limit cycle. At the tip this
+/// is a little over 0.05 mm.
+const PAUSE_BELOW: [f64; 2] = [8e-5, 1e-4];
+/// They resume above this error and rate, or when the reference moves.
+const RESUME_ABOVE: [f64; 2] = [1.6e-4, 1e-3];
 
-/// Damping of the task's error in joints [m2]: near postures in which the arm loses a direction the joints' own error is better.
-const TRUSTED: f64 = 1e-4;
+/// Damping of the task's error in joints (m2): near singular postures the joint error is better.
+const TASK_DAMPING: f64 = 1e-4;
 
-/// What a controller remembers between steps.
+/// The controller's state between steps.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
-    /// The last torques [N m or N].
+    /// The last torques (N m or N).
     pub torque: Joints,
-    /// Integral of the error [rad s or m s], or what the observer found: torques that the model does not know [N m or N].
+    /// Integral of the error (rad s or m s), or the observed torques that are not in the model (N m
+    /// or N).
     pub correction: Joints,
-    /// Joints that stand still where they should.
-    pub asleep: JointSet,
+    /// Joints that stand still at their reference.
+    pub paused: JointSet,
 }
 
 impl Memory {
-    /// At rest under these torques.
+    /// At rest under `torque`.
     pub fn at_rest(torque: Joints) -> Self {
-        Self { torque, correction: Joints::zeros(torque.len()), asleep: JointSet::default() }
+        Self { torque, correction: Joints::zeros(torque.len()), paused: JointSet::default() }
     }
 
-    /// Says anew which joints need no correction.
-    fn watch(&mut self, error: &Joints, rate: &Joints, wanted: &Joints) {
-        let mut asleep = JointSet::default();
+    /// Updates the joints that need no correction.
+    fn update_paused(&mut self, error: &Joints, rate: &Joints, wanted: &Joints) {
+        let mut paused = JointSet::default();
         for i in 0..error.len() {
-            let [near, slow] = if self.asleep.contains(i) { AWAKE } else { QUIET };
+            let [near, slow] = if self.paused.contains(i) { RESUME_ABOVE } else { PAUSE_BELOW };
             if error[i].abs() < near && rate[i].abs() < slow && wanted[i].abs() < slow {
-                asleep.insert(i);
+                paused.insert(i);
             }
         }
-        self.asleep = asleep;
+        self.paused = paused;
     }
 }
 
-/// What does not change.
-pub(super) struct Plan<'a> {
-    pub settings: &'a Settings,
+/// The constants of a controller.
+pub(super) struct Controller<'a> {
+    pub settings: &'a ControllerSettings,
     pub believed: &'a SerialArm,
-    /// The joints' own inertias in the start posture [kg m2 or kg].
+    /// The joints' diagonal inertias in the start posture (kg m2 or kg).
     pub inertia: &'a Joints,
     pub instrument: &'a Instrument,
     pub port: &'a Port,
 }
 
-impl Plan<'_> {
-    /// The torques for a step of `dt` [s]: within the arm's limits and their rate. `from` and `to` are the references at its beginning and end.
+impl Controller<'_> {
+    /// The torques for a step of `dt` (s), within the limits of torque and its rate. `from` and
+    /// `to` are the references at the start and the end of the step.
     pub fn torque(
         &self,
         memory: &mut Memory,
@@ -78,7 +84,7 @@ impl Plan<'_> {
             Law::RcmImpedance => self.task_error(&behind, dynamics, from),
             _ => behind,
         };
-        memory.watch(&behind, &measured.qd, &from.qd);
+        memory.update_paused(&behind, &measured.qd, &from.qd);
         let mut wanted = to.qdd;
         if law != Law::JointImpedance {
             for i in 0..n {
@@ -87,9 +93,9 @@ impl Plan<'_> {
         }
         if law == Law::Integral {
             for i in 0..n {
-                if !memory.asleep.contains(i) {
-                    // No more than a share of the joint's torque.
-                    let most = CORRECTION_SHARE * self.effort(i)
+                if !memory.paused.contains(i) {
+                    // At most a share of the joint's torque.
+                    let most = MAX_CORRECTION_SHARE * self.effort(i)
                         / (stiffness * g.integral * dynamics.mass_matrix.row(i)[i]).max(1e-9);
                     memory.correction[i] = (memory.correction[i] + dt * error[i]).clamp(-most, most);
                 }
@@ -113,8 +119,9 @@ impl Plan<'_> {
         torque
     }
 
-    /// Learns from a step of `dt` [s] what torque it took beyond what the model says.
-    pub fn learn(&self, memory: &mut Memory, dynamics: &Dynamics, before: &ArmState, after: &ArmState, dt: f64) {
+    /// Updates the disturbance observer with the torque of a step of `dt` (s) that is not in the
+    /// model.
+    pub fn observe(&self, memory: &mut Memory, dynamics: &Dynamics, before: &ArmState, after: &ArmState, dt: f64) {
         if !self.settings.law.observes() {
             return;
         }
@@ -123,18 +130,20 @@ impl Plan<'_> {
         let inertial = dynamics.mass_matrix.times(&rate);
         let share = 1.0 - (-self.settings.gains.observer * dt).exp();
         for i in 0..n {
-            if memory.asleep.contains(i) {
+            if memory.paused.contains(i) {
                 continue;
             }
             let missing = memory.torque[i] - inertial[i] - dynamics.bias[i];
-            let most = CORRECTION_SHARE * self.effort(i);
+            let most = MAX_CORRECTION_SHARE * self.effort(i);
             memory.correction[i] = (memory.correction[i] + share * (missing - memory.correction[i])).clamp(-most, most);
         }
     }
 
-    /// The acceleration that brings an error back: w^2 e + 2 z w e' where it is small. A torque that may change by no more than r a second gives a joint of inertia m no more
-    /// jerk than j = r/m, and a loop that asks for more swings up. So the speed of the way back, and its acceleration, grow with the root alone from where
-    /// to bring them to zero again at the loop's pace would take half that jerk.
+    /// The acceleration that corrects an error: w^2 e + 2 z w e' for small errors. A torque rate of
+    /// at most r limits the jerk of a joint of inertia m to j = r/m, and a loop that needs more
+    /// becomes unstable. So the speed of the correction and its acceleration grow only with the
+    /// square root, from the point where stopping them at the loop's bandwidth would take half of
+    /// this jerk.
     fn correction(&self, error: f64, slower: f64, inertia: f64) -> f64 {
         let g = &self.settings.gains;
         let w = g.bandwidth;
@@ -143,47 +152,49 @@ impl Plan<'_> {
             return w * w * error;
         }
         let most = jerk / (4.0 * g.damping * w);
-        let back = rooted(w / (2.0 * g.damping) * error, g.damping * most / w);
-        rooted(2.0 * g.damping * w * (back + slower), most)
+        let back = soft_limit(w / (2.0 * g.damping) * error, g.damping * most / w);
+        soft_limit(2.0 * g.damping * w * (back + slower), most)
     }
 
     fn effort(&self, i: usize) -> f64 {
         self.believed.segments()[i].joint.limits.effort
     }
 
-    /// The joints' error as the tip, the port and the roll see it, the port's share weighed; the elbow's as it is.
+    /// The joint error with its task part replaced by the errors of tip, port (weighted) and roll.
+    /// The null-space part is unchanged.
     fn task_error(&self, behind: &Joints, dynamics: &Dynamics, from: &Reference) -> Joints {
         let n = behind.len();
         let (is, shall) = (dynamics.frames.flange(), self.believed.frames(&from.q).flange());
         let (tip, wanted) = (self.instrument.tip(&is), self.instrument.tip(&shall));
         let (shaft, other) = (Shaft::of(self.instrument, &is), Shaft::of(self.instrument, &shall));
-        // Where the shafts are nearest to the centre.
+        // The points of the shafts nearest to the centre.
         let at = |s: &Shaft| s.base + (self.port.centre() - s.base).dot(s.direction) * s.direction;
         let (here, there) = (at(&shaft), at(&other));
         let (one, two) = shaft.direction.any_orthonormal_pair();
         let (of_tip, of_port) = (dynamics.frames.jacobian(n, tip.translation), dynamics.frames.jacobian(n, here));
-        let mut rows = [Joints::zeros(n); TASK];
+        let mut rows = [Joints::zeros(n); TASK_ROWS];
         for i in 0..n {
             let (t, p) = (of_tip.linear()[i], of_port.linear()[i]);
-            let about = LEVER * of_tip.angular()[i].dot(shaft.direction);
+            let about = ROTATION_LEVER * of_tip.angular()[i].dot(shaft.direction);
             let column = [t.x, t.y, t.z, p.dot(one), p.dot(two), about];
             for (row, value) in rows.iter_mut().zip(column) {
                 row[i] = value;
             }
         }
-        let (d, r) = (wanted.translation - tip.translation, turn(wanted.rotation * tip.rotation.inverse()));
+        let (d, r) = (wanted.translation - tip.translation, rotation_vector(wanted.rotation * tip.rotation.inverse()));
         let weight = self.settings.gains.port;
         let away = there - here;
-        let task = [d.x, d.y, d.z, away.dot(one), away.dot(two), LEVER * r.dot(shaft.direction)];
+        let task = [d.x, d.y, d.z, away.dot(one), away.dot(two), ROTATION_LEVER * r.dot(shaft.direction)];
         let weighed = [0.0, 0.0, 0.0, (weight - 1.0) * task[3], (weight - 1.0) * task[4], 0.0];
-        // The joints' error already holds the task's to first order; what is added is the rest of it and the port's weight.
-        let extra: [f64; TASK] = std::array::from_fn(|a| task[a] - rows[a].dot(behind) + weighed[a]);
-        let add = solve(&rows, JointSet::default(), extra, TRUSTED, 1);
+        // The joint error contains the task error to first order. Adds the rest of it and the
+        // weight of the port.
+        let extra: [f64; TASK_ROWS] = std::array::from_fn(|a| task[a] - rows[a].dot(behind) + weighed[a]);
+        let add = solve_task(&rows, JointSet::default(), extra, TASK_DAMPING, 1);
         Joints::from_fn(n, |i| behind[i] + add[i])
     }
 }
 
-/// `x` up to `limit`, from there on growing as a root does, with no kink.
-fn rooted(x: f64, limit: f64) -> f64 {
+/// `x` up to `limit`, then growing like a square root, without a kink.
+fn soft_limit(x: f64, limit: f64) -> f64 {
     if x.abs() <= limit { x } else { limit.copysign(x) * (2.0 * x.abs() / limit - 1.0).sqrt() }
 }

@@ -1,31 +1,32 @@
-//! What a manipulator's sensors and its controller say, in CRTK's words.
+//! Measurements and setpoints of a manipulator, by CRTK's names.
 
-use super::{Manipulator, reference};
+use super::controlled_arm::Manipulator;
+use super::reference;
 use crate::chain::{ArmState, Frames, Joints};
 use crate::instrument::{Coordinates, compose};
 use crate::port::{Measured, Shaft, Twist};
 use glam::{DMat3, DVec3};
 use trocar_core::{Pose, Wrench};
 
-/// What is read at the joints.
+/// Readings of the joints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JointReadings {
-    /// Positions [rad or m].
+    /// Positions (rad or m).
     pub position: Joints,
-    /// Rates [rad/s or m/s].
+    /// Rates (rad/s or m/s).
     pub velocity: Joints,
-    /// Torques of the drives [N m or N].
+    /// Torques of the drives (N m or N).
     pub effort: Joints,
 }
 
 impl Manipulator {
-    /// The joints as they are.
+    /// The measured joints.
     pub fn measured_js(&self) -> JointReadings {
         let s = &self.state;
         JointReadings { position: s.arm.q, velocity: s.arm.qd, effort: s.memory.torque }
     }
 
-    /// The joints as the controller wants them; effort is the last torque's.
+    /// The reference of the joints; the effort is the last torque.
     pub fn setpoint_js(&self) -> JointReadings {
         let s = &self.state;
         JointReadings { position: s.reference.q, velocity: s.reference.qd, effort: s.memory.torque }
@@ -36,12 +37,12 @@ impl Manipulator {
         self.instrument.tip(&self.flange())
     }
 
-    /// Pose of the tip that the controller is given now: the reference, which is behind the command by its filter.
+    /// Pose of the tip in the reference, which the filter delays behind the command.
     pub fn setpoint_cp(&self) -> Pose {
         self.instrument.tip(&self.arm.frames(&self.state.reference.q).flange())
     }
 
-    /// How the tip moves, at the jaw's pivot, in the cell.
+    /// Twist of the tip at the jaw's pivot, in the cell.
     pub fn measured_cv(&self) -> Twist {
         let frames = self.arm.frames(&self.state.arm.q);
         let tip = self.instrument.tip(&frames.flange()).translation;
@@ -49,8 +50,10 @@ impl Manipulator {
         Twist { linear, angular }
     }
 
-    /// What a six-axis sensor at the mount reads, mean over the last step: what the instrument does to the mount, with its weight, its inertia, the load on its
-    /// tip and the rim's forces; in the flange's frame, torque about its origin, as [`LoadModel`](crate::wrench::LoadModel) has it.
+    /// The reading of a six-axis sensor at the mount, mean over the last step: the wrench of the
+    /// instrument on the mount, with its weight and inertia, the load on its tip and the rim's
+    /// forces. In the flange's frame, torque about its origin, as in
+    /// [`LoadModel`](crate::wrench::LoadModel).
     pub fn measured_cf(&self) -> Wrench {
         let turn = self.flange().rotation.inverse();
         let [force, torque] = self.state.mount;
@@ -67,8 +70,9 @@ impl Manipulator {
         Shaft::of(&self.instrument, &self.flange())
     }
 
-    /// The instrument's coordinates as measured, and their rates: pivots [rad/s], insertion [m/s], roll [rad/s], jaw [1/s]. Where the shaft does not point into the body
-    /// any more, which takes joint commands, they are those of the reference at rest.
+    /// The measured coordinates of the instrument, and their rates: pivots (rad/s), insertion
+    /// (m/s), roll (rad/s), jaw (1/s). If the shaft does not point into the body, which only joint
+    /// commands can cause, they are those of the reference at rest.
     pub fn coordinates(&self) -> (Coordinates, [f64; 5]) {
         let frames = self.arm.frames(&self.state.arm.q);
         let flange = frames.flange();
@@ -82,12 +86,12 @@ impl Manipulator {
         }
     }
 
-    /// The instrument in its port. None where the shaft does not point into the body.
+    /// The instrument in its port; `None` if the shaft does not point into the body.
     pub fn in_port(&self) -> Option<Measured> {
         self.port.measure(&self.instrument, &self.flange(), self.state.jaw[0]).ok()
     }
 
-    /// The coordinates that the controller is given now; the jaw's is the commanded one.
+    /// The coordinates of the reference; the jaw's opening is the commanded one.
     pub fn setpoint_coordinates(&self) -> Coordinates {
         let (r, jaw) = (&self.state.reference, self.state.jaw[2]);
         let own = reference::unpack(&r.value, jaw);
@@ -97,28 +101,28 @@ impl Manipulator {
         let flange = self.arm.frames(&r.q).flange();
         match self.port.measure(&self.instrument, &flange, jaw) {
             Ok(m) => self.limits.clamp(&m.coordinates).0,
-            // A shaft that joint commands have drawn out comes back upright.
+            // A shaft that joint commands have pulled out returns upright.
             Err(_) => Coordinates { insertion: self.limits.insertion[0], jaw, ..Coordinates::default() },
         }
     }
 
-    /// The coordinates that were commanded last, after limits.
+    /// The coordinates of the last command, after limits.
     pub fn commanded(&self) -> Coordinates {
         let (r, jaw) = (&self.state.reference, self.state.jaw[2]);
         if r.in_joints() { self.setpoint_coordinates() } else { reference::unpack(&r.target, jaw) }
     }
 
-    /// Distance from the port's centre to the shaft's axis, in the port's plane [m].
+    /// Distance from the port's centre to the shaft's axis, in the port's plane (m).
     pub fn rcm_deviation(&self) -> f64 {
         self.deviation(&self.arm.frames(&self.state.arm.q))
     }
 
-    /// Angle between shaft and port normal [rad].
+    /// Angle between shaft and port normal (rad).
     pub fn tilt(&self) -> f64 {
         self.shaft().direction.angle_between(self.port.normal())
     }
 
-    /// The jaw's opening, 0 to 1.
+    /// The jaw's opening, in [0, 1].
     pub fn jaw(&self) -> f64 {
         self.state.jaw[0]
     }
@@ -127,7 +131,7 @@ impl Manipulator {
         let flange = frames.flange();
         match self.port.measure(&self.instrument, &flange, 0.0) {
             Ok(m) => m.deviation(),
-            // A shaft along the plane may never cross it: its distance from the centre.
+            // A shaft along the plane may not cross it: its distance from the centre is used.
             Err(_) => {
                 let shaft = Shaft::of(&self.instrument, &flange);
                 (self.port.centre() - shaft.base).cross(shaft.direction).length()
@@ -135,8 +139,9 @@ impl Manipulator {
         }
     }
 
-    /// What the instrument does to the mount: its weight and what touches it (`outer`: force, and torque about the flange's origin at the
-    /// step's beginning) less what its momentum took (Newton and Euler). In the cell's axes.
+    /// The wrench of the instrument on the mount: its weight and the external wrench `outer`
+    /// (force, and torque about the flange's origin at the start of the step) minus the change of
+    /// momentum (Newton-Euler). In the cell's axes.
     pub(super) fn mount_reading(
         &self,
         before: &ArmState,

@@ -1,8 +1,8 @@
-//! Another start for an arm that is there already: what an episode's reset needs, without building the arm's models anew.
+//! A new start for an existing manipulator: the reset of an episode, without building models again.
 
 use super::control::Memory;
+use super::controlled_arm::{Manipulator, ManipulatorState, START_SEARCHES};
 use super::reference::Reference;
-use super::{Manipulator, ManipulatorState, STARTS};
 use crate::chain::{ArmState, InverseOptions};
 use crate::instrument::Coordinates;
 use crate::port::RimState;
@@ -10,11 +10,12 @@ use crate::{Error, Result};
 use glam::DVec3;
 
 impl Manipulator {
-    /// Puts the arm at rest at `start`, as [`Manipulator::new`] does; only the controller's joint inertias stay those of the start it was made with, so that states of all its starts go on to the bit
-    /// in all manipulators that were made alike.
+    /// Puts the arm at rest at `start`, as [`Manipulator::new`] does. The controller's joint
+    /// inertias stay those of the first start, so that states of all starts continue bit for bit in
+    /// identical manipulators.
     ///
     /// # Errors
-    /// A start outside the limits, or one that the arm does not reach: nothing is changed.
+    /// A start outside the limits or out of reach. The state is then unchanged.
     pub fn restart(&mut self, start: &Coordinates) -> Result<()> {
         let start = Coordinates::from_action(start.to_action())?;
         let (kept, excess) = self.limits.clamp(&start);
@@ -22,11 +23,11 @@ impl Manipulator {
             return Err(Error::invalid("start", format!("its {name} is outside the limits by {by:.4} (SI units)")));
         }
         let target = self.port.flange(&self.instrument, &kept);
-        let options = InverseOptions { restarts: STARTS, tolerance: [1e-9, 1e-9], ..InverseOptions::default() };
+        let options = InverseOptions { restarts: START_SEARCHES, tolerance: [1e-9, 1e-9], ..InverseOptions::default() };
         let found = self.arm.inverse(&target, &self.arm.home(), &options)?;
         if !found.reached {
             let off = 1e3 * found.translation.length();
-            let reason = format!("the flange of arm '{}' would be {off:.1} mm from its place", self.arm.name());
+            let reason = format!("the flange of arm '{}' would be {off:.1} mm from its pose", self.arm.name());
             return Err(Error::invalid("start", reason));
         }
         let dynamics = self.believed.dynamics(&found.q, &self.arm.zeros());

@@ -1,4 +1,4 @@
-//! What drives an arm: which controller, its gains, and what it believes wrongly.
+//! Settings of the controller: the control law, its gains, and its model error.
 
 use crate::error::within;
 use crate::instrument::Limits;
@@ -6,24 +6,28 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// A control law. All of them command joint torques, and all feed forward what their model says that the reference takes.
+/// A control law. All of them command joint torques and feed forward the model's torques for the
+/// reference.
 ///
-/// With e the error of the joints behind the reference, M and b the believed mass matrix and bias (Coriolis, centrifugal, gravity):
+/// With the joint error e, and the model's mass matrix M and bias b (Coriolis, centrifugal,
+/// gravity):
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Law {
-    /// Constant stiffness and damping a joint: M qdd_ref + b + K e + D e'. K and D are those of the bandwidth for the joint's own inertia
-    /// in the start posture.
+    /// Constant stiffness and damping of each joint: M qdd_ref + b + K e + D e'. K and D follow
+    /// from the bandwidth and the joint's diagonal inertia in the start posture.
     JointImpedance,
     /// Computed torque: M (qdd_ref + w^2 e + 2 z w e') + b (Siciliano et al. 2009, section 8.5.2).
     ComputedTorque,
     /// Computed torque with the integral of the error: M (... + w^2 w_i int e) + b.
     Integral,
-    /// Computed torque less what a disturbance observer finds: what torque the last steps took beyond the model's, low-passed at w_o. For a constant M it is the
-    /// momentum observer of De Luca and Mattone (2003).
+    /// Computed torque with a disturbance observer: it adds the torque of the last steps beyond the
+    /// model's, low-passed at w_o. For a constant M it is the momentum observer of De Luca and
+    /// Mattone (2003).
     Observer,
-    /// As [`Law::Observer`], with errors where they matter: the tip's place, the shaft's distance from the port's centre (weighed by
-    /// `port`) and the roll, the elbow in what these leave free. It halves the RCM deviation and bears no knocks: from 60 rad/s on it does not come back from 25 N.
+    /// As [`Law::Observer`], with task errors: the tip's position, the shaft's distance from the
+    /// port's centre (weighted by `port`) and the roll; the joint error in the null space. It
+    /// halves the RCM deviation but is less robust: from 60 rad/s on it does not recover from 25 N.
     RcmImpedance,
 }
 
@@ -32,7 +36,7 @@ impl Law {
     pub const ALL: [Self; 5] =
         [Self::JointImpedance, Self::ComputedTorque, Self::Integral, Self::Observer, Self::RcmImpedance];
 
-    /// Its name in scene files and reports.
+    /// The name in scene files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::JointImpedance => "joint-impedance",
@@ -43,7 +47,7 @@ impl Law {
         }
     }
 
-    /// Names of the gains that it has.
+    /// Names of its gains.
     pub fn gains(self) -> &'static [&'static str] {
         match self {
             Self::JointImpedance | Self::ComputedTorque => &["bandwidth", "damping"],
@@ -58,30 +62,30 @@ impl Law {
     }
 }
 
-/// Gains of a control law. Those that a law does not have do nothing.
+/// Gains of a control law. A law ignores the gains that it does not have.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Gains {
-    /// Bandwidth w of the error [rad/s]: the stiffness is w^2 times the inertia.
+    /// Bandwidth w of the error (rad/s): the stiffness is w^2 times the inertia.
     pub bandwidth: f64,
     /// Damping ratio z.
     pub damping: f64,
-    /// Bandwidth w_i of the integral action [rad/s].
+    /// Bandwidth w_i of the integral action (rad/s).
     pub integral: f64,
-    /// Bandwidth w_o of the disturbance observer [rad/s].
+    /// Bandwidth w_o of the disturbance observer (rad/s).
     pub observer: f64,
-    /// How many times as stiff the shaft is held in the port as the tip in its place.
+    /// Weight of the shaft's error in the port, relative to the tip's.
     pub port: f64,
 }
 
-/// What a controller believes wrongly (SPEC's gravity error).
+/// The error of the controller's model: masses (the paper's gravity error) and friction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ModelError {
-    /// Share by which every link is believed lighter than it is.
+    /// Share by which the model's links are too light.
     pub links: f64,
-    /// Share by which the instrument is believed lighter than it is.
+    /// Share by which the model's instrument is too light.
     pub instrument: f64,
-    /// Coulomb friction in each joint of the arm, of which the controller knows nothing [N m or N]. It takes the place of the arm's own. None: the arm's own
-    /// stays, and is as unknown.
+    /// Coulomb friction in each joint of the actual arm (N m or N), instead of the arm's own, which
+    /// `None` keeps. The model has none in either case.
     pub friction: Option<f64>,
 }
 
@@ -92,34 +96,35 @@ impl Default for ModelError {
 }
 
 impl ModelError {
-    /// A controller that knows everything, and joints without friction.
+    /// An exact model, and joints without friction.
     pub const NONE: Self = Self { links: 0.0, instrument: 0.0, friction: Some(0.0) };
 }
 
-/// How a manipulator is driven.
+/// Settings of a manipulator's controller.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Settings {
+pub struct ControllerSettings {
     /// The control law.
     pub law: Law,
-    /// Its gains.
+    /// The gains.
     pub gains: Gains,
-    /// What it believes wrongly.
+    /// The error of its model.
     pub error: ModelError,
-    /// Commands a second. The reference passes between them on a spline.
+    /// Commands a second. The reference interpolates them by a spline.
     pub command_rate: f64,
-    /// Fastest change of a joint's torque [N m/s], or of a force [N/s].
+    /// Maximum rate of a joint's torque (N m/s) or force (N/s).
     pub torque_rate: f64,
-    /// Limits of the instrument's coordinates. None: the port's for this instrument, touching allowed, pivot and shaft's base 20 mm inside and outside.
+    /// Limits of the instrument's coordinates. `None`: those of the port for this instrument, with
+    /// contact allowed, the jaw's pivot 20 mm inside and the shaft's base 20 mm outside.
     pub limits: Option<Limits>,
-    /// Parts into which the arm's dynamics divide a physics step.
+    /// Number of substeps of the arm's dynamics in a physics step.
     pub substeps: usize,
 }
 
-/// Highest rate of torque of an FR3 [N m/s] (Franka's control interface).
+/// Maximum torque rate of an FR3 (N m/s), from Franka's control interface.
 const FR3_TORQUE_RATE: f64 = 1000.0;
 
-impl Default for Settings {
-    /// The controller that `trocar experiment controller-grid` chose.
+impl Default for ControllerSettings {
+    /// The controller chosen by `trocar experiment controller-grid`.
     fn default() -> Self {
         let gains = Gains { bandwidth: 80.0, damping: 1.0, integral: 15.0, observer: 45.0, port: 2.0 };
         Self {
@@ -134,11 +139,12 @@ impl Default for Settings {
     }
 }
 
-impl Settings {
-    /// The settings of a controller by its name in a scene file, `default` or a [`Law::name`], with some gains set otherwise.
+impl ControllerSettings {
+    /// The settings of a controller by its name in a scene file, `default` or a [`Law::name`], with
+    /// other values of `gains`.
     ///
     /// # Errors
-    /// A name or gain that the controller does not have, with the nearest that exists; a gain out of range.
+    /// An unknown name or gain, with the most similar one; a gain out of range.
     pub fn named(name: &str, gains: &BTreeMap<String, f64>) -> Result<Self> {
         let mut settings = Self::default();
         if name != "default" {
@@ -166,7 +172,7 @@ impl Settings {
         Ok(settings)
     }
 
-    /// Says whether the settings can be used.
+    /// Checks the settings.
     ///
     /// # Errors
     /// A gain, rate or share out of range.
@@ -194,7 +200,7 @@ fn unknown<'a>(what: &str, given: &str, names: impl Iterator<Item = &'a str> + C
     let all: Vec<&str> = names.collect();
     Error::invalid(
         format!("{what} '{shown}'"),
-        format!("is unknown; '{nearest}' is nearest (there are {})", all.join(", ")),
+        format!("is unknown; the most similar is '{nearest}'; it must be one of {}", all.join(", ")),
     )
 }
 
@@ -202,13 +208,13 @@ fn unknown<'a>(what: &str, given: &str, names: impl Iterator<Item = &'a str> + C
 mod tests {
     use super::*;
 
-    fn named(name: &str, gains: &[(&str, f64)]) -> Result<Settings> {
-        Settings::named(name, &gains.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect())
+    fn named(name: &str, gains: &[(&str, f64)]) -> Result<ControllerSettings> {
+        ControllerSettings::named(name, &gains.iter().map(|(n, v)| ((*n).to_owned(), *v)).collect())
     }
 
     #[test]
-    fn controllers_and_gains_go_by_name() {
-        assert_eq!(named("default", &[]).unwrap(), Settings::default());
+    fn controllers_and_gains_are_found_by_name() {
+        assert_eq!(named("default", &[]).unwrap(), ControllerSettings::default());
         for law in Law::ALL {
             let gains: Vec<_> = law.gains().iter().map(|g| (*g, 3.0)).collect();
             let s = named(law.name(), &gains).unwrap();
@@ -217,12 +223,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_unknown_is_refused_with_the_nearest() {
+    fn unknown_names_are_refused_with_the_most_similar() {
         let said = |name: &str, gains: &[(&str, f64)]| named(name, gains).unwrap_err().to_string();
-        assert!(said("computed_torque", &[]).contains("'computed-torque' is nearest"));
-        assert!(said("rcm", &[]).contains("'rcm-impedance' is nearest"));
-        assert!(said("computed-torque", &[("bandwith", 1.0)]).contains("'bandwidth' is nearest"));
-        assert!(said("computed-torque", &[("observer", 1.0)]).contains("unknown"), "gains that would do nothing");
+        assert!(said("computed_torque", &[]).contains("most similar is 'computed-torque'"));
+        assert!(said("rcm", &[]).contains("most similar is 'rcm-impedance'"));
+        assert!(said("computed-torque", &[("bandwith", 1.0)]).contains("most similar is 'bandwidth'"));
+        assert!(said("computed-torque", &[("observer", 1.0)]).contains("unknown"), "gains without effect are refused");
         assert!(said("default", &[("bandwidth", f64::NAN)]).contains("bandwidth"));
         assert!(said("default", &[("damping", -1.0)]).contains("damping"));
     }

@@ -1,15 +1,16 @@
-//! The shaft at the port's rim, as couplings for the arm's step.
+//! Contacts between shaft and rim, as couplings for the arm's step.
 
-use super::Manipulator;
+use super::controlled_arm::Manipulator;
 use crate::chain::{ArmState, Coupling, CouplingLaw, Frames, MAX_COUPLINGS};
 use crate::port::{Shaft, Twist};
 use glam::DVec3;
 
-/// The shaft touches the rim within a step only where it is nearer than this [m].
-const NEAR: f64 = 2e-3;
+/// Maximum gap at which the shaft may touch the rim within a step (m).
+const MAX_GAP: f64 = 2e-3;
 
 impl Manipulator {
-    /// Where the shaft touches the rim, or may within the step, as couplings: a push and friction along the shaft at each place.
+    /// The contacts of the shaft with the rim, present or possible within the step, as couplings: a
+    /// push, and friction along the shaft.
     pub(super) fn touches(&self, frames: &Frames, state: &ArmState) -> Touches {
         let flange = frames.flange();
         let shaft = Shaft::of(&self.instrument, &flange);
@@ -18,7 +19,7 @@ impl Manipulator {
             Touches { couplings: [none; MAX_COUPLINGS], places: [(DVec3::ZERO, DVec3::ZERO); MAX_COUPLINGS], count: 0 };
         let (linear, angular) = frames.jacobian(self.arm.dof(), shaft.base).velocity(&state.qd);
         let contacts = self.port.contacts(&shaft, &Twist { linear, angular }, &self.state.rim);
-        for contact in contacts.iter().filter(|c| c.at.gap < NEAR) {
+        for contact in contacts.iter().filter(|c| c.at.gap < MAX_GAP) {
             let jacobian = frames.jacobian(self.arm.dof(), contact.at.point);
             let of = touches.count;
             touches.add(
@@ -47,7 +48,7 @@ impl Manipulator {
     }
 }
 
-/// Couplings of a shaft and its rim: where they act and along what.
+/// Couplings of a shaft with the rim, with their points (m) and directions.
 pub(super) struct Touches {
     pub couplings: [Coupling; MAX_COUPLINGS],
     pub places: [(DVec3, DVec3); MAX_COUPLINGS],

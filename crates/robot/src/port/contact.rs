@@ -1,87 +1,90 @@
-//! Forces between shaft and rim: a spring and a dashpot across the shaft, Coulomb friction along it.
+//! Forces between shaft and rim: a spring and a damper across the shaft, Coulomb friction along it.
 //!
-//! Friction is a spring to a mark on the shaft: it pulls back to where the mark was at the rim until Coulomb's limit, then the mark follows. A load below the limit
-//! does not creep. The marks are the caller's [`RimState`], plain data, so that a step can be tried again.
+//! Friction is a spring to a mark on the shaft, up to Coulomb's limit; beyond it the mark slides. A
+//! load below the limit causes no creep. The marks are in the caller's [`RimState`], plain data, so
+//! that a step can be repeated.
 
-use super::{Edge, Port, RimPoint, Shaft, Twist};
+use super::port_model::Port;
+use super::rim::{Edge, RimPoint};
+use super::shaft::{Shaft, Twist};
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-/// A contact that has moved less than this along the rim [rad] since its mark was set keeps the mark to the bit.
-const STAYS: f64 = 0.02;
+/// A contact that has moved less than this along the rim (rad) keeps its mark bit for bit.
+const MARK_TOLERANCE: f64 = 0.02;
 
 /// A mark on the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 struct Mark {
     /// Whether it is at the inner edge.
     inner: bool,
-    /// The rim's place that it belongs to: the angle about the normal [rad].
+    /// Angle of its contact about the normal (rad).
     angle: f64,
-    /// Distance of the mark from the shaft's base [m].
+    /// Distance of the mark from the shaft's base (m).
     along: f64,
 }
 
-/// What friction remembers between steps.
+/// The state of friction between steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RimState {
     marks: [Option<Mark>; 4],
 }
 
-/// One scalar force on the shaft, for a solver to linearise: a point of the shaft that moves by dx along `direction` at speed v changes it by
-/// -(stiffness dx + damping v).
+/// A scalar force on the shaft, with its linearisation: a motion dx of the point along `direction`
+/// at speed v changes the force by -(stiffness dx + damping v).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactRow {
-    /// Where it acts [m], in the cell.
+    /// Its point (m), in the cell.
     pub point: DVec3,
-    /// Unit vector along which it acts on the shaft, in the cell.
+    /// Its unit direction, in the cell.
     pub direction: DVec3,
-    /// Force along `direction` now [N].
+    /// Force along `direction` (N).
     pub force: f64,
-    /// How it falls with motion [N/m]; 0 where it does not.
+    /// Decrease with motion (N/m), or 0.
     pub stiffness: f64,
-    /// How it falls with speed [N s/m]; 0 where it does not.
+    /// Decrease with speed (N s/m), or 0.
     pub damping: f64,
 }
 
-/// The shaft near or at a place of the rim.
+/// A contact of the shaft with the rim, or a near point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RimContact {
-    /// Where, and how near.
+    /// The point of the rim, with the gap.
     pub at: RimPoint,
-    /// Force across the shaft, along the normal.
+    /// Normal force, across the shaft.
     pub normal: ContactRow,
-    /// Friction, along the shaft's direction.
+    /// Friction force, along the shaft.
     pub friction: ContactRow,
-    /// How far the shaft has moved along its direction from where friction holds it [m]; 0 where it is not touched.
+    /// Displacement of the shaft along its direction from the mark (m); 0 without contact.
     pub stretch: f64,
     /// Whether friction is at its limit.
     pub sliding: bool,
 }
 
-/// All places at which a shaft is near the rim.
+/// All contacts and near points of a shaft.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contacts {
     all: [Option<RimContact>; 4],
 }
 
 impl Contacts {
-    /// Every place, pressing or not.
+    /// All of them, in contact or not.
     pub fn iter(&self) -> impl Iterator<Item = &RimContact> {
         self.all.iter().flatten()
     }
 
-    /// The places that the shaft presses.
+    /// Those in contact.
     pub fn touching(&self) -> impl Iterator<Item = &RimContact> {
         self.iter().filter(|c| c.at.gap < 0.0)
     }
 
-    /// The least gap [m]; none where the shaft is not in the port.
+    /// The minimum gap (m); `None` if the shaft is not in the port.
     pub fn gap(&self) -> Option<f64> {
         self.iter().map(|c| c.at.gap).reduce(f64::min)
     }
 
-    /// Force [N] and torque about `point` [N m] that the rim exerts on the shaft, in the cell.
+    /// Force (N) and torque about `point` (N m) of the rim on the shaft, in the cell.
     pub fn on_shaft(&self, point: DVec3) -> (DVec3, DVec3) {
         let rows = self.touching().flat_map(|c| [&c.normal, &c.friction]);
         rows.fold((DVec3::ZERO, DVec3::ZERO), |(force, torque), row| {
@@ -92,7 +95,8 @@ impl Contacts {
 }
 
 impl Port {
-    /// The contacts of a shaft that moves by `motion` (at its base), and their forces on it. Changes nothing: [`Port::advance`] moves the marks once a step is done.
+    /// The contacts of a shaft with the twist `motion` at its base, and their forces on it. The
+    /// marks do not change; [`Port::advance`] updates them after a step.
     pub fn contacts(&self, shaft: &Shaft, motion: &Twist, state: &RimState) -> Contacts {
         let all = self.nearest(shaft).map(|near| near.map(|at| self.contact(at, shaft, motion, state)));
         Contacts { all }
@@ -105,7 +109,7 @@ impl Port {
         if at.gap < 0.0 {
             let velocity = motion.at(shaft.base, at.point);
             let force = -self.stiffness * at.gap - self.damping * velocity.dot(at.normal);
-            // A rim pushes; it does not hold a shaft that leaves it.
+            // A rim only pushes: damping must not hold a shaft that leaves it.
             if force > 0.0 {
                 normal = ContactRow { force, stiffness: self.stiffness, damping: self.damping, ..normal };
             }
@@ -121,14 +125,14 @@ impl Port {
         RimContact { at, normal, friction, stretch, sliding }
     }
 
-    /// How far the shaft has moved along its direction since the mark was set [m].
+    /// Displacement of the shaft along its direction since the mark was set (m).
     fn stretch(&self, shaft: &Shaft, mark: &Mark) -> f64 {
         let edge = if mark.inner { Edge::Inner } else { Edge::Outer };
         mark.along - (self.rim(edge, mark.angle) - shaft.base).dot(shaft.direction)
     }
 
-    /// Ends a step with the shaft where it is now: marks where friction slides follow, contacts that moved along the rim take theirs along, those that the shaft
-    /// has left are forgotten.
+    /// Updates the marks after a step: those of sliding contacts follow, those of contacts that
+    /// moved along the rim move with them, and those of lost contacts are removed.
     pub fn advance(&self, shaft: &Shaft, state: &mut RimState) {
         let before = *state;
         state.marks = self.nearest(shaft).map(|near| {
@@ -138,7 +142,7 @@ impl Port {
             let stretch = mark.map_or(0.0, |m| self.stretch(shaft, m));
             if let Some(mark) = mark
                 && stretch.abs() <= most
-                && turned(at.angle, mark.angle) < STAYS
+                && turned(at.angle, mark.angle) < MARK_TOLERANCE
             {
                 return Some(*mark);
             }
@@ -149,7 +153,8 @@ impl Port {
 }
 
 impl RimState {
-    /// The mark of the contact that was nearest to this one on the same edge, if it is not on the hole's other side.
+    /// The mark of the nearest contact on the same edge, unless it is on the other side of the
+    /// hole.
     fn mark_for(&self, at: &RimPoint) -> Option<&Mark> {
         let same = self.marks.iter().flatten().filter(|m| m.inner == (at.edge == Edge::Inner));
         same.min_by(|a, b| turned(at.angle, a.angle).total_cmp(&turned(at.angle, b.angle)))
@@ -157,7 +162,7 @@ impl RimState {
     }
 }
 
-/// Angle between two angles [rad], 0 to pi.
+/// The difference of two angles, in [0, pi] (rad).
 fn turned(a: f64, b: f64) -> f64 {
     ((a - b + PI).rem_euclid(TAU) - PI).abs()
 }

@@ -1,65 +1,69 @@
-//! Statistics of the RCM deviation of an episode (SPEC E2, E3).
+//! Statistics of the RCM deviation of an episode (see the glossary).
 
 use crate::{Error, Result};
 
-/// RCM deviation that an episode is judged by [m].
+/// Threshold of the RCM deviation in the evaluation of an episode (m).
 pub const RCM_THRESHOLD: f64 = 3e-3;
 
-/// RCM deviation at which the hardware aborts [m].
+/// RCM deviation at which the hardware stops (m).
 pub const RCM_ABORT: f64 = 5e-3;
 
-/// Deviations gathered step by step.
+/// RCM deviations of all steps.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Deviation {
     values: Vec<f64>,
 }
 
 impl Deviation {
-    /// Takes one deviation [m].
+    /// Adds a deviation (m).
     ///
     /// # Errors
     /// One that is negative or not finite.
     pub fn add(&mut self, deviation: f64) -> Result<()> {
         if !(deviation.is_finite() && deviation >= 0.0) {
-            return Err(Error::invalid("RCM deviation", format!("{deviation} m must be finite and not negative")));
+            return Err(Error::invalid(
+                "RCM deviation",
+                format!("is {deviation} m; it must be finite and not negative"),
+            ));
         }
         self.values.push(deviation);
         Ok(())
     }
 
-    /// How many there are.
+    /// Number of deviations.
     pub fn count(&self) -> usize {
         self.values.len()
     }
 
-    /// The greatest [m], 0 without any.
+    /// The maximum (m), 0 without any.
     pub fn peak(&self) -> f64 {
         self.values.iter().copied().fold(0.0, f64::max)
     }
 
-    /// Root of the mean square [m], 0 without any.
+    /// The root mean square (m), 0 without any.
     pub fn rms(&self) -> f64 {
         let sum: f64 = self.values.iter().map(|v| v * v).sum();
         (sum / self.values.len().max(1) as f64).sqrt()
     }
 
-    /// The deviation [m] that a `share` 0 to 1 of all stay at or below, linear between neighbours as numpy has it (0.5 the median, 0.95 the p95); 0 without any.
+    /// The quantile (m) of `share` in [0, 1], linear between neighbours as in NumPy (0.5 is the
+    /// median); 0 without any.
     pub fn percentile(&self, share: f64) -> f64 {
         let mut sorted = self.values.clone();
         sorted.sort_by(f64::total_cmp);
         let Some(last) = sorted.len().checked_sub(1) else { return 0.0 };
-        let place = crate::instrument::share(share) * last as f64;
+        let place = crate::instrument::clamp_unit(share) * last as f64;
         let below = (place as usize).min(last);
         let above = (below + 1).min(last);
         sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
     }
 
-    /// How many are above [`RCM_THRESHOLD`].
+    /// Number of deviations above [`RCM_THRESHOLD`].
     pub fn above_threshold(&self) -> usize {
         self.values.iter().filter(|v| **v > RCM_THRESHOLD).count()
     }
 
-    /// Index of the first at or above [`RCM_ABORT`], if the hardware would have stopped.
+    /// Index of the first at or above [`RCM_ABORT`], where the hardware would have stopped.
     pub fn aborted(&self) -> Option<usize> {
         self.values.iter().position(|v| *v >= RCM_ABORT)
     }
@@ -70,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_are_those_of_the_values() {
+    fn statistics_match_the_values() {
         let mut d = Deviation::default();
         assert_eq!((d.peak(), d.rms(), d.percentile(0.5), d.aborted()), (0.0, 0.0, 0.0, None));
         (0..=100).for_each(|k| d.add(f64::from(k) * 4e-5).unwrap());

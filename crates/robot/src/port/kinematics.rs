@@ -1,49 +1,54 @@
-//! Coordinates to poses and back, for a shaft whose axis goes through the port's centre; and the measuring of one whose axis does not.
+//! Kinematics of an instrument in a port: poses from coordinates for a shaft through the port's
+//! centre, coordinates from poses for any shaft.
 
-use super::{Port, Shaft, Twist};
+use super::port_model::Port;
+use super::shaft::{Shaft, Twist};
 use crate::instrument::{Coordinates, Excess, Instrument, Limits, compose, coordinates, shaft_to_tip};
 use crate::{Error, Result};
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::TAU;
 use trocar_core::Pose;
 
-/// Least cosine of the tilt at which a shaft is taken to go through the port and not to lie in its plane.
-pub(super) const LEAST_COS: f64 = 0.05;
+/// Minimum cosine of the tilt of a shaft that goes through the port.
+pub(super) const MIN_TILT_COS: f64 = 0.05;
 
-/// Where an instrument is, whether its axis goes through the centre or not.
+/// The measured position of an instrument, whether or not its axis goes through the centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
-    /// Its coordinates: the insertion is counted from where the axis crosses the port's plane, the jaw is the caller's.
+    /// Coordinates. The insertion starts where the axis crosses the port's plane; the jaw's opening
+    /// is the caller's.
     pub coordinates: Coordinates,
-    /// Angle between shaft and normal [rad].
+    /// Angle between shaft and normal (rad).
     pub tilt: f64,
-    /// From the port's centre to where the axis crosses the port's plane [m], along the port's x and y; its length is the RCM deviation (SPEC).
+    /// Vector from the port's centre to the crossing of the axis with the port's plane (m), along
+    /// the port's x and y. Its length is the RCM deviation.
     pub offset: DVec2,
-    /// The jaw's pivot in the cell.
+    /// Pose of the tip in the cell.
     pub tip: Pose,
 }
 
 impl Measured {
-    /// RCM deviation [m]: distance from the port's centre to the shaft's axis, in the port's plane.
+    /// RCM deviation (m): distance from the port's centre to the shaft's axis, in the port's plane.
     pub fn deviation(&self) -> f64 {
         self.offset.length()
     }
 }
 
-/// The nearest that an instrument can come to a wanted pose of its tip.
+/// The reachable pose of the tip nearest to a wanted one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Solution {
-    /// Its coordinates there, within the limits.
+    /// Coordinates, within the limits.
     pub coordinates: Coordinates,
-    /// The tip there, in the cell.
+    /// Pose of the tip, in the cell.
     pub tip: Pose,
-    /// The flange there, in the cell.
+    /// Pose of the flange, in the cell.
     pub flange: Pose,
-    /// What is left of the wanted orientation: the axis times the angle [rad] of the turn, in the cell, that would take the reached orientation to the wanted one.
+    /// The rejected rotation: axis times angle (rad) from the reached orientation to the wanted
+    /// one, in the cell.
     pub rejected_rotation: DVec3,
-    /// What is left of the wanted position [m], in the cell; zero unless a limit binds.
+    /// The rejected translation (m), in the cell; zero unless a limit binds.
     pub rejected_translation: DVec3,
-    /// By how much the wanted pose lies outside which limit.
+    /// By how much the wanted pose exceeds each limit.
     pub excess: Excess,
 }
 
@@ -60,7 +65,8 @@ impl Port {
         instrument.flange(&self.tip(coordinates))
     }
 
-    /// How the tip moves, in the cell, for one unit a second of each of the two pivots, the insertion and the roll.
+    /// Twist of the tip, in the cell, at unit rate of each of the two pivots, the insertion and the
+    /// roll.
     pub fn tip_jacobian(&self, coordinates: &Coordinates) -> [Twist; 4] {
         let along = self.pose.rotation * Coordinates::direction(coordinates.pivots);
         let arm = coordinates.insertion * along;
@@ -74,10 +80,12 @@ impl Port {
         ]
     }
 
-    /// Measures an instrument whose flange is at `flange` in the cell. The roll is within +-pi; `jaw` is taken over.
+    /// Measures an instrument whose flange is at `flange` in the cell. The roll is within +-pi;
+    /// `jaw` is copied to the result.
     ///
     /// # Errors
-    /// A pose that is not finite, a shaft that points out of the body or lies in the port's plane (a tilt over 87 degrees).
+    /// A pose that is not finite, a shaft that points out of the body or lies in the port's plane
+    /// (a tilt over 87 degrees).
     pub fn measure(&self, instrument: &Instrument, flange: &Pose, jaw: f64) -> Result<Measured> {
         let shaft = Shaft::of(instrument, flange);
         let inverse = self.pose.inverse();
@@ -87,7 +95,7 @@ impl Port {
         }
         let across = DVec2::new(along.x, along.y);
         let tilt = across.length().atan2(along.z);
-        if along.z < LEAST_COS {
+        if along.z < MIN_TILT_COS {
             let reason =
                 format!("the shaft is tilted by {:.1} degrees; it must point into the body", tilt.to_degrees());
             return Err(Error::invalid("flange", reason));
@@ -101,11 +109,11 @@ impl Port {
         Ok(Measured { coordinates, tilt, offset: DVec2::new(crossing.x, crossing.y), tip })
     }
 
-    /// How fast the two pivots [rad/s], the insertion [m/s] and the roll [rad/s] that [`Port::measure`] gives change, for a flange at `flange` that moves by `motion` (at
-    /// its origin, in the cell).
+    /// The rates of the coordinates of [`Port::measure`]: two pivots (rad/s), insertion (m/s), roll
+    /// (rad/s), for a flange at `flange` with the twist `motion` at its origin, in the cell.
     ///
     /// # Errors
-    /// As [`Port::measure`]; a motion that is not finite.
+    /// As [`Port::measure`]; a twist that is not finite.
     pub fn rates(&self, instrument: &Instrument, flange: &Pose, motion: &Twist) -> Result<[f64; 4]> {
         self.measure(instrument, flange, 0.0)?;
         let shaft = Shaft::of(instrument, flange);
@@ -114,7 +122,7 @@ impl Port {
         let angular = inverse.rotation * motion.angular;
         let linear = inverse.rotation * motion.at(flange.translation, shaft.base);
         if !angular.is_finite() || !linear.is_finite() {
-            return Err(Error::invalid("flange", "its motion must be finite"));
+            return Err(Error::invalid("flange", "its twist must be finite"));
         }
         let swing = angular.cross(u);
         let square = u.y * u.y + u.z * u.z;
@@ -125,15 +133,18 @@ impl Port {
         Ok([first, second, insertion, angular.dot(u) - first * u.x])
     }
 
-    /// The nearest that an instrument within `limits` comes to `wanted`, a pose of its tip in the cell. Position goes first: two pivots and the insertion
-    /// meet it, the roll comes as near to the orientation as it can, and what is left is told. The roll is the one nearest to `near.roll`, so the long way
-    /// round is never taken; `near.pivots` say where to tilt where the position leaves it open, and `near.jaw` is taken over.
+    /// The reachable pose within `limits` nearest to `wanted`, a pose of the tip in the cell.
+    /// Position has priority: two pivots and the insertion reach it, and the roll comes as near to
+    /// the orientation as possible. The result has the rejected rest. The roll is the equivalent
+    /// one nearest to `near.roll`; `near.pivots` choose the tilt if the position leaves it open,
+    /// and `near.jaw` is copied to the result.
     ///
-    /// Where a limit binds, the nearest reachable point is taken. It moves continuously with the wanted one, except on the axis outside the body, from which all
-    /// tilts are as near, and where the wanted roll is half a turn from `near`.
+    /// If a limit binds, the result is the nearest reachable point. It depends continuously on the
+    /// wanted one, except on the axis outside the body, where all tilts are equally near, and where
+    /// the wanted roll is half a turn from `near`.
     ///
     /// # Errors
-    /// A pose that is not finite, limits that cannot be used.
+    /// A pose that is not finite, invalid limits.
     pub fn solve(
         &self,
         instrument: &Instrument,
@@ -144,7 +155,10 @@ impl Port {
         limits.check()?;
         let unit = wanted.rotation.is_normalized();
         if !wanted.translation.is_finite() || !unit || near.to_action().iter().any(|c| !c.is_finite()) {
-            return Err(Error::invalid("wanted tip", "its pose must be finite, its rotation a quaternion of length 1"));
+            return Err(Error::invalid(
+                "wanted tip",
+                "its pose must be finite, with a unit quaternion as its rotation",
+            ));
         }
         let mut excess = Excess::default();
         let point = self.pose.inverse().transform(wanted.translation);
@@ -154,12 +168,13 @@ impl Port {
             let u = Coordinates::direction(near.pivots);
             DVec2::new(u.x, u.y).try_normalize().unwrap_or(DVec2::X)
         });
-        let (kept, beyond) = coordinates::cut(tilt, [0.0, limits.tilt]);
+        let (kept, beyond) = coordinates::clamp_with_excess(tilt, [0.0, limits.tilt]);
         excess.tilt = beyond;
         let (sin, cos) = kept.sin_cos();
-        // Within the cone the wanted point lies on the ray; outside, its foot on the cone's side is the nearest.
+        // Inside the cone the wanted point lies on the ray; outside, the nearest point is its foot
+        // on the cone's side.
         let length = across.length() * sin + point.z * cos;
-        let (insertion, beyond) = coordinates::cut(length, limits.insertion);
+        let (insertion, beyond) = coordinates::clamp_with_excess(length, limits.insertion);
         excess.insertion = beyond;
         let pivots = if excess.tilt == 0.0 && point.length() > 1e-12 {
             coordinates::pivots(across, point.z)
@@ -168,9 +183,9 @@ impl Port {
         };
         let roll = self.nearest_roll(pivots, wanted.rotation);
         let unwound = roll + TAU * ((near.roll - roll) / TAU).round();
-        let (roll, beyond) = coordinates::cut(unwound, limits.roll);
+        let (roll, beyond) = coordinates::clamp_with_excess(unwound, limits.roll);
         excess.roll = beyond;
-        let (jaw, beyond) = coordinates::cut(near.jaw, [0.0, 1.0]);
+        let (jaw, beyond) = coordinates::clamp_with_excess(near.jaw, [0.0, 1.0]);
         excess.jaw = beyond;
         let coordinates = Coordinates { pivots, insertion, roll, jaw };
         let tip = self.tip(&coordinates);
@@ -184,8 +199,9 @@ impl Port {
         })
     }
 
-    /// The roll that brings the tip nearest to an orientation at these pivots: the twist about the shaft of what is left. Where a swing of half a turn is left too,
-    /// every roll is as near, and 0 is given.
+    /// The roll that brings the tip nearest to an orientation at these pivots: the twist about the
+    /// shaft of what is left. Where a swing of half a turn is left too, every roll is as near, and
+    /// 0 is given.
     fn nearest_roll(&self, pivots: [f64; 2], orientation: DQuat) -> f64 {
         let shaft = (self.pose.rotation * turn(pivots)).inverse() * orientation * shaft_to_tip().inverse();
         if shaft.w.hypot(shaft.z) < 1e-12 {

@@ -1,35 +1,35 @@
-//! A shaft in space and how it moves.
+//! The shaft of an instrument and its twist.
 
 use crate::instrument::Instrument;
 use glam::DVec3;
 use trocar_core::Pose;
 
-/// How a rigid body moves.
+/// The velocity of a rigid body.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Twist {
-    /// Velocity of the body's reference point [m/s].
+    /// Velocity of the body's reference point (m/s).
     pub linear: DVec3,
-    /// Angular velocity [rad/s].
+    /// Angular velocity (rad/s).
     pub angular: DVec3,
 }
 
 impl Twist {
-    /// Velocity [m/s] of the body's point at `point`, for the twist at `reference` [m].
+    /// Velocity (m/s) of the body at `point` (m), for a twist at `reference` (m).
     pub fn at(&self, reference: DVec3, point: DVec3) -> DVec3 {
         self.linear + self.angular.cross(point - reference)
     }
 }
 
-/// The round part of an instrument: a cylinder.
+/// The shaft of an instrument: a cylinder.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shaft {
-    /// Where it leaves the motor's head [m], in the cell. The reference point of its [`Twist`].
+    /// Its base at the motor housing (m), in the cell. The reference point of its [`Twist`].
     pub base: DVec3,
-    /// Unit vector from the base to the end, in the cell.
+    /// Unit vector from base to end, in the cell.
     pub direction: DVec3,
-    /// Radius [m].
+    /// Radius (m).
     pub radius: f64,
-    /// Length [m].
+    /// Length (m).
     pub length: f64,
 }
 

@@ -1,35 +1,37 @@
-//! Readings with the instrument's weight taken off, tared at reset.
+//! Compensation of the instrument's weight in readings, with a tare.
 
-use super::{ForceKind, Identification, SensorNoise, check_pose, regressor};
+use super::identify::Identification;
+use super::load::{ForceKind, SensorNoise, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_core::Wrench;
 
-/// What is left of a reading: the force on the instrument.
+/// The force on the instrument: a reading without weight and bias.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ForceReading {
-    /// What kind of force it is.
+    /// The kind of force.
     pub kind: ForceKind,
-    /// Force [N] on the instrument and torque [N m] about the flange's origin, along the cell's axes.
+    /// Force (N) on the instrument and torque (N m) about the flange's origin, in the cell's axes.
     pub wrench: Wrench,
-    /// Covariance of the force [N2], along the cell's axes.
+    /// Covariance of the force (N2), in the cell's axes.
     pub force_covariance: DMat3,
-    /// Covariance of the torque [N2 m2], along the cell's axes.
+    /// Covariance of the torque (N2 m2), in the cell's axes.
     pub torque_covariance: DMat3,
 }
 
 impl ForceReading {
-    /// Standard deviation of the force along each axis of the cell [N].
+    /// Standard deviation of the force along each axis of the cell (N).
     pub fn force_deviation(&self) -> DVec3 {
         let c = self.force_covariance;
         DVec3::new(c.x_axis.x, c.y_axis.y, c.z_axis.z).max(DVec3::ZERO).map(f64::sqrt)
     }
 }
 
-/// Takes an identified load off readings.
+/// Subtracts an identified load from readings.
 ///
-/// A tare at orientation R0 leaves of a reading y at R: (y - y0) - (A(R) - A(R0)) p with A the load model's derivative: the bias is gone, the identified parameters p
-/// matter only as far as the instrument was turned since, and so does their covariance.
+/// With a tare y0 at orientation R0, a reading y at R becomes (y - y0) - (A(R) - A(R0)) p, with A
+/// the derivative of the load model. The bias cancels, and the identified parameters p and their
+/// covariance matter only as far as the instrument has rotated since the tare.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compensator {
     load: Identification,
@@ -46,10 +48,10 @@ struct Tare {
 }
 
 impl Compensator {
-    /// Without a tare: the identified bias is taken off.
+    /// A compensator without a tare: it subtracts the identified bias.
     ///
     /// # Errors
-    /// Noise or a gravity [m/s2] that cannot be used.
+    /// Invalid noise or gravity (m/s2).
     pub fn new(load: Identification, noise: SensorNoise, gravity: DVec3) -> Result<Self> {
         noise.check()?;
         check_pose("compensator", DQuat::IDENTITY, gravity)?;
@@ -61,14 +63,15 @@ impl Compensator {
         &self.load
     }
 
-    /// Takes the mean of `readings` at `orientation` (the flange's frame to the cell's) for touching nothing.
+    /// Sets the tare: the mean of `readings` without contact at `orientation` (from the flange's
+    /// frame to the cell's).
     ///
     /// # Errors
-    /// No reading, or one that is not finite; the tare stays as it was.
+    /// No reading, or one that is not finite. The tare is then unchanged.
     pub fn tare(&mut self, orientation: DQuat, readings: &[Wrench]) -> Result<()> {
         check_pose("tare", orientation, self.gravity)?;
         if readings.is_empty() {
-            return Err(Error::invalid("tare", "needs one reading at least"));
+            return Err(Error::invalid("tare", "needs at least one reading"));
         }
         if let Some(k) = readings.iter().position(|r| !r.is_finite()) {
             return Err(Error::invalid(format!("tare, reading {k}"), "must be finite"));
@@ -80,7 +83,8 @@ impl Compensator {
         Ok(())
     }
 
-    /// The force on the instrument in one reading with the flange at `orientation`; `kind` says what is held or touched now.
+    /// The force on the instrument in a reading with the flange at `orientation`. `kind` is the
+    /// current kind of force.
     ///
     /// # Errors
     /// A reading or orientation that is not finite.

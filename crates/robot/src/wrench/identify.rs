@@ -1,26 +1,25 @@
-//! The load model from readings at rest: weighted least squares, with what it does not know.
+//! Identification of the load model from readings at rest, by weighted least squares.
 
+use super::load::{LoadModel, PARAMETERS, SensorNoise, check_pose, regressor};
 use super::svd::Svd;
-use super::{LoadModel, SensorNoise, check_pose, regressor};
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
 use trocar_core::Wrench;
 
-/// Parameters of a [`LoadModel`]: mass, first moment (3), bias of force (3) and torque (3), in this order.
-pub const PARAMETERS: usize = 10;
+/// Minimum number of poses. With two, a rotation about the line between their gravities does not
+/// determine the centre of mass.
+const MIN_POSES: usize = 3;
 
-/// Fewest poses: with two, a turn about the line between their gravities leaves the centre of mass open.
-const FEWEST: usize = 3;
+/// Maximum condition number. Above it the orientations are too similar to separate weight from
+/// bias: all within about two degrees of each other.
+const MAX_CONDITION: f64 = 100.0;
 
-/// Condition number from which the orientations are too alike to tell weight from bias: all within about two degrees of one another.
-const WORST_CONDITION: f64 = 100.0;
-
-/// A reading at rest, touching nothing.
+/// A reading at rest, without contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticReading {
-    /// The flange's frame to the cell's.
+    /// Rotation from the flange's frame to the cell's.
     pub orientation: DQuat,
-    /// What the sensor read, in the flange's frame.
+    /// The reading, in the flange's frame.
     pub reading: Wrench,
 }
 
@@ -29,11 +28,13 @@ pub struct StaticReading {
 pub struct Identification {
     /// The estimate.
     pub model: LoadModel,
-    /// Condition number of the equations, each weighted by its noise and each parameter scaled to the same effect.
+    /// Condition number of the equations, weighted by the noise, with parameters scaled to equal
+    /// effect.
     pub condition: f64,
-    /// Sum of the squared residuals over their variances. For a true model about `degrees`; far more says that the noise is greater than was said or that something was touched.
+    /// Sum of the squared residuals over their variances: about `degrees` for a true model. A much
+    /// larger value means more noise than assumed, or contact.
     pub chi_squared: f64,
-    /// Equations less parameters.
+    /// Degrees of freedom: equations minus parameters.
     pub degrees: usize,
     covariance: [[f64; PARAMETERS]; PARAMETERS],
     /// The inverse of the covariance: the normal matrix of the weighted equations.
@@ -41,18 +42,18 @@ pub struct Identification {
 }
 
 impl Identification {
-    /// Covariance of the parameters in the order of [`PARAMETERS`], SI units.
+    /// Covariance of the parameters in the order of [`PARAMETERS`] (SI units).
     pub fn covariance(&self) -> [[f64; PARAMETERS]; PARAMETERS] {
         self.covariance
     }
 
-    /// Standard deviation of every parameter.
+    /// Standard deviations of the parameters.
     pub fn deviations(&self) -> LoadModel {
         LoadModel::from_array(std::array::from_fn(|i| self.covariance[i][i].max(0.0).sqrt()))
     }
 
-    /// Square of the distance from the estimate to `truth` in standard deviations. It is chi-squared
-    /// with ten degrees of freedom where noise is the only error.
+    /// Square of the distance from the estimate to `truth` in standard deviations. It is
+    /// chi-squared with ten degrees of freedom where noise is the only error.
     pub fn distance_squared(&self, truth: &LoadModel) -> f64 {
         let (a, b) = (self.model.to_array(), truth.to_array());
         let off: [f64; PARAMETERS] = std::array::from_fn(|i| a[i] - b[i]);
@@ -71,16 +72,18 @@ fn quadratic(m: &[[f64; PARAMETERS]; PARAMETERS], a: &[f64; PARAMETERS], b: &[f6
     (0..PARAMETERS).map(|i| a[i] * row(i)).sum()
 }
 
-/// Identifies the load from readings at rest under `gravity` [m/s2] (in the cell) of a sensor with `noise`.
+/// Identifies the load from readings at rest of a sensor with `noise`, under `gravity` in the cell
+/// (m/s2).
 ///
 /// # Errors
-/// Fewer than three poses, orientations too alike to tell weight from bias, a number that is not finite; the pose is said.
+/// Fewer than three poses, orientations too similar to separate weight from bias, a number that is
+/// not finite.
 pub fn identify(poses: &[StaticReading], noise: &SensorNoise, gravity: DVec3) -> Result<Identification> {
     noise.check()?;
-    if poses.len() < FEWEST {
+    if poses.len() < MIN_POSES {
         return Err(Error::invalid(
             "static poses",
-            format!("{} are too few for ten parameters; take 54, at least {FEWEST}", poses.len()),
+            format!("{} are too few for ten parameters; use 54, at least {MIN_POSES}", poses.len()),
         ));
     }
     let count = 6 * poses.len();
@@ -105,7 +108,7 @@ pub fn identify(poses: &[StaticReading], noise: &SensorNoise, gravity: DVec3) ->
 fn solve(equations: &[[f64; PARAMETERS]], readings: &[f64]) -> Result<Identification> {
     let alike = |condition: f64| {
         let reason = format!(
-            "their orientations are too alike (condition number {condition:.1e}, at most {WORST_CONDITION}); tilt the instrument by 20 degrees or more to several sides"
+            "their orientations are too similar (condition number {condition:.1e}; the maximum is {MAX_CONDITION}); tilt the instrument by 20 degrees or more to several sides"
         );
         Error::invalid("static poses", reason)
     };
@@ -125,7 +128,7 @@ fn solve(equations: &[[f64; PARAMETERS]], readings: &[f64]) -> Result<Identifica
     let (least, most) =
         svd.values.iter().fold((f64::INFINITY, 0.0_f64), |(least, most), v| (least.min(*v), most.max(*v)));
     let condition = most / least;
-    if condition.is_nan() || condition >= WORST_CONDITION {
+    if condition.is_nan() || condition >= MAX_CONDITION {
         return Err(alike(condition));
     }
     let scaled = svd.solve(readings);

@@ -1,4 +1,4 @@
-//! A small arm with a turning and a sliding joint, in both formats.
+//! A small arm with a revolute and a prismatic joint, in both formats.
 
 pub const URDF: &str = r#"<?xml version="1.0"?>
 <robot name="two">
@@ -38,7 +38,8 @@ pub const MJCF: &str = r#"<mujoco model="two">
   <keyframe><key name="home" qpos="0.2 0.1"/></keyframe>
 </mujoco>"#;
 
-/// The arm of both files with looks: a foot, a mesh on the first link, a red box that is fixed to it, a rod on the second.
+/// The arm of both files with visual shapes: a foot, a mesh on the first link, a red box fixed to
+/// it, a rod on the second.
 pub fn shown_urdf() -> String {
     let mesh = r#"<link name="a"><visual><origin xyz="0 0 0.1"/><geometry><mesh filename="meshes/a.stl" scale="2 2 2"/></geometry></visual>"#;
     let red =

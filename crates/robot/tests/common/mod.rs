@@ -12,10 +12,10 @@ use glam::{DMat3, DVec3};
 use trocar_core::Pose;
 use trocar_robot::chain::{Joint, JointKind, JointLimits, Joints, MassProperties, Segment, SerialArm};
 use trocar_robot::instrument::{Coordinates, Instrument};
-use trocar_robot::manipulator::{Manipulator, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Manipulator};
 use trocar_robot::port::Port;
 
-/// A number between.
+/// A number in a range.
 pub fn between(rng: &mut Random, low: f64, high: f64) -> f64 {
     rng.between(low, high)
 }
@@ -28,12 +28,12 @@ pub fn posture(arm: &SerialArm, rng: &mut Random) -> Joints {
     })
 }
 
-/// Numbers of either sign.
+/// Numbers of both signs.
 pub fn noise(n: usize, size: f64, rng: &mut Random) -> Joints {
     Joints::from_fn(n, |_| between(rng, -size, size))
 }
 
-/// A rod of this mass [kg] and half length [m] along its x.
+/// A rod of a mass (kg) and half length (m) along its x.
 pub fn rod(mass: f64, half: f64) -> MassProperties {
     let across = mass * half * half / 3.0;
     MassProperties {
@@ -43,7 +43,7 @@ pub fn rod(mass: f64, half: f64) -> MassProperties {
     }
 }
 
-/// Joints that turn and slide about skewed axes, without friction, limits or rotors.
+/// Revolute and prismatic joints about skewed axes, without friction, limits and armature.
 pub fn skewed(n: usize) -> SerialArm {
     let segment = |i: usize| {
         let slides = i % 3 == 2;
@@ -66,15 +66,16 @@ pub fn skewed(n: usize) -> SerialArm {
     SerialArm::new("skewed", (0..n).map(segment).collect(), Pose::IDENTITY).unwrap()
 }
 
-/// The FR3 with nothing that takes energy: no friction, damping or limits.
+/// The FR3 without dissipation: no friction, damping or limits.
 pub fn free_fr3() -> SerialArm {
     let arm = SerialArm::franka_fr3().unwrap();
     let nothing = vec![0.0; arm.dof()];
     arm.with_friction(&nothing, &nothing).unwrap().with_limits(&[JointLimits::NONE; 7]).unwrap()
 }
 
-/// An arm of the paper's cell: the left with the grasper at 13.3 degrees, the right with the cutter at 18.3, in a sheet without thickness.
-pub fn cell(side: usize, settings: Settings) -> Manipulator {
+/// An arm of the paper's cell: the left one with the grasper at 13.3 degrees, the right one with
+/// the cutter at 18.3 degrees, in a sheet without thickness.
+pub fn cell(side: usize, settings: ControllerSettings) -> Manipulator {
     let x = [-1.0, 1.0][side.min(1)];
     let base = Pose {
         rotation: glam::DQuat::from_rotation_z(std::f64::consts::FRAC_PI_2),
@@ -86,13 +87,13 @@ pub fn cell(side: usize, settings: Settings) -> Manipulator {
     Manipulator::new(arm, instrument, port, settings, start(side)).unwrap()
 }
 
-/// Where they start.
+/// Their start.
 pub fn start(side: usize) -> Coordinates {
     let tilt = [13.3_f64, 18.3][side.min(1)].to_radians();
     Coordinates { pivots: [0.0, [1.0, -1.0][side.min(1)] * tilt], insertion: 0.1, roll: 0.0, jaw: 0.5 }
 }
 
-/// A tip on a circle of 15 mm across the port's normal, from rest and back to it in 4 s.
+/// A tip on a circle of 15 mm across the port's normal, from rest to rest in 4 s.
 pub fn tip_circle(m: &Manipulator, start: &Coordinates, t: f64) -> Pose {
     let s = (t / 4.0).clamp(0.0, 1.0);
     let a = std::f64::consts::TAU * s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);

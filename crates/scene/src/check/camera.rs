@@ -4,7 +4,7 @@ use super::{Checked, join, names, number, numbers, point, problem, quaternion};
 use crate::{CellCamera, Lens, Scene, View};
 use glam::DVec3;
 
-/// Largest side of an image [px].
+/// Largest side of an image (px).
 const MOST_PIXELS: f64 = 8192.0;
 
 pub(super) fn check(scene: &Scene) -> Checked {

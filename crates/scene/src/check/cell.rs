@@ -3,14 +3,15 @@
 use super::unit::{hint, show};
 use super::{Checked, join, name, names, number, numbers, one_of, point, problem, quaternion, unit};
 use crate::cell::SIMPLE;
-use crate::{Arm, ArmModel, Frame, Instrument, Port, Scene, Start};
+use crate::{Arm, ArmModel, Drive, Frame, Instrument, Port, Scene, Start};
 use glam::DVec3;
 
-/// Height of the FR3's shoulder above its base, and how far its flange gets from there [m] (Franka's data sheet: reach 855 mm).
+/// Height of the FR3's shoulder above its base, and how far its flange gets from there (m)
+/// (Franka's data sheet: reach 855 mm).
 const FR3_SHOULDER: f64 = 0.333;
 const FR3_REACH: f64 = 0.855;
 
-/// Limits of the FR3's joints [rad] (Franka's data sheet).
+/// Limits of the FR3's joints (rad) (Franka's data sheet).
 const FR3_LIMITS: [(f64, f64); 7] = [
     (-2.7437, 2.7437),
     (-1.7837, 1.7837),
@@ -21,10 +22,10 @@ const FR3_LIMITS: [(f64, f64); 7] = [
     (-3.0159, 3.0159),
 ];
 
-/// Bases nearer to each other than this are in the same place [m]: the FR3's is 0.2 m wide.
+/// Bases nearer to each other than this are in the same place (m): the FR3's is 0.2 m wide.
 const BASE_WIDTH: f64 = 0.2;
 
-/// A tilt below this that is not 0 was meant in radians [degrees].
+/// A tilt below this that is not 0 was meant in radians (degrees).
 const LEAST_TILT: f64 = 1.0;
 
 /// Most joints of an arm.
@@ -113,7 +114,13 @@ fn frame(at: &str, frame: &Frame) -> Checked {
 fn arm(at: &str, one: &Arm, scene: &Scene) -> Checked {
     model(at, one, scene)?;
     shapes(&join(at, "shapes"), one, scene)?;
-    frame(&join(at, "base"), &one.base)?;
+    if let Some(base) = &one.base {
+        frame(&join(at, "base"), base)?;
+    }
+    if one.drive == Drive::Dynamics && one.base.is_none() {
+        let reason = " is missing; the pose of the arm's base in the cell, or drive = \"ideal\" for an arm without one";
+        return Err(problem(join(at, "base"), reason.to_owned()));
+    }
     posture(&join(at, "posture_deg"), one)?;
     name(&join(at, "controller.name"), &one.controller.name)?;
     for (gain, value) in &one.controller.gains {
@@ -124,13 +131,19 @@ fn arm(at: &str, one: &Arm, scene: &Scene) -> Checked {
             return Err(problem(field, format!(" is {}; 0 or more, and finite", show(*value))));
         }
     }
-    let ports: Vec<&str> = scene.ports.iter().map(|p| p.name.as_str()).collect();
-    one_of(&join(at, "port"), &one.port, "the ports are", &ports)?;
+    if let Some(port) = &one.port {
+        let ports: Vec<&str> = scene.ports.iter().map(|p| p.name.as_str()).collect();
+        one_of(&join(at, "port"), port, "the ports are", &ports)?;
+    } else if one.drive == Drive::Dynamics {
+        let reason = " is missing; the name of a port, or drive = \"ideal\" for an arm that moves freely";
+        return Err(problem(join(at, "port"), reason.to_owned()));
+    }
     let held: Vec<&str> = scene.instruments.iter().map(|i| i.name.as_str()).collect();
     one_of(&join(at, "instrument"), &one.instrument, "the instruments are", &held)?;
-    match (scene.port(&one.port), scene.instrument(&one.instrument)) {
-        (Some(port), Some(instrument)) => fits(at, one, port, instrument, scene.task.variation.tilt_deg),
-        _ => Ok(()),
+    let Some(instrument) = scene.instrument(&one.instrument) else { return Ok(()) };
+    match one.port.as_deref().and_then(|port| scene.port(port)) {
+        Some(port) => fits(at, one, port, instrument, scene.task.variation.tilt_deg),
+        None => free(at, one),
     }
 }
 
@@ -179,7 +192,22 @@ fn posture(field: &str, one: &Arm) -> Checked {
     Ok(())
 }
 
-/// The instrument goes through the port, leans no farther than the hole lets it, and the arm gets there.
+/// An arm without a port has a direction and a start.
+fn free(at: &str, one: &Arm) -> Checked {
+    if let Some(direction) = &one.direction {
+        unit(&join(at, "direction"), direction, "a unit vector")?;
+    }
+    let at = join(at, "start");
+    let Some(position) = one.start.position_m else {
+        let reason = " is missing; an arm without a port needs it: where the pivot of its jaw starts in the cell";
+        return Err(problem(join(&at, "position_m"), reason.to_owned()));
+    };
+    point(&join(&at, "position_m"), position)?;
+    numbers(&at, &[("roll_deg", one.start.roll_deg, -180.0..=180.0), ("jaw", one.start.jaw, 0.0..=1.0)])
+}
+
+/// The instrument goes through the port, leans no farther than the hole lets it, and the arm gets
+/// there.
 fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f64) -> Checked {
     let (shaft, hole) = (instrument.shaft_diameter_mm, port.hole_diameter_mm);
     let Some(limit) = port.tilt_limit(shaft) else {
@@ -193,13 +221,21 @@ fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f
         return Err(problem(join(at, "instrument"), reason));
     };
     let at = join(at, "start");
+    for (key, given) in [("direction", one.direction.is_some()), ("start.position_m", one.start.position_m.is_some())] {
+        if given {
+            let reason = format!(" is for arms without a port; this one works through port '{}'", port.name);
+            return Err(problem(join(at.trim_end_matches(".start"), key), reason));
+        }
+    }
     start(&at, &one.start, limit.to_degrees(), varies_deg, instrument)?;
+    let Some(base) = one.base.filter(|_| one.drive == Drive::Dynamics) else { return Ok(()) };
     if one.source() != Some(ArmModel::FrankaFr3) {
         return Ok(());
     }
-    // The flange is at the instrument's other end; a mount of its own moves it by no more than its length.
+    // The flange is at the instrument's other end; a mount of its own moves it by no more than its
+    // length.
     let flange = one.start.tip(port) - instrument.length() * one.start.direction(port);
-    let shoulder = one.base.pose().transform(FR3_SHOULDER * DVec3::Z);
+    let shoulder = base.pose().transform(FR3_SHOULDER * DVec3::Z);
     let far = flange.distance(shoulder) - DVec3::from(instrument.mount.position_m).length();
     if far > FR3_REACH {
         let reason = format!(
@@ -253,12 +289,16 @@ fn apart(scene: &Scene) -> Checked {
         }
     }
     let [one, other] = scene.arms.as_slice() else { return Ok(()) };
-    let far = DVec3::from(one.base.position_m).distance(other.base.position_m.into());
-    if far < BASE_WIDTH {
-        let reason = format!(" is {} m from that of arm[0]; bases are {BASE_WIDTH} m or more apart", show(far));
-        return Err(problem("arm[1].base.position_m", reason));
+    if let (Some(one), Some(other)) = (&one.base, &other.base) {
+        let far = DVec3::from(one.position_m).distance(other.position_m.into());
+        if far < BASE_WIDTH {
+            let reason = format!(" is {} m from that of arm[0]; bases are {BASE_WIDTH} m or more apart", show(far));
+            return Err(problem("arm[1].base.position_m", reason));
+        }
     }
-    for (key, first, second) in [("port", &one.port, &other.port), ("instrument", &one.instrument, &other.instrument)] {
+    let names = |arm: &Arm| [("port", arm.port.clone()), ("instrument", Some(arm.instrument.clone()))];
+    for ((key, first), (_, second)) in names(one).into_iter().zip(names(other)) {
+        let (Some(first), Some(second)) = (first, second) else { continue };
         if first == second {
             return Err(problem(format!("arm[1].{key}"), format!(" is '{second}', which arm[0] has; each its own")));
         }

@@ -1,4 +1,5 @@
-//! What a scene must be beyond its form: ranges, units, names, and parts that fit together. The first mistake is reported.
+//! What a scene must be beyond its form: ranges, units, names, and parts that fit together. The
+//! first mistake is reported.
 
 mod anatomy;
 mod camera;
@@ -67,7 +68,8 @@ fn point(field: &str, value: [f64; 3]) -> Checked {
     value.iter().enumerate().try_for_each(|(k, v)| number(&format!("{field}[{k}]"), *v, &range))
 }
 
-/// How far from 1 the length of what should be a unit may be; typed ones have four decimals or more.
+/// How far from 1 the length of what should be a unit may be; typed ones have four decimals or
+/// more.
 const UNIT_TOLERANCE: f64 = 1e-4;
 
 /// A vector or quaternion of length 1.

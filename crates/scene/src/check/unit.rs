@@ -2,7 +2,8 @@
 
 use std::ops::RangeInclusive;
 
-/// Ending of a key, its unit, and the unit that is most often mistaken for it, with how many of the first it is.
+/// Ending of a key, its unit, and the unit that is most often mistaken for it, with how many of the
+/// first it is.
 type Unit = (&'static str, &'static str, Option<(&'static str, f64)>);
 
 /// Endings of keys with their units, longer ones first.
@@ -30,7 +31,8 @@ pub(super) fn unit_of(field: &str) -> &'static str {
     UNITS.iter().find(|(ending, ..)| key.ends_with(ending)).map_or("", |(_, unit, _)| unit)
 }
 
-/// "; 0.006 m is 6 mm" where the value would be in its range if it were in the unit that is most often mistaken for the right one.
+/// "; 0.006 m is 6 mm" where the value would be in its range if it were in the unit that is most
+/// often mistaken for the right one.
 pub(super) fn hint(unit: &str, value: f64, range: &RangeInclusive<f64>) -> String {
     let mistaken = UNITS.iter().find(|(_, u, _)| *u == unit).and_then(|(.., other)| *other);
     match mistaken {

@@ -8,12 +8,14 @@ use super::timing::median;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::PathBuf;
-use trocar_cell::{Action, Cell, CellLift, CellLiftPolicy, Policy};
+use trocar_cell::{Action, Cell, ContactParts, Setpoint};
 use trocar_core::Progress;
-use trocar_robot::instrument::Coordinates;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
+use trocar_task::policy::{Script, Scripted};
+use trocar_task::{Episode, Policy, SETTLE_S};
 use trocar_workflow::scene_specimen;
+use trocar_workflow::specimen_scene::{grasp_lift, task_organ};
 
 /// How the right arm swings: amplitude of its pivots [rad] and its frequency [Hz].
 const SWING: (f64, f64) = (0.1, 0.5);
@@ -80,40 +82,45 @@ impl CellBench {
             None => scene_specimen(&scene, &self.phantoms, progress)?,
         };
         let machine = Machine::here();
-        let mut cell = Cell::new(&scene, &specimen, self.threads)?;
-        let mut apart = Cell::with_contact(&scene, &specimen, self.threads, false)?;
-        let mut policy = CellLiftPolicy::new(&CellLift::default(), &cell)?;
-        let right: Option<Coordinates> = cell.setpoint("right").ok();
+        let mut lifting = scene.clone();
+        let organ = task_organ(&specimen, Some(&scene.task.organ))?;
+        lifting.task = trocar_scene::Task { grasp: scene.task.grasp, ..grasp_lift(organ) };
+        let mut episode = Episode::new(&lifting, &specimen, self.threads)?;
+        let parts = ContactParts { organs: false, ..ContactParts::default() };
+        let mut apart = Cell::with_contact(&lifting, &specimen, self.threads, parts)?;
+        apart.settle(SETTLE_S)?;
+        let mut policy = Scripted::following(Script::default());
+        policy.begin(&episode, 0)?;
+        let right: Option<Setpoint> = episode.cell().setpoint("right").ok();
+        let (from, apart_from) = (episode.cell().timing(), apart.timing());
         let mut times = Vec::new();
-        let mut begun = None;
         progress.begin("cell", 1);
-        loop {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
+        while episode.end().is_none() {
+            let chunk = policy.act(&episode)?;
+            if chunk.is_empty() {
+                break;
             }
-            let settled = policy.phase() != "settle";
-            if settled && begun.is_none() {
-                begun = Some((cell.timing(), apart.timing()));
-            }
-            let Some(mut action) = policy.act(&cell)? else { break };
-            if let Some(right) = right.filter(|_| settled) {
-                swing(&mut action, &right, cell.time());
-            }
-            let before = cell.timing().all;
-            // Each first in every second period, so that what disturbs the machine disturbs both.
-            if times.len().is_multiple_of(2) {
-                cell.step(&action)?;
-                apart.step(&action)?;
-            } else {
-                apart.step(&action)?;
-                cell.step(&action)?;
-            }
-            if settled {
-                times.push(1e3 * (cell.timing().all - before).as_secs_f64());
+            for mut action in chunk {
+                if progress.interrupted() {
+                    return Err(Error::Interrupted);
+                }
+                if let Some(right) = &right {
+                    swing(&mut action, right, episode.time());
+                }
+                let before = episode.cell().timing().all;
+                // Each first in every second period, so that what disturbs the machine disturbs both.
+                if times.len().is_multiple_of(2) {
+                    episode.step(&action)?;
+                    apart.step(&action)?;
+                } else {
+                    apart.step(&action)?;
+                    episode.step(&action)?;
+                }
+                times.push(1e3 * (episode.cell().timing().all - before).as_secs_f64());
             }
         }
         progress.end();
-        let Some((from, apart_from)) = begun else { return Err(Error::Mismatch("nothing was timed".into())) };
+        let cell = episode.cell();
         let n = times.len().max(1) as f64;
         let (now, apart_now) = (cell.timing(), apart.timing());
         let ms = |a: std::time::Duration, b: std::time::Duration| 1e3 * (a - b).as_secs_f64() / n;
@@ -144,10 +151,10 @@ impl CellBench {
 }
 
 /// The right arm's numbers of an action, which are the second five.
-fn swing(action: &mut Action, at: &Coordinates, time: f64) {
+fn swing(action: &mut Action, at: &Setpoint, time: f64) {
     let phase = std::f64::consts::TAU * SWING.1 * time;
     // It swings up from its start, away from the tissue and back.
-    let turned = [at.pivots[0] + SWING.0 * phase.sin(), at.pivots[1] + 0.5 * SWING.0 * (1.0 - phase.cos())];
+    let turned = [at.0[0] + SWING.0 * phase.sin(), at.0[1] + 0.5 * SWING.0 * (1.0 - phase.cos())];
     if let Some(numbers) = action.numbers.get_mut(5..7) {
         numbers.copy_from_slice(&turned);
     }

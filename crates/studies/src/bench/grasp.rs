@@ -6,20 +6,25 @@
 
 use super::machine::Machine;
 use super::timing::median;
+use crate::experiment::design_name;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
-use trocar_cell::{FRAME, GraspDesign, GraspLift, Session};
+use trocar_cell::{Cell, ContactParts, FRAME, Timing};
 use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
+use trocar_scene::GraspDesignName;
 use trocar_specimen::Specimen;
-use trocar_workflow::phantoms;
+use trocar_task::policy::Scripted;
+use trocar_task::{Episode, Policy, SETTLE_S};
+use trocar_workflow::specimen_scene::{free_scene, task_organ};
+use trocar_workflow::{Lift, phantoms};
 
-/// Phases that are timed: those in which the gripper is near the tissue.
-const PHASES: [&str; 6] = ["approach", "close", "lift", "hold", "lower", "open"];
+/// Phases that are timed: those in which the jaws are near the tissue.
+const PHASES: [&str; 6] = ["enter", "close", "lift", "hold", "lower", "open"];
 
-/// Most repetitions anyone means.
-const MOST_REPEATS: usize = 1000;
+/// Most repetitions.
+const MAX_REPEATS: usize = 1000;
 
 /// The benchmark's options.
 #[derive(Clone, Debug)]
@@ -29,7 +34,7 @@ pub struct GraspBench {
     /// How the phantom is filmed.
     pub record: RecordOptions,
     /// Grasp design.
-    pub design: GraspDesign,
+    pub design: GraspDesignName,
     /// Force of the jaws [N].
     pub jaw_force: f64,
     /// Times that the runs are repeated.
@@ -103,7 +108,7 @@ struct Frames {
     phase: &'static str,
     with: Frame,
     same_motion: Frame,
-    /// How far a node of the same motion was from where contact had it, at most [m].
+    /// How far a node of the same motion was from where contact had it, at most (m).
     off: f64,
     without: Frame,
 }
@@ -111,15 +116,17 @@ struct Frames {
 /// One frame of one run.
 #[derive(Clone, Copy)]
 struct Frame {
-    /// Wall time [s].
+    /// Wall time of the tissue (s).
     seconds: f64,
     /// The solver's iterations.
     iterations: usize,
 }
 
 impl Frame {
-    fn of(session: &Session<'_>) -> Self {
-        Self { seconds: session.last_step().as_secs_f64(), iterations: session.last_iterations() }
+    /// The frames of a cell between two readings of its clock.
+    fn between(before: Timing, after: Timing) -> Self {
+        let seconds = (after.tissue - before.tissue).as_secs_f64();
+        Self { seconds, iterations: after.iterations - before.iterations }
     }
 }
 
@@ -129,28 +136,38 @@ impl GraspBench {
     /// # Errors
     /// A specimen that cannot be had or simulated, an option out of range, an interruption.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<GraspBenchResult> {
-        if !(1..=MOST_REPEATS).contains(&self.repeats) {
-            return Err(Error::Mismatch(format!("{} repetitions; 1 to {MOST_REPEATS} make sense", self.repeats)));
+        if !(1..=MAX_REPEATS).contains(&self.repeats) {
+            return Err(Error::Mismatch(format!("{} repetitions; must be in [1, {MAX_REPEATS}]", self.repeats)));
         }
-        let specimen = match &self.specimen {
-            Some(folder) => Specimen::read(folder)?,
-            None => phantoms::specimen("phantom-a", &self.record, &output.join("phantom-a"), progress)?,
+        let (specimen, folder) = match &self.specimen {
+            Some(folder) => (Specimen::read(folder)?, folder.clone()),
+            None => {
+                let folder = output.join("phantom-a");
+                (phantoms::specimen("phantom-a", &self.record, &folder, progress)?, folder.join("specimen"))
+            }
         };
         let machine = Machine::here();
-        let with =
-            GraspLift { design: self.design, jaw_force: self.jaw_force, threads: self.threads, ..GraspLift::default() };
-        let without = GraspLift { contact: false, ..with.clone() };
-        let (mut times, mut size, mut held) = (Vec::new(), (0, 0), false);
+        let lift = Lift { design: Some(self.design), jaw_force: Some(self.jaw_force), ..Lift::default() };
+        let organ = task_organ(&specimen, None)?;
+        let mut scene = lift.arrange(free_scene(&specimen, &folder, organ, false)?)?;
+        // One tissue frame a control period, so that frames can be compared.
+        scene.rates.control_hz = 60;
+        let (mut times, mut held) = (Vec::new(), false);
+        let mut with = Episode::new(&scene, &specimen, self.threads)?;
         for _ in 0..self.repeats {
-            let mut a = Session::new(&with, &specimen)?;
-            let (mut b, mut c) = (Session::new(&without, &specimen)?, Session::new(&without, &specimen)?);
-            size = a.size();
-            progress.begin("three runs side by side", a.frames() as u64);
-            let timed = together([&mut a, &mut b, &mut c], progress);
+            let none = ContactParts { organs: false, instruments: false };
+            let mut without = Cell::with_contact(&scene, &specimen, self.threads, none)?;
+            let mut same = Cell::with_contact(&scene, &specimen, self.threads, none)?;
+            without.settle(SETTLE_S)?;
+            with.reset(0)?;
+            let mut policy = Scripted::following(lift.script);
+            progress.begin("three runs side by side", 1);
+            times.extend(together(&mut with, &mut policy, [&mut same, &mut without], progress)?);
             progress.end();
-            times.extend(timed?);
-            held = a.finish().summary.held;
+            held = with.summary().held;
         }
+        let bodies = with.cell().world().model.bodies();
+        let size = (bodies.iter().map(|b| b.len()).sum(), bodies.iter().map(|b| b.tets().len()).sum());
         let all = timing("all", &times);
         Ok(GraspBenchResult {
             real_time_factor: 1e3 * FRAME / all.with_contact_ms,
@@ -158,7 +175,7 @@ impl GraspBench {
             own_share: all.own_share,
             contact_share: all.contact_share,
             phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &times))).collect(),
-            design: self.design.name(),
+            design: design_name(self.design),
             held,
             organs: specimen.organs.len(),
             nodes: size.0,
@@ -171,35 +188,46 @@ impl GraspBench {
 }
 
 /// Steps the runs frame by frame in changing order, so that what disturbs the machine disturbs all.
-fn together(runs: [&mut Session<'_>; 3], progress: &dyn Progress) -> Result<Vec<Frames>> {
-    let [a, b, c] = runs;
+fn together(
+    with: &mut Episode,
+    policy: &mut Scripted,
+    [same, without]: [&mut Cell; 2],
+    progress: &dyn Progress,
+) -> Result<Vec<Frames>> {
+    policy.begin(with, 0)?;
     let mut times = Vec::new();
-    for frame in 0.. {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
+    loop {
+        let chunk = policy.act(with)?;
+        if chunk.is_empty() {
+            return Ok(times);
         }
-        let before = a.moment();
-        let all = match frame % 3 {
-            0 => [b.advance()?, a.advance()?, c.shadow(a, &before)?],
-            1 => [a.advance()?, b.advance()?, c.shadow(a, &before)?],
-            _ => [a.advance()?, c.shadow(a, &before)?, b.advance()?],
-        };
-        if all.contains(&false) {
-            break;
-        }
-        progress.advance(1);
-        let phase = |s: &Session<'_>| s.samples().last().map(|s| s.phase);
-        if let Some(phase) = phase(a).filter(|p| [phase(b), phase(c)] == [Some(*p); 2]) {
+        for action in chunk {
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
+            }
+            let clocks = (with.cell().timing(), without.timing());
+            let before = with.cell().moment();
+            if times.len().is_multiple_of(2) {
+                without.step(&action)?;
+            }
+            let ended = with.step(&action)?.end.is_some();
+            let (report, took) = same.shadow(with.cell(), &before);
+            if !times.len().is_multiple_of(2) {
+                without.step(&action)?;
+            }
             times.push(Frames {
-                phase,
-                off: c.off(a),
-                with: Frame::of(a),
-                same_motion: Frame::of(c),
-                without: Frame::of(b),
+                phase: policy.phase(),
+                with: Frame::between(clocks.0, with.cell().timing()),
+                same_motion: Frame { seconds: took.as_secs_f64(), iterations: report.iterations },
+                off: same.distance_from(with.cell()),
+                without: Frame::between(clocks.1, without.timing()),
             });
+            progress.advance(1);
+            if ended {
+                return Ok(times);
+            }
         }
     }
-    Ok(times)
 }
 
 fn timing(phase: &'static str, frames: &[Frames]) -> GraspPhaseTiming {

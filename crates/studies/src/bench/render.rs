@@ -17,7 +17,7 @@ use trocar_render::{Appearance, BodyId, Film, Light, RayGenerator, RenderSetting
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
 use trocar_testing::scenes::{LaparoscopicScene, endoscope_view};
-use trocar_workflow::Script;
+use trocar_workflow::ScriptedLift;
 use trocar_workflow::scene_specimen;
 
 /// The organ that deforms.
@@ -239,11 +239,10 @@ impl RenderBench {
     fn cell(&self, name: &str, progress: &dyn Progress) -> Result<CellRow> {
         let scene = Scene::read(name)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
-        let cell = Cell::new(&scene, &specimen, 0)?;
+        let mut script = ScriptedLift::new(&scene, &specimen, 0)?;
         let clock = Instant::now();
-        let mut sight = CameraRig::new(&scene, &specimen, &cell)?;
+        let mut sight = CameraRig::new(&scene, &specimen, script.cell())?;
         let begin_ms = 1e3 * clock.elapsed().as_secs_f64();
-        let mut script = Script::new(&scene, cell)?;
         let names: Vec<String> = scene.cameras.iter().map(|c| c.name.clone()).collect();
         let mut shadowed = vec![Vec::new(); names.len()];
         let mut plain = shadowed.clone();
@@ -256,7 +255,7 @@ impl RenderBench {
                     }
                     script.advance()?;
                     let clock = Instant::now();
-                    timed(&mut sight, &script.cell)?;
+                    timed(&mut sight, script.cell())?;
                     if frame >= FRAMES / 10 {
                         times.push(1e3 * clock.elapsed().as_secs_f64());
                     }

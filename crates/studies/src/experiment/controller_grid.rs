@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_robot::manipulator::{Law, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Law};
 use trocar_workflow::REPORT;
 
 /// The file that makes a folder one of this experiment's.
@@ -110,12 +110,12 @@ pub struct ControllerGridResult {
 }
 
 /// All configurations.
-fn grid() -> Vec<Settings> {
+fn grid() -> Vec<ControllerSettings> {
     let mut all = Vec::with_capacity(KINDS.len() * BANDWIDTHS.len() * DAMPINGS.len());
     for (law, correction) in KINDS {
         for bandwidth in BANDWIDTHS {
             for damping in DAMPINGS {
-                let mut settings = Settings { law, ..Settings::default() };
+                let mut settings = ControllerSettings { law, ..ControllerSettings::default() };
                 (settings.gains.bandwidth, settings.gains.damping) = (bandwidth, damping);
                 match law {
                     Law::Integral => settings.gains.integral = correction,
@@ -129,7 +129,7 @@ fn grid() -> Vec<Settings> {
     all
 }
 
-fn key(s: &Settings) -> String {
+fn key(s: &ControllerSettings) -> String {
     let g = &s.gains;
     let of =
         |name: &str, value: f64| if s.law.gains().contains(&name) { format!(" {name} {value}") } else { String::new() };
@@ -143,7 +143,7 @@ fn key(s: &Settings) -> String {
     )
 }
 
-fn row(s: &Settings) -> Result<ControllerRow> {
+fn row(s: &ControllerSettings) -> Result<ControllerRow> {
     let has = |name: &str, value: f64| s.law.gains().contains(&name).then_some(value);
     Ok(ControllerRow {
         controller: s.law.name().to_owned(),
@@ -173,17 +173,17 @@ impl ControllerGridExperiment {
         let clock = Instant::now();
         super::claim(output, MARKER)?;
         let grid = grid();
-        let store = Trials::open(output, "controller-grid", &format!("{:?}", Settings::default().error))?;
+        let store = Trials::open(output, "controller-grid", &format!("{:?}", ControllerSettings::default().error))?;
         let Outcomes { rows, resumed } =
             store.run("configurations", &grid, key, self.threads, progress, |s, _| row(s))?;
         let chosen = choose(&rows);
         let (mut shown, mut plain) = (Vec::new(), Vec::new());
         if let Some(k) = chosen {
             shown = trace(&grid[k], EVERY)?;
-            plain = trace(&Settings { law: Law::ComputedTorque, ..grid[k] }, EVERY)?;
+            plain = trace(&ControllerSettings { law: Law::ComputedTorque, ..grid[k] }, EVERY)?;
         }
         let result = ControllerGridResult {
-            chosen_is_default: chosen.is_some_and(|k| key(&grid[k]) == key(&Settings::default())),
+            chosen_is_default: chosen.is_some_and(|k| key(&grid[k]) == key(&ControllerSettings::default())),
             chosen: chosen.map(|k| rows[k].clone()),
             bars: BARS,
             stable: rows.iter().filter(|r| r.figures.stable).count(),
@@ -208,7 +208,7 @@ pub(crate) mod tests {
 
     /// A result of made-up rows.
     pub(crate) fn made_up_result() -> ControllerGridResult {
-        let row = |k: usize, s: &Settings| {
+        let row = |k: usize, s: &ControllerSettings| {
             let size = 1.0 + k as f64;
             ControllerRow {
                 controller: s.law.name().to_owned(),
@@ -262,7 +262,7 @@ pub(crate) mod tests {
         keys.dedup();
         assert_eq!(keys.len(), 182);
         grid().iter().for_each(|s| s.check().unwrap());
-        assert!(grid().iter().any(|s| key(s) == key(&Settings::default())), "the default is one of them");
+        assert!(grid().iter().any(|s| key(s) == key(&ControllerSettings::default())), "the default is one of them");
     }
 
     #[test]

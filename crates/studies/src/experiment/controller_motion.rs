@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use trocar_core::{Pose, Wrench};
 use trocar_robot::chain::SerialArm;
 use trocar_robot::instrument::{Coordinates, Instrument};
-use trocar_robot::manipulator::{Manipulator, Settings};
+use trocar_robot::manipulator::{ControllerSettings, Manipulator};
 use trocar_robot::port::{Deviation, Port};
 
 /// Steps and commands a second (SPEC E4).
@@ -104,7 +104,7 @@ pub struct ControllerInstant {
 }
 
 /// An arm of the paper's cell in its start pose; the port is a sheet without thickness, as the paper's clearances have it.
-fn arm((side, tilt): (f64, f64), settings: &Settings) -> Result<Manipulator> {
+fn arm((side, tilt): (f64, f64), settings: &ControllerSettings) -> Result<Manipulator> {
     let base = Pose { rotation: DQuat::from_rotation_z(FRAC_PI_2), translation: DVec3::new(0.45 * side, 0.0, 0.0) };
     let fr3 = SerialArm::franka_fr3()?.with_base(base)?;
     let instrument = if side < 0.0 { Instrument::grasper() } else { Instrument::cutter() };
@@ -232,7 +232,7 @@ fn delay(ahead: &[DVec3], behind: &[DVec3]) -> f64 {
 }
 
 /// Knocks the tip and lets the command leap: the greatest RCM deviation [m], infinite where the arm does not come back.
-fn rough(which: (f64, f64), settings: &Settings) -> Result<f64> {
+fn rough(which: (f64, f64), settings: &ControllerSettings) -> Result<f64> {
     let mut m = arm(which, settings)?;
     let start = m.commanded();
     let mut peak = 0.0_f64;
@@ -260,7 +260,7 @@ fn rough(which: (f64, f64), settings: &Settings) -> Result<f64> {
 }
 
 /// Sends both arms through the test motion.
-pub(super) fn judge(settings: &Settings) -> Result<ControllerFigures> {
+pub(super) fn judge(settings: &ControllerSettings) -> Result<ControllerFigures> {
     let (mut deviations, mut stable) = (Deviation::default(), true);
     let (mut squares, mut raw_squares, mut lags, mut raw_lags) = (0.0, 0.0, 0.0, 0.0);
     let mut jolt = 0.0_f64;
@@ -304,7 +304,7 @@ pub(super) fn judge(settings: &Settings) -> Result<ControllerFigures> {
 }
 
 /// The left arm's run step by step, one instant in `every`.
-pub(super) fn trace(settings: &Settings, every: usize) -> Result<Vec<ControllerInstant>> {
+pub(super) fn trace(settings: &ControllerSettings, every: usize) -> Result<Vec<ControllerInstant>> {
     let mut m = arm(ARMS[0], settings)?;
     let start = m.measured_cp().translation;
     let along = DVec3::from_array(CORNERS[1]).normalize();
@@ -355,7 +355,7 @@ mod tests {
 
     #[test]
     fn the_default_controller_meets_the_papers_figures() {
-        let figures = judge(&Settings::default()).unwrap();
+        let figures = judge(&ControllerSettings::default()).unwrap();
         assert!(figures.stable && figures.rcm_p95_mm <= 0.34, "{figures:?}");
         assert!(figures.tracking_rms_mm <= 0.048 && figures.droop_mm <= 0.26, "{figures:?}");
         assert!((figures.command_lag_s - 1.0 / 30.0).abs() < 5e-3, "the reference's filter: {figures:?}");

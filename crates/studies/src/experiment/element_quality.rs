@@ -1,35 +1,39 @@
-//! Fig. 7(f): do elements invert, and does anything diverge, when a cluster of the appendix is carried high against what holds the rest?
+//! Fig. 7(f): do elements invert, and does anything diverge, when a cluster of the appendix is carried high
+//! against what holds the rest? Measured in the whole cell and with the appendix alone.
 
-use super::appendix::{AppendixSource, fingerprint, with_organ};
+use super::lift_trials::{
+    AppendixSource, Condition, LiftTrial, appendix, design_name, divergence, peak_constraint, pin_end_and_band,
+};
 use super::trials::{Outcomes, Resumed, Trials};
 use crate::{Error, Result, pages};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
-use trocar_cell::{GraspDesign, GraspLift};
 use trocar_core::Progress;
-use trocar_specimen::{Organ, Pins, Specimen};
+use trocar_scene::{GraspDesignName, Scene};
+use trocar_specimen::Specimen;
+use trocar_task::policy::{AfterHold, Script};
 use trocar_workflow::REPORT;
 
 /// The file that makes a folder one of this experiment's.
 const MARKER: &str = "element-quality.json";
 
-/// Jaw lifts [m].
+/// Jaw lifts (m).
 const LIFTS: [f64; 2] = [0.015, 0.030];
 
-/// Young's moduli [Pa].
+/// Young's moduli (Pa).
 const MODULI: [f64; 5] = [3e3, 6e3, 12e3, 24e3, 48e3];
 
 /// Pin rules, and the share of the lowest nodes along the whole organ that each pins besides the far end.
 const PINS: [(&str, f64); 2] = [("far-end", 0.0), ("far-end + band", 0.42)];
 
 /// Designs.
-const DESIGNS: [GraspDesign; 2] = [GraspDesign::LivePose, GraspDesign::Compliant];
+const DESIGNS: [GraspDesignName; 2] = [GraspDesignName::LivePose, GraspDesignName::Compliant];
 
 /// Organ coordinate of the grasp.
 const AT: f64 = 0.5;
 
-/// The jaws press with the given force at this modulus [Pa], and with more or less in proportion at others, so that tissue of every modulus is squeezed alike.
+/// Scaled forces are the given one at this modulus (Pa).
 const FORCE_AT: f64 = 12e3;
 
 /// The experiment's options.
@@ -37,8 +41,13 @@ const FORCE_AT: f64 = 12e3;
 pub struct ElementQualityExperiment {
     /// The appendix.
     pub appendix: AppendixSource,
-    /// Force of the jaws at 12 kPa [N]; at other moduli in proportion.
+    /// In what it is lifted.
+    pub conditions: Vec<Condition>,
+    /// Force of the jaws (N), the same for all moduli.
     pub jaw_force: f64,
+    /// Run all cases a second time with a jaw force in proportion to the modulus, so that tissue of every
+    /// modulus is squeezed alike.
+    pub scaled: bool,
     /// Trials at once; 0 for as many as the machine has threads.
     pub threads: usize,
 }
@@ -46,17 +55,21 @@ pub struct ElementQualityExperiment {
 /// One case.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ElementQualityRow {
+    /// In what the appendix was lifted.
+    pub condition: Condition,
+    /// The jaw force is in proportion to the modulus.
+    pub scaled: bool,
     /// The grasp design's name.
     pub design: String,
-    /// Jaw lift [mm].
+    /// Jaw lift (mm).
     pub lift_mm: f64,
-    /// Young's modulus [kPa].
+    /// Young's modulus (kPa).
     pub modulus_kpa: f64,
     /// The pin rule.
     pub pins: String,
-    /// Force of the jaws [N].
+    /// Force of the jaws (N).
     pub jaw_force_n: f64,
-    /// Tissue was between the blades.
+    /// The jaws took hold of the appendix.
     pub attached: bool,
     /// Most inverted elements in any frame.
     pub inverted_peak: usize,
@@ -64,6 +77,8 @@ pub struct ElementQualityRow {
     pub diverged: bool,
     /// Why.
     pub divergence: Option<String>,
+    /// Why it did not pass, in one line.
+    pub why: Option<String>,
     /// Substeps in which the grasp yielded.
     pub yielded_substeps: usize,
     /// Smallest volume of an element over its volume at rest, in any frame.
@@ -72,14 +87,18 @@ pub struct ElementQualityRow {
     pub held: bool,
     /// Tissue lift over jaw lift.
     pub follow_ratio: f64,
-    /// Slip [mm].
+    /// Slip (mm).
     pub slip_mm: f64,
-    /// Largest pull of held nodes at the gripper [N].
+    /// Largest motion of any node in the first frame of the grasp (mm): what moved.
+    pub activation_step_mm: f64,
+    /// Largest pull of held nodes at the gripper (N).
     pub peak_constraint_n: f64,
-    /// Frames in which held tissue began to slide.
+    /// Times that held tissue began to slide.
     pub slipped: usize,
     /// The tissue tore out.
     pub torn: bool,
+    /// Suspensions of physics: contacts disabled, contacts of blades disabled, organs relaxed.
+    pub suspensions: [usize; 3],
 }
 
 /// The experiment's outcome.
@@ -87,7 +106,7 @@ pub struct ElementQualityRow {
 pub struct ElementQualityResult {
     /// Every case.
     pub rows: Vec<ElementQualityRow>,
-    /// Force of the jaws at 12 kPa [N].
+    /// Force of the jaws (N); of scaled cases at 12 kPa.
     pub jaw_force_n: f64,
     /// Nodes of the appendix.
     pub nodes: usize,
@@ -95,9 +114,9 @@ pub struct ElementQualityResult {
     pub tets: usize,
     /// What an earlier run had finished.
     pub resumed: Resumed,
-    /// Wall time of everything [s].
+    /// Wall time of everything (s).
     pub seconds: f64,
-    /// The report's path.
+    /// The page's path.
     pub report: String,
 }
 
@@ -105,29 +124,39 @@ pub struct ElementQualityResult {
 struct Case {
     pins: &'static str,
     modulus: f64,
-    specimen: Specimen,
-    task: GraspLift,
+    scaled: bool,
+    scene: Scene,
+    /// Place of the specimen among those of the conditions.
+    specimen: usize,
+    trial: LiftTrial,
 }
 
 impl ElementQualityExperiment {
-    /// Runs everything into the folder `output`: the phantom's recording and specimen, the figures and the report. Cases that an earlier run in the folder finished are not run again.
+    /// Runs everything into the folder `output`: the phantom's recording and specimen, the figures and the
+    /// page. Cases that an earlier run in the folder finished are not run again.
     ///
     /// # Errors
-    /// A specimen without an appendix, an option out of range, a folder that cannot be written, an interruption.
+    /// A specimen without an appendix, an option out of range, a folder that cannot be written, an
+    /// interruption.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<ElementQualityResult> {
         let clock = Instant::now();
         super::claim(output, MARKER)?;
-        let specimen = self.appendix.appendix(output, progress)?;
-        let cases = self.cases(&specimen);
-        let settings = format!("{} N, {}", self.jaw_force, fingerprint(&specimen));
+        let whole = self.appendix.read(output, progress)?;
+        let mut cases = Vec::new();
+        let specimens: Vec<Specimen> = self.conditions.iter().map(|c| whole.specimen(*c)).collect();
+        for (k, condition) in self.conditions.iter().enumerate() {
+            cases.extend(self.cases(*condition, k, &whole.scene(*condition)?, &specimens[k]));
+        }
+        let settings = format!("{} N, {}", self.jaw_force, whole.fingerprint());
         let store = Trials::open(output, "element-quality", &settings)?;
-        let one = |case: &Case, progress: &dyn Progress| case.run(progress);
+        let one = |case: &Case, progress: &dyn Progress| case.run(&specimens[case.specimen], progress);
         let Outcomes { rows, resumed } = store.run("cases", &cases, Case::key, self.threads, progress, one)?;
+        let (nodes, tets) = whole.size();
         let result = ElementQualityResult {
             rows,
             jaw_force_n: self.jaw_force,
-            nodes: specimen.organs[0].body.vertices.len(),
-            tets: specimen.organs[0].body.tets.len(),
+            nodes,
+            tets,
             resumed,
             seconds: clock.elapsed().as_secs_f64(),
             report: output.join(REPORT).display().to_string(),
@@ -138,20 +167,20 @@ impl ElementQualityExperiment {
         Ok(result)
     }
 
-    fn cases(&self, specimen: &Specimen) -> Vec<Case> {
+    fn cases(&self, condition: Condition, place: usize, scene: &Scene, specimen: &Specimen) -> Vec<Case> {
         let mut cases = Vec::new();
-        for design in DESIGNS {
+        let runs: &[bool] = if self.scaled { &[false, true] } else { &[false] };
+        for (scaled, design) in runs.iter().flat_map(|s| DESIGNS.map(|d| (*s, d))) {
             for (pins, share) in PINS {
                 for lift in LIFTS {
                     cases.extend(MODULI.map(|modulus| {
-                        let jaw_force = self.jaw_force * modulus / FORCE_AT;
-                        let common = GraspLift::default();
-                        let task = GraspLift { at: AT, lift, design, jaw_force, lower: false, threads: 1, ..common };
-                        let specimen = with_organ(specimen, |organ| {
-                            organ.material.young_modulus_pa = modulus;
-                            pin(organ, share);
-                        });
-                        Case { pins, modulus, specimen, task }
+                        let mut scene = scene.clone();
+                        appendix(&mut scene).material.young_modulus_pa = Some(modulus);
+                        pin_end_and_band(&mut scene, specimen, share);
+                        let jaw_force = self.jaw_force * if scaled { modulus / FORCE_AT } else { 1.0 };
+                        let script = Script { at: AT, lift, after: AfterHold::Finish, ..Script::default() };
+                        let trial = LiftTrial { condition, script, design, jaw_force };
+                        Case { pins, modulus, scaled, scene, specimen: place, trial }
                     }));
                 }
             }
@@ -160,40 +189,40 @@ impl ElementQualityExperiment {
     }
 }
 
-/// Pins the far end as the specimen has it, and the lowest `share` of the nodes of all the rest; an organ that is not pinned at an end stays as it is.
-fn pin(organ: &mut Organ, share: f64) {
-    if let Pins::End { length, band_length, band_share, .. } = &mut organ.pins {
-        *band_length = if share > 0.0 { 1.0 - *length } else { 0.0 };
-        *band_share = share;
-    }
-}
-
 impl Case {
     /// Its name among all.
     fn key(&self) -> String {
-        format!("{} {} m, {}, {} Pa", self.task.design, self.task.lift, self.pins, self.modulus)
+        let (condition, design) = (self.trial.condition.name(), design_name(self.trial.design));
+        let (lift, force) = (self.trial.script.lift, if self.scaled { "scaled" } else { "one force" });
+        format!("{condition}, {design} {lift} m, {}, {} Pa, {force}", self.pins, self.modulus)
     }
 
-    fn run(&self, progress: &dyn Progress) -> Result<ElementQualityRow> {
-        let s = self.task.run(&self.specimen, progress)?.summary;
+    fn run(&self, specimen: &Specimen, progress: &dyn Progress) -> Result<ElementQualityRow> {
+        let made = self.trial.run(&self.scene, specimen, progress)?;
+        let (s, d) = (&made.summary, &made.summary.details);
         Ok(ElementQualityRow {
-            design: self.task.design.name().to_owned(),
-            lift_mm: 1e3 * self.task.lift,
+            condition: self.trial.condition,
+            scaled: self.scaled,
+            design: design_name(self.trial.design).to_owned(),
+            lift_mm: 1e3 * self.trial.script.lift,
             modulus_kpa: 1e-3 * self.modulus,
             pins: self.pins.to_owned(),
-            jaw_force_n: self.task.jaw_force,
+            jaw_force_n: self.trial.jaw_force,
             attached: s.attached,
             inverted_peak: s.inverted_peak,
             diverged: s.diverged,
-            divergence: s.divergence,
+            divergence: divergence(&made),
+            why: s.why.clone(),
             yielded_substeps: s.yielded_substeps,
             min_volume_ratio: s.min_volume_ratio,
             held: s.held,
             follow_ratio: s.follow_ratio,
             slip_mm: s.slip_mm,
-            peak_constraint_n: s.peak_constraint_n,
-            slipped: s.slipped,
-            torn: s.torn,
+            activation_step_mm: d.activation_step_mm,
+            peak_constraint_n: peak_constraint(&made),
+            slipped: d.slipped,
+            torn: s.torn > 0,
+            suspensions: [s.disabled_contacts, s.disabled_blades, s.relaxed],
         })
     }
 }
@@ -208,7 +237,9 @@ pub(crate) mod tests {
         for (pins, _) in PINS {
             for (design, modulus) in DESIGNS.iter().flat_map(|d| MODULI.map(|m| (*d, m))) {
                 rows.extend(LIFTS.map(|lift| ElementQualityRow {
-                    design: design.name().to_owned(),
+                    condition: Condition::Appendix,
+                    scaled: false,
+                    design: design_name(design).to_owned(),
                     lift_mm: 1e3 * lift,
                     modulus_kpa: 1e-3 * modulus,
                     pins: pins.to_owned(),
@@ -217,14 +248,17 @@ pub(crate) mod tests {
                     inverted_peak: usize::from(modulus < 4e3),
                     diverged: false,
                     divergence: None,
+                    why: None,
                     yielded_substeps: 3,
                     min_volume_ratio: 0.3,
                     held: true,
                     follow_ratio: 0.99,
                     slip_mm: 0.1,
+                    activation_step_mm: 0.01,
                     peak_constraint_n: 0.4,
                     slipped: 0,
                     torn: false,
+                    suspensions: [0, 0, 0],
                 }));
             }
         }

@@ -1,6 +1,5 @@
 //! The paper's tables and figures, made anew: one file an experiment.
 
-mod appendix;
 mod controller_grid;
 mod controller_motion;
 mod convergence;
@@ -8,18 +7,19 @@ mod element_quality;
 mod grasp_designs;
 mod integrator_forms;
 mod integrators;
+mod lift_trials;
 mod normal;
 mod port_budget;
 mod random_actions;
 mod reconstruction;
 mod rollouts;
 mod settling;
+mod side_by_side;
 mod similarity;
 mod step_ladder;
 mod trials;
 mod wrench;
 
-pub use appendix::AppendixSource;
 pub(crate) use controller_grid::IN_HAND;
 #[cfg(test)]
 pub(crate) use controller_grid::tests::made_up_result as made_up_controller_grid;
@@ -29,11 +29,14 @@ pub use convergence::{ConvergenceCase, ConvergenceExperiment, ConvergenceResult}
 #[cfg(test)]
 pub(crate) use element_quality::tests::made_up_result as made_up_element_quality;
 pub use element_quality::{ElementQualityExperiment, ElementQualityResult, ElementQualityRow};
+pub(crate) use grasp_designs::DESIGNS;
 #[cfg(test)]
 pub(crate) use grasp_designs::tests::made_up_result as made_up_grasp_designs;
 pub use grasp_designs::{GraspDesignRow, GraspDesignsExperiment, GraspDesignsResult, GraspTrial, PaperGrasp};
 pub(crate) use integrators::SPEED_LIMIT;
 pub use integrators::{IntegratorRow, IntegratorsExperiment, IntegratorsResult};
+pub(crate) use lift_trials::design_name;
+pub use lift_trials::{AppendixSource, Condition};
 pub(crate) use port_budget::SHEETS;
 #[cfg(test)]
 pub(crate) use port_budget::tests::measured as measured_port_budget;

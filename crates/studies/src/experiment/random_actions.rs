@@ -5,15 +5,19 @@ use crate::{Error, Result, pages};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-use trocar_cell::{Cell, CellEvent, Policy, RandomActions};
+use trocar_cell::Cell;
 use trocar_core::Progress;
-use trocar_scene::Scene;
+use trocar_scene::{Scene, TaskName};
 use trocar_specimen::Specimen;
-use trocar_workflow::REPORT;
-use trocar_workflow::scene_specimen;
+use trocar_task::policy::RandomActions;
+use trocar_task::{ArmChannels, End, Episode, Policy};
+use trocar_workflow::{REPORT, scene_specimen};
 
 /// The file that makes a folder one of this experiment's.
 const MARKER: &str = "random-actions.json";
+
+/// RCM deviation below which nothing is said of it (mm). An episode would end at the scene's own limit.
+const ENDLESS_RCM_MM: f64 = 25.0;
 
 /// The experiment's options.
 #[derive(Clone, Debug)]
@@ -33,7 +37,7 @@ pub struct RandomActionsExperiment {
 }
 
 /// One seed.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RandomActionsRow {
     /// The seed.
     pub seed: u64,
@@ -53,9 +57,11 @@ pub struct RandomActionsRow {
     pub rcm_max_mm: f64,
     /// Largest force on an instrument [N].
     pub force_max_n: f64,
-    /// How often an instrument let go of what it had pierced, hooked or crushed.
-    pub unhooked: usize,
-    /// How often an organ that was folded for good was put right.
+    /// How often contact of an instrument with tissue was disabled.
+    pub disabled_contacts: usize,
+    /// How often contact of blades that hold tissue was disabled.
+    pub disabled_blades: usize,
+    /// How often an organ was relaxed outside of time.
     pub relaxed: usize,
     /// Arms and periods in which the force guard shortened a command.
     pub guarded: usize,
@@ -116,6 +122,17 @@ impl RandomActionsExperiment {
     }
 }
 
+/// The scene as it is asked to go on whatever happens: no task, no end but the last action.
+fn endless(scene: &Scene, actions: usize) -> Scene {
+    let mut scene = scene.clone();
+    scene.task.name = TaskName::PortReach;
+    scene.task.stop_when_passed = false;
+    scene.task.episode_s = actions as f64 / f64::from(scene.rates.control_hz);
+    // What goes beyond the limit is counted; hardware would stop there.
+    (scene.safety.rcm_threshold_mm, scene.safety.rcm_abort_mm) = (ENDLESS_RCM_MM, 2.0 * ENDLESS_RCM_MM);
+    scene
+}
+
 fn run(
     scene: &Scene,
     specimen: &Specimen,
@@ -123,46 +140,56 @@ fn run(
     actions: usize,
     progress: &dyn Progress,
 ) -> Result<RandomActionsRow> {
-    let mut cell = Cell::new(scene, specimen, 1)?;
-    let arms: Vec<&str> = cell.observe().iter().map(|arm| arm.side.name()).collect();
-    let mut policy = RandomActions::new(seed, &arms);
-    let mut row = RandomActionsRow {
-        seed,
-        actions: 0,
-        diverged: None,
-        inverted_peak: 0,
-        max_stretch: 1.0,
-        min_volume_ratio: 1.0,
-        joint_limits_broken: 0,
-        rcm_max_mm: 0.0,
-        force_max_n: 0.0,
-        unhooked: 0,
-        relaxed: 0,
-        guarded: 0,
-    };
-    while row.actions < actions && row.diverged.is_none() {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
-        let Some(action) = policy.act(&cell)? else { break };
-        let report = cell.step(&action)?;
-        row.actions += 1;
-        row.diverged = report.tissue.divergence.map(|d| d.to_string());
-        row.inverted_peak = row.inverted_peak.max(report.tissue.inverted);
-        row.max_stretch = row.max_stretch.max(cell.max_stretch());
-        row.min_volume_ratio = row.min_volume_ratio.min(report.tissue.min_volume_ratio);
-        for arm in &report.arms {
-            row.rcm_max_mm = row.rcm_max_mm.max(1e3 * arm.rcm_peak);
-            row.force_max_n = row.force_max_n.max((arm.contact + arm.constraint).length());
-            row.guarded += usize::from(arm.guarded);
-            let q = cell.measured_js(arm.side.name())?.position;
-            let limits = cell.joint_limits(arm.side.name())?;
-            row.joint_limits_broken += q.iter().zip(&limits).filter(|(q, [a, b])| !(*a..=*b).contains(q)).count();
-        }
-        for event in &report.events {
-            row.unhooked += usize::from(matches!(event, CellEvent::Unhooked { .. }));
-            row.relaxed += usize::from(matches!(event, CellEvent::Relaxed { .. }));
+    let mut episode = Episode::new(&endless(scene, actions), specimen, 1)?;
+    episode.reset(seed)?;
+    let mut policy = RandomActions::default();
+    policy.begin(&episode, seed)?;
+    let mut row = RandomActionsRow { seed, max_stretch: 1.0, min_volume_ratio: 1.0, ..RandomActionsRow::default() };
+    'episode: while row.actions < actions && episode.end().is_none() {
+        for action in policy.act(&episode)? {
+            if progress.interrupted() {
+                return Err(Error::Interrupted);
+            }
+            let step = episode.step(&action)?;
+            row.actions += 1;
+            row.max_stretch = row.max_stretch.max(episode.max_stretch());
+            row.joint_limits_broken += joint_limits_broken(episode.cell())?;
+            if step.end.is_some() {
+                break 'episode;
+            }
         }
     }
+    let s = episode.summary();
+    row.diverged = match episode.end() {
+        Some(end @ (End::Diverged { .. } | End::RcmAbort { .. })) => Some(end.to_string()),
+        _ => None,
+    };
+    row.inverted_peak = s.inverted_peak;
+    row.min_volume_ratio = s.min_volume_ratio;
+    row.rcm_max_mm = s.rcm_peak_mm;
+    let force = |arm: &ArmChannels| {
+        let sum = [
+            arm.contact_x_n + arm.constraint_x_n,
+            arm.contact_y_n + arm.constraint_y_n,
+            arm.contact_z_n + arm.constraint_z_n,
+        ];
+        glam::DVec3::from(sum).length()
+    };
+    row.force_max_n = episode.rows().iter().flat_map(|c| c.arms().map(force)).fold(0.0, f64::max);
+    (row.disabled_contacts, row.disabled_blades, row.relaxed) = (s.disabled_contacts, s.disabled_blades, s.relaxed);
+    row.guarded = s.arms.iter().map(|a| a.guarded).sum();
     Ok(row)
+}
+
+/// Joints of any arm that are beyond their limits now.
+fn joint_limits_broken(cell: &Cell) -> Result<usize> {
+    let mut broken = 0;
+    for (side, _) in cell.arms() {
+        let limits = cell.joint_limits(side.name())?;
+        if !limits.is_empty() {
+            let q = cell.measured_js(side.name())?.position;
+            broken += q.iter().zip(&limits).filter(|(q, [a, b])| !(*a..=*b).contains(q)).count();
+        }
+    }
+    Ok(broken)
 }

@@ -89,6 +89,8 @@ pub struct RolloutsResult {
     pub rcm_within_5_mm: usize,
     /// Most inverted elements in any frame.
     pub inverted_peak: usize,
+    /// Suspensions of physics in all rollouts: contacts disabled, contacts of blades disabled, organs relaxed.
+    pub suspensions: [usize; 3],
     /// Controller by controller.
     pub by_policy: Vec<PolicyRow>,
     /// What the paper says.
@@ -147,6 +149,11 @@ impl RolloutsResult {
             rcm_within_3_mm: within(THRESHOLD_MM),
             rcm_within_5_mm: within(ABORT_MM),
             inverted_peak: kept.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+            suspensions: [
+                kept.iter().map(|k| k.summary.disabled_contacts).sum(),
+                kept.iter().map(|k| k.summary.disabled_blades).sum(),
+                kept.iter().map(|k| k.summary.relaxed).sum(),
+            ],
             by_policy: made.policies,
             paper: PAPER,
             hash: made.hash,

@@ -4,7 +4,7 @@
 //! row, written at once and flushed, so that a run may be killed at any instant: a line that was torn is dropped, and its trial is run again. A file of other settings is put aside as
 //! `trials.jsonl.old`, and everything starts anew. While a run uses the file it is locked.
 
-use super::appendix::side_by_side;
+use super::side_by_side::side_by_side;
 use crate::{Error, Result};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};

@@ -382,7 +382,7 @@ pub(crate) mod tests {
         let dir = tempfile::tempdir().unwrap();
         let refused = |e: WrenchExperiment| e.run(dir.path(), &Silent).err().unwrap().to_string();
         assert!(refused(WrenchExperiment { poses: 2, ..good }).contains("static poses"));
-        assert!(refused(WrenchExperiment { tilt: 0.02, ..good }).contains("too alike"));
+        assert!(refused(WrenchExperiment { tilt: 0.02, ..good }).contains("too similar"));
         assert!(refused(WrenchExperiment { runs: 0, ..good }).contains("runs"));
         assert!(refused(WrenchExperiment { noise: SensorNoise { force: -1.0, ..noise }, ..good }).contains("noise"));
     }

@@ -28,8 +28,9 @@ pub(super) fn body(r: &RandomActionsResult) -> String {
         "Least volume",
         "RCM [mm]",
         "Force [N]",
-        "Unhooked",
-        "Put right",
+        "Contacts disabled",
+        "Of blades",
+        "Relaxed",
         "Guarded",
     ];
     let rows: Vec<Vec<String>> = r
@@ -45,7 +46,8 @@ pub(super) fn body(r: &RandomActionsResult) -> String {
                 percent(row.min_volume_ratio, 2),
                 fixed(row.rcm_max_mm, 2),
                 fixed(row.force_max_n, 2),
-                count(row.unhooked),
+                count(row.disabled_contacts),
+                count(row.disabled_blades),
                 count(row.relaxed),
                 count(row.guarded),
             ]

@@ -21,6 +21,12 @@ pub(super) fn body(plan: &Plan, r: &RolloutsResult, kept: &[Kept]) -> Result<Str
         Card::new("Diverged", count(r.diverged), "of all rollouts").met(r.diverged == 0),
         Card::new("Inverted elements", count(r.inverted_peak), "at worst, in any frame").met(r.inverted_peak == 0),
         Card::new("Passed", format!("{} of {}", r.passed, r.rollouts), "all stages"),
+        Card::new(
+            "Suspensions",
+            super::grasp_designs::suspensions(&r.suspensions),
+            "of physics: contacts disabled / contacts of blades disabled / organs relaxed",
+        )
+        .met(r.suspensions == [0; 3]),
     ]);
     let plots = [lift_and_rcm(plan, kept)?, lifts(plan, kept)?];
     Ok(page::section("Outcome", &lead, &(cards + &beside_paper(r)))

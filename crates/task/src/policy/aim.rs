@@ -2,10 +2,8 @@
 
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
-use trocar_cell::{Cell, clusters};
+use trocar_cell::{Cell, Cluster, Reached, Setpoint, clusters};
 use trocar_core::Pose;
-use trocar_robot::instrument::Coordinates;
-use trocar_robot::port::Solution;
 
 /// Nodes within this organ coordinate to either side tell where the organ is there.
 const SLICE: f64 = 0.04;
@@ -13,8 +11,12 @@ const SLICE: f64 = 0.04;
 /// How far to either side the direction of the organ is taken from.
 const CHORD: f64 = 0.08;
 
-/// Jaws hold nodes within this distance of the middle of what they pinch [m].
+/// Jaws hold nodes within this distance of the middle of what they pinch (m).
 const REACH: f64 = 0.009;
+
+/// A cluster clear of pins is preferred to one that is not, even if it is this much farther along
+/// the organ.
+const CLEAR_WORTH: f64 = 0.1;
 
 /// Fewest nodes that are worth a grasp.
 const FEWEST: usize = 8;
@@ -23,14 +25,14 @@ const FEWEST: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Aim {
     pub pose: Pose,
-    pub coordinates: Coordinates,
-    /// How far the tip stays from where it should be [m].
+    pub setpoint: Setpoint,
+    /// How far the tip stays from where it should be (m).
     pub missed: f64,
     /// Organ coordinate.
     pub s: f64,
 }
 
-/// Middle of the organ at organ coordinate `s` as it is now [m]: of its nodes there.
+/// Middle of the organ at organ coordinate `s` as it is now (m): of its nodes there.
 pub(super) fn middle(cell: &Cell, body: usize, s: f64) -> Option<DVec3> {
     let (world, mut wide) = (cell.world(), SLICE);
     // A coarse mesh may have no node in a thin slice.
@@ -51,48 +53,81 @@ fn along(cell: &Cell, body: usize, s: f64) -> DVec3 {
     at(s + CHORD) - at(s - CHORD)
 }
 
-/// The aim of `arm` at the cluster of `body` nearest to `s` that may be grasped, `depth` [m] from the pivot in its mouth.
-pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, s: f64, range: [f64; 2], depth: f64) -> Result<Aim> {
+/// The cluster of `body` nearest to `s` that may be grasped. Clusters that are clear of pins and
+/// lie in `range` come first, if there are any.
+fn cluster_in_range(cell: &Cell, body: usize, s: f64, range: [f64; 2]) -> Option<Cluster> {
     let world = cell.world();
     let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, REACH)).collect();
-    let clear = |c: &trocar_cell::Cluster| c.clear && c.nodes.len() >= FEWEST && (range[0]..=range[1]).contains(&c.s);
+    let clear = |c: &Cluster| c.clear && c.nodes.len() >= FEWEST && (range[0]..=range[1]).contains(&c.s);
     if all.iter().any(clear) {
         all.retain(clear);
     }
-    let nearest = all.into_iter().min_by(|a, b| (a.s - s).abs().total_cmp(&(b.s - s).abs()));
-    let Some(cluster) = nearest else {
-        let name = world.model.bodies()[body].name();
-        return Err(Error::Option(format!("organ '{name}' has no free node to grasp: all are pinned; pin fewer")));
-    };
-    at(cell, arm, body, cluster.s, cluster.centroid(world, body), depth)
+    all.into_iter().min_by(|a, b| (a.s - s).abs().total_cmp(&(b.s - s).abs()))
 }
 
-/// The aim of `arm` at a point of `body` near `s`: shaft through the port, jaws across the organ, the point `depth` [m] from the pivot.
+/// The cluster of `body` nearest to `s` that jaws from above reach enough nodes of. One that is
+/// clear of pins is preferred even if it is a little farther along the organ.
+fn cluster_at(cell: &Cell, body: usize, s: f64) -> Option<Cluster> {
+    let world = cell.world();
+    let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, REACH)).collect();
+    let rank = |c: &Cluster| (c.s - s).abs() + if c.clear { 0.0 } else { CLEAR_WORTH };
+    all.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
+    let enough = all.iter().position(|c| c.nodes.len() >= FEWEST).unwrap_or(0);
+    all.into_iter().nth(enough)
+}
+
+/// Where a grasp is to be.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Place {
+    /// In the middle of a range of organ coordinates.
+    InRange([f64; 2]),
+    /// At an organ coordinate.
+    At(f64),
+}
+
+/// The aim of `arm` at the cluster of `body` at `place`, `depth` (m) from the pivot between its
+/// blades and `aside` (m) of their closing plane.
+pub(super) fn grasp(cell: &Cell, arm: &str, body: usize, place: Place, depth: f64, aside: f64) -> Result<Aim> {
+    let cluster = match place {
+        Place::InRange(range) => cluster_in_range(cell, body, 0.5 * (range[0] + range[1]), range),
+        Place::At(s) => cluster_at(cell, body, s),
+    };
+    let Some(cluster) = cluster else {
+        let name = cell.world().model.bodies()[body].name();
+        return Err(Error::Option(format!("organ '{name}' has no free node to grasp: all are pinned; pin fewer")));
+    };
+    let aim = at(cell, arm, body, cluster.s, cluster.centroid(cell.world(), body), depth)?;
+    if aside == 0.0 {
+        return Ok(aim);
+    }
+    beside(cell, arm, &aim, aside * (aim.pose.rotation * DVec3::Y))
+}
+
+/// The same aim, moved by `by` (m, cell).
+pub(super) fn beside(cell: &Cell, arm: &str, aim: &Aim, by: DVec3) -> Result<Aim> {
+    let tip = Pose { translation: aim.pose.translation + by, ..aim.pose };
+    let reached = cell.solve(arm, &tip, &aim.setpoint)?;
+    Ok(Aim { pose: tip, setpoint: reached.setpoint, missed: reached.rejected_translation.length(), s: aim.s })
+}
+
+/// The aim of `arm` at a point of `body` near `s`: shaft through the port, jaws across the organ,
+/// the point `depth` (m) from the pivot.
 pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, depth: f64) -> Result<Aim> {
     let along = along(cell, body, s);
-    let x = (point - cell.port(arm)?.centre()).normalize_or(-DVec3::Z);
+    let workspace = cell.workspace(arm)?;
+    let x = workspace.direction_to(point);
     let hinge = (along - along.dot(x) * x).try_normalize().unwrap_or_else(|| x.any_orthonormal_vector());
     let pose = |z: DVec3| {
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
         Pose { rotation, translation: point - depth * x }
     };
-    // The blades are alike: of the two ways round, the one that the wrist reaches with less of a turn.
-    let near = Coordinates { jaw: 1.0, ..cell.setpoint(arm)? };
-    let turn = |s: &Solution| (s.coordinates.roll - near.roll).abs() + 10.0 * s.excess.roll.abs();
-    let (a, b) = (cell.solve(arm, &pose(hinge), &near)?, cell.solve(arm, &pose(-hinge), &near)?);
+    // The blades are alike: of the two ways round, the one that the wrist reaches with less of a
+    // turn.
+    let near = cell.setpoint(arm)?.with_jaw(1.0);
+    let turn = |s: &Reached| (s.setpoint.roll() - near.roll()).abs() + 10.0 * s.roll_excess.abs();
+    let (a, b) = (workspace.solve(&pose(hinge), &near)?, workspace.solve(&pose(-hinge), &near)?);
     let best = if turn(&a) <= turn(&b) { a } else { b };
-    Ok(Aim { pose: best.tip, coordinates: best.coordinates, missed: best.rejected_translation.length(), s })
-}
-
-/// A part of the way between two places; the jaw is that of the second.
-pub(super) fn between(from: &Coordinates, to: &Coordinates, share: f64) -> Coordinates {
-    let mix = |a: f64, b: f64| a + share * (b - a);
-    Coordinates {
-        pivots: [mix(from.pivots[0], to.pivots[0]), mix(from.pivots[1], to.pivots[1])],
-        insertion: mix(from.insertion, to.insertion),
-        roll: mix(from.roll, to.roll),
-        jaw: to.jaw,
-    }
+    Ok(Aim { pose: best.tip, setpoint: best.setpoint, missed: best.rejected_translation.length(), s })
 }
 
 /// 0 to 1 with both ends at rest.

@@ -1,13 +1,17 @@
-//! Policies: what moves an episode. Six controllers come with the program: a scripted one that passes, and five that are worse in one way each.
+//! Policies: what moves an episode. Six controllers come with the program: a scripted one that
+//! passes, and five that are worse in one way each.
 
 mod aim;
+mod cut_place;
 mod perturbed;
+mod random_actions;
 mod random_walk;
 mod scripted;
 
 pub use perturbed::{DELAY_S, Delay, NOISE_M, NOISE_RAD, Noise, OFFSET_MM, Offset};
+pub use random_actions::RandomActions;
 pub use random_walk::RandomWalk;
-pub use scripted::{Scripted, Style};
+pub use scripted::{AfterHold, CutAt, Script, Scripted, Style};
 
 use crate::{Episode, Error, Result};
 use trocar_cell::Action;
@@ -26,11 +30,19 @@ pub trait Policy {
     /// An episode that it cannot do.
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()>;
 
-    /// The next 1 to [`CHUNK`] actions, one a control period. What is to be scored looks at [`Episode::observe`] alone; scripts may look at the tissue too.
+    /// The next 1 to [`CHUNK`] actions, one a control period. What is to be scored looks at
+    /// [`Episode::observe`] alone; scripts may look at the tissue too.
     ///
     /// # Errors
     /// Ends the episode as [`crate::End::PolicyError`].
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>>;
+
+    /// Whether it has nothing left to do. An episode whose policy gives no action and has finished
+    /// ends as [`crate::End::Finished`]; one whose policy gives none and has not, as a failure of
+    /// the policy.
+    fn finished(&self) -> bool {
+        false
+    }
 }
 
 /// Names of the controllers.

@@ -4,36 +4,39 @@ use super::{CHUNK, Policy};
 use crate::random::Random;
 use crate::{Episode, Result};
 use std::collections::VecDeque;
-use trocar_cell::{Action, ActionSpace};
-use trocar_robot::instrument::Coordinates;
+use trocar_cell::{Action, ActionSpace, Setpoint, Workspace};
 
-/// Standard deviation of the noise on pivots [rad]: about 3 mm at the tip. On roll ten times as much.
+/// Standard deviation of the noise on pivots (rad): about 3 mm at the tip. On roll ten times as
+/// much.
 pub const NOISE_RAD: f64 = 0.03;
-/// And on the insertion [m].
+/// And on the insertion (m).
 pub const NOISE_M: f64 = 0.003;
-/// The noise is drawn so often a second [Hz] and goes straight in between: a hand's tremor and drift, not a buzz that arms filter out.
+/// The noise is drawn so often a second (Hz) and goes straight in between: a hand's tremor and
+/// drift, not a buzz that arms filter out.
 const NOISE_HZ: f64 = 2.0;
-/// How late actions come [s].
+/// How late actions come (s).
 pub const DELAY_S: f64 = 0.5;
-/// How far each arm goes astray [mm] at the organ, to a side of the seed's choice.
+/// How far each arm goes astray (mm) at the organ, to a side of the seed's choice.
 pub const OFFSET_MM: f64 = 5.0;
 
-/// Distance from port to organ that turns millimetres into pivots [m].
+/// Distance from port to organ that turns millimetres into pivots (m).
 const ARM: f64 = 0.12;
 
-/// Changes each arm's coordinates and keeps them within the limits; other action spaces are left as they are.
-fn changed(episode: &Episode, action: Action, mut change: impl FnMut(usize, &mut Coordinates)) -> Result<Action> {
+/// Changes each arm's targets and keeps them within the limits; other action spaces are left as
+/// they are. `change` gets the arm's place, and its first three numbers and roll.
+fn changed(episode: &Episode, action: Action, mut change: impl FnMut(usize, &Workspace, &mut [f64])) -> Result<Action> {
     if action.space != ActionSpace::Pivots {
         return Ok(action);
     }
     let mut all = Vec::new();
     for (k, (side, _)) in episode.cell().arms().into_iter().enumerate() {
         let n = &action.numbers[5 * k..5 * k + 5];
-        let mut c = Coordinates { pivots: [n[0], n[1]], insertion: n[2], roll: n[3], jaw: n[4] };
-        change(k, &mut c);
-        all.push(episode.cell().limits(side.name())?.clamp(&c).0);
+        let mut target = Setpoint([n[0], n[1], n[2], n[3], n[4]]);
+        let workspace = episode.cell().workspace(side.name())?;
+        change(k, workspace, &mut target.0);
+        all.push(workspace.clamp(&target));
     }
-    Ok(Action::pivots(&all))
+    Ok(Action::targets(&all))
 }
 
 /// A policy with noise on its pivots, insertion and roll.
@@ -56,6 +59,10 @@ impl<P: Policy> Policy for Noise<P> {
         "noise"
     }
 
+    fn finished(&self) -> bool {
+        self.inner.finished()
+    }
+
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()> {
         (self.random, self.count) = (Random::new(seed, "noise"), 0);
         self.inner.begin(episode, seed)
@@ -72,11 +79,12 @@ impl<P: Policy> Policy for Noise<P> {
                 let value = |knot: u64| if knot == 0 { 0.0 } else { self.random.normal(index(knot)) };
                 value(knot) + share * (value(knot + 1) - value(knot))
             };
-            chunk.push(changed(episode, action, |k, c| {
-                c.pivots[0] += NOISE_RAD * draw(k, 0);
-                c.pivots[1] += NOISE_RAD * draw(k, 1);
-                c.insertion += NOISE_M * draw(k, 2);
-                c.roll += 10.0 * NOISE_RAD * draw(k, 3);
+            chunk.push(changed(episode, action, |k, workspace, n| {
+                let aside = if workspace.as_port().is_some() { NOISE_RAD } else { NOISE_M };
+                n[0] += aside * draw(k, 0);
+                n[1] += aside * draw(k, 1);
+                n[2] += NOISE_M * draw(k, 2);
+                n[3] += 10.0 * NOISE_RAD * draw(k, 3);
             })?);
             self.count += 1;
         }
@@ -103,11 +111,15 @@ impl<P: Policy> Policy for Delay<P> {
         "delay"
     }
 
+    fn finished(&self) -> bool {
+        self.inner.finished()
+    }
+
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()> {
         self.inner.begin(episode, seed)?;
-        let stay: Vec<Coordinates> = episode.cell().observe().iter().map(|arm| arm.commanded).collect();
+        let stay: Vec<Setpoint> = episode.cell().observe().iter().map(|arm| arm.commanded).collect();
         let count = (DELAY_S / episode.cell().period()).round() as usize;
-        self.late = std::iter::repeat_n(Action::pivots(&stay), count).collect();
+        self.late = std::iter::repeat_n(Action::targets(&stay), count).collect();
         Ok(())
     }
 
@@ -123,7 +135,7 @@ impl<P: Policy> Policy for Delay<P> {
 #[derive(Clone, Debug)]
 pub struct Offset<P> {
     inner: P,
-    /// Pivots [rad] and insertion [m] of each arm.
+    /// Pivots (rad) and insertion (m) of each arm.
     by: [[f64; 3]; 2],
 }
 
@@ -139,6 +151,10 @@ impl<P: Policy> Policy for Offset<P> {
         "offset"
     }
 
+    fn finished(&self) -> bool {
+        self.inner.finished()
+    }
+
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()> {
         let random = Random::new(seed, "offset");
         self.by = [0_u64, 1].map(|k| {
@@ -152,11 +168,12 @@ impl<P: Policy> Policy for Offset<P> {
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>> {
         let by = self.by;
         let moved = |action| {
-            changed(episode, action, |k, c| {
+            changed(episode, action, |k, workspace, n| {
                 let [a, b, deeper] = by[k.min(1)];
-                c.pivots[0] += a;
-                c.pivots[1] += b;
-                c.insertion += deeper;
+                let arm = if workspace.as_port().is_some() { 1.0 } else { ARM };
+                n[0] += arm * a;
+                n[1] += arm * b;
+                n[2] += deeper;
             })
         };
         self.inner.act(episode)?.into_iter().map(moved).collect()

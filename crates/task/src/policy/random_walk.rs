@@ -1,23 +1,24 @@
 //! Random motion: what no policy should be worse than.
 
-use super::aim::{between, eased};
+use super::aim::eased;
 use super::{CHUNK, Policy};
 use crate::random::Random;
 use crate::{Episode, Result};
-use trocar_cell::Action;
+use trocar_cell::{Action, Setpoint, Workspace};
 use trocar_robot::instrument::Coordinates;
 
-/// Time from one random place to the next [s].
+/// Time from one random place to the next (s).
 const HOP_S: f64 = 2.0;
 
-/// Goes from one random place within the arms' limits to the next, jaws included; half of the time deep, where the tissue is.
+/// Goes from one random place within the arms' limits to the next, jaws included; half of the time
+/// deep, where the tissue is.
 #[derive(Clone, Debug)]
 pub struct RandomWalk {
     random: Random,
     count: u64,
     hop: u64,
-    from: Vec<Coordinates>,
-    to: Vec<Coordinates>,
+    from: Vec<Setpoint>,
+    to: Vec<Setpoint>,
 }
 
 impl Default for RandomWalk {
@@ -27,10 +28,18 @@ impl Default for RandomWalk {
 }
 
 impl RandomWalk {
-    fn place(&self, episode: &Episode, k: usize) -> Result<Coordinates> {
-        let limits = episode.cell().limits(episode.cell().arms()[k].0.name())?;
+    fn place(&self, episode: &Episode, k: usize) -> Result<Setpoint> {
+        let workspace = episode.cell().workspace(episode.cell().arms()[k].0.name())?;
         let first = 32 * self.hop + 8 * k as u64;
         let unit = |n: u64| self.random.unit(first + n);
+        let Workspace::Port(space) = workspace else {
+            let bounds = workspace.bounds();
+            return Ok(Setpoint(std::array::from_fn(|n| {
+                let [low, high] = bounds[n];
+                low + (high - low) * unit(n as u64)
+            })));
+        };
+        let limits = &space.limits;
         let lean = 0.8 * limits.tilt * unit(0).sqrt();
         let azimuth = std::f64::consts::TAU * unit(1);
         let [low, high] = limits.insertion;
@@ -41,7 +50,7 @@ impl RandomWalk {
             roll: limits.roll[0] + (limits.roll[1] - limits.roll[0]) * unit(4),
             jaw: unit(5),
         };
-        Ok(limits.clamp(&c).0)
+        Ok(limits.clamp(&c).0.into())
     }
 }
 
@@ -67,8 +76,8 @@ impl Policy for RandomWalk {
             }
             self.count += 1;
             let share = eased(((self.count - 1) % hop + 1) as f64 / hop as f64);
-            let all: Vec<Coordinates> = self.from.iter().zip(&self.to).map(|(a, b)| between(a, b, share)).collect();
-            chunk.push(Action::pivots(&all));
+            let all: Vec<Setpoint> = self.from.iter().zip(&self.to).map(|(a, b)| a.towards(b, share)).collect();
+            chunk.push(Action::targets(&all));
         }
         Ok(chunk)
     }

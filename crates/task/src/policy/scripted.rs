@@ -1,39 +1,63 @@
-//! The scripted finite-state baseline (SPEC E3): grasp at the organ's middle, lift, bring the cutter to the tissue between grasp and base, open, engage, close.
+//! The scripted finite-state baseline: grasp at the organ's middle, lift, bring the cutter to the
+//! tissue between grasp and base, open, engage, close. With a [`Script`] it lifts as far as it is
+//! asked to, where it is asked to, and lowers or cuts what it lifted.
 //!
-//! It looks at where the tissue is, which no policy that is scored may; all it does goes through actions, and so through ports, controllers and arms.
+//! It looks at where the tissue is, which no policy that is scored may. All it does goes through
+//! actions, and so through controllers, arms and ports where there are any.
 
-use super::aim::{self, Aim, between, eased};
+use super::aim::{self, Aim, Place, eased};
+use super::cut_place::cut_place;
 use super::{CHUNK, Policy};
 use crate::{Episode, Error, Result};
 use glam::DVec3;
-use trocar_cell::Action;
+use trocar_cell::{Action, Setpoint};
 use trocar_core::Pose;
-use trocar_robot::instrument::Coordinates;
 use trocar_scene::TaskName;
 
-/// Way along the shaft from which open jaws come [m].
+/// Way along the shaft from which open jaws come (m).
 const BACK: f64 = 0.025;
 
-/// Speed of the tips on the way there, and close to tissue [m/s].
+/// Way along the shaft by which a cutter draws back after a cut (m).
+const WITHDRAWN: f64 = 0.060;
+
+/// How far the jaws rise with what a cut freed (m), and how long that takes and is kept (s).
+const CARRY: f64 = 0.010;
+const CARRY_S: f64 = 1.0;
+const KEEP_S: f64 = 0.5;
+
+/// Speed of the tips on the way there, and close to tissue (m/s).
 const FAST: f64 = 0.04;
 const SLOW: f64 = 0.025;
 
-/// Tissue is taken this far from the pivot: in mid-mouth by the grasper [m] ...
+/// Tissue is taken this far from the pivot by the grasper (m): in the middle of its jaws.
 const GRASP_DEPTH: f64 = 0.0115;
-/// ... and farther out by the cutter, where the gap of nearly closed blades is still wider than their skin (SPEC C3).
+/// The cutter takes it farther out (m), where the gap of nearly closed blades is still wider than
+/// their contact skin.
 const CUT_DEPTH: f64 = 0.0140;
 
-/// Way along the organ from the middle of the grasp to the cut [m]: half of a grasper's blade and half of a cutter's, and as much between them as either jaw's aim may be off.
+/// Way along the organ from the middle of the grasp to the cut (m): half of a grasper's blade and
+/// half of a cutter's, and as much between them as either jaw's aim may be off.
 const BESIDE: f64 = 0.0060;
 
-/// Lift of the jaws [m] above what the gate asks for.
+/// Lift of the jaws (m) above what the gate asks for.
 const ABOVE_GATE: f64 = 0.0025;
 
-/// Time of the lift [s], and of waiting for jaws to take hold or to close.
+/// Time of the lift (s), and of waiting for jaws to take hold or to close.
 const LIFT_S: f64 = 1.5;
 const CLOSE_S: f64 = 1.5;
 
-/// Speed of the greedy one over that of the careful one, and the time that it gives jaws to close [s]: what they take on nothing and a little more.
+/// Time of a lift that a [`Script`] asks for, of its hold and of lowering (s).
+const SCRIPT_LIFT_S: f64 = 1.0;
+const SCRIPT_HOLD_S: f64 = 1.0;
+
+/// Time of dragging, letting go and opening (s), and how wide jaws open to let go of dragged
+/// tissue.
+const DRAG_S: f64 = 0.6;
+const OPEN_S: f64 = 0.5;
+const RELEASE_JAW: f64 = 0.6;
+
+/// Speed of the greedy one over that of the careful one, and the time that it gives jaws to close
+/// (s): what they take on nothing and a little more.
 const HASTE: f64 = 3.0;
 const SNATCH_S: f64 = 0.4;
 
@@ -44,12 +68,83 @@ const CLOSED: f64 = 0.75;
 const TRIES: usize = 3;
 
 /// How it goes about it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Style {
     /// Comes along the shaft, waits for what it has begun, tries again.
+    #[default]
     Careful,
-    /// Straight to everything at three times the speed, open loop: no way round, no looking whether jaws have taken hold or the lift has lasted, no second try.
+    /// Straight to everything at three times the speed, open loop: no way round, no looking whether
+    /// jaws have taken hold or the lift has lasted, no second try.
     Greedy,
+}
+
+/// Where a [`Script`] cuts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum CutAt {
+    /// Half way between the grasp and the pinned part.
+    Between,
+    /// At an organ coordinate, 0 to 1.
+    S(f64),
+}
+
+/// What a [`Script`] does after its hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AfterHold {
+    /// Nothing: it is finished.
+    #[default]
+    Finish,
+    /// Lowers what was lifted, lets go of it and is finished.
+    Lower,
+    /// Cuts the organ between the grasp and what holds it, carries on what came loose and is
+    /// finished.
+    Cut(CutAt),
+}
+
+/// A grasp-lift with a place, a height and an end of its own choice.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Script {
+    /// Organ coordinate of the grasp, 0 to 1.
+    pub at: f64,
+    /// How far beside the tissue's middle the jaws come (m), across the organ.
+    pub approach_offset: f64,
+    /// Lift of the jaws (m), in one second and held for another.
+    pub lift: f64,
+    /// The jaws first drag the tissue sideways by this much (m), let go of it there and close
+    /// again.
+    pub regrasp: Option<f64>,
+    /// Times that it tries again where the jaws took hold of nothing.
+    pub retries: usize,
+    /// What follows the hold.
+    pub after: AfterHold,
+}
+
+impl Default for Script {
+    fn default() -> Self {
+        Self { at: 0.5, approach_offset: 0.0, lift: 0.015, regrasp: None, retries: 0, after: AfterHold::default() }
+    }
+}
+
+impl Script {
+    /// Says which option is out of range.
+    ///
+    /// # Errors
+    /// The option by its name on the command line.
+    pub fn check(&self) -> Result<()> {
+        let within = |name: &str, value: f64, low: f64, high: f64, unit: &str| {
+            if (low..=high).contains(&value) {
+                return Ok(());
+            }
+            Err(Error::Option(format!("{name} is {value}{unit}; must be in [{low}, {high}]{unit}")))
+        };
+        within("--at", self.at, 0.0, 1.0, "")?;
+        within("--lift", 1e3 * self.lift, 0.1, 100.0, " mm")?;
+        within("--approach-offset", 1e3 * self.approach_offset, -50.0, 50.0, " mm")?;
+        within("--regrasp", 1e3 * self.regrasp.unwrap_or(0.0), -50.0, 50.0, " mm")?;
+        match self.after {
+            AfterHold::Cut(CutAt::S(s)) => within("--sever", s, 0.0, 1.0, ""),
+            _ => Ok(()),
+        }
+    }
 }
 
 /// What it is at.
@@ -58,34 +153,45 @@ enum Phase {
     Approach,
     Enter,
     Close,
+    Drag,
+    Release,
     Lift,
     Hold,
+    Lower,
+    Open,
     Reach,
     Engage,
     Cut,
-    /// Port-reach: both arms to target number so.
+    Carry,
+    Keep,
+    /// Port-reach: both arms to this target.
     Target(usize),
     Rest,
+    Finished,
 }
 
 /// The baseline.
 #[derive(Clone, Debug)]
 pub struct Scripted {
     style: Style,
+    script: Option<Script>,
     name: &'static str,
     phase: Phase,
     /// Periods of the phase that are over, and as many as it has; 0: it is to be entered.
     done: usize,
     count: usize,
     /// Where each arm goes from and to in this phase.
-    from: Vec<Coordinates>,
-    to: Vec<Coordinates>,
-    /// What it asked of each arm last. Not what the cell was told: who changes its actions on the way must not shift where its next phase begins, or a constant offset grows with every phase.
-    last: Vec<Coordinates>,
+    from: Vec<Setpoint>,
+    to: Vec<Setpoint>,
+    /// What it asked of each arm last. Not what the cell was commanded: who changes its actions on
+    /// the way must not shift where its next phase begins, or a constant offset grows with every
+    /// phase.
+    last: Vec<Setpoint>,
     /// The grasp, as it was aimed at.
     grasp: Option<Aim>,
     lift: f64,
     tries: usize,
+    dragged: bool,
 }
 
 impl Scripted {
@@ -96,23 +202,81 @@ impl Scripted {
             Style::Greedy => "greedy",
         };
         let [from, to, last] = [const { Vec::new() }; 3];
-        Self { style, name, phase: Phase::Rest, done: 0, count: 0, from, to, last, grasp: None, lift: 0.0, tries: 0 }
+        Self {
+            style,
+            script: None,
+            name,
+            phase: Phase::Rest,
+            done: 0,
+            count: 0,
+            from,
+            to,
+            last,
+            grasp: None,
+            lift: 0.0,
+            tries: 0,
+            dragged: false,
+        }
     }
 
-    /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on, an appendix whose base is held is pinned, and pinned tissue feels no blade.
-    fn cut_at(&self, episode: &Episode, body: usize) -> f64 {
-        let grasp = self.grasp.as_ref().map_or(0.5, |g| g.s);
-        let length = episode.cell().world().axes[body].length.max(1e-3);
-        grasp - (BESIDE / length).min(0.5 * grasp)
+    /// One that follows `script`.
+    pub fn following(script: Script) -> Self {
+        Self { script: Some(script), ..Self::new(Style::Careful) }
     }
 
+    /// Name of the phase that it is in.
+    pub fn phase(&self) -> &'static str {
+        match self.phase {
+            Phase::Approach => "approach",
+            Phase::Enter => "enter",
+            Phase::Close => "close",
+            Phase::Drag => "drag",
+            Phase::Release => "release",
+            Phase::Lift => "lift",
+            Phase::Hold => "hold",
+            Phase::Lower => "lower",
+            Phase::Open => "open",
+            Phase::Reach => "reach",
+            Phase::Engage => "engage",
+            Phase::Cut => "cut",
+            Phase::Carry => "carry",
+            Phase::Keep => "keep",
+            Phase::Target(_) => "target",
+            Phase::Rest => "rest",
+            Phase::Finished => "finished",
+        }
+    }
+
+    /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on,
+    /// an appendix whose base is held is pinned, and pinned tissue feels no blade.
+    fn cut_at(&self, episode: &Episode, body: usize) -> Result<f64> {
+        match self.script.map(|script| script.after) {
+            Some(AfterHold::Cut(CutAt::S(s))) => Ok(s),
+            Some(AfterHold::Cut(CutAt::Between)) => cut_place(episode, body),
+            _ => {
+                let grasp = self.grasp.as_ref().map_or(0.5, |g| g.s);
+                let length = episode.cell().world().axes[body].length.max(1e-3);
+                Ok(grasp - (BESIDE / length).min(0.5 * grasp))
+            }
+        }
+    }
+
+    /// The body to be grasped or cut: of a cut organ the piece that kept its name.
     fn body(&self, episode: &Episode) -> Result<usize> {
         let bodies = episode.bodies();
         bodies.first().copied().ok_or_else(|| Error::Option("the scene has no organ to grasp".to_owned()))
     }
 
-    fn go(&mut self, phase: Phase) {
+    fn start_phase(&mut self, phase: Phase) {
         (self.phase, self.done, self.count) = (phase, 0, 0);
+    }
+
+    /// Sends the grasper's tip to the aim moved by `by` (m, cell).
+    fn send_beside(&mut self, episode: &Episode, arm: &str, by: DVec3) -> Result<()> {
+        let (Some(k), Some(aim)) = (episode.roles().0, &self.grasp) else { return Ok(()) };
+        let tip = Pose { translation: aim.pose.translation + by, ..aim.pose };
+        self.to[k] = episode.cell().solve(arm, &tip, &aim.setpoint)?.setpoint.with_jaw(0.0);
+        Ok(())
     }
 
     /// Enters the phase: says where the arms go and for how many periods.
@@ -133,74 +297,108 @@ impl Scripted {
                 let Some(k) = grasper else { return Err(Error::Option("scripted needs a grasper".into())) };
                 let body = self.body(episode)?;
                 let gates = &episode.scene().task.gates;
-                let range = [gates.grasp_from, gates.grasp_to];
-                let aim = aim::grasp(cell, arms[k], body, 0.5 * (range[0] + range[1]), range, GRASP_DEPTH)?;
+                let (place, aside) = match &self.script {
+                    Some(script) => (Place::At(script.at), script.approach_offset),
+                    None => (Place::InRange([gates.grasp_from, gates.grasp_to]), 0.0),
+                };
+                let aim = aim::grasp(cell, arms[k], body, place, GRASP_DEPTH, aside)?;
                 self.grasp = Some(aim);
-                let open = Coordinates { jaw: 1.0, ..aim.coordinates };
-                self.to[k] = if self.phase == Phase::Approach { behind(cell, arms[k], &open)? } else { open };
+                let open = aim.setpoint.with_jaw(1.0);
+                let behind = || Ok::<_, Error>(cell.workspace(arms[k])?.behind(&open, BACK));
+                self.to[k] = if self.phase == Phase::Approach { behind()? } else { open };
                 self.time(episode, k, if self.phase == Phase::Approach { FAST } else { SLOW })?
             }
             Phase::Close => {
                 if let Some(k) = grasper {
-                    self.to[k].jaw = 0.0;
-                    self.from[k].jaw = 0.0;
+                    self.to[k] = self.to[k].with_jaw(0.0);
+                    self.from[k] = self.from[k].with_jaw(0.0);
                 }
                 close
             }
-            Phase::Lift => {
-                let (Some(k), Some(aim)) = (grasper, &self.grasp) else { return Ok(()) };
-                self.lift = 1e-3 * episode.scene().task.gates.lift_mm + ABOVE_GATE;
-                let tip = Pose { translation: aim.pose.translation + self.lift * DVec3::Z, ..aim.pose };
-                let solved = cell.solve(arms[k], &tip, &aim.coordinates)?.coordinates;
-                self.to[k] = Coordinates { jaw: 0.0, ..solved };
-                LIFT_S
+            Phase::Drag => {
+                let (Some(k), Some(aim), Some(script)) = (grasper, &self.grasp, &self.script) else { return Ok(()) };
+                let by = aim.pose.rotation * (script.regrasp.unwrap_or(0.0) * DVec3::Y);
+                let aim = aim::beside(cell, arms[k], aim, by)?;
+                self.to[k] = aim.setpoint.with_jaw(0.0);
+                (self.grasp, self.dragged) = (Some(aim), true);
+                DRAG_S
             }
+            Phase::Release | Phase::Open => {
+                let jaw = if self.phase == Phase::Open { 1.0 } else { RELEASE_JAW };
+                if let Some(k) = grasper {
+                    self.to[k] = self.to[k].with_jaw(jaw);
+                }
+                if self.phase == Phase::Open { OPEN_S } else { DRAG_S }
+            }
+            Phase::Lift => {
+                let Some(k) = grasper else { return Ok(()) };
+                let gate = 1e-3 * episode.scene().task.gates.lift_mm + ABOVE_GATE;
+                self.lift = self.script.map_or(gate, |script| script.lift);
+                self.send_beside(episode, arms[k], self.lift * DVec3::Z)?;
+                if self.script.is_some() { SCRIPT_LIFT_S } else { LIFT_S }
+            }
+            Phase::Hold if self.script.is_some() => SCRIPT_HOLD_S,
             Phase::Hold => episode.scene().task.gates.lift_s + 0.2,
+            Phase::Lower => {
+                let Some(k) = grasper else { return Ok(()) };
+                self.send_beside(episode, arms[k], DVec3::ZERO)?;
+                SCRIPT_LIFT_S
+            }
             Phase::Reach | Phase::Engage => {
                 let Some(k) = cutter else { return Err(Error::Option("scripted needs a cutter".into())) };
                 let body = self.body(episode)?;
-                let s = self.cut_at(episode, body);
+                let s = self.cut_at(episode, body)?;
                 let point = aim::middle(cell, body, s).unwrap_or(DVec3::ZERO);
                 // Deeper with every try.
                 let depth = CUT_DEPTH - 1.5e-3 * self.tries as f64;
-                let open = Coordinates { jaw: 1.0, ..aim::at(cell, arms[k], body, s, point, depth)?.coordinates };
-                self.to[k] = if self.phase == Phase::Reach { behind(cell, arms[k], &open)? } else { open };
+                let open = aim::at(cell, arms[k], body, s, point, depth)?.setpoint.with_jaw(1.0);
+                let behind = || Ok::<_, Error>(cell.workspace(arms[k])?.behind(&open, BACK));
+                self.to[k] = if self.phase == Phase::Reach { behind()? } else { open };
                 self.time(episode, k, if self.phase == Phase::Reach { FAST } else { SLOW })?
             }
             Phase::Cut => {
                 if let Some(k) = cutter {
-                    self.to[k].jaw = CLOSED * episode.scene().task.gates.cut_closed;
-                    self.from[k].jaw = self.to[k].jaw;
+                    self.to[k] = self.to[k].with_jaw(CLOSED * episode.scene().task.gates.cut_closed);
+                    self.from[k] = self.from[k].with_jaw(self.to[k].jaw());
                 }
                 close
             }
+            Phase::Carry => {
+                if let Some(k) = cutter {
+                    self.to[k] = cell.workspace(arms[k])?.behind(&self.to[k], WITHDRAWN);
+                }
+                if let Some(k) = grasper.filter(|k| is_free(episode, *k)) {
+                    self.send_beside(episode, arms[k], (self.lift + CARRY) * DVec3::Z)?;
+                }
+                CARRY_S
+            }
+            Phase::Keep => KEEP_S,
             Phase::Target(n) => {
                 let mut seconds: f64 = 0.0;
                 for (k, targets) in episode.targets().iter().enumerate() {
                     let pose = cell.measured_cp(arms[k])?;
                     let length = cell.blade_tip(arms[k])?.distance(pose.translation);
-                    let x = (targets[n] - cell.port(arms[k])?.centre()).normalize_or(-DVec3::Z);
+                    let x = cell.workspace(arms[k])?.direction_to(targets[n]);
                     let tip = Pose { translation: targets[n] - length * x, ..pose };
-                    let roll = self.from[k].roll;
-                    self.to[k] = Coordinates { roll, ..cell.solve(arms[k], &tip, &self.from[k])?.coordinates };
-                    self.to[k].jaw = self.from[k].jaw;
+                    let reached = cell.solve(arms[k], &tip, &self.from[k])?.setpoint;
+                    self.to[k] = reached.with_roll(self.from[k].roll()).with_jaw(self.from[k].jaw());
                     seconds = seconds.max(self.time(episode, k, FAST)?);
                 }
                 seconds + 0.8
             }
-            Phase::Rest => 1.0,
+            Phase::Rest | Phase::Finished => 1.0,
         };
         self.count = ((seconds / speed / cell.period()).round() as usize).max(1);
         Ok(())
     }
 
-    /// Time of arm `k` on its way at a mean of two thirds of `speed` [m/s].
+    /// Time of arm `k` on its way at a mean of two thirds of `speed` (m/s).
     fn time(&self, episode: &Episode, k: usize, speed: f64) -> Result<f64> {
         let cell = episode.cell();
-        let port = cell.port(cell.arms()[k].0.name())?;
-        let tip = |c: &Coordinates| port.tip(c).translation;
+        let workspace = cell.workspace(cell.arms()[k].0.name())?;
+        let tip = |c: &Setpoint| workspace.tip(c).translation;
         let way = tip(&self.from[k]).distance(tip(&self.to[k]));
-        let turn = (self.from[k].roll - self.to[k].roll).abs();
+        let turn = (self.from[k].roll() - self.to[k].roll()).abs();
         Ok((1.5 * way / speed).max(turn).max(0.3))
     }
 
@@ -208,8 +406,11 @@ impl Scripted {
     fn next(&mut self, episode: &Episode) {
         let channels = episode.rows().last().copied().unwrap_or_default();
         let (t, careful) = (channels.task, self.style == Style::Careful);
-        let again = careful && self.tries < TRIES;
+        let tries = self.script.map_or(TRIES, |script| script.retries);
+        let again = careful && self.tries < tries;
         let task = episode.scene().task.name;
+        let drags = self.script.is_some_and(|script| script.regrasp.is_some()) && !self.dragged;
+        let after = self.script.map(|script| script.after);
         let next = match self.phase {
             Phase::Approach => Phase::Enter,
             Phase::Enter => Phase::Close,
@@ -217,33 +418,42 @@ impl Scripted {
                 self.tries += 1;
                 Phase::Approach
             }
+            Phase::Close if drags => Phase::Drag,
             Phase::Close => Phase::Lift,
+            Phase::Drag => Phase::Release,
+            Phase::Release => Phase::Close,
             Phase::Lift if !careful && task != TaskName::GraspLift => Phase::Reach,
             Phase::Lift => Phase::Hold,
             Phase::Hold if t.grasped == 0.0 && again => {
                 self.tries += 1;
                 Phase::Approach
             }
-            Phase::Hold if task == TaskName::GraspLift => Phase::Rest,
+            Phase::Hold if after == Some(AfterHold::Finish) => Phase::Finished,
+            Phase::Hold if after == Some(AfterHold::Lower) => Phase::Lower,
+            Phase::Hold if after.is_none() && task == TaskName::GraspLift => Phase::Rest,
             Phase::Hold => {
                 self.tries = 0;
                 Phase::Reach
             }
+            Phase::Lower => Phase::Open,
             Phase::Reach => Phase::Engage,
             Phase::Engage if t.cut_mouth == 0.0 && again => {
                 self.tries += 1;
                 Phase::Engage
             }
             Phase::Engage => Phase::Cut,
+            Phase::Cut if after.is_some() => Phase::Carry,
             Phase::Cut if again => {
                 self.tries += 1;
                 Phase::Reach
             }
+            Phase::Carry => Phase::Keep,
+            Phase::Open | Phase::Keep | Phase::Finished => Phase::Finished,
             Phase::Cut => Phase::Rest,
             Phase::Target(n) if n < 2 => Phase::Target(n + 1),
             Phase::Target(_) | Phase::Rest => Phase::Rest,
         };
-        self.go(next);
+        self.start_phase(next);
     }
 
     /// Whether the phase is over before its time.
@@ -258,20 +468,20 @@ impl Scripted {
         }
         self.done += 1;
         let share = eased(self.done as f64 / self.count as f64);
-        let targets: Vec<Coordinates> = self.from.iter().zip(&self.to).map(|(a, b)| between(a, b, share)).collect();
-        let limits = episode.cell().arms().into_iter().map(|(side, _)| episode.cell().limits(side.name()));
-        let limits: Vec<_> = limits.collect::<std::result::Result<_, _>>()?;
-        let kept: Vec<Coordinates> = targets.iter().zip(limits).map(|(c, l)| l.clamp(c).0).collect();
-        let action = Action::pivots(&kept);
+        let targets: Vec<Setpoint> = self.from.iter().zip(&self.to).map(|(a, b)| a.towards(b, share)).collect();
+        let spaces = episode.cell().arms().into_iter().map(|(side, _)| episode.cell().workspace(side.name()));
+        let spaces: Vec<_> = spaces.collect::<std::result::Result<_, _>>()?;
+        let kept: Vec<Setpoint> = targets.iter().zip(spaces).map(|(c, space)| space.clamp(c)).collect();
+        let action = Action::targets(&kept);
         self.last = kept;
         Ok(action)
     }
 }
 
-/// The same place, but farther out along the shaft.
-fn behind(cell: &trocar_cell::Cell, arm: &str, at: &Coordinates) -> Result<Coordinates> {
-    let low = cell.limits(arm)?.insertion[0];
-    Ok(Coordinates { insertion: (at.insertion - BACK).max(low), ..*at })
+/// Whether what the arm at place `k` holds hangs on nothing that is pinned.
+fn is_free(episode: &Episode, k: usize) -> bool {
+    let bodies = episode.cell().world().model.bodies();
+    episode.cell().carried(k).is_some_and(|held| !bodies[held.organ].pinned().contains(&true))
 }
 
 impl Policy for Scripted {
@@ -280,14 +490,21 @@ impl Policy for Scripted {
     }
 
     fn begin(&mut self, episode: &Episode, _seed: u64) -> Result<()> {
-        *self = Self::new(self.style);
+        *self = Self { script: self.script, ..Self::new(self.style) };
+        if let Some(script) = &self.script {
+            script.check()?;
+        }
         let greedy = self.style == Style::Greedy;
-        self.go(match episode.scene().task.name {
+        self.start_phase(match episode.scene().task.name {
             TaskName::PortReach => Phase::Target(0),
             _ if greedy => Phase::Enter,
             _ => Phase::Approach,
         });
         Ok(())
+    }
+
+    fn finished(&self) -> bool {
+        self.phase == Phase::Finished
     }
 
     fn act(&mut self, episode: &Episode) -> Result<Vec<Action>> {
@@ -305,6 +522,9 @@ impl Policy for Scripted {
                 if self.style == Style::Greedy && self.phase == Phase::Reach {
                     self.phase = Phase::Engage;
                 }
+            }
+            if self.phase == Phase::Finished {
+                break;
             }
             chunk.push(self.action(episode)?);
         }

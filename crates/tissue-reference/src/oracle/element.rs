@@ -6,7 +6,8 @@ use trocar_tissue::assembly::Tangent;
 
 /// F from the corners' positions and rest gradients, F = sum x m'.
 pub(crate) fn deformation(x: [DVec3; 4], m: &[DVec3; 4]) -> DMat3 {
-    // Gradients sum to zero: edges instead of positions keep the rounding of positions far from the origin out.
+    // Gradients sum to zero: edges instead of positions avoid the rounding of positions far from
+    // the origin.
     let mut f = DMat3::ZERO;
     for k in 1..4 {
         let edge = x[k] - x[0];
@@ -17,7 +18,8 @@ pub(crate) fn deformation(x: [DVec3; 4], m: &[DVec3; 4]) -> DMat3 {
     f
 }
 
-/// The nearest positive semidefinite tangent: negative eigenvalues become 0. None if there is no eigendecomposition (numbers that are not finite).
+/// The nearest positive semidefinite tangent: negative eigenvalues become 0. None if there is no
+/// eigendecomposition (numbers that are not finite).
 pub(crate) fn projected(tangent: &Tangent) -> Option<Tangent> {
     if tangent.iter().flatten().any(|v| !v.is_finite()) {
         return None;

@@ -1,4 +1,5 @@
-//! The Hessian's Cholesky factor. The symbolic factorisation (approximate minimum degree, faer) depends on the mesh and on which nodes are fixed only, and is kept.
+//! The Hessian's Cholesky factor. The symbolic factorisation (approximate minimum degree, faer)
+//! depends only on the mesh and on which nodes are fixed, and is kept.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::llt::factor::LltRegularization;

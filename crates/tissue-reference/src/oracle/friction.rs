@@ -1,17 +1,18 @@
-//! Friction, which is no potential: minimise with its limits held, take them anew, until the forces of the true law balance.
+//! Friction, which has no potential: minimise with its limits held, update them, until the forces
+//! of the true law balance.
 
 use super::newton::{Solver, norm};
 use super::potential::Potential;
 use super::solution::{Failure, Solution};
 use glam::DVec3;
 
-/// Most times the limits are taken anew.
-const MOST_ROUNDS: usize = 100;
+/// Greatest number of updates of the limits.
+const MAX_FRICTION_ROUNDS: usize = 100;
 
 /// Share of the true law's imbalance to which a round minimises.
 const INNER_SHARE: f64 = 0.1;
 
-/// Brings `x` to the minimum of `potential` with fixed nodes at their targets.
+/// Moves `x` to the minimum of `potential` with fixed nodes at their targets.
 pub(super) fn minimise(
     solver: &mut Solver,
     potential: &mut Potential<'_>,
@@ -31,14 +32,14 @@ pub(super) fn minimise(
         return Ok(solution);
     }
     let mut gradient = vec![DVec3::ZERO; x.len()];
-    for _ in 0..MOST_ROUNDS {
+    for _ in 0..MAX_FRICTION_ROUNDS {
         potential.limits = potential.friction_limits(x);
         potential.gradient(x, &mut gradient);
         solution.gradient = norm(&gradient, fixed);
         if solution.gradient <= tolerance {
             return Ok(solution);
         }
-        // Held limits are worth no more than they are true.
+        // Held limits need no more precision than they are true.
         let next = solver.minimise(potential, fixed, tolerance.max(INNER_SHARE * solution.gradient), x)?;
         solution.iterations += next.iterations;
         solution.projected += next.projected;

@@ -7,7 +7,8 @@ use glam::DVec3;
 /// A step leaves each element this share of the volume it has.
 const KEPT_SHARE: f64 = 0.1;
 
-/// The largest share of the step, up to 1, on all of whose way every element keeps a tenth of its volume.
+/// The largest share of the step, up to 1, on the whole way of which every element keeps a tenth of
+/// its volume.
 pub(super) fn allowed_share(elastic: &Elastic, x: &[DVec3], step: &[DVec3]) -> f64 {
     let mut share = 1.0;
     for t in 0..elastic.tets.len() {
@@ -22,13 +23,15 @@ pub(super) fn allowed_share(elastic: &Elastic, x: &[DVec3], step: &[DVec3]) -> f
     share
 }
 
-/// Where the cubic with these coefficients first falls below `floor`, up to `end`; a little before it rather than after it. 0 where it is not a number.
+/// Where the cubic with these coefficients first falls below `floor`, up to `end`; a little before
+/// it rather than after it. 0 where it is NaN.
 fn first_below(floor: f64, [c0, c1, c2, c3]: [f64; 4], end: f64) -> f64 {
     if c0 - end * (c1.abs() + c2.abs() + c3.abs()) >= floor {
         return end;
     }
     let at = |s: f64| c0 + s * (c1 + s * (c2 + s * c3));
-    // It is monotonic between the roots of its derivative, c1 + 2 c2 s + 3 c3 s^2; where there are none, this is not a number, or not within.
+    // It is monotonic between the roots of its derivative, c1 + 2 c2 s + 3 c3 s^2; where there are
+    // none, this is NaN or out of range.
     let q = -(c2 + (c2 * c2 - 3.0 * c1 * c3).sqrt().copysign(c2));
     let (one, other) = (q / (3.0 * c3), c1 / q);
     let mut from = 0.0;
@@ -51,11 +54,11 @@ fn first_below(floor: f64, [c0, c1, c2, c3]: [f64; 4], end: f64) -> f64 {
         }
         return from;
     }
-    // Not a number: no step.
+    // NaN: no step.
     if at(end) >= floor { end } else { 0.0 }
 }
 
-/// Refuses positions in which an element has no volume.
+/// Checks that every element has a volume.
 pub(super) fn check(elastic: &Elastic, x: &[DVec3]) -> Result<(), Failure> {
     for element in 0..elastic.tets.len() {
         let ratio = elastic.deformation(element, x).determinant();

@@ -1,23 +1,26 @@
 //! The oracle: implicit Euler's step and the static equilibrium in double precision, converged.
 //!
-//! Every solver of this crate minimises the same function of the free nodes' positions x,
+//! The solvers of `trocar-tissue` minimise the same function of the free nodes' positions x,
 //!
 //! 1/(2 dt^2) |x - y|_M^2 + sum V0 Psi(F) + dashpots + support planes, y = x0 + dt v0 + dt^2 g,
 //!
-//! and is judged by how near it comes to this one, which finds the minimum by Newton's method with a sparse direct solve. It is slow and meant for tests and
-//! experiments. What is in it:
+//! and are judged by how near they come to the oracle, which finds the minimum by Newton's method
+//! with a sparse direct solve. It is slow and meant for tests and studies. The function contains:
 //!
-//! - energies, stresses and their derivatives of [`crate::Hyperelastic`]; masses, dashpots and contact stiffness as the model holds them (rounded to `f32`);
-//! - dashpots as the sweeps have them: quadratic in the change of an edge's squared length since the beginning of the step, so that no rigid motion meets them;
-//! - the supports' one-sided quadratic penalty. Their friction is no potential, since its limit grows with the depth: it is minimised with the limits held
-//!   and the limits are then taken anew, until the forces of the true law are in balance;
-//! - pinned nodes stay; held nodes are prescribed. The stepper's rules for what cannot follow a tool (yielding grasps) are left out: a motion that
-//!   cannot be followed is an error.
+//! - energies, stresses and their derivatives of [`trocar_tissue::Hyperelastic`]; masses, dashpots
+//!   and contact stiffness as the model holds them (rounded to `f32`);
+//! - dashpots as the sweeps have them: quadratic in the change of an edge's squared length since
+//!   the beginning of the step, so that no rigid motion meets them;
+//! - the supports' one-sided quadratic penalty. Their friction has no potential, because its limit
+//!   grows with the depth: the function is minimised with the limits held, which are then updated,
+//!   until the forces of the true law are in balance;
+//! - pinned nodes stay; held nodes are prescribed. The stepper's rules for nodes that cannot follow
+//!   a tool are left out: a motion that cannot be followed is an error.
 //!
-//! The minimum is one for the steps of `Schedule::PAPER`'s kind. A body in free flight is stepped exactly by the default schedule,
-//! by implicit Euler here.
+//! The minimum is that of the steps of `SolverSettings::PAPER`. The default solver steps a body in
+//! free flight exactly, the oracle by implicit Euler.
 //!
-//! Everything runs on the calling thread in a fixed order: the same machine gives the same bits.
+//! All work is done on the calling thread in a fixed order: the same machine gives the same bits.
 
 mod element;
 mod factor;
@@ -42,7 +45,8 @@ use newton::Solver;
 use potential::{Elastic, Motion, Potential};
 use trocar_tissue::Model;
 
-/// Finds converged steps and equilibria of one model. It keeps the symbolic factorisations from step to step, as long as the same nodes are held.
+/// Finds converged steps and equilibria of one model. It keeps the symbolic factorisations from
+/// step to step while the same nodes are held.
 pub struct Oracle {
     bodies: Vec<(Elastic, Solver)>,
 }
@@ -63,11 +67,13 @@ impl Oracle {
         Self { bodies: model.bodies().iter().map(prepare).collect() }
     }
 
-    /// Advances `state` by one step of implicit Euler of length `dt` [s], the oracle's counterpart of one *substep* of the stepper. Held nodes end
-    /// at their targets with no velocity. Returns how each body's minimum was found.
+    /// Advances `state` by one step of implicit Euler of length `dt` (s), the counterpart of one
+    /// *substep* of the stepper. Held nodes end at their targets without velocity. Returns how each
+    /// body's minimum was found.
     ///
     /// # Errors
-    /// A body whose minimum was not found, by name; `dt`, a state or a target that cannot be. The state is then as it was.
+    /// A body whose minimum was not found, by name; a `dt`, state or target that is not valid. The
+    /// state is then as it was.
     pub fn step(&mut self, model: &Model, state: &mut OracleState, dt: f64, held: &[Held]) -> Result<Vec<Solution>> {
         if !(dt > 0.0 && dt.is_finite()) {
             return Err(Error::Invalid(format!("a step of {dt} s; it must be above 0")));
@@ -77,7 +83,8 @@ impl Oracle {
         Ok(solutions)
     }
 
-    /// Brings `state` to the static equilibrium near it: the step for an infinite `dt`, without inertia, dashpots and friction. Velocities become 0.
+    /// Moves `state` to the static equilibrium near it: the step for an infinite `dt`, without
+    /// inertia, dashpots and friction. Velocities become 0.
     ///
     /// # Errors
     /// As [`Self::step`]; also a body that gravity acts on and nothing holds.
@@ -85,8 +92,10 @@ impl Oracle {
         self.solve(model, state, held, None)
     }
 
-    /// The incremental potential of each body [J] of a step of `dt` [s] from `before` that ends with the positions of `after`: what [`Self::step`] minimises over free
-    /// nodes, without friction. Not finite where an element has no volume. Zero is nothing in particular: only differences mean something.
+    /// The incremental potential of each body (J) of a step of `dt` (s) from `before` that ends
+    /// with the positions of `after`: the function that [`Self::step`] minimises over free nodes,
+    /// without friction. It is not finite where an element has no volume. Only differences have a
+    /// meaning.
     ///
     /// # Errors
     /// States of another model or that are not finite; a `dt` that is not above 0.

@@ -1,7 +1,8 @@
 //! Newton's method with a line search that lets no element lose its volume.
 //!
-//! The exact Hessian is tried first, since it alone converges quadratically; where it is not positive definite, the elements' tangents are projected (Teran and others,
-//! "Robust quasistatic finite elements and flesh simulation", 2005), and where that is singular, the diagonal is shifted.
+//! The exact Hessian is tried first, because it alone converges quadratically. Where it is not
+//! positive definite, the elements' tangents are projected (Teran and others, "Robust quasistatic
+//! finite elements and flesh simulation", 2005); where that is singular, the diagonal is shifted.
 
 use super::factor::Factor;
 use super::guard;
@@ -10,29 +11,30 @@ use super::solution::{Failure, Precision, Solution};
 use glam::DVec3;
 use trocar_tissue::assembly::Stiffness;
 
-/// Acceleration that makes a mass a weight on earth [m/s2].
+/// Acceleration that makes a mass a weight on earth (m/s2).
 const EARTH: f64 = 9.81;
 
 /// Share of the linear decrease that a step must bring (Armijo).
 const ARMIJO: f64 = 1e-4;
 
-/// A share of a step below which the next one is taken with friction's secant.
-const SHORT: f64 = 0.5;
+/// After a step of a smaller share the next one uses the secant of friction.
+const SHORT_STEP_SHARE: f64 = 0.5;
 
-/// Halvings of a step before the search gives up.
-const MOST_HALVINGS: usize = 50;
+/// Greatest number of halvings of a step.
+const MAX_HALVINGS: usize = 50;
 
 /// Rounding of the energy, over the body's elastic scale and the energy itself.
-const ROUNDING: f64 = 1e-13;
+const ENERGY_ROUNDING: f64 = 1e-13;
 
-/// Shifts that are tried, over the mean of the diagonal.
-const SHIFTS: [f64; 6] = [1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2];
+/// Shifts of the diagonal that are tried, over its mean.
+const DIAGONAL_SHIFTS: [f64; 6] = [1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2];
 
-/// Most parts in which held nodes are moved to their targets, and Newton steps after each.
-const MOST_LOAD_STEPS: usize = 300;
-const LOAD_STEP_ITERATIONS: usize = 4;
+/// Greatest number of parts in which held nodes are moved to their targets, and of Newton steps
+/// after each.
+const MAX_LOAD_STEPS: usize = 300;
+const MAX_LOAD_STEP_ITERATIONS: usize = 4;
 
-/// Solves one body; keeps pattern and symbolic factorisation.
+/// Solves one body; keeps the pattern and the symbolic factorisation.
 pub(super) struct Solver {
     tolerance: f64,
     iterations: usize,
@@ -51,12 +53,12 @@ impl Solver {
         Self::new(precision.gradient * EARTH * elastic.masses.iter().sum::<f64>(), precision.iterations)
     }
 
-    /// To a gradient of `tolerance` [N] within so many iterations.
+    /// To a gradient of `tolerance` (N) within so many iterations.
     pub fn new(tolerance: f64, iterations: usize) -> Self {
         Self { tolerance, iterations, system: None }
     }
 
-    /// Greatest norm of the gradient [N].
+    /// Greatest norm of the gradient (N).
     pub fn tolerance(&self) -> f64 {
         self.tolerance
     }
@@ -70,8 +72,9 @@ impl Solver {
         self.system.as_mut().ok_or(Failure::Singular)
     }
 
-    /// Brings fixed nodes of `x` to their targets, in parts where an element would lose its volume, the free nodes following. Free nodes go on with their
-    /// velocities (`guess`: dt and velocities) if they can. Returns the number of parts.
+    /// Moves fixed nodes of `x` to their targets, in parts where an element would lose its volume,
+    /// with the free nodes following. Free nodes continue with their velocities (`guess`: dt and
+    /// velocities) if they can. Returns the number of parts.
     pub fn move_fixed(
         &mut self,
         potential: &Potential<'_>,
@@ -93,17 +96,17 @@ impl Solver {
             }
         }
         let mut left = 1.0;
-        for part in 1..=MOST_LOAD_STEPS {
+        for part in 1..=MAX_LOAD_STEPS {
             let share = guard::allowed_share(potential.elastic, x, &step);
             if share >= 1.0 {
                 add(x, 1.0, &step);
                 exactly(x, fixed, targets);
                 return Ok(part);
             }
-            // Half of what is possible leaves the elements room to be relaxed in.
+            // Half of the possible way leaves the elements room to relax.
             add(x, 0.5 * share, &step);
             left *= 1.0 - 0.5 * share;
-            match self.relax(potential, fixed, self.tolerance, LOAD_STEP_ITERATIONS, x) {
+            match self.relax(potential, fixed, self.tolerance, MAX_LOAD_STEP_ITERATIONS, x) {
                 Ok(_) | Err(Failure::NotConverged { .. } | Failure::Stuck { .. }) => {}
                 Err(failure) => return Err(failure),
             }
@@ -114,7 +117,7 @@ impl Solver {
         Err(Failure::Unreachable { share: if way > 0.0 { 1.0 - left } else { 1.0 } })
     }
 
-    /// Brings free nodes of `x` so near the minimum that the gradient's norm is `tolerance` [N].
+    /// Moves free nodes of `x` until the norm of the gradient is at most `tolerance` (N).
     pub fn minimise(
         &mut self,
         potential: &Potential<'_>,
@@ -139,7 +142,7 @@ impl Solver {
         let mut size = norm(&gradient, fixed);
         let mut solution = Solution { iterations: 0, projected: 0, load_steps: 0, gradient: size };
         let mut secant = false;
-        // Not a number is not small.
+        // NaN is not small.
         while size.is_nan() || size > tolerance {
             if solution.iterations == most {
                 return Err(Failure::NotConverged { iterations: most, gradient: size, tolerance });
@@ -153,15 +156,16 @@ impl Solver {
             if slope.is_nan() || slope >= 0.0 {
                 return Err(Failure::Singular);
             }
-            let rounding = ROUNDING * (potential.elastic.scale + energy.abs());
+            let rounding = ENERGY_ROUNDING * (potential.elastic.scale + energy.abs());
             let mut share = guard::allowed_share(potential.elastic, x, &step);
             let mut found = false;
-            for _ in 0..MOST_HALVINGS {
+            for _ in 0..MAX_HALVINGS {
                 next.copy_from_slice(x);
                 add(&mut next, share, &step);
                 let next_energy = potential.gradient(&next, &mut next_gradient);
                 let next_size = norm(&next_gradient, fixed);
-                // Near the minimum energies differ by less than their rounding; gradients still tell.
+                // Near the minimum energies differ by less than their rounding; gradients still
+                // tell.
                 let decreases = next_energy <= energy + ARMIJO * share * slope;
                 let nearer = (next_energy - energy).abs() <= rounding && next_size < size;
                 if next_size.is_finite() && next_energy.is_finite() && (decreases || nearer) {
@@ -170,8 +174,9 @@ impl Solver {
                 }
                 share *= 0.5;
             }
-            // Friction turns within the sticking length, far less than a step: where its curvature led too far, its secant does not.
-            secant = share < SHORT;
+            // Friction turns within the sticking length, far less than a step: where its curvature
+            // leads too far, its secant does not.
+            secant = share < SHORT_STEP_SHARE;
             if !found {
                 return Err(Failure::Stuck { gradient: size, tolerance });
             }
@@ -184,7 +189,7 @@ impl Solver {
 }
 
 impl System {
-    /// Factorises the Hessian at x; true if it had to be made positive definite.
+    /// Factorises the Hessian at x. Returns true if it had to be made positive definite.
     fn factorise(&mut self, potential: &Potential<'_>, secant: bool, x: &[DVec3]) -> Result<bool, Failure> {
         let Self { matrix, factor, .. } = self;
         potential.hessian(x, false, secant, matrix);
@@ -195,7 +200,7 @@ impl System {
             return Err(Failure::Singular);
         }
         let mean = matrix.mean_diagonal();
-        for shift in [0.0].into_iter().chain(SHIFTS) {
+        for shift in [0.0].into_iter().chain(DIAGONAL_SHIFTS) {
             matrix.shift(shift * mean);
             if factor.factorise(matrix) {
                 return Ok(true);
@@ -214,7 +219,7 @@ fn add(x: &mut [DVec3], share: f64, step: &[DVec3]) {
     x.iter_mut().zip(step).for_each(|(x, d)| *x += share * *d);
 }
 
-/// Takes the rounding out of the way to the targets.
+/// Removes the rounding from the way to the targets.
 fn exactly(x: &mut [DVec3], fixed: &[bool], targets: &[DVec3]) {
     for (i, x) in x.iter_mut().enumerate().filter(|(i, _)| fixed[*i]) {
         *x = targets[i];

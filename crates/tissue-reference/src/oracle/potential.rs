@@ -1,4 +1,4 @@
-//! The function that is minimised: energy, gradient and Hessian over all nodes of a body.
+//! The minimised function: energy, gradient and Hessian over all nodes of a body.
 
 use super::element::{deformation, projected};
 use super::state::Nodes;
@@ -6,22 +6,23 @@ use glam::{DMat3, DVec3};
 use trocar_tissue::assembly::{Stiffness, blocks, shape_gradients, tangent};
 use trocar_tissue::{Body, Hyperelastic, Support, SupportContact};
 
-/// What a body's energies are made of, nodes in their original order.
+/// Constants of a body's energies, nodes in their original order.
 pub(super) struct Elastic {
     pub tets: Vec<[u32; 4]>,
-    /// Rest gradients of the shape functions [1/m].
+    /// Rest gradients of the shape functions (1/m).
     pub gradients: Vec<[DVec3; 4]>,
-    /// Rest volumes [m3].
+    /// Rest volumes (m3).
     pub volumes: Vec<f64>,
     pub psi: Box<dyn Hyperelastic>,
-    /// [kg]
+    /// (kg)
     pub masses: Vec<f64>,
-    /// Edges with a dashpot: nodes and coefficient [N s/m].
+    /// Edges with a dashpot: nodes and coefficient (N s/m).
     dashpots: Vec<([usize; 2], f64)>,
     supports: Vec<Support>,
-    /// [N/m]
+    /// (N/m)
     contact_stiffness: Vec<f64>,
-    /// An energy that is large beside every change that matters [J]: energies are known to its rounding.
+    /// An energy that is large beside every change that matters (J): energies are known to its
+    /// rounding.
     pub scale: f64,
 }
 
@@ -49,22 +50,22 @@ impl Elastic {
     }
 }
 
-/// Elastic energy of a body with its nodes at `x` [J].
+/// Elastic energy of a body with its nodes at `x` (J).
 pub fn elastic_energy(body: &Body, x: &[DVec3]) -> f64 {
     let elastic = Elastic::new(body);
     (0..elastic.tets.len()).map(|t| elastic.volumes[t] * elastic.psi.energy(elastic.deformation(t, x))).sum()
 }
 
-/// What a step in time adds to the elastic energy.
+/// The part of a step in time that is added to the elastic energy.
 pub(super) struct Motion {
     dt: f64,
-    /// Positions at the beginning [m].
+    /// Positions at the beginning (m).
     start: Vec<DVec3>,
-    /// Inertial predictor y [m].
+    /// Inertial predictor y (m).
     predictor: Vec<DVec3>,
-    /// Squared lengths of the dashpots at the beginning [m2].
+    /// Squared lengths of the dashpots at the beginning (m2).
     lengths: Vec<f64>,
-    /// Where friction holds each node at each support, support by support [m].
+    /// Where friction holds each node at each support, support by support (m).
     places: Vec<DVec3>,
 }
 
@@ -80,7 +81,7 @@ impl Motion {
         Self { dt, lengths: elastic.dashpots.iter().map(length).collect(), predictor, places, start }
     }
 
-    /// Lets a force [N] act on a node throughout the step.
+    /// Applies a force (N) to a node throughout the step.
     pub fn push(&mut self, elastic: &Elastic, node: usize, force: DVec3) {
         self.predictor[node] += self.dt * self.dt / elastic.masses[node] * force;
     }
@@ -96,12 +97,13 @@ pub(super) struct Potential<'a> {
     /// None: statics.
     pub motion: Option<Motion>,
     pub gravity: DVec3,
-    /// Greatest friction of each node at each support [N], support by support; empty: none.
+    /// Greatest friction of each node at each support (N), support by support; empty: none.
     pub limits: Vec<f64>,
 }
 
 impl Potential<'_> {
-    /// Energy at x [J]; not finite where an element has no volume. Writes the gradient [N] over all nodes.
+    /// Energy at x (J); not finite where an element has no volume. Writes the gradient (N) over all
+    /// nodes.
     pub fn gradient(&self, x: &[DVec3], out: &mut [DVec3]) -> f64 {
         let e = self.elastic;
         out.fill(DVec3::ZERO);
@@ -148,8 +150,9 @@ impl Potential<'_> {
         energy
     }
 
-    /// Writes the Hessian at x [N/m] into `into`; elements' tangents made positive semidefinite if `project`, friction's curvature replaced by its secant if
-    /// `secant`. False if the projection is impossible.
+    /// Writes the Hessian at x (N/m) into `into`; elements' tangents made positive semidefinite if
+    /// `project`, friction's curvature replaced by its secant if `secant`. Returns false if the
+    /// projection is impossible.
     pub fn hessian(&self, x: &[DVec3], project: bool, secant: bool, into: &mut Stiffness) -> bool {
         let e = self.elastic;
         into.clear();
@@ -207,7 +210,8 @@ impl Potential<'_> {
         self.motion.is_some() && self.elastic.supports.iter().any(|support| support.friction() > 0.0)
     }
 
-    /// Where friction holds each node at each support after a step that ended at x: what pulled harder than the true limit was dragged along.
+    /// Where friction holds each node at each support after a step that ended at x: a node that
+    /// pulled harder than the true limit was dragged along.
     pub fn anchors(&self, x: &[DVec3]) -> Vec<Option<DVec3>> {
         let (Some(motion), limits) = (&self.motion, self.friction_limits(x)) else { return Vec::new() };
         let nodes = x.len();
@@ -233,7 +237,8 @@ impl Potential<'_> {
                 if touch.height < 0.0 || limit > 0.0 {
                     let mut contact = Contact::pressed(&touch, self.elastic.contact_stiffness[i]);
                     if let Some(motion) = self.motion.as_ref().filter(|_| limit > 0.0) {
-                        // The plane of friction is that of the step's beginning: it has a potential then.
+                        // The plane of friction is that of the step's beginning: it has a potential
+                        // then.
                         let gradient = support.contact(motion.start[i]).gradient;
                         let stiffness = self.elastic.contact_stiffness[i] * gradient.length_squared();
                         contact.rub(gradient.normalize_or_zero(), x - motion.places[k], limit, stiffness);
@@ -251,9 +256,10 @@ struct Contact {
     gradient: DVec3,
     /// Without `curvature`.
     hessian: DMat3,
-    /// What the support's own curvature adds to the Hessian.
+    /// Part of the support's own curvature in the Hessian.
     curvature: DMat3,
-    /// The quadratic that touches the energy at this slide and at the opposite one, and lies above it everywhere: the sweeps' block.
+    /// The quadratic that touches the energy at this slide and at the opposite one, and lies above
+    /// it everywhere: the block of the sweeps.
     secant: DMat3,
 }
 
@@ -271,7 +277,8 @@ impl Contact {
         }
     }
 
-    /// Friction with its limit held: a spring towards where it sticks, and the limit beyond, as a potential.
+    /// Friction with its limit held: a spring towards where it sticks, and the limit beyond, as a
+    /// potential.
     fn rub(&mut self, normal: DVec3, motion: DVec3, limit: f64, stiffness: f64) {
         let slide = motion - motion.dot(normal) * normal;
         let length = slide.length();

@@ -3,9 +3,10 @@
 /// How well the minimum is found.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Precision {
-    /// Greatest norm of the gradient, over the weight the body has on earth (its mass times 9.81 m/s2).
+    /// Greatest norm of the gradient, over the weight the body has on earth (its mass times 9.81
+    /// m/s2).
     pub gradient: f64,
-    /// Newton steps after which it gives up.
+    /// Greatest number of Newton steps.
     pub iterations: usize,
 }
 
@@ -25,7 +26,7 @@ pub struct Solution {
     pub projected: usize,
     /// Parts in which held nodes were moved to their targets.
     pub load_steps: usize,
-    /// Norm of the gradient over free nodes at the end [N].
+    /// Norm of the gradient over free nodes at the end (N).
     pub gradient: f64,
 }
 
@@ -37,17 +38,17 @@ pub enum Failure {
     NotConverged {
         /// Steps taken.
         iterations: usize,
-        /// Norm of the gradient [N].
+        /// Norm of the gradient (N).
         gradient: f64,
-        /// What it should have been [N].
+        /// Tolerance (N).
         tolerance: f64,
     },
     /// No step along the Newton direction decreases the energy, and the gradient is too large.
     #[error("no step decreases the energy at a gradient of {gradient:.3e} N; {tolerance:.3e} N or less was asked for")]
     Stuck {
-        /// Norm of the gradient [N].
+        /// Norm of the gradient (N).
         gradient: f64,
-        /// What it should have been [N].
+        /// What it should have been (N).
         tolerance: f64,
     },
     /// An element has no volume where the solve begins.
@@ -70,9 +71,9 @@ pub enum Failure {
     /// Friction's limits and the motion found no balance.
     #[error("friction is off balance by {gradient:.3e} N; {tolerance:.3e} N or less was asked for")]
     Friction {
-        /// Norm of the gradient with friction's true limits [N].
+        /// Norm of the gradient with friction's true limits (N).
         gradient: f64,
-        /// What it should have been [N].
+        /// What it should have been (N).
         tolerance: f64,
     },
     /// Gravity acts on a body that nothing holds: it has no equilibrium.

@@ -12,7 +12,7 @@ pub struct Held {
     pub body: usize,
     /// Its node.
     pub node: u32,
-    /// Where it is to be, in the world [m].
+    /// Its target, in the world (m).
     pub target: DVec3,
 }
 
@@ -26,7 +26,7 @@ impl Held {
 /// Positions and velocities at one instant, in double precision, nodes in their original order.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OracleState {
-    /// Simulated time [s].
+    /// Simulated time (s).
     pub time: f64,
     pub(crate) bodies: Vec<Nodes>,
 }
@@ -34,11 +34,11 @@ pub struct OracleState {
 /// A body's nodes.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Nodes {
-    /// World positions [m].
+    /// World positions (m).
     pub x: Vec<DVec3>,
-    /// Velocities [m/s].
+    /// Velocities (m/s).
     pub v: Vec<DVec3>,
-    /// Where friction holds each node at each support, support by support [m]; empty: nowhere yet.
+    /// Where friction holds each node at each support, support by support (m); empty: nowhere yet.
     pub anchors: Vec<Option<DVec3>>,
 }
 
@@ -52,14 +52,15 @@ impl OracleState {
         Self { time: 0.0, bodies: model.bodies().iter().map(at_rest).collect() }
     }
 
-    /// A stepper's state of the same model, without its grasp: that is said to the oracle by [`Held`].
+    /// The motion of a stepper's state, without its grasps; [`Held`] replaces them.
     pub fn from_state(model: &Model, state: &State) -> Self {
         let nodes = |(index, body): (usize, &Body)| Nodes::new(body, &state.motion(model, index));
         Self { time: state.time, bodies: model.bodies().iter().enumerate().map(nodes).collect() }
     }
 
-    /// A stepper's state of the same motion, rounded to `f32`, without grasps. What the adaptive start is to know of the acceleration is taken from `before`, the oracle's state
-    /// a step of `dt` [s] earlier.
+    /// A stepper's state of the same motion, rounded to `f32`, without grasps. The accelerations
+    /// for the adaptive start are the change of velocity since `before`, the oracle's state a step
+    /// of `dt` (s) earlier.
     ///
     /// # Errors
     /// States of another model or that are not finite; a `dt` that is not above 0.
@@ -83,27 +84,27 @@ impl OracleState {
         Ok(state)
     }
 
-    /// World positions of a body's nodes [m].
+    /// World positions of a body's nodes (m).
     pub fn positions(&self, body: usize) -> &[DVec3] {
         &self.bodies[body].x
     }
 
-    /// Velocities of a body's nodes [m/s].
+    /// Velocities of a body's nodes (m/s).
     pub fn velocities(&self, body: usize) -> &[DVec3] {
         &self.bodies[body].v
     }
 
-    /// World positions of a body's nodes, to be changed [m].
+    /// World positions of a body's nodes, to be changed (m).
     pub fn positions_mut(&mut self, body: usize) -> &mut [DVec3] {
         &mut self.bodies[body].x
     }
 
-    /// Velocities of a body's nodes, to be changed [m/s].
+    /// Velocities of a body's nodes, to be changed (m/s).
     pub fn velocities_mut(&mut self, body: usize) -> &mut [DVec3] {
         &mut self.bodies[body].v
     }
 
-    /// Refuses what does not fit the model.
+    /// Checks that it fits the model.
     pub(super) fn check(&self, model: &Model, held: &[Held]) -> Result<()> {
         let same = self.bodies.len() == model.bodies().len()
             && self.bodies.iter().zip(model.bodies()).all(|(s, b)| s.x.len() == b.len());
@@ -130,7 +131,7 @@ impl OracleState {
 }
 
 impl Nodes {
-    /// A body's nodes as the stepper has them.
+    /// The nodes of a stepper's motion.
     pub fn new(body: &Body, motion: &BodyMotion) -> Self {
         Self {
             x: motion.positions.iter().map(|x| body.origin() + *x).collect(),
@@ -139,7 +140,7 @@ impl Nodes {
         }
     }
 
-    /// Gives them to the stepper.
+    /// Writes them into a stepper's motion.
     pub fn write(&self, body: &Body, motion: &mut BodyMotion) {
         motion.positions.iter_mut().zip(&self.x).for_each(|(to, x)| *to = *x - body.origin());
         motion.velocities.clone_from(&self.v);

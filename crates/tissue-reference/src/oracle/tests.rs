@@ -119,7 +119,8 @@ fn gradient_and_hessian_are_the_energys_derivatives() {
     }
 }
 
-/// Eigenvalues are seen through quadratic forms; nothing of a tangent is lost where all are positive.
+/// Eigenvalues are seen through quadratic forms; nothing of a tangent is lost where all are
+/// positive.
 #[test]
 fn projection_takes_the_negative_part_alone() {
     let twist = DMat3::from_cols(DVec3::new(0.7, 0.3, -0.1), DVec3::new(-0.2, 0.6, 0.2), DVec3::new(0.1, -0.3, 0.8));
@@ -177,7 +178,8 @@ fn every_newton_step_lowers_the_energy() {
         let (potential, far) = deformed(&elastic, &model, true);
         let mut fixed = vec![false; far.len()];
         fixed[26] = true;
-        // Far from the minimum and not convex; squeezed so far, St. Venant-Kirchhoff tissue collapses (see below).
+        // Far from the minimum and not convex; squeezed so far, St. Venant-Kirchhoff tissue
+        // collapses (see below).
         let squeeze = match constitutive {
             ConstitutiveModel::StVenantKirchhoff => DVec3::new(0.8, 1.2, 0.8),
             _ => DVec3::new(0.5, 1.4, 0.6),
@@ -201,8 +203,9 @@ fn every_newton_step_lowers_the_energy() {
     }
 }
 
-/// Why the test above squeezes St. Venant-Kirchhoff tissue less: its energy falls all the way to a flat element and beyond. The guard leaves that element a tenth of its volume in
-/// each step, and it holds up all others; no Newton step, projected or not, leads out of there.
+/// Why the test above squeezes St. Venant-Kirchhoff tissue less: its energy falls all the way to a
+/// flat element and beyond. The guard leaves that element a tenth of its volume in each step, and
+/// it holds up all others; no Newton step, projected or not, leads out of there.
 #[test]
 fn st_venant_kirchhoff_tissue_squeezed_too_far_goes_flat() {
     let model = model(ConstitutiveModel::StVenantKirchhoff, 0.0);

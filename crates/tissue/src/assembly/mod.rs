@@ -1,7 +1,7 @@
 //! Assembly of a body's stiffness matrix from its elements, in double precision.
 //!
-//! Solvers that factorise the stiffness use it: the quasi-Newton method here, Newton's method of the
-//! reference crate.
+//! Solvers that factorise the stiffness use it: the quasi-Newton method here, Newton's method of
+//! the reference crate.
 
 mod element;
 mod stiffness;

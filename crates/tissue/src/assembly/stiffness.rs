@@ -1,6 +1,7 @@
 //! A body's stiffness over its free nodes, as a sparse symmetric matrix of 3x3 blocks.
 //!
-//! The pattern depends on the mesh and on which nodes are fixed only, and is kept. Numbers are added element by element in the mesh's order, on one thread.
+//! The pattern depends only on the mesh and on which nodes are fixed, and is kept. Numbers are
+//! added element by element in the mesh's order, on one thread.
 
 use faer::sparse::SymbolicSparseColMatRef;
 use glam::DMat3;
@@ -13,7 +14,7 @@ pub struct Stiffness {
     /// Number of each node among the free ones.
     number: Vec<usize>,
     free: Vec<usize>,
-    /// Per free node, the numbers below its own of its neighbours, ascending.
+    /// Per free node, its neighbours with higher numbers, ascending.
     below: Vec<Vec<usize>>,
     columns: Vec<usize>,
     rows: Vec<usize>,
@@ -64,7 +65,8 @@ impl Stiffness {
         self.values.fill(0.0);
     }
 
-    /// Adds a block at nodes (i, j). Fixed nodes have none, and of (i, j) and (j, i) one is kept, so both are to be added.
+    /// Adds a block at nodes (i, j). Fixed nodes have none. Of (i, j) and (j, i) one is kept, so
+    /// both must be added.
     pub fn add(&mut self, i: usize, j: usize, block: DMat3) {
         let (row, column) = (self.number[i], self.number[j]);
         if row == FIXED || column == FIXED || row < column {
@@ -99,13 +101,13 @@ impl Stiffness {
         }
     }
 
-    /// Mean of the diagonal's absolute values [N/m].
+    /// Mean of the diagonal's absolute values (N/m).
     pub fn mean_diagonal(&self) -> f64 {
         let diagonal = self.columns[..self.columns.len() - 1].iter().map(|first| self.values[*first].abs());
         diagonal.sum::<f64>() / (3 * self.free.len()).max(1) as f64
     }
 
-    /// Pattern of the lower triangle, as faer wants it.
+    /// Pattern of the lower triangle for faer.
     pub fn pattern(&self) -> SymbolicSparseColMatRef<'_, usize> {
         let n = 3 * self.free.len();
         SymbolicSparseColMatRef::new_checked(n, n, &self.columns, None, &self.rows)

@@ -1,24 +1,24 @@
-//! What can be wrong with one body: all of it is found before it is laid out.
+//! Checks of one body before it is laid out.
 
 use super::BodyDescription;
 use glam::DVec3;
 use trocar_geometry::TetMesh;
 
-/// Extent of a body [m] that can be an organ or a test piece; anything else is a mistaken unit.
-const EXTENT: std::ops::RangeInclusive<f64> = 1e-3..=2.0;
+/// Extent of a body that can be an organ or a test piece (m); anything else is a mistaken unit.
+const EXTENT_RANGE: std::ops::RangeInclusive<f64> = 1e-3..=2.0;
 
-/// Volume over that of a regular element with edges of the same root mean square length, below which an element has no volume worth the name: `f32` kernels know its
-/// volume ratio to a thousandth at this share.
-const FLATTEST: f64 = 1e-4;
+/// Least volume of an element over that of a regular element with edges of the same root mean
+/// square length: `f32` kernels know the volume ratio to a thousandth at this share.
+const MIN_SHAPE_QUALITY: f64 = 1e-4;
 
-/// Says what is wrong, if anything.
+/// Checks a body.
 pub(super) fn check(body: &BodyDescription<'_>) -> Result<(), String> {
     let m = body.material;
     let within = |name: &str, value: f64, least: f64, most: f64, unit: &str| {
         if (least..=most).contains(&value) {
             Ok(())
         } else {
-            Err(format!("{name} is {value} {unit}; {least} to {most} {unit} make sense (is the unit right?)"))
+            Err(format!("{name} is {value} {unit}; must be in [{least}, {most}] {unit} (is the unit right?)"))
         }
     };
     within("Young's modulus", m.young_modulus, 1.0, 1e9, "Pa")?;
@@ -41,10 +41,10 @@ fn check_nodes(mesh: &TetMesh) -> Result<(), String> {
         return Err(format!("node {i} is at {}; coordinates are finite numbers", mesh.vertices[i]));
     }
     let extent = mesh.bounds().map_or(0.0, |(low, high)| (high - low).max_element());
-    if !EXTENT.contains(&extent) {
-        let (least, most) = (EXTENT.start(), EXTENT.end());
+    if !EXTENT_RANGE.contains(&extent) {
+        let (least, most) = (EXTENT_RANGE.start(), EXTENT_RANGE.end());
         return Err(format!(
-            "it is {extent:.3e} m long; {least} to {most} m make sense: coordinates are metres, so a mesh in millimetres is scaled by 0.001 as it is read \
+            "it is {extent:.3e} m long; must be in [{least}, {most}] m: coordinates are metres, so a mesh in millimetres is scaled by 0.001 as it is read \
              (`trocar reconstruct --units mm`)"
         ));
     }
@@ -59,14 +59,15 @@ fn check_elements(mesh: &TetMesh) -> Result<(), String> {
             return Err(format!("element {t} names nodes {tet:?}; there are {nodes}"));
         }
         let volume = mesh.tet_volume(t);
-        // Below the smallest volume whose reciprocal the f32 kernels can hold there is no element either.
+        // Below the smallest volume whose reciprocal the f32 kernels can hold there is no element
+        // either.
         if !(volume > 1e-24 && volume.is_finite()) {
             return Err(format!("element {t} has a volume of {volume:.3e} m3; it must be positive"));
         }
         let regular = regular_volume(mesh.corners(t));
-        if volume < FLATTEST * regular {
+        if volume < MIN_SHAPE_QUALITY * regular {
             return Err(format!(
-                "element {t} is flat: its volume is {:.1e} of a regular element's of its size; {FLATTEST:.0e} is the least",
+                "element {t} is flat: its volume is {:.1e} of a regular element's of its size; {MIN_SHAPE_QUALITY:.0e} is the least",
                 volume / regular
             ));
         }
@@ -78,7 +79,7 @@ fn check_elements(mesh: &TetMesh) -> Result<(), String> {
     }
 }
 
-/// Volume [m3] of the regular tetrahedron whose edges are as long as the root mean square of these.
+/// Volume (m3) of the regular tetrahedron whose edges are as long as the root mean square of these.
 fn regular_volume(corners: [DVec3; 4]) -> f64 {
     let mut squares = 0.0;
     for i in 0..4 {

@@ -1,21 +1,22 @@
 //! Which bodies may touch in a frame, and where.
 
 use super::proximity::{Limits, Near, Proximity};
-use crate::integrator::Frame;
+use crate::frame::Frame;
 use crate::{BodyContact, Model, State};
 
-/// Bodies this much further apart [m] than where they press and what they travel in a frame are not looked at.
-const NEAR: f32 = 5e-4;
+/// Bodies that are farther apart than where they press, what they travel in a frame and this margin
+/// (m) are not examined.
+const FRAME_MARGIN: f32 = 5e-4;
 
-/// Steps of the reach [m].
-const STEP: f32 = 1e-3;
+/// Steps of the reach (m).
+const REACH_STEP: f32 = 1e-3;
 
-/// Finds at the beginning of every frame what may touch, and the islands of bodies that do.
+/// Finds which bodies may touch at the beginning of every frame, and their islands.
 pub(crate) struct Coupling {
     contact: BodyContact,
     proximity: Proximity,
     near: Vec<Near>,
-    /// How far each body may go in the frame [m].
+    /// Upper bound of how far each body goes in the frame (m).
     ways: Vec<f32>,
     /// A body of the same island with a smaller number, or the body itself.
     parents: Vec<u32>,
@@ -33,7 +34,7 @@ impl Coupling {
         }
     }
 
-    /// Looks over the bodies as they are at the frame's beginning.
+    /// Finds the pairs for the bodies as they are at the frame's beginning.
     pub fn find(&mut self, model: &Model, state: &State, frame: &Frame<'_>) {
         let dt = frame.dt as f32;
         let fall = dt * dt * frame.gravity.length() as f32;
@@ -41,18 +42,17 @@ impl Coupling {
         for (b, (body, way)) in state.bodies.iter().zip(&mut self.ways).enumerate() {
             let fastest = body.v.iter().map(|v| v.length_squared()).fold(0.0, f32::max).sqrt();
             let here = frame.of(b);
-            let carried = here.grasps().filter_map(|grasp| frame.tools.get(grasp.tool));
-            let carried = carried.map(|tool| tool.travel(&model.bodies[b])).fold(0.0, f64::max);
+            let carried = here.carried(&model.bodies[b], false);
             let model = &model.bodies[b];
-            // What is pinned does not fall.
+            // A pinned body does not fall.
             let falls = if model.pinned.contains(&true) { 0.0 } else { fall };
             let pushed = here.pushes(model, |reaches| self.proximity.meets(model, b, reaches));
             *way = carried.max(pushed) as f32 + dt * fastest + falls;
         }
         let ways = &self.ways;
-        // In steps, so that what did not move need not be looked at again while tools come nearer.
-        let stepped = |reach: f32| (reach / STEP).ceil() * STEP;
-        let reach = |a: usize, b: usize| stepped(self.contact.offset as f32 + NEAR + ways[a] + ways[b]);
+        // In steps, so that bodies at rest are not examined again while tools come nearer.
+        let stepped = |reach: f32| (reach / REACH_STEP).ceil() * REACH_STEP;
+        let reach = |a: usize, b: usize| stepped(self.contact.offset as f32 + FRAME_MARGIN + ways[a] + ways[b]);
         self.proximity.find(model, &state.bodies, reach, &mut self.near);
         self.parents.iter_mut().enumerate().for_each(|(b, parent)| *parent = b as u32);
         for k in 0..self.near.len() {
@@ -61,7 +61,7 @@ impl Coupling {
         }
     }
 
-    /// The island that a body belongs to: its first body.
+    /// The island of a body: the number of its first body.
     pub fn island(&self, body: usize) -> usize {
         let mut at = body;
         while self.parents[at] as usize != at {
@@ -70,7 +70,7 @@ impl Coupling {
         at
     }
 
-    /// What may touch, by body, vertex and other body.
+    /// Pairs that may touch, by body, vertex and other body.
     pub fn near(&self) -> &[Near] {
         &self.near
     }

@@ -1,9 +1,9 @@
-//! What contact and grasp do to the tools, and what a user must hear of.
+//! Forces of tissue on tools, and events of grasps.
 
 use trocar_core::Wrench;
 
 impl ToolForce {
-    /// Adds what another body does.
+    /// Adds the forces of another body.
     pub(crate) fn add(&mut self, other: &Self) {
         for (sum, part) in [(&mut self.contact, &other.contact), (&mut self.constraint, &other.constraint)] {
             *sum += *part;
@@ -13,14 +13,16 @@ impl ToolForce {
     }
 }
 
-/// What tissue does to one tool at the end of the last frame. Contact and constraint are kept apart (SPEC C8).
+/// Force of tissue on one tool at the end of the last frame. Contact and constraint are kept apart.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ToolForce {
     /// Tissue's reaction on the tool's colliders.
     pub contact: Wrench,
-    /// What the nodes that the tool holds pull at it; for those held rigidly without dashpots and their own inertia.
+    /// Pull of the nodes that the tool holds; of rigidly held ones without dashpots and their own
+    /// inertia.
     pub constraint: Wrench,
-    /// Sum of the magnitudes of the normal contact forces [N]: how hard tissue is pressed, even where forces cancel.
+    /// Sum of the magnitudes of the normal contact forces (N): how hard tissue is pressed, even
+    /// where forces cancel.
     pub pressing: f64,
     /// Nodes that press against the tool's colliders.
     pub touching: usize,
@@ -29,20 +31,20 @@ pub struct ToolForce {
 /// Something that happened to a grasp in a frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// Held tissue began to slide through the jaws; told once, until it sticks again.
+    /// Held tissue began to slide through the jaws. Reported once, until it sticks again.
     Slipped {
         /// The tool.
         tool: usize,
         /// The body.
         body: usize,
     },
-    /// The pull went beyond what the tissue bears: the grasp holds nothing any more. Told once.
+    /// The pull exceeded what the tissue bears: the grasp holds nothing any more. Reported once.
     Torn {
         /// The tool.
         tool: usize,
         /// The body.
         body: usize,
-        /// Pull at which it tore [N].
+        /// Pull at which it tore (N).
         force: f64,
     },
 }

@@ -1,34 +1,35 @@
 //! Convex polyhedra from points, and their exact signed distance.
 //!
-//! The hull grows from a tetrahedron by the point farthest outside of it, so that every point that is taken is a corner and the faces stay well shaped. Points within
-//! rounding of a face belong to it.
+//! The hull grows from a tetrahedron by the point farthest outside of it, so that every added point
+//! is a corner and the faces stay well shaped. Points within rounding of a face belong to it.
 
-use super::Nearest;
-use super::shape::LARGEST;
+use super::nearest::{MAX_SHAPE_SIZE, Nearest};
 use glam::DVec3;
 use trocar_geometry::TriMesh;
 
-/// Points that a hull may be made of. Every query goes through all faces.
-const MOST_POINTS: usize = 256;
+/// Greatest number of points of a hull. Every query visits all faces.
+const MAX_HULL_POINTS: usize = 256;
 
-/// Least extent of a hull [m].
-const SMALLEST: f64 = 1e-5;
+/// Least extent of a hull (m).
+const MIN_HULL_EXTENT: f64 = 1e-5;
 
 /// Thickness over extent below which points lie in a plane or on a line.
 const FLAT: f64 = 1e-4;
 
-/// Share of the extent within which a point belongs to a face: 10 nm for an instrument of 10 cm. A face that is this narrow still has its normal to a hundredth of it.
+/// Share of the extent within which a point belongs to a face: 10 nm for an instrument of 10 cm. A
+/// face this narrow still has its normal to a hundredth of it.
 const ON_FACE: f64 = 1e-7;
 
-/// Share of the extent that rounding can make of a distance: a shorter offset has no direction.
+/// Rounding of a distance over the extent: a shorter offset has no direction.
 const ROUNDING: f64 = 1e-14;
 
-/// A convex polyhedron. Its distance costs a dot product for each face, and some twenty more for each that faces the point.
+/// A convex polyhedron. A query costs a dot product for each face, and some twenty more for each
+/// face that faces the point.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hull {
     surface: TriMesh,
     faces: Vec<Face>,
-    /// Corner to corner of the box around it [m].
+    /// Diagonal of the box around it (m).
     extent: f64,
 }
 
@@ -41,29 +42,32 @@ struct Face {
 }
 
 impl Hull {
-    /// The convex hull of `points` [m], at most 256 of them; those inside are left out.
+    /// The convex hull of at most 256 `points` (m). Points inside are left out.
     ///
     /// # Errors
-    /// Too few or too many points, coordinates that are not finite or beyond 10 m, points in a plane or on a line, or all within 0.01 mm.
+    /// Too few or too many points, coordinates that are not finite or beyond 10 m, points in a
+    /// plane or on a line, or all within 0.01 mm.
     pub fn of(points: &[DVec3]) -> Result<Self, String> {
-        if !(4..=MOST_POINTS).contains(&points.len()) {
-            return Err(format!("a hull of {} points; it takes 4 to {MOST_POINTS}", points.len()));
+        if !(4..=MAX_HULL_POINTS).contains(&points.len()) {
+            return Err(format!("a hull of {} points; it takes 4 to {MAX_HULL_POINTS}", points.len()));
         }
         // NaN fails every comparison.
-        if let Some(i) = points.iter().position(|p| !(p.is_finite() && p.abs().max_element() <= LARGEST)) {
+        if let Some(i) = points.iter().position(|p| !(p.is_finite() && p.abs().max_element() <= MAX_SHAPE_SIZE)) {
             return Err(format!(
-                "point {i} of a hull is {} m; finite coordinates within {LARGEST} m make sense",
+                "point {i} of a hull is {} m; finite coordinates within {MAX_SHAPE_SIZE} m make sense",
                 points[i]
             ));
         }
         let (low, high) = points.iter().fold((points[0], points[0]), |(l, h), p| (l.min(*p), h.max(*p)));
         let extent = (high - low).length();
-        if extent < SMALLEST {
-            return Err(format!("a hull's points lie within {extent:.1e} m; {SMALLEST:.0e} m or more make sense"));
+        if extent < MIN_HULL_EXTENT {
+            return Err(format!(
+                "a hull's points lie within {extent:.1e} m; {MIN_HULL_EXTENT:.0e} m or more make sense"
+            ));
         }
         let mut triangles = first_tetrahedron(points, extent)?.to_vec();
         while let Some(p) = farthest_outside(points, &triangles, ON_FACE * extent) {
-            // Each turn takes another point, so that there is an end.
+            // Each round adds a point, so the loop ends.
             if triangles.iter().flatten().any(|i| *i == p) {
                 return Err(too_close(p));
             }
@@ -73,7 +77,8 @@ impl Hull {
     }
 
     fn from_triangles(points: &[DVec3], mut triangles: Vec<[usize; 3]>, extent: f64) -> Self {
-        // The same hull whichever way it grew: each triangle from its lowest corner on, in order.
+        // The result does not depend on the order of growth: each triangle begins with its lowest
+        // corner, and triangles are sorted.
         for t in &mut triangles {
             let least = (0..3).fold(0, |a, b| if t[b] < t[a] { b } else { a });
             t.rotate_left(least);
@@ -96,7 +101,7 @@ impl Hull {
         }
     }
 
-    /// Its corners [m], in the order of the points it was made of.
+    /// Its corners (m), in the order of the points it was made of.
     pub fn corners(&self) -> &[DVec3] {
         &self.surface.vertices
     }
@@ -106,19 +111,19 @@ impl Hull {
         &self.surface
     }
 
-    /// Smallest and largest coordinates [m].
+    /// Smallest and largest coordinates (m).
     pub(super) fn aabb(&self) -> (DVec3, DVec3) {
         self.surface.bounds().unwrap_or_default()
     }
 
-    /// Centre and radius [m] of a ball around it.
+    /// Centre and radius (m) of a ball around it.
     pub(super) fn ball(&self) -> (DVec3, f64) {
         let (low, high) = self.aabb();
         let centre = 0.5 * (low + high);
         (centre, self.corners().iter().fold(0.0, |r, p| p.distance(centre).max(r)))
     }
 
-    /// The nearest point of the surface to `p` [m].
+    /// The nearest point of the surface to `p` (m).
     pub fn nearest(&self, p: DVec3) -> Nearest {
         let mut top = Nearest { distance: f64::NEG_INFINITY, normal: DVec3::Z };
         for face in &self.faces {
@@ -127,8 +132,9 @@ impl Hull {
                 top = Nearest { distance: height, normal: face.normal };
             }
         }
-        // Inside, the nearest plane is nearest. Outside, the nearest point lies on a face that is seen from `p`, no nearer than its plane. Where triangles share a plane, rounding
-        // may hide the right one.
+        // Inside, the nearest plane is the answer. Outside, the nearest point lies on a face that
+        // is seen from `p`, no nearer than its plane. Where triangles share a plane, rounding may
+        // hide the right one.
         let hidden = -2.0 * ON_FACE * self.extent;
         if top.distance <= 0.0 {
             return top;
@@ -162,7 +168,8 @@ impl Face {
         (p - self.corners[0]).dot(self.normal)
     }
 
-    /// From the nearest point of the triangle's edges to `p`; none where `p` is above the triangle (Ericson 2005, Real-Time Collision Detection, 5.1.5).
+    /// From the nearest point of the triangle's edges to `p`; None where `p` is above the triangle
+    /// (Ericson 2005, "Real-Time Collision Detection", 5.1.5).
     fn offset(&self, p: DVec3) -> Option<DVec3> {
         let [a, b, c] = self.corners;
         let mut beyond = false;
@@ -236,7 +243,8 @@ fn add_corner(points: &[DVec3], triangles: &mut Vec<[usize; 3]>, p: usize, round
     let (gone, mut kept): (Vec<[usize; 3]>, Vec<[usize; 3]>) = triangles.iter().partition(|t| seen(t));
     let sides: Vec<[usize; 2]> = gone.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]).collect();
     let outline: Vec<[usize; 2]> = sides.iter().filter(|[a, b]| !sides.contains(&[*b, *a])).copied().collect();
-    // One closed line that meets every corner once, and no triangle without area: anything else is points too close to tell apart.
+    // The outline is one closed line that meets every corner once, and no triangle is without area.
+    // Otherwise points are too close to be told apart.
     let once = outline.iter().all(|[a, _]| outline.iter().filter(|[b, _]| a == b).count() == 1);
     let follows = |start: usize| outline.iter().find(|[a, _]| *a == start).map(|[_, b]| *b);
     let mut length = 0;

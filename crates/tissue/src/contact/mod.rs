@@ -1,32 +1,37 @@
-//! What touches tissue: convex parts of tools, supports, the jaws that hold it, and other tissue.
+//! What tissue touches: convex parts of tools, supports, the jaws that hold it, and other tissue.
 
 mod body_contact;
-pub(crate) mod broad_phase;
 mod collider;
-mod contacts;
+mod compliant_grasp;
+#[expect(clippy::module_inception, reason = "a contact is the idea of the file")]
+mod contact;
+mod contact_set;
 mod coupling;
 mod force;
-mod hanging;
 mod hull;
+mod members;
+mod memory;
+mod nearest;
 mod pairs;
-mod placed;
 pub(crate) mod proximity;
 #[cfg(test)]
 mod proximity_tests;
 mod reaction;
 mod shape;
 mod shape_surface;
-pub(crate) mod surface;
-mod touch;
+mod tool_placement;
 
 pub use body_contact::BodyContact;
 pub use collider::Collider;
-pub(crate) use contacts::{Anchor, Contacts};
+pub(crate) use compliant_grasp::CompliantNode;
+pub(crate) use contact::Push;
+pub(crate) use contact_set::ContactSet;
 pub(crate) use coupling::Coupling;
 pub use force::{Event, ToolForce};
-pub(crate) use hanging::Hanging;
 pub use hull::Hull;
-pub(crate) use pairs::{Pairs, Stretch};
+pub(crate) use members::Members;
+pub(crate) use memory::{Anchor, Source, Stretch};
+pub use nearest::Nearest;
+pub(crate) use pairs::Pairs;
 pub(crate) use reaction::Reaction;
-pub use shape::{Nearest, Shape};
-pub(crate) use touch::{Push, Source};
+pub use shape::Shape;

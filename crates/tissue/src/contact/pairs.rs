@@ -1,55 +1,53 @@
-//! Where the bodies of an island touch each other, and folded tissue itself: vertices of one at triangles of another.
+//! Contacts between the bodies of an island, and of folded tissue with itself: vertices of one at
+//! triangles of another.
 //!
-//! During a substep the plane, and the place on the triangle that is nearest, are held: a [`Touch`] of the vertex's offset from that place, which moves with the triangle's corners. So the
-//! push has a potential of all four vertices, and what one body feels the other does. Friction is a spring across the plane; how far it is stretched belongs to the state and is turned
-//! with the plane.
+//! During a substep the plane and the nearest place on the triangle are held. A pair is a
+//! [`Contact`] of the vertex's offset from that place, which moves with the corners of the
+//! triangle. So the force has a potential of all four vertices, and acts on both bodies alike.
+//! Friction is a spring across the plane. How far it is stretched belongs to the state, and is
+//! turned with the plane.
 
+use super::contact::{Contact, Friction, Push};
 use super::coupling::Coupling;
-use super::touch::{Friction, Push, Source, Touch};
-use crate::integrator::{Frame, Solver, Worker};
+use super::members::Members;
+use super::memory::{Source, Stretch};
+use crate::Body;
+use crate::frame::Frame;
 use glam::Vec3A;
 
-/// What is this much further away [m] than where it presses and twice what it goes in a substep is left out of it.
-const LIKELY: f32 = 3e-4;
-
-/// How far friction's spring between a vertex and another body is stretched.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Stretch {
-    pub vertex: u32,
-    pub other: u32,
-    /// The vertex from where friction holds it without force [m].
-    pub by: Vec3A,
-}
+/// Pairs that are farther apart than where they press, twice their way in a substep and this margin
+/// (m) are left out of the substep.
+const SUBSTEP_MARGIN: f32 = 3e-4;
 
 /// A vertex at a triangle.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pair {
-    /// The vertex's body and the triangle's, among those of the island.
+    /// The body of the vertex and that of the triangle, by their numbers in the island.
     pub member: usize,
     pub other: usize,
     pub vertex: u32,
-    /// Corners of the triangle, and how much each counts at the place that is nearest.
+    /// Corners of the triangle, and their weights at the nearest place.
     pub corners: [u32; 3],
     pub weights: [f32; 3],
-    /// Of the vertex's offset from that place.
-    pub touch: Touch,
-    /// Limit of friction [N], held during a search.
+    /// The contact of the vertex's offset from that place.
+    pub contact: Contact,
+    /// Limit of friction (N), held during a search.
     pub limit: f32,
-    /// What it pushed its vertex with when that was last written down [N].
-    pub noted: Vec3A,
-    /// Which of those that may touch in the frame it is.
+    /// Force on the vertex when it was last recorded (N).
+    pub recorded: Vec3A,
+    /// Its number among the candidates of the frame.
     candidate: u32,
     /// The triangle's number.
     triangle: u32,
-    /// Distance at which nothing presses [m].
+    /// Distance at which nothing presses (m).
     free: f32,
-    /// From the triangle's frame to the vertex's [m].
+    /// From the triangle's frame to the vertex's (m).
     shift: Vec3A,
-    /// At the substep's beginning [m].
+    /// Stretch of friction's spring at the substep's beginning (m).
     stretch: Vec3A,
-    /// Whether the vertex was outside when it was last looked at.
+    /// Whether the vertex was outside when the pair was last examined.
     outside: bool,
-    /// Whether it was near enough then.
+    /// Whether it was near enough for the substep then.
     listed: bool,
 }
 
@@ -59,39 +57,40 @@ struct Role {
     member: u32,
     vertex: u32,
     pair: u32,
-    /// Which corner of the triangle it is; 3: it is the vertex.
+    /// Its corner of the triangle; 3: it is the vertex.
     corner: u32,
 }
 
-/// What may touch in an island during a frame.
+/// The pairs of an island during a frame.
 #[derive(Default)]
 pub(crate) struct Pairs {
-    /// How far tools carry held nodes of each body in the frame [m].
+    /// How far tools carry held nodes of each body in the frame (m).
     carried: Vec<f32>,
-    /// In the frame.
+    /// Pairs that may touch in the frame.
     candidates: Vec<Pair>,
-    /// In the substep.
+    /// Pairs that may touch in the substep.
     list: Vec<Pair>,
     /// Sorted; for the sweeps.
     roles: Vec<Role>,
-    pressed: Vec<Touch>,
+    pressed: Vec<Contact>,
 }
 
 impl Pair {
-    /// Offset of the vertex from the place on the triangle [m]; `x` says where a vertex of a body of the island is.
+    /// Offset of the vertex from the place on the triangle (m); `x` is the position of a vertex of
+    /// a body of the island.
     #[inline(always)]
     pub fn offset(&self, x: impl Fn(usize, u32) -> Vec3A) -> Vec3A {
         let place = |k: usize| self.weights[k] * x(self.other, self.corners[k]);
         x(self.member, self.vertex) + self.shift - (place(0) + place(1) + place(2))
     }
 
-    /// The four vertices with their bodies, and how much of the push each gets.
+    /// The four vertices with their bodies, and the share of the force on each.
     pub fn shares(&self) -> [(usize, u32, f32); 4] {
         let corner = |k: usize| (self.other, self.corners[k], -self.weights[k]);
         [(self.member, self.vertex, 1.0), corner(0), corner(1), corner(2)]
     }
 
-    /// What the vertex is pushed with [N]; `x` says where a vertex of a body of the island is.
+    /// Force on the vertex (N); `x` is the position of a vertex of a body of the island.
     pub fn push_at(&self, x: impl Fn(usize, u32) -> Vec3A) -> Vec3A {
         self.push(self.offset(x)).map_or(Vec3A::ZERO, |push| push.gradient)
     }
@@ -99,31 +98,32 @@ impl Pair {
     /// Force on the vertex at an `offset`, within the limit of friction.
     #[inline(always)]
     pub fn push(&self, offset: Vec3A) -> Option<Push> {
-        self.touch.push_within(offset, self.limit)
+        self.contact.push_within(offset, self.limit)
     }
 }
 
 impl Pairs {
-    /// Begins a frame of an island: takes over what `coupling` found.
-    pub fn begin<S: Solver>(&mut self, coupling: &Coupling, frame: &Frame<'_>, island: &[Worker<S>]) {
+    /// Begins a frame of an island with the pairs that `coupling` found.
+    pub fn begin_frame(&mut self, coupling: &Coupling, frame: &Frame<'_>, island: &(impl Members + ?Sized)) {
         self.candidates.clear();
         self.list.clear();
         self.carried.clear();
-        for Worker { index, body, .. } in island {
-            let here = frame.of(*index);
-            let tools = here.rigid_grasps().filter_map(|grasp| frame.tools.get(grasp.tool));
-            self.carried.push(tools.map(|tool| tool.travel(body)).fold(0.0, f64::max) as f32);
+        for m in 0..island.count() {
+            self.carried.push(frame.of(island.index(m)).carried(island.body(m), true) as f32);
         }
-        let Some(first) = island.first() else { return };
+        if island.count() == 0 {
+            return;
+        }
+        let own = coupling.island(island.index(0));
         let contact = coupling.contact();
-        let member = |body: u32| island.iter().position(|worker| worker.index == body as usize);
-        let near = coupling.near().iter().filter(|near| coupling.island(near.body as usize) == first.island);
+        let member = |body: u32| (0..island.count()).find(|m| island.index(*m) == body as usize);
+        let near = coupling.near().iter().filter(|near| coupling.island(near.body as usize) == own);
         for near in near {
             let (Some(a), Some(b)) = (member(near.body), member(near.other)) else { continue };
-            let (one, two) = (&island[a], &island[b]);
-            let stretches = &one.state.stretches;
+            let (one, two) = (island.body(a), island.body(b));
+            let stretches = &island.state(a).stretches;
             let known = stretches.binary_search_by_key(&(near.vertex, near.other), |s| (s.vertex, s.other));
-            let stiffness = |worker: &Worker<S>, vertex: u32| worker.body.tissue_stiffness(vertex as usize);
+            let stiffness = |body: &Body, vertex: u32| body.tissue_stiffness(vertex as usize);
             let theirs: f32 = near.triangle.iter().zip(near.weights).map(|(c, w)| w * stiffness(two, *c)).sum();
             let ours = stiffness(one, near.vertex);
             self.candidates.push(Pair {
@@ -132,7 +132,7 @@ impl Pairs {
                 vertex: near.vertex,
                 corners: near.triangle,
                 weights: near.weights,
-                touch: Touch {
+                contact: Contact {
                     vertex: near.vertex,
                     source: Source::Body(near.other),
                     normal: near.normal.into(),
@@ -143,11 +143,11 @@ impl Pairs {
                     friction: Friction::Coulomb(contact.friction as f32),
                 },
                 limit: 0.0,
-                noted: Vec3A::ZERO,
+                recorded: Vec3A::ZERO,
                 candidate: self.candidates.len() as u32,
                 triangle: near.at,
                 free: near.free,
-                shift: (one.body.origin - two.body.origin).as_vec3a(),
+                shift: (one.origin - two.origin).as_vec3a(),
                 stretch: known.map_or(Vec3A::ZERO, |k| stretches[k].by),
                 outside: near.distance > 0.0,
                 listed: false,
@@ -160,7 +160,7 @@ impl Pairs {
         self.candidates.is_empty()
     }
 
-    /// What may touch in the substep.
+    /// The pairs of the substep.
     pub fn list(&self) -> &[Pair] {
         &self.list
     }
@@ -169,12 +169,15 @@ impl Pairs {
         &mut self.list
     }
 
-    /// Finds the places and planes of a substep of `h` [s] that begins with the states as they are. They are those that the vertex will have come to along the surface: planes of where it is would
-    /// be steps in its way wherever it goes over an edge. Between bodies of which `rested` says that they were at rest since the last substep of this frame, nothing is new.
-    pub fn find<S: Solver>(&mut self, island: &[Worker<S>], h: f32, rested: impl Fn(&Worker<S>) -> bool) {
+    /// Finds places and planes of a substep of `h` (s) that begins with the states as they are.
+    ///
+    /// They are those where the vertex will be along the surface at the end: planes of where it is
+    /// now would be steps in its way wherever it passes an edge. Pairs of bodies that were at rest
+    /// (`rested`) since the last substep of this frame stay as they are.
+    pub fn find(&mut self, island: &(impl Members + ?Sized), h: f32, rested: impl Fn(usize) -> bool) {
         self.list.clear();
         for pair in &mut self.candidates {
-            if rested(&island[pair.member]) && rested(&island[pair.other]) {
+            if rested(pair.member) && rested(pair.other) {
                 if pair.listed {
                     pair.limit = 0.0;
                     self.list.push(*pair);
@@ -182,16 +185,16 @@ impl Pairs {
                 continue;
             }
             pair.listed = false;
-            let (one, two) = (&island[pair.member], &island[pair.other]);
-            let (surface, x, v) = (&two.body.surface, &two.state.x[..], &two.state.v[..]);
-            let p = one.state.x[pair.vertex as usize] + pair.shift;
+            let (one, two) = (island.state(pair.member), island.state(pair.other));
+            let (surface, x, v) = (&island.body(pair.other).surface, &two.x[..], &two.v[..]);
+            let p = one.x[pair.vertex as usize] + pair.shift;
             let (triangle, foot) = surface.at(x, p, pair.triangle);
             let theirs = |t: u32, weights: [f32; 3]| -> Vec3A {
                 (0..3).map(|k| weights[k] * v[surface.triangles[t as usize][k] as usize]).sum()
             };
-            let way = h * (one.state.v[pair.vertex as usize] - theirs(triangle, foot.weights));
+            let way = h * (one.v[pair.vertex as usize] - theirs(triangle, foot.weights));
             let carried = self.carried[pair.member] + self.carried[pair.other];
-            let reach = (pair.free + LIKELY + 2.0 * way.length() + carried).max(0.0);
+            let reach = (pair.free + SUBSTEP_MARGIN + 2.0 * way.length() + carried).max(0.0);
             if pair.stretch == Vec3A::ZERO && foot.off.length_squared() > reach * reach && pair.outside {
                 continue;
             }
@@ -213,30 +216,30 @@ impl Pairs {
             pair.weights = foot.weights;
             let along = pair.stretch - pair.stretch.dot(normal) * normal;
             pair.stretch = along.normalize_or_zero() * pair.stretch.length();
-            pair.touch.normal = normal;
-            pair.touch.point = pair.free * normal;
-            pair.touch.place = foot.off - (ahead - p) - pair.stretch;
+            pair.contact.normal = normal;
+            pair.contact.point = pair.free * normal;
+            pair.contact.place = foot.off - (ahead - p) - pair.stretch;
             pair.limit = 0.0;
             pair.listed = true;
             self.list.push(*pair);
         }
     }
 
-    /// Whether a body of the island is pressed by another.
-    pub fn presses<S: Solver>(&self, island: &[Worker<S>], member: usize) -> bool {
-        let x = |m: usize, vertex: u32| island[m].state.x[vertex as usize];
+    /// Whether another body presses a body of the island.
+    pub fn presses(&self, island: &(impl Members + ?Sized), member: usize) -> bool {
+        let x = |m: usize, vertex: u32| island.x(m, vertex);
         let of = |pair: &&Pair| pair.member == member || pair.other == member;
-        self.list.iter().filter(of).any(|pair| pair.touch.push(pair.offset(x)).is_some())
+        self.list.iter().filter(of).any(|pair| pair.contact.push(pair.offset(x)).is_some())
     }
 
-    /// Ends a substep with the states as they are: friction's places follow what slips.
-    pub fn settle<S: Solver>(&mut self, island: &[Worker<S>]) {
-        let x = |m: usize, vertex: u32| island[m].state.x[vertex as usize];
+    /// Ends a substep with the states as they are: stretches follow what slips.
+    pub fn end_substep(&mut self, island: &(impl Members + ?Sized)) {
+        let x = |m: usize, vertex: u32| island.x(m, vertex);
         for pair in &self.list {
             let offset = pair.offset(x);
-            self.candidates[pair.candidate as usize].stretch = if pair.touch.push(offset).is_some() {
-                let normal = pair.touch.normal;
-                let off = offset - pair.touch.place - pair.touch.slide(offset).unwrap_or(Vec3A::ZERO);
+            self.candidates[pair.candidate as usize].stretch = if pair.contact.push(offset).is_some() {
+                let normal = pair.contact.normal;
+                let off = offset - pair.contact.place - pair.contact.slide(offset).unwrap_or(Vec3A::ZERO);
                 off - off.dot(normal) * normal
             } else {
                 Vec3A::ZERO
@@ -244,22 +247,22 @@ impl Pairs {
         }
     }
 
-    /// Ends a frame: the states remember.
-    pub fn end<S: Solver>(&self, island: &mut [Worker<S>]) {
-        island.iter_mut().for_each(|worker| worker.state.stretches.clear());
+    /// Ends a frame: the states keep the stretches.
+    pub fn end_frame(&self, island: &mut (impl Members + ?Sized)) {
+        (0..island.count()).for_each(|m| island.state_mut(m).stretches.clear());
         for pair in self.candidates.iter().filter(|pair| pair.stretch != Vec3A::ZERO) {
-            let other = island[pair.other].index as u32;
+            let other = island.index(pair.other) as u32;
             let stretch = Stretch { vertex: pair.vertex, other, by: pair.stretch };
-            island[pair.member].state.stretches.push(stretch);
+            island.state_mut(pair.member).stretches.push(stretch);
         }
     }
 
-    /// Sorts out which vertices of which bodies take part, for the sweeps of a substep.
+    /// Lists which vertices of which bodies take part, for the sweeps of a substep.
     pub fn assign(&mut self) {
         self.roles.clear();
         for (k, pair) in self.list.iter().enumerate() {
             for (corner, (member, vertex, share)) in pair.shares().into_iter().enumerate() {
-                // What hardly counts is no touch: sweeps divide by it.
+                // A tiny share is no contact: sweeps divide by it.
                 if share.abs() > 1e-6 {
                     // The vertex itself comes first among the shares.
                     let corner = (corner as u32 + 3) % 4;
@@ -270,24 +273,25 @@ impl Pairs {
         self.roles.sort_unstable();
     }
 
-    /// What the others do to a body, by vertex: every touch as it is for one vertex while the other three of its pair stay where they are.
-    pub fn on<S: Solver>(&mut self, island: &[Worker<S>], member: usize) -> &[Touch] {
-        let x = |m: usize, vertex: u32| island[m].state.x[vertex as usize];
+    /// Contacts of a body with the others, by vertex: each as it is for one vertex while the other
+    /// three of its pair stay where they are.
+    pub fn on(&mut self, island: &(impl Members + ?Sized), member: usize) -> &[Contact] {
+        let x = |m: usize, vertex: u32| island.x(m, vertex);
         self.pressed.clear();
         let first = self.roles.partition_point(|role| (role.member as usize) < member);
         for role in self.roles[first..].iter().take_while(|role| role.member as usize == member) {
             let pair = &self.list[role.pair as usize];
             let (offset, here) = (pair.offset(x), x(member, role.vertex));
-            let (height, off) = (pair.touch.height(offset), offset - pair.touch.place);
-            // The offset changes by so much of what the vertex moves.
+            let (height, off) = (pair.contact.height(offset), offset - pair.contact.place);
+            // Share of the vertex's motion by which the offset changes.
             let share = if role.corner == 3 { 1.0 } else { -pair.weights[role.corner as usize] };
-            self.pressed.push(Touch {
+            self.pressed.push(Contact {
                 vertex: role.vertex,
-                normal: share.signum() * pair.touch.normal,
-                point: here - (height / share) * pair.touch.normal,
+                normal: share.signum() * pair.contact.normal,
+                point: here - (height / share) * pair.contact.normal,
                 place: here - off / share,
-                stiffness: pair.touch.stiffness * share * share,
-                ..pair.touch
+                stiffness: pair.contact.stiffness * share * share,
+                ..pair.contact
             });
         }
         &self.pressed

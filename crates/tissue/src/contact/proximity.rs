@@ -1,32 +1,38 @@
-//! Which vertices of a body's surface are near or inside another body, or folded tissue of their own, and how far.
+//! Which vertices of a body's surface are near or inside another body, or folded tissue of their
+//! own, and how far.
 //!
-//! A tree of boxes over each surface is fitted to its vertices. Leaf by leaf of one tree that the other reaches, the nearest triangle to each vertex is looked for, beginning with that
-//! of the vertex before. All in single precision, in the other body's frame: off by some 10 nm.
+//! A tree of boxes over each surface is fitted to its vertices. For each leaf of one tree that the
+//! other tree reaches, the nearest triangle to each vertex is sought, beginning with that of the
+//! vertex before. All of it is in single precision, in the other body's frame: off by some 10 nm.
 
-use super::broad_phase::Aabb;
-use super::surface::{Foot, foot};
+use crate::body::surface::{Foot, foot};
+use crate::body::tree::Aabb;
 use crate::state::BodyState;
 use crate::{Body, Model, State};
 use glam::{Vec3, Vec3A};
 
-/// What is within the reach of folded tissue, at most, in offsets.
+/// Reach of folded tissue, over the offset.
 const CLOSE: f32 = 4.0 / 3.0;
 
-/// How far apart at rest, in reaches, the boxes of folded tissue are; what is nearer belongs together.
+/// Distance at rest beyond which boxes of one body count as folded, over the reach. Nearer boxes
+/// belong together.
 const FOLDED: f32 = 2.0;
 
-/// How far apart at rest, in reaches, folded tissue is where it did not face itself: what is nearer is the other side of the tissue, or beside it, and only squeezed.
+/// Distance at rest beyond which tissue that did not face itself counts as folded, over the reach.
+/// Nearer tissue is the other side of it, or beside it, and only squeezed.
 const OTHER_SIDE: f32 = 4.0;
 
-/// Sine of the angle above a triangle from which on a vertex faces it.
+/// Sine of the angle above a triangle from which a vertex faces it.
 const FACING: f32 = 0.2;
 
-/// What is looked for.
+/// The limits of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Limits {
-    /// Gap at which surfaces begin to press [m] (SPEC C1: 1.5 mm). Where they were nearer at rest, it is the gap at rest.
+    /// Gap at which surfaces begin to press (m). Where they were nearer at rest, it is the gap at
+    /// rest.
     pub offset: f32,
-    /// Vertices deeper inside than this [m], or than this from where they were at rest if they were inside then, are left alone.
+    /// Vertices deeper inside than this (m), or than this from where they were at rest if they were
+    /// inside then, are left out.
     pub depth: f32,
     /// Whether bodies that collide with themselves are searched for folds.
     pub folds: bool,
@@ -54,13 +60,14 @@ pub(crate) struct Near {
     pub weights: [f32; 3],
     /// Unit vector out of the other body, along the line from that point to the vertex.
     pub normal: Vec3,
-    /// Signed distance along `normal` [m]; negative inside.
+    /// Signed distance along `normal` (m); negative inside.
     pub distance: f32,
-    /// Distance at which nothing presses [m]: [`Limits::offset`], or the signed distance at rest where that is less. There is force where `distance` is below it.
+    /// Distance at which nothing presses (m): [`Limits::offset`], or the signed distance at rest
+    /// where that is less. There is force where `distance` is below it.
     pub free: f32,
 }
 
-/// Scratch memory and what is known of the rest shapes.
+/// Scratch memory, and what is known of the rest shapes.
 #[derive(Clone, Debug)]
 pub(crate) struct Proximity {
     limits: Limits,
@@ -68,16 +75,17 @@ pub(crate) struct Proximity {
     boxes: Vec<Vec<Aabb>>,
     /// Of each ordered pair, [`Near::free`] by vertex; empty where it is the offset everywhere.
     free: Vec<Vec<f32>>,
-    /// Rest positions by internal number and boxes round them, of bodies that are searched for folds.
+    /// Rest positions by internal number and boxes around them, of bodies that are searched for
+    /// folds.
     rest: Vec<(Vec<Vec3A>, Vec<Aabb>)>,
-    /// Where the bodies were when they were last looked at, and how often they had moved by then.
+    /// Where the bodies were when they were last examined, and how often they had moved by then.
     seen: Vec<Vec<Vec3A>>,
     versions: Vec<u64>,
     /// Of each ordered pair, what was found.
     known: Vec<Known>,
 }
 
-/// What was found of a pair, within what reach.
+/// What was found of a pair, and within which reach.
 #[derive(Clone, Debug, Default)]
 struct Known {
     reach: f32,
@@ -107,7 +115,8 @@ impl Best {
 }
 
 impl Proximity {
-    /// For the bodies of `model` in their rest shapes. Made anew when a body changes its elements.
+    /// For the bodies of `model` in their rest shapes. A body with other elements needs another
+    /// one.
     pub fn new(model: &Model, limits: Limits) -> Self {
         let n = model.bodies.len();
         let rest = State::new(model).bodies;
@@ -141,7 +150,8 @@ impl Proximity {
         }
     }
 
-    /// Whether `reaches` holds for the middle and half the diagonal of the box round any few triangles of a body and of all boxes round that.
+    /// Whether `reaches` holds for the middle and half the diagonal of the box around some
+    /// triangles of a body and of all boxes around that.
     pub fn meets(&self, body: &Body, index: usize, reaches: &dyn Fn(Vec3A, f32) -> bool) -> bool {
         let (nodes, boxes) = (&body.surface.tree.nodes, &self.boxes[index]);
         let mut at = 0;
@@ -158,9 +168,11 @@ impl Proximity {
         false
     }
 
-    /// Puts into `found` every vertex whose distance from another body it collides with is between [`Limits::depth`] deeper than where it presses and `reach` of both bodies [m], with the nearest triangle;
-    /// ordered by body, vertex, other body. Pairs of bodies of which neither moved since the last call are not looked at again. Allocates only to make lists
-    /// longer than they ever were.
+    /// Writes into `found` every vertex whose distance from another body that it may touch is
+    /// between [`Limits::depth`] deeper than where it presses and `reach` of both bodies (m), with
+    /// the nearest triangle; ordered by body, vertex and other body. Pairs of bodies that did not
+    /// move since the last call are not examined again. It allocates only to make lists longer than
+    /// before.
     pub fn find(
         &mut self,
         model: &Model,
@@ -195,9 +207,9 @@ impl Proximity {
     fn find_pair(&mut self, model: &Model, state: &[BodyState], [a, b]: [usize; 2], reach: f32, found: &mut Vec<Near>) {
         let n = model.bodies.len();
         let Limits { offset, depth, .. } = self.limits;
-        // Folds are not looked for deep inside, where the tissue's own surface is.
+        // Folds are not sought deep inside, where the tissue's own surface is.
         let depth = if a == b { depth.min(reach) } else { depth };
-        // However fast the tissue is: what belongs together does so all the same.
+        // Tissue that belongs together does so however fast it is.
         let close = CLOSE * offset;
         let least = self.free[a * n + b].iter().copied().fold(0.0, f32::min);
         let search = reach.max(depth - least);
@@ -229,7 +241,8 @@ impl Proximity {
                     let skip = |t: u32| is_squeezed(from.body, rest, *vertex, t, OTHER_SIDE * close);
                     to.nearest(p, &mut best, apart, skip);
                 } else {
-                    // The vertices before are neighbours, mostly: where they ended bounds the search.
+                    // The vertices before are mostly neighbours: where they ended bounds the
+                    // search.
                     to.try_triangle(last, p, &mut best);
                     to.nearest(p, &mut best, |_| true, |_| false);
                     if best.triangle != u32::MAX {
@@ -263,7 +276,7 @@ impl Side<'_> {
         self.body.surface.triangles[t as usize].map(|i| self.x[i as usize])
     }
 
-    /// Takes triangle `t` if it is nearer.
+    /// Keeps triangle `t` if it is nearer.
     fn try_triangle(&self, t: u32, p: Vec3A, best: &mut Best) {
         let foot = foot(p, self.corners(t));
         let squared = foot.off.length_squared();
@@ -272,7 +285,7 @@ impl Side<'_> {
         }
     }
 
-    /// Looks for the nearest triangle: in leaves that `open` lets in, but for those to `skip`.
+    /// Seeks the nearest triangle in leaves that `open` admits, except those to `skip`.
     #[inline]
     fn nearest(&self, p: Vec3A, best: &mut Best, open: impl Fn(u32) -> bool, skip: impl Fn(u32) -> bool) {
         let nodes = &self.body.surface.tree.nodes;
@@ -305,7 +318,8 @@ impl Side<'_> {
     }
 }
 
-/// Of each vertex of `from` the signed distance from `to` at rest where it is below `offset`, and `offset` elsewhere; empty if it is so everywhere.
+/// For each vertex of `from` the signed distance from `to` at rest where it is below `offset`, and
+/// `offset` elsewhere; empty if it is `offset` everywhere.
 fn free_at_rest(from: &Side<'_>, to: &Side<'_>, offset: f32) -> Vec<f32> {
     let shift = (from.body.origin - to.body.origin).as_vec3a();
     let Some(whole) = to.boxes.first().map(|b| b.moved(Vec3A::ZERO, offset)) else {
@@ -326,7 +340,8 @@ fn free_at_rest(from: &Side<'_>, to: &Side<'_>, offset: f32) -> Vec<f32> {
     if free.iter().all(|f| *f == offset) { Vec::new() } else { free }
 }
 
-/// Whether triangle `t` of a vertex's own body was within `thickness` of it at rest and did not face it.
+/// Whether triangle `t` of a vertex's own body was within `thickness` of it at rest and did not
+/// face it.
 fn is_squeezed(body: &Body, rest: &[Vec3A], vertex: u32, t: u32, thickness: f32) -> bool {
     let [a, b, c] = body.surface.triangles[t as usize].map(|i| rest[i as usize]);
     let off = foot(rest[vertex as usize], [a, b, c]).off;

@@ -1,4 +1,5 @@
-//! Detection against every triangle in double precision with the winding number for a sign, and against exact convex shapes.
+//! Detection against every triangle in double precision with the winding number for a sign, and
+//! against exact convex shapes.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic; the timing is printed")]
 
 use super::hull::Hull;
@@ -87,7 +88,8 @@ fn boundary(model: &Model, state: &State, body: usize) -> (trocar_geometry::TriM
     mesh.boundary()
 }
 
-/// Every surface vertex of `a` with its signed distance from `b`, by internal number: all triangles, the winding number for a sign.
+/// Every surface vertex of `a` with its signed distance from `b`, by internal number: all
+/// triangles, the winding number for a sign.
 fn brute_force(model: &Model, state: &State, a: usize, b: usize) -> Vec<(u32, f64)> {
     let (points, nodes) = boundary(model, state, a);
     let solid = MeshDistance::new(&boundary(model, state, b).0).unwrap();

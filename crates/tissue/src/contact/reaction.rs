@@ -1,14 +1,15 @@
-//! What nodes that a tool carries rigidly pull at it with.
+//! Forces at a tool of the nodes that it carries rigidly.
 
 use super::force::ToolForce;
 use crate::assembly::shape_gradients;
-use crate::integrator::Frame;
+use crate::frame::Frame;
 use crate::state::BodyState;
 use crate::{Body, Grasp, Hyperelastic};
 use glam::{DMat3, DVec3};
 use trocar_core::Wrench;
 
-/// Finds the constraint forces of a body's rigid grasps: the elastic forces of their nodes and their weight. Dashpots and the nodes' own inertia are left out: they vanish when the tool rests.
+/// The constraint forces of a body's rigid grasps: elastic forces of their nodes, and their weight.
+/// Dashpots and the nodes' own inertia are left out; they vanish when the tool rests.
 pub(crate) struct Reaction {
     psi: Box<dyn Hyperelastic>,
     /// By vertex: the tool that carries it.
@@ -21,12 +22,13 @@ impl Reaction {
         Self { psi: body.material.hyperelastic(), carrier: vec![None; body.len()], forces: Vec::new() }
     }
 
-    /// What the body in `state` does to each tool.
+    /// Forces of the body on each tool.
     pub fn forces(&self) -> &[ToolForce] {
         &self.forces
     }
 
-    /// Takes the forces at the end of a frame; of `all` grasps for solvers that hold all of them rigidly.
+    /// Computes the forces at the end of a frame; of `all` grasps for solvers that hold all of them
+    /// rigidly.
     pub fn take(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState, all: bool) {
         self.forces.clear();
         self.forces.resize(frame.tools.len(), ToolForce::default());
@@ -60,7 +62,7 @@ impl Reaction {
         }
     }
 
-    /// Adds what another body does to a vertex that a tool carries [N]; nothing if none does.
+    /// Adds the force of another body on a vertex (N), if a tool carries it.
     pub fn press(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState, vertex: usize, force: DVec3) {
         if let Some(tool) = self.carrier[vertex] {
             let arm = body.origin + state.x[vertex].as_dvec3() - frame.tools[tool].to.translation;

@@ -1,64 +1,54 @@
 //! Convex shapes and their exact signed distance.
 
-use super::Hull;
+use super::hull::Hull;
+use super::nearest::{MAX_SHAPE_SIZE, Nearest};
 use super::shape_surface;
 use glam::{DQuat, DVec3};
 use trocar_geometry::TriMesh;
 
-/// Largest coordinate and size of a shape [m]; more is a mistaken unit.
-pub(super) const LARGEST: f64 = 10.0;
-
-/// Below this length [m] an offset has no direction: its square would be lost to the exponent's range.
+/// Below this length (m) an offset has no direction: its square would underflow.
 const NO_DIRECTION: f64 = 1e-150;
 
-/// A convex shape in the frame of what carries it.
+/// A convex shape in the frame of its carrier.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// All points within `radius` of a point.
     Sphere {
-        /// Centre [m].
+        /// Centre (m).
         centre: DVec3,
-        /// [m]
+        /// (m)
         radius: f64,
     },
     /// All points within `radius` of a segment.
     Capsule {
-        /// Ends of the segment [m]; they may coincide.
+        /// Ends of the segment (m); they may coincide.
         ends: [DVec3; 2],
-        /// [m]
+        /// (m)
         radius: f64,
     },
     /// Everything behind a plane.
     HalfSpace {
-        /// A point of the plane [m].
+        /// A point of the plane (m).
         point: DVec3,
         /// Unit normal, outwards.
         normal: DVec3,
     },
     /// A cuboid.
     Box {
-        /// Centre [m].
+        /// Centre (m).
         centre: DVec3,
         /// From the cuboid's axes to the frame.
         rotation: DQuat,
-        /// Half its edges' lengths [m].
+        /// Half its edges' lengths (m).
         half: DVec3,
     },
     /// A convex polyhedron.
     Hull(Hull),
 }
 
-/// The point of a shape's surface nearest to some point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest {
-    /// Signed distance [m]: negative inside.
-    pub distance: f64,
-    /// Unit normal there, outwards: the gradient of the distance. Where several would do (a sphere's centre, an edge), one of them.
-    pub normal: DVec3,
-}
-
 impl Shape {
-    /// The nearest point of the surface to `p` [m], in the shape's frame: in closed form, exact but for rounding.
+    /// The nearest point of the surface to `p` (m), in the shape's frame: in closed form, exact but
+    /// for rounding.
     pub fn nearest(&self, p: DVec3) -> Nearest {
         match self {
             Self::Sphere { centre, radius } => round(p - *centre, *radius, DVec3::Z),
@@ -77,7 +67,7 @@ impl Shape {
         }
     }
 
-    /// Smallest and largest coordinates [m]; infinite for a half-space.
+    /// Smallest and largest coordinates (m); infinite for a half-space.
     pub fn aabb(&self) -> (DVec3, DVec3) {
         match self {
             Self::Sphere { centre, radius } => (*centre - *radius, *centre + *radius),
@@ -93,8 +83,8 @@ impl Shape {
         }
     }
 
-    /// Centre and radius [m] of a ball that holds every point within `margin` of the shape; the radius is infinite for a half-space. Wherever the tool is, the ball moves with it
-    /// and keeps its radius.
+    /// Centre and radius (m) of a ball that contains every point within `margin` of the shape; the
+    /// radius is infinite for a half-space. The ball moves with the tool and keeps its radius.
     pub fn bounds(&self, margin: f64) -> (DVec3, f64) {
         let (centre, radius) = match self {
             Self::Sphere { centre, radius } => (*centre, *radius),
@@ -106,7 +96,8 @@ impl Shape {
         (centre, radius + margin)
     }
 
-    /// The surface for pictures: closed, facing outwards; round ones to within 1% of their radius. Empty for a half-space.
+    /// The surface for pictures: closed, facing outwards; round shapes to within 1% of their
+    /// radius. Empty for a half-space.
     pub fn surface(&self) -> TriMesh {
         match self {
             Self::Sphere { centre, radius } => shape_surface::capsule([*centre; 2], *radius),
@@ -117,10 +108,11 @@ impl Shape {
         }
     }
 
-    /// Says what is wrong, if anything. A [`Hull`] was checked as it was made.
+    /// Checks the shape. A [`Hull`] is checked when it is made.
     ///
     /// # Errors
-    /// Numbers that are not finite, sizes of 0 or less or above 10 m, coordinates beyond 10 m, normals and rotations that are not of unit length.
+    /// Numbers that are not finite, sizes that are not above 0 or exceed 10 m, coordinates beyond
+    /// 10 m, normals and rotations that are not of unit length.
     pub fn check(&self) -> Result<(), String> {
         match self {
             Self::Sphere { centre, radius } => {
@@ -162,14 +154,15 @@ impl From<Hull> for Shape {
     }
 }
 
-/// The surface of a ball seen from `off` its centre; `otherwise` is the normal where there is no direction.
+/// The nearest point of a ball at the offset `off` from its centre; `otherwise` is the normal where
+/// there is no direction.
 fn round(off: DVec3, radius: f64, otherwise: DVec3) -> Nearest {
     let length = off.length();
     let normal = if length > NO_DIRECTION { off / length } else { otherwise };
     Nearest { distance: length - radius, normal }
 }
 
-/// The surface of a cuboid about the origin, along the axes.
+/// The nearest point of a cuboid about the origin, along the axes.
 fn nearest_of_cuboid(p: DVec3, half: DVec3) -> Nearest {
     let side = DVec3::ONE.copysign(p);
     let beyond = p.abs() - half;
@@ -190,17 +183,17 @@ fn nearest_of_cuboid(p: DVec3, half: DVec3) -> Nearest {
 
 fn check_point(name: &str, p: DVec3) -> Result<(), String> {
     // NaN fails every comparison.
-    if p.abs().max_element() <= LARGEST && p.is_finite() {
+    if p.abs().max_element() <= MAX_SHAPE_SIZE && p.is_finite() {
         Ok(())
     } else {
-        Err(format!("{name} is {p} m; finite coordinates within {LARGEST} m make sense"))
+        Err(format!("{name} is {p} m; coordinates must be finite and within {MAX_SHAPE_SIZE} m"))
     }
 }
 
 fn check_size(name: &str, size: f64) -> Result<(), String> {
-    if size > 0.0 && size <= LARGEST {
+    if size > 0.0 && size <= MAX_SHAPE_SIZE {
         Ok(())
     } else {
-        Err(format!("{name} is {size} m; more than 0 and up to {LARGEST} m make sense"))
+        Err(format!("{name} is {size} m; must be in (0, {MAX_SHAPE_SIZE}]"))
     }
 }

@@ -1,17 +1,18 @@
-//! What a cut body was, carried over to its pieces: masses, pins, motion, grasps, collision filters.
+//! What a cut body was, transferred to its pieces: masses, pins, motion, grasps, collision filters.
 
 use super::split::{Split, parts};
 use super::{Piece, Severed};
 use crate::builder::{Inherited, lay_out};
 use crate::contact::Anchor;
-use crate::state::BodyState;
+use crate::state::{BodyState, WarmStart};
 use crate::{Body, BodyDescription, Compliance, Grasp, MassFloor, Model, State};
 use trocar_geometry::TetMesh;
 
-/// A mass this much above what the volume around a node weighs was raised to the floor; less is rounding.
-const RAISED: f64 = 1.0 + 1e-5;
+/// A mass this many times the weight of the volume around a node was raised to the floor; less is
+/// rounding.
+const RAISED_MASS_RATIO: f64 = 1.0 + 1e-5;
 
-/// Makes model and state anew with the body at `index` as it was `split`.
+/// The model and state with the body at `index` as it was `split`.
 pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -> Severed {
     let whole = &model.bodies[index];
     let (group, groups) = bodies(whole, split);
@@ -69,8 +70,9 @@ pub(super) fn carry(model: &Model, state: &State, index: usize, split: &Split) -
     Severed { model: after, state: moved, faces: split.faces, pieces }
 }
 
-/// To which body each new node belongs, 0 being the one that stays, and their number. Of each connected part that the cut severed the piece with the most pinned nodes, then the
-/// largest, then the first, stays.
+/// The body of each new node, 0 being the one that stays, and the number of bodies. Of each
+/// connected part that the cut severed, the piece with the most pinned nodes, then the largest,
+/// then the first, stays.
 fn bodies(whole: &Body, split: &Split) -> (Vec<usize>, usize) {
     let (part, count) = parts(&split.tets, split.parent.len());
     let (old, old_count) = parts(&whole.rest.tets, split.before);
@@ -102,14 +104,15 @@ fn bodies(whole: &Body, split: &Split) -> (Vec<usize>, usize) {
 
 /// Masses of the new nodes.
 struct Masses {
-    /// By new node [kg].
+    /// By new node (kg).
     of: Vec<f64>,
     /// By old node: whether the mass floor raised it.
     raised: Vec<bool>,
 }
 
 impl Masses {
-    /// A node that fell apart leaves its mass, raised or not, to its copies by the volumes of the elements around them.
+    /// A node that fell apart leaves its mass, raised or not, to its copies by the volumes of the
+    /// elements around them.
     fn new(whole: &Body, split: &Split) -> Self {
         let mut before = vec![0.0; split.before];
         let mut after = vec![0.0; split.parent.len()];
@@ -122,7 +125,7 @@ impl Masses {
             let share = if split.fell_apart(parent) { after[i] / before[parent as usize] } else { 1.0 };
             share * whole.mass(parent as usize)
         };
-        let raised = |i: usize| whole.mass(i) > RAISED * whole.material.density * before[i];
+        let raised = |i: usize| whole.mass(i) > RAISED_MASS_RATIO * whole.material.density * before[i];
         Self { of: (0..after.len()).map(mass).collect(), raised: (0..before.len()).map(raised).collect() }
     }
 }
@@ -137,17 +140,18 @@ fn motion(whole: &Body, state: &BodyState, piece: &Body, nodes: &[u32]) -> BodyS
     BodyState {
         x: from.iter().map(|i| state.x[*i]).collect(),
         v: from.iter().map(|i| state.v[*i]).collect(),
-        falling: from.iter().map(|i| state.falling[*i]).collect(),
-        supported: from.iter().map(|i| state.supported[*i]).collect(),
         anchors: from.iter().enumerate().flat_map(|(k, i)| anchors(state, *i, k as u32)).collect(),
-        // Cut tissue settles against its neighbours anew.
+        // Cut tissue settles against its neighbours from the beginning.
         stretches: Vec::new(),
-        disturbed: state.disturbed,
-        relaxes: state.relaxes,
+        repair: state.repair,
+        warm: WarmStart {
+            falling: from.iter().map(|i| state.warm.falling[*i]).collect(),
+            supported: from.iter().map(|i| state.warm.supported[*i]).collect(),
+        },
     }
 }
 
-/// What vertex `from` touches and rubs against, for its copy `to`.
+/// The anchors of vertex `from`, for its copy `to`.
 fn anchors(state: &BodyState, from: usize, to: u32) -> impl Iterator<Item = Anchor> {
     let of = move |anchor: &&Anchor| anchor.vertex == from as u32;
     let first = state.anchors.partition_point(|anchor| anchor.vertex < from as u32);
@@ -166,7 +170,7 @@ fn free_name(bodies: &[Body], name: &str) -> String {
     }
 }
 
-/// Pieces do not collide with what the whole did not collide with.
+/// Filters pieces from what the whole did not touch.
 fn filter(filtered: &mut Vec<[usize; 2]>, whole: usize, pieces: std::ops::Range<usize>) {
     let known = filtered.clone();
     for [a, b] in known.into_iter().filter(|pair| pair.contains(&whole)) {
@@ -182,7 +186,7 @@ fn filter(filtered: &mut Vec<[usize; 2]>, whole: usize, pieces: std::ops::Range<
     filtered.sort_unstable();
 }
 
-/// Shares out grasps among the pieces.
+/// Distributes grasps among the pieces.
 struct Hands<'a> {
     split: &'a Split,
     /// By new node: the number of its piece and its node there.

@@ -1,14 +1,15 @@
-//! Which faces a cut opens: those between elements on different sides of it, once the sides are smooth.
+//! Which faces a cut opens: those between elements on different sides of it, after the sides are
+//! smoothed.
 
 use super::Cut;
 use glam::DVec3;
 use trocar_geometry::TetMesh;
 
 /// A piece of fewer elements does not come loose.
-const CRUMB: usize = 4;
+const MIN_PIECE_ELEMENTS: usize = 4;
 
-/// Most passes over the elements; a few are enough.
-const PASSES: usize = 64;
+/// Greatest number of passes over the elements; a few are enough.
+const MAX_PASSES: usize = 64;
 
 /// The faces of a mesh and which of them are open.
 pub(super) struct Opened {
@@ -20,7 +21,7 @@ pub(super) struct Opened {
     pub above: Vec<bool>,
 }
 
-/// Finds the faces of `mesh`, its nodes at `x` [m, world], that `cut` opens.
+/// Finds the faces of `mesh`, its nodes at `x` (m, world), that `cut` opens.
 pub(super) fn open(mesh: &TetMesh, x: &[DVec3], cut: &Cut) -> Opened {
     let height: Vec<f64> = x.iter().map(|x| (x - cut.point).dot(cut.normal)).collect();
     let above = mesh.tets.iter().map(|tet| tet.map(|i| height[i as usize]).iter().sum::<f64>() > 0.0).collect();
@@ -40,7 +41,8 @@ struct Sides<'a> {
 }
 
 impl Sides<'_> {
-    /// Corners of the face of element `t` opposite its corner `k`, in an order that both its elements agree on: their sums are the same to the bit.
+    /// Corners of the face of element `t` opposite its corner `k`, in an order that both its
+    /// elements agree on: their sums are the same to the bit.
     fn face(&self, t: usize, k: usize) -> [DVec3; 3] {
         let tet = self.mesh.tets[t];
         let mut nodes = [tet[(k + 1) % 4], tet[(k + 2) % 4], tet[(k + 3) % 4]];
@@ -66,15 +68,16 @@ impl Sides<'_> {
         (0..4).any(|k| self.is_open(t, k))
     }
 
-    /// Elements that the plane passes through change sides where less of their surface is open then. Every change makes the cut smaller, and only those elements may: a cut does not
-    /// wander off along a tapering organ.
+    /// Changes the sides of elements that the plane passes through where less of their surface is
+    /// open then. Every change makes the cut smaller, and only those elements may change: a cut
+    /// does not wander along a tapering organ.
     fn smooth(&mut self, height: &[f64]) {
         let crossed = |tet: &[u32; 4]| {
             let side = |i: u32| height[i as usize] > 0.0;
             tet.iter().any(|i| side(*i) != side(tet[0]))
         };
         let crossed: Vec<usize> = (0..self.mesh.tets.len()).filter(|t| crossed(&self.mesh.tets[*t])).collect();
-        for _ in 0..PASSES {
+        for _ in 0..MAX_PASSES {
             let mut changed = false;
             for &t in &crossed {
                 let (mut open, mut joined) = (0.0, 0.0);
@@ -94,9 +97,10 @@ impl Sides<'_> {
         }
     }
 
-    /// Gives pieces of too few elements to the side with which they share more area. Each joins a neighbour by it and opens no face anew, so this ends.
+    /// Gives pieces of too few elements to the side with which they share more area. Each joins a
+    /// neighbour by it and opens no face, so this ends.
     fn keep_crumbs(&mut self) {
-        for _ in 0..PASSES {
+        for _ in 0..MAX_PASSES {
             let mut changed = false;
             for t in 0..self.mesh.tets.len() {
                 if !self.has_open(t) {
@@ -119,7 +123,7 @@ impl Sides<'_> {
         }
     }
 
-    /// The elements that hang together with `t` by closed faces, if they are too few.
+    /// The elements connected with `t` by closed faces, if they are too few.
     fn crumb(&self, t: usize) -> Option<Vec<usize>> {
         let mut found = vec![t];
         let mut next = 0;
@@ -132,7 +136,7 @@ impl Sides<'_> {
                     found.push(other);
                 }
             }
-            if found.len() >= CRUMB {
+            if found.len() >= MIN_PIECE_ELEMENTS {
                 return None;
             }
             next += 1;

@@ -1,7 +1,9 @@
 //! Cutting: the blades of a tool part a body along the faces of its elements.
 //!
-//! A [`Model`] never changes, so a cut makes another one, in which the body that was cut is laid out anew and all others are shared. A pool of spare vertices in a body of fixed size
-//! would not help: the quasi-Newton solver needs another ordering and another factor after any change of topology, and they are more than half of what a cut costs ([`sever`] has the figures).
+//! A [`Model`] never changes, so a cut makes another one, in which the cut body is laid out again
+//! and all others are shared. A pool of spare vertices in a body of fixed size would not help: the
+//! quasi-Newton solver needs another ordering and another factor after any change of topology, and
+//! they are more than half of the cost of a cut ([`sever`] has the figures).
 
 mod carry;
 mod faces;
@@ -15,17 +17,18 @@ use glam::DVec3;
 pub struct Cut {
     /// The body that is cut.
     pub body: usize,
-    /// Middle of the rectangle [m, world].
+    /// Middle of the rectangle (m, world).
     pub point: DVec3,
     /// Unit normal of its plane.
     pub normal: DVec3,
     /// Unit vector in the plane: the blades' direction.
     pub along: DVec3,
-    /// Half of the rectangle's extent along `along` and across it [m], above 0. Infinity cuts without end.
+    /// Half of the rectangle's extent along `along` and across it (m), above 0. Infinity cuts
+    /// without end.
     pub half_extents: [f64; 2],
 }
 
-/// A body that came out of a cut.
+/// A body that a cut made.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Piece {
     /// Its index in the new model.
@@ -36,10 +39,10 @@ pub struct Piece {
     pub elements: Vec<u32>,
 }
 
-/// What a cut left.
+/// The result of a cut.
 #[derive(Clone, Debug)]
 pub struct Severed {
-    /// The model after the cut. It shares the bodies that were not cut with the model of before.
+    /// The model after the cut. It shares the bodies that were not cut with the model before.
     pub model: Model,
     /// The state after the cut, at the same instant.
     pub state: State,
@@ -63,7 +66,7 @@ impl Cut {
         offset.dot(self.along).abs() <= self.half_extents[0] && offset.dot(across).abs() <= self.half_extents[1]
     }
 
-    /// Says what is wrong, if anything.
+    /// Checks the cut.
     fn check(&self) -> std::result::Result<(), String> {
         if !(self.point.is_finite() && self.normal.is_finite() && self.along.is_finite()) {
             return Err(format!(
@@ -91,27 +94,40 @@ impl Cut {
 
 /// Cuts a body of `model` as it lies in `state`.
 ///
-/// Every element is on the side of the plane on which its centroid is, but for those that would hang by little, which go with the side they share more area with: no piece of fewer than
-/// four elements comes loose. Faces between elements of different sides whose centroid is within the cut's rectangle open, and a node falls into as many copies as the elements around
-/// it fall into groups that are joined by faces; the end of a crack stays joined. Elements are left as they are, so volumes are kept exactly.
+/// Every element is on the side of the plane on which its centroid is. Elements that would hang by
+/// little go with the side they share more area with: no piece of fewer than four elements comes
+/// loose. Faces between elements of different sides open if their centroid is within the cut's
+/// rectangle. A node falls into as many copies as the elements around it fall into groups that are
+/// joined by faces; the end of a crack stays joined. Elements stay as they are, so volumes are kept
+/// exactly.
 ///
-/// Copies have position, velocity and rest position of the node they come from, to the bit, and its mass by the volumes around them: masses are kept to rounding (6e-8 each). The
-/// mass floor is not applied again, so that a copy may be lighter than it; the implicit solvers do not need it, the explicit comparator's stable step becomes shorter. Copies of pinned nodes are
-/// pinned. Supports stay. Nodes that stay whole keep their number as long as the body is one, and one copy of each node that fell apart has its number; the others come last.
+/// Copies have the position, velocity and rest position of their node, to the bit, and shares of
+/// its mass by the volumes around them: masses are kept to rounding (6e-8 each). The mass floor is
+/// not applied again, so that a copy may be lighter than it; the implicit solvers do not need it,
+/// the explicit comparator's stable step becomes shorter. Copies of pinned nodes are pinned.
+/// Supports stay. Nodes that stay whole keep their number as long as the body is one, and one copy
+/// of each node that fell apart has its number; the others come last.
 ///
-/// What falls off becomes a body of its own at the end of the model, named `appendix.1`, `appendix.2`, ...; the piece that is pinned by the most nodes, or else is the largest, stays
-/// the body it was. New bodies collide with what the whole one collided with, and with the other pieces where the whole collided with itself. A body of loose parts keeps those that
-/// the cut did not sever.
+/// What falls off becomes a body of its own at the end of the model, named `appendix.1`,
+/// `appendix.2`, ... The piece that is pinned by the most nodes, or else is the largest, stays the
+/// body it was. New bodies touch what the whole one touched, and the other pieces if the whole
+/// touched itself. A body of loose parts keeps those that the cut did not sever.
 ///
-/// A grasp goes with the nodes it holds: one that holds nodes of several pieces becomes a grasp for each, one behind the other, jaw and tear force shared by the number of nodes.
-/// Of a held node's copies those stay held that share an element with a held node off the cut; if there are none, those of a piece that has any; and if there are none at all, every copy.
+/// A grasp follows the nodes it holds: one that holds nodes of several pieces becomes a grasp for
+/// each, in sequence, jaw and tear force shared by the number of nodes. Of a held node's copies,
+/// those stay held that share an element with a held node off the cut; if there are none, those of
+/// a piece that has any; and if there are none at all, every copy.
 ///
-/// A cut that meets nothing opens no face and leaves model and state as they were. The model and the state of before stay good: [`crate::Stepper::set_model`] goes over to either. On one
-/// thread of a Zen 5 core that others used at the same time, a tube of 7,752 elements is severed in 15 ms, and the fast schedule goes over in 23 ms (layout, ordering and factor of both pieces),
-/// which are two frames of 60 Hz together; 3,958 elements take 8 and 14 ms, 31,498 take 53 and 179 ms. Sweeps go over at once. (`cargo bench -p trocar-tissue --bench cutting`)
+/// A cut that meets nothing opens no face and leaves model and state as they were. The model and
+/// the state before remain valid: [`crate::Stepper::set_model`] changes to either. On one thread of
+/// a Zen 5 core that others used at the same time, a tube of 7,752 elements is severed in 15 ms,
+/// and the fast solver changes to the new model in 23 ms (layout, ordering and factor of both
+/// pieces), which are two frames of 60 Hz together; 3,958 elements take 8 and 14 ms, 31,498 take 53
+/// and 179 ms. Sweeps change at once. (`cargo bench -p trocar-tissue --bench cutting`)
 ///
 /// # Errors
-/// A body that is not there, a state of another model, numbers that are not finite, vectors that are not of unit length, a direction out of the plane, extents that are not above 0.
+/// A body that does not exist, a state of another model, numbers that are not finite, vectors that
+/// are not of unit length, a direction out of the plane, extents that are not above 0.
 pub fn sever(model: &Model, state: &State, cut: &Cut) -> Result<Severed> {
     let Some(body) = model.bodies.get(cut.body) else {
         return Err(Error::Model(format!("body {} is to be cut; there are {}", cut.body, model.bodies.len())));
@@ -208,7 +224,8 @@ mod tests {
 
     #[test]
     fn what_hangs_by_an_edge_stays_with_its_side() {
-        // A row, and on each of two of its cubes an element that shares an edge along the row with it and nothing else.
+        // A row, and on each of two of its cubes an element that shares an edge along the row with
+        // it and nothing else.
         let mut mesh = row(6);
         for i in [1u32, 4] {
             let first = mesh.vertices.len() as u32;
@@ -224,7 +241,8 @@ mod tests {
         let whole = model(&mesh, vec![]);
         let state = State::new(&whole);
         assert_eq!(whole.bodies[0].parts(), 1);
-        // Between the cubes: through an end of the edge by which the first hangs, of none, of that by which the second does.
+        // Between the cubes: through an end of the edge by which the first hangs, of none, of that
+        // by which the second does.
         for x in [4e-3, 6e-3, 8e-3] {
             let cut = sever(&whole, &state, &Cut::through(0, DVec3::X * x, DVec3::X)).unwrap();
             let parts = |p: &Piece| cut.model.bodies[p.body].parts();

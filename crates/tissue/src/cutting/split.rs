@@ -1,4 +1,4 @@
-//! Nodes fall into copies where the elements around them fall apart.
+//! Splits nodes into copies where the elements around them come apart.
 
 use super::faces::Opened;
 use trocar_geometry::TetMesh;
@@ -7,7 +7,8 @@ use trocar_geometry::TetMesh;
 pub(super) struct Split {
     /// Elements by the new nodes.
     pub tets: Vec<[u32; 4]>,
-    /// For each new node the node it was. The first are as many as there were, each itself; then copies, ascending.
+    /// For each new node the old one. The first are the old nodes themselves; then copies,
+    /// ascending.
     pub parent: Vec<u32>,
     /// Faces that came apart.
     pub faces: usize,
@@ -21,7 +22,7 @@ impl Split {
         self.parent[self.before..].binary_search(&node).is_ok()
     }
 
-    /// What became of a node of before: ascending.
+    /// The new nodes of an old one, ascending.
     pub fn copies(&self, node: u32) -> impl Iterator<Item = u32> {
         let added = &self.parent[self.before..];
         let first = added.partition_point(|parent| *parent < node);
@@ -39,7 +40,8 @@ pub(super) fn split(mesh: &TetMesh, opened: &Opened) -> Split {
     let mut fan = Fan::default();
     for (node, elements) in around_open_faces(mesh, opened) {
         fan.find(node, &elements, mesh, opened);
-        // The first group keeps the node, every other gets a copy, in the order of their first elements.
+        // The first group keeps the node, every other gets a copy, in the order of their first
+        // elements.
         let mut copy_of = vec![(fan.group[0], node)];
         for (k, &t) in elements.iter().enumerate() {
             let group = fan.group[k];
@@ -86,15 +88,16 @@ fn around_open_faces(mesh: &TetMesh, opened: &Opened) -> Vec<(u32, Vec<u32>)> {
 /// The elements around a node in groups.
 #[derive(Default)]
 struct Fan {
-    /// Group of each element: the place of its first.
+    /// Group of each element: the index of its first.
     group: Vec<usize>,
     /// The same without the cut.
     whole: Vec<usize>,
 }
 
 impl Fan {
-    /// Groups the `elements` around `node` by the faces that join them. What shared no face around the node even before the cut goes with what is on its side: the cut does not
-    /// take apart what it does not meet.
+    /// Groups the `elements` around `node` by the faces that join them. Elements that shared no
+    /// face around the node even before the cut go with those on their side: the cut does not take
+    /// apart what it does not meet.
     fn find(&mut self, node: u32, elements: &[u32], mesh: &TetMesh, opened: &Opened) {
         for group in [&mut self.group, &mut self.whole] {
             group.clear();
@@ -124,7 +127,7 @@ impl Fan {
     }
 }
 
-/// Makes the groups of `i` and `j` one. Fans have some twenty elements.
+/// Merges the groups of `i` and `j`. Fans have some twenty elements.
 fn join(group: &mut [usize], i: usize, j: usize) {
     let (keep, drop) = (group[i].min(group[j]), group[i].max(group[j]));
     group.iter_mut().filter(|group| **group == drop).for_each(|group| *group = keep);
@@ -148,7 +151,8 @@ fn count_faces(before: &[[u32; 4]], after: &[[u32; 4]], opened: &Opened) -> usiz
     count
 }
 
-/// Number of the connected part of each node; parts are numbered by their first nodes, and hang together by nodes.
+/// Number of the connected part of each node; parts are connected by nodes and numbered by their
+/// first.
 pub(super) fn parts(tets: &[[u32; 4]], nodes: usize) -> (Vec<u32>, usize) {
     let mut root: Vec<u32> = (0..nodes as u32).collect();
     for tet in tets {

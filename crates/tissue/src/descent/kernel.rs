@@ -8,9 +8,9 @@ use glam::{Mat3A, Vec3A};
 /// Negative gradient and Hessian block of an energy at one vertex.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Local {
-    /// Force [N].
+    /// Force (N).
     pub force: Vec3A,
-    /// Hessian block [N/m], symmetric.
+    /// Hessian block (N/m), symmetric.
     pub block: Mat3A,
 }
 
@@ -33,8 +33,9 @@ impl Local {
     }
 }
 
-/// Gradient of the element's volume ratio J with respect to the vertex [1/m]: a third of the area vector of the face opposite over the rest volume.
-/// J is affine in any single vertex: J = gradient.(x - a), a being any corner of that face.
+/// Gradient of the element's volume ratio J with respect to the vertex (1/m): a third of the area
+/// vector of the opposite face over the rest volume. J is affine in any single vertex: J =
+/// gradient.(x - a), a being any corner of that face.
 #[inline(always)]
 pub(crate) fn volume_gradient(corner: &Corner, [a, b, c]: [Vec3A; 3]) -> Vec3A {
     (b - a).cross(c - a) * corner.inverse_6v
@@ -43,11 +44,11 @@ pub(crate) fn volume_gradient(corner: &Corner, [a, b, c]: [Vec3A; 3]) -> Vec3A {
 /// One element as a vertex sees it now.
 #[derive(Clone, Copy)]
 pub(crate) struct Seen {
-    /// The vertex [m].
+    /// The vertex (m).
     pub x: Vec3A,
-    /// The other three corners [m].
+    /// The other three corners (m).
     pub others: [Vec3A; 3],
-    /// [`volume_gradient`] [1/m].
+    /// [`volume_gradient`] (1/m).
     pub gradient: Vec3A,
     /// Volume over rest volume.
     pub ratio: f32,
@@ -59,11 +60,12 @@ pub(crate) trait VertexElasticity: Sync {
     fn add(&self, body: &Body, k: usize, seen: &Seen, local: &mut Local);
 }
 
-/// A material's energy of the volume ratio: its block V0 psi''(J) g g' is positive semidefinite as it is. It is all that is left of [`StableNeoHookean`], whose
-/// other part, mu/2 tr(F'F), is quadratic in the positions: a constant Laplacian along the edges, added by the sweep.
+/// The energy of the volume ratio of a material: its block V0 psi''(J) g g' is positive
+/// semidefinite. It is all that remains of [`StableNeoHookean`], whose other part, mu/2 tr(F'F), is
+/// quadratic in the positions: a constant Laplacian along the edges, added by the sweep.
 pub(crate) struct VolumeTerm {
     energy: VolumeEnergy,
-    /// Volume modulus [Pa].
+    /// Volume modulus (Pa).
     pub lambda: f32,
     /// Volume ratio at which the quadratic is least.
     pub alpha: f32,
@@ -71,15 +73,15 @@ pub(crate) struct VolumeTerm {
 
 impl VolumeTerm {
     /// Above this volume ratio the volume term is its plain quadratic.
-    pub const PLAIN: f32 = 0.25;
+    pub const MIN_PLAIN_RATIO: f32 = 0.25;
 
-    /// Its first and second derivatives [Pa].
+    /// Its first and second derivatives (Pa).
     #[inline(always)]
     pub fn at(&self, ratio: f32) -> (f32, f32) {
-        if ratio > Self::PLAIN {
+        if ratio > Self::MIN_PLAIN_RATIO {
             return (self.lambda * (ratio - self.alpha), self.lambda);
         }
-        // The guard keeps J positive; this keeps the logarithm finite if it ever were not.
+        // The guard keeps J positive; this keeps the logarithm finite if it does not.
         let (_, slope, curvature) = self.energy.at(f64::from(ratio).max(1e-4));
         (slope as f32, curvature as f32)
     }
@@ -101,7 +103,8 @@ impl VertexElasticity for VolumeTerm {
     }
 }
 
-/// [`crate::StVenantKirchhoff`] with its block made positive semidefinite: the geometric stiffness m'Sm is dropped where it is negative.
+/// [`crate::StVenantKirchhoff`] with its block made positive semidefinite: the geometric stiffness
+/// m'Sm is dropped where it is negative.
 pub(crate) struct GreenStrain {
     pub mu: f32,
     pub lambda: f32,
@@ -126,7 +129,8 @@ impl VertexElasticity for GreenStrain {
     }
 }
 
-/// F and the vertex's own rest gradient, from the other three corners' rest gradients and positions.
+/// F and the vertex's own rest gradient, from the other three corners' rest gradients and
+/// positions.
 #[inline(always)]
 fn deformation(gradients: &[Vec3A; 3], x: Vec3A, others: [Vec3A; 3]) -> (Mat3A, Vec3A) {
     // F = sum over corners of x_c m_c', and the four rest gradients m sum to zero.
@@ -140,8 +144,9 @@ fn deformation(gradients: &[Vec3A; 3], x: Vec3A, others: [Vec3A; 3]) -> (Mat3A, 
     (f, -(gradients[0] + gradients[1] + gradients[2]))
 }
 
-/// [`crate::Corotated`]. Its block has 2 mu (|m|^2 I - K) with the rotation's part K = R [m]x' (tr(S) I - S)^-1 [m]x R'. K is at most |m|^2/2 in
-/// stretched tissue; in squeezed tissue it would make the block indefinite, and is cut to that.
+/// [`crate::Corotated`]. Its block has 2 mu (|m|^2 I - K) with the rotation's part K = R skew(m)'
+/// (tr(S) I - S)^-1 skew(m) R'. K is at most |m|^2/2 in stretched tissue. In squeezed tissue it
+/// would make the block indefinite, and is limited to that.
 pub(crate) struct RotatedStrain {
     pub mu: f32,
     pub volume: VolumeTerm,
@@ -187,8 +192,8 @@ fn inverse(m: &Mat3A) -> Mat3A {
     Mat3A::from_cols(bc, ca, ab) * (1.0 / a.dot(bc))
 }
 
-/// The rotation in F = R S by Newton's iteration, as the oracle's in double precision ([`crate::Corotated`]). The guard keeps det F above 0;
-/// the floor keeps this finite if it ever were not.
+/// The rotation in F = R S by Newton's iteration, as [`crate::Corotated`] computes it in double
+/// precision. The guard keeps det F above 0; the floor keeps this finite if it does not.
 #[inline(always)]
 fn rotation(f: Mat3A) -> Mat3A {
     let norm = |m: &Mat3A| m.x_axis.length_squared() + m.y_axis.length_squared() + m.z_axis.length_squared();

@@ -1,12 +1,15 @@
 //! The sweep of stable neo-Hookean tissue, sixteen vertices at once.
 //!
-//! Its block at a vertex is V0 (mu |m|^2 I + psi'' g g'), g the gradient of the volume ratio. The first part is a constant Laplacian along the edges. The second needs of each
-//! element the area vector A of the face opposite the vertex, g = A / (6 V0); a strip ([`crate::descent::strip`]) yields a face with each point that is read. What is rare (elements
-//! below a quarter of their volume, vertices that touch something) is added lane by lane.
+//! The block at a vertex is V0 (mu |m|^2 I + psi'' g g'), g being the gradient of the volume ratio.
+//! The first part is a constant Laplacian along the edges. The second needs the area vector A of
+//! the face opposite the vertex in each element, g = A / (6 V0); a strip ([`crate::body::strip`])
+//! yields a face with each point that is read. Rare parts (elements below a quarter of their
+//! volume, contacts) are added lane by lane.
 
-use crate::descent::groups::{Group, Groups};
-use crate::descent::kernel::{Local, VolumeTerm};
-use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE, Substep, allowed_share};
+use super::kernel::{Local, VolumeTerm};
+use super::vertex_step::Substep;
+use crate::body::groups::{Group, Groups};
+use crate::inversion_guard::{KEPT_SHARE, MIN_SQUARED_LENGTH, MIN_VOLUME_RATIO, allowed_share};
 use crate::lanes::{add, cross, dot, scale, sub};
 use crate::registers::{
     BLOCK, Block, Mask, Reg, Reg3, bits, lanes, load, load3, part_of, parts, rows, signed, splat, store, store3, width,
@@ -15,11 +18,11 @@ use fearless_simd::{ExtractToken, Select, Simd, SimdBase, SimdMask, dispatch};
 use glam::{Mat3A, Vec3A};
 use rayon::prelude::*;
 
-/// Longest strip that is swept in lanes; groups with longer ones are swept vertex by vertex.
-const STEPS: usize = 64;
+/// Longest strip that is swept in lanes. Groups with longer ones are swept vertex by vertex.
+const MAX_STRIP_STEPS: usize = 64;
 
-/// Groups a task; a colour of fewer than two tasks is swept by one thread.
-const CHUNK: usize = 16;
+/// Groups a task. A colour of fewer than two tasks is swept by one thread.
+const GROUPS_PER_TASK: usize = 16;
 
 /// A body's sweep.
 pub(crate) struct LaneSweep<'a> {
@@ -28,10 +31,11 @@ pub(crate) struct LaneSweep<'a> {
     pub term: &'a VolumeTerm,
 }
 
-/// A group's area vectors and volume ratios, kept between the force and the guard, its sums, and where its vertices go.
+/// Area vectors and volume ratios of a group, kept between the force and the guard; its sums, and
+/// the new positions of its vertices.
 struct Memory {
-    faces: [Face; STEPS],
-    /// Forces and blocks, as in [`Sums`]. They are here and not in registers while anything is called.
+    faces: [Face; MAX_STRIP_STEPS],
+    /// Forces and blocks, as in [`Sums`]. They are in memory and not in registers during calls.
     sums: [Block<f32>; 9],
     to: [Block<f32>; 3],
 }
@@ -45,7 +49,7 @@ struct Face {
 impl Memory {
     fn new() -> Self {
         let zero = Block([0.0; BLOCK]);
-        Self { faces: [Face { area: [zero; 3], ratio: zero }; STEPS], sums: [zero; 9], to: [zero; 3] }
+        Self { faces: [Face { area: [zero; 3], ratio: zero }; MAX_STRIP_STEPS], sums: [zero; 9], to: [zero; 3] }
     }
 }
 
@@ -102,7 +106,7 @@ impl<S: Simd> Sums<S> {
         [dot(bc, f), dot(ca, f), dot(ab, f)]
     }
 
-    /// The sums of a part, out of memory.
+    /// Loads the sums of a part.
     #[inline(always)]
     fn load(simd: S, from: &[Block<f32>; 9], part: usize) -> Self {
         let mut sums = Self { force: [splat(simd, 0.0); 3], block: [splat(simd, 0.0); 6] };
@@ -115,7 +119,7 @@ impl<S: Simd> Sums<S> {
         sums
     }
 
-    /// Puts the sums of a part into memory.
+    /// Stores the sums of a part.
     #[inline(always)]
     fn store(&self, to: &mut [Block<f32>; 9], part: usize) {
         for c in 0..3 {
@@ -133,27 +137,27 @@ impl LaneSweep<'_> {
         assert!(x.len() == self.groups.points() && self.substep.start.len() == x.len());
         assert!(self.substep.predictor.len() == x.len());
         let level = self.substep.isa.level();
-        if self.substep.alone || self.groups.colors().all(|groups| groups.len() < 2 * CHUNK) {
+        if self.substep.single_thread || self.groups.colors().all(|groups| groups.len() < 2 * GROUPS_PER_TASK) {
             dispatch!(level, simd => self.in_place(simd, self.groups.all(), x));
             return;
         }
         for groups in self.groups.colors() {
-            if groups.len() < 2 * CHUNK {
+            if groups.len() < 2 * GROUPS_PER_TASK {
                 dispatch!(level, simd => self.in_place(simd, groups, x));
                 continue;
             }
             let (first, last) = (groups[0].first as usize, &groups[groups.len() - 1]);
             let end = (last.first + last.count) as usize;
-            let (all, chunks) = (&*x, groups.par_chunks(CHUNK));
+            let (all, chunks) = (&*x, groups.par_chunks(GROUPS_PER_TASK));
             // All groups of a colour but the last are full.
-            moved[first..end].par_chunks_mut(CHUNK * BLOCK).zip(chunks).for_each(|(moved, groups)| {
+            moved[first..end].par_chunks_mut(GROUPS_PER_TASK * BLOCK).zip(chunks).for_each(|(moved, groups)| {
                 dispatch!(level, simd => self.apart(simd, groups, all, moved));
             });
             x[first..end].copy_from_slice(&moved[first..end]);
         }
     }
 
-    /// Groups one after the other, in place.
+    /// Sweeps groups one after the other, in place.
     #[inline(always)]
     fn in_place<S: Simd>(&self, simd: S, groups: &[Group], x: &mut [Vec3A]) {
         let mut memory = Memory::new();
@@ -164,7 +168,8 @@ impl LaneSweep<'_> {
         }
     }
 
-    /// Groups of one colour: where their vertices go from the positions of all, the first group's vertices first.
+    /// Computes where the vertices of the groups of one colour go, from the positions of all; the
+    /// first group's vertices come first.
     #[inline(always)]
     fn apart<S: Simd>(&self, simd: S, groups: &[Group], x: &[Vec3A], moved: &mut [Vec3A]) {
         let mut memory = Memory::new();
@@ -178,15 +183,15 @@ impl LaneSweep<'_> {
         }
     }
 
-    /// Finds where a group's vertices go; returns the lanes that move.
+    /// Computes where the vertices of a group go. Returns the lanes that move.
     #[inline(always)]
     fn relax<S: Simd>(&self, simd: S, group: &Group, x: &[Vec3A], memory: &mut Memory) -> u16 {
         let active = group.active(self.substep.fixed);
-        // There are points; nobody else has to ask.
+        // There are points; callees need not check.
         if active == 0 || x.is_empty() || self.substep.start.is_empty() || self.substep.predictor.is_empty() {
             return 0;
         }
-        if self.groups.steps_of(group).len() > STEPS {
+        if self.groups.steps_of(group).len() > MAX_STRIP_STEPS {
             for lane in (0..BLOCK).filter(|lane| active >> lane & 1 == 1) {
                 let to = self.substep.relax(self.term, group.first as usize + lane, x).to_array();
                 memory.to.iter_mut().zip(to).for_each(|(block, value)| block.0[lane] = value);
@@ -205,11 +210,12 @@ impl LaneSweep<'_> {
         active
     }
 
-    /// Adds the dashpot along the edge to a step's point, which is at `d` from the vertex and was at `before`.
+    /// Adds the dashpot along the edge to a step's point, which is at `d` from the vertex and was
+    /// at `before`.
     #[inline(always)]
     fn add_dashpot<S: Simd>(&self, damping: Reg<S>, before: Reg3<S>, d: Reg3<S>, sums: &mut Sums<S>) {
         let (simd, h) = (damping.token(), self.substep.h);
-        let length = dot(before, before).max(splat(simd, LEAST_SQUARE));
+        let length = dot(before, before).max(splat(simd, MIN_SQUARED_LENGTH));
         let stiffness = damping * splat(simd, 1.0 / h) / length;
         let shortening = (dot(before, before) - dot(d, d)) * splat(simd, 0.5);
         sums.pull(stiffness * shortening, d);
@@ -234,7 +240,7 @@ impl LaneSweep<'_> {
         let pulled = sub(rows(simd, self.substep.predictor, &group.own, part), here);
         let mut sums: Sums<S> =
             Sums { force: scale(pulled, inertia), block: [diagonal, zero, zero, diagonal, zero, diagonal] };
-        let (sixth, plain) = (splat(simd, self.term.lambda / 6.0), splat(simd, VolumeTerm::PLAIN));
+        let (sixth, plain) = (splat(simd, self.term.lambda / 6.0), splat(simd, VolumeTerm::MIN_PLAIN_RATIO));
         let pressure = splat(simd, self.term.lambda * self.term.alpha / 6.0);
         let steps = self.groups.steps_of(group);
         let drops = &self.groups.drops_of(group)[..steps.len()];
@@ -268,7 +274,8 @@ impl LaneSweep<'_> {
             let six_v = zero - dot(area, p);
             let inverse = load(simd, &step.inverse_6v, part);
             let ratio = inverse * six_v;
-            // V0 psi'' = |inverse| lambda / 6 on A, and V0 psi' = lambda / 6 (|inverse| 6V - alpha sign).
+            // V0 psi'' = |inverse| lambda / 6 on A, and V0 psi' = lambda / 6 (|inverse| 6V - alpha
+            // sign).
             let stiffness = inverse.abs() * sixth;
             sums.pull(stiffness * six_v - signed(simd, pressure, inverse), area);
             sums.add_outer(stiffness, area);
@@ -288,14 +295,14 @@ impl LaneSweep<'_> {
         store3::<S>(to, &mut memory.to, part);
     }
 
-    /// Vertices of a group that something presses or holds.
+    /// Vertices of a group that are in contact.
     #[inline(always)]
     fn pressed(&self, group: &Group, x: &[Vec3A]) -> u16 {
         let (contacts, first) = (self.substep.contacts, group.first as usize);
         if !contacts.any(first..first + group.count as usize) {
             return 0;
         }
-        let pressed = |i: usize| contacts.of(i).any(|touch| touch.push(x[i]).is_some());
+        let pressed = |i: usize| contacts.of(i).any(|contact| contact.push(x[i]).is_some());
         (0..group.count as usize).fold(0, |lanes, lane| lanes | u16::from(pressed(first + lane)) << lane)
     }
 
@@ -317,13 +324,14 @@ impl LaneSweep<'_> {
         }
     }
 
-    /// What the plain sums lack in one lane: what it touches, and the barrier in elements of little volume.
+    /// Adds what the plain sums lack in one lane: contacts, and the barrier in elements of little
+    /// volume.
     fn add_rare_to(&self, local: &mut Local, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory) {
         let vertex = group.first as usize + lane;
-        self.substep.add_touches(vertex, x[vertex], local);
+        self.substep.add_contacts(vertex, x[vertex], local);
         for (step, face) in self.groups.steps_of(group).iter().zip(&memory.faces).skip(2) {
             let (inverse, ratio) = (step.inverse_6v.0[lane], face.ratio.0[lane]);
-            if inverse != 0.0 && ratio <= VolumeTerm::PLAIN {
+            if inverse != 0.0 && ratio <= VolumeTerm::MIN_PLAIN_RATIO {
                 let gradient = inverse * Vec3A::from(face.area.each_ref().map(|area| area.0[lane]));
                 let volume = 1.0 / (6.0 * inverse.abs());
                 let (slope, curvature) = self.term.at(ratio);
@@ -337,7 +345,7 @@ impl LaneSweep<'_> {
     /// The step, cut where it would take too much of an element's volume.
     #[inline(always)]
     fn guarded<S: Simd>(&self, simd: S, group: &Group, part: usize, step: Reg3<S>, memory: &Memory) -> Reg3<S> {
-        let (kept, least) = (splat(simd, KEPT_SHARE), splat(simd, FLOOR));
+        let (kept, least) = (splat(simd, KEPT_SHARE), splat(simd, MIN_VOLUME_RATIO));
         let mut too_far = Mask::<S>::splat(simd, false);
         let steps = self.groups.steps_of(group);
         for k in 2..steps.len() {

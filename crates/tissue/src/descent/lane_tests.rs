@@ -1,9 +1,9 @@
 //! The sweep in lanes does what the sweep vertex by vertex does, with any instructions.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-use crate::contact::Contacts;
-use crate::descent::kernel::Kernel;
-use crate::descent::sweep::Substep;
+use super::kernel::Kernel;
+use super::vertex_step::Substep;
+use crate::contact::ContactSet;
 use crate::support::{SupportField, SupportPlane};
 use crate::{BodyDescription, ConstitutiveModel, Isa, Material, Model, ModelBuilder};
 use glam::{DVec3, Vec3A};
@@ -89,7 +89,7 @@ fn lanes_do_what_single_vertices_do() {
         let fixed: Vec<bool> = (0..body.len()).map(|i| body.vertices[i].pinned || i % 7 == 3).collect();
         let sweep = |isa| {
             let (start, predictor) = (jolted(1e-4, 200), jolted(2e-3, 400));
-            let contacts = Contacts::of_everything(body, &start);
+            let contacts = ContactSet::of_everything(body, &start);
             let substep = Substep {
                 body,
                 h: 1.0 / 480.0,
@@ -98,12 +98,12 @@ fn lanes_do_what_single_vertices_do() {
                 fixed: &fixed,
                 contacts: &contacts,
                 isa,
-                alone: false,
+                single_thread: false,
             };
             let (mut x, mut moved, mut expected) = (begin.clone(), begin.clone(), begin.clone());
-            substep.sweep(&mut x, &mut moved);
+            super::sweep::sweep(&substep, &mut x, &mut moved);
             let Kernel::StableNeoHookean(term) = Kernel::of(body) else { return (x, expected) };
-            substep.sweep_with(&term, &mut expected, &mut moved);
+            super::sweep::sweep_with(&substep, &term, &mut expected, &mut moved);
             (x, expected)
         };
         let (x, expected) = sweep(Isa::Portable);

@@ -6,20 +6,23 @@ use glam::{DMat3, DVec3};
 
 /// Psi = mu |F - R|^2 + lambda/2 (J - 1)^2, R being the rotation in F = R S.
 ///
-/// Stomakhin, Howes, Schroeder and Teran, "Energetically consistent invertible elasticity", 2012, section 3.3 (their fixed corotated model). Small strains obey
-/// Hooke's law with Lame's mu and lambda exactly, and pure shape change costs what linear elasticity says at any rotation. Like
-/// [`super::StableNeoHookean`] it is finite for flat elements, so it has the same barrier below a fifth of the rest volume, with (lambda + mu)/20 ln(J/0.2)^2;
-/// it is not defined for inverted elements, which no solver here lets happen.
+/// Stomakhin, Howes, Schroeder and Teran, "Energetically consistent invertible elasticity", 2012,
+/// section 3.3 (their fixed corotated model). Small strains obey Hooke's law with Lame's mu and
+/// lambda exactly, and pure shape change costs what linear elasticity says at any rotation. Like
+/// [`super::StableNeoHookean`] it is finite for flat elements, so it has the same barrier below a
+/// fifth of the rest volume, with (lambda + mu)/20 ln(J/0.2)^2. It is not defined for inverted
+/// elements, which no solver here produces.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Corotated {
-    /// Lame's mu [Pa].
+    /// Lame's mu (Pa).
     pub mu: f64,
-    /// Lame's lambda [Pa].
+    /// Lame's lambda (Pa).
     pub lambda: f64,
 }
 
-/// Most steps of the polar decomposition; ten are enough for a condition number of 1e16.
-const MOST_STEPS: usize = 30;
+/// Greatest number of steps of the polar decomposition; ten are enough for a condition number of
+/// 1e16.
+const MAX_POLAR_STEPS: usize = 30;
 
 impl Corotated {
     /// The energy of the volume ratio.
@@ -38,7 +41,8 @@ impl Hyperelastic for Corotated {
         (f - rotation(f)) * (2.0 * self.mu) + self.volume().stress(f)
     }
 
-    /// The rotation's own change is R [w]x with (tr(S) I - S) w = axial(R'dF - dF'R) (McAdams and others, "Efficient elasticity for character skinning", 2011).
+    /// The rotation itself changes by R skew(w) with (tr(S) I - S) w = axial(R'dF - dF'R) (McAdams
+    /// and others, "Efficient elasticity for character skinning", 2011).
     fn stress_change(&self, f: DMat3, change: DMat3) -> DMat3 {
         let r = rotation(f);
         let s = r.transpose() * f;
@@ -51,18 +55,19 @@ impl Hyperelastic for Corotated {
     }
 }
 
-/// The rotation R of the polar decomposition F = R S, for det F above 0: Newton's iteration with Frobenius scaling (Higham, "Computing the polar decomposition",
-/// 1986). For a singular F it is not finite.
+/// The rotation R of the polar decomposition F = R S, for det F above 0: Newton's iteration with
+/// Frobenius scaling (Higham, "Computing the polar decomposition", 1986). For a singular F it is
+/// not finite.
 fn rotation(f: DMat3) -> DMat3 {
     let mut x = f;
-    for _ in 0..MOST_STEPS {
+    for _ in 0..MAX_POLAR_STEPS {
         let cofactor = cofactor(x);
         let inverse = cofactor * (1.0 / x.x_axis.dot(cofactor.x_axis));
         let scale = (dot(inverse, inverse) / dot(x, x)).powf(0.25);
         let next = (x * scale + inverse * (1.0 / scale)) * 0.5;
         let change = next - x;
         x = next;
-        // It converges quadratically: what is left is the square of this.
+        // It converges quadratically: the remaining error is the square of this.
         if dot(change, change) < 1e-18 {
             break;
         }

@@ -1,7 +1,8 @@
 //! Hyperelastic materials.
 //!
-//! Each model says its energy and stress in double precision, the plain textbook form that tests hold the fast kernels to; the kernels of
-//! the sweeps stand in [`crate::descent::kernel`].
+//! Each model gives its energy and stress in double precision, in the textbook form that tests
+//! compare the fast kernels with. The kernels of the sweeps are in `descent`, those of the
+//! quasi-Newton solver in `quasi_newton`.
 
 mod corotated;
 mod st_venant_kirchhoff;
@@ -17,13 +18,14 @@ use glam::DMat3;
 
 /// A hyperelastic material: a stored energy of the deformation gradient F.
 pub trait Hyperelastic: Send + Sync {
-    /// Energy density at F [J/m3]; 0 and smallest at rest.
+    /// Energy density at F (J/m3); 0 and smallest at rest.
     fn energy(&self, f: DMat3) -> f64;
 
-    /// First Piola-Kirchhoff stress P = dPsi/dF [Pa].
+    /// First Piola-Kirchhoff stress P = dPsi/dF (Pa).
     fn stress(&self, f: DMat3) -> DMat3;
 
-    /// Change of the stress when F changes by `change`, to first order: d2Psi/dF2 applied to `change` [Pa]; symmetric as a map.
+    /// First-order change of the stress when F changes by `change`: d2Psi/dF2 applied to `change`
+    /// (Pa); symmetric as a map.
     fn stress_change(&self, f: DMat3, change: DMat3) -> DMat3;
 }
 
@@ -49,23 +51,27 @@ impl ConstitutiveModel {
 pub struct Material {
     /// Constitutive model.
     pub model: ConstitutiveModel,
-    /// Young's modulus [Pa].
+    /// Young's modulus (Pa).
     pub young_modulus: f64,
     /// Poisson's ratio.
     pub poisson_ratio: f64,
-    /// Density [kg/m3].
+    /// Density (kg/m3).
     pub density: f64,
-    /// Shear viscosity eta [Pa s]; rigid motion is not damped.
+    /// Shear viscosity eta (Pa s); rigid motion is not damped.
     ///
-    /// Each edge of rest length L has a dashpot of 15 eta V/L^2, V being its share of the volume (a sixth of each element at it). Along edges of
-    /// all directions the mean of (n'Dn)^2 is (2 D:D + tr(D)^2)/15 for a rate of strain D, so that an isotropic mesh dissipates eta (2 D:D + tr(D)^2) per volume: a Newtonian
-    /// fluid of shear viscosity eta and bulk viscosity 5/3 eta. A mesh whose edges prefer directions is off: the lattice mesher's by up to 11% with the direction of the
-    /// shear (3% in the mean), a regular grid of six tetrahedra a cube by 30%. Strain is told by the change of an edge's squared length over a substep, which no rotation changes.
+    /// Each edge of rest length L has a dashpot of 15 eta V/L^2, V being its share of the volume (a
+    /// sixth of each element at it). Along edges of all directions the mean of (n'Dn)^2 is (2 D:D +
+    /// tr(D)^2)/15 for a rate of strain D, so that an isotropic mesh dissipates eta (2 D:D +
+    /// tr(D)^2) per volume: a Newtonian fluid of shear viscosity eta and bulk viscosity 5/3 eta. A
+    /// mesh whose edges prefer directions deviates: that of the lattice mesher by up to 11% with
+    /// the direction of the shear (3% in the mean), a regular grid of six tetrahedra a cube by 30%.
+    /// The strain of an edge is the change of its squared length over a substep, which no rotation
+    /// changes.
     pub viscosity: f64,
 }
 
 impl Material {
-    /// Lame's parameters (mu, lambda) [Pa]: mu = E/(2(1+nu)), lambda = E nu/((1+nu)(1-2nu)).
+    /// Lame's parameters (mu, lambda) (Pa): mu = E/(2(1+nu)), lambda = E nu/((1+nu)(1-2nu)).
     pub fn lame(&self) -> (f64, f64) {
         let (e, nu) = (self.young_modulus, self.poisson_ratio);
         (e / (2.0 * (1.0 + nu)), e * nu / ((1.0 + nu) * (1.0 - 2.0 * nu)))
@@ -91,7 +97,8 @@ mod tests {
         Material { model, young_modulus: 12e3, poisson_ratio: 0.45, density: 1200.0, viscosity: 0.0 }
     }
 
-    /// Some deformation gradients: near rest, sheared, squeezed, stretched, squeezed into the volume barrier.
+    /// Some deformation gradients: near rest, sheared, squeezed, stretched, squeezed into the
+    /// volume barrier.
     fn deformations() -> [DMat3; 5] {
         let skew =
             DMat3::from_cols(DVec3::new(1.1, 0.2, -0.1), DVec3::new(-0.3, 0.8, 0.25), DVec3::new(0.05, -0.2, 1.3));
@@ -156,7 +163,8 @@ mod tests {
         }
     }
 
-    /// A bar pulled by a small strain shows its Young's modulus and, sides left free, its Poisson ratio.
+    /// A bar pulled by a small strain shows its Young's modulus and, sides left free, its Poisson
+    /// ratio.
     #[test]
     fn small_strains_show_the_moduli() {
         for model in ConstitutiveModel::ALL {

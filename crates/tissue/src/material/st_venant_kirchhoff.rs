@@ -4,13 +4,14 @@ use super::Hyperelastic;
 use super::volume::trace;
 use glam::DMat3;
 
-/// Psi = mu tr(E^2) + lambda/2 tr(E)^2 with Green's strain E = (F'F - I)/2 (paper, section IV-B). Its compressive stress peaks at a
-/// stretch of 0.577 and then falls to nothing: it cannot hold a squeezed element.
+/// Psi = mu tr(E^2) + lambda/2 tr(E)^2 with Green's strain E = (F'F - I)/2 (paper, section IV-B).
+/// Its compressive stress peaks at a stretch of 0.577 and then falls to nothing: it cannot hold a
+/// squeezed element.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StVenantKirchhoff {
-    /// Lame's mu [Pa].
+    /// Lame's mu (Pa).
     pub mu: f64,
-    /// Lame's lambda [Pa].
+    /// Lame's lambda (Pa).
     pub lambda: f64,
 }
 

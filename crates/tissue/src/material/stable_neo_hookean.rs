@@ -6,28 +6,32 @@ use glam::DMat3;
 
 /// Psi = mu/2 (tr(F'F) - 3) + lambda'/2 (J - alpha)^2 - const, alpha = 1 + mu/lambda'.
 ///
-/// Smith, De Goes and Kim, "Stable neo-Hookean flesh simulation", 2018, without the logarithmic term, which only matters at the origin of F. It is finite for
-/// flat elements, though, and an element between a rigid grasp and pinned tissue can be pulled flat; below a fifth of its rest volume a barrier
-/// lambda'/20 ln(J/0.2)^2 is therefore added. Its linearisation at rest is 2 mu eps + (lambda' - mu) tr(eps) I, so lambda' = lambda + mu
-/// makes small strains obey Hooke's law with Lame's mu and lambda exactly.
+/// Smith, De Goes and Kim, "Stable neo-Hookean flesh simulation", 2018, without the logarithmic
+/// term, which only matters at the origin of F. The energy is finite for flat elements, though, and
+/// an element between a rigid grasp and pinned tissue can be pulled flat; so a barrier lambda'/20
+/// ln(J/0.2)^2 is added below a fifth of the rest volume. The linearisation at rest is 2 mu eps +
+/// (lambda' - mu) tr(eps) I, so lambda' = lambda + mu makes small strains obey Hooke's law with
+/// Lame's mu and lambda exactly.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StableNeoHookean {
-    /// Shear modulus [Pa].
+    /// Shear modulus (Pa).
     pub mu: f64,
-    /// Volume modulus lambda' [Pa].
+    /// Volume modulus lambda' (Pa).
     pub lambda: f64,
-    /// Volume ratio towards which the volume term pulls; above 1, it balances the first term at rest.
+    /// Volume ratio at which the volume term is least; above 1, because it balances the first term
+    /// at rest.
     pub alpha: f64,
 }
 
 impl StableNeoHookean {
-    /// From Lame's parameters [Pa].
+    /// From Lame's parameters (Pa).
     pub fn new(mu: f64, lame_lambda: f64) -> Self {
         let lambda = lame_lambda + mu;
         Self { mu, lambda, alpha: 1.0 + mu / lambda }
     }
 
-    /// Energy density of the volume ratio J [J/m3], and its first and second derivatives; convex for J above 0.
+    /// Energy density of the volume ratio J (J/m3), and its first and second derivatives; convex
+    /// for J above 0.
     pub fn volume_term(&self, j: f64) -> (f64, f64, f64) {
         self.volume().at(j)
     }

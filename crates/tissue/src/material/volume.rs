@@ -1,4 +1,5 @@
-//! The volume part of a stored energy, shared by the materials that have one, and the algebra of the volume ratio J = det F.
+//! The volume part of a stored energy, shared by the materials that have one, and the algebra of
+//! the volume ratio J = det F.
 
 use glam::DMat3;
 
@@ -6,25 +7,26 @@ use glam::DMat3;
 const BARRIER_BEGINS: f64 = 0.2;
 const BARRIER_STRENGTH: f64 = 0.1;
 
-/// modulus/2 (J - alpha)^2, and below a fifth of the rest volume a barrier strength/2 ln(J/0.2)^2: the quadratic is finite for flat elements, and an
-/// element between a rigid grasp and pinned tissue can be pulled flat. Convex for J above 0, not a number below.
+/// modulus/2 (J - alpha)^2, and below a fifth of the rest volume a barrier strength/2 ln(J/0.2)^2:
+/// the quadratic is finite for flat elements, and an element between a rigid grasp and pinned
+/// tissue can be pulled flat. Convex for J above 0, NaN below.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct VolumeEnergy {
-    /// Volume modulus [Pa].
+    /// Volume modulus (Pa).
     pub modulus: f64,
     /// Volume ratio at which the quadratic is least.
     pub alpha: f64,
-    /// The barrier's strength [Pa].
+    /// The barrier's strength (Pa).
     pub strength: f64,
 }
 
 impl VolumeEnergy {
-    /// With a barrier as strong as is right for tissue of volume modulus `stiffness` [Pa].
+    /// With the barrier for tissue of volume modulus `stiffness` (Pa).
     pub fn new(modulus: f64, alpha: f64, stiffness: f64) -> Self {
         Self { modulus, alpha, strength: BARRIER_STRENGTH * stiffness }
     }
 
-    /// Energy density of the volume ratio J [J/m3], and its first and second derivatives.
+    /// Energy density of the volume ratio J (J/m3), and its first and second derivatives.
     pub fn at(&self, j: f64) -> (f64, f64, f64) {
         let d = j - self.alpha;
         let (mut energy, mut slope, mut curvature) = (0.5 * self.modulus * d * d, self.modulus * d, self.modulus);
@@ -37,12 +39,12 @@ impl VolumeEnergy {
         (energy, slope, curvature)
     }
 
-    /// Its part of the stress, slope dJ/dF [Pa].
+    /// Its part of the stress: slope dJ/dF (Pa).
     pub fn stress(&self, f: DMat3) -> DMat3 {
         cofactor(f) * self.at(f.determinant()).1
     }
 
-    /// Change of [`Self::stress`] when F changes by `change`, to first order [Pa].
+    /// First-order change of [`Self::stress`] when F changes by `change` (Pa).
     pub fn stress_change(&self, f: DMat3, change: DMat3) -> DMat3 {
         let (_, slope, curvature) = self.at(f.determinant());
         let cofactor = cofactor(f);
@@ -56,7 +58,7 @@ pub(crate) fn cofactor(f: DMat3) -> DMat3 {
     DMat3::from_cols(b.cross(c), c.cross(a), a.cross(b))
 }
 
-/// Change of the cofactor matrix when F changes by `change`, to first order.
+/// First-order change of the cofactor matrix when F changes by `change`.
 fn cofactor_change(f: DMat3, change: DMat3) -> DMat3 {
     let [a, b, c] = [f.x_axis, f.y_axis, f.z_axis];
     let [da, db, dc] = [change.x_axis, change.y_axis, change.z_axis];

@@ -1,13 +1,15 @@
 //! Nested dissection: an order of elimination that keeps the Cholesky factor sparse.
 //!
-//! George, "Nested dissection of a regular finite element mesh", 1973. A part is cut into two halves along the coordinate axis, or along the distance over the mesh from one of
-//! its ends, that gives the smallest separator; the separator is a minimum vertex cover of the edges cut (Koenig's theorem), and is eliminated after the halves.
+//! George, "Nested dissection of a regular finite element mesh", 1973. A part is cut into two
+//! halves along the coordinate axis, or along the distance over the mesh from one of its ends, that
+//! gives the smallest separator. The separator is a minimum vertex cover of the cut edges (Koenig's
+//! theorem), and is eliminated after the halves.
 
 use glam::DVec3;
 use std::collections::VecDeque;
 
 /// Parts of at most this many nodes are not cut further.
-const LEAF: usize = 14;
+const MAX_LEAF_NODES: usize = 14;
 
 /// A mesh graph: the neighbours of node i are `to[first[i]..first[i + 1]]`.
 pub(super) struct Graph {
@@ -36,7 +38,8 @@ impl Graph {
     }
 }
 
-/// The nodes of `graph`, which lie at `positions`, in the order of elimination: first eliminated first.
+/// The nodes of `graph`, which lie at `positions`, in the order of elimination: first eliminated
+/// first.
 pub(super) fn dissect(graph: &Graph, positions: &[DVec3]) -> Vec<u32> {
     let n = graph.len();
     let mut work = Work {
@@ -73,7 +76,7 @@ struct Work<'a> {
 impl Work<'_> {
     /// Appends the nodes of a part to `order`.
     fn cut(&mut self, nodes: Vec<u32>, order: &mut Vec<u32>) {
-        if nodes.len() <= LEAF {
+        if nodes.len() <= MAX_LEAF_NODES {
             order.extend(nodes);
             return;
         }
@@ -108,7 +111,8 @@ impl Work<'_> {
         all
     }
 
-    /// The node of the part farthest from `from` in edges, and all distances; unreachable nodes are farther than all others.
+    /// The node of the part farthest from `from` in edges, and all distances; unreachable nodes are
+    /// farther than all others.
     fn farthest(&mut self, nodes: &[u32], from: u32) -> (u32, Vec<f64>) {
         self.visits += 1;
         let mut level = std::collections::BTreeMap::new();
@@ -130,7 +134,7 @@ impl Work<'_> {
         (last, nodes.iter().map(|i| level.get(i).copied().unwrap_or(beyond)).collect())
     }
 
-    /// Halves of the part by `keys`, and what separates them.
+    /// Halves of the part by `keys`, and their separator.
     fn halves(&mut self, nodes: &[u32], keys: &[f64]) -> (Vec<u32>, Vec<u32>, Vec<u32>) {
         let mut by_key: Vec<usize> = (0..nodes.len()).collect();
         by_key.sort_by(|a, b| keys[*a].total_cmp(&keys[*b]).then(nodes[*a].cmp(&nodes[*b])));
@@ -151,7 +155,8 @@ impl Work<'_> {
             self.visits += 1;
             self.augment(*i, part);
         }
-        // Koenig: what alternating paths from unmatched left nodes reach; the cover is the left not reached and the right reached.
+        // Koenig: nodes that alternating paths from unmatched left nodes reach. The cover is the
+        // left nodes not reached and the right ones reached.
         self.visits += 1;
         let mut stack: Vec<u32> = left.iter().copied().filter(|i| self.mate[*i as usize] == NONE).collect();
         stack.iter().for_each(|i| self.seen[*i as usize] = self.visits);
@@ -171,7 +176,7 @@ impl Work<'_> {
         for i in nodes {
             let k = *i as usize;
             let reached = self.seen[k] == self.visits;
-            // Matched nodes alone can be in the cover.
+            // Only matched nodes can be in the cover.
             let covers = self.mate[k] != NONE && (reached == (self.side[k] == 2));
             if covers {
                 halves.2.push(*i);

@@ -1,22 +1,22 @@
-//! One pass over a body's elements: forces on their corners and volume ratios.
+//! Evaluation of a body's elements: forces on their corners, and volume ratios.
 
 use super::layout::{Batch, Layout};
 use super::stress::Stress;
 use crate::Body;
-use crate::descent::sweep::{FLOOR, KEPT_SHARE, LEAST_SQUARE};
+use crate::inversion_guard::{KEPT_SHARE, MIN_SQUARED_LENGTH, MIN_VOLUME_RATIO, is_squeezed};
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
 use fearless_simd::{Simd, SimdBase, f32x16};
 use std::collections::BTreeMap;
 
-/// What a pass over the elements writes, and what it compares with.
+/// Forces and volume ratios of the elements.
 pub(super) struct Elements {
     stress: Stress,
-    /// Gradient of the energy by each corner's position [N], batch by batch, corner by corner.
+    /// Gradient of the energy by each corner's position (N), batch by batch, corner by corner.
     pub corners: Vec<Row>,
-    /// Volume ratios at the accepted positions and at those of the last pass.
+    /// Volume ratios at the accepted positions, and at those of the last evaluation.
     pub ratios: Vec<[f32; LANES]>,
     pub trial: Vec<[f32; LANES]>,
-    /// Each element's part of the dashpots along its edges [N s/m]; empty without viscosity.
+    /// Each element's part of the dashpots along its edges (N s/m); empty without viscosity.
     dashpots: Vec<[[f32; LANES]; 6]>,
 }
 
@@ -32,18 +32,19 @@ impl Elements {
         }
     }
 
-    /// Forces and volume ratios at `x`. A substep of `h` [s] began at `start`, which the dashpots know. Whether an element has lost too much of its accepted volume.
+    /// Evaluates forces and volume ratios at `x`. The substep of `h` (s) began at `start`, which
+    /// the dashpots need. Returns whether an element has lost too much of its accepted volume.
     #[inline(always)]
-    pub fn pass<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row], start: &[Row], h: f32) -> bool {
+    pub fn evaluate<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row], start: &[Row], h: f32) -> bool {
         if self.dashpots.is_empty() {
-            self.pass_with::<S, false>(simd, layout, x, start, h)
+            self.evaluate_with::<S, false>(simd, layout, x, start, h)
         } else {
-            self.pass_with::<S, true>(simd, layout, x, start, h)
+            self.evaluate_with::<S, true>(simd, layout, x, start, h)
         }
     }
 
     #[inline(always)]
-    fn pass_with<S: Simd, const VISCOUS: bool>(
+    fn evaluate_with<S: Simd, const VISCOUS: bool>(
         &mut self,
         simd: S,
         layout: &Layout,
@@ -79,7 +80,7 @@ impl Elements {
                     } else {
                         (sub(from[j - 1], from[i - 1]), sub(edges[j - 1], edges[i - 1]))
                     };
-                    let length = simd.max_f32x16(dot(before, before), splat(simd, LEAST_SQUARE));
+                    let length = simd.max_f32x16(dot(before, before), splat(simd, MIN_SQUARED_LENGTH));
                     let along = load(simd, &self.dashpots[b][k]) * rate * (dot(now, now) - length) / (length + length);
                     let force = scale(now, along);
                     forces[j - 1] = add(forces[j - 1], force);
@@ -99,16 +100,17 @@ impl Elements {
         simd.any_true_mask32x16(simd.simd_gt_f32x16(squeezed, zero))
     }
 
-    /// The last pass's positions are accepted.
+    /// Accepts the positions of the last evaluation.
     pub fn accept(&mut self) {
         std::mem::swap(&mut self.ratios, &mut self.trial);
     }
 
-    /// Calls `found` with the nodes of every element that the last pass squeezed too far.
+    /// Calls `found` with the nodes of every element that is squeezed too far at the last
+    /// evaluation.
     pub fn for_squeezed(&self, layout: &Layout, mut found: impl FnMut([u32; 4])) {
         for (b, batch) in layout.batches.iter().enumerate() {
             for lane in 0..LANES {
-                if crate::descent::sweep::is_squeezed(self.trial[b][lane], self.ratios[b][lane]) {
+                if is_squeezed(self.trial[b][lane], self.ratios[b][lane]) {
                     found(batch.nodes.map(|nodes| nodes[lane]));
                 }
             }
@@ -116,10 +118,11 @@ impl Elements {
     }
 }
 
-/// By how much a volume ratio is below what it must be after `before`; 0 or less where it is not. Not a number counts as too low.
+/// By how much a volume ratio is below what it must be after `before`; 0 where it is not. NaN
+/// counts as too low.
 #[inline(always)]
 fn lack<S: Simd>(simd: S, ratio: f32x16<S>, before: f32x16<S>) -> f32x16<S> {
-    let floor = simd.min_f32x16(simd.max_f32x16(before * KEPT_SHARE, splat(simd, FLOOR)), before);
+    let floor = simd.min_f32x16(simd.max_f32x16(before * KEPT_SHARE, splat(simd, MIN_VOLUME_RATIO)), before);
     simd.select_f32x16(simd.simd_ge_f32x16(ratio, floor), splat(simd, 0.0), splat(simd, 1.0))
 }
 

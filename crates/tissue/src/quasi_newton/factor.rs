@@ -1,4 +1,5 @@
-//! The preconditioner of one body: its stiffness at rest with the masses of a substep, factorised once and packed.
+//! The preconditioner of one body: its stiffness at rest with the masses of a substep, factorised
+//! once and packed.
 
 use super::dissection::{Graph, dissect};
 use super::tiles::Tiles;
@@ -20,11 +21,12 @@ use faer::{Mat, Par, Side};
 use fearless_simd::Simd;
 use glam::DMat3;
 
-/// Neighbouring supernodes of so many columns together are merged while the share of zeros stays below: a tile is 16 x 16.
+/// Neighbouring supernodes of so many columns together are merged while the share of zeros stays
+/// below this: a tile is 16 x 16.
 const RELAX: [(usize, f64); 3] = [(24, 0.6), (48, 0.25), (usize::MAX, 0.05)];
 
-/// Stiffness that holds a node where a tool carries it, over its own.
-const HOLDING: f32 = 1e4;
+/// Stiffness that holds a node where a tool carries it, over the node's own.
+const HOLDING_FACTOR: f32 = 1e4;
 
 /// The factor of a body's matrix over its free nodes.
 pub(super) struct Factor {
@@ -36,9 +38,9 @@ pub(super) struct Factor {
     values: Vec<f32>,
     /// 1 / sqrt of the diagonal, three a node.
     pub scale: Vec<f32>,
-    /// What is added to the diagonal [N/m], three a node alike: masses over h^2.
+    /// Masses over h^2, which are added to the diagonal (N/m), three a node alike.
     added: Vec<f32>,
-    /// Stiffness by which tools hold nodes or supports carry them [N/m].
+    /// Stiffness by which tools hold nodes or supports carry them (N/m).
     pub holding: Vec<f32>,
     symbolic: SymbolicCholesky<usize>,
     numbers: Vec<f32>,
@@ -49,7 +51,8 @@ pub(super) struct Factor {
 }
 
 impl Factor {
-    /// Orders, assembles and analyses for substeps of `h` [s]; pinned nodes have no part in it. None if memory is short or no node is free.
+    /// Orders, assembles and analyses for substeps of `h` (s), without pinned nodes. None if memory
+    /// is short or no node is free.
     pub fn new(body: &Body, h: f64) -> Option<Self> {
         let mesh = &body.rest;
         let free: Vec<usize> = (0..body.len()).filter(|i| !body.pinned[*i]).collect();
@@ -95,10 +98,10 @@ impl Factor {
             supernodal_params: SymbolicSupernodalParams { relax: Some(&RELAX) },
             ..Default::default()
         };
-        // The order is in the numbering already; faer takes a lower triangle with a permutation only.
+        // The numbering is the order already; faer takes a lower triangle with a permutation only.
         let identity: Vec<usize> = (0..3 * order.len()).collect();
-        let as_it_is = SymmetricOrdering::Custom(PermRef::new_checked(&identity, &identity, identity.len()));
-        let symbolic = factorize_symbolic_cholesky(rest.pattern(), Side::Lower, as_it_is, parameters).ok()?;
+        let natural_order = SymmetricOrdering::Custom(PermRef::new_checked(&identity, &identity, identity.len()));
+        let symbolic = factorize_symbolic_cholesky(rest.pattern(), Side::Lower, natural_order, parameters).ok()?;
         let request = symbolic.factorize_numeric_llt_scratch::<f32>(Par::Seq, Default::default());
         let memory = MemBuffer::try_new(request).ok()?;
         let SymbolicCholeskyRaw::Supernodal(supernodes) = symbolic.raw() else { return None };
@@ -119,20 +122,21 @@ impl Factor {
         })
     }
 
-    /// Sets the masses [kg] and the substep [s].
+    /// Sets the masses (kg) and the substep (s).
     pub fn set_step(&mut self, masses: &[f32], h: f64) {
         for (added, mass) in self.added.iter_mut().zip(masses) {
             *added = (f64::from(*mass) / (h * h)) as f32;
         }
     }
 
-    /// Factorises with the `held` nodes held by a large stiffness and the others by `supports` [N/m]. False if the matrix is not positive definite.
+    /// Factorises with the `held` nodes held by a large stiffness and the others by `supports`
+    /// (N/m). False if the matrix is not positive definite.
     pub fn factorise(&mut self, held: &[bool], supports: &[f32]) -> bool {
         let pattern = self.rest.pattern();
         let columns = pattern.col_ptr();
         for (node, holding) in self.holding.iter_mut().enumerate() {
             let own = self.rest.values()[columns[3 * node]] as f32 + self.added[node];
-            *holding = if held[node] { HOLDING * own } else { supports[node] };
+            *holding = if held[node] { HOLDING_FACTOR * own } else { supports[node] };
         }
         for (column, first) in columns[..columns.len() - 1].iter().enumerate() {
             let diagonal = self.rest.values()[*first] as f32 + self.added[column / 3] + self.holding[column / 3];
@@ -181,7 +185,8 @@ impl Factor {
         true
     }
 
-    /// Solves for `x` in place: three numbers a node in the order of elimination. `x` is at least 16 numbers longer, finite.
+    /// Solves for `x` in place: three numbers a node in the order of elimination. `x` is at least
+    /// 16 numbers longer, finite.
     #[inline(always)]
     pub fn solve<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
         for (x, s) in x.iter_mut().zip(&self.scale) {
@@ -194,7 +199,7 @@ impl Factor {
     }
 }
 
-/// Adds what the dashpots resist within a substep to the stiffness, nodes numbered by `rank`.
+/// Adds the resistance of the dashpots within a substep to the stiffness, nodes numbered by `rank`.
 fn add_dashpots(body: &Body, rank: &[u32], h: f64, stiffness: &mut Stiffness) {
     let node_of = body.nodes_of_vertices();
     for (i, node) in node_of.iter().enumerate() {
@@ -202,7 +207,7 @@ fn add_dashpots(body: &Body, rank: &[u32], h: f64, stiffness: &mut Stiffness) {
             let to = node_of[edge.to as usize];
             let n = (body.rest.vertices[to] - body.rest.vertices[*node]).normalize_or_zero();
             let block = DMat3::from_cols(n * n.x, n * n.y, n * n.z) * (f64::from(edge.damping) / h);
-            // Every edge is met from both its ends.
+            // Every edge appears at both its ends.
             let (i, j) = (rank[*node] as usize, rank[to] as usize);
             stiffness.add(i, i, block);
             stiffness.add(i, j, -block);

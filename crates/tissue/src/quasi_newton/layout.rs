@@ -1,4 +1,5 @@
-//! A body laid out for the quasi-Newton solver: free nodes in the order of elimination, elements sixteen at a time.
+//! A body laid out for the quasi-Newton solver: free nodes in the order of elimination, elements
+//! sixteen at a time.
 
 use crate::Body;
 use crate::assembly::shape_gradients;
@@ -11,13 +12,14 @@ use glam::DVec3;
 pub(super) struct Batch {
     /// Their nodes, corner by corner.
     pub nodes: [[u32; LANES]; 4],
-    /// Rest gradients of the shape functions of corners 1 to 3 [1/m]; that of corner 0 is minus their sum.
+    /// Rest gradients of the shape functions of corners 1 to 3 (1/m); that of corner 0 is minus
+    /// their sum.
     pub gradients: [[[f32; LANES]; 3]; 3],
-    /// Rest volumes [m3]; 0 for what fills the last batch up.
+    /// Rest volumes (m3); 0 for the spare lanes of the last batch.
     pub volumes: [f32; LANES],
 }
 
-/// Where a body's data lie.
+/// The order and the sizes of a body's data.
 pub(super) struct Layout {
     /// Free nodes; pinned ones that share an element with them follow.
     pub free: usize,
@@ -31,14 +33,16 @@ pub(super) struct Layout {
     pub number: Vec<u32>,
     /// Elements with a free node.
     pub batches: Vec<Batch>,
-    /// Per free node, the places of its corners among all corners of the batches: those of node i are `corners[first_corner[i]..first_corner[i + 1]]`.
+    /// Per free node, the indices of its corners among all corners of the batches: those of node i
+    /// are `corners[first_corner[i]..first_corner[i + 1]]`.
     pub first_corner: Vec<u32>,
     pub corners: Vec<u32>,
-    /// Per free node, its neighbours and the weights with which their offsets make its mean deformation gradient, F = sum (x_j - x_i) w_j'.
+    /// Per free node, its neighbours and the weights with which their offsets make its mean
+    /// deformation gradient, F = sum (x_j - x_i) w_j'.
     pub first_neighbour: Vec<u32>,
     pub neighbours: Vec<u32>,
     pub weights: Vec<Row>,
-    /// Masses of free nodes [kg].
+    /// Masses of free nodes (kg).
     pub masses: Vec<f32>,
 }
 
@@ -57,7 +61,8 @@ impl Layout {
         let mut tets: Vec<usize> = (0..body.rest.tets.len())
             .filter(|t| body.rest.tets[*t].iter().any(|i| (place[*i as usize] as usize) < free))
             .collect();
-        // Elements near each other in the order of elimination share nodes: their gathers hit the cache.
+        // Elements near each other in the order of elimination share nodes: their gathers hit the
+        // cache.
         tets.sort_by_key(|t| body.rest.tets[*t].iter().map(|i| place[*i as usize]).min());
         let batches: Vec<Batch> = tets.chunks(LANES).map(|chunk| batch(body, &place, chunk)).collect();
 

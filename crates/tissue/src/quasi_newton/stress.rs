@@ -6,13 +6,14 @@ use crate::{ConstitutiveModel, Corotated, Material, StableNeoHookean};
 use fearless_simd::{Simd, SimdBase, f32x16};
 
 /// Volume ratio above which the volume energy is its plain quadratic.
-const PLAIN: f32 = 0.25;
+const MIN_PLAIN_RATIO: f32 = 0.25;
 
-/// Smallest volume ratio whose logarithm is taken: the guard keeps ratios above, this keeps numbers finite if it ever did not.
-const LEAST: f64 = 1e-4;
+/// Smallest volume ratio whose logarithm is taken. The guard keeps ratios above; this keeps numbers
+/// finite if it does not.
+const MIN_LOGARITHM_RATIO: f64 = 1e-4;
 
-/// Determinant of F below which its rotation is not sought.
-const LEAST_ROTATION: f32 = 1e-4;
+/// Determinant of F below which no rotation is computed.
+const MIN_ROTATION_RATIO: f32 = 1e-4;
 
 /// A body's stress law.
 pub(super) enum Stress {
@@ -77,7 +78,7 @@ impl Stress {
             }
             Self::Corotated { mu, volume } => {
                 let (two_mu, slope) = (splat(simd, 2.0 * mu), volume.slope(simd, ratio));
-                let (r, cofactor) = (rotation(simd, f, LEAST_ROTATION), cofactor(f));
+                let (r, cofactor) = (rotation(simd, f, MIN_ROTATION_RATIO), cofactor(f));
                 let mut p = *f;
                 for c in 0..3 {
                     p[c] = add(scale(sub(f[c], r[c]), two_mu), scale(cofactor[c], slope));
@@ -93,7 +94,7 @@ impl Volume {
     #[inline(always)]
     fn slope<S: Simd>(&self, simd: S, ratio: f32x16<S>) -> f32x16<S> {
         let plain = (ratio - self.alpha) * self.modulus;
-        let squeezed = simd.simd_lt_f32x16(ratio, splat(simd, PLAIN));
+        let squeezed = simd.simd_lt_f32x16(ratio, splat(simd, MIN_PLAIN_RATIO));
         if simd.any_true_mask32x16(squeezed) { self.with_barrier(simd, plain, ratio) } else { plain }
     }
 
@@ -104,8 +105,8 @@ impl Volume {
         plain.store_slice(&mut slopes);
         ratio.store_slice(&mut ratios);
         for (slope, ratio) in slopes.iter_mut().zip(ratios) {
-            if ratio < PLAIN {
-                *slope = self.energy.at(f64::from(ratio).max(LEAST)).1 as f32;
+            if ratio < MIN_PLAIN_RATIO {
+                *slope = self.energy.at(f64::from(ratio).max(MIN_LOGARITHM_RATIO)).1 as f32;
             }
         }
         load(simd, &slopes)

@@ -1,26 +1,29 @@
 //! A Cholesky factor packed for speed, and the solve with it.
 //!
-//! A solve reads the whole factor twice and does one multiplication a number: it is bound by memory. So the factor is kept in 16 bits a number, in tiles of 16 x 16 numbers with
-//! one scale each, supernode by supernode. The triangle on a supernode's diagonal is kept as its inverse, so that a solve is nothing but products with tiles and waits for no
-//! division.
+//! A solve reads the whole factor twice and does one multiplication a number: it is bound by
+//! memory. So the factor is kept in 16 bits a number, in tiles of 16 x 16 numbers with one scale
+//! each, supernode by supernode. The triangle on a supernode's diagonal is kept as its inverse, so
+//! that a solve consists of products with tiles and waits for no division.
 //!
-//! The backward half is the exact transpose of the forward half, tile by tile: rounding the factor to 16 bits leaves the preconditioner symmetric and positive definite.
+//! The backward half is the exact transpose of the forward half, tile by tile. So rounding the
+//! factor to 16 bits leaves the preconditioner symmetric and positive definite.
 
 use fearless_simd::{Simd, SimdBase, SimdCvtFloat, f32x16, i32x16};
 use std::ops::Range;
 
 /// Rows and columns of a tile.
-const TILE: usize = 16;
+const TILE_SIZE: usize = 16;
 
 /// Greatest number in 16 bits.
-const GREATEST: f32 = 32767.0;
+const MAX_INT16: f32 = 32767.0;
 
-/// 16 x 16 numbers. A word has the numbers of two neighbouring columns: the low half that of the even one; the whole word, over 65536, that of the odd one (what the low half
-/// adds to it is less than its rounding, and was taken into account in it).
+/// 16 x 16 numbers. A word has the numbers of two neighbouring columns: its low half is that of the
+/// even column; the whole word, over 65536, is that of the odd one (the low half adds less than its
+/// rounding, and is taken into account in it).
 #[derive(Clone, Copy)]
 #[repr(C, align(64))]
 struct Tile {
-    words: [[i32; TILE]; TILE / 2],
+    words: [[i32; TILE_SIZE]; TILE_SIZE / 2],
 }
 
 /// One supernode: columns `first..first + width` of the vector, rows below by number.
@@ -47,7 +50,7 @@ pub(super) struct Tiles {
 
 /// Tiles that cover `n` numbers.
 fn covering(n: usize) -> usize {
-    n.div_ceil(TILE)
+    n.div_ceil(TILE_SIZE)
 }
 
 impl Tiles {
@@ -63,8 +66,8 @@ impl Tiles {
         self.scales.clear();
     }
 
-    /// Adds the next supernode: the inverse of its diagonal triangle, `inverse(row, column)`, and what is below, `below(row, column)`; `rows` are the
-    /// nodes below, ascending.
+    /// Adds the next supernode: the inverse of its diagonal triangle, `inverse(row, column)`, and
+    /// the numbers below, `below(row, column)`; `rows` are the nodes below, ascending.
     pub fn push(
         &mut self,
         first: usize,
@@ -81,7 +84,7 @@ impl Tiles {
         for i in 0..columns {
             for j in 0..=i {
                 self.pack(|r, c| {
-                    let (r, c) = (TILE * i + r, TILE * j + c);
+                    let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
                     if r < width && c <= r { inverse(r, c) } else { 0.0 }
                 });
             }
@@ -89,29 +92,29 @@ impl Tiles {
         for i in 0..covering(height) {
             for j in 0..columns {
                 self.pack(|r, c| {
-                    let (r, c) = (TILE * i + r, TILE * j + c);
+                    let (r, c) = (TILE_SIZE * i + r, TILE_SIZE * j + c);
                     if r < height && c < width { below(r, c) } else { 0.0 }
                 });
             }
         }
-        self.buffer.resize(self.buffer.len().max(TILE * (columns + covering(height)) + TILE), 0.0);
+        self.buffer.resize(self.buffer.len().max(TILE_SIZE * (columns + covering(height)) + TILE_SIZE), 0.0);
     }
 
     fn pack(&mut self, at: impl Fn(usize, usize) -> f32) {
-        let mut numbers = [[0.0f32; TILE]; TILE];
+        let mut numbers = [[0.0f32; TILE_SIZE]; TILE_SIZE];
         let mut most = 0.0f32;
-        for c in 0..TILE {
-            for r in 0..TILE {
+        for c in 0..TILE_SIZE {
+            for r in 0..TILE_SIZE {
                 numbers[c][r] = at(r, c);
                 most = most.max(numbers[c][r].abs());
             }
         }
-        let scale = if most > 0.0 { most / GREATEST } else { 1.0 };
-        let mut tile = Tile { words: [[0; TILE]; TILE / 2] };
+        let scale = if most > 0.0 { most / MAX_INT16 } else { 1.0 };
+        let mut tile = Tile { words: [[0; TILE_SIZE]; TILE_SIZE / 2] };
         for (pair, words) in tile.words.iter_mut().enumerate() {
             for (r, word) in words.iter_mut().enumerate() {
                 let even = (numbers[2 * pair][r] / scale).round();
-                let odd = (numbers[2 * pair + 1][r] / scale - even / 65536.0).round().clamp(-GREATEST, GREATEST);
+                let odd = (numbers[2 * pair + 1][r] / scale - even / 65536.0).round().clamp(-MAX_INT16, MAX_INT16);
                 *word = (odd as i32) * 65536 + i32::from(even as i16);
             }
         }
@@ -120,7 +123,8 @@ impl Tiles {
         self.scales.push(scale / 65536.0);
     }
 
-    /// Solves in place: `x` is the right side and then the solution, three numbers a node in the order of elimination, padded by at least 16.
+    /// Solves in place: `x` is the right side and then the solution, three numbers a node in the
+    /// order of elimination, padded by at least 16.
     #[inline(always)]
     pub fn solve<S: Simd>(&mut self, simd: S, x: &mut [f32]) {
         let mut buffer = std::mem::take(&mut self.buffer);
@@ -133,31 +137,31 @@ impl Tiles {
         self.buffer = buffer;
     }
 
-    /// y = inverse b, and what lies below loses its product with y.
+    /// y = inverse b, and the rows below lose their product with y.
     #[inline(always)]
     fn forward<S: Simd>(&self, simd: S, s: &Supernode, x: &mut [f32], buffer: &mut [f32]) {
         let columns = covering(s.width);
-        let (y, below) = buffer.split_at_mut(TILE * columns);
+        let (y, below) = buffer.split_at_mut(TILE_SIZE * columns);
         let mut at = s.tiles;
         for i in 0..columns {
             let mut sum = f32x16::splat(simd, 0.0);
             for j in 0..=i {
                 // Beyond the width other supernodes' numbers are read: their tiles are 0 there.
-                let b = &x[s.first + TILE * j..s.first + TILE * (j + 1)];
+                let b = &x[s.first + TILE_SIZE * j..s.first + TILE_SIZE * (j + 1)];
                 sum = self.product(simd, at, b, sum);
                 at += 1;
             }
-            sum.store_slice(&mut y[TILE * i..TILE * (i + 1)]);
+            sum.store_slice(&mut y[TILE_SIZE * i..TILE_SIZE * (i + 1)]);
         }
         x[s.first..s.first + s.width].copy_from_slice(&y[..s.width]);
         let rows = &self.rows[s.rows.clone()];
         for i in 0..covering(3 * rows.len()) {
             let mut sum = f32x16::splat(simd, 0.0);
             for j in 0..columns {
-                sum = self.product(simd, at, &y[TILE * j..TILE * (j + 1)], sum);
+                sum = self.product(simd, at, &y[TILE_SIZE * j..TILE_SIZE * (j + 1)], sum);
                 at += 1;
             }
-            sum.store_slice(&mut below[TILE * i..TILE * (i + 1)]);
+            sum.store_slice(&mut below[TILE_SIZE * i..TILE_SIZE * (i + 1)]);
         }
         for (k, node) in rows.iter().enumerate() {
             let to = &mut x[3 * *node as usize..3 * *node as usize + 3];
@@ -174,28 +178,33 @@ impl Tiles {
         let columns = covering(s.width);
         let rows = &self.rows[s.rows.clone()];
         let tall = covering(3 * rows.len());
-        let (z, below) = buffer.split_at_mut(TILE * columns);
+        let (z, below) = buffer.split_at_mut(TILE_SIZE * columns);
         for (k, node) in rows.iter().enumerate() {
             below[3 * k..3 * k + 3].copy_from_slice(&x[3 * *node as usize..3 * *node as usize + 3]);
         }
-        below[3 * rows.len()..TILE * tall].fill(0.0);
+        below[3 * rows.len()..TILE_SIZE * tall].fill(0.0);
         let triangle = s.tiles;
         let panel = triangle + columns * (columns + 1) / 2;
         z[..s.width].copy_from_slice(&x[s.first..s.first + s.width]);
         z[s.width..].fill(0.0);
         for j in 0..columns {
             let sum = self.transposed(simd, panel + j, columns, below, tall);
-            let b = f32x16::from_slice(simd, &z[TILE * j..TILE * (j + 1)]);
-            (b - sum).store_slice(&mut z[TILE * j..TILE * (j + 1)]);
+            let b = f32x16::from_slice(simd, &z[TILE_SIZE * j..TILE_SIZE * (j + 1)]);
+            (b - sum).store_slice(&mut z[TILE_SIZE * j..TILE_SIZE * (j + 1)]);
         }
         for j in 0..columns {
-            let mut sums = [f32x16::splat(simd, 0.0); TILE];
+            let mut sums = [f32x16::splat(simd, 0.0); TILE_SIZE];
             for i in j..columns {
-                self.add_transposed(simd, triangle + i * (i + 1) / 2 + j, &z[TILE * i..TILE * (i + 1)], &mut sums);
+                self.add_transposed(
+                    simd,
+                    triangle + i * (i + 1) / 2 + j,
+                    &z[TILE_SIZE * i..TILE_SIZE * (i + 1)],
+                    &mut sums,
+                );
             }
             let out = transpose_sum(simd, sums);
             // Only columns j.. are read of z from here on.
-            out.store_slice(&mut z[TILE * j..TILE * (j + 1)]);
+            out.store_slice(&mut z[TILE_SIZE * j..TILE_SIZE * (j + 1)]);
         }
         x[s.first..s.first + s.width].copy_from_slice(&z[..s.width]);
     }
@@ -219,16 +228,17 @@ impl Tiles {
     /// Sum over a column of `tall` tiles, `stride` apart, of tile' times its part of `below`.
     #[inline(always)]
     fn transposed<S: Simd>(&self, simd: S, at: usize, stride: usize, below: &[f32], tall: usize) -> f32x16<S> {
-        let mut sums = [f32x16::splat(simd, 0.0); TILE];
+        let mut sums = [f32x16::splat(simd, 0.0); TILE_SIZE];
         for i in 0..tall {
-            self.add_transposed(simd, at + stride * i, &below[TILE * i..TILE * (i + 1)], &mut sums);
+            self.add_transposed(simd, at + stride * i, &below[TILE_SIZE * i..TILE_SIZE * (i + 1)], &mut sums);
         }
         transpose_sum(simd, sums)
     }
 
-    /// Adds the products of a tile's columns with `x`, lane by lane: what is wanted are the sums over lanes.
+    /// Adds the products of a tile's columns with `x`, lane by lane; the caller needs their sums
+    /// over lanes.
     #[inline(always)]
-    fn add_transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32], sums: &mut [f32x16<S>; TILE]) {
+    fn add_transposed<S: Simd>(&self, simd: S, at: usize, x: &[f32], sums: &mut [f32x16<S>; TILE_SIZE]) {
         let x = f32x16::from_slice(simd, x) * self.scales[at];
         for (pair, words) in self.tiles[at].words.iter().enumerate() {
             let word = i32x16::from_slice(simd, words);
@@ -242,7 +252,7 @@ impl Tiles {
 
 /// The sum over lanes of each of 16 vectors.
 #[inline(always)]
-fn transpose_sum<S: Simd>(simd: S, mut v: [f32x16<S>; TILE]) -> f32x16<S> {
+fn transpose_sum<S: Simd>(simd: S, mut v: [f32x16<S>; TILE_SIZE]) -> f32x16<S> {
     // Each round adds neighbours and halves the number of vectors; unzipping keeps their order.
     for half in [8, 4, 2, 1] {
         for k in 0..half {

@@ -1,4 +1,5 @@
-//! The rotation of the tissue around each node: what turns a residual into the frame in which the stiffness at rest is right (stiffness warping, Mueller and others 2002).
+//! The rotation of the tissue around each node. It turns a residual into the frame in which the
+//! stiffness at rest is valid (stiffness warping, Mueller and others 2002).
 
 use super::layout::Layout;
 use crate::lanes::{LANES, Mat3L, Row, apply, apply_transposed, load, load_rows, rotation, store_rows};
@@ -16,8 +17,8 @@ pub(super) struct Warp {
     nodes: Vec<Sixteen>,
 }
 
-/// A neighbourhood squeezed below this volume ratio has no rotation that could be trusted.
-const LEAST: f32 = 0.01;
+/// A neighbourhood squeezed below this volume ratio has no reliable rotation.
+const MIN_VOLUME_RATIO: f32 = 0.01;
 
 impl Warp {
     pub fn new(layout: &Layout) -> Self {
@@ -25,7 +26,7 @@ impl Warp {
         Self { nodes: vec![none; layout.rows / LANES] }
     }
 
-    /// Takes the rotations at `x`, from scratch: they do not depend on any past.
+    /// Computes the rotations at `x` from scratch: they do not depend on the past.
     #[inline(always)]
     pub fn update<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row]) {
         for (group, sixteen) in self.nodes.iter_mut().enumerate() {
@@ -53,7 +54,7 @@ impl Warp {
                 columns[2].store_slice(&mut f[2][lane]);
             }
             let f = [load_rows(simd, &f[0]), load_rows(simd, &f[1]), load_rows(simd, &f[2])];
-            let r = rotation(simd, &f, LEAST);
+            let r = rotation(simd, &f, MIN_VOLUME_RATIO);
             for c in 0..3 {
                 for k in 0..3 {
                     r[c][k].store_slice(&mut sixteen.columns[c][k]);

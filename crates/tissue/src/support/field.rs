@@ -1,45 +1,50 @@
-//! A height field that conforms to the underside of a body at rest (SPEC T7).
+//! A height field that conforms to the underside of a body at rest.
 //!
-//! The surface is a biquadratic B-spline over a square grid: its normal is continuous, so that a node that slides over it meets no edges, and it lies nowhere above its
-//! coefficients, so that it can be kept under every node of a body by lowering them.
+//! The surface is a biquadratic B-spline over a square grid. Its normal is continuous, so that a
+//! node that slides over it meets no edges. It lies nowhere above its coefficients, so that
+//! lowering them keeps it under every node of a body.
 
 use super::SupportContact;
 use crate::{Error, Result};
 use glam::{DMat3, DVec3};
 use trocar_geometry::TetMesh;
 
-/// Steepest slope of a support under a body: 45 degrees. Where the body's side is steeper the support leaves it.
-const STEEPEST: f64 = 1.0;
+/// Greatest slope of a support under a body: 45 degrees. Where the body's side is steeper, the
+/// support leaves it.
+const MAX_SLOPE: f64 = 1.0;
 
 /// Cells of level bed around the body; the spline reaches over one and a half.
 const MARGIN: usize = 4;
 
-/// Most cells of a field.
-const MOST_CELLS: f64 = 4e6;
+/// Greatest number of cells of a field.
+const MAX_CELLS: f64 = 4e6;
 
 /// A one-sided height field over a plane.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SupportField {
-    /// Where the first coefficient lies on the level bed [m].
+    /// Where the first coefficient lies on the level bed (m).
     pub(super) origin: DVec3,
     /// Unit vectors along columns and rows of the grid, and up.
     pub(super) axes: [DVec3; 3],
-    /// Side of a cell [m].
+    /// Side of a cell (m).
     pub(super) cell: f64,
     /// Columns and rows.
     pub(super) size: [usize; 2],
-    /// Coefficients of the spline, row by row: heights above the bed [m].
+    /// Coefficients of the spline, row by row: heights above the bed (m).
     pub(super) heights: Vec<f64>,
     friction: f64,
 }
 
 impl SupportField {
-    /// The support that bears `mesh` as it lies: under each node of its underside as near as `cell` [m] and slopes of at most 45 degrees allow and never above it,
-    /// so that it pushes nothing at rest. It runs out at the height of the lowest node, the level bed. Friction has Coulomb's coefficient `friction`.
+    /// The support of `mesh` as it lies: under each node of its underside, as near as `cell` (m)
+    /// and slopes of at most 45 degrees allow, and never above it, so that it pushes nothing at
+    /// rest. Beyond the body it is the level bed at the height of the lowest node. `friction` is
+    /// Coulomb's coefficient.
     ///
     /// # Errors
-    /// Refuses a mesh without elements or with numbers that are not finite, an `up` without direction, a cell that is not above 0 or so small that the field has
-    /// more than four million, and negative friction.
+    /// A mesh without elements or with numbers that are not finite, an `up` without direction, a
+    /// cell that is not above 0 or so small that the field has more than four million cells, and
+    /// negative friction.
     pub fn under(mesh: &TetMesh, up: DVec3, cell: f64, friction: f64) -> Result<Self> {
         let refuse = |what: String| Err(Error::Model(format!("a support cannot be made: {what}")));
         let Some(up) = up.try_normalize() else {
@@ -63,7 +68,7 @@ impl SupportField {
         }
         let margin = MARGIN as f64;
         let cells = [0, 1].map(|k| ((high[k] - low[k]) / cell).ceil() + 2.0 * margin + 1.0);
-        if cells[0] * cells[1] > MOST_CELLS {
+        if cells[0] * cells[1] > MAX_CELLS {
             return refuse(format!("{} x {} cells of {cell} m; larger ones will do", cells[0], cells[1]));
         }
         let size = cells.map(|n| n as usize);
@@ -85,7 +90,7 @@ impl SupportField {
         self.friction
     }
 
-    /// Place of a point in the grid: column, row, height above the bed [m].
+    /// Place of a point in the grid: column, row, height above the bed (m).
     fn place(&self, p: DVec3) -> [f64; 3] {
         let off = p - self.origin;
         [off.dot(self.axes[0]) / self.cell, off.dot(self.axes[1]) / self.cell, off.dot(self.axes[2])]
@@ -122,10 +127,11 @@ impl SupportField {
         }
     }
 
-    /// Lowers coefficients until none is steeper above its neighbours than allowed: two passes over the grid with eight neighbours (chamfer distances).
+    /// Lowers coefficients until none is steeper above its neighbours than allowed: two passes over
+    /// the grid with eight neighbours (chamfer distances).
     fn soften(&mut self) {
         let [columns, rows] = self.size;
-        let rise = STEEPEST * self.cell;
+        let rise = MAX_SLOPE * self.cell;
         let near = [(-1, 0, 1.0), (0, -1, 1.0), (-1, -1, std::f64::consts::SQRT_2), (1, -1, std::f64::consts::SQRT_2)];
         for backwards in [false, true] {
             for k in 0..columns * rows {
@@ -143,7 +149,8 @@ impl SupportField {
         }
     }
 
-    /// Lowers the coefficients around each node that lies below the surface by as much. What is lowered for one node lowers the surface for the others.
+    /// Lowers the coefficients around each node that lies below the surface by its depth. What is
+    /// lowered for one node lowers the surface for the others.
     fn lower(&mut self, mesh: &TetMesh) {
         for p in &mesh.vertices {
             let depth = -self.contact(*p).height;
@@ -152,7 +159,7 @@ impl SupportField {
                 let ([column, _], [row, _]) = (self.knot(u, 0), self.knot(v, 1));
                 for j in 0..3 {
                     for i in 0..3 {
-                        // A little more than its depth: rounding is no contact.
+                        // A little more than the depth: rounding must not make a contact.
                         let k = (row as usize + j) * self.size[0] + column as usize + i;
                         self.heights[k] -= depth * (1.0 + 1e-9) + 1e-12;
                     }
@@ -161,7 +168,8 @@ impl SupportField {
         }
     }
 
-    /// First of the three coefficients that count at a place along an axis, and the way from the middle one. Beyond the grid the bed goes on.
+    /// First of the three coefficients that count at a place along an axis, and the way from the
+    /// middle one. The bed continues beyond the grid.
     fn knot(&self, place: f64, axis: usize) -> [f64; 2] {
         let last = (self.size[axis] - 2) as f64;
         let place = place.clamp(0.5, last + 0.5);
@@ -196,7 +204,8 @@ impl SupportField {
     }
 }
 
-/// The quadratic B-spline's weights of three neighbours at `t` (-0.5..=0.5) from the middle one, and their first two derivatives.
+/// The quadratic B-spline's weights of three neighbours at `t` (-0.5..=0.5) from the middle one,
+/// and their first two derivatives.
 fn weights(t: f64) -> [[f64; 3]; 3] {
     [
         [0.5 * (0.5 - t) * (0.5 - t), 0.75 - t * t, 0.5 * (0.5 + t) * (0.5 + t)],

@@ -22,7 +22,7 @@ pub(crate) struct LocalPlane {
 #[derive(Clone, Debug)]
 pub(crate) struct LocalField {
     origin: Vec3A,
-    /// Along columns and rows over the cell [1/m], and up.
+    /// Along columns and rows over the cell (1/m), and up.
     axes: [Vec3A; 3],
     columns: usize,
     /// Last middle of three coefficients, by axis.
@@ -32,7 +32,7 @@ pub(crate) struct LocalField {
 }
 
 impl LocalSupport {
-    /// What supports a body.
+    /// The supports of a body.
     pub fn of(body: &Body) -> Vec<Self> {
         let local = |support: &Support| match support {
             Support::Plane(plane) => Self::Plane(LocalPlane::new(plane, body.origin)),
@@ -48,7 +48,7 @@ impl LocalSupport {
         }
     }
 
-    /// Height of a point above the support [m], and its gradient.
+    /// Height of a point above the support (m), and its gradient.
     #[inline]
     pub fn contact(&self, x: Vec3A) -> (f32, Vec3A) {
         match self {
@@ -100,7 +100,8 @@ impl LocalField {
     }
 }
 
-/// First of the three coefficients at a place along an axis, their weights and the weights' derivatives. A place that is not a number is the first.
+/// First of the three coefficients at a place along an axis, their weights and the weights'
+/// derivatives. NaN counts as the first place.
 #[inline]
 fn knot(place: f32, last: f32) -> (usize, [f32; 3], [f32; 3]) {
     let place = place.clamp(0.5, last + 0.5);

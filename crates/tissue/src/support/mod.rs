@@ -1,4 +1,4 @@
-//! What a body rests on: one-sided surfaces with a quadratic penalty and Coulomb friction.
+//! Supports of a body: one-sided surfaces with a quadratic penalty and Coulomb friction.
 
 mod field;
 mod local;
@@ -20,7 +20,7 @@ pub enum Support {
 /// A one-sided plane that a body rests on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SupportPlane {
-    /// A point of the plane [m].
+    /// A point of the plane (m).
     pub point: DVec3,
     /// Unit normal, into the free side.
     pub normal: DVec3,
@@ -48,7 +48,8 @@ impl Support {
         }
     }
 
-    /// Height of `x` above the support [m]: along a plane's normal, along a field's `up`; negative below.
+    /// Height of `x` above the support (m): along a plane's normal, along a field's `up`; negative
+    /// below.
     pub fn height(&self, x: DVec3) -> f64 {
         self.contact(x).height
     }
@@ -65,7 +66,7 @@ impl Support {
         }
     }
 
-    /// Says what is wrong, if anything.
+    /// Checks the support.
     pub(crate) fn check(&self) -> Result<(), String> {
         let Self::Plane(plane) = self else {
             return Ok(());

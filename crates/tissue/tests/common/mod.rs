@@ -25,7 +25,8 @@ pub fn tissue(young_modulus: f64) -> Material {
 pub struct Judged {
     pub name: &'static str,
     pub schedule: SolverSettings,
-    /// Whether it minimises: held to the laws that the minimum keeps. Sweeps that stop early are not at the minimum.
+    /// Whether it minimises: held to the laws that the minimum keeps. Sweeps that stop early are
+    /// not at the minimum.
     pub converges: bool,
 }
 
@@ -58,7 +59,8 @@ pub fn noise(k: u64) -> f64 {
     ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// A box of `cells` cubes of edge `edge` [m], lower corner at the origin, six tetrahedra a cube around its main diagonal.
+/// A box of `cells` cubes of edge `edge` (m), lower corner at the origin, six tetrahedra a cube
+/// around its main diagonal.
 pub fn block(cells: [usize; 3], edge: f64) -> TetMesh {
     let [nx, ny, nz] = cells;
     let index = |i: usize, j: usize, k: usize| ((k * (ny + 1) + j) * (nx + 1) + i) as u32;
@@ -95,7 +97,8 @@ pub fn model(mesh: &TetMesh, material: Material, pinned: Vec<u32>, gravity: DVec
     builder.build().unwrap()
 }
 
-/// An organ of an appendix's size, bent in the plane z = 0, by the lattice mesher with cells of `cell` [m]. It lies along x from 0 to its length.
+/// An organ of an appendix's size, bent in the plane z = 0, by the lattice mesher with cells of
+/// `cell` (m). It lies along x from 0 to its length.
 pub fn appendix(cell: f64) -> TetMesh {
     struct Tube;
     impl SignedDistance for Tube {

@@ -1,24 +1,19 @@
 //! The pages of specimens and runs.
 //!
-//! [`reconstruction`] shows how a recording became organs, [`surface`] what became of a ready surface, [`grasp_lift`] how
+//! [`reconstruction`] shows how a recording became organs, [`surface`] what became of a ready surface, and the page of a lift how
 //! the organs behaved when they were lifted.
 
-mod cell_lift;
-mod moving_picture;
+mod bodies;
+mod lift;
 mod organ_table;
 pub mod organ_views;
-mod run;
 mod seen;
 mod severed;
-mod summary_table;
 mod truth;
 
-use crate::cell_figures::CellRun;
-use crate::watched::Pictures;
-use crate::{Error, Result};
-use moving_picture::Lift;
+use crate::Result;
+use crate::lifted::Lifted;
 use std::path::Path;
-use trocar_cell::GraspLiftRun;
 use trocar_geometry::RepairReport;
 use trocar_reconstruct::Reconstruction;
 use trocar_report::{page, table};
@@ -52,18 +47,9 @@ pub fn reconstruction_sections(r: &Reconstruction) -> Result<String> {
     let specimen = &r.specimen;
     Ok(seen::overview(r)
         + &seen::images(r)?
-        + &run::bodies(specimen, true)?
+        + &bodies::section(specimen, true)?
         + &seen::depth_errors(r)?
         + &notes(&r.notes))
-}
-
-/// The page of a grasp-lift in the cell.
-///
-/// # Errors
-/// A plot that cannot be drawn.
-pub(crate) fn cell_lift(made: &CellRun, run: &trocar_cell::CellLiftRun, pictures: &Pictures) -> Result<String> {
-    let subtitle = format!("Grasp-lift in the cell '{}'", made.scene);
-    Ok(page::page(&made.scene, &subtitle, &cell_lift::body(made, run, pictures)?))
 }
 
 /// The page of a specimen made from a ready surface.
@@ -88,7 +74,7 @@ pub fn surface(s: &Specimen, repair: &RepairReport) -> Result<String> {
     .into_iter()
     .flatten()
     .collect();
-    let body = run::bodies(s, false)?
+    let body = bodies::section(s, false)?
         + &page::section(
             "The surface as found",
             "What was wrong with the file's surface, and what was done.",
@@ -98,28 +84,21 @@ pub fn surface(s: &Specimen, repair: &RepairReport) -> Result<String> {
     Ok(page::page(&s.name, &made_from(s, "Organ"), &body))
 }
 
-/// The page of a grasp-lift run; `before` are sections to put first, such as [`reconstruction_sections`].
+/// The page of a lift; `before` are sections to put first, such as [`reconstruction_sections`].
 ///
 /// # Errors
-/// Snapshots that are not of this specimen, a picture that cannot be encoded.
-pub fn grasp_lift(s: &Specimen, run: &GraspLiftRun, before: Option<&str>) -> Result<String> {
-    let (outcome, details) = run::sections(s, run)?;
+/// A picture or plot that cannot be made.
+pub(crate) fn lift(s: &Specimen, lifted: &Lifted, before: Option<&str>) -> Result<String> {
+    let (outcome, details) = lift::sections(lifted)?;
     let body = match before {
         // The outcome first: it is what the reader came for.
         Some(before) => outcome + before + &details,
-        None => outcome + &run::bodies(s, s.camera.is_some())? + &details,
+        None => outcome + &bodies::section(s, s.camera.is_some())? + &details,
     };
-    let done = if run.summary.sever.is_some() { "grasp, lift and cut" } else { "grasp and lift" };
-    let title = format!("{}: {done} of the {}", s.name, run.summary.organ);
+    let summary = &lifted.recording.summary;
+    let done = if summary.cuts > 0 { "grasp, lift and cut" } else { "grasp and lift" };
+    let title = format!("{}: {done} of the {}", s.name, summary.details.organ);
     Ok(page::page(&title, &made_from(s, "Specimen"), &(body + &provenance(s))))
-}
-
-/// The moving picture of a run as a GIF, 480 x 300 pixels, 15 frames a second, endless.
-///
-/// # Errors
-/// A run without snapshots, or with snapshots that are not of this specimen.
-pub fn lift_gif(s: &Specimen, run: &GraspLiftRun) -> Result<Vec<u8>> {
-    Lift::new(s, run)?.ok_or(Error::NoSnapshots)?.gif()
 }
 
 fn made_from(s: &Specimen, what: &str) -> String {

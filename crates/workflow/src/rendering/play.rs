@@ -1,6 +1,6 @@
 //! What moving pictures are of: something that goes on a control period at a time.
 
-use super::script::Script;
+use super::script::ScriptedLift;
 use crate::replayed::Replayed;
 use crate::{Error, Result};
 use trocar_cell::Cell;
@@ -20,13 +20,13 @@ pub(crate) trait Play {
     fn differs(&self) -> Option<String>;
 }
 
-impl Play for Script {
+impl Play for ScriptedLift {
     fn name(&self) -> &'static str {
         "grasp-lift"
     }
 
     fn cell(&self) -> &Cell {
-        &self.cell
+        ScriptedLift::cell(self)
     }
 
     fn periods(&self) -> Option<usize> {
@@ -34,7 +34,7 @@ impl Play for Script {
     }
 
     fn advance(&mut self) -> Result<bool> {
-        Script::advance(self)
+        ScriptedLift::advance(self)
     }
 
     fn differs(&self) -> Option<String> {

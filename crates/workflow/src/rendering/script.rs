@@ -1,33 +1,51 @@
-//! The scripted grasp-lift as something to film.
+//! The scripted grasp-lift of a scene, a control period at a time: for pictures.
 
 use crate::Result;
-use trocar_cell::{Cell, CellLift, CellLiftPolicy, Policy};
+use crate::specimen_scene::{grasp_lift, task_organ};
+use trocar_cell::Cell;
 use trocar_scene::Scene;
+use trocar_specimen::Specimen;
+use trocar_task::policy::{Script, Scripted};
+use trocar_task::{Episode, Policy};
 
-/// The scripted grasp-lift, a control period at a time.
-pub struct Script {
-    /// The cell.
-    pub cell: Cell,
-    policy: CellLiftPolicy,
+/// The scripted grasp-lift in progress.
+pub struct ScriptedLift {
+    episode: Episode,
+    policy: Scripted,
+    chunk: std::collections::VecDeque<trocar_cell::Action>,
 }
 
-impl Script {
-    /// The task of `scene`: its organ, grasped in the middle, lifted 15 mm.
-    pub fn new(scene: &Scene, cell: Cell) -> Result<Self> {
-        let mut task = CellLift::default();
-        if let Some(arm) = scene.grasping_arm() {
-            task.arm = arm.name.name().to_owned();
-        }
-        let organ = &scene.task.organ;
-        task.organ = cell.world().model.bodies().iter().any(|b| b.name() == organ).then(|| organ.clone());
-        task.design = Some(cell.grasp_design(&task.arm)?);
-        Ok(Self { policy: CellLiftPolicy::new(&task, &cell)?, cell })
+impl ScriptedLift {
+    /// In the cell of `scene` around `specimen`: the organ of the scene's task, grasped in the middle and
+    /// lifted 15 mm, as the scene's grasp design holds.
+    ///
+    /// # Errors
+    /// A scene that cannot be built, a specimen without organs.
+    pub fn new(scene: &Scene, specimen: &Specimen, threads: usize) -> Result<Self> {
+        let mut scene = scene.clone();
+        let own = specimen.organs.iter().any(|o| o.name == scene.task.organ).then(|| scene.task.organ.clone());
+        let organ = task_organ(specimen, own.as_deref())?;
+        scene.task = trocar_scene::Task { grasp: scene.task.grasp, ..grasp_lift(organ) };
+        let episode = Episode::new(&scene, specimen, threads)?;
+        let mut policy = Scripted::following(Script::default());
+        policy.begin(&episode, 0)?;
+        Ok(Self { episode, policy, chunk: std::collections::VecDeque::new() })
     }
 
-    /// Does one control period; false when the task is over.
+    /// The cell as it is now.
+    pub fn cell(&self) -> &Cell {
+        self.episode.cell()
+    }
+
+    /// Does one control period; false when the lift is over.
+    ///
+    /// # Errors
+    /// A place that cannot be grasped.
     pub fn advance(&mut self) -> Result<bool> {
-        let Some(action) = self.policy.act(&self.cell)? else { return Ok(false) };
-        let report = self.cell.step(&action)?;
-        Ok(report.tissue.divergence.is_none())
+        if self.chunk.is_empty() {
+            self.chunk = self.policy.act(&self.episode)?.into();
+        }
+        let Some(action) = self.chunk.pop_front() else { return Ok(false) };
+        Ok(self.episode.end().is_none() && self.episode.step(&action)?.end.is_none())
     }
 }

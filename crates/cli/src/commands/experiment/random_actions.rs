@@ -27,8 +27,9 @@ fn text(r: &RandomActionsResult) -> String {
         "least volume",
         "rcm mm",
         "force N",
-        "unhooked",
-        "put right",
+        "contacts disabled",
+        "of blades",
+        "relaxed",
         "guarded",
     ];
     let rows: Vec<Vec<String>> = r
@@ -43,7 +44,8 @@ fn text(r: &RandomActionsResult) -> String {
                 format!("{:.4}", row.min_volume_ratio),
                 format!("{:.2}", row.rcm_max_mm),
                 format!("{:.2}", row.force_max_n),
-                row.unhooked.to_string(),
+                row.disabled_contacts.to_string(),
+                row.disabled_blades.to_string(),
                 row.relaxed.to_string(),
                 row.guarded.to_string(),
             ]

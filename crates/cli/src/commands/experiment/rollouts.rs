@@ -46,13 +46,16 @@ fn text(r: &RolloutsResult) -> String {
         })
         .collect();
     format!(
-        "{}\n{}\n{} of {} passed, {} diverged, {} inverted elements at worst; states {}\nreport {}",
+        "{}\n{}\n{} of {} passed, {} diverged, {} inverted elements at worst, suspensions of physics {}/{}/{} (contacts, contacts of blades, organs relaxed); states {}\nreport {}",
         output::table(&["", "here", "paper"], &rows),
         output::table(&["controller", "passed", "held", "lift mm", "RCM max mm", "diverged"], &policies),
         r.passed,
         r.rollouts,
         r.diverged,
         r.inverted_peak,
+        r.suspensions[0],
+        r.suspensions[1],
+        r.suspensions[2],
         r.hash,
         r.report
     )

@@ -1,13 +1,16 @@
 //! Arms from description files: URDF and MJCF.
 //!
-//! Both are read with `roxmltree`, which expands no entity of a document's own, and from each only what makes a serial chain. (`urdf-rs` fills in zeros
-//! where a link has no inertia, `mjcf-rs` does not read torque limits; neither can tell these from what the file says.)
+//! Both are parsed by `roxmltree`, which expands no entities of a document. The readers use only
+//! the elements of a serial chain. (`urdf-rs` replaces a missing inertia by zeros, and `mjcf-rs`
+//! does not read torque limits, so neither shows what is missing in a file.)
 
 mod mjcf;
+mod mjcf_visual;
 mod urdf;
+mod urdf_visual;
 mod visual;
 mod xml;
 
-pub use mjcf::mjcf_visuals;
-pub use urdf::urdf_visuals;
+pub use mjcf_visual::mjcf_visuals;
+pub use urdf_visual::urdf_visuals;
 pub use visual::{Visual, VisualShape};

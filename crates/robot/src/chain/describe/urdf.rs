@@ -1,9 +1,5 @@
 //! Arms from URDF, ROS's format: the links from a base to a tip.
 
-mod visual;
-
-pub use visual::urdf_visuals;
-
 use super::xml::{Source, children, place, shown};
 use crate::chain::arm::{Joint, JointKind, JointLimits, Segment, SerialArm};
 use crate::chain::frames::compose;
@@ -16,16 +12,18 @@ use std::path::Path;
 use trocar_core::Pose;
 
 impl SerialArm {
-    /// Reads the arm from the link `base` to the link `tip` from a URDF file. Without `base` it begins at the root, without `tip` it ends at the
-    /// only link that has no child.
+    /// Reads the arm from the link `base` to the link `tip` from a URDF file. Without `base` it
+    /// starts at the root, without `tip` it ends at the only link without a child.
     ///
-    /// Links that are fixed to a moving one are part of it; what hangs on the tip is left out: a payload takes its place. URDF knows no rotor inertia,
-    /// so that the armature is zero; gravity is 9.81 m/s2 along -z.
+    /// Links that are fixed to a moving link are part of it. Children of the tip are ignored: a
+    /// payload takes their place. URDF has no rotor inertia, so the armature is zero; gravity is
+    /// 9.81 m/s2 along -z.
     ///
     /// # Errors
-    /// A file that cannot be read, is no URDF or is an unexpanded xacro; no such base or tip, several ends, a loop; a joint that is neither
-    /// revolute, continuous, prismatic nor fixed, or mimics another; a link that is moved by a joint and has no `<inertial>`; another branch that
-    /// moves; and what [`SerialArm::new`] refuses.
+    /// A file that cannot be read, is not URDF or is an unexpanded xacro; an unknown base or tip,
+    /// several ends, a loop; a joint that is neither revolute, continuous, prismatic nor fixed, or
+    /// mimics another; a moving link without `<inertial>`; another moving branch; and the errors of
+    /// [`SerialArm::new`].
     pub fn from_urdf(path: &Path, base: Option<&str>, tip: Option<&str>) -> Result<Self> {
         let (source, text) = Source::read(path)?;
         let document = source.parse(&text, "robot")?;
@@ -39,45 +37,45 @@ impl SerialArm {
     }
 }
 
-struct Reader<'p, 'a, 'i> {
-    source: Source<'p>,
-    root: Node<'a, 'i>,
-    links: BTreeMap<&'a str, Node<'a, 'i>>,
-    /// Joints by the link that they move, and by the one that they are on.
-    by_child: BTreeMap<&'a str, Node<'a, 'i>>,
-    by_parent: BTreeMap<&'a str, Vec<Node<'a, 'i>>>,
+pub(super) struct Reader<'p, 'a, 'i> {
+    pub(super) source: Source<'p>,
+    pub(super) root: Node<'a, 'i>,
+    pub(super) links: BTreeMap<&'a str, Node<'a, 'i>>,
+    /// Joints by child link, and by parent link.
+    pub(super) by_child: BTreeMap<&'a str, Node<'a, 'i>>,
+    pub(super) by_parent: BTreeMap<&'a str, Vec<Node<'a, 'i>>>,
 }
 
 impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
-    fn new(source: Source<'p>, root: Node<'a, 'i>) -> Result<Self> {
+    pub(super) fn new(source: Source<'p>, root: Node<'a, 'i>) -> Result<Self> {
         let mut reader =
             Self { source, root, links: BTreeMap::new(), by_child: BTreeMap::new(), by_parent: BTreeMap::new() };
         for link in children(root, "link") {
             let name = source.required(link, "name")?;
             if reader.links.insert(name, link).is_some() {
-                return Err(source.fail(format!("{} is there twice", place(link))));
+                return Err(source.fail(format!("{} occurs twice", place(link))));
             }
         }
         for joint in children(root, "joint") {
             let (parent, child) = (reader.end(joint, "parent")?, reader.end(joint, "child")?);
             if reader.by_child.insert(child, joint).is_some() {
-                return Err(source.fail(format!("link '{}' has two parents, must have one", shown(child))));
+                return Err(source.fail(format!("link '{}' has two parents; it must have one", shown(child))));
             }
             reader.by_parent.entry(parent).or_default().push(joint);
         }
         Ok(reader)
     }
 
-    fn at(&self, node: Node<'_, '_>, complaint: &str) -> Error {
+    pub(super) fn at(&self, node: Node<'_, '_>, complaint: &str) -> Error {
         self.source.fail(format!("{} {complaint}", place(node)))
     }
 
     /// The link at one end of a joint.
-    fn end(&self, joint: Node<'a, 'i>, kind: &str) -> Result<&'a str> {
+    pub(super) fn end(&self, joint: Node<'a, 'i>, kind: &str) -> Result<&'a str> {
         let node = children(joint, kind).next().ok_or_else(|| self.at(joint, &format!("has no <{kind}>")))?;
         let name = self.source.required(node, "link")?;
         if !self.links.contains_key(name) {
-            return Err(self.at(joint, &format!("has the {kind} '{}', which is no link", shown(name))));
+            return Err(self.at(joint, &format!("has the {kind} '{}', which is not a link", shown(name))));
         }
         Ok(name)
     }
@@ -85,21 +83,21 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
     fn link(&self, name: &str) -> Result<&'a str> {
         let known = || self.links.keys().take(20).map(|n| shown(n)).collect::<Vec<_>>().join(", ");
         let found = self.links.get_key_value(name).map(|(name, _)| *name);
-        found.ok_or_else(|| self.source.fail(format!("no link '{}'; links: {}", shown(name), known())))
+        found.ok_or_else(|| self.source.fail(format!("there is no link '{}'; the links are: {}", shown(name), known())))
     }
 
     /// The joints from `base` to `tip`.
-    fn joints(&self, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Node<'a, 'i>>> {
+    pub(super) fn joints(&self, base: Option<&str>, tip: Option<&str>) -> Result<Vec<Node<'a, 'i>>> {
         let tip = match tip {
             Some(tip) => self.link(tip)?,
             None => {
                 let ends: Vec<_> = self.links.keys().copied().filter(|l| !self.by_parent.contains_key(l)).collect();
                 match ends[..] {
                     [end] => end,
-                    [] => return Err(self.source.fail("no link without a child; there must be one, or name the tip")),
+                    [] => return Err(self.source.fail("every link has a child; name the tip")),
                     _ => {
                         let names = ends.iter().take(10).map(|n| shown(n)).collect::<Vec<_>>().join(", ");
-                        return Err(self.source.fail(format!("several ends, name the tip: {names}")));
+                        return Err(self.source.fail(format!("there are several ends; name the tip: {names}")));
                     }
                 }
             }
@@ -122,7 +120,9 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
             };
             joints.push(joint);
             if joints.len() > self.links.len() {
-                return Err(self.source.fail(format!("the links around '{}' are a loop, must be a tree", shown(tip))));
+                return Err(self
+                    .source
+                    .fail(format!("the links around '{}' form a loop; they must form a tree", shown(tip))));
             }
             at = self.end(joint, "parent")?;
         }
@@ -132,7 +132,7 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
 
     fn build(&self, joints: &[Node<'a, 'i>]) -> Result<SerialArm> {
         let mut segments: Vec<Segment> = Vec::new();
-        // The link's pose in the axes of the last one that moves, or of the base.
+        // Pose of the link in the axes of the last moving link, or of the base.
         let mut here = Pose::IDENTITY;
         for (k, &node) in joints.iter().enumerate() {
             here = compose(&here, &self.origin(node)?);
@@ -152,19 +152,19 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
             }
         }
         if segments.is_empty() {
-            return Err(self.source.fail("no joint that moves between base and tip"));
+            return Err(self.source.fail("there is no moving joint between base and tip"));
         }
         let name = self.root.attribute("name").unwrap_or("urdf");
         SerialArm::new(shown(name), segments, here).map_err(|e| self.source.explain(e))
     }
 
-    /// Adds to the segment what is fixed to `link` beside the chain.
+    /// Adds the links that are fixed to `link`, outside the chain, to the segment.
     fn weld(&self, link: &'a str, next: Node<'a, 'i>, here: &Pose, segment: &mut Segment) -> Result<()> {
         let mut open = vec![(link, *here)];
         while let Some((link, parent)) = open.pop() {
             for &joint in self.by_parent.get(link).into_iter().flatten().filter(|j| **j != next) {
                 if joint.attribute("type") != Some("fixed") {
-                    return Err(self.at(joint, "moves and is not on the way to the tip: the tree branches"));
+                    return Err(self.at(joint, "moves and is not between base and tip: the tree must not branch"));
                 }
                 let pose = compose(&parent, &self.origin(joint)?);
                 let child = self.end(joint, "child")?;
@@ -177,7 +177,7 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
         Ok(())
     }
 
-    fn origin(&self, node: Node<'a, 'i>) -> Result<Pose> {
+    pub(super) fn origin(&self, node: Node<'a, 'i>) -> Result<Pose> {
         let Some(origin) = children(node, "origin").next() else { return Ok(Pose::IDENTITY) };
         let translation = self.source.vector(origin, "xyz")?.unwrap_or(DVec3::ZERO);
         let [roll, pitch, yaw] = self.source.numbers::<3>(origin, "rpy")?.unwrap_or([0.0; 3]);
@@ -203,19 +203,18 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
             *value = need(node, name)?;
         }
         if mass <= 0.0 {
-            return Err(self.at(
-                link,
-                &format!("has a mass of {mass} kg, must be positive; leave <inertial> out if there is none"),
-            ));
+            return Err(
+                self.at(link, &format!("has a mass of {mass} kg; it must be positive, or <inertial> must be left out"))
+            );
         }
         let inertia = DMat3::from_cols_array(&[xx, xy, xz, xy, yy, yz, xz, yz, zz]);
         let placed = MassProperties { mass, center: DVec3::ZERO, inertia }.placed(&self.origin(inertial)?);
-        // Rounding of the turn leaves it unsymmetric in the last bit.
+        // Rounding of the rotation makes it asymmetric in the last bit.
         Ok(Some(MassProperties { inertia: 0.5 * (placed.inertia + placed.inertia.transpose()), ..placed }))
     }
 
-    /// The joint whose link is at `here` when it is at zero; `None` for a fixed one.
-    fn joint(&self, node: Node<'a, 'i>, here: &Pose) -> Result<Option<Joint>> {
+    /// The joint whose link is at `here` at position zero; `None` for a fixed joint.
+    pub(super) fn joint(&self, node: Node<'a, 'i>, here: &Pose) -> Result<Option<Joint>> {
         let (kind, bounded) = match self.source.required(node, "type")? {
             "fixed" => return Ok(None),
             "revolute" => (JointKind::Revolute, true),
@@ -223,12 +222,12 @@ impl<'p, 'a, 'i> Reader<'p, 'a, 'i> {
             "prismatic" => (JointKind::Prismatic, true),
             other => {
                 let complaint =
-                    format!("is of the type '{}', must be revolute, continuous, prismatic or fixed", shown(other));
+                    format!("has the type '{}'; it must be revolute, continuous, prismatic or fixed", shown(other));
                 return Err(self.at(node, &complaint));
             }
         };
         if children(node, "mimic").next().is_some() {
-            return Err(self.at(node, "mimics another joint, which an arm's joint must not"));
+            return Err(self.at(node, "mimics another joint, which is not supported"));
         }
         let mut axis = DVec3::X;
         if let Some(a) = children(node, "axis").next() {

@@ -1,19 +1,19 @@
-//! What the links of a description look like: meshes and simple shapes, each with its pose and colour. Only for pictures; no force knows of it.
+//! The visual shapes of links: meshes and primitives with pose and colour, for rendering only.
 
 use glam::DVec3;
 use std::path::PathBuf;
 use trocar_core::Pose;
 
-/// A shape that a description shows of a link.
+/// A visual shape of a link.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Visual {
-    /// Name of the link or body that has it.
+    /// Name of the link or body.
     pub link: String,
-    /// Its shape.
+    /// The shape.
     pub shape: VisualShape,
-    /// Pose of the shape in the axes of the arm's link (of the base for what does not move).
+    /// Pose of the shape in the axes of the arm's link, or of the base.
     pub pose: Pose,
-    /// sRGB, 0 to 1 each.
+    /// sRGB, each in [0, 1].
     pub color: [f64; 3],
 }
 
@@ -22,35 +22,35 @@ pub struct Visual {
 pub enum VisualShape {
     /// A mesh file in metres, its vertices times `scale` along each axis.
     Mesh {
-        /// The file, which nobody has looked for yet.
+        /// The file. It need not exist.
         file: PathBuf,
         /// Factors along x, y and z.
         scale: DVec3,
     },
-    /// A box with these halves of its sides [m].
+    /// A box with these half-extents (m).
     Block(DVec3),
     /// A cylinder about z.
     Cylinder {
-        /// Radius [m].
+        /// Radius (m).
         radius: f64,
-        /// Half its length [m].
+        /// Half the length (m).
         half: f64,
     },
-    /// A cylinder about z with round ends.
+    /// A cylinder about z with hemispherical ends.
     Capsule {
-        /// Radius [m].
+        /// Radius (m).
         radius: f64,
-        /// Half its length without the ends [m].
+        /// Half the length without the ends (m).
         half: f64,
     },
-    /// A ball with this radius [m].
+    /// A sphere with this radius (m).
     Ball(f64),
 }
 
-/// Colour of what has none.
-pub(super) const PLAIN: [f64; 3] = [0.7; 3];
+/// Colour of shapes without one.
+pub(super) const DEFAULT_COLOR: [f64; 3] = [0.7; 3];
 
-/// The first three of four numbers of a colour; `None` for what cannot be seen through its last.
+/// The red, green and blue of a colour; `None` for a fully transparent one.
 pub(super) fn opaque([r, g, b, a]: [f64; 4]) -> Option<[f64; 3]> {
     (a > 0.0).then(|| [r, g, b].map(|c| c.clamp(0.0, 1.0)))
 }

@@ -1,4 +1,4 @@
-//! Reading XML that is not to be trusted: size, entities, numbers.
+//! Reads untrusted XML: size, entities and numbers are checked.
 
 use crate::{Error, Result};
 use glam::DVec3;
@@ -6,55 +6,57 @@ use roxmltree::{Document, Node, ParsingOptions};
 use std::io::Read;
 use std::path::Path;
 
-/// The largest file [bytes]. Descriptions of arms have some tens of kilobytes; their meshes are files of their own.
-const LARGEST: u64 = 16 << 20;
-/// The most nodes, which bounds memory.
-const NODES: u32 = 300_000;
-/// The deepest nesting: every reader of it may recurse.
-const DEEPEST: usize = 256;
+/// Maximum size of a file (bytes). Descriptions of arms have some tens of kilobytes; meshes are
+/// separate files.
+const MAX_FILE_SIZE: u64 = 16 << 20;
+/// Maximum number of nodes, which bounds memory.
+const MAX_NODES: u32 = 300_000;
+/// Maximum nesting, because readers may recurse.
+const MAX_NESTING: usize = 256;
 
-/// A file and what is wrong with it.
+/// A file, and errors about it.
 #[derive(Clone, Copy)]
 pub(super) struct Source<'p> {
     pub path: &'p Path,
 }
 
 impl<'p> Source<'p> {
-    /// The complaint as one line, whatever of the file is quoted in it.
+    /// An error about the file, in one line.
     pub fn fail(&self, reason: impl Into<String>) -> Error {
         let reason = reason.into().replace(char::is_control, " ");
         Error::Description { path: self.path.to_owned(), reason }
     }
 
-    /// The file's text.
+    /// Reads the file's text.
     pub fn read(path: &'p Path) -> Result<(Self, String)> {
         let source = Self { path };
         let io = |e| Error::Io { path: path.to_owned(), source: e };
         let mut bytes = Vec::new();
-        std::fs::File::open(path).map_err(io)?.take(LARGEST + 1).read_to_end(&mut bytes).map_err(io)?;
-        if bytes.len() as u64 > LARGEST {
-            return Err(source.fail(format!("larger than {} MiB, which no description of an arm is", LARGEST >> 20)));
+        std::fs::File::open(path).map_err(io)?.take(MAX_FILE_SIZE + 1).read_to_end(&mut bytes).map_err(io)?;
+        if bytes.len() as u64 > MAX_FILE_SIZE {
+            return Err(source
+                .fail(format!("is larger than {} MiB, the maximum for a description of an arm", MAX_FILE_SIZE >> 20)));
         }
-        let text = String::from_utf8(bytes).map_err(|e| source.fail(format!("not UTF-8 text: {e}")))?;
-        // Before the parser sees it: nesting is a matter of the stack.
-        if nesting(&text) > DEEPEST {
-            return Err(source.fail(format!("elements nested deeper than {DEEPEST}")));
+        let text = String::from_utf8(bytes).map_err(|e| source.fail(format!("is not UTF-8 text: {e}")))?;
+        // Checked before parsing, which may overflow the stack.
+        if nesting(&text) > MAX_NESTING {
+            return Err(source.fail(format!("elements are nested deeper than {MAX_NESTING}")));
         }
         Ok((source, text))
     }
 
-    /// The document, whose root must be called `root`.
+    /// Parses the document, whose root element must be `root`.
     pub fn parse<'t>(&self, text: &'t str, root: &str) -> Result<Document<'t>> {
-        let options = ParsingOptions { allow_dtd: false, nodes_limit: NODES, ..ParsingOptions::default() };
+        let options = ParsingOptions { allow_dtd: false, nodes_limit: MAX_NODES, ..ParsingOptions::default() };
         let document = Document::parse_with_options(text, options).map_err(|e| self.fail(e.to_string()))?;
         let found = document.root_element().tag_name().name();
         if found != root {
-            return Err(self.fail(format!("the root element is <{}>, must be <{root}>", shown(found))));
+            return Err(self.fail(format!("the root element is <{}>; it must be <{root}>", shown(found))));
         }
         Ok(document)
     }
 
-    /// The numbers of an attribute, `None` where there is none.
+    /// The numbers of an attribute; `None` if it is missing.
     pub fn numbers<const N: usize>(&self, node: Node<'_, '_>, name: &str) -> Result<Option<[f64; N]>> {
         node.attribute(name).map(|text| self.parse_numbers(text, &place(node), name)).transpose()
     }
@@ -73,7 +75,7 @@ impl<'p> Source<'p> {
             count += 1;
         }
         if count != N {
-            return Err(self.fail(format!("{place}: {name} has {count} numbers, must have {N}")));
+            return Err(self.fail(format!("{place}: {name} has {count} numbers; it must have {N}")));
         }
         Ok(values)
     }
@@ -86,12 +88,12 @@ impl<'p> Source<'p> {
         Ok(self.numbers::<3>(node, name)?.map(DVec3::from_array))
     }
 
-    /// An attribute that must be there.
+    /// A required attribute.
     pub fn required<'a>(&self, node: Node<'a, '_>, name: &str) -> Result<&'a str> {
         node.attribute(name).ok_or_else(|| self.fail(format!("{}: the attribute '{name}' is missing", place(node))))
     }
 
-    /// Says of a complaint of the arm's own checks which file it is about.
+    /// Adds the file to an error of the arm's own checks.
     pub fn explain(&self, error: Error) -> Error {
         match error {
             Error::Invalid { what, reason } => self.fail(format!("{what}: {reason}")),
@@ -100,7 +102,7 @@ impl<'p> Source<'p> {
     }
 }
 
-/// The element for a message: its kind, name and line.
+/// An element in error messages: its line, kind and name.
 pub(super) fn place(node: Node<'_, '_>) -> String {
     let line = node.document().text_pos_at(node.range().start).row;
     let kind = node.tag_name().name();
@@ -110,7 +112,7 @@ pub(super) fn place(node: Node<'_, '_>) -> String {
     }
 }
 
-/// A word of the file, short enough for a message.
+/// A word of the file, shortened for error messages.
 pub(super) fn shown(word: &str) -> String {
     let mut short: String = word.chars().take(60).collect();
     if short.len() < word.len() {
@@ -119,12 +121,12 @@ pub(super) fn shown(word: &str) -> String {
     short
 }
 
-/// Child elements of one kind.
+/// The child elements of one kind.
 pub(super) fn children<'a, 'i>(node: Node<'a, 'i>, kind: &str) -> impl Iterator<Item = Node<'a, 'i>> {
     node.children().filter(move |c| c.has_tag_name(kind))
 }
 
-/// An upper bound of the depth of elements: opening marks less closing ones. What is in comments may count too.
+/// An upper bound of the nesting: opening tags minus closing tags.
 fn nesting(text: &str) -> usize {
     let bytes = text.as_bytes();
     let (mut depth, mut deepest) = (0usize, 0);

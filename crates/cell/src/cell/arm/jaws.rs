@@ -1,0 +1,148 @@
+//! What an arm's jaws and blades do to the tissue between them: take hold, let go, cut.
+
+use super::{ArmState, ArmUnit, Held};
+use crate::blades::{Tools, opening_force};
+use crate::cell::report::CellEvent;
+use crate::grasp_candidate::{GraspCandidate, Snap};
+use crate::hold::{Hold, Moved};
+use crate::target::reach_into;
+use crate::{GraspDesign, Gripper, JawRegion, TissueInJaws, World};
+use glam::DVec3;
+use trocar_tissue::Piece;
+
+/// Jaws that press with this share of their force have closed on what is between them.
+const PRESSING: f64 = 0.95;
+
+/// Jaws are commanded to close, or to open, when the opening asked for is beyond the one they have
+/// by this much.
+const LEAST_COMMANDED_MOTION: f64 = 0.02;
+
+impl ArmUnit {
+    /// The region between the blades.
+    pub fn jaw_region(&self) -> JawRegion {
+        JawRegion::sized(&self.state.gripper, self.model.blades.length)
+    }
+
+    /// Jaws that press take hold of what is between them; jaws that are commanded to open let go.
+    pub fn grasp(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
+        let (wanted, opening) = (self.state.wanted.jaw(), self.opening());
+        if let Some(held) = &self.state.held {
+            let opens = wanted > held.opening + LEAST_COMMANDED_MOTION;
+            let lost =
+                self.state.design == GraspDesign::Friction && self.jaw_region().tissue_of(world, held.organ).is_none();
+            if opens || lost {
+                self.let_go(world, events);
+            }
+            return;
+        }
+        let presses =
+            opening_force(&self.state.gripper, Tools::of(0), &self.state.forces) >= PRESSING * self.state.jaw.budget;
+        if wanted < opening - LEAST_COMMANDED_MOTION && presses {
+            self.take_hold(world, events);
+        }
+    }
+
+    fn take_hold(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
+        let (region, opening) = (self.jaw_region(), self.opening());
+        let Self { model, state, .. } = self;
+        let Some((organ, tissue)) = region.fullest(world) else { return };
+        let reach = reach_into(world, organ);
+        let Some(candidate) = GraspCandidate::on(world, organ, &region, tissue, reach, state.design) else { return };
+        let pose = state.gripper.pose;
+        let closing_force_n = opening_force(&state.gripper, Tools::of(0), &state.forces);
+        let displaced_mm = 1e3 * candidate.displaced(world, organ);
+        let grasp = state.design.grasp(world, organ, &candidate.nodes, model.tools, &pose, state.jaw.budget);
+        let snap = grasp.as_ref().map(|g| Snap::of(world, g, &pose)).unwrap_or_default();
+        let hold = Hold::new(world, organ, candidate.nodes, &pose);
+        state.held = Some(Held { organ, s: candidate.s, hold, opening });
+        world.state.grasps.extend(grasp);
+        events.push(CellEvent::Attached {
+            arm: model.side,
+            organ: world.model.bodies()[organ].name().to_owned(),
+            s: candidate.s,
+            nodes: snap.nodes,
+            snap_mm: 1e3 * snap.most,
+            snap_mean_mm: 1e3 * snap.mean,
+            displaced_mm,
+            gap_mm: 1e3 * tissue.gap,
+            closing_force_n,
+        });
+    }
+
+    pub fn let_go(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
+        let tool = self.model.tools.gripper;
+        world.state.grasps.retain(|g| g.tool != tool);
+        // Blades without contact are in tissue that would be dragged along.
+        self.state.contact_disabled |= std::mem::take(&mut self.state.blades_disabled);
+        if self.state.held.take().is_some() {
+            self.state.design = self.model.design;
+            events.push(CellEvent::Released { arm: self.model.side });
+        }
+    }
+
+    /// Blades that close through tissue cut it, after they were open with tissue between them all
+    /// the while: the organ, and the cutter as wide as it was open.
+    ///
+    /// What closes past each other with edges shears: it goes through what lies between instead of
+    /// pressing it flat. So from the closing on tissue does not feel the blades, until none is left
+    /// where the open blades were and they are out of all organs. The shaft is felt all the while.
+    pub fn cut(&mut self, world: &World) -> Option<(usize, Gripper)> {
+        let length = self.model.blades.length;
+        let between = |open: &Gripper| JawRegion::sized(open, length).fullest(world).map(|(organ, _)| organ);
+        if let Some(jaw_angle) = self.state.shears
+            && between(&Gripper { jaw_angle, ..self.state.gripper }).is_none()
+            && self.inside_organ(world, 3).is_none()
+        {
+            self.state.shears = None;
+        }
+        let state = &mut self.state;
+        if let Some(open) = state.scissors.follow(&state.gripper) {
+            return between(&open).map(|organ| (organ, open));
+        }
+        if let Some(jaw_angle) = state.scissors.opened().filter(|_| state.jaw_rate < 0.0) {
+            if between(&Gripper { jaw_angle, ..state.gripper }).is_some() {
+                state.shears = Some(jaw_angle);
+            } else {
+                state.scissors.rest();
+            }
+        }
+        None
+    }
+
+    /// The organ that is held has been cut into `pieces`; `was` is the centroid of what is held
+    /// before (m).
+    pub fn follow_cut(&mut self, world: &World, pieces: &[Piece], was: DVec3) {
+        let ArmState { held, gripper, .. } = &mut self.state;
+        if let Some(held) = held {
+            held.hold.follow(world, pieces, &gripper.pose, was);
+            held.organ = held.hold.tissue().0;
+        }
+    }
+
+    /// The tissue between the blades now, and its organ; of blades that shear, between them as wide
+    /// as they were.
+    pub fn tissue(&self, world: &World) -> Option<(usize, TissueInJaws)> {
+        let jaw_angle = self.state.shears.unwrap_or(self.state.gripper.jaw_angle);
+        JawRegion::sized(&Gripper { jaw_angle, ..self.state.gripper }, self.model.blades.length).fullest(world)
+    }
+
+    /// Centroid of what is held (m); zero of nothing.
+    pub fn held_now(&self, world: &World) -> DVec3 {
+        self.state.held.as_ref().map_or(DVec3::ZERO, |h| h.hold.now(world))
+    }
+
+    /// Whether the next frame is the first of what the jaws hold.
+    pub fn is_newly_attached(&self, world: &World) -> bool {
+        self.state.held.as_ref().is_some_and(|h| h.hold.is_new(world))
+    }
+
+    /// Body and number of the nodes that are held.
+    pub fn held_nodes(&self) -> Option<(usize, usize)> {
+        self.state.held.as_ref().map(|h| (h.organ, h.hold.tissue().1.len()))
+    }
+
+    /// How far jaws and what they hold have gone since they closed.
+    pub fn moved(&self, world: &World) -> Option<Moved> {
+        self.state.held.as_ref().map(|h| h.hold.moved(world, &self.state.gripper.pose))
+    }
+}

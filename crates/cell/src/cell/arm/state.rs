@@ -1,0 +1,186 @@
+//! What changes of an arm besides its drive's state, as it begins and as numbers.
+
+use super::ArmModel;
+use crate::cell::exchange::Exchange;
+use crate::cell::rules::ForceGuard;
+use crate::cell::setpoint::Setpoint;
+use crate::hold::Hold;
+use crate::{GraspDesign, Gripper, Jaw, Scissors};
+use glam::DVec3;
+use trocar_core::Pose;
+use trocar_core::Wrench;
+use trocar_tissue::ToolForce;
+
+/// What an arm is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::cell) enum Wanted {
+    /// Absolute targets, and what is left of the orientation that was asked for.
+    Setpoint(Setpoint, DVec3),
+    /// Joints, which the drive knows, and the jaw's opening.
+    Joints(f64),
+}
+
+/// Tissue that the jaws hold.
+#[derive(Clone, Debug)]
+pub(in crate::cell) struct Held {
+    pub organ: usize,
+    /// Organ coordinate of what is held.
+    pub s: f64,
+    pub hold: Hold,
+    /// The opening at which the jaws closed on it.
+    pub opening: f64,
+}
+
+/// What changes of an arm besides its drive's state: plain data.
+#[derive(Clone, Debug)]
+pub(in crate::cell) struct ArmState {
+    pub wanted: Wanted,
+    /// What was commanded last.
+    pub commanded: Setpoint,
+    /// The last command stops short of what was asked.
+    pub held_back: bool,
+    pub guard: ForceGuard,
+    /// The guard has shortened the last command.
+    pub guarded: bool,
+    /// The gripper at the end of the last tissue frame.
+    pub gripper: Gripper,
+    pub design: GraspDesign,
+    pub jaw: Jaw,
+    /// Change of the jaw's opening (1/s).
+    pub jaw_rate: f64,
+    pub exchange: Exchange,
+    pub forces: [ToolForce; 3],
+    pub scissors: Scissors,
+    /// A cutter's blades are closing, or have closed, through tissue: how wide they were (rad).
+    /// They shear it then and press none of it.
+    pub shears: Option<f64>,
+    pub held: Option<Held>,
+    /// Contact of the whole instrument with tissue is disabled.
+    pub contact_disabled: bool,
+    /// Contact of the blades is disabled until they let go of what they hold.
+    pub blades_disabled: bool,
+    /// Largest RCM deviation of the period so far (m).
+    pub rcm_peak: f64,
+    /// Which of the RCM limits are exceeded, and that was reported.
+    pub rcm_reported: [bool; 2],
+}
+
+impl Wanted {
+    /// The opening that is asked for.
+    pub fn jaw(&self) -> f64 {
+        match self {
+            Self::Setpoint(to, _) => to.jaw(),
+            Self::Joints(jaw) => *jaw,
+        }
+    }
+
+    /// Asks for another opening.
+    pub fn set_jaw(&mut self, opening: f64) {
+        match self {
+            Self::Setpoint(to, _) => *to = to.with_jaw(opening),
+            Self::Joints(jaw) => *jaw = opening,
+        }
+    }
+
+    /// What is left of the orientation that was asked for.
+    pub fn rejected_rotation(&self) -> DVec3 {
+        match self {
+            Self::Setpoint(_, rejected) => *rejected,
+            Self::Joints(_) => DVec3::ZERO,
+        }
+    }
+}
+
+impl ArmState {
+    /// At rest at `start`, the tip frame at `pose`, holding nothing.
+    pub fn new(
+        pose: Pose,
+        model: &ArmModel,
+        start: Setpoint,
+        design: GraspDesign,
+        jaw: Jaw,
+        scissors: Scissors,
+    ) -> Self {
+        Self {
+            wanted: Wanted::Setpoint(start, DVec3::ZERO),
+            commanded: start,
+            held_back: false,
+            guard: ForceGuard::default(),
+            guarded: false,
+            gripper: Gripper { pose, jaw_angle: start.jaw() * model.blades.max_angle },
+            design,
+            jaw,
+            jaw_rate: 0.0,
+            exchange: Exchange::new(pose.translation),
+            forces: [ToolForce::default(); 3],
+            scissors,
+            shears: None,
+            held: None,
+            contact_disabled: false,
+            blades_disabled: false,
+            rcm_peak: 0.0,
+            rcm_reported: [false; 2],
+        }
+    }
+
+    /// Every number of the state, for its hash. Each field is named here, so that one that is added
+    /// and forgotten does not compile.
+    pub fn numbers(&self) -> Vec<f64> {
+        let Self {
+            wanted,
+            commanded,
+            held_back,
+            guard,
+            guarded,
+            gripper: Gripper { pose: Pose { rotation, translation }, jaw_angle },
+            design,
+            jaw,
+            jaw_rate,
+            exchange,
+            forces,
+            scissors,
+            shears,
+            held,
+            contact_disabled,
+            blades_disabled,
+            rcm_peak,
+            rcm_reported,
+        } = self;
+        let mut all = match wanted {
+            Wanted::Setpoint(to, _) => to.0.to_vec(),
+            Wanted::Joints(jaw) => vec![*jaw],
+        };
+        all.extend(wanted.rejected_rotation().to_array());
+        all.extend(commanded.0);
+        all.extend(translation.to_array());
+        all.extend(rotation.to_array());
+        all.extend([*jaw_angle, *jaw_rate, *rcm_peak, shears.unwrap_or(-1.0)]);
+        all.extend(exchange.numbers());
+        all.extend(guard.numbers());
+        all.extend(jaw.numbers());
+        all.extend(scissors.numbers());
+        for ToolForce { contact, constraint, pressing, touching } in forces {
+            for Wrench { force, torque } in [contact, constraint] {
+                all.extend(force.to_array());
+                all.extend(torque.to_array());
+            }
+            all.extend([*pressing, *touching as f64]);
+        }
+        let flags = [
+            *contact_disabled,
+            *blades_disabled,
+            *held_back,
+            *guarded,
+            rcm_reported[0],
+            rcm_reported[1],
+            held.is_some(),
+        ];
+        all.extend(flags.map(|b| f64::from(u8::from(b))));
+        all.push(GraspDesign::ALL.iter().position(|d| d == design).unwrap_or(0) as f64);
+        if let Some(Held { organ, s, hold, opening }) = held {
+            all.extend([*organ as f64, *s, *opening]);
+            all.extend(hold.numbers());
+        }
+        all
+    }
+}

@@ -1,0 +1,74 @@
+//! Where an arm's instrument is in the tissue: what it is near, what it has gone into.
+
+use super::ArmUnit;
+use crate::World;
+use crate::cell::clearance::Rod;
+use crate::cell::inside::first_organ_around;
+use glam::DVec3;
+use trocar_core::Pose;
+use trocar_tissue::Shape;
+
+impl ArmUnit {
+    /// Whether it may have to do with the tissue's stretch.
+    pub fn meets_tissue(&self) -> bool {
+        self.state.contact_disabled || self.state.held.is_some() || self.state.forces.iter().any(|f| f.touching > 0)
+    }
+
+    /// Distance of a point from the instrument's axis, from the blades' tips up its shaft (m).
+    pub fn distance(&self, p: DVec3) -> f64 {
+        let q = self.state.gripper.pose.inverse().transform(p);
+        let along = q.x.clamp(-self.model.blades.shaft_length, self.model.blades.length);
+        q.distance(along * DVec3::X)
+    }
+
+    /// Whether the jaws hold tissue of that organ.
+    pub fn holds(&self, organ: usize) -> bool {
+        self.state.held.as_ref().is_some_and(|held| held.organ == organ)
+    }
+
+    /// Its convex parts where they are now, as far as they are round. The rest offset is the
+    /// blades' thickness.
+    pub fn rods(&self) -> Vec<Rod> {
+        let rods = self.frames().into_iter().flat_map(|(tool, frame)| {
+            let parts = self.model.parts.iter().filter(move |part| part.tool == tool);
+            parts.filter_map(move |part| match part.shape {
+                Shape::Capsule { ends, radius } => {
+                    let ends = ends.map(|p| frame.transform(p));
+                    Some(Rod { ends, radius: radius + part.rest_offset })
+                }
+                _ => None,
+            })
+        });
+        rods.collect()
+    }
+
+    /// The instrument's tools and where they are.
+    fn frames(&self) -> [(usize, Pose); 3] {
+        let [one, two] = self.model.tools.sides().map(|(tool, side)| (tool, self.state.gripper.blade(side)));
+        [(self.model.tools.gripper, self.state.gripper.pose), one, two]
+    }
+
+    /// The organ that a part of the instrument that tissue feels has gone into, except what the
+    /// jaws hold and what blades shear.
+    pub fn pierces(&self, world: &World) -> Option<usize> {
+        let felt = if self.state.shears.is_some() || self.state.blades_disabled { 1 } else { 3 };
+        self.inside_organ(world, felt)
+    }
+
+    /// The organ that one of the first `count` tools has gone into: the shaft, then the blades.
+    pub fn inside_organ(&self, world: &World, count: usize) -> Option<usize> {
+        let Self { model, state, .. } = self;
+        let spared = state.held.as_ref().map(|held| held.organ);
+        for (tool, frame) in self.frames().into_iter().take(count) {
+            let axes = model.parts.iter().filter(|part| part.tool == tool).filter_map(|part| match part.shape {
+                Shape::Capsule { ends, .. } => Some(ends.map(|p| frame.transform(p))),
+                _ => None,
+            });
+            let axes: Vec<[DVec3; 2]> = axes.collect();
+            if let Some((organ, _)) = first_organ_around(world, &axes, spared) {
+                return Some(organ);
+            }
+        }
+        None
+    }
+}

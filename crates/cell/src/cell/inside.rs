@@ -1,0 +1,80 @@
+//! Whether a segment lies inside an organ.
+
+use crate::World;
+use glam::DVec3;
+
+/// The first organ, but for `spared`, in which one of `segments` lies in part, and where (m).
+/// Elements that are pinned all round do not count: nothing feels them.
+pub(super) fn first_organ_around(
+    world: &World,
+    segments: &[[DVec3; 2]],
+    spared: Option<usize>,
+) -> Option<(usize, DVec3)> {
+    let ends = segments.iter().flatten();
+    let (low, high) = ends.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(*p), high.max(*p)));
+    let mut places = Vec::new();
+    let mut sides = Vec::new();
+    for (k, body) in world.model.bodies().iter().enumerate().filter(|(k, _)| Some(*k) != spared) {
+        places.clear();
+        sides.clear();
+        for i in 0..body.len() {
+            let p = world.state.position(&world.model, k, i);
+            places.push(p);
+            sides.push(p.cmplt(low).bitmask() | p.cmpgt(high).bitmask() << 3);
+        }
+        let pinned = body.pinned();
+        for tet in body.tets() {
+            let t = tet.map(|i| i as usize);
+            // All corners beyond one side of the box round the segments.
+            if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 || t.iter().all(|i| pinned[*i]) {
+                continue;
+            }
+            let corners = t.map(|i| places[i]);
+            if let Some(at) = segments.iter().find_map(|s| inside(&corners, s)) {
+                return Some((k, at));
+            }
+        }
+    }
+    None
+}
+
+/// The middle of what of a segment lies inside a tetrahedron, if any does.
+fn inside(corners: &[DVec3; 4], [from, to]: &[DVec3; 2]) -> Option<DVec3> {
+    let (mut begin, mut end) = (0.0_f64, 1.0_f64);
+    // Each face with the corner opposite to it.
+    for [a, b, c, d] in [[0, 1, 2, 3], [0, 3, 1, 2], [0, 2, 3, 1], [1, 3, 2, 0]] {
+        let [a, b, c, d] = [a, b, c, d].map(|i: usize| corners[i]);
+        let normal = (b - a).cross(c - a);
+        let inwards = normal * (d - a).dot(normal).signum();
+        let (one, two) = ((*from - a).dot(inwards), (*to - a).dot(inwards));
+        if one < 0.0 && two < 0.0 {
+            return None;
+        }
+        let share = one / (one - two);
+        if one < 0.0 {
+            begin = begin.max(share);
+        } else if two < 0.0 {
+            end = end.min(share);
+        }
+    }
+    (begin < end).then(|| from.lerp(*to, 0.5 * (begin + end)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_of_a_segment_is_inside_a_tetrahedron_is_found() {
+        let corners = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::Z];
+        let at = |from: [f64; 3], to: [f64; 3]| inside(&corners, &[from.into(), to.into()]);
+        let near = |at: Option<DVec3>, to: [f64; 3]| at.is_some_and(|at| at.distance(to.into()) < 1e-12);
+        assert!(near(at([0.1, 0.1, -1.0], [0.1, 0.1, 1.8]), [0.1, 0.1, 0.4]));
+        assert!(near(at([0.1, 0.1, 0.1], [0.1, 0.1, 0.3]), [0.1, 0.1, 0.2]), "all of it");
+        assert_eq!(at([0.1, 0.1, -1.0], [0.1, 0.1, -0.01]), None, "it ends before");
+        assert_eq!(at([0.5, 0.5, 0.1], [1.0, 1.0, 0.1]), None);
+        // Whichever way the corners turn.
+        let turned = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::Z];
+        assert!(inside(&turned, &[DVec3::splat(0.2), DVec3::ONE]).is_some());
+    }
+}

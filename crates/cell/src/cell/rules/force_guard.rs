@@ -1,0 +1,139 @@
+//! Rule: no command pushes an instrument harder into tissue than the scene's force limit.
+//!
+//! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N
+//! for a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a
+//! stop is not enough, because what is pressed stays pressed. So the part of a command's way that
+//! goes against the force gets shorter as the force nears the limit, and beyond the limit the
+//! instrument draws back. What a step may cost is known from the stiffness seen so far, as in
+//! [`crate::Jaw`]: a fixed gain would swing on stiff tissue or creep on soft. The rest of the way
+//! is the command's.
+
+use glam::DVec3;
+
+/// Share of the force's way to the limit that one step goes.
+const GAIN: f64 = 0.3;
+
+/// The limit matters from this share of it on.
+const FROM_SHARE: f64 = 0.5;
+
+/// Within this share of the limit it stands still.
+const DEADBAND: f64 = 0.02;
+
+/// Softest and stiffest that tissue is taken to be (N/m).
+const STIFFNESS: [f64; 2] = [2e3, 5e4];
+
+/// What is left of the stiffness from one period to the next.
+const FORGETTING: f64 = 0.98;
+
+/// Least motion that gives a secant (m).
+const LEAST_MOTION: f64 = 2e-5;
+
+/// Fastest that it draws back (m a period).
+const RETREAT: f64 = 1e-3;
+
+/// The force guard of one arm.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(in crate::cell) struct ForceGuard {
+    /// Force gained a way gone against it (N/m).
+    stiffness: f64,
+    /// Force (N) and tip (m) a period ago.
+    last: [DVec3; 2],
+    /// The force is beyond the limit, and that was reported.
+    reported: bool,
+}
+
+impl ForceGuard {
+    /// A period begins with the tip at `at` (m) under `force` (N).
+    pub fn begin_period(&mut self, force: DVec3, at: DVec3) {
+        let [was, there] = self.last;
+        let (change, way) = (force - was, at - there);
+        self.stiffness *= FORGETTING;
+        if way.length() > LEAST_MOTION && force.length() > 0.0 {
+            self.stiffness = self.stiffness.max(-change.dot(way) / way.length_squared());
+        }
+        self.last = [force, at];
+    }
+
+    /// What is left of a way (m) that is commanded for the next period where `limit` (N) must not
+    /// be passed; the same where it need not be changed.
+    pub fn allow(&self, way: DVec3, limit: f64) -> DVec3 {
+        let [force, _] = self.last;
+        let size = force.length();
+        if size <= FROM_SHARE * limit {
+            return way;
+        }
+        let out = force / size;
+        let room = if (limit - size).abs() < DEADBAND * limit { 0.0 } else { limit - size };
+        let most = GAIN * room / self.stiffness.clamp(STIFFNESS[0], STIFFNESS[1]);
+        let against = -way.dot(out);
+        // Beyond the limit `most` is negative: at least so far back.
+        let allowed = against.min(most.max(-RETREAT));
+        if allowed == against { way } else { way + (against - allowed) * out }
+    }
+
+    /// Whether the force has just gone beyond `limit` (N).
+    pub fn newly_exceeded(&mut self, limit: f64) -> Option<f64> {
+        let size = self.last[0].length();
+        // Reported once, until it is well below.
+        let over = size > if self.reported { 0.8 * limit } else { limit };
+        let new = over && !self.reported;
+        self.reported = over;
+        new.then_some(size)
+    }
+
+    /// The numbers of its state.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
+        let Self { stiffness, last, reported } = *self;
+        let vectors = last.map(|v| v.to_array());
+        vectors.into_iter().flatten().chain([stiffness, f64::from(u8::from(reported))])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Goes `speed` (m a period) into a wall of `stiffness` (N/m), the tip a share behind the
+    /// command: forces of 300 periods (N).
+    fn press(stiffness: f64, speed: f64, limit: f64) -> Vec<f64> {
+        let (mut guard, mut command, mut tip) = (ForceGuard::default(), 0.01, 0.01_f64);
+        let mut forces = Vec::new();
+        for _ in 0..300 {
+            let force = stiffness * (-tip).max(0.0);
+            guard.begin_period(force * DVec3::X, tip * DVec3::X);
+            command += guard.allow(DVec3::new(-speed, 0.001, 0.0), limit).x;
+            tip += 0.8 * (command - tip);
+            forces.push(force);
+        }
+        forces
+    }
+
+    #[test]
+    fn it_comes_to_the_limit_and_stays_there() {
+        for stiffness in [500.0, 5e3, 2e4] {
+            let forces = press(stiffness, 2e-4, 10.0);
+            let last = &forces[280..];
+            let peak = forces.iter().copied().fold(0.0, f64::max);
+            assert!(last.iter().all(|f| (f - last[0]).abs() < 0.2), "{stiffness} N/m: {last:?}");
+            assert!(peak < 12.0 && last[0] > 8.0, "{stiffness} N/m: a peak of {peak} N, then {} N", last[0]);
+        }
+        // What comes fast onto stiff tissue is drawn back.
+        let forces = press(2e4, 1e-3, 10.0);
+        assert!(forces[299] < 11.0, "{:?}", &forces[280..]);
+    }
+
+    #[test]
+    fn what_goes_aside_or_away_is_let_go() {
+        let mut guard = ForceGuard::default();
+        guard.begin_period(9.5 * DVec3::Z, DVec3::ZERO);
+        for way in [1e-3 * DVec3::X, 2e-3 * DVec3::Z] {
+            assert_eq!(guard.allow(way, 10.0), way);
+        }
+        let slanted = guard.allow(DVec3::new(1e-3, 0.0, -1e-3), 10.0);
+        assert!(slanted.x == 1e-3 && slanted.z > -1e-4 && slanted.z < 0.0, "{slanted}");
+        assert_eq!(guard.allow(-1e-3 * DVec3::Z, 100.0), -1e-3 * DVec3::Z);
+        guard.begin_period(30.0 * DVec3::Z, DVec3::ZERO);
+        assert!(guard.allow(-1e-3 * DVec3::Z, 10.0).z > 0.0, "it draws back");
+        assert_eq!((guard.newly_exceeded(10.0), guard.newly_exceeded(10.0)), (Some(30.0), None));
+    }
+}

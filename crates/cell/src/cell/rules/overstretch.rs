@@ -1,0 +1,48 @@
+//! Rule: the instrument at tissue that is strained beyond what tissue bears lets go of it.
+//!
+//! Real tissue tears at a stretch of about two; the model has no such end. So where an edge of an
+//! organ is longer than [`MAX_STRETCH`] times its rest length, or an element has less than
+//! [`MIN_VOLUME_SHARE`] of its rest volume, contact of the nearest instrument is disabled until the
+//! tissue has come back. Jaws that hold by a latch keep their hold at first and only press no more;
+//! they let go beyond [`MAX_LATCHED_STRETCH`]. No figure of merit counts on what follows.
+//!
+//! [`MAX_STRETCH`]: super::strain::MAX_STRETCH
+//! [`MIN_VOLUME_SHARE`]: super::strain::MIN_VOLUME_SHARE
+//! [`MAX_LATCHED_STRETCH`]: super::strain::MAX_LATCHED_STRETCH
+
+use super::Scope;
+use super::strain::{MAX_LATCHED_STRETCH, MAX_WAIT_FRAMES};
+
+/// An instrument farther than this from where tissue is strained most has nothing to do with it
+/// (m).
+const NEAR: f64 = 0.03;
+
+/// The arm whose instrument tissue feels at the strained place of `organ`. What only presses comes
+/// before what holds, then the nearest.
+pub(super) fn instrument_at(scope: &Scope<'_>, organ: usize) -> Option<usize> {
+    let at = scope.strains[organ].at;
+    let felt = scope.arms.iter().enumerate().filter(|(_, s)| !s.state.contact_disabled && s.meets_tissue());
+    let near = felt.filter(|(_, s)| s.distance(at) < NEAR || s.holds(organ));
+    let ranked = near.map(|(k, s)| (k, (s.holds(organ), s.distance(at))));
+    ranked.min_by(|(_, a), (_, b)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(k, _)| k)
+}
+
+/// Disables contact of arm `k` if it strains `organ` too much. What an instrument left behind that
+/// has just let go is given time to come back.
+pub(super) fn apply(scope: &mut Scope<'_>, organ: usize, k: usize) {
+    let strain = scope.strains[organ];
+    let left_behind = scope.arms.iter().any(|s| {
+        (s.state.contact_disabled || s.state.blades_disabled) && (s.distance(strain.at) < NEAR || s.holds(organ))
+    });
+    let patient = left_behind && scope.waits[organ] < MAX_WAIT_FRAMES && strain.stretch < MAX_LATCHED_STRETCH;
+    if patient && strain.is_too_much() {
+        scope.waits[organ] += 1;
+        return;
+    }
+    scope.waits[organ] = 0;
+    let arm = &scope.arms[k];
+    if strain.is_beyond(arm.state.blades_disabled && arm.holds(organ)) {
+        scope.log.rules.overstretched += 1;
+        scope.disable_contact(k, organ);
+    }
+}

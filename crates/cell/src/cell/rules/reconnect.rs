@@ -1,0 +1,14 @@
+//! Rule: an instrument whose contact is disabled is felt again once it is out of all organs and no
+//! organ is strained any more.
+
+use super::Scope;
+
+pub(super) fn apply(scope: &mut Scope<'_>) {
+    let calm = !scope.strains.iter().any(|s| s.lasts());
+    for arm in scope.arms.iter_mut().filter(|arm| arm.state.contact_disabled) {
+        if calm && arm.pierces(scope.world).is_none() {
+            arm.state.contact_disabled = false;
+            scope.log.rules.reconnected += 1;
+        }
+    }
+}

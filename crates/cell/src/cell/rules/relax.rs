@@ -1,0 +1,24 @@
+//! Rule: an organ that stays folded with no instrument at it is relaxed outside of time.
+//!
+//! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold
+//! lock each other, whatever the energy. An organ that is strained beyond what tissue bears with no
+//! instrument at it, or that stays strained for [`MAX_WAIT_FRAMES`], is relaxed by
+//! [`trocar_tissue::State::relax`] without regard to time and forces.
+
+use super::Scope;
+use super::strain::MAX_WAIT_FRAMES;
+use crate::cell::report::CellEvent;
+
+/// Relaxes `organ` if it has to be; the event of it.
+pub(super) fn apply(scope: &mut Scope<'_>, organ: usize) -> Option<CellEvent> {
+    let (strain, wait) = (scope.strains[organ], &mut scope.waits[organ]);
+    if strain.is_too_much() || strain.lasts() && *wait >= MAX_WAIT_FRAMES {
+        *wait = 0;
+        scope.world.state.relax(organ);
+        scope.log.rules.relaxed += 1;
+        let name = scope.world.model.bodies()[organ].name().to_owned();
+        return Some(CellEvent::Relaxed { organ: name, stretch: strain.stretch, volume: strain.volume });
+    }
+    *wait = if strain.lasts() { *wait + 1 } else { 0 };
+    None
+}

@@ -1,0 +1,135 @@
+//! How far organs are from their rest shape, and the limits that the rules go by.
+
+use crate::World;
+use glam::DVec3;
+
+/// Stretch of an edge at which contact of the nearest instrument is disabled.
+pub(super) const MAX_STRETCH: f64 = 5.0;
+
+/// Stretch at which a latch lets go and nothing is waited for: at ten the solver reports
+/// divergence.
+pub(super) const MAX_LATCHED_STRETCH: f64 = 6.5;
+
+/// Stretch of all edges below which an instrument is felt again.
+const RESTED_STRETCH: f64 = 3.0;
+
+/// Share of its rest volume below which an element is crushed: less than the strongest grasps of
+/// the lifts leave. Below a thousandth the solvers make no progress.
+pub(super) const MIN_VOLUME_SHARE: f64 = 0.01;
+
+/// Share of its rest volume that every element needs for an instrument to be felt again.
+const RESTED_VOLUME_SHARE: f64 = 0.05;
+
+/// Tissue that no instrument meets is examined where an element has less than this share of its
+/// rest volume.
+pub(super) const SQUEEZED: f64 = 0.2;
+
+/// Frames for which an organ may stay strained after the last instrument has let go of it: what is
+/// elastic has come back by then.
+pub(super) const MAX_WAIT_FRAMES: u32 = 15;
+
+/// How far an organ is from its rest shape at worst.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::cell) struct Strain {
+    /// Length of the most stretched edge over that at rest; 1 where none is stretched.
+    pub stretch: f64,
+    /// Least volume of an element over that at rest; 1 where that was not asked for.
+    pub volume: f64,
+    /// Where the worse of the two is (m).
+    pub at: DVec3,
+}
+
+impl Strain {
+    /// Beyond what tissue bears.
+    pub fn is_too_much(&self) -> bool {
+        self.is_beyond(false)
+    }
+
+    /// Beyond what an instrument keeps its contact at. `latched`: its latch alone holds the organ,
+    /// and its blades press on nothing. How hard that may pull is for the tearing force to say; the
+    /// stretch only ends what solvers bear.
+    pub fn is_beyond(&self, latched: bool) -> bool {
+        self.stretch > if latched { MAX_LATCHED_STRETCH } else { MAX_STRETCH } || self.volume < MIN_VOLUME_SHARE
+    }
+
+    /// Not as good as at rest.
+    pub fn lasts(&self) -> bool {
+        self.stretch > RESTED_STRETCH || self.volume < RESTED_VOLUME_SHARE
+    }
+}
+
+/// The element of a body that has least of its rest volume: how much of it, and its middle (m).
+fn most_crushed(world: &World, body: usize, now: &[DVec3]) -> (f64, DVec3) {
+    let (data, mut least) = (&world.model.bodies()[body], (1.0, DVec3::ZERO));
+    for tet in data.tets() {
+        let volume = |x: &[DVec3]| {
+            let [a, b, c, d] = tet.map(|i| x[i as usize]);
+            (b - a).cross(c - a).dot(d - a)
+        };
+        let share = volume(now) / volume(data.rest_positions());
+        if share < least.0 {
+            least = (share, tet.iter().map(|i| 0.25 * now[*i as usize]).sum());
+        }
+    }
+    least
+}
+
+/// The edges of all bodies with their squared rest lengths.
+pub(in crate::cell) struct Edges {
+    bodies: Vec<Vec<([u32; 2], f64)>>,
+    /// The world's count of cuts for which they are right.
+    cuts: usize,
+    positions: Vec<DVec3>,
+}
+
+impl Edges {
+    pub fn of(world: &World) -> Self {
+        let bodies = world.model.bodies().iter().map(|body| {
+            let mut pairs: Vec<[u32; 2]> = Vec::with_capacity(6 * body.tets().len());
+            for t in body.tets() {
+                for (i, k) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+                    pairs.push([t[i].min(t[k]), t[i].max(t[k])]);
+                }
+            }
+            pairs.sort_unstable();
+            pairs.dedup();
+            let rest = body.rest_positions();
+            let length = |[a, b]: [u32; 2]| rest[a as usize].distance_squared(rest[b as usize]);
+            pairs.into_iter().map(|e| (e, length(e))).collect()
+        });
+        Self { bodies: bodies.collect(), cuts: world.cuts, positions: Vec::new() }
+    }
+
+    /// The strain of every body; `least` is the smallest share of its rest volume that any element
+    /// has.
+    pub fn strains(&mut self, world: &World, least: f64) -> Vec<Strain> {
+        if self.cuts != world.cuts {
+            *self = Self::of(world);
+        }
+        let Self { bodies, positions, .. } = self;
+        let strain = |(body, edges): (usize, &Vec<([u32; 2], f64)>)| {
+            positions.clear();
+            let count = world.model.bodies()[body].len();
+            positions.extend((0..count).map(|i| world.state.position(&world.model, body, i)));
+            let (mut most, mut which) = (1.0, [0, 0]);
+            for ([a, b], rest) in edges {
+                let square = positions[*a as usize].distance_squared(positions[*b as usize]);
+                if square > most * rest {
+                    (most, which) = (square / rest, [*a, *b]);
+                }
+            }
+            let [a, b] = which.map(|i| positions[i as usize]);
+            let mut strain = Strain { stretch: most.sqrt(), volume: 1.0, at: 0.5 * (a + b) };
+            if least < RESTED_VOLUME_SHARE {
+                let (volume, at) = most_crushed(world, body, positions);
+                strain.volume = volume;
+                // The place of what makes the strain last.
+                if strain.stretch < RESTED_STRETCH || strain.stretch < MAX_STRETCH && volume < MIN_VOLUME_SHARE {
+                    strain.at = at;
+                }
+            }
+            strain
+        };
+        bodies.iter().enumerate().map(strain).collect()
+    }
+}

@@ -1,0 +1,216 @@
+//! The region between the blades, and the tissue in it (paper section IV-C).
+//!
+//! The region is a wedge from 2 to 21 mm beyond the pivot, 5 mm wide, whose half-gap at distance r
+//! from the pivot is r sin(theta / 2). Tissue is grasped only if it lies in the wedge on both sides
+//! of the closing plane and the blades are farther apart than their contact skin.
+
+use crate::clusters::MIN_HELD_NODES;
+use crate::gripper::{BLADE_TIP, BLADE_WIDTH, JAW_REGION_BEGIN};
+use crate::{Cluster, Gripper, World, clusters};
+use glam::DVec3;
+use trocar_core::Pose;
+
+/// Blades whose inner faces are no farther apart than this (m), where tissue is, hold nothing but
+/// each other's skin (the contact offset of SPEC C1).
+pub const CONTACT_SKIN: f64 = 0.0015;
+
+/// A cluster farther than this (m) from the middle of the tissue between the blades is not what
+/// they hold.
+const ATTACH_WITHIN: f64 = 0.012;
+
+/// Share of the way from an element's middle to its corners at which it is looked at, besides its
+/// middle.
+const TOWARDS_CORNER: f64 = 0.5;
+
+/// The wedge between the blades at one instant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JawRegion {
+    gripper: Gripper,
+    to_gripper: Pose,
+    /// Length of the blades (m).
+    length: f64,
+}
+
+/// Tissue between the blades.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TissueInJaws {
+    /// Its centroid in the world (m).
+    pub centroid: DVec3,
+    /// Its volume (m3).
+    pub volume: f64,
+    /// Gap between the blades' inner faces there (m).
+    pub gap: f64,
+}
+
+impl JawRegion {
+    /// The mouth of a gripper with the paper's blades.
+    pub fn of(gripper: &Gripper) -> Self {
+        Self::sized(gripper, BLADE_TIP)
+    }
+
+    /// The mouth of a gripper whose blades are `length` (m) long.
+    pub fn sized(gripper: &Gripper, length: f64) -> Self {
+        Self { gripper: *gripper, to_gripper: gripper.pose.inverse(), length }
+    }
+
+    /// Whether a point [m, world] is in the wedge; on its faces counts as in.
+    pub fn contains(&self, p: DVec3) -> bool {
+        self.holds(self.to_gripper.transform(p), 0.0)
+    }
+
+    /// The same in the gripper's frame, with the blades farther apart by `beyond` (m) on each side.
+    fn holds(&self, q: DVec3, beyond: f64) -> bool {
+        let r = q.x.hypot(q.y);
+        let along = q.x > 0.0 && (JAW_REGION_BEGIN..=self.length).contains(&r);
+        along && q.z.abs() <= 0.5 * BLADE_WIDTH && q.y.abs() <= self.gripper.half_gap(r) + beyond
+    }
+
+    /// The part of a body of elements `tets` with nodes at `positions` [m, world] that is grasped
+    /// when the jaws close on it now; `None` when that is none.
+    ///
+    /// Elements are looked at in five points, their middle and half way from there to each corner,
+    /// each for a fifth of the volume: nodes alone are too far apart, and those that touch a blade
+    /// may lie on either side of its face.
+    pub fn tissue(&self, tets: &[[u32; 4]], positions: &[DVec3]) -> Option<TissueInJaws> {
+        let (mut sides, mut sum, mut volume) = ([0.0; 2], DVec3::ZERO, 0.0);
+        for tet in tets {
+            let corners = tet.map(|i| positions[i as usize]);
+            let [a, b, c, d] = corners;
+            let share = (b - a).cross(c - a).dot(d - a).abs() / 30.0;
+            let middle = 0.25 * (a + b + c + d);
+            // Most elements are far away; no point that is looked at is farther from the middle
+            // than half of the way to a corner.
+            let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
+            if middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach {
+                continue;
+            }
+            for p in corners.map(|c| middle.lerp(c, TOWARDS_CORNER)).into_iter().chain([middle]) {
+                let q = self.to_gripper.transform(p);
+                if self.holds(q, 0.0) {
+                    sides[usize::from(q.y > 0.0)] += share;
+                    sum += share * p;
+                    volume += share;
+                }
+            }
+        }
+        if sides.contains(&0.0) {
+            return None;
+        }
+        let centroid = sum / volume;
+        let q = self.to_gripper.transform(centroid);
+        let gap = 2.0 * self.gripper.half_gap(q.x.hypot(q.y));
+        (gap > CONTACT_SKIN).then_some(TissueInJaws { centroid, volume, gap })
+    }
+
+    /// Tissue of organ `organ` between the blades, as [`tissue`](Self::tissue).
+    pub fn tissue_of(&self, world: &World, organ: usize) -> Option<TissueInJaws> {
+        self.tissue(world.model.bodies()[organ].tets(), &world.state.positions(&world.model, organ))
+    }
+
+    /// The organ with the most tissue between the blades, and that tissue.
+    pub fn fullest(&self, world: &World) -> Option<(usize, TissueInJaws)> {
+        let near = |k: &usize| self.is_near(world, *k);
+        let all = (0..world.model.bodies().len()).filter(near).filter_map(|k| Some((k, self.tissue_of(world, k)?)));
+        all.reduce(|best, next| if next.1.volume > best.1.volume { next } else { best })
+    }
+
+    /// Whether any node of organ `organ` is so near that some of it may be between the blades.
+    fn is_near(&self, world: &World, organ: usize) -> bool {
+        let body = &world.model.bodies()[organ];
+        // Coarse inner elements are a few times as large as the median.
+        let reach = self.length + BLADE_WIDTH + 8.0 * body.median_edge();
+        let place = |i: usize| world.state.position(&world.model, organ, i);
+        (0..body.len()).any(|i| place(i).distance_squared(self.gripper.pose.translation) < reach * reach)
+    }
+
+    /// Nodes of organ `organ` between the blades, or within half of a median edge of them.
+    pub fn nodes_of(&self, world: &World, organ: usize) -> Vec<u32> {
+        let body = &world.model.bodies()[organ];
+        let beyond = 0.5 * body.median_edge();
+        let inside = |i: &u32| {
+            let p = world.state.position(&world.model, organ, *i as usize);
+            self.holds(self.to_gripper.transform(p), beyond)
+        };
+        (0..body.len() as u32).filter(inside).collect()
+    }
+}
+
+/// The cluster of organ `organ` that is attached when jaws close on tissue around `centroid` (m):
+/// the nearest, within 12 mm. Of thick organs, clusters are what jaws can reach (`reach` (m), see
+/// [`Cluster::within_reach`]).
+pub fn attached(world: &World, organ: usize, centroid: DVec3, reach: f64) -> Option<Cluster> {
+    let mut all: Vec<Cluster> = clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();
+    if all.iter().any(|c| c.nodes.len() >= MIN_HELD_NODES) {
+        all.retain(|c| c.nodes.len() >= MIN_HELD_NODES);
+    }
+    let distance = |c: &Cluster| c.centroid(world, organ).distance(centroid);
+    let nearest = all.into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    (distance(&nearest) <= ATTACH_WITHIN).then_some(nearest)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::MAX_ANGLE;
+
+    /// A cube of edge 2 mm about `at` (m), in five elements.
+    fn cube(at: DVec3) -> (Vec<[u32; 4]>, Vec<DVec3>) {
+        let corner = |k: u32| DVec3::new(f64::from(k & 1), f64::from(k >> 1 & 1), f64::from(k >> 2 & 1)) * 2.0 - 1.0;
+        let tets = vec![[0, 1, 2, 4], [3, 2, 1, 7], [5, 4, 7, 1], [6, 7, 4, 2], [1, 2, 4, 7]];
+        (tets, (0..8).map(|k| at + 0.001 * corner(k)).collect())
+    }
+
+    fn grasped(gripper: &Gripper, at: DVec3) -> bool {
+        let (tets, mut nodes) = cube(at);
+        nodes.iter_mut().for_each(|p| *p = gripper.pose.transform(*p));
+        JawRegion::of(gripper).tissue(&tets, &nodes).is_some()
+    }
+
+    fn gripper(jaw_angle: f64) -> Gripper {
+        Gripper::over(DVec3::new(0.3, -0.1, 0.05), DVec3::new(0.6, 0.0, 0.8), DVec3::Y, jaw_angle)
+    }
+
+    #[test]
+    fn just_inside_and_just_outside_every_face_of_the_wedge() {
+        let open = gripper(MAX_ANGLE);
+        let mm = |x: f64, y: f64, z: f64| DVec3::new(x, y, z) * 1e-3;
+        assert!(grasped(&open, mm(11.5, 0.0, 0.0)));
+        // Before its beginning and beyond its end. The cube is 1 mm large to each side and is
+        // looked at to half way.
+        assert!(grasped(&open, mm(21.0, 0.0, 0.0)) && !grasped(&open, mm(22.05, 0.0, 0.0)));
+        assert!(grasped(&open, mm(2.5, 0.0, 0.0)) && !grasped(&open, mm(0.9, 0.0, 0.0)));
+        assert!(!grasped(&open, mm(-11.5, 0.0, 0.0)), "behind the pivot");
+        // To both sides of its width.
+        for side in [-1.0, 1.0] {
+            assert!(grasped(&open, mm(11.5, 0.0, side * 2.4)) && !grasped(&open, mm(11.5, 0.0, side * 3.55)));
+        }
+        // On one side of the closing plane only, and behind a blade.
+        for side in [-1.0, 1.0] {
+            assert!(grasped(&open, mm(11.5, side * 0.4, 0.0)));
+            assert!(!grasped(&open, mm(11.5, side * 1.05, 0.0)));
+            assert!(!grasped(&open, mm(11.5, side * 8.0, 0.0)));
+        }
+    }
+
+    #[test]
+    fn the_half_gap_is_the_papers() {
+        let open = gripper(0.5);
+        let region = JawRegion::of(&open);
+        for r in [0.003, 0.010, 0.020] {
+            let y = r * (0.25_f64).sin();
+            let at = |y: f64| open.pose.transform(DVec3::new((r * r - y * y).sqrt(), y, 0.0));
+            assert!(region.contains(at(0.999 * y)) && region.contains(at(-0.999 * y)));
+            assert!(!region.contains(at(1.001 * y)) && !region.contains(at(-1.001 * y)));
+        }
+    }
+
+    #[test]
+    fn blades_that_touch_hold_nothing() {
+        let at = 0.0115;
+        let angle = |gap: f64| 2.0 * (0.5 * gap / at).asin();
+        let middle = DVec3::new(at, 0.0, 0.0);
+        assert!(grasped(&gripper(angle(1.1 * CONTACT_SKIN)), middle));
+        assert!(!grasped(&gripper(angle(0.9 * CONTACT_SKIN)), middle));
+        assert!(!grasped(&gripper(0.0), middle));
+    }
+}

@@ -1,0 +1,142 @@
+//! Why an episode did not pass, in one line.
+
+use crate::facts::Facts;
+use crate::{Channels, End, Progress, Stage};
+use trocar_cell::CellEvent;
+
+/// Jaws open less than this are closed.
+const CLOSED_JAW: f64 = 0.05;
+
+/// Jaws that never come nearer to the organ than this are out of reach (mm): half of a blade.
+const OUT_OF_REACH_MM: f64 = 10.0;
+
+/// Why the episode of `rows` that ended as `end` says did not pass; `None` where it did or goes on.
+pub(crate) fn why(rows: &[Channels], facts: &Facts<'_>, progress: &Progress, end: Option<&End>) -> Option<String> {
+    match end? {
+        End::Passed => None,
+        End::RcmAbort { .. } | End::Diverged { .. } | End::PolicyError { .. } => Some(end?.to_string()),
+        End::TimeOut | End::Finished => {
+            let stage = progress.stages.get(progress.stage)?.stage;
+            Some(Reason { rows, facts }.of(stage))
+        }
+    }
+}
+
+struct Reason<'a, 'b> {
+    rows: &'a [Channels],
+    facts: &'a Facts<'b>,
+}
+
+impl Reason<'_, '_> {
+    fn of(&self, stage: Stage) -> String {
+        let (task, organ) = (&self.facts.task.gates, &self.facts.task.organ);
+        let last = self.rows.last().map(|c| c.task).unwrap_or_default();
+        let least = |of: fn(&Channels) -> f64| self.rows.iter().map(of).fold(f64::INFINITY, f64::min);
+        match stage {
+            Stage::Grasp => self.no_grasp(),
+            Stage::Lift | Stage::Held if last.grasped == 0.0 => self.lost_grasp(),
+            Stage::Lift => format!(
+                "not lifted: the {organ} rose by {:.1} mm at most, {} mm are needed for {} s",
+                self.rows.iter().map(|c| c.task.lift_mm).fold(0.0, f64::max),
+                task.lift_mm,
+                task.lift_s
+            ),
+            Stage::Held => format!(
+                "slipped: tissue followed {:.0}% of the jaws' lift and slid {:.1} mm in them",
+                1e2 * last.follow,
+                last.slip_mm
+            ),
+            Stage::Positioning | Stage::JawOnTissue | Stage::Cut if last.grasped == 0.0 => self.lost_grasp(),
+            Stage::Positioning => format!(
+                "out of reach: the cutter came no nearer than {:.1} mm to the {organ} between grasp and base; {} mm are needed",
+                least(|c| c.task.position_mm),
+                task.positioning_mm
+            ),
+            Stage::JawOnTissue => format!("empty jaws: nothing of the {organ} came between the cutter's blades"),
+            Stage::Cut => {
+                format!("not cut: the blades did not open and then close with the {organ} between them all the while")
+            }
+            Stage::Reach1 => {
+                format!("out of reach: the first target stayed {:.1} mm away", least(|c| c.task.reach_1_mm))
+            }
+            Stage::Reach2 => {
+                format!("out of reach: the second target stayed {:.1} mm away", least(|c| c.task.reach_2_mm))
+            }
+            Stage::Reach3 => {
+                format!("out of reach: the third target stayed {:.1} mm away", least(|c| c.task.reach_3_mm))
+            }
+        }
+    }
+
+    /// The jaws never held the organ where the gate wants it.
+    fn no_grasp(&self) -> String {
+        let (organ, gates) = (&self.facts.task.organ, &self.facts.task.gates);
+        if let Some(said) = self.disabled() {
+            return said;
+        }
+        let attached = self.facts.events.iter().rev().find_map(|(time, e)| match e {
+            CellEvent::Attached { arm, organ, s, .. } if Some(*arm) == self.facts.grasper => Some((*time, organ, *s)),
+            _ => None,
+        });
+        if let Some((time, held, s)) = attached {
+            if !held.starts_with(organ.as_str()) {
+                return format!("wrong organ: at {time:.1} s the jaws took hold of the {held} instead of the {organ}");
+            }
+            let (from, to) = (gates.grasp_from, gates.grasp_to);
+            return format!("wrong place: the jaws took hold of the {organ} at s = {s:.2}; the gate is {from} to {to}");
+        }
+        let nearest = self.rows.iter().map(|c| c.task.grasp_distance_mm).fold(f64::INFINITY, f64::min);
+        if nearest > OUT_OF_REACH_MM {
+            return format!("out of reach: the jaws came no nearer than {nearest:.0} mm to the {organ}");
+        }
+        let jaw = |c: &&Channels| self.grasper(c).is_some_and(|arm| arm.jaw < CLOSED_JAW && arm.attached == 0.0);
+        if let Some(closed) = self.rows.iter().find(jaw) {
+            let (time, mm) = (closed.time_s, closed.task.grasp_distance_mm);
+            return format!("empty jaws: they closed on nothing at {time:.1} s, {mm:.0} mm from the {organ}");
+        }
+        format!("no grasp: the jaws came within {nearest:.0} mm of the {organ} and did not close on it")
+    }
+
+    /// The jaws held the organ and do not any more.
+    fn lost_grasp(&self) -> String {
+        let organ = &self.facts.task.organ;
+        if let Some(said) = self.disabled() {
+            return said;
+        }
+        let lost = self.facts.events.iter().rev().find_map(|(time, e)| match e {
+            CellEvent::Torn { arm, force_n } if Some(*arm) == self.facts.grasper => {
+                Some(format!("torn: the {organ} tore out of the jaws at {time:.1} s, at {force_n:.1} N"))
+            }
+            CellEvent::Slipped { arm } if Some(*arm) == self.facts.grasper => {
+                Some(format!("slipped: the {organ} began to slide at {time:.1} s and is out of the jaws"))
+            }
+            CellEvent::Released { arm } if Some(*arm) == self.facts.grasper => {
+                Some(format!("let go: the jaws opened at {time:.1} s"))
+            }
+            _ => None,
+        });
+        lost.unwrap_or_else(|| format!("the jaws do not hold the {organ}"))
+    }
+
+    /// Contact of the grasper is disabled at the end.
+    fn disabled(&self) -> Option<String> {
+        let last = self.rows.last()?;
+        if self.grasper(last)?.contact_disabled == 0.0 {
+            return None;
+        }
+        let said = self.facts.events.iter().rev().find_map(|(time, e)| match e {
+            CellEvent::ContactDisabled { arm, organ, .. } if Some(*arm) == self.facts.grasper => Some((*time, organ)),
+            _ => None,
+        });
+        Some(match said {
+            Some((time, organ)) => format!(
+                "contact disabled: since {time:.1} s tissue does not feel the grasper, which had pierced or strained the {organ}"
+            ),
+            None => "contact disabled: tissue does not feel the grasper".to_owned(),
+        })
+    }
+
+    fn grasper<'c>(&self, row: &'c Channels) -> Option<&'c crate::ArmChannels> {
+        self.facts.grasper.map(|side| row.arms()[side as usize])
+    }
+}

@@ -1,0 +1,128 @@
+//! One body in a frame: its solver, its state on the way through the frame, and what is measured of
+//! it.
+
+use crate::contact::{ContactSet, Members, Pairs, Reaction};
+use crate::frame::Frame;
+use crate::report::Measured;
+use crate::state::BodyState;
+use crate::untangle::Untangler;
+use crate::{Body, StepReport};
+use rayon::prelude::*;
+
+/// The solver of one body with its scratch memory.
+pub(crate) trait Solver: Send + Sync + Sized {
+    /// What all bodies of an island share during a solve.
+    type Shared: Send + Sync;
+
+    /// Whether bodies can touch each other.
+    const COUPLES: bool;
+
+    /// Scratch memory for an island of bodies like this one.
+    fn new_shared(&self) -> Self::Shared;
+
+    /// Advances the bodies of an island by a frame, and writes what happened into their reports. It
+    /// allocates nothing but longer lists of contacts.
+    fn advance(island: IslandFrame<'_, Self>);
+
+    /// What the body touched in the last frame. None for a solver without contact with tools.
+    fn contacts(&self) -> Option<&ContactSet> {
+        None
+    }
+}
+
+/// An island on its way through a frame.
+pub(crate) struct IslandFrame<'a, S: Solver> {
+    pub slots: &'a mut [BodySlot<S>],
+    pub pairs: &'a mut Pairs,
+    pub shared: &'a mut S::Shared,
+    pub frame: &'a Frame<'a>,
+}
+
+/// A body with its solver.
+pub(crate) struct BodySlot<S> {
+    /// The body's place in the model.
+    pub index: usize,
+    /// The body that the solver was made for.
+    pub body: Body,
+    pub solver: S,
+    /// The state, during a frame.
+    pub state: BodyState,
+    /// The state at the frame's beginning.
+    pub before: BodyState,
+    pub report: StepReport,
+    /// The island of the frame, by its first body.
+    pub island: usize,
+    pub reaction: Reaction,
+    pub untangler: Untangler,
+    pub measured: Measured,
+}
+
+impl<S: Solver> BodySlot<S> {
+    /// For the body of this `index`, which has the state `rest` at rest.
+    pub fn new(index: usize, body: &Body, solver: S, rest: BodyState) -> Self {
+        Self {
+            index,
+            body: body.clone(),
+            solver,
+            report: StepReport::default(),
+            island: index,
+            reaction: Reaction::new(body),
+            untangler: Untangler::new(&rest),
+            measured: Measured::nothing(body.len()),
+            before: rest.clone(),
+            state: rest,
+        }
+    }
+
+    /// Begins a frame: remembers the state, and repairs inverted elements.
+    pub fn begin_frame(&mut self, state: &mut BodyState, frame: &Frame<'_>) {
+        self.report = StepReport::default();
+        self.before.copy_from(state);
+        self.untangler.untangle(&frame.of(self.index), &self.body, state);
+    }
+
+    /// Measures the body at the end of a frame: speeds, volumes, and what it does to the tools.
+    pub fn measure(&mut self, frame: &Frame<'_>) {
+        let Self { index, body, solver, state, report, reaction, measured, .. } = self;
+        report.measure(*index, body, state, measured);
+        reaction.take(&frame.of(*index), body, state, solver.contacts().is_none());
+    }
+}
+
+impl<S: Solver> Members for [BodySlot<S>] {
+    fn count(&self) -> usize {
+        self.len()
+    }
+
+    #[inline(always)]
+    fn index(&self, member: usize) -> usize {
+        self[member].index
+    }
+
+    #[inline(always)]
+    fn body(&self, member: usize) -> &Body {
+        &self[member].body
+    }
+
+    #[inline(always)]
+    fn state(&self, member: usize) -> &BodyState {
+        &self[member].state
+    }
+
+    fn state_mut(&mut self, member: usize) -> &mut BodyState {
+        &mut self[member].state
+    }
+}
+
+/// Does the same with every body of an island, in parallel.
+pub(crate) fn for_each<S: Solver>(
+    slots: &mut [BodySlot<S>],
+    frame: &Frame<'_>,
+    work: impl Fn(&mut BodySlot<S>) + Send + Sync,
+) {
+    if frame.single_thread || slots.len() < 2 {
+        slots.iter_mut().for_each(work);
+    } else {
+        slots.par_iter_mut().with_max_len(1).for_each(work);
+    }
+}

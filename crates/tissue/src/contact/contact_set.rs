@@ -1,0 +1,415 @@
+//! All contacts of one body with supports and tools.
+//!
+//! They are found for every substep, from where vertices and tools are at its beginning. Only the
+//! anchors are kept, and so belong to the state: the places where friction holds a vertex, in the
+//! frame of what it touches.
+
+use super::compliant_grasp::{self, CompliantNode};
+use super::contact::{Contact, Friction};
+use super::force::ToolForce;
+use super::memory::{Anchor, Source};
+use super::tool_placement::{self, Placed};
+use crate::Body;
+use crate::frame::Frame;
+use crate::state::BodyState;
+use crate::support::LocalSupport;
+use glam::Vec3A;
+use trocar_core::Wrench;
+
+/// A vertex within this distance of a surface (m), beyond what it may travel in two frames, may
+/// touch it in a frame.
+const REACH_MARGIN: f32 = 1e-3;
+
+/// The matrix stays as it is if at most so many vertices more or fewer touch, and an eighth of
+/// them.
+const MAX_CHANGED_CONTACTS: usize = 3;
+
+/// The contacts of one body.
+pub(crate) struct ContactSet {
+    supports: Vec<LocalSupport>,
+    /// Free vertices of the body's surface, ascending.
+    surface: Vec<u32>,
+    /// Vertices that may touch something in this frame or hang on a tool, ascending.
+    near: Vec<u32>,
+    compliant: Vec<CompliantNode>,
+    contacts: Vec<Contact>,
+    /// First contact of each vertex; that of the next vertex is the end.
+    first: Vec<u32>,
+    /// Contacts with other bodies as they are now, and the first of each vertex: for the sweeps.
+    pressed: Vec<Contact>,
+    first_pressed: Vec<u32>,
+    /// Place of each contact in the frame of what is touched.
+    places: Vec<Vec3A>,
+    /// Sorted by vertex and source.
+    anchors: Vec<Anchor>,
+    next_anchors: Vec<Anchor>,
+    /// Where the colliders are in the substep; None: the tool has no motion.
+    placed: Vec<Option<Placed>>,
+    /// Whether a vertex is one of `surface`.
+    outer: Vec<bool>,
+    /// Vertices that touch at the frame's beginning or are about to.
+    touching: Vec<bool>,
+    /// Vertices that no contact moves: pinned or held rigidly.
+    fixed: Vec<bool>,
+    /// Distance from which a vertex may touch a surface in this frame (m).
+    reach: f32,
+    /// Forces on each tool at the end of the last substep.
+    forces: Vec<ToolForce>,
+}
+
+impl ContactSet {
+    pub fn new(body: &Body) -> Self {
+        let surface = body.surface_vertices();
+        Self {
+            supports: LocalSupport::of(body),
+            near: Vec::with_capacity(body.len()),
+            compliant: Vec::with_capacity(body.len()),
+            contacts: Vec::with_capacity(2 * surface.len()),
+            places: Vec::with_capacity(2 * surface.len()),
+            anchors: Vec::with_capacity(2 * surface.len()),
+            next_anchors: Vec::with_capacity(2 * surface.len()),
+            first: vec![0; body.len() + 1],
+            pressed: Vec::new(),
+            first_pressed: vec![0; body.len() + 1],
+            placed: Vec::new(),
+            outer: outer(&surface, body.len()),
+            touching: vec![false; body.len()],
+            fixed: vec![false; body.len()],
+            reach: 0.0,
+            forces: Vec::new(),
+            surface,
+        }
+    }
+
+    /// Begins a frame: finds what may be touched in it.
+    ///
+    /// If many other vertices touch than the quasi-Newton solver's matrix contains, the warm start
+    /// in `state` is set to those that touch now.
+    pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
+        self.anchors.clone_from(&state.anchors);
+        self.forces.clear();
+        self.forces.resize(frame.tools.len(), ToolForce::default());
+        self.mark_fixed(frame, body);
+        compliant_grasp::find(frame, body, &self.fixed, &mut self.compliant);
+        tool_placement::place(frame, body, 0.0, 1.0, &mut self.placed);
+        // Room for all contacts that a substep may have, so that only the first one allocates.
+        self.contacts.clear();
+        self.places.clear();
+        let most = (self.supports.len() + frame.colliders.len()) * self.surface.len() + body.len();
+        self.contacts.reserve(most);
+        self.places.reserve(most);
+        let anchors = 2 * self.surface.len();
+        state.anchors.reserve(anchors.saturating_sub(state.anchors.len()));
+        self.find_near(frame, body, state);
+    }
+
+    fn mark_fixed(&mut self, frame: &Frame<'_>, body: &Body) {
+        for (fixed, vertex) in self.fixed.iter_mut().zip(&body.vertices) {
+            *fixed = vertex.pinned;
+        }
+        for grasp in frame.rigid_grasps() {
+            grasp.nodes.iter().for_each(|i| self.fixed[body.internal[*i as usize] as usize] = true);
+        }
+    }
+
+    fn find_near(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
+        self.near.clear();
+        self.touching.fill(false);
+        let dt = frame.dt as f32;
+        let fastest = self.surface.iter().map(|i| state.v[*i as usize].length_squared()).fold(0.0, f32::max).sqrt();
+        let fall = dt * dt * frame.gravity.length() as f32;
+        let carried = frame.carried(body, false);
+        self.reach = REACH_MARGIN + carried as f32 + 2.5 * (dt * fastest + fall);
+        // A loose body falls in this frame; a held one may not.
+        let loose = !self.fixed.contains(&true) && self.compliant.is_empty();
+        let drop = if loose { dt * dt * frame.gravity.as_vec3a() } else { Vec3A::ZERO };
+        let (mut touching, mut changed) = (0, 0);
+        let mut hanging = self.compliant.iter().map(|h| h.vertex).peekable();
+        for k in 0..self.surface.len() {
+            let vertex = self.surface[k];
+            let i = vertex as usize;
+            while let Some(before) = hanging.next_if(|h| *h < vertex) {
+                self.near.push(before);
+            }
+            let hangs = hanging.next_if_eq(&vertex).is_some();
+            let (mut near, mut touches) = (hangs, false);
+            if !self.fixed[i] {
+                let (x, ahead) = (state.x[i], state.x[i] + dt * state.v[i] + drop);
+                self.for_sources(frame, body, x, |_, height, normal, point, _, _| {
+                    near = true;
+                    touches |= height < 0.0 || (ahead - point).dot(normal) < 0.0;
+                });
+            }
+            if near {
+                self.near.push(vertex);
+            }
+            touching += usize::from(touches);
+            changed += usize::from(touches != state.warm.supported[i]);
+            self.touching[i] = touches;
+        }
+        self.near.extend(hanging);
+        if changed > MAX_CHANGED_CONTACTS.min(touching / 2) + touching / 8 {
+            state.warm.supported.copy_from_slice(&self.touching);
+        }
+    }
+
+    /// Calls `found` for everything within reach of a vertex at `x`: what it is; the height above
+    /// it now; normal and point of the plane at the substep's end; the vertex in the frame of what
+    /// it touches; and a factor of its contact stiffness, because a field's penalty is along its
+    /// `up`.
+    #[inline(always)]
+    fn for_sources(
+        &self,
+        frame: &Frame<'_>,
+        body: &Body,
+        x: Vec3A,
+        mut found: impl FnMut(Source, f32, Vec3A, Vec3A, Vec3A, f32),
+    ) {
+        for (s, support) in self.supports.iter().enumerate() {
+            let (height, gradient) = support.contact(x);
+            if height <= self.reach {
+                let steepness = gradient.length();
+                let (normal, height) = (gradient / steepness, height / steepness);
+                let factor = steepness * steepness;
+                found(Source::Support(s as u32), height, normal, x - height * normal, x, factor);
+            }
+        }
+        for (c, (collider, placed)) in frame.colliders.iter().zip(&self.placed).enumerate() {
+            let Some(placed) = placed else { continue };
+            let far = self.reach + placed.reach;
+            if (x - placed.centre).length_squared() > (placed.radius + far) * (placed.radius + far) {
+                continue;
+            }
+            let p = placed.from.transform(body.origin + x.as_dvec3());
+            let nearest = collider.shape.nearest(p);
+            if nearest.distance <= f64::from(far) {
+                let height = nearest.distance - collider.rest_offset;
+                let point = placed.to.transform(p - height * nearest.normal) - body.origin;
+                let normal = placed.to.rotation * nearest.normal;
+                let source = Source::Collider(c as u32);
+                found(source, height as f32, normal.as_vec3a(), point.as_vec3a(), p.as_vec3a(), 1.0);
+            }
+        }
+    }
+
+    /// Finds the contacts of the substep between two shares of the frame, of a body whose vertices
+    /// begin it at `x`.
+    pub fn find(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64, x: impl Fn(usize) -> Vec3A) {
+        tool_placement::place(frame, body, from, to, &mut self.placed);
+        let (mut contacts, mut places) = (std::mem::take(&mut self.contacts), std::mem::take(&mut self.places));
+        contacts.clear();
+        places.clear();
+        self.first.fill(0);
+        let mut anchor = 0;
+        let mut hanging = self.compliant.iter().peekable();
+        for vertex in &self.near {
+            let i = *vertex as usize;
+            let begin = contacts.len();
+            let held = hanging.next_if(|h| h.vertex == *vertex);
+            if self.outer[i] && !self.fixed[i] {
+                let stiffness = body.vertices[i].contact_stiffness;
+                self.for_sources(frame, body, x(i), |source, _, normal, point, now, factor| {
+                    while self.anchors.get(anchor).is_some_and(|a| (a.vertex, a.source) < (*vertex, source)) {
+                        anchor += 1;
+                    }
+                    let known = self.anchors.get(anchor).filter(|a| (a.vertex, a.source) == (*vertex, source));
+                    let place = known.map_or(now, |a| a.place);
+                    let friction = match source {
+                        Source::Support(s) => self.supports[s as usize].friction(),
+                        Source::Collider(c) => match &self.placed[c as usize] {
+                            // The grasp holds what friction would.
+                            Some(placed) if placed.grips => 0.0,
+                            _ => frame.colliders[c as usize].friction as f32,
+                        },
+                        Source::Body(_) | Source::Grasp(..) => 0.0,
+                    };
+                    contacts.push(Contact {
+                        vertex: *vertex,
+                        source,
+                        normal,
+                        point,
+                        place: self.carried(source, body, place),
+                        stiffness: factor * stiffness,
+                        friction: Friction::Coulomb(friction),
+                    });
+                    places.push(place);
+                });
+            }
+            if let Some(held) = held
+                && let Some(contact) = held.contact(frame, body, to)
+            {
+                contacts.push(contact);
+                places.push(held.slid);
+            }
+            self.first[i] = begin as u32 | MARK;
+        }
+        // Vertices without contacts have an empty range.
+        let mut next = contacts.len() as u32;
+        for first in self.first.iter_mut().rev() {
+            if *first & MARK != 0 {
+                next = *first & !MARK;
+            }
+            *first = next;
+        }
+        (self.contacts, self.places) = (contacts, places);
+    }
+
+    /// A place in the frame of what is touched, converted to the body's frame at the substep's end.
+    fn carried(&self, source: Source, body: &Body, place: Vec3A) -> Vec3A {
+        match source {
+            Source::Collider(c) => match &self.placed[c as usize] {
+                Some(placed) => (placed.to.transform(place.as_dvec3()) - body.origin).as_vec3a(),
+                None => place,
+            },
+            Source::Support(_) | Source::Body(_) | Source::Grasp(..) => place,
+        }
+    }
+
+    /// Contacts of every vertex of a body that begins at `x`, however far away.
+    #[cfg(test)]
+    pub fn of_everything(body: &Body, x: &[Vec3A]) -> Self {
+        let mut contacts = Self::new(body);
+        let frame = Frame {
+            dt: 1.0,
+            gravity: glam::DVec3::ZERO,
+            index: 0,
+            grasps: &[],
+            tools: &[],
+            loads: &[],
+            colliders: &[],
+            single_thread: true,
+        };
+        contacts.reach = f32::INFINITY;
+        contacts.near.clone_from(&contacts.surface);
+        contacts.find(&frame, body, 0.0, 1.0, |i| x[i]);
+        contacts
+    }
+
+    /// All contacts with supports, tools and grasps, by vertex.
+    pub fn list(&self) -> &[Contact] {
+        &self.contacts
+    }
+
+    /// Contacts of a vertex; those with other bodies come last.
+    #[inline(always)]
+    pub fn of(&self, vertex: usize) -> impl Iterator<Item = &Contact> {
+        let range = |first: &[u32]| first[vertex] as usize..first[vertex + 1] as usize;
+        self.contacts[range(&self.first)].iter().chain(&self.pressed[range(&self.first_pressed)])
+    }
+
+    /// Whether any vertex of a range has contacts.
+    #[inline(always)]
+    pub fn any(&self, vertices: std::ops::Range<usize>) -> bool {
+        let any = |first: &[u32]| first[vertices.start] != first[vertices.end];
+        any(&self.first) || any(&self.first_pressed)
+    }
+
+    /// Sets the contacts with other bodies, by vertex.
+    pub fn press(&mut self, pressed: &[Contact]) {
+        self.pressed.clear();
+        self.first_pressed.fill(0);
+        for contact in pressed.iter().filter(|contact| !self.fixed[contact.vertex as usize]) {
+            self.pressed.push(*contact);
+            self.first_pressed[contact.vertex as usize + 1] += 1;
+        }
+        for i in 1..self.first_pressed.len() {
+            self.first_pressed[i] += self.first_pressed[i - 1];
+        }
+    }
+
+    /// Whether no contact has a force, with the vertices at `x`.
+    pub fn is_idle(&self, x: impl Fn(usize) -> Vec3A) -> bool {
+        self.contacts.iter().all(|contact| contact.push(x(contact.vertex as usize)).is_none())
+    }
+
+    /// Stiffness of the contacts and the grasp of a vertex that the quasi-Newton solver's matrix
+    /// contains (N/m).
+    pub fn stiffness(&self, frame: &Frame<'_>, body: &Body, state: &BodyState, vertex: usize) -> f32 {
+        let pressed = if state.warm.supported[vertex] { body.vertices[vertex].contact_stiffness } else { 0.0 };
+        let held = self.compliant.binary_search_by_key(&(vertex as u32), |h| h.vertex);
+        let hangs = held.ok().and_then(|h| frame.grasps[self.compliant[h].grasp as usize].compliance);
+        pressed + hangs.map_or(0.0, |c| c.stiffness as f32)
+    }
+
+    /// Ends a substep with the vertices at `x`: anchors follow what slips, and tools feel the
+    /// forces.
+    pub fn end_substep(&mut self, frame: &Frame<'_>, body: &Body, share: f64, x: impl Fn(usize) -> Vec3A) {
+        self.next_anchors.clear();
+        self.forces.fill(ToolForce::default());
+        let (mut hanging, mut counted) = (0, None);
+        for (contact, place) in self.contacts.iter().zip(&self.places) {
+            let here = x(contact.vertex as usize);
+            let push = contact.push(here);
+            if let Source::Grasp(..) = contact.source {
+                while self.compliant[hanging].vertex < contact.vertex {
+                    hanging += 1;
+                }
+                let held = &mut self.compliant[hanging];
+                held.pull = push.map_or(Vec3A::ZERO, |push| push.gradient);
+                let slide = contact.slide(here);
+                held.slides = slide.is_some();
+                if let (Some(slide), Some(tool)) = (slide, frame.tools.get(frame.grasps[held.grasp as usize].tool)) {
+                    let back = tool.at(share).rotation.inverse();
+                    held.slid += (back * slide.as_dvec3()).as_vec3a();
+                }
+                continue;
+            }
+            let Some(push) = push else { continue };
+            // A vertex that sticks keeps its anchor to the bit.
+            let place = match (contact.slide(here), contact.source) {
+                (None, _) => *place,
+                (Some(by), Source::Collider(c)) => match &self.placed[c as usize] {
+                    Some(placed) => {
+                        let moved = (contact.place + by).as_dvec3() + body.origin;
+                        placed.to.inverse().transform(moved).as_vec3a()
+                    }
+                    None => *place,
+                },
+                (Some(by), _) => *place + by,
+            };
+            self.next_anchors.push(Anchor { vertex: contact.vertex, source: contact.source, place });
+            if let Source::Collider(c) = contact.source {
+                let tool = frame.colliders[c as usize].tool;
+                if let (Some(force), Some(Some(placed))) = (self.forces.get_mut(tool), self.placed.get(c as usize)) {
+                    let arm = body.origin + here.as_dvec3() - placed.to.translation;
+                    force.contact += Wrench::at(push.gradient.as_dvec3(), arm);
+                    force.pressing += f64::from(contact.stiffness * -contact.height(here));
+                    force.touching += usize::from(counted != Some((contact.vertex, tool)));
+                    counted = Some((contact.vertex, tool));
+                }
+            }
+        }
+        std::mem::swap(&mut self.anchors, &mut self.next_anchors);
+        for held in &self.compliant {
+            let grasp = &frame.grasps[held.grasp as usize];
+            if let (Some(force), Some(tool)) = (self.forces.get_mut(grasp.tool), frame.tools.get(grasp.tool)) {
+                let arm = body.origin + x(held.vertex as usize).as_dvec3() - tool.at(share).translation;
+                force.constraint += Wrench::at(held.pull.as_dvec3(), arm);
+            }
+        }
+    }
+
+    /// Ends a frame: the state keeps the anchors.
+    pub fn end_frame(&self, state: &mut BodyState) {
+        state.anchors.clone_from(&self.anchors);
+    }
+
+    /// Forces of the body on each tool in the last substep.
+    pub fn forces(&self) -> &[ToolForce] {
+        &self.forces
+    }
+
+    /// Nodes that hang compliantly on tools.
+    pub fn compliant(&self) -> &[CompliantNode] {
+        &self.compliant
+    }
+}
+
+/// Marks a vertex's first contact while they are being found.
+const MARK: u32 = 1 << 31;
+
+fn outer(surface: &[u32], vertices: usize) -> Vec<bool> {
+    let mut outer = vec![false; vertices];
+    surface.iter().for_each(|i| outer[*i as usize] = true);
+    outer
+}

@@ -1,0 +1,35 @@
+//! What friction remembers from frame to frame: it belongs to the state.
+
+use glam::Vec3A;
+
+/// What a vertex touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Source {
+    /// The body's support of this number.
+    Support(u32),
+    /// The model's collider of this number.
+    Collider(u32),
+    /// The body of this number.
+    Body(u32),
+    /// The grasp of this number, and its node of this number: it holds from both sides.
+    Grasp(u32, u32),
+}
+
+/// Where friction holds a vertex.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Anchor {
+    pub vertex: u32,
+    pub source: Source,
+    /// In the frame of what is touched: the tool's, or for a support the body's (m). A tool carries
+    /// it along.
+    pub place: Vec3A,
+}
+
+/// How far friction's spring between a vertex and another body is stretched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Stretch {
+    pub vertex: u32,
+    pub other: u32,
+    /// The vertex from where friction holds it without force (m).
+    pub by: Vec3A,
+}

@@ -1,0 +1,162 @@
+//! Islands: bodies that may touch each other and no others. Each is solved on its own, in parallel.
+
+use crate::body_slot::{BodySlot, IslandFrame, Solver, for_each};
+use crate::contact::{ContactSet, Coupling, Members, Pairs, Source};
+use crate::frame::Frame;
+use glam::DVec3;
+use std::cmp::Reverse;
+
+/// An island: how many of the slots are its bodies, and what it owns.
+pub(crate) struct Island<S: Solver> {
+    /// Bodies of the island; they are adjacent in the list of slots.
+    bodies: usize,
+    /// Where the bodies may touch each other.
+    pairs: Pairs,
+    /// What their solvers share.
+    shared: S::Shared,
+}
+
+/// The islands of a frame, the largest first. Islands of earlier frames stay as spare memory.
+pub(crate) struct Islands<S: Solver> {
+    list: Vec<Island<S>>,
+    /// Islands in use.
+    count: usize,
+    /// By body: elements of the island that begins with it.
+    sizes: Vec<usize>,
+}
+
+impl<S: Solver> Islands<S> {
+    /// None, with room for one for each of `slots`.
+    pub fn new(slots: &[BodySlot<S>]) -> Self {
+        let island = |slot: &BodySlot<S>| {
+            let shared = slot.solver.new_shared();
+            Island { bodies: 0, pairs: Pairs::default(), shared }
+        };
+        Self { list: slots.iter().map(island).collect(), count: 0, sizes: vec![0; slots.len()] }
+    }
+
+    /// Sorts the bodies into islands by what may touch in the frame: island by island, the largest
+    /// first.
+    pub fn build(&mut self, slots: &mut [BodySlot<S>], coupling: Option<&Coupling>) {
+        let Self { list, count, sizes } = self;
+        sizes.fill(0);
+        for slot in slots.iter_mut() {
+            slot.island = coupling.map_or(slot.index, |coupling| coupling.island(slot.index));
+            sizes[slot.island] += slot.body.tets.len();
+        }
+        slots.sort_unstable_by_key(|slot| (Reverse(sizes[slot.island]), slot.island, slot.index));
+        *count = 0;
+        for (island, bodies) in list.iter_mut().zip(slots.chunk_by(|a, b| a.island == b.island)) {
+            island.bodies = bodies.len();
+            *count += 1;
+        }
+    }
+
+    /// Solves all islands, on the threads of a pool if there is one: a free thread takes the next.
+    pub fn solve(
+        &mut self,
+        slots: &mut [BodySlot<S>],
+        coupling: Option<&Coupling>,
+        frame: &Frame<'_>,
+        pool: Option<&rayon::ThreadPool>,
+    ) {
+        let islands = &mut self.list[..self.count];
+        let solve = |island: &mut Island<S>, slots: &mut [BodySlot<S>]| island.solve(slots, coupling, frame);
+        match pool {
+            Some(pool) => pool.install(|| in_parallel(islands, slots, &solve)),
+            None => in_order(islands, slots, &solve),
+        }
+    }
+
+    /// Calls `visit(body, vertex, force)` for every contact force (N) on a vertex at the end of the
+    /// last frame; `x` is where a body's vertex is.
+    pub fn for_contact_forces(
+        &self,
+        slots: &[BodySlot<S>],
+        x: impl Fn(usize, u32) -> glam::Vec3A,
+        visit: &mut dyn FnMut(usize, u32, DVec3),
+    ) {
+        let mut rest = slots;
+        for island in &self.list[..self.count] {
+            let (slots, next) = rest.split_at(island.bodies);
+            island.for_contact_forces(slots, &x, visit);
+            rest = next;
+        }
+    }
+}
+
+impl<S: Solver> Island<S> {
+    /// Advances the island by a frame and measures its bodies.
+    fn solve(&mut self, slots: &mut [BodySlot<S>], coupling: Option<&Coupling>, frame: &Frame<'_>) {
+        let Self { pairs, shared, .. } = self;
+        if let Some(coupling) = coupling {
+            pairs.begin_frame(coupling, frame, slots);
+        }
+        S::advance(IslandFrame { slots, pairs, shared, frame });
+        for_each(slots, frame, |slot| slot.measure(frame));
+        press_tools(slots, pairs, frame);
+    }
+
+    fn for_contact_forces(
+        &self,
+        slots: &[BodySlot<S>],
+        x: &impl Fn(usize, u32) -> glam::Vec3A,
+        visit: &mut dyn FnMut(usize, u32, DVec3),
+    ) {
+        let x = |m: usize, vertex: u32| x(slots[m].index, vertex);
+        for (m, slot) in slots.iter().enumerate() {
+            let contacts = slot.solver.contacts().map_or(&[][..], ContactSet::list);
+            for contact in contacts.iter().filter(|contact| matches!(contact.source, Source::Collider(_))) {
+                if let Some(push) = contact.push(x(m, contact.vertex)) {
+                    visit(slot.index, contact.vertex, -push.gradient.as_dvec3());
+                }
+            }
+        }
+        for pair in self.pairs.list() {
+            if let Some(push) = pair.contact.push(pair.offset(x)) {
+                for (m, vertex, share) in pair.shares() {
+                    visit(slots[m].index, vertex, (-share * push.gradient).as_dvec3());
+                }
+            }
+        }
+    }
+}
+
+/// Adds the forces of other bodies on rigidly held nodes to the tools that hold them.
+fn press_tools<S: Solver>(slots: &mut [BodySlot<S>], pairs: &Pairs, frame: &Frame<'_>) {
+    for pair in pairs.list() {
+        if let Some(push) = pair.contact.push(pair.offset(|m, vertex| slots.x(m, vertex))) {
+            for (m, vertex, share) in pair.shares() {
+                let BodySlot { body, state, reaction, .. } = &mut slots[m];
+                let force = (-share * push.gradient).as_dvec3();
+                reaction.press(frame, body, state, vertex as usize, force);
+            }
+        }
+    }
+}
+
+fn in_order<S: Solver>(
+    islands: &mut [Island<S>],
+    mut slots: &mut [BodySlot<S>],
+    solve: &impl Fn(&mut Island<S>, &mut [BodySlot<S>]),
+) {
+    for island in islands {
+        let (own, rest) = std::mem::take(&mut slots).split_at_mut(island.bodies);
+        solve(island, own);
+        slots = rest;
+    }
+}
+
+fn in_parallel<S: Solver>(
+    islands: &mut [Island<S>],
+    slots: &mut [BodySlot<S>],
+    solve: &(impl Fn(&mut Island<S>, &mut [BodySlot<S>]) + Sync),
+) {
+    let Some((island, others)) = islands.split_first_mut() else { return };
+    let (own, rest) = slots.split_at_mut(island.bodies);
+    if others.is_empty() {
+        solve(island, own);
+    } else {
+        rayon::join(|| solve(island, own), || in_parallel(others, rest, solve));
+    }
+}

@@ -1,0 +1,395 @@
+//! The quasi-Newton solver of one body: its parts by purpose, and the potential of one body.
+
+use super::elements::Elements;
+use super::history::{History, Memory};
+use super::iterate::{InitialGuess, Iterate, add, max_coordinate, position};
+use super::layout::Layout;
+use super::rigid_modes::RigidModes;
+use super::sleep::{RestCache, Sleep};
+use super::system::System;
+use crate::contact::{ContactSet, Source};
+use crate::descent::BodyDescent;
+use crate::frame::Frame;
+use crate::lanes::{Row, dot_rows};
+use crate::settings::{Descent, QuasiNewton, Start};
+use crate::state::BodyState;
+use crate::{Body, Isa};
+use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x4};
+use glam::Vec3A;
+
+/// Sweeps a substep for a body that the quasi-Newton steps gave up.
+const FALLBACK_SWEEPS: usize = 20;
+
+/// The solver of one body.
+pub(crate) struct QuasiNewtonSolver {
+    pub(super) settings: QuasiNewton,
+    pub(super) level: Level,
+    /// Where the body's data lie.
+    pub(super) layout: Layout,
+    /// The preconditioner.
+    pub(super) system: System,
+    /// Forces and volumes of the elements.
+    pub(super) elements: Elements,
+    /// The vectors of the search.
+    pub(super) iterate: Iterate,
+    /// What the body touches.
+    pub(super) touching: Touching,
+    /// Forces from outside.
+    pub(super) loads: Loads,
+    /// Free nodes that a tool carries.
+    pub(super) held: Vec<bool>,
+    /// The body's part of the island's last steps.
+    pub(super) memory: Memory,
+    /// Rigid motions, of a body that touches others and that nothing holds.
+    pub(super) rigid: Option<RigidModes>,
+    /// What happened to the body in the substep.
+    pub(super) progress: Progress,
+    /// Whether the body takes part in the search.
+    pub(super) sleep: Sleep,
+    pub(super) rest: RestCache,
+    /// What steps the body when the quasi-Newton steps fail.
+    pub(super) fallback: BodyDescent,
+}
+
+/// What a body touches in a substep.
+pub(super) struct Touching {
+    pub contacts: ContactSet,
+    /// Limits of friction of the contacts (N), held during a search.
+    pub limits: Vec<f32>,
+    /// Whether another body presses it when the substep begins.
+    pub pressed: bool,
+}
+
+/// Forces from outside on free nodes.
+pub(super) struct Loads {
+    /// (N)
+    forces: Vec<Row>,
+    /// Whether there is any.
+    pub any: bool,
+}
+
+/// What happened to a body in a substep.
+pub(super) struct Progress {
+    /// Where the substep started from.
+    pub guess: InitialGuess,
+    /// Whether a tool moves held nodes in the substep.
+    pub carried: bool,
+    /// Whether a held node stays behind because an edge would be too long.
+    pub yielded: bool,
+    /// The report's count of that when the substep began.
+    pub limited: usize,
+    /// Whether the last step along a direction was possible.
+    pub stepped: bool,
+    /// Largest coordinate of the direction (m).
+    pub longest: f32,
+    /// Largest coordinate of the way from where the body would go by itself (m).
+    pub gone: f32,
+}
+
+impl QuasiNewtonSolver {
+    /// For `body` stepped by frames of `dt` (s); `single_thread`: the calling thread does all the
+    /// work.
+    pub fn new(settings: QuasiNewton, body: &Body, dt: f64, single_thread: bool) -> Self {
+        let (system, layout) = System::new(body, dt / settings.substeps as f64);
+        let sweeps = Descent { substeps: settings.substeps, iterations: FALLBACK_SWEEPS, start: Start::Adaptive };
+        let limits = Vec::with_capacity(2 * body.len());
+        Self {
+            settings,
+            level: Isa::detect().level(),
+            system,
+            elements: Elements::new(&layout, body),
+            iterate: Iterate::new(&layout),
+            touching: Touching { contacts: ContactSet::new(body), limits, pressed: false },
+            loads: Loads { forces: vec![[0.0; 4]; layout.rows], any: false },
+            held: vec![false; layout.free],
+            memory: Memory::new(settings.memory, layout.rows),
+            rigid: None,
+            progress: Progress {
+                guess: InitialGuess::Still,
+                carried: false,
+                yielded: false,
+                limited: 0,
+                stepped: true,
+                longest: 0.0,
+                gone: 0.0,
+            },
+            sleep: Sleep { active: true, ..Sleep::default() },
+            rest: RestCache::new(&layout),
+            fallback: BodyDescent::new(sweeps, body, single_thread),
+            layout,
+        }
+    }
+
+    /// What bodies of an island share.
+    pub fn new_history(&self) -> History {
+        History::new(self.settings.memory)
+    }
+
+    /// Begins a frame.
+    pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
+        self.iterate.load(&self.layout, state);
+        self.mark_held(frame, body);
+        if std::mem::take(&mut self.loads.any) {
+            self.loads.forces.fill([0.0; 4]);
+        }
+        frame.for_loads(body, |vertex, force| {
+            let i = self.layout.number[vertex] as usize;
+            if i < self.layout.free && !self.held[i] {
+                add(&mut self.loads.forces[i], force.as_vec3a());
+                self.loads.any = true;
+            }
+        });
+        self.touching.contacts.begin_frame(frame, body, state);
+        self.refresh_system(frame, body, state);
+    }
+
+    /// Marks the nodes that tools carry.
+    fn mark_held(&mut self, frame: &Frame<'_>, body: &Body) {
+        self.held.fill(false);
+        for grasp in frame.rigid_grasps() {
+            for node in &grasp.nodes {
+                let i = self.layout.number[body.internal[*node as usize] as usize] as usize;
+                if i < self.layout.free {
+                    self.held[i] = true;
+                }
+            }
+        }
+    }
+
+    /// Factorises again if other nodes are held, press, or hang on a tool than in the factor.
+    fn refresh_system(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
+        let Self { system, layout, held, touching, .. } = self;
+        let stiffness = |vertex: usize| touching.contacts.stiffness(frame, body, state, vertex);
+        if system.refresh(body, layout, held, &state.warm.supported, stiffness) {
+            self.rest.correction = None;
+        }
+    }
+
+    /// Adds to the matrix the tools and supports that press where the substep began or would have
+    /// ended by itself. False if it has them all.
+    pub fn add_contacts_to_system(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
+        let (x, targets, number) = (&self.iterate.x, &self.iterate.targets, &self.layout.number);
+        let places = |vertex: u32| {
+            let i = number[vertex as usize] as usize;
+            [position(&x[i]), position(&targets[i])]
+        };
+        let mut new = false;
+        let contacts = self.touching.contacts.list().iter();
+        for contact in contacts.filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
+            let presses = places(contact.vertex).iter().any(|x| contact.height(*x) < 0.0);
+            let known = &mut state.warm.supported[contact.vertex as usize];
+            new |= presses && !*known;
+            *known |= presses;
+        }
+        if new {
+            self.refresh_system(frame, body, state);
+        }
+        new
+    }
+
+    /// Finds the contacts of the substep between two shares of the frame.
+    pub fn find_contacts(&mut self, frame: &Frame<'_>, body: &Body, from: f64, to: f64) {
+        let Self { iterate, layout, touching: Touching { contacts, limits, .. }, .. } = self;
+        contacts.find(frame, body, from, to, |vertex| iterate.at(layout, vertex as u32));
+        limits.clear();
+        limits.resize(contacts.list().len(), 0.0);
+    }
+
+    /// Ends the substep that ends with `share` of the frame.
+    pub fn end_substep(&mut self, frame: &Frame<'_>, body: &Body, share: f64) {
+        let Self { iterate, layout, touching, .. } = self;
+        touching.contacts.end_substep(frame, body, share, |vertex| iterate.at(layout, vertex as u32));
+    }
+
+    /// Begins a substep: where nodes would be without forces but gravity.
+    pub fn predict(&mut self, h: f32, gravity: Row) {
+        self.iterate.start.copy_from_slice(&self.iterate.x);
+        // A body in free flight falls exactly: gravity's part of its motion is uniform and
+        // integrated as h^2/2 g. Elsewhere implicit Euler's h^2 g.
+        let reach = if !self.touching.pressed && self.flies() { 0.5 * h * h } else { h * h };
+        let Self { level, layout, iterate: Iterate { predictor, x, v, .. }, .. } = self;
+        dispatch!(*level, _simd => {
+            for ((y, x), v) in predictor[..layout.free].iter_mut().zip(x.iter()).zip(v.iter()) {
+                for c in 0..3 {
+                    y[c] = x[c] + h * v[c] + reach * gravity[c];
+                }
+            }
+        });
+    }
+
+    /// Evaluates the elements where the nodes are: forces and volume ratios. Returns whether an
+    /// element has lost too much of its accepted volume.
+    pub fn evaluate(&mut self, h: f32) -> bool {
+        self.rest.evaluated = false;
+        let Self { level, elements, layout, iterate: Iterate { x, start, .. }, .. } = self;
+        dispatch!(*level, simd => elements.evaluate(simd, layout, x, start, h))
+    }
+
+    /// Turns the system with the tissue where the nodes are.
+    pub fn update_warp(&mut self) {
+        if self.rest.evaluated && std::mem::replace(&mut self.rest.warped, true) {
+            return;
+        }
+        self.system.update_warp(self.level, &self.layout, &self.iterate.x);
+    }
+
+    /// Updates the system for the contacts that press where the nodes are.
+    pub fn update_contacts(&mut self) {
+        let Self { level, system, layout, touching, held, iterate, .. } = self;
+        system.update_contacts(*level, layout, &touching.contacts, held, &iterate.x);
+    }
+
+    /// Writes the gradient of the body's own potential into the next gradient, from the forces of
+    /// the last evaluation; 0 at held nodes.
+    pub fn take_gradient(&mut self, h: f32) {
+        let level = self.level;
+        dispatch!(level, simd => self.gradient_at(simd, h));
+        let Self { iterate: Iterate { x, next_gradient, .. }, touching, loads, layout, .. } = self;
+        for (contact, limit) in touching.contacts.list().iter().zip(&touching.limits) {
+            let i = layout.number[contact.vertex as usize] as usize;
+            if let Some(push) = contact.push_within(position(&x[i]), *limit) {
+                add(&mut next_gradient[i], push.gradient);
+            }
+        }
+        if loads.any {
+            for (sum, force) in next_gradient.iter_mut().zip(&loads.forces) {
+                (0..3).for_each(|c| sum[c] -= force[c]);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn gradient_at<S: Simd>(&mut self, simd: S, h: f32) {
+        let inertia = 1.0 / (h * h);
+        let Self { iterate: Iterate { x, predictor, next_gradient, .. }, layout, elements, held, .. } = self;
+        for i in 0..layout.free {
+            if held[i] {
+                next_gradient[i] = [0.0; 4];
+                continue;
+            }
+            let x = f32x4::from_slice(simd, &x[i]);
+            let off = x - f32x4::from_slice(simd, &predictor[i]);
+            let mut sum = off * (layout.masses[i] * inertia);
+            let (first, end) = (layout.first_corner[i] as usize, layout.first_corner[i + 1] as usize);
+            for k in &layout.corners[first..end] {
+                sum += f32x4::from_slice(simd, &elements.corners[*k as usize]);
+            }
+            sum.store_slice(&mut next_gradient[i]);
+        }
+    }
+
+    /// Accepts the next gradient, with friction's limits as they are here. Within a search the
+    /// limits are held, so that there is a function to minimise.
+    pub fn accept_gradient(&mut self) {
+        let Self { iterate: Iterate { x, gradient, next_gradient, .. }, touching, layout, held, .. } = self;
+        std::mem::swap(gradient, next_gradient);
+        for (contact, limit) in touching.contacts.list().iter().zip(&mut touching.limits) {
+            let i = layout.number[contact.vertex as usize] as usize;
+            let x = position(&x[i]);
+            let now = contact.limit(x);
+            if now != *limit && !held[i] {
+                let push = |limit| contact.push_within(x, limit).map_or(Vec3A::ZERO, |push| push.gradient);
+                add(&mut gradient[i], push(now) - push(*limit));
+            }
+            *limit = now;
+        }
+    }
+
+    /// Position of a vertex (m).
+    pub fn at(&self, vertex: u32) -> Vec3A {
+        self.iterate.at(&self.layout, vertex)
+    }
+
+    /// Adds a force of another body to a vertex's accepted gradient, if the vertex is free to move.
+    pub fn push(&mut self, vertex: u32, force: Vec3A) {
+        if let Some(i) = self.free_node(vertex) {
+            add(&mut self.iterate.gradient[i], force);
+        }
+    }
+
+    /// Adds it to the next gradient.
+    pub fn push_next(&mut self, vertex: u32, force: Vec3A) {
+        if let Some(i) = self.free_node(vertex) {
+            add(&mut self.iterate.next_gradient[i], force);
+        }
+    }
+
+    fn free_node(&self, vertex: u32) -> Option<usize> {
+        let i = self.layout.number[vertex as usize] as usize;
+        (i < self.layout.free && !self.held[i]).then_some(i)
+    }
+
+    /// Product of the gradient and the direction.
+    pub fn slope(&self) -> f32 {
+        dispatch!(self.level, simd => dot_rows(simd, &self.iterate.gradient, &self.iterate.direction))
+    }
+
+    /// Product of the next gradient and the direction.
+    pub fn next_slope(&self) -> f32 {
+        dispatch!(self.level, simd => dot_rows(simd, &self.iterate.next_gradient, &self.iterate.direction))
+    }
+
+    /// direction = P^-1 direction.
+    pub fn precondition(&mut self) {
+        self.system.apply(self.level, &mut self.iterate.direction);
+    }
+
+    /// Turns the direction downhill; held nodes have none.
+    pub fn turn_downhill(&mut self) {
+        let Self { level, held, iterate: Iterate { direction, .. }, .. } = self;
+        dispatch!(*level, _simd => direction.as_flattened_mut().iter_mut().for_each(|d| *d = -*d));
+        for (d, _) in direction.iter_mut().zip(held).filter(|(_, held)| **held) {
+            *d = [0.0; 4];
+        }
+    }
+
+    /// Largest coordinate of any free node (m).
+    pub fn extent(&self) -> f32 {
+        dispatch!(self.level, _simd => max_coordinate(&self.iterate.x[..self.layout.free]))
+    }
+
+    /// Sum of the gradient over the nodes (N).
+    pub fn force(&self) -> Vec3A {
+        self.iterate.gradient[..self.layout.free].iter().fold(Vec3A::ZERO, |sum, row| sum + position(row))
+    }
+
+    /// Mass of the free nodes (kg).
+    pub fn mass(&self) -> f32 {
+        self.layout.masses.iter().sum()
+    }
+
+    /// Moves all nodes alike (m).
+    pub fn shift(&mut self, by: Vec3A) {
+        self.iterate.x[..self.layout.free].iter_mut().for_each(|row| add(row, by));
+    }
+
+    /// Puts the beginning of the substep back.
+    pub fn restore(&mut self) {
+        self.iterate.restore(self.layout.free);
+    }
+
+    /// The velocities after the substep.
+    pub fn take_velocities(&mut self, h: f32, gravity: Row) {
+        let Self { level, layout, held, iterate: Iterate { predictor, x, v, .. }, .. } = self;
+        dispatch!(*level, _simd => {
+            let ways = x[..layout.free].iter().zip(predictor.iter()).zip(held.iter());
+            for (v, ((x, y), held)) in v.iter_mut().zip(ways) {
+                for c in 0..3 {
+                    let next = v[c] + h * gravity[c] + (x[c] - y[c]) / h;
+                    v[c] = if *held { 0.0 } else { next };
+                }
+            }
+        });
+    }
+
+    /// Whether nothing holds any node.
+    pub fn is_free(&self) -> bool {
+        self.layout.free == self.layout.nodes && !self.held.contains(&true)
+    }
+
+    /// Whether no tool and no support holds or touches the body, and no load acts on it.
+    pub fn flies(&self) -> bool {
+        let x = |vertex: usize| self.iterate.at(&self.layout, vertex as u32);
+        !self.loads.any && self.is_free() && self.touching.contacts.is_idle(x)
+    }
+}

@@ -1,0 +1,120 @@
+//! The vectors of a body that a search works on.
+
+use super::layout::Layout;
+use crate::lanes::Row;
+use crate::state::BodyState;
+use glam::Vec3A;
+
+/// Positions, velocities and directions of one body, in the layout's order. All but `x` and `start`
+/// have rows for free nodes only.
+pub(super) struct Iterate {
+    /// Positions of all nodes (m).
+    pub x: Vec<Row>,
+    /// Where the substep began (m).
+    pub start: Vec<Row>,
+    /// Velocities (m/s).
+    pub v: Vec<Row>,
+    /// Inertial predictor (m).
+    pub predictor: Vec<Row>,
+    /// Where nodes go by themselves in the substep, and held ones with their tools (m).
+    pub targets: Vec<Row>,
+    /// Gradient of the incremental potential at the accepted positions, and at those of a trial
+    /// (N).
+    pub gradient: Vec<Row>,
+    pub next_gradient: Vec<Row>,
+    /// Direction of the search (m); a gradient on the way to it (N).
+    pub direction: Vec<Row>,
+    /// Positions where the line search began (m).
+    pub base: Vec<Row>,
+}
+
+/// Where a substep starts from.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum InitialGuess {
+    /// Where it began: nothing moves.
+    Still,
+    /// Free nodes continued with their velocities, held ones with their tools.
+    Ahead,
+    /// Where it began, though things move: elements would be squeezed too far on the way ahead.
+    Behind,
+}
+
+impl Iterate {
+    /// All zero.
+    pub fn new(layout: &Layout) -> Self {
+        let rows = || vec![[0.0f32; 4]; layout.rows];
+        let all = || vec![[0.0f32; 4]; layout.nodes.max(layout.rows)];
+        Self {
+            x: all(),
+            start: all(),
+            v: rows(),
+            predictor: rows(),
+            targets: rows(),
+            gradient: rows(),
+            next_gradient: rows(),
+            direction: rows(),
+            base: rows(),
+        }
+    }
+
+    /// Takes positions and velocities over from the state.
+    pub fn load(&mut self, layout: &Layout, state: &BodyState) {
+        for (i, vertex) in layout.vertex.iter().enumerate() {
+            self.x[i] = state.x[*vertex as usize].extend(0.0).to_array();
+        }
+        for i in 0..layout.free {
+            self.v[i] = state.v[layout.vertex[i] as usize].extend(0.0).to_array();
+        }
+    }
+
+    /// Gives positions and velocities to the state.
+    pub fn store(&self, layout: &Layout, state: &mut BodyState) {
+        for i in 0..layout.free {
+            let vertex = layout.vertex[i] as usize;
+            state.x[vertex] = position(&self.x[i]);
+            state.v[vertex] = position(&self.v[i]);
+            // This solver does not know the sweeps' warm start: sweeps after it start afresh.
+            state.warm.falling[vertex] = 0.0;
+        }
+        for vertex in &layout.vertex[layout.free..] {
+            state.v[*vertex as usize] = Vec3A::ZERO;
+        }
+    }
+
+    /// Puts the beginning of the substep back.
+    pub fn restore(&mut self, free: usize) {
+        self.x[..free].copy_from_slice(&self.start[..free]);
+    }
+
+    /// Position of a vertex (m).
+    #[inline(always)]
+    pub fn at(&self, layout: &Layout, vertex: u32) -> Vec3A {
+        position(&self.x[layout.number[vertex as usize] as usize])
+    }
+}
+
+/// The three coordinates of a row.
+#[inline(always)]
+pub(super) fn position(row: &Row) -> Vec3A {
+    Vec3A::new(row[0], row[1], row[2])
+}
+
+/// Largest absolute coordinate of any row; infinite if one is not finite.
+#[inline(always)]
+pub(super) fn max_coordinate(rows: &[Row]) -> f32 {
+    let mut most = [0.0f32; 4];
+    let mut sane = true;
+    for row in rows {
+        for c in 0..4 {
+            most[c] = most[c].max(row[c].abs());
+        }
+        sane &= row[0].is_finite() & row[1].is_finite() & row[2].is_finite();
+    }
+    if sane { most[0].max(most[1]).max(most[2]) } else { f32::INFINITY }
+}
+
+/// Adds to a row.
+#[inline(always)]
+pub(super) fn add(row: &mut Row, by: Vec3A) {
+    row.iter_mut().zip(by.to_array()).for_each(|(sum, part)| *sum += part);
+}

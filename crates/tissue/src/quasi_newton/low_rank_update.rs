@@ -1,0 +1,172 @@
+//! Contacts that began or ended since the matrix was factorised, as a low-rank update of its
+//! inverse.
+//!
+//! The factor contains the stiffness of the nodes that pressed when it was made. Nodes that press
+//! since, and nodes that let go, differ from it by a stiffness on a few nodes: a matrix of low
+//! rank. By Woodbury's formula (Hager 1989, "Updating the inverse of a matrix") the inverse of the
+//! sum is that of the factor less a product of a few of its columns. A node costs three solves
+//! once, and each solve then costs three products with vectors. The stiffness is the same in all
+//! directions, so the columns are kept in the tissue's rest frame and stay valid however it turns.
+
+use super::factor::Factor;
+use fearless_simd::Simd;
+
+/// Greatest number of nodes in the update.
+const MAX_NODES: usize = 16;
+
+/// The difference between the contacts now and those in the factor.
+pub(super) struct LowRankUpdate {
+    /// Nodes and the stiffness that is added (N/m); those whose stiffness is taken out of the
+    /// factor come first.
+    nodes: Vec<(u32, f32)>,
+    next: Vec<(u32, f32)>,
+    /// Index of each node's columns.
+    places: Vec<usize>,
+    /// Nodes whose columns of the factor's inverse are known, and three columns of each.
+    known: Vec<u32>,
+    columns: Vec<f32>,
+    /// Numbers of a column.
+    length: usize,
+    /// 1 / stiffness + the inverse's block of the nodes, as L D L': what is below the diagonal of
+    /// L, and D on it.
+    matrix: Vec<f64>,
+    shares: Vec<f64>,
+    /// Whether the matrix is that of a sum that is positive definite.
+    usable: bool,
+}
+
+impl LowRankUpdate {
+    /// For solves with vectors of `length` numbers.
+    pub fn new(length: usize) -> Self {
+        Self {
+            nodes: Vec::with_capacity(MAX_NODES),
+            next: Vec::with_capacity(MAX_NODES),
+            places: Vec::with_capacity(MAX_NODES),
+            known: Vec::with_capacity(MAX_NODES),
+            // Zeros take no memory until a column is written.
+            columns: vec![0.0; 3 * MAX_NODES * length],
+            length,
+            matrix: vec![0.0; 9 * MAX_NODES * MAX_NODES],
+            shares: vec![0.0; 3 * MAX_NODES],
+            usable: false,
+        }
+    }
+
+    /// Forgets everything: the factor has changed.
+    pub fn clear(&mut self) {
+        self.nodes.clear();
+        self.known.clear();
+        self.usable = false;
+    }
+
+    /// Makes the update empty: the contacts are those in the factor.
+    pub fn reset(&mut self) {
+        self.nodes.clear();
+        self.usable = false;
+    }
+
+    /// Sets the nodes that differ (N/m): first those whose stiffness is taken out of the factor,
+    /// with a negative one, then those that get more; each kind ascending. Nodes beyond the
+    /// greatest number are left out.
+    #[inline(always)]
+    pub fn set<S: Simd>(
+        &mut self,
+        simd: S,
+        factor: &mut Factor,
+        scratch: &mut [f32],
+        nodes: impl Iterator<Item = (u32, f32)>,
+    ) {
+        self.next.clear();
+        self.next.extend(nodes.take(MAX_NODES));
+        if self.next == self.nodes {
+            return;
+        }
+        std::mem::swap(&mut self.nodes, &mut self.next);
+        self.solve_columns(simd, factor, scratch);
+        self.usable = self.factorise();
+    }
+
+    /// Solves for the columns that are not known.
+    #[inline(always)]
+    fn solve_columns<S: Simd>(&mut self, simd: S, factor: &mut Factor, scratch: &mut [f32]) {
+        let size = 3 * self.length;
+        self.places.clear();
+        for (node, _) in &self.nodes {
+            let place = self.known.iter().position(|known| known == node).unwrap_or_else(|| {
+                let unused = |known: &u32| self.nodes.iter().all(|(node, _)| node != known);
+                let free = if self.known.len() < MAX_NODES { None } else { self.known.iter().position(unused) };
+                let place = free.unwrap_or(self.known.len());
+                if place < self.known.len() {
+                    self.known[place] = *node;
+                } else {
+                    self.known.push(*node);
+                }
+                for c in 0..3 {
+                    scratch.fill(0.0);
+                    scratch[3 * *node as usize + c] = 1.0;
+                    factor.solve(simd, scratch);
+                    let column = &mut self.columns[place * size + c * self.length..][..self.length];
+                    column.copy_from_slice(&scratch[..self.length]);
+                }
+                place
+            });
+            self.places.push(place);
+        }
+    }
+
+    /// Builds the matrix of the nodes and its L D L'. False if the sum is not positive definite.
+    fn factorise(&mut self) -> bool {
+        let n = 3 * self.nodes.len();
+        for j in 0..n {
+            let column = &self.columns[(3 * self.places[j / 3] + j % 3) * self.length..][..self.length];
+            for i in j..n {
+                let node = self.nodes[i / 3].0 as usize;
+                self.matrix[i * n + j] = f64::from(column[3 * node + i % 3]);
+            }
+            self.matrix[j * n + j] += 1.0 / f64::from(self.nodes[j / 3].1);
+        }
+        for j in 0..n {
+            for i in j..n {
+                let known: f64 =
+                    (0..j).map(|k| self.matrix[i * n + k] * self.matrix[j * n + k] * self.matrix[k * n + k]).sum();
+                let rest = self.matrix[i * n + j] - known;
+                self.matrix[i * n + j] = if i == j { rest } else { rest / self.matrix[j * n + j] };
+            }
+            // What is taken out makes the matrix negative there, and what is added makes it
+            // positive: it is quasi-definite.
+            let d = self.matrix[j * n + j] * f64::from(self.nodes[j / 3].1);
+            if d.is_nan() || d <= 0.0 {
+                return false;
+            }
+        }
+        n > 0
+    }
+
+    /// Turns the factor's solution `x` into that of the sum.
+    #[inline(always)]
+    pub fn apply<S: Simd>(&mut self, _simd: S, x: &mut [f32]) {
+        if !self.usable {
+            return;
+        }
+        let n = 3 * self.nodes.len();
+        let (matrix, shares) = (&self.matrix, &mut self.shares[..n]);
+        for i in 0..n {
+            let known: f64 = (0..i).map(|k| matrix[i * n + k] * shares[k]).sum();
+            shares[i] = f64::from(x[3 * self.nodes[i / 3].0 as usize + i % 3]) - known;
+        }
+        for i in (0..n).rev() {
+            let known: f64 = (i + 1..n).map(|k| matrix[k * n + i] * shares[k]).sum();
+            shares[i] = shares[i] / matrix[i * n + i] - known;
+        }
+        let x = &mut x[..self.length];
+        for (place, shares) in self.places.iter().zip(shares.chunks_exact(3)) {
+            let columns = &self.columns[3 * place * self.length..3 * (place + 1) * self.length];
+            let (a, rest) = columns.split_at(self.length);
+            let (b, c) = rest.split_at(self.length);
+            let [s, t, u] = [shares[0] as f32, shares[1] as f32, shares[2] as f32];
+            for (((x, a), b), c) in x.iter_mut().zip(a).zip(b).zip(c) {
+                *x -= s * a + t * b + u * c;
+            }
+        }
+    }
+}

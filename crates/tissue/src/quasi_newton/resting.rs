@@ -1,0 +1,91 @@
+//! A body that stays where it is: what was found there need not be found again.
+
+use super::body_system::QuasiNewtonSolver;
+use super::iterate::{Iterate, max_coordinate};
+use super::sleep::RestCache;
+use fearless_simd::dispatch;
+
+impl QuasiNewtonSolver {
+    /// Evaluates the elements where the body is and stays, and accepts their volumes. A body that
+    /// has not moved since it was last evaluated in place is not evaluated again.
+    pub fn evaluate_in_place(&mut self, h: f32) {
+        let Iterate { x, start, .. } = &self.iterate;
+        if self.rest.evaluated && *x == self.rest.x && *start == self.rest.start {
+            return;
+        }
+        self.evaluate(h);
+        self.elements.accept();
+        let Self { rest, iterate, .. } = self;
+        rest.x.copy_from_slice(&iterate.x);
+        rest.start.copy_from_slice(&iterate.start);
+        (rest.evaluated, rest.warped) = (true, false);
+    }
+
+    /// Whether no node goes farther than `way` (m) by itself in a substep of `h` (s), and no tool
+    /// carries any.
+    pub fn is_quiet(&self, h: f32, way: f32) -> bool {
+        !self.progress.carried && h * dispatch!(self.level, _simd => max_coordinate(&self.iterate.v)) <= way
+    }
+
+    /// How far the gradient would move any node (m), without the history. The direction is lost.
+    pub fn correction(&mut self) -> f32 {
+        self.iterate.direction.copy_from_slice(&self.iterate.gradient);
+        self.precondition();
+        dispatch!(self.level, _simd => max_coordinate(&self.iterate.direction))
+    }
+
+    /// The same, from the cache if positions and gradient are still the same; without contacts that
+    /// are not in the factor.
+    pub fn correction_at_rest(&mut self) -> f32 {
+        let free = self.layout.free;
+        let Self { rest: RestCache { correction_x, correction_gradient, correction, .. }, iterate, .. } = self;
+        let same = iterate.gradient == *correction_gradient && iterate.x[..free] == correction_x[..free];
+        if let Some(correction) = correction.filter(|_| same) {
+            return correction;
+        }
+        correction_x[..free].copy_from_slice(&iterate.x[..free]);
+        correction_gradient.copy_from_slice(&iterate.gradient);
+        let correction = self.correction();
+        self.rest.correction = Some(correction);
+        correction
+    }
+
+    /// Leaves the body where the substep began.
+    pub fn leave_at_rest(&mut self, h: f32) {
+        self.restore();
+        let Iterate { predictor, v, .. } = &mut self.iterate;
+        for (y, v) in predictor.iter_mut().zip(v.iter()) {
+            (0..3).for_each(|c| y[c] -= h * v[c]);
+        }
+        v.fill([0.0; 4]);
+        self.sleep.active = false;
+    }
+
+    /// Sets the targets of the substep to where the nodes are.
+    pub fn clear_targets(&mut self) {
+        let (free, Iterate { targets, x, .. }) = (self.layout.free, &mut self.iterate);
+        targets[..free].copy_from_slice(&x[..free]);
+    }
+
+    /// Measures the direction, and how far the body went; nowhere before the `first` step.
+    pub fn measure_direction(&mut self, first: bool) {
+        self.progress.longest = dispatch!(self.level, _simd => max_coordinate(&self.iterate.direction));
+        self.progress.gone = if first { 0.0 } else { self.gone() };
+    }
+
+    /// Largest distance of a coordinate from where the node would have gone by itself (m): the
+    /// deformation that the substep brought, without any rigid motion.
+    fn gone(&self) -> f32 {
+        let Self { level, layout, held, iterate: Iterate { x, targets, .. }, .. } = self;
+        dispatch!(*level, _simd => {
+            let mut most = [0.0f32; 4];
+            for ((x, to), held) in x[..layout.free].iter().zip(targets).zip(held) {
+                let counts = if *held { 0.0 } else { 1.0 };
+                for c in 0..4 {
+                    most[c] = most[c].max(counts * (x[c] - to[c]).abs());
+                }
+            }
+            most[0].max(most[1]).max(most[2])
+        })
+    }
+}

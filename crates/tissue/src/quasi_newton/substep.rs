@@ -1,0 +1,209 @@
+//! One substep of an island: start, search direction after direction, take the velocities.
+
+use super::apply_step::ConstraintMotion;
+use super::body_system::QuasiNewtonSolver;
+use super::island_system::IslandSystem;
+use super::iterate::InitialGuess;
+use super::line_search::Found;
+use crate::body_slot::{BodySlot, for_each};
+use glam::Vec3A;
+
+/// How often a minimum is sought, each time with the limits of friction found at the last.
+const MAX_FRICTION_ROUNDS: usize = 4;
+
+/// Where no step helps any more, the positions are taken for the minimum if the correction is at
+/// most this many times the one that ends a substep: that is rounding, and not a search gone
+/// astray.
+const MAX_ROUNDING_FACTOR: f32 = 100.0;
+
+/// The correction that ends a substep: an absolute one (m), and one over how far the body went.
+struct Tolerance {
+    absolute: f32,
+    relative: f32,
+}
+
+impl IslandSystem<'_> {
+    /// Minimises one substep, which ends when `share` of the frame is over.
+    ///
+    /// False if it was given up. Nothing has changed then but scratch memory, and that bodies at
+    /// rest have no velocity.
+    pub fn substep(&mut self, share: f64) -> bool {
+        let alone = self.pairs.is_empty();
+        self.start(share);
+        let moved = self.all().any(|body| body.progress.guess != InitialGuess::Still);
+        let behind = self.all().any(|body| body.progress.guess == InitialGuess::Behind);
+        self.choose_active(alone);
+        self.for_active(|body| {
+            if body.progress.guess != InitialGuess::Still {
+                body.update_contacts();
+            }
+        });
+        let held = self.is_held();
+        let mut stepped = behind && self.move_constraints();
+        let settings = self.slots[0].solver.settings;
+        let (tolerance, at_rest) = self.tolerances();
+        let Tolerance { absolute, relative } = tolerance;
+        if alone {
+            self.rest_alone(absolute.min(at_rest));
+        }
+        let mut rounds = 0;
+        for iteration in usize::from(behind)..settings.iterations {
+            if self.active().next().is_none() {
+                // Nothing moves, and nothing did.
+                return true;
+            }
+            self.find_direction();
+            self.count_iteration();
+            self.for_active(|body| body.measure_direction(iteration == 0));
+            if self.is_solved(absolute, relative) {
+                if iteration > 0 || moved {
+                    if !alone && self.wake(absolute, relative) {
+                        continue;
+                    }
+                    rounds += 1;
+                    if alone || rounds == MAX_FRICTION_ROUNDS || !self.refresh_limits() {
+                        break;
+                    }
+                    continue;
+                }
+                if self.active().all(|body| body.progress.longest <= at_rest) {
+                    // At rest: what is left of the velocity is noise.
+                    self.active().for_each(|body| body.iterate.v.fill([0.0; 4]));
+                    return true;
+                }
+            } else if !alone {
+                self.fall_asleep(absolute, relative);
+            }
+            let (wide, wide_relative) = (MAX_ROUNDING_FACTOR * absolute, MAX_ROUNDING_FACTOR * relative);
+            match self.search() {
+                Found::Step => stepped = true,
+                Found::Nothing if stepped && !alone && self.wake(absolute, relative) => {}
+                Found::Nothing if stepped && (!held || self.is_solved(wide, wide_relative)) => break,
+                // Steps of an earlier substep may mislead where contacts have changed.
+                Found::Nothing if self.history.forget() => {}
+                Found::Nothing => {
+                    self.all().for_each(|body| body.restore());
+                    return false;
+                }
+            }
+        }
+        self.finish();
+        true
+    }
+
+    /// Predicts, moves the bodies to where the substep starts from, and evaluates them there.
+    fn start(&mut self, share: f64) {
+        let (h, gravity) = (self.h, self.gravity());
+        for member in 0..self.slots.len() {
+            self.slots[member].solver.touching.pressed = self.pairs.presses(self.slots, member);
+        }
+        let frame = self.frame;
+        for_each(self.slots, frame, |BodySlot { index, body, solver, report, .. }| {
+            solver.predict(h, gravity);
+            solver.progress.guess = solver.start_substep(&frame.of(*index), share, h, body);
+            solver.update_warp();
+            report.grasp_limited += usize::from(solver.progress.yielded);
+            solver.system.reset_update();
+        });
+    }
+
+    fn gravity(&self) -> [f32; 4] {
+        self.frame.gravity.as_vec3a().extend(0.0).to_array()
+    }
+
+    /// The tolerance of the search, and the correction (m) below which a body that does not move is
+    /// at rest. Neither rounding of positions nor, at rest, what gravity does in a short substep is
+    /// a correction.
+    fn tolerances(&mut self) -> (Tolerance, f32) {
+        let (settings, rounding, h) = (self.slots[0].solver.settings, self.rounding(), self.h);
+        let at_rest =
+            if self.gravity() == [0.0; 4] { f32::INFINITY } else { 1e-4 * h * h * self.frame.gravity.length() as f32 };
+        let absolute = (settings.tolerance as f32).max(rounding);
+        (Tolerance { absolute, relative: settings.relative as f32 }, at_rest)
+    }
+
+    /// Finds the gradient where the substep starts, and which bodies take part: a body among others
+    /// that neither moves nor would by what pushes it is left where it is.
+    fn choose_active(&mut self, alone: bool) {
+        let h = self.h;
+        for body in self.all() {
+            body.sleep.was_resting = !std::mem::replace(&mut body.sleep.active, true);
+            (body.sleep.asleep, body.sleep.disturbed) = (false, false);
+        }
+        self.take_gradient();
+        self.accept_gradient();
+        self.refresh_limits();
+        if alone {
+            return;
+        }
+        self.record_pushes();
+        let still = self.still();
+        for_each(self.slots, self.frame, |BodySlot { solver, .. }| {
+            if solver.is_quiet(h, still) && solver.correction_at_rest() <= still {
+                solver.leave_at_rest(h);
+            }
+        });
+        if self.all().any(|body| body.sleep.was_resting == body.sleep.active) {
+            self.history.clear();
+        }
+    }
+
+    /// Leaves a body that no other is near where it is, if it is at rest.
+    fn rest_alone(&mut self, limit: f32) {
+        let h = self.h;
+        if let [BodySlot { solver, .. }] = self.slots
+            && solver.progress.guess == InitialGuess::Still
+            && solver.is_quiet(h, limit)
+            && solver.correction_at_rest() <= limit
+        {
+            solver.leave_at_rest(h);
+        }
+    }
+
+    /// Moves held nodes with their tools in bodies that could not start ahead. Returns whether any
+    /// node moved.
+    fn move_constraints(&mut self) -> bool {
+        let h = self.h;
+        let mut stepped = false;
+        let behind = |solver: &QuasiNewtonSolver| {
+            solver.sleep.active
+                && solver.progress.guess == InitialGuess::Behind
+                && (solver.progress.carried || solver.is_free())
+        };
+        for BodySlot { solver, report, .. } in self.slots.iter_mut().filter(|slot| behind(&slot.solver)) {
+            report.iterations += 1;
+            let motion = solver.move_constraints(h);
+            stepped |= motion != ConstraintMotion::Blocked;
+            let late = motion != ConstraintMotion::Arrived && !solver.progress.yielded;
+            report.grasp_limited += usize::from(late);
+        }
+        self.take_gradient();
+        self.accept_gradient();
+        stepped
+    }
+
+    fn count_iteration(&mut self) {
+        let active = self.slots.iter_mut().filter(|slot| slot.solver.sleep.active);
+        active.for_each(|slot| slot.report.iterations += 1);
+    }
+
+    /// Ends the search: wakes all that moved, and takes the velocities.
+    fn finish(&mut self) {
+        let (h, gravity) = (self.h, self.gravity());
+        self.all().for_each(|body| body.sleep.active |= std::mem::take(&mut body.sleep.asleep));
+        self.keep_momentum();
+        self.active().for_each(|body| body.take_velocities(h, gravity));
+    }
+
+    /// Removes what is left of the sum of all forces from an island that nothing holds: to move all
+    /// of it alike changes no force within.
+    fn keep_momentum(&mut self) {
+        if self.pairs.is_empty() || !self.all().all(|body| body.sleep.active && body.flies()) {
+            return;
+        }
+        let force = self.active().map(|body| body.force()).fold(Vec3A::ZERO, |sum, part| sum + part);
+        let mass: f32 = self.active().map(|body| body.mass()).sum();
+        let by = force * (-self.h * self.h / mass);
+        self.active().for_each(|body| body.shift(by));
+    }
+}

@@ -1,0 +1,146 @@
+//! The linear system of one body: its stiffness at rest with the masses of a substep, factorised
+//! once, turned with the tissue, and updated for contacts. It preconditions the search.
+
+use super::factor::Factor;
+use super::iterate::position;
+use super::layout::Layout;
+use super::low_rank_update::LowRankUpdate;
+use super::warp::Warp;
+use crate::Body;
+use crate::contact::{ContactSet, Source};
+use crate::lanes::Row;
+use fearless_simd::{Level, dispatch};
+
+/// The preconditioner of one body.
+pub(super) struct System {
+    /// None if no node is free or memory is short.
+    factor: Option<Factor>,
+    /// Contacts that are not in the factor, or no longer there.
+    update: LowRankUpdate,
+    warp: Warp,
+    /// Nodes that press in the factor, and their stiffness (N/m); negative where they no longer do.
+    known: Vec<(u32, f32)>,
+    /// Nodes that tools carry in the factor.
+    held: Vec<bool>,
+    /// Stiffness of the contacts and grasps of free nodes in the factor (N/m).
+    contacts: Vec<f32>,
+    /// Whether the factor is that of the matrix.
+    pub usable: bool,
+    /// Scratch: stiffness of what presses each free node now (N/m).
+    pressing: Vec<f32>,
+    /// Scratch: the vector of a solve.
+    right: Vec<f32>,
+}
+
+impl System {
+    /// For `body` with substeps of `h` (s), and the body's layout in the order of elimination.
+    pub fn new(body: &Body, h: f64) -> (Self, Layout) {
+        let mut factor = Factor::new(body, h);
+        let free: Vec<u32> = (0..body.len() as u32).filter(|i| !body.pinned[*i as usize]).collect();
+        let layout = Layout::new(body, factor.as_ref().map_or(&free, |factor| &factor.order));
+        let (held, contacts) = (vec![false; layout.free], vec![0.0; layout.free]);
+        if let Some(made) = &mut factor {
+            made.set_step(&layout.masses, h);
+            if !made.factorise(&held, &contacts) {
+                factor = None;
+            }
+        }
+        let system = Self {
+            usable: factor.is_some() || layout.free == 0,
+            update: LowRankUpdate::new(3 * layout.rows),
+            warp: Warp::new(&layout),
+            known: Vec::with_capacity(layout.free),
+            held,
+            contacts,
+            pressing: vec![0.0; layout.free],
+            right: vec![0.0; 3 * layout.rows + 16],
+            factor,
+        };
+        (system, layout)
+    }
+
+    /// Factorises again unless the factor is the one for the `held` nodes and the stiffness of
+    /// contacts at each vertex (N/m). `supported` marks the vertices that press. Returns whether it
+    /// did.
+    pub fn refresh(
+        &mut self,
+        body: &Body,
+        layout: &Layout,
+        held: &[bool],
+        supported: &[bool],
+        stiffness: impl Fn(usize) -> f32,
+    ) -> bool {
+        let Some(factor) = &mut self.factor else { return false };
+        let mut stale = !self.usable || *held != self.held[..];
+        for (vertex, known) in layout.vertex.iter().zip(&mut self.contacts) {
+            let now = stiffness(*vertex as usize);
+            stale |= now != *known;
+            *known = now;
+        }
+        if stale {
+            self.update.clear();
+            self.known.clear();
+            for (i, vertex) in layout.vertex[..layout.free].iter().enumerate() {
+                if supported[*vertex as usize] {
+                    self.known.push((i as u32, body.vertices[*vertex as usize].contact_stiffness));
+                }
+            }
+            self.usable = factor.factorise(held, &self.contacts);
+            self.held.copy_from_slice(held);
+        }
+        stale
+    }
+
+    /// Begins a substep: the contacts are those in the factor.
+    pub fn reset_update(&mut self) {
+        self.update.reset();
+    }
+
+    /// Updates the inverse for the contacts that press at the positions `x`.
+    pub fn update_contacts(&mut self, level: Level, layout: &Layout, contacts: &ContactSet, held: &[bool], x: &[Row]) {
+        let Self { factor: Some(factor), update, pressing, known, right, .. } = self else { return };
+        if contacts.list().is_empty() && known.is_empty() {
+            return;
+        }
+        pressing.fill(0.0);
+        for contact in contacts.list().iter().filter(|contact| !matches!(contact.source, Source::Grasp(..))) {
+            let i = layout.number[contact.vertex as usize] as usize;
+            if i < layout.free && !held[i] && contact.height(position(&x[i])) < 0.0 {
+                pressing[i] = contact.stiffness;
+            }
+        }
+        // What remains in `pressing` after this is new.
+        for (i, stiffness) in known.iter_mut() {
+            *stiffness = -stiffness.abs();
+            if std::mem::take(&mut pressing[*i as usize]) > 0.0 {
+                *stiffness = -*stiffness;
+            }
+        }
+        let gone = known.iter().filter(|(i, stiffness)| *stiffness < 0.0 && !held[*i as usize]).copied();
+        let new = pressing.iter().enumerate().filter(|(_, k)| **k > 0.0).map(|(i, k)| (i as u32, *k));
+        dispatch!(level, simd => update.set(simd, factor, right, gone.chain(new)));
+    }
+
+    /// Turns the system with the tissue, nodes at `x`.
+    pub fn update_warp(&mut self, level: Level, layout: &Layout, x: &[Row]) {
+        let Self { warp, .. } = self;
+        dispatch!(level, simd => warp.update(simd, layout, x));
+    }
+
+    /// direction = P^-1 direction, P being the stiffness at rest turned with the tissue.
+    pub fn apply(&mut self, level: Level, direction: &mut [Row]) {
+        let Self { warp, factor, update, right, .. } = self;
+        let Some(factor) = factor else { return };
+        dispatch!(level, simd => {
+            warp.to_rest(simd, direction, right);
+            factor.solve(simd, right);
+            update.apply(simd, right);
+            warp.out_of_rest(simd, right, direction);
+        });
+    }
+
+    /// The stiffness that holds a held node (N/m).
+    pub fn holding(&self, i: usize) -> f32 {
+        self.factor.as_ref().map_or(0.0, |factor| factor.holding[i])
+    }
+}

@@ -1,0 +1,143 @@
+//! The solvers of all bodies of a model, behind the stages of a frame.
+
+use crate::body_slot::{BodySlot, Solver};
+use crate::contact::{ContactSet, Coupling, Reaction};
+use crate::frame::Frame;
+use crate::island::Islands;
+use crate::report::Divergence;
+use crate::state::BodyState;
+use crate::{Body, BodyContact, Model, State, StepReport};
+use glam::DVec3;
+
+/// The stages of a frame that the stepper runs, whatever the kind of the solvers.
+pub(crate) trait SolverSet: Send + Sync {
+    /// Changes to another model; bodies that both have in common keep their solvers.
+    /// `single_thread`: the calling thread does all the work.
+    fn set_model(&mut self, model: &Model, single_thread: bool);
+
+    /// Whether the model is the one that was set, and the state is one of it.
+    fn fits(&self, model: &Model, state: &State) -> bool;
+
+    /// Remembers where the frame begins, and repairs bodies with inverted elements.
+    fn begin_frame(&mut self, state: &mut State, frame: &Frame<'_>);
+
+    /// Finds what may touch in the frame, and sorts the bodies into islands.
+    fn build_islands(&mut self, model: &Model, state: &State, frame: &Frame<'_>);
+
+    /// Solves the islands, on the threads of a pool if there is one.
+    fn solve_islands(&mut self, state: &mut State, frame: &Frame<'_>, pool: Option<&rayon::ThreadPool>);
+
+    /// Sums up the frame. If a position is not finite, all bodies are put back to where the frame
+    /// began.
+    fn end_frame(&mut self, state: &mut State) -> StepReport;
+
+    /// Calls `visit` for every body with what it did to the tools in the last frame.
+    fn for_bodies(&self, visit: &mut dyn FnMut(usize, &Reaction, Option<&ContactSet>));
+
+    /// Calls `visit(body, vertex, force)` for every contact force (N) of tools and other bodies on
+    /// a vertex at the end of the last frame, which left `state`.
+    fn for_contact_forces(&self, state: &State, visit: &mut dyn FnMut(usize, u32, DVec3));
+}
+
+/// Makes the solver of a body; the flag says whether the calling thread does all the work.
+type MakeSolver<S> = Box<dyn Fn(&Body, bool) -> S + Send + Sync>;
+
+/// Bodies with solvers of one kind.
+pub(crate) struct BodySolvers<S: Solver> {
+    make: MakeSolver<S>,
+    /// Island by island, the largest first.
+    slots: Vec<BodySlot<S>>,
+    islands: Islands<S>,
+    /// Finds which bodies may touch; None if bodies pass through each other.
+    coupling: Option<Coupling>,
+    /// The contact and the filtered pairs of the model that the coupling was made for.
+    contact: Option<BodyContact>,
+    filtered: Vec<[usize; 2]>,
+}
+
+impl<S: Solver> BodySolvers<S> {
+    /// For no body yet.
+    pub fn new(make: impl Fn(&Body, bool) -> S + Send + Sync + 'static) -> Self {
+        let make = Box::new(make);
+        Self {
+            make,
+            slots: Vec::new(),
+            islands: Islands::new(&[]),
+            coupling: None,
+            contact: None,
+            filtered: Vec::new(),
+        }
+    }
+}
+
+impl<S: Solver> SolverSet for BodySolvers<S> {
+    fn set_model(&mut self, model: &Model, single_thread: bool) {
+        let mut old = std::mem::take(&mut self.slots);
+        for (index, body) in model.bodies.iter().enumerate() {
+            let slot = match old.iter().position(|slot| slot.body.is(body)) {
+                Some(at) => BodySlot { index, ..old.swap_remove(at) },
+                None => BodySlot::new(index, body, (self.make)(body, single_thread), BodyState::at_rest(body)),
+            };
+            self.slots.push(slot);
+        }
+        self.islands = Islands::new(&self.slots);
+        self.contact = model.body_contact;
+        self.filtered.clone_from(&model.filtered);
+        let couple = |contact: BodyContact| Coupling::new(model, contact);
+        self.coupling = model.body_contact.filter(|_| S::COUPLES).map(couple);
+    }
+
+    fn fits(&self, model: &Model, state: &State) -> bool {
+        let contact = self.coupling.is_none() || self.contact == model.body_contact && self.filtered == model.filtered;
+        let counts = contact && self.slots.len() == model.bodies.len() && self.slots.len() == state.bodies.len();
+        // A model that was built again from the same parts is the same; one that was cut elsewhere
+        // is not.
+        let same = |slot: &BodySlot<S>| {
+            let size = state.bodies[slot.index].x.len();
+            size == slot.state.x.len() && model.bodies[slot.index].is_alike(&slot.body)
+        };
+        counts && self.slots.iter().all(same)
+    }
+
+    fn begin_frame(&mut self, state: &mut State, frame: &Frame<'_>) {
+        for slot in &mut self.slots {
+            slot.begin_frame(&mut state.bodies[slot.index], frame);
+        }
+    }
+
+    fn build_islands(&mut self, model: &Model, state: &State, frame: &Frame<'_>) {
+        if let Some(coupling) = &mut self.coupling {
+            coupling.find(model, state, frame);
+        }
+        self.islands.build(&mut self.slots, self.coupling.as_ref());
+    }
+
+    fn solve_islands(&mut self, state: &mut State, frame: &Frame<'_>, pool: Option<&rayon::ThreadPool>) {
+        for slot in &mut self.slots {
+            std::mem::swap(&mut slot.state, &mut state.bodies[slot.index]);
+        }
+        self.islands.solve(&mut self.slots, self.coupling.as_ref(), frame, pool);
+    }
+
+    fn end_frame(&mut self, state: &mut State) -> StepReport {
+        let report = self.slots.iter().fold(StepReport::default(), |all, slot| all.with(&slot.report));
+        let broken = matches!(report.divergence, Some(Divergence::NonFinite { .. }));
+        for slot in &mut self.slots {
+            // The whole state is of one instant: if a body is lost, all are put back.
+            if broken {
+                slot.state.copy_from(&slot.before);
+            }
+            std::mem::swap(&mut slot.state, &mut state.bodies[slot.index]);
+        }
+        report
+    }
+
+    fn for_bodies(&self, visit: &mut dyn FnMut(usize, &Reaction, Option<&ContactSet>)) {
+        self.slots.iter().for_each(|slot| visit(slot.index, &slot.reaction, slot.solver.contacts()));
+    }
+
+    fn for_contact_forces(&self, state: &State, visit: &mut dyn FnMut(usize, u32, DVec3)) {
+        let x = |body: usize, vertex: u32| state.bodies[body].x[vertex as usize];
+        self.islands.for_contact_forces(&self.slots, x, visit);
+    }
+}

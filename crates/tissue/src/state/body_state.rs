@@ -1,0 +1,117 @@
+//! The part of a state that belongs to one body: its physics, and the solvers' warm start.
+
+use crate::Body;
+use crate::contact::{Anchor, Source, Stretch};
+use glam::Vec3A;
+use xxhash_rust::xxh3::Xxh3;
+
+/// The state of one body, vertices in the body's internal order, positions relative to its origin.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct BodyState {
+    /// Positions (m).
+    pub x: Vec<Vec3A>,
+    /// Velocities (m/s).
+    pub v: Vec<Vec3A>,
+    /// Where friction holds what touches supports and tools, by vertex.
+    pub anchors: Vec<Anchor>,
+    /// How far friction against other bodies is stretched, by vertex and body.
+    pub stretches: Vec<Stretch>,
+    /// What the next frame puts right before it begins.
+    pub repair: Repair,
+    /// What the solvers remember.
+    pub warm: WarmStart,
+}
+
+/// What the solvers remember from frame to frame.
+///
+/// It is not physics: with another warm start the same minimum is found, to the solver's tolerance.
+/// It is part of the state because the bits of the next frame depend on it, and a restored state
+/// must continue with the same bits.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct WarmStart {
+    /// Acceleration along gravity that the last substep showed, as a share of gravity in 0..=1: the
+    /// adaptive start of the sweeps predicts with it.
+    pub falling: Vec<f32>,
+    /// Vertices whose contact stiffness is in the quasi-Newton solver's matrix: the matrix is
+    /// factorised again only when many others touch.
+    pub supported: Vec<bool>,
+}
+
+/// A request to repair a body before the next frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Repair {
+    /// Nodes were moved from outside; elements may be inverted by it.
+    pub disturbed: bool,
+    /// The body is to be relaxed even if no element is inverted.
+    pub relax: bool,
+}
+
+impl BodyState {
+    /// At rest in the rest shape.
+    pub fn at_rest(body: &Body) -> Self {
+        let mut x = vec![Vec3A::ZERO; body.len()];
+        for (node, p) in body.rest_positions().iter().enumerate() {
+            x[body.internal[node] as usize] = (p - body.origin).as_vec3a();
+        }
+        Self {
+            x,
+            v: vec![Vec3A::ZERO; body.len()],
+            anchors: Vec::with_capacity(2 * body.surface_vertices().len()),
+            stretches: Vec::new(),
+            repair: Repair::default(),
+            warm: WarmStart { falling: vec![0.0; body.len()], supported: vec![false; body.len()] },
+        }
+    }
+
+    /// Copies another state of the same body without allocating. Destructuring names every field:
+    /// a new one that is not copied does not compile.
+    pub fn copy_from(&mut self, other: &Self) {
+        let Self { x, v, anchors, stretches, repair, warm: WarmStart { falling, supported } } = other;
+        self.x.copy_from_slice(x);
+        self.v.copy_from_slice(v);
+        self.anchors.clone_from(anchors);
+        self.stretches.clone_from(stretches);
+        self.repair = *repair;
+        self.warm.falling.copy_from_slice(falling);
+        self.warm.supported.copy_from_slice(supported);
+    }
+
+    /// Hashes every bit. Destructuring names every field: a new one that is not hashed does not
+    /// compile.
+    pub fn hash(&self, hash: &mut Xxh3) {
+        let Self { x, v, anchors, stretches, repair, warm } = self;
+        let WarmStart { falling, supported } = warm;
+        let Repair { disturbed, relax } = repair;
+        for vector in x.iter().chain(v) {
+            hash_vector(hash, *vector);
+        }
+        for share in falling {
+            hash.update(&share.to_bits().to_le_bytes());
+        }
+        for Anchor { vertex, source, place } in anchors {
+            let (kind, number) = match source {
+                Source::Support(s) => (0u32, s),
+                Source::Collider(c) => (1, c),
+                // Grasps have no anchors.
+                Source::Grasp(g, _) => (2, g),
+                Source::Body(b) => (3, b),
+            };
+            [*vertex, kind, *number].iter().for_each(|k| hash.update(&k.to_le_bytes()));
+            hash_vector(hash, *place);
+        }
+        for Stretch { vertex, other, by } in stretches {
+            [vertex, other].iter().for_each(|k| hash.update(&k.to_le_bytes()));
+            hash_vector(hash, *by);
+        }
+        for flag in supported.iter().chain([disturbed, relax]) {
+            hash.update(&[u8::from(*flag)]);
+        }
+    }
+}
+
+/// Hashes the coordinates of a vector.
+pub(super) fn hash_vector(hash: &mut Xxh3, vector: Vec3A) {
+    for c in vector.to_array() {
+        hash.update(&c.to_bits().to_le_bytes());
+    }
+}

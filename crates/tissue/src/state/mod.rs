@@ -1,0 +1,157 @@
+//! What changes while stepping: plain data.
+
+mod body_state;
+mod motion;
+#[cfg(test)]
+mod tests;
+
+pub(crate) use body_state::{BodyState, WarmStart};
+pub use motion::BodyMotion;
+
+use crate::contact::Source;
+use crate::{Body, Grasp, Model};
+use glam::{DVec3, Vec3A};
+use xxhash_rust::xxh3::Xxh3;
+
+/// Positions, velocities and grasps at one instant. Cloning a state saves it; assigning the clone
+/// restores it exactly.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    /// Simulated time (s).
+    pub time: f64,
+    /// The grasps in force. Adding one closes it. Removing it opens it, and its nodes are free. A
+    /// node in several grasps follows the last, but a rigid one before a compliant one.
+    pub grasps: Vec<Grasp>,
+    /// One for each body.
+    pub(crate) bodies: Vec<BodyState>,
+}
+
+impl State {
+    /// The model at rest in its rest shape.
+    pub fn new(model: &Model) -> Self {
+        let bodies = model.bodies.iter().map(BodyState::at_rest).collect();
+        Self { time: 0.0, grasps: Vec::new(), bodies }
+    }
+
+    /// Whether every grasp holds nodes that the model has.
+    pub(crate) fn grasps_fit(&self, model: &Model) -> bool {
+        self.grasps.iter().all(|grasp| {
+            let nodes = model.bodies.get(grasp.body).map_or(0, |body| body.len());
+            grasp.nodes.len() == grasp.captured.len() && grasp.nodes.iter().all(|i| (*i as usize) < nodes)
+        })
+    }
+
+    /// The motion of a body, in double precision and node order.
+    pub fn motion(&self, model: &Model, body: usize) -> BodyMotion {
+        let mut motion = BodyMotion::default();
+        motion.load(&model.bodies[body], &self.bodies[body]);
+        motion
+    }
+
+    /// Sets the motion of a body, rounded to single precision. Friction with tools and other bodies
+    /// stays as it is.
+    pub fn set_motion(&mut self, model: &Model, body: usize, motion: &BodyMotion) {
+        motion.store(&model.bodies[body], &mut self.bodies[body]);
+    }
+
+    /// Sets the acceleration of each node of a body in the last substep (m/s2), which the adaptive
+    /// start of the sweeps uses.
+    pub fn set_accelerations(&mut self, model: &Model, body: usize, accelerations: &[DVec3]) {
+        let strength = model.gravity.length_squared();
+        if strength > 0.0 {
+            for (i, acceleration) in model.bodies[body].internal.iter().zip(accelerations) {
+                let share = acceleration.dot(model.gravity) / strength;
+                self.bodies[body].warm.falling[*i as usize] = share.clamp(0.0, 1.0) as f32;
+            }
+        }
+    }
+
+    /// World position of a node (m).
+    pub fn position(&self, model: &Model, body: usize, node: usize) -> DVec3 {
+        let b = &model.bodies[body];
+        b.origin + self.bodies[body].x[b.internal[node] as usize].as_dvec3()
+    }
+
+    /// World positions of a body's nodes (m).
+    pub fn positions(&self, model: &Model, body: usize) -> Vec<DVec3> {
+        (0..model.bodies[body].len()).map(|node| self.position(model, body, node)).collect()
+    }
+
+    /// Copies positions and velocities of all nodes from another state, and where friction holds
+    /// them on supports. Other friction and the grasps stay. Returns false, and changes nothing, if
+    /// the other state has other bodies.
+    pub fn copy_motion(&mut self, other: &Self) -> bool {
+        let sizes = |state: &Self| state.bodies.iter().map(|body| body.x.len()).collect::<Vec<_>>();
+        if sizes(self) != sizes(other) {
+            return false;
+        }
+        for (to, from) in self.bodies.iter_mut().zip(&other.bodies) {
+            to.x.copy_from_slice(&from.x);
+            to.v.copy_from_slice(&from.v);
+            to.anchors.clear();
+            to.anchors.extend(from.anchors.iter().filter(|anchor| matches!(anchor.source, Source::Support(_))));
+        }
+        true
+    }
+
+    /// Velocity of a node (m/s).
+    pub fn velocity(&self, model: &Model, body: usize, node: usize) -> DVec3 {
+        self.bodies[body].v[model.bodies[body].internal[node] as usize].as_dvec3()
+    }
+
+    /// Sets the world position of a node (m), pinned or not; its velocity stays. Elements that are
+    /// inverted by it are repaired at the beginning of the next step, without regard to time and
+    /// forces.
+    pub fn set_position(&mut self, model: &Model, body: usize, node: usize, position: DVec3) {
+        let b = &model.bodies[body];
+        self.bodies[body].x[b.internal[node] as usize] = (position - b.origin).as_vec3a();
+        self.bodies[body].repair.disturbed = true;
+    }
+
+    /// Requests that a body be relaxed at the beginning of the next step, without regard to time
+    /// and forces: towards the rest shape, rotated to fit, until no element is squeezed and no edge
+    /// is stretched much. It is for tissue so folded that its elements lock each other. Pinned and
+    /// held nodes stay.
+    pub fn relax(&mut self, body: usize) {
+        self.bodies[body].repair.disturbed = true;
+        self.bodies[body].repair.relax = true;
+    }
+
+    /// Sets the velocity of a node (m/s); a pinned or held node keeps none.
+    pub fn set_velocity(&mut self, model: &Model, body: usize, node: usize, velocity: DVec3) {
+        self.bodies[body].v[model.bodies[body].internal[node] as usize] = velocity.as_vec3a();
+    }
+
+    /// Kinetic energy of all bodies (J).
+    pub fn kinetic_energy(&self, model: &Model) -> f64 {
+        let of = |(body, state): (&Body, &BodyState)| -> f64 {
+            let vertices = body.vertices.iter().zip(&state.v);
+            vertices.map(|(vertex, v)| 0.5 * f64::from(vertex.mass) * f64::from(v.length_squared())).sum()
+        };
+        model.bodies.iter().zip(&self.bodies).map(of).sum()
+    }
+
+    /// Stops every node where it is.
+    pub fn stop(&mut self) {
+        for body in &mut self.bodies {
+            body.v.fill(Vec3A::ZERO);
+        }
+    }
+
+    /// Mean position of some nodes of a body (m); zero for none.
+    pub fn centroid(&self, model: &Model, body: usize, nodes: &[u32]) -> DVec3 {
+        let sum: DVec3 = nodes.iter().map(|i| self.position(model, body, *i as usize)).sum();
+        if nodes.is_empty() { DVec3::ZERO } else { sum / nodes.len() as f64 }
+    }
+
+    /// Hash over every bit of the state. Destructuring names every field: a new one that is not
+    /// hashed does not compile.
+    pub fn hash(&self) -> u64 {
+        let Self { time, grasps, bodies } = self;
+        let mut hash = Xxh3::new();
+        hash.update(&time.to_bits().to_le_bytes());
+        bodies.iter().for_each(|body| body.hash(&mut hash));
+        grasps.iter().for_each(|grasp| grasp.hash(&mut hash));
+        hash.digest()
+    }
+}

@@ -1,0 +1,49 @@
+//! The section on the bodies of a specimen: views and table.
+
+use super::organ_table;
+use super::organ_views::{self, Directions};
+use crate::Result;
+use glam::DVec3;
+use trocar_report::page::{self, Columns};
+use trocar_report::views::View;
+use trocar_report::{colors, figures};
+use trocar_specimen::Specimen;
+
+/// Views of the organs and their table.
+pub(super) fn section(s: &Specimen, beside_paper: bool) -> Result<String> {
+    // The bodies too: a lattice may stand out a little beyond its surface.
+    let points: Vec<DVec3> =
+        s.organs.iter().flat_map(|o| o.surface.vertices.iter().chain(&o.body.vertices).copied()).collect();
+    let d = Directions::of(s);
+    let size = (800, 520);
+    let oblique = View::framing(&points, d.oblique(), d.up, size);
+    let low = View::framing(&points, d.low(), d.up, size);
+    let rest = organ_views::rest(s);
+    let picture = |view: &View, instances, alt: &str| figures::img(&view.picture(instances, 2), alt);
+    let names = s.organs.iter().enumerate().map(|(i, o)| (o.name.as_str(), colors::organ(i)));
+    let wires = format!("<b>Tetrahedra.</b> Outer faces of the bodies that are simulated.{}", page::legend(names));
+    let cut = "<b>Cut-away.</b> Each organ opened by an upright plane through its middle; cut elements are lighter.";
+    let figures = [
+        page::figure(
+            &picture(&oblique, organ_views::surfaces(s), "organ surfaces, oblique view")?,
+            "<b>Surfaces.</b> Closed, coloured, seen obliquely from the front.",
+        ),
+        page::figure(
+            &picture(&low, organ_views::surfaces(s), "organ surfaces, low view")?,
+            "<b>Surfaces, from low on the other side.</b>",
+        ),
+        page::figure(&picture(&oblique, organ_views::wires(s, &rest, None), "tetrahedral meshes")?, &wires),
+        page::figure(
+            &picture(&oblique, organ_views::wires(s, &rest, Some(d.front)), "tetrahedral meshes, cut open")?,
+            cut,
+        ),
+    ];
+    let lead = if beside_paper {
+        "Each organ is a watertight surface around a body of tetrahedra; under the figures, where the names agree, \
+         the paper\u{2019}s Table I."
+    } else {
+        "Each organ is a watertight surface around a body of tetrahedra."
+    };
+    let body = page::grid(Columns::Two, &figures) + &organ_table::organs(s, beside_paper);
+    Ok(page::section("The organs", lead, &body))
+}

@@ -1,0 +1,185 @@
+//! Scenes for specimens: the specimen alone with ideal arms, or placed in the paper's cell.
+
+use crate::{Error, Result};
+use glam::{DQuat, DVec3};
+use std::path::Path;
+use trocar_cell::{ToolReach, tool_reach};
+use trocar_core::Pose;
+use trocar_scene::{
+    Arm, CellCamera, Frame, Gates, Instrument, InstrumentKind, Lens, Safety, Scene, Side, SpecimenSource, Task,
+    TaskName, Variation, View,
+};
+use trocar_specimen::Specimen;
+
+/// Height at which the lowest tissue lies in the cell (m), as in the paper's cell.
+const BED_HEIGHT: f64 = 0.02;
+
+/// The organ's middle lies no higher than this in the cell (m); thick specimens lie lower for it.
+const MAX_MIDDLE_HEIGHT: f64 = 0.055;
+
+/// Turns about the vertical that are tried.
+const TURNS: i32 = 24;
+
+/// Where the organ's middle lies in the cell (m): below the ports' midpoint of the paper's cell.
+const MIDDLE: [f64; 2] = [0.0, 0.46];
+
+/// Free instruments start this far above the highest tissue (m), and a cutter this far beside the grasper.
+const START_ABOVE: f64 = 0.04;
+const CUTTER_BESIDE: f64 = 0.06;
+
+/// Force that no command of a free instrument pushes beyond (N): that of a strong hand.
+const FREE_FORCE_LIMIT_N: f64 = 40.0;
+
+/// The organ of `specimen` that a task is about: the one of that name, or the appendix if there is one, or
+/// else the first.
+///
+/// # Errors
+/// Names the organs of a specimen that does not have it.
+pub fn task_organ<'a>(specimen: &'a Specimen, name: Option<&'a str>) -> Result<&'a str> {
+    let names: Vec<&str> = specimen.organs.iter().map(|o| o.name.as_str()).collect();
+    match name {
+        Some(name) if names.contains(&name) => Ok(name),
+        Some(name) => {
+            let known = names.join(", ");
+            Err(Error::Mismatch(format!("no organ '{name}' in the specimen; it has {known}")))
+        }
+        None => names
+            .iter()
+            .find(|n| **n == "appendix")
+            .or(names.first())
+            .copied()
+            .ok_or_else(|| Error::Mismatch("the specimen has no organ".to_owned())),
+    }
+}
+
+/// The specimen in `folder` alone, with a grasper that moves freely, and a cutter if `sever`: a scene of one
+/// or two ideal arms without ports, whose task is a grasp-lift of `organ`.
+///
+/// # Errors
+/// A specimen without that organ.
+pub fn free_scene(specimen: &Specimen, folder: &Path, organ: &str, sever: bool) -> Result<Scene> {
+    let placement = placed(specimen, organ, 0.0)?;
+    let points = || specimen.organs.iter().flat_map(|o| &o.body.vertices).map(|p| placement.transform(*p));
+    let top = points().map(|p| p.z).fold(f64::NEG_INFINITY, f64::max);
+    let start = [MIDDLE[0], MIDDLE[1], top + START_ABOVE];
+    let mut scene = Scene::new("specimen", source(folder));
+    scene.description = format!("{} alone, with instruments that move freely", specimen.name);
+    scene.placement = frame(&placement);
+    scene.ports = Vec::new();
+    scene.arms = vec![Arm::free(Side::Left, "grasper", start)];
+    scene.instruments = vec![Instrument::of(InstrumentKind::Grasper)];
+    if sever {
+        let beside = [start[0] + CUTTER_BESIDE, start[1], start[2]];
+        scene.arms.push(Arm::free(Side::Right, "cutter", beside));
+        scene.instruments.push(Instrument::of(InstrumentKind::Cutter));
+    }
+    scene.cameras = cameras(specimen, &placement, organ);
+    scene.safety = Safety { force_limit_n: FREE_FORCE_LIMIT_N, ..Safety::default() };
+    scene.task = grasp_lift(organ);
+    scene.task.sever = sever;
+    Ok(scene)
+}
+
+/// The paper's cell with the specimen in `folder` placed so that both tools reach `organ`: its middle below
+/// the ports' midpoint, turned about the vertical to where the tools miss it by least. And how near they
+/// come.
+///
+/// # Errors
+/// A specimen without that organ.
+pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -> Result<(Scene, Vec<ToolReach>)> {
+    let mut scene = Scene::new(name, source(folder));
+    scene.description = format!("The paper's two-arm cell around {}", specimen.name);
+    organ.clone_into(&mut scene.task.organ);
+    if specimen.camera.is_none() {
+        scene.cameras.retain(|c| !matches!(c.lens, Lens::Recording {}));
+    }
+    let missed = |reach: &[ToolReach]| reach.iter().map(|r| r.missed_mm).fold(0.0, f64::max);
+    let mut best: Option<(Scene, Vec<ToolReach>)> = None;
+    for k in 0..TURNS {
+        // Small turns to either side first, so that of equals the least is taken.
+        let turn = if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 };
+        let turn = std::f64::consts::TAU * f64::from(turn) / f64::from(TURNS);
+        scene.placement = frame(&placed(specimen, organ, turn)?);
+        let reach = tool_reach(&scene, specimen)?;
+        if best.as_ref().is_none_or(|(_, b)| missed(&reach) < missed(b) - 0.1) {
+            best = Some((scene.clone(), reach));
+        }
+        if best.as_ref().is_some_and(|(_, reach)| missed(reach) < 0.1) {
+            break;
+        }
+    }
+    best.ok_or_else(|| Error::Mismatch("the specimen cannot be placed".to_owned()))
+}
+
+/// A grasp-lift of `organ` anywhere along it that goes on until its policy has finished, from the same
+/// start every time.
+pub fn grasp_lift(organ: &str) -> Task {
+    let still = Variation {
+        tilt_deg: 0.0,
+        azimuth_deg: 0.0,
+        insertion_mm: 0.0,
+        roll_deg: 0.0,
+        specimen_shift_mm: 0.0,
+        specimen_turn_deg: 0.0,
+    };
+    Task {
+        name: TaskName::GraspLift,
+        organ: organ.to_owned(),
+        episode_s: 60.0,
+        stop_when_passed: false,
+        gates: Gates { grasp_from: 0.0, grasp_to: 1.0, lift_s: 0.0, ..Gates::default() },
+        variation: still,
+        ..Task::default()
+    }
+}
+
+/// The pose that brings the middle of `organ` below the ports' midpoint and the lowest tissue to the bed,
+/// with the specimen turned by `turn` (rad) about the vertical.
+pub(crate) fn placed(specimen: &Specimen, organ: &str, turn: f64) -> Result<Pose> {
+    let name = task_organ(specimen, Some(organ))?;
+    let upright = DQuat::from_rotation_arc(specimen.up.normalize(), DVec3::Z);
+    let rotation = (DQuat::from_rotation_z(turn) * upright).normalize();
+    let turned = |p: &DVec3| rotation * *p;
+    let body = specimen.organs.iter().filter(|o| o.name == name).flat_map(|o| &o.body.vertices);
+    let (sum, count) = body.fold((DVec3::ZERO, 0.0), |(sum, n), p| (sum + turned(p), n + 1.0));
+    let middle = sum / f64::max(count, 1.0);
+    let all = specimen.organs.iter().flat_map(|o| &o.body.vertices);
+    let lowest = all.map(|p| turned(p).z).fold(f64::INFINITY, f64::min);
+    let bed = BED_HEIGHT.min(MAX_MIDDLE_HEIGHT - (middle.z - lowest));
+    let translation = DVec3::new(MIDDLE[0] - middle.x, MIDDLE[1] - middle.y, bed - lowest);
+    Ok(Pose { rotation, translation })
+}
+
+pub(crate) fn frame(pose: &Pose) -> Frame {
+    let q = pose.rotation;
+    Frame { position_m: pose.translation.to_array(), rotation_wxyz: [q.w, q.x, q.y, q.z] }
+}
+
+pub(crate) fn source(folder: &Path) -> SpecimenSource {
+    let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+    SpecimenSource { path: Some(folder.display().to_string()), phantom: None, seed: 1 }
+}
+
+/// A close look at the organ from the front, and one at all of the specimen.
+fn cameras(specimen: &Specimen, placement: &Pose, organ: &str) -> Vec<CellCamera> {
+    let bounds = |of: &dyn Fn(&str) -> bool| {
+        let points = specimen.organs.iter().filter(|o| of(&o.name)).flat_map(|o| &o.body.vertices);
+        let points = points.map(|p| placement.transform(*p));
+        points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
+    };
+    let look = |name: &str, (low, high): (DVec3, DVec3), near: f64| {
+        let (middle, size) = (0.5 * (low + high), (high - low).length().max(0.04));
+        let target = middle + 0.1 * size * DVec3::Z;
+        let eye = target + near * size * DVec3::new(0.35, -0.75, 0.55);
+        CellCamera {
+            name: name.to_owned(),
+            view: View::LookAt { eye_m: eye.to_array(), target_m: target.to_array(), up: [0.0, 0.0, 1.0] },
+            lens: Lens::FieldOfView { width_deg: 58.0, height_deg: 34.6 },
+            size_px: [1280, 720],
+            policy_size_px: [224, 224],
+            oblique_deg: 0.0,
+            depth: false,
+        }
+    };
+    vec![look("close-up", bounds(&|name| name == organ), 1.3), look("overview", bounds(&|_| true), 1.2)]
+}
