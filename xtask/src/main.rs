@@ -3,6 +3,7 @@
 
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
+mod figures;
 mod peers;
 mod python;
 mod tools;
@@ -31,6 +32,7 @@ const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, 
        cargo xtask docs          the API documentation, and the book in target/book where mdbook is installed
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
+       cargo xtask figures [NAME...]  run studies and write their tables into docs/generated; all that are there by default
        cargo xtask fuzz [CASES]  damaged files against every reader, a million cases by default";
 
 fn main() -> ExitCode {
@@ -53,6 +55,13 @@ fn main() -> ExitCode {
             tools::fetch();
             ExitCode::SUCCESS
         }
+        ["figures", names @ ..] => match figures::run(names) {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(why) => {
+                eprintln!("{why}");
+                ExitCode::FAILURE
+            }
+        },
         ["peers"] => match peers::run() {
             Ok(()) => ExitCode::SUCCESS,
             Err(why) => {

@@ -3,8 +3,10 @@
 //! The peers' scripts and meshes stand beside the repository (`../shared/peers`) and are copied; the peers come from PyPI into an environment of their own. Runs alternate, so that
 //! a busy machine slows all of them; every figure is the median over the rounds.
 //!
-//! MuJoCo's script and ours time as many frames. They are not of the same motion: the peers' scripts know none but the organs' sagging from rest under gravity, ours drags the
-//! appendix up and down meanwhile, which is the harder work. The table says what each did.
+//! MuJoCo's script and ours time as many frames. The peers' scripts know one motion, the organs sagging from rest under
+//! gravity; ours is timed on the same sag, and on a drag of the appendix, which is harder. The table says what each did.
+//! MuJoCo is timed without and with a pool of two threads, and the faster counts. Newton's kernels on a CPU run on one
+//! thread whatever is set, so that is its best.
 
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -16,7 +18,7 @@ const PACKAGES: [&str; 5] = ["newton==1.8.0", "warp-lang==1.19.0", "mujoco==4.0.
 const SCRIPTS: &str = "../shared/peers";
 /// Where everything is put.
 const FOLDER: &str = "target/peers";
-/// The mesh.
+/// The mesh: synthetic organs with the paper's counts of nodes and elements, not the paper's specimen A.
 const MESH: &str = "specimen_a";
 /// Rounds of runs.
 const ROUNDS: usize = 2;
@@ -49,20 +51,28 @@ struct Places {
     mesh: PathBuf,
 }
 
-const SOLVERS: [Solver; 6] = [
+const SOLVERS: [Solver; 11] = [
     Solver { name: "Newton 1.8 VBD, 8 x 10", threads: "1", work: "5 frames of sag", run: newton },
-    Solver { name: "MuJoCo 4.0 flex, 1/60 s", threads: "1", work: "120 frames of sag", run: mujoco },
+    Solver { name: "MuJoCo 4.0 flex, 1/60 s", threads: "1", work: SAG, run: |p| mujoco(p, "0") },
+    Solver { name: "MuJoCo 4.0 flex, 1/60 s", threads: "2", work: SAG, run: |p| mujoco(p, "2") },
+    Solver { name: "trocar, paper schedule", threads: "1", work: SAG, run: |p| sagging(p, "paper", "1") },
+    Solver { name: "trocar, paper schedule", threads: "2", work: SAG, run: |p| sagging(p, "paper", "2") },
+    Solver { name: "trocar, fast schedule", threads: "1", work: SAG, run: |p| sagging(p, "fast", "1") },
+    Solver { name: "trocar, fast schedule", threads: "2", work: SAG, run: |p| sagging(p, "fast", "2") },
     Solver { name: "trocar, paper schedule", threads: "1", work: DRAG, run: |p| ours(p, "paper", "1") },
     Solver { name: "trocar, fast schedule", threads: "1", work: DRAG, run: |p| ours(p, "fast", "1") },
-    Solver { name: "trocar, paper schedule", threads: "all", work: DRAG, run: |p| ours(p, "paper", "0") },
-    Solver { name: "trocar, fast schedule", threads: "all", work: DRAG, run: |p| ours(p, "fast", "0") },
+    Solver { name: "trocar, paper schedule", threads: "2", work: DRAG, run: |p| ours(p, "paper", "2") },
+    Solver { name: "trocar, fast schedule", threads: "2", work: DRAG, run: |p| ours(p, "fast", "2") },
 ];
 
 /// What ours does: the frames that `bench organs` times unless told otherwise.
 const DRAG: &str = "120 frames of drag";
 
-/// Peers come first in [`SOLVERS`].
-const PEERS: usize = 2;
+/// What MuJoCo does, and ours beside it: the organs sag from rest under gravity.
+const SAG: &str = "120 frames of sag";
+
+/// Peers come first in [`SOLVERS`]: Newton, and MuJoCo without and with a pool of threads.
+const PEERS: usize = 3;
 
 /// Sets everything up, runs everything, prints the table and writes it to `target/peers/table.json`.
 pub fn run() -> Outcome<()> {
@@ -79,7 +89,7 @@ pub fn run() -> Outcome<()> {
         }
     }
     let medians: Vec<Outcome<Figures>> = measured.into_iter().map(median).collect();
-    let table = json!({ "mesh": MESH, "rounds": ROUNDS, "rows": rows(&medians) });
+    let table = json!({ "mesh": MESH, "mesh_is": "synthetic, of the paper's counts", "rounds": ROUNDS, "rows": rows(&medians) });
     let text = serde_json::to_string_pretty(&table).map_err(|e| e.to_string())?;
     let path = Path::new(FOLDER).join("table.json");
     std::fs::write(&path, text).map_err(|e| format!("{}: {e}", path.display()))?;
@@ -143,7 +153,7 @@ fn newton(places: &Places) -> Outcome<Figures> {
     peer(places, &arguments, "newton.npy")
 }
 
-fn mujoco(places: &Places) -> Outcome<Figures> {
+fn mujoco(places: &Places, threads: &str) -> Outcome<Figures> {
     let arguments = [
         "bench_mujoco.py",
         "--mesh",
@@ -154,6 +164,8 @@ fn mujoco(places: &Places) -> Outcome<Figures> {
         "lumped",
         "--sim",
         "2",
+        "--threads",
+        threads,
         "--save",
         "mujoco.npy",
     ];
@@ -175,11 +187,21 @@ fn peer(places: &Places, arguments: &[&str], saved: &str) -> Outcome<Figures> {
     })
 }
 
+/// Ours on the same motion as MuJoCo's.
+fn sagging(places: &Places, schedule: &str, threads: &str) -> Outcome<Figures> {
+    timed(places, schedule, threads, "real_time_factor_sag")
+}
+
+/// Ours on the harder motion.
 fn ours(places: &Places, schedule: &str, threads: &str) -> Outcome<Figures> {
+    timed(places, schedule, threads, "real_time_factor")
+}
+
+fn timed(places: &Places, schedule: &str, threads: &str, key: &str) -> Outcome<Figures> {
     let mut command = Command::new(&places.trocar);
     command.args(["--json", "--quiet", "bench", "organs", "--schedule", schedule, "--threads", threads, "--mesh"]);
     let result = json_of(&output(command.arg(&places.mesh))?)?;
-    let wall = number(&result, "real_time_factor")?;
+    let wall = number(&result, key)?;
     Ok(Figures { wall, cpu: (threads == "1").then_some(wall), sag: number(&result, "static_sag_error")? })
 }
 
@@ -232,6 +254,15 @@ fn ratio(ours: &Figures, peer: &Figures) -> f64 {
     }
 }
 
+/// Of MuJoCo's two thread settings the one with more frames a second.
+fn faster<'a>(one: &'a Outcome<Figures>, two: &'a Outcome<Figures>) -> &'a Outcome<Figures> {
+    match (one, two) {
+        (Ok(a), Ok(b)) if b.wall > a.wall => two,
+        (Err(_), Ok(_)) => two,
+        _ => one,
+    }
+}
+
 fn rows(medians: &[Outcome<Figures>]) -> Vec<Value> {
     let row = |(k, (solver, figures)): (usize, (&Solver, &Outcome<Figures>))| {
         let named = json!({ "solver": solver.name, "threads": solver.threads, "work": solver.work });
@@ -241,7 +272,7 @@ fn rows(medians: &[Outcome<Figures>]) -> Vec<Value> {
                 let over = |peer: &Outcome<Figures>| peer.as_ref().ok().filter(|_| k >= PEERS).map(|p| ratio(f, p));
                 json!({
                     "real_time_factor": f.wall, "real_time_factor_cpu": f.cpu, "static_sag_error": f.sag,
-                    "over_newton": over(&medians[0]), "over_mujoco": over(&medians[1]),
+                    "over_newton": over(&medians[0]), "over_mujoco": over(faster(&medians[1], &medians[2])),
                 })
             }
         };
@@ -274,7 +305,7 @@ fn print(medians: &[Outcome<Figures>]) {
                     fixed(f.cpu),
                     100.0 * f.sag,
                     over(&medians[0]),
-                    over(&medians[1])
+                    over(faster(&medians[1], &medians[2]))
                 );
             }
         }
