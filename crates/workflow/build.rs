@@ -1,12 +1,14 @@
-//! Hashes of sources: of those that make phantoms' specimens, so that one which was kept is used only as long as it would be made the same, and of those that decide what an episode is, so that one
-//! campaign is not made by two programs.
+//! Hashes of sources: of those that make phantoms' specimens, so that one which was kept is used
+//! only as long as it would be made the same, and of those that decide what an episode is, so that
+//! one campaign is not made by two programs.
 
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
 /// Crates whose code decides what a phantom's specimen is.
-const MAKERS: [&str; 8] = [
+const MAKERS: [&str; 9] = [
     "camera/src",
+    "core/src",
     "geometry/src",
     "phantom/src",
     "recording/src",
@@ -16,10 +18,12 @@ const MAKERS: [&str; 8] = [
     "specimen/src",
 ];
 
-/// What decides what an episode is: crates, what policies of other processes are shown and how they are asked, and the versions of all that is built in.
-const PLAYERS: [&str; 13] = [
+/// What decides what an episode is: crates, what policies of other processes are shown and how they
+/// are asked, and the versions of all that is built in.
+const PLAYERS: [&str; 14] = [
     "camera/src",
     "cell/src",
+    "core/src",
     "geometry/src",
     "remote/src",
     "render/src",
