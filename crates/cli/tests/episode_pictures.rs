@@ -70,7 +70,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
         assert_eq!(&bytes[4..8], b"ftyp");
     } else {
         println!("skipped: no ffmpeg");
-        assert!(String::from_utf8_lossy(&mp4.stderr).contains("ffmpeg makes .mp4 and is not installed"));
+        assert!(String::from_utf8_lossy(&mp4.stderr).contains(".mp4 needs the program ffmpeg, which is not installed"));
     }
 
     let refused = |source: &str, out: &str, more: &[&str], words: &[&str]| {

@@ -6,6 +6,7 @@ use crate::gripper::{BLADE_WIDTH, JAW_REGION_BEGIN};
 use crate::{Result, TissueInJaws};
 use glam::DVec3;
 use trocar_scene::{InstrumentKind, Side};
+use trocar_tissue::State;
 
 /// Tissue that jaws hold, and how it has moved since they closed on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,12 +78,14 @@ impl Cell {
         Ok((state.contact_disabled, state.blades_disabled))
     }
 
-    /// Largest distance of a pinned node from where it was recorded (m).
+    /// Largest distance of a pinned node from where it was recorded (m). A state stores positions in
+    /// single precision, so the recorded ones are compared as a state stores them.
     pub fn pin_drift(&self) -> f64 {
         let (model, state) = (&self.world.model, &self.world.state);
+        let recorded = &State::new(model);
         let drift = model.bodies().iter().enumerate().flat_map(|(k, body)| {
             let pinned = (0..body.len()).filter(|i| body.pinned()[*i]);
-            pinned.map(move |i| state.position(model, k, i).distance(body.rest_positions()[i]))
+            pinned.map(move |i| state.position(model, k, i).distance(recorded.position(model, k, i)))
         });
         drift.fold(0.0, f64::max)
     }
