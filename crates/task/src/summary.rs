@@ -90,7 +90,7 @@ pub struct Summary {
     /// Follow ratio (tissue lift over jaw lift) then.
     pub follow_ratio: Option<f64>,
     /// The jaws held the tissue then: it followed at least 0.80 of their lift and slipped less than
-    /// 3 mm.
+    /// 3 mm, and the grasp did not end because contact of the jaws was disabled.
     #[serde(default)]
     pub held: bool,
     /// Times that tissue tore out of jaws.
@@ -183,6 +183,7 @@ impl Summary {
     /// Adds what the channels do not have.
     pub(crate) fn add_facts(&mut self, facts: &Facts<'_>) {
         self.details = facts.details();
+        self.held &= !facts.lost_contact();
         self.why = why(facts.rows, facts, &self.progress, self.end.as_ref());
         let slipped = self.attached && !self.held && !self.diverged && self.torn == 0;
         self.advice = if slipped { facts.advice() } else { None };

@@ -3,6 +3,7 @@
 use crate::facts::Facts;
 use crate::{Channels, End, Progress, Stage};
 use trocar_cell::CellEvent;
+use trocar_scene::Side;
 
 /// Jaws open less than this are closed.
 const CLOSED_JAW: f64 = 0.05;
@@ -92,6 +93,17 @@ impl Reason<'_, '_> {
         let jaw = |c: &&Channels| self.grasper(c).is_some_and(|arm| arm.jaw < CLOSED_JAW && arm.attached == 0.0);
         if let Some(closed) = self.rows.iter().find(jaw) {
             let (time, mm) = (closed.time_s, closed.task.grasp_distance_mm);
+            let disabled = self.facts.events.iter().rev().find_map(|(at, e)| match e {
+                CellEvent::ContactDisabled { arm, organ, .. } if self.grasps(*arm) && *at <= time + 1e-9 => {
+                    Some((*at, organ))
+                }
+                _ => None,
+            });
+            if let Some((at, organ)) = disabled {
+                return format!(
+                    "contact disabled: at {at:.1} s the grasper had pierced or strained the {organ}; it then closed on nothing"
+                );
+            }
             return format!("empty jaws: they closed on nothing at {time:.1} s, {mm:.0} mm from the {organ}");
         }
         format!("no grasp: the jaws came within {nearest:.0} mm of the {organ} and did not close on it")
@@ -103,19 +115,33 @@ impl Reason<'_, '_> {
         if let Some(said) = self.disabled() {
             return said;
         }
-        let lost = self.facts.events.iter().rev().find_map(|(time, e)| match e {
-            CellEvent::Torn { arm, force_n } if Some(*arm) == self.facts.grasper => {
+        let events = self.facts.events;
+        let attached = |e: &CellEvent| matches!(e, CellEvent::Attached { arm, .. } if self.grasps(*arm));
+        let from = events.iter().rposition(|(_, e)| attached(e)).map_or(0, |k| k + 1);
+        let ended = events[from..].iter().find_map(|(time, e)| match e {
+            CellEvent::ContactDisabled { arm, organ, .. } if self.grasps(*arm) => Some(format!(
+                "contact disabled: at {time:.1} s the grasper had pierced or strained the {organ} and let go of it"
+            )),
+            CellEvent::Torn { arm, force_n } if self.grasps(*arm) => {
                 Some(format!("torn: the {organ} tore out of the jaws at {time:.1} s, at {force_n:.1} N"))
             }
-            CellEvent::Slipped { arm } if Some(*arm) == self.facts.grasper => {
-                Some(format!("slipped: the {organ} began to slide at {time:.1} s and is out of the jaws"))
-            }
-            CellEvent::Released { arm } if Some(*arm) == self.facts.grasper => {
-                Some(format!("let go: the jaws opened at {time:.1} s"))
-            }
+            CellEvent::Released { arm } if self.grasps(*arm) => Some(format!("let go: the jaws opened at {time:.1} s")),
             _ => None,
         });
-        lost.unwrap_or_else(|| format!("the jaws do not hold the {organ}"))
+        let slipped = || {
+            events[from..].iter().rev().find_map(|(time, e)| match e {
+                CellEvent::Slipped { arm } if self.grasps(*arm) => {
+                    Some(format!("slipped: the {organ} began to slide at {time:.1} s and is out of the jaws"))
+                }
+                _ => None,
+            })
+        };
+        ended.or_else(slipped).unwrap_or_else(|| format!("the jaws do not hold the {organ}"))
+    }
+
+    /// Whether `arm` is the one with the first grasper.
+    fn grasps(&self, arm: Side) -> bool {
+        Some(arm) == self.facts.grasper
     }
 
     /// Contact of the grasper is disabled at the end.

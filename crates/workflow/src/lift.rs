@@ -169,11 +169,13 @@ impl Lift {
         let mut episode = Episode::new(&scene, specimen, self.threads)?;
         let mut recorder = Recorder::new(CameraRig::new(&scene, specimen, episode.cell())?);
         let mut policy = Phased { inner: Scripted::following(self.script), phases: Vec::new() };
-        progress.begin("simulate", 1);
+        let periods = scene.task.episode_s / episode.cell().period();
+        progress.begin("simulate", periods.round() as u64);
         let clock = Instant::now();
         let mut stopped = false;
         let recording = run_watched(&mut episode, &mut policy, 0, &mut |episode, step| {
             recorder.record(episode, step);
+            progress.advance(1);
             stopped = progress.interrupted();
             !stopped
         });

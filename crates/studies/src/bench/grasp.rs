@@ -161,7 +161,8 @@ impl GraspBench {
             without.settle(SETTLE_S)?;
             with.reset(0)?;
             let mut policy = Scripted::following(lift.script);
-            progress.begin("three runs side by side", 1);
+            let periods = scene.task.episode_s / with.cell().period();
+            progress.begin("three runs side by side", periods.round() as u64);
             times.extend(together(&mut with, &mut policy, [&mut same, &mut without], progress)?);
             progress.end();
             held = with.summary().held;
