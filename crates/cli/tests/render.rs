@@ -69,7 +69,7 @@ fn mistakes_are_one_line_and_leave_nothing() {
     refused(&["cell-b"], "seen.png", &["cell-b", "cell-a"]);
     refused(&["cell-a", "--at", "-1"], "seen.png", &["--at is -1", "[0, 600]"]);
     refused(&["cell-a", "--at", "1"], "seen.webp", &["--at", ".png"]);
-    refused(&["cell-a"], "no/such/folder/seen.webp", &["there is no folder"]);
+    refused(&["cell-a"], "no/such/folder/seen.webp", &["the folder", "does not exist"]);
     refused(&["cell-a", "--size", "1280"], "seen.png", &["1280x720"]);
     refused(&["cell-a", "--samples", "4"], "seen.png", &["--path"]);
     let empty = tempfile::tempdir().unwrap();
