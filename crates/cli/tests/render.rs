@@ -76,5 +76,5 @@ fn mistakes_are_one_line_and_leave_nothing() {
     refused(&[empty.path().to_str().unwrap()], "seen.png", &["specimen.toml"]);
     refused(&[empty.path().to_str().unwrap()], "seen.webp", &["does not move"]);
     std::fs::write(empty.path().join("result.json"), "{}").unwrap();
-    refused(&[empty.path().to_str().unwrap()], "seen.png", &["a run keeps figures", "--at"]);
+    refused(&[empty.path().to_str().unwrap()], "seen.png", &["this run has no episode file", "--at"]);
 }
