@@ -6,7 +6,6 @@
 #[path = "../../cell/tests/common/mod.rs"]
 mod tube;
 
-use std::path::Path;
 use trocar_scene::GraspDesignName;
 use trocar_specimen::Pins;
 use trocar_task::policy::{AfterHold, CutAt, Script, Scripted};
@@ -19,7 +18,10 @@ fn lift(lift: &Lift, pins: Pins) -> Result<Recording> {
     lift.script.check()?;
     let specimen = specimen(pins);
     let sever = matches!(lift.script.after, AfterHold::Cut(_));
-    let scene = lift.arrange(free_scene(&specimen, Path::new("tube"), "tube", sever)?)?;
+    // A scene names a specimen's folder; the one in memory is stepped.
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("specimen.toml"), "").unwrap();
+    let scene = lift.arrange(free_scene(&specimen, folder.path(), "tube", sever)?)?;
     let mut episode = Episode::new(&scene, &specimen, lift.threads)?;
     Ok(run(&mut episode, &mut Scripted::following(lift.script), 0, &mut |_| true)?)
 }
@@ -128,7 +130,7 @@ fn options_out_of_range_are_named() {
     assert!(refused(|l| l.script.regrasp = Some(f64::NAN)).contains("--regrasp"));
     assert!(refused(|l| l.script.after = AfterHold::Cut(CutAt::S(f64::NAN))).contains("--sever"));
     assert!(refused(|l| l.jaw_force = Some(0.0)).contains("jaw_force"));
-    let other = free_scene(&specimen(ONE_END), Path::new("tube"), "liver", false).unwrap_err().to_string();
+    let other = free_scene(&specimen(ONE_END), "tube".as_ref(), "liver", false).unwrap_err().to_string();
     assert!(other.contains("liver") && other.contains("tube"), "{other}");
     let pinned = lift(&Lift::default(), Pins::Band { share: 1.0 }).map(|r| r.summary);
     assert!(pinned.unwrap_err().to_string().contains("pin"));
