@@ -11,7 +11,9 @@ fn the_demo_lifts_the_appendix_of_a_reconstructed_phantom() {
         .output()
         .unwrap();
     assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
-    assert!(run.stderr.is_empty(), "no bars where nobody looks: {}", String::from_utf8_lossy(&run.stderr));
+    // A slow machine gets a plain line every half minute, but no bar is drawn into a pipe.
+    let progress = String::from_utf8_lossy(&run.stderr);
+    assert!(!progress.contains(['\r', '\u{1b}']), "no bars in a pipe: {progress}");
     let said: serde_json::Value = serde_json::from_slice(&run.stdout).unwrap();
     let number = |key: &str| said[key].as_f64().unwrap_or_else(|| panic!("no number '{key}' in {said}"));
     assert_eq!((number("organs"), number("watertight")), (6.0, 6.0));
