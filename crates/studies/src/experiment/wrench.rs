@@ -48,7 +48,7 @@ pub struct Weighing {
     /// Static poses of an identification.
     #[arg(long, default_value_t = trocar_robot::wrench::STATIC_POSES)]
     pub poses: usize,
-    /// Largest tilt of the instrument in them [degrees].
+    /// Largest tilt of the instrument in them (degrees).
     #[arg(long, default_value = "60", value_parser = degrees, allow_negative_numbers = true)]
     pub tilt: f64,
     /// Identifications, each with other noise.
