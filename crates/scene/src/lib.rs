@@ -36,4 +36,4 @@ pub use phantoms::{PHANTOMS, Phantom};
 pub use port::Port;
 pub use scene::{Rates, Scene, Tool};
 pub use start::Start;
-pub use task::{Gates, GraspDesignName, Safety, Task, TaskName, Variation};
+pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task, TaskName, Variation};

@@ -6,8 +6,8 @@ use std::path::Path;
 use trocar_cell::{ToolReach, tool_reach};
 use trocar_core::Pose;
 use trocar_scene::{
-    Arm, CellCamera, Frame, Gates, Instrument, InstrumentKind, Lens, Safety, Scene, Side, SpecimenSource, Task,
-    TaskName, Variation, View,
+    Arm, CellCamera, Frame, Gates, Instrument, InstrumentKind, Lens, Safety, SafetyRules, Scene, Side, SpecimenSource,
+    Task, TaskName, Variation, View,
 };
 use trocar_specimen::Specimen;
 
@@ -74,7 +74,9 @@ pub fn free_scene(specimen: &Specimen, folder: &Path, organ: &str, sever: bool) 
         scene.instruments.push(Instrument::of(InstrumentKind::Cutter));
     }
     scene.cameras = cameras(specimen, &placement, organ);
-    scene.safety = Safety { force_limit_n: FREE_FORCE_LIMIT_N, ..Safety::default() };
+    // A study of the tissue alone: what it bears is seen, not cut short.
+    let rules = SafetyRules { pierce: false, overstretch: false, relax: false, force_guard: true };
+    scene.safety = Safety { force_limit_n: FREE_FORCE_LIMIT_N, rules, ..Safety::default() };
     scene.task = grasp_lift(organ);
     scene.task.sever = sever;
     Ok(scene)

@@ -103,7 +103,7 @@ fn arm(scene: &Scene, k: usize, tool: &Tool<'_>, floor: f64) -> Result<ArmUnit> 
         tools: Tools::of(k),
         blades,
         parts: blades.colliders(Tools::of(k)),
-        force_limit: scene.safety.force_limit_n,
+        force_limit: if scene.safety.rules.force_guard { scene.safety.force_limit_n } else { f64::INFINITY },
         rcm_limits: [1e-3 * scene.safety.rcm_threshold_mm, 1e-3 * scene.safety.rcm_abort_mm],
         period: 1.0 / f64::from(scene.rates.control_hz),
         design: design(scene.task.grasp),

@@ -47,7 +47,7 @@ use arm::{ArmUnit, Wanted};
 use rules::Edges;
 use setpoint::NUMBERS;
 use std::time::Duration;
-use trocar_scene::Scene;
+use trocar_scene::{SafetyRules, Scene};
 use trocar_specimen::Specimen;
 use trocar_tissue::ToolMotion;
 
@@ -94,6 +94,8 @@ pub struct Cell {
     physics_steps: u32,
     /// Cuts part tissue.
     sever: bool,
+    /// The safety rules that are applied.
+    rules: SafetyRules,
     /// Motions of the tools in the last frame.
     motions: Vec<ToolMotion>,
     edges: Edges,
@@ -142,6 +144,7 @@ impl Cell {
             frames,
             physics_steps,
             sever: scene.task.sever,
+            rules: scene.safety.rules,
             timing: Timing::default(),
         })
     }

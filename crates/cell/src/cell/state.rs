@@ -57,6 +57,7 @@ impl Cell {
             sever: _,
             motions: _,
             edges: _,
+            rules: _,
             timing: _,
         } = self;
         CellState {

@@ -9,6 +9,9 @@
 //! | [`reconnect`] | the instrument is out, and tissue has come back | enables contact again |
 //! | [`relax`] | an organ stays folded with no instrument at it | relaxes it outside of time |
 //!
+//! A scene turns rules off in `[safety.rules]`. [`reconnect`] undoes what the rules did, and needs no
+//! switch.
+//!
 //! Contact of jaws that hold by a latch is disabled in two steps: first of the blades, which keep
 //! their hold, then of the whole instrument, which lets go.
 
@@ -44,6 +47,10 @@ impl Cell {
     /// Applies the rules on tissue after a frame whose smallest element has the share `least` of
     /// its rest volume.
     pub(super) fn enforce_tissue_limits(&mut self, least: f64, log: &mut PeriodLog) {
+        let rules = self.rules;
+        if !(rules.pierce || rules.overstretch || rules.relax) {
+            return;
+        }
         let waiting = self.waits.iter().any(|w| *w > 0);
         if least > SQUEEZED && !waiting && !self.arms.iter().any(ArmUnit::meets_tissue) {
             return;
@@ -52,13 +59,16 @@ impl Cell {
         self.waits.resize(strains.len(), 0);
         let (world, arms, waits) = (&mut self.world, &mut self.arms[..], &mut self.waits[..]);
         let mut scope = Scope { world, arms, strains: &strains, waits, log };
-        pierce::apply(&mut scope);
+        if rules.pierce {
+            pierce::apply(&mut scope);
+        }
         reconnect::apply(&mut scope);
         let mut relaxed = Vec::new();
         for organ in 0..strains.len() {
             match overstretch::instrument_at(&scope, organ) {
-                Some(arm) => overstretch::apply(&mut scope, organ, arm),
-                None => relaxed.extend(relax::apply(&mut scope, organ)),
+                Some(arm) if rules.overstretch => overstretch::apply(&mut scope, organ, arm),
+                None if rules.relax => relaxed.extend(relax::apply(&mut scope, organ)),
+                _ => {}
             }
         }
         scope.log.events.append(&mut relaxed);
