@@ -27,9 +27,8 @@ const EXAMPLES: [&str; 5] = ["gravity", "grasp_lift", "two_arms", "reconstruct",
 const API_DOCS: Check =
     ("docs", &["doc", "--workspace", "--no-deps", "--release", "--locked"], &[("RUSTDOCFLAGS", "-D warnings")]);
 
-const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, examples and docs, warnings as errors
-       cargo xtask python        ruff, mypy and the tests of the Python package (skipped without Python or network);
-                                 builds on what xtask test has built; python alone: builds the module alone
+const USAGE: &str = "usage: cargo xtask test          formatting, lints, tests, examples, docs and Python, warnings as errors
+       cargo xtask python        ruff, mypy and the tests of the Python package alone (skipped without Python or network)
        cargo xtask docs          the API documentation, and the book in target/book where mdbook is installed
        cargo xtask tools         fetch the programs and libraries that some tests compare with (test does this too)
        cargo xtask peers         our stepping beside Newton and MuJoCo on one mesh (peers from PyPI; scripts from ../shared/peers)
@@ -44,33 +43,14 @@ fn main() -> ExitCode {
             tools::fetch();
             test()
         }
-        ["python"] => check_python(python::Build::Workspace),
-        ["python", "alone"] => check_python(python::Build::Module),
-        ["docs"] => {
-            if docs() {
-                ExitCode::SUCCESS
-            } else {
-                ExitCode::FAILURE
-            }
-        }
+        ["python"] => code(check_python(python::Build::Module)),
+        ["docs"] => code(docs()),
         ["tools"] => {
             tools::fetch();
             ExitCode::SUCCESS
         }
-        ["figures", names @ ..] => match figures::run(names) {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(why) => {
-                eprintln!("{why}");
-                ExitCode::FAILURE
-            }
-        },
-        ["peers"] => match peers::run() {
-            Ok(()) => ExitCode::SUCCESS,
-            Err(why) => {
-                eprintln!("{why}");
-                ExitCode::FAILURE
-            }
-        },
+        ["figures", names @ ..] => code(told(figures::run(names))),
+        ["peers"] => code(told(peers::run())),
         ["fuzz"] => fuzz(1_000_000),
         ["fuzz", cases] => match cases.parse() {
             Ok(cases) => fuzz(cases),
@@ -85,9 +65,22 @@ fn usage() -> ExitCode {
     ExitCode::from(2)
 }
 
+/// The exit status of a program that succeeded or not.
+fn code(passed: bool) -> ExitCode {
+    if passed { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// Prints why something failed; says whether it succeeded.
+fn told(result: Result<(), String>) -> bool {
+    if let Err(why) = &result {
+        eprintln!("{why}");
+    }
+    result.is_ok()
+}
+
 fn test() -> ExitCode {
-    if TEST.iter().all(check) && EXAMPLES.iter().all(example) && docs() {
-        eprintln!("\nformatting, lints, tests, examples and docs are in order");
+    if TEST.iter().all(check) && EXAMPLES.iter().all(example) && docs() && check_python(python::Build::Workspace) {
+        eprintln!("\nformatting, lints, tests, examples, docs and Python are in order");
         return ExitCode::SUCCESS;
     }
     ExitCode::FAILURE
@@ -129,14 +122,12 @@ fn docs() -> bool {
     }
 }
 
-fn check_python(build: python::Build) -> ExitCode {
-    match python::check(build) {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(name) => {
-            eprintln!("\nPython: {name} failed");
-            ExitCode::FAILURE
-        }
+fn check_python(build: python::Build) -> bool {
+    let checked = python::check(build);
+    if let Err(name) = checked {
+        eprintln!("\nPython: {name} failed");
     }
+    checked.is_ok()
 }
 
 /// Runs the tests named `damage_never_panics` of all crates; each takes its share of the cases.
