@@ -12,7 +12,8 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// From `low` to `high`, which are exponents of ten on a logarithmic axis, with about `most` ticks.
+    /// From `low` to `high`, which are exponents of ten on a logarithmic axis, with about `most`
+    /// ticks.
     pub fn new(log: bool, low: f64, high: f64, most: usize) -> Self {
         Self { inner: (low..high).into(), ticks: ticks(log, low, high, most) }
     }
@@ -47,8 +48,10 @@ pub fn decimal(value: f64, span: f64) -> String {
     }
 }
 
-/// Where an axis from `low` to `high` has ticks, about `most` of them. A logarithmic axis, whose ends are exponents of ten, has them at 1, 2 and 5 times powers of ten; at the powers alone, or at
-/// every so many, where that is enough; and at every whole multiple where it is so short that fewer than three would be left.
+/// Where an axis from `low` to `high` has ticks, about `most` of them. A logarithmic axis, whose
+/// ends are exponents of ten, has them at 1, 2 and 5 times powers of ten; at the powers alone, or
+/// at every so many, where that is enough; and at every whole multiple where it is so short that
+/// fewer than three would be left.
 fn ticks(log: bool, low: f64, high: f64, most: usize) -> Vec<f64> {
     if !log {
         let axis: RangedCoordf64 = (low..high).into();
@@ -69,7 +72,8 @@ fn ticks(log: bool, low: f64, high: f64, most: usize) -> Vec<f64> {
     if steps.len() > 2 { steps } else { at(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]) }
 }
 
-/// The label of a tick at 10 to `exponent`, which is a small whole multiple of a power of ten: a plain number where that is short, else 10 to a power.
+/// The label of a tick at 10 to `exponent`, which is a small whole multiple of a power of ten: a
+/// plain number where that is short, else 10 to a power.
 pub fn log_label(exponent: f64) -> String {
     let decade = (exponent + 1e-9).floor();
     let multiple = 10f64.powf(exponent - decade).round();

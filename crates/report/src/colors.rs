@@ -9,7 +9,8 @@ pub const INSTRUMENT: [u8; 3] = [0, 229, 255];
 /// Metal of the gripper.
 pub const METAL: [u8; 3] = [196, 202, 208];
 
-/// Colour of organ `index`; told apart by most kinds of colour vision (after Okabe and Ito's choice of hues).
+/// Colour of organ `index`; told apart by most kinds of colour vision (after Okabe and Ito's choice
+/// of hues).
 pub fn organ(index: usize) -> [u8; 3] {
     const HUES: [[u8; 3]; 8] = [
         [230, 150, 20],

@@ -127,12 +127,13 @@ impl Section {
         self
     }
 
-    /// A plot above its caption (HTML). Plots and pictures that follow each other share a grid of two columns.
+    /// A plot above its caption (HTML). Plots and pictures that follow each other share a grid of
+    /// two columns.
     ///
     /// # Errors
     /// A plot that cannot be drawn.
     pub fn plot(self, plot: &Plot<'_>, caption: &str) -> Result<Self> {
-        Ok(self.figure(Columns::Two, page::figure(&plot.svg()?, caption)))
+        Ok(self.figure(Columns::Two, plot.figure(caption)?))
     }
 
     /// A picture above its caption (HTML); `alt` is its description in plain text.
@@ -224,7 +225,8 @@ impl Document {
         out
     }
 
-    /// What the docs include: sections with a table or figures of merit, without plots and pictures.
+    /// What the docs include: sections with a table or figures of merit, without plots and
+    /// pictures.
     pub fn markdown(&self) -> String {
         let mut out = String::new();
         for section in &self.sections {
@@ -273,7 +275,7 @@ mod tests {
 
     fn made_up() -> Document {
         let table = Table::new(
-            ["Organ", "Error [mm]"],
+            ["Organ", "Error (mm)"],
             vec![vec!["liver".into(), "\u{2212}0.12".into()], vec!["a|b".into(), "1\u{202f}000".into()]],
         );
         let long = Table::new(["only the page"], vec![vec!["has this".into()]]).on_page_only();
@@ -298,7 +300,7 @@ mod tests {
         let text = made_up().text();
         assert_eq!(
             text,
-            "Worst: 0.12 mm; of two\n  Organ  Error [mm]\n  liver       -0.12\n  a|b         1 000\nfound & kept\n"
+            "Worst: 0.12 mm; of two\n  Organ  Error (mm)\n  liver       -0.12\n  a|b         1 000\nfound & kept\n"
         );
     }
 
@@ -306,7 +308,7 @@ mod tests {
     fn the_docs_have_tables_and_figures_of_merit() {
         let markdown = made_up().markdown();
         assert!(markdown.starts_with("**Together**\n\n- Worst: 0.12 mm (of two)\n"));
-        assert!(markdown.contains("| Organ | Error [mm] |\n| --- | --: |\n| liver | \u{2212}0.12 |\n| a\\|b |"));
+        assert!(markdown.contains("| Organ | Error (mm) |\n| --- | --: |\n| liver | \u{2212}0.12 |\n| a\\|b |"));
         assert!(!markdown.contains("has this"));
     }
 }

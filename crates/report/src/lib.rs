@@ -1,5 +1,5 @@
-//! Pages as single HTML files: tables, plots, pictures. Nothing here knows what is shown; no scripts, nothing loaded from
-//! elsewhere.
+//! Pages as single HTML files: tables, plots, pictures. Nothing here knows what is shown; no
+//! scripts, nothing loaded from elsewhere.
 
 mod axis;
 pub mod colors;

@@ -3,7 +3,7 @@
 use crate::colors::{self, DIVERGING, SEQUENTIAL};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 
-/// The signed-error map spans plus and minus this [m].
+/// The signed-error map spans plus and minus this (m).
 pub const ERROR_SPAN: f64 = 5e-3;
 
 /// Draws the rim of `mask`, two pixels wide, inside it.
@@ -39,7 +39,7 @@ pub fn dimmed(picture: &ColorImage) -> ColorImage {
     ColorImage { pixels: picture.pixels.iter().map(grey).collect(), ..*picture }
 }
 
-/// Depth in false colours between `range` [m]; black where there is none.
+/// Depth in false colours between `range` (m); black where there is none.
 pub fn depth(depth: &DepthImage, range: (f64, f64)) -> ColorImage {
     let span = (range.1 - range.0).max(f64::MIN_POSITIVE);
     let color = |d: &f32| {
@@ -48,15 +48,15 @@ pub fn depth(depth: &DepthImage, range: (f64, f64)) -> ColorImage {
     ColorImage { width: depth.width, height: depth.height, pixels: depth.depth.iter().map(color).collect() }
 }
 
-/// Paints signed errors [m] where `compared` is set.
+/// Paints signed errors (m) where `compared` is set.
 pub fn error(picture: &mut ColorImage, error: &[f32], compared: &Mask) {
     for ((pixel, e), _) in picture.pixels.iter_mut().zip(error).zip(&compared.set).filter(|(_, set)| **set) {
         *pixel = colors::map(&DIVERGING, 0.5 + 0.5 * f64::from(*e) / ERROR_SPAN);
     }
 }
 
-/// Smallest box (x0, y0, x1, y1; ends excluded) around the mask grown by `margin` pixels and by what makes it at least
-/// `aspect` wide to high; `None` for an empty mask.
+/// Smallest box (x0, y0, x1, y1; ends excluded) around the mask grown by `margin` pixels and by
+/// what makes it at least `aspect` wide to high; `None` for an empty mask.
 pub fn crop_box(mask: &Mask, margin: usize, aspect: f64) -> Option<[usize; 4]> {
     let set = || mask.set.iter().enumerate().filter(|(_, s)| **s).map(|(i, _)| (i % mask.width, i / mask.width));
     let x0 = set().map(|p| p.0).min()?.saturating_sub(margin);

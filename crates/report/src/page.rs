@@ -1,4 +1,5 @@
-//! The page: frame, style sheet, building blocks, and the escaping of every text that comes from a file.
+//! The page: frame, style sheet, building blocks, and the escaping of every text that comes from a
+//! file.
 
 use std::fmt::Write;
 

@@ -1,9 +1,11 @@
-//! Tables for the docs: Markdown whose first line says by which command, commit and schema it was made.
+//! Tables for the docs: Markdown whose first line says by which command, commit and schema it was
+//! made.
 
 use crate::registry::STUDIES;
 use crate::study::Entry;
 
-/// The file's content: the first line names study, schema and commit; then the command, then the table.
+/// The file's content: the first line names study, schema and commit; then the command, then the
+/// table.
 pub fn page(entry: &dyn Entry, command: &str, commit: &str, body: &str) -> String {
     let (kind, name) = (entry.kind().name(), entry.name());
     format!(
@@ -12,7 +14,8 @@ pub fn page(entry: &dyn Entry, command: &str, commit: &str, body: &str) -> Strin
     )
 }
 
-/// Checks that `text` was written by a study that still exists and whose table still has that schema.
+/// Checks that `text` was written by a study that still exists and whose table still has that
+/// schema.
 ///
 /// # Errors
 /// What is wrong, in a sentence.

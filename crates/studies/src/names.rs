@@ -1,15 +1,19 @@
 //! Options that several studies have: choices by name, and numbers in the units that people write.
 
+use crate::Result;
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_scene::{GraspDesignName, ScheduleName};
+use trocar_specimen::Specimen;
+use trocar_workflow::phantoms;
 
 /// A length written in millimetres, in metres.
 ///
 /// # Errors
 /// A text that is no number.
-pub(crate) fn millimetres(text: &str) -> Result<f64, std::num::ParseFloatError> {
+pub(crate) fn millimetres(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|mm| 1e-3 * mm)
 }
 
@@ -17,7 +21,7 @@ pub(crate) fn millimetres(text: &str) -> Result<f64, std::num::ParseFloatError> 
 ///
 /// # Errors
 /// A text that is no number.
-pub(crate) fn kilopascals(text: &str) -> Result<f64, std::num::ParseFloatError> {
+pub(crate) fn kilopascals(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|kpa| 1e3 * kpa)
 }
 
@@ -25,7 +29,7 @@ pub(crate) fn kilopascals(text: &str) -> Result<f64, std::num::ParseFloatError> 
 ///
 /// # Errors
 /// A text that is no number.
-pub(crate) fn degrees(text: &str) -> Result<f64, std::num::ParseFloatError> {
+pub(crate) fn degrees(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(f64::to_radians)
 }
 
@@ -108,6 +112,16 @@ pub enum DesignName {
     Compliant,
 }
 
+/// The name of a design in reports and JSON.
+pub(crate) fn design_name(design: GraspDesignName) -> &'static str {
+    match design {
+        GraspDesignName::Friction => "friction",
+        GraspDesignName::RestPose => "rest-pose",
+        GraspDesignName::LivePose => "live-pose",
+        GraspDesignName::Compliant => "compliant",
+    }
+}
+
 impl From<DesignName> for GraspDesignName {
     fn from(name: DesignName) -> Self {
         match name {
@@ -181,7 +195,8 @@ impl From<Units> for trocar_geometry::io::Unit {
 pub enum SensorName {
     /// Independent from pixel to pixel and frame to frame.
     Plain,
-    /// Like stereo matching's too: smooth over several pixels, slow to change, silhouettes fattened.
+    /// Like stereo matching's too: smooth over several pixels, slow to change, silhouettes
+    /// fattened.
     Stereo,
 }
 
@@ -197,10 +212,26 @@ impl From<SensorName> for trocar_phantom::Sensor {
 /// Which appendix.
 #[derive(Clone, Debug, Args)]
 pub struct AppendixChoice {
-    /// A specimen folder with an organ named appendix; phantom A, recorded and reconstructed, by default.
+    /// A specimen folder with an organ named appendix; phantom A, recorded and reconstructed, by
+    /// default.
     #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,
     /// How phantom A is recorded.
     #[command(flatten)]
     pub recorded: Recorded,
+}
+
+impl AppendixChoice {
+    /// The specimen and its folder. A phantom is recorded and reconstructed in the folder `output`.
+    ///
+    /// # Errors
+    /// A specimen that cannot be read, or a phantom that cannot be made.
+    pub(crate) fn read(&self, output: &Path, progress: &dyn Progress) -> Result<(Specimen, PathBuf)> {
+        if let Some(folder) = &self.specimen {
+            return Ok((Specimen::read(folder)?, folder.clone()));
+        }
+        let folder = output.join("phantom-a");
+        let specimen = phantoms::specimen("phantom-a", &self.recorded.options(), &folder, progress)?;
+        Ok((specimen, folder.join("specimen")))
+    }
 }

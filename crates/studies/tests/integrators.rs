@@ -1,4 +1,5 @@
-//! The comparison of integrators on a tiny mesh: what diverges, what stays bounded, what is written.
+//! The comparison of integrators on a tiny mesh: what diverges, what stays bounded, what is
+//! written.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use trocar_core::Silent;

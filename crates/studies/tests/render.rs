@@ -1,4 +1,5 @@
-//! The renderer's benchmark, and its rays against Embree's. The latter is skipped, saying so, where Embree is not.
+//! The renderer's benchmark, and its rays against Embree's. The latter is skipped, saying so, where
+//! Embree is not.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 

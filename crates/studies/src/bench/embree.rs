@@ -1,12 +1,13 @@
-//! Embree through the Python package `embreex`, as a peer to measure beside: a separate process on one thread.
+//! Embree through the Python package `embreex`, as a peer to measure beside: a separate process on
+//! one thread.
 
 use glam::Vec3;
 use std::path::Path;
 use std::process::Command;
 use trocar_geometry::TriMesh;
 
-/// Reads float32 vertices, int32 triangles, float32 origins and directions; prints the least seconds of the tries and writes
-/// float32 distances, in units of the directions.
+/// Reads float32 vertices, int32 triangles, float32 origins and directions; prints the least
+/// seconds of the tries and writes float32 distances, in units of the directions.
 const SCRIPT: &str = "
 import sys, time, numpy
 from embreex.rtcore_scene import EmbreeScene
@@ -39,7 +40,7 @@ pub(super) struct Embree<'a> {
 
 /// What it says.
 pub(super) struct EmbreeRows {
-    /// Least time [s].
+    /// Least time (s).
     pub seconds: f64,
     /// Distances in units of the directions; infinite where nothing was hit.
     pub distances: Vec<f32>,

@@ -1,10 +1,12 @@
-//! What a whole episode costs: two arms, all organs, and pictures of two cameras once a control period, as policies see them.
+//! What a whole episode costs: two arms, all organs, and pictures of two cameras once a control
+//! period, as policies see them.
 //!
-//! The scripted controller does the scene's task; the same seed each time, so that all runs do the same work.
+//! The scripted controller does the scene's task; the same seed each time, so that all runs do the
+//! same work.
 
 use super::machine::Machine;
-use super::timing::median;
 use crate::names::SceneChoice;
+use crate::statistics::median;
 use crate::study::{Job, Kind, Study, stop_if_asked};
 use crate::{Error, Result};
 use clap::Args;
@@ -25,7 +27,7 @@ const PATH_FRAMES: usize = 10;
 /// Least real-time factor that is asked of two cores (SPEC E6).
 const BAR: f64 = 0.5;
 
-/// Largest side of a picture [px].
+/// Largest side of a picture (px).
 const LARGEST: usize = 4096;
 
 /// Speed of a whole scripted episode with arms, organs and two cameras, and what its parts cost.
@@ -43,10 +45,11 @@ pub struct EpisodeBench {
     /// Seed of the episode.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// A camera that looks once a control period; the endoscope and the depth camera by default. Several are named by several.
+    /// A camera that looks once a control period; the endoscope and the depth camera by default.
+    /// Several are named by several.
     #[arg(long = "camera", value_name = "NAME", default_values_t = ["endoscope".to_owned(), "d405".to_owned()])]
     pub cameras: Vec<String>,
-    /// Side of the square pictures [px].
+    /// Side of the square pictures (px).
     #[arg(long, default_value_t = 224)]
     pub size: usize,
     /// Paths a pixel of the path-traced pictures of 1280 x 720; 0 leaves them out.
@@ -54,7 +57,8 @@ pub struct EpisodeBench {
     pub samples: u32,
 }
 
-/// The benchmark's outcome: medians over runs. Times are means over control periods, in milliseconds of wall time.
+/// The benchmark's outcome: medians over runs. Times are means over control periods, in
+/// milliseconds of wall time.
 #[derive(Clone, Debug, Serialize)]
 pub struct EpisodeBenchResult {
     /// Simulated over wall time, from after the reset to the end, pictures included.
@@ -73,11 +77,11 @@ pub struct EpisodeBenchResult {
     pub pictures_ms: f64,
     /// All else: the policy, jaws and mouths, channels.
     pub rest_ms: f64,
-    /// Length of a control period [ms].
+    /// Length of a control period (ms).
     pub period_ms: f64,
     /// Control periods of the episode.
     pub periods: usize,
-    /// Their time [s].
+    /// Their time (s).
     pub simulated_s: f64,
     /// How the episode ended.
     pub end: String,
@@ -93,17 +97,19 @@ pub struct EpisodeBenchResult {
     pub nodes: usize,
     /// The cameras.
     pub cameras: Vec<String>,
-    /// Side of their pictures [px].
+    /// Side of their pictures (px).
     pub size: usize,
     /// Worker threads for tissue.
     pub threads: usize,
     /// What the pictures of `real_time_factor` are.
     pub pictures: String,
-    /// Ten frames of 1280 x 720, path-traced, by the first camera: their mean [ms]; left out with 0 samples.
+    /// Ten frames of 1280 x 720, path-traced, by the first camera: their mean (ms); left out with 0
+    /// samples.
     pub path_720p_ms: Option<f64>,
     /// Paths a pixel of them.
     pub samples: u32,
-    /// Real-time factor of an episode with such a picture from every camera once a control period, extrapolated from these ten.
+    /// Real-time factor of an episode with such a picture from every camera once a control period,
+    /// extrapolated from these ten.
     pub real_time_factor_path_720p: Option<f64>,
     /// The machine.
     pub machine: Machine,
@@ -190,7 +196,8 @@ impl Study for EpisodeBench {
 }
 
 impl EpisodeBench {
-    /// Mean wall time of path-traced frames of 1280 x 720 through the first camera, where the episode ended [ms].
+    /// Mean wall time of path-traced frames of 1280 x 720 through the first camera, where the
+    /// episode ended (ms).
     fn path_traced(&self, episode: &Episode, sight: &mut CameraRig, progress: &dyn Progress) -> Result<f64> {
         let Some(camera) = self.cameras.first() else {
             return Err(Error::Mismatch("--camera: one or more are wanted".to_owned()));
@@ -220,9 +227,7 @@ impl EpisodeBench {
         let (clock, mut pictures) = (Instant::now(), Duration::ZERO);
         'episode: while episode.end().is_none() {
             for action in scripted.act(episode)? {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
+                stop_if_asked(progress)?;
                 let ended = episode.step(&action)?.end.is_some();
                 let looking = Instant::now();
                 for camera in &self.cameras {
@@ -249,10 +254,10 @@ fn document(r: &EpisodeBenchResult) -> Document {
     let head = [
         "Pictures, once a control period",
         "times real time",
-        "arms [ms]",
-        "tissue [ms]",
-        "pictures [ms]",
-        "rest [ms]",
+        "arms (ms)",
+        "tissue (ms)",
+        "pictures (ms)",
+        "rest (ms)",
     ];
     let cameras = r.cameras.len();
     let row = |name: String, factor: f64, pictures: f64| {

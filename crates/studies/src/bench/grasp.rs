@@ -1,24 +1,27 @@
-//! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole specimen with all contact, and without, frame beside frame.
+//! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole
+//! specimen with all contact, and without, frame beside frame.
 //!
-//! Without contact there are two runs. In one nothing takes its place: jaws pass through tissue that stays at rest, and what is saved is contact and all motion that it causes. In the other every
-//! frame starts where the run with contact started it, and every node gets the force that contact did to it at the frame's end, so that tissue moves alike: what is saved is contact alone (finding it, its forces, and
-//! the iterations that its stiffness costs).
+//! Without contact there are two runs. In one nothing takes its place: jaws pass through tissue
+//! that stays at rest, and what is saved is contact and all motion that it causes. In the other
+//! every frame starts where the run with contact started it, and every node gets the force that
+//! contact did to it at the frame's end, so that tissue moves alike: what is saved is contact alone
+//! (finding it, its forces, and the iterations that its stiffness costs).
 
 use super::machine::Machine;
-use super::timing::median;
-use crate::experiment::design_name;
+use crate::names::{AppendixChoice, DesignName, design_name};
+use crate::statistics::median;
+use crate::study::{Job, Kind, Study, stop_if_asked};
 use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 use trocar_cell::{Cell, ContactParts, FRAME, Timing};
 use trocar_core::Progress;
-use trocar_phantom::RecordOptions;
-use trocar_scene::GraspDesignName;
-use trocar_specimen::Specimen;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::table::{count, fixed, percent};
 use trocar_task::policy::Scripted;
 use trocar_task::{Episode, Policy, SETTLE_S};
+use trocar_workflow::Lift;
 use trocar_workflow::specimen_scene::{free_scene, task_organ};
-use trocar_workflow::{Lift, phantoms};
 
 /// Phases that are timed: those in which the jaws are near the tissue.
 const PHASES: [&str; 6] = ["enter", "close", "lift", "hold", "lower", "open"];
@@ -26,20 +29,23 @@ const PHASES: [&str; 6] = ["enter", "close", "lift", "hold", "lower", "open"];
 /// Most repetitions.
 const MAX_REPEATS: usize = 1000;
 
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// Cost of contact with the gripper in a grasp-lift of all organs.
+#[derive(Clone, Debug, Args)]
 pub struct GraspBench {
-    /// A specimen folder; phantom A, recorded and reconstructed, when `None`.
-    pub specimen: Option<PathBuf>,
-    /// How the phantom is filmed.
-    pub record: RecordOptions,
-    /// Grasp design.
-    pub design: GraspDesignName,
-    /// Force of the jaws [N].
+    /// The specimen.
+    #[command(flatten)]
+    pub specimen: AppendixChoice,
+    /// How the jaws hold.
+    #[arg(long, value_enum, default_value_t = DesignName::LivePose)]
+    pub design: DesignName,
+    /// Closing force of the jaws (N).
+    #[arg(long, default_value_t = trocar_cell::JAW_FORCE)]
     pub jaw_force: f64,
-    /// Times that the runs are repeated.
+    /// Repetitions of the runs with and without contact.
+    #[arg(long, default_value_t = 3)]
     pub repeats: usize,
-    /// Worker threads, 0 for all.
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
 }
 
@@ -50,13 +56,14 @@ pub struct GraspPhaseTiming {
     pub phase: &'static str,
     /// Frames timed, of each run.
     pub frames: usize,
-    /// Median wall time of a frame with contact [ms].
+    /// Median wall time of a frame with contact (ms).
     pub with_contact_ms: f64,
-    /// The same without, under the forces that contact did [ms].
+    /// The same without, under the forces that contact did (ms).
     pub same_motion_ms: f64,
-    /// How far a node was from where contact had it after a frame under contact's forces, median over the frames [mm].
+    /// How far a node was from where contact had it after a frame under contact's forces, median
+    /// over the frames (mm).
     pub same_motion_off_mm: f64,
-    /// The same without contact and its forces [ms].
+    /// The same without contact and its forces (ms).
     pub without_contact_ms: f64,
     /// Mean number of the solver's iterations in a frame with contact, of all organs and substeps.
     pub with_contact_iterations: f64,
@@ -64,18 +71,21 @@ pub struct GraspPhaseTiming {
     pub same_motion_iterations: f64,
     /// The same without contact and its forces.
     pub without_contact_iterations: f64,
-    /// The slowest frame with contact [ms].
+    /// The slowest frame with contact (ms).
     pub worst_ms: f64,
-    /// Share of the time with contact that contact costs: more than the same motion without, from the sums over the frames.
+    /// Share of the time with contact that contact costs: more than the same motion without, from
+    /// the sums over the frames.
     pub own_share: f64,
-    /// Share of it that contact and all motion it causes cost: more than without contact and its forces.
+    /// Share of it that contact and all motion it causes cost: more than without contact and its
+    /// forces.
     pub contact_share: f64,
 }
 
 /// The benchmark's outcome.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraspBenchResult {
-    /// 1/60 s over the median wall time of a frame with contact, all phases in which the gripper is near.
+    /// 1/60 s over the median wall time of a frame with contact, all phases in which the gripper is
+    /// near.
     pub real_time_factor: f64,
     /// The same without contact and its forces.
     pub real_time_factor_without_contact: f64,
@@ -130,24 +140,22 @@ impl Frame {
     }
 }
 
-impl GraspBench {
-    /// Does the runs; a phantom that has to be recorded and its specimen go to the folder `output`.
-    ///
-    /// # Errors
-    /// A specimen that cannot be had or simulated, an option out of range, an interruption.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<GraspBenchResult> {
+impl Study for GraspBench {
+    const NAME: &'static str = "grasp";
+    const KIND: Kind = Kind::Bench;
+    const FOLDER: Option<&'static str> =
+        Some("Folder of the phantom's recording and specimen. A finished recording in it is used again.");
+    const WRITES_OWN_FILES: bool = true;
+    type Figures = GraspBenchResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(GraspBenchResult, Document)> {
         if !(1..=MAX_REPEATS).contains(&self.repeats) {
-            return Err(Error::Mismatch(format!("{} repetitions; must be in [1, {MAX_REPEATS}]", self.repeats)));
+            return Err(Error::Mismatch(format!("--repeats {}: must be in [1, {MAX_REPEATS}]", self.repeats)));
         }
-        let (specimen, folder) = match &self.specimen {
-            Some(folder) => (Specimen::read(folder)?, folder.clone()),
-            None => {
-                let folder = output.join("phantom-a");
-                (phantoms::specimen("phantom-a", &self.record, &folder, progress)?, folder.join("specimen"))
-            }
-        };
+        let (progress, design) = (job.progress, self.design.into());
+        let (specimen, folder) = self.specimen.read(job.output(), progress)?;
         let machine = Machine::here();
-        let lift = Lift { design: Some(self.design), jaw_force: Some(self.jaw_force), ..Lift::default() };
+        let lift = Lift { design: Some(design), jaw_force: Some(self.jaw_force), ..Lift::default() };
         let organ = task_organ(&specimen, None)?;
         let mut scene = lift.arrange(free_scene(&specimen, &folder, organ, false)?)?;
         // One tissue frame a control period, so that frames can be compared.
@@ -170,13 +178,13 @@ impl GraspBench {
         let bodies = with.cell().world().model.bodies();
         let size = (bodies.iter().map(|b| b.len()).sum(), bodies.iter().map(|b| b.tets().len()).sum());
         let all = timing("all", &times);
-        Ok(GraspBenchResult {
+        let result = GraspBenchResult {
             real_time_factor: 1e3 * FRAME / all.with_contact_ms,
             real_time_factor_without_contact: 1e3 * FRAME / all.without_contact_ms,
             own_share: all.own_share,
             contact_share: all.contact_share,
             phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &times))).collect(),
-            design: design_name(self.design),
+            design: design_name(design),
             held,
             organs: specimen.organs.len(),
             nodes: size.0,
@@ -184,7 +192,9 @@ impl GraspBench {
             repeats: self.repeats,
             threads: if self.threads == 0 { machine.cores } else { self.threads },
             machine,
-        })
+        };
+        let document = document(&result);
+        Ok((result, document))
     }
 }
 
@@ -203,9 +213,7 @@ fn together(
             return Ok(times);
         }
         for action in chunk {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            stop_if_asked(progress)?;
             let clocks = (with.cell().timing(), without.timing());
             let before = with.cell().moment();
             if times.len().is_multiple_of(2) {
@@ -267,6 +275,54 @@ impl Run {
     fn median_ms(&self) -> f64 {
         1e3 * median(&mut self.0.iter().map(|f| f.seconds).collect::<Vec<f64>>())
     }
+}
+
+fn document(r: &GraspBenchResult) -> Document {
+    let head = [
+        "Phase",
+        "Frames",
+        "Contact (ms)",
+        "Same motion (ms)",
+        "Off (mm)",
+        "Nothing (ms)",
+        "Iterations",
+        "Worst (ms)",
+        "Own share",
+        "Contact's share",
+    ];
+    let row = |p: &GraspPhaseTiming| {
+        let iterations = [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations];
+        vec![
+            p.phase.to_owned(),
+            p.frames.to_string(),
+            fixed(p.with_contact_ms, 2),
+            fixed(p.same_motion_ms, 2),
+            fixed(p.same_motion_off_mm, 4),
+            fixed(p.without_contact_ms, 2),
+            iterations.map(|n| fixed(n, 0)).join("/"),
+            fixed(p.worst_ms, 2),
+            percent(p.own_share, 1),
+            percent(p.contact_share, 1),
+        ]
+    };
+    let lines = [
+        "Same motion: every frame again without contact but with its forces. Nothing: no contact, no forces."
+            .to_owned(),
+        format!(
+            "{}x real time with contact, {}x without; {} grasp, {}; {} organs, {} nodes, {} tets; {} threads on {}",
+            fixed(r.real_time_factor, 2),
+            fixed(r.real_time_factor_without_contact, 2),
+            r.design,
+            if r.held { "held" } else { "NOT held" },
+            r.organs,
+            count(r.nodes),
+            count(r.tets),
+            r.threads,
+            r.machine.described()
+        ),
+    ];
+    Document::new("Grasp", "What contact with the gripper costs")
+        .with(Section::new("Phases", "").table(Table::new(head, r.phases.iter().map(row).collect())).lines(lines))
 }
 
 #[cfg(test)]

@@ -7,7 +7,8 @@ use serde::Serialize;
 pub struct Machine {
     /// Logical cores.
     pub cores: usize,
-    /// Average number of runnable tasks over the last minute at the beginning, where the system tells: more than the cores and the figures are too low.
+    /// Average number of runnable tasks over the last minute at the beginning, where the system
+    /// tells: more than the cores and the figures are too low.
     pub load: Option<f64>,
 }
 

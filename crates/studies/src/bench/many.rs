@@ -1,6 +1,7 @@
 //! Many small models stepped at once, beside one model of the same total size.
 
-use super::timing::median;
+use crate::statistics::median;
+use crate::study::stop_if_asked;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
@@ -12,7 +13,8 @@ use trocar_workflow::{SOLVERS, solver_named};
 const WARM_UP: usize = 3;
 const FRAMES: usize = 60;
 
-/// One schedule and number of threads. Frames of all ways are timed in turn, so that what disturbs the machine disturbs all.
+/// One schedule and number of threads. Frames of all ways are timed in turn, so that what disturbs
+/// the machine disturbs all.
 #[derive(Clone, Debug, Serialize)]
 pub struct ManyRow {
     /// The schedule's name.
@@ -23,11 +25,11 @@ pub struct ManyRow {
     pub models: usize,
     /// Elements of them together.
     pub tets: usize,
-    /// A frame of the many models, each with a stepper of its own [ms].
+    /// A frame of the many models, each with a stepper of its own (ms).
     pub many_ms: f64,
-    /// A frame of one model with the same bodies [ms].
+    /// A frame of one model with the same bodies (ms).
     pub one_model_ms: f64,
-    /// A frame of one model of six organs [ms].
+    /// A frame of one model of six organs (ms).
     pub organs_ms: f64,
     /// Elements of the six organs.
     pub organs_tets: usize,
@@ -61,9 +63,7 @@ pub(super) fn measure(
             let mut times: [Vec<f64>; 3] = Default::default();
             let whole = Instant::now();
             for frame in 0..WARM_UP + FRAMES {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
+                stop_if_asked(progress)?;
                 let took = [
                     timed(|| step_all(&mut many, threads))?,
                     timed(|| Ok(one.frame().map(|_| ())?))?,
@@ -97,7 +97,8 @@ pub(super) fn measure(
     Ok(rows)
 }
 
-/// Steps all by a frame, shared out among `threads` threads. Plain threads: those of a pool would begin with another model while they wait for one's own pool.
+/// Steps all by a frame, shared out among `threads` threads. Plain threads: those of a pool would
+/// begin with another model while they wait for one's own pool.
 fn step_all(runs: &mut [Run<'_>], threads: usize) -> Result<()> {
     let share = runs.len().div_ceil(threads.max(1)).max(1);
     std::thread::scope(|scope| {
@@ -109,7 +110,7 @@ fn step_all(runs: &mut [Run<'_>], threads: usize) -> Result<()> {
     })
 }
 
-/// Wall time [ms].
+/// Wall time (ms).
 fn timed(work: impl FnOnce() -> Result<()>) -> Result<f64> {
     let clock = Instant::now();
     work()?;

@@ -1,28 +1,30 @@
-//! What meshing costs: the lattice mesher from ten thousand to a million elements, and side by side with TetGen and fTetWild.
+//! What meshing costs: the lattice mesher from ten thousand to a million elements, and side by side
+//! with TetGen and fTetWild.
 
 use super::pytetwild::PytetwildMesher;
 use crate::names::Units;
 use crate::study::{Job, Kind, Study, stop_if_asked};
-use crate::{Error, Result};
+use crate::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use trocar_geometry::io::read_surface;
 use trocar_geometry::{LatticeMesher, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, repair};
+use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_report::{colors, page};
 use trocar_testing::scenes::ellipsoid;
 
-/// Half axes of the body that is meshed where no surface is named [m]: 815 cm3, the paper's liver.
+/// Half axes of the body that is meshed where no surface is named (m): 815 cm3, the paper's liver.
 const LIVER: [f64; 3] = [0.105, 0.064, 0.029];
 
 /// The lattice mesher from ten thousand to a million elements, and beside TetGen and fTetWild.
 #[derive(Clone, Debug, Args)]
 pub struct MeshingBench {
-    /// Closed surfaces (.stl, .ply, .obj); an ellipsoid of a liver's size by default. The first is the one meshed finer and finer.
+    /// Closed surfaces (.stl, .ply, .obj); an ellipsoid of a liver's size by default. The first is
+    /// the one meshed finer and finer.
     pub surfaces: Vec<PathBuf>,
     /// Unit of the surface files.
     #[arg(long, value_enum, default_value_t = Units::Mm)]
@@ -50,19 +52,19 @@ pub struct MeshingRow {
     pub nodes: usize,
     /// Tetrahedra.
     pub tets: usize,
-    /// Wall time from surface to mesh [s], the least of the runs.
+    /// Wall time from surface to mesh (s), the least of the runs.
     pub seconds: f64,
-    /// The same per element [ns].
+    /// The same per element (ns).
     pub ns_per_tet: f64,
-    /// Smallest dihedral angle [degrees].
+    /// Smallest dihedral angle (degrees).
     pub min_dihedral_deg: f64,
-    /// Median over elements of the smallest dihedral angle [degrees].
+    /// Median over elements of the smallest dihedral angle (degrees).
     pub median_dihedral_deg: f64,
-    /// Largest dihedral angle [degrees].
+    /// Largest dihedral angle (degrees).
     pub max_dihedral_deg: f64,
     /// Elements with volume at or below 0.
     pub inverted: usize,
-    /// Median edge [mm].
+    /// Median edge (mm).
     pub median_edge_mm: f64,
     /// Volume over that of the surface, minus 1.
     pub volume_error: f64,
@@ -178,24 +180,14 @@ fn document(result: &MeshingResult) -> Result<Document> {
         points
     };
     let plot = |title: &'static str, y: &'static str, points: Vec<(f64, f64)>| {
-        let line = Line { points, color: colors::organ(0), filled: false };
-        let x = "tetrahedra [thousands]";
-        let plot = Plot {
-            title,
-            x,
-            y,
-            lines: vec![line],
-            bands: vec![],
-            show: vec![0.0],
-            limits: vec![],
-            log_x: false,
-            log_y: false,
-        };
-        Ok::<_, Error>(page::figure(&plot.svg()?, &format!("<b>{title}.</b>")))
+        let line = Line::new(points, colors::organ(0));
+        let x = "tetrahedra (thousands)";
+        let plot = Plot { title, x, y, lines: vec![line], show: vec![0.0], ..Plot::default() };
+        plot.figure(&format!("<b>{title}.</b>"))
     };
     let figures = [
-        plot("Time over size", "time [s]", points(&|r| r.seconds))?,
-        plot("Time per element", "time [\u{b5}s]", points(&|r| 1e-3 * r.ns_per_tet))?,
+        plot("Time over size", "time (s)", points(&|r| r.seconds))?,
+        plot("Time per element", "time (\u{b5}s)", points(&|r| 1e-3 * r.ns_per_tet))?,
     ];
     let linear = result.linearity.map_or(String::new(), |ratio| {
         format!(" Time per element at the largest size over that at the smallest: {}.", fixed(ratio, 2))
@@ -217,13 +209,13 @@ fn rows<'a>(rows: impl Iterator<Item = &'a MeshingRow>) -> Table {
         "Mesher",
         "Nodes",
         "Tetrahedra",
-        "Time [s]",
-        "[ns/tet]",
+        "Time (s)",
+        "(ns/tet)",
         "Dihedral min.",
         "median",
         "max.",
         "Inverted",
-        "Edge [mm]",
+        "Edge (mm)",
         "Volume",
     ];
     let row = |r: &MeshingRow| match &r.failure {

@@ -1,4 +1,5 @@
-//! How fast and how exact organs are stepped: one schedule on one mesh, speed and error from the same scenes.
+//! How fast and how exact organs are stepped: one schedule on one mesh, speed and error from the
+//! same scenes.
 
 use super::machine::Machine;
 use super::timing::Timing;
@@ -18,13 +19,14 @@ use trocar_workflow::solver_named;
 /// The frames of the tube at which errors are taken.
 const TUBE_FRAMES: [usize; 3] = [15, 30, 60];
 
-/// Longest time to settle [s].
+/// Longest time to settle (s).
 const LONGEST: f64 = 3600.0;
 
 /// Speed and error of the stepping of six organs by one schedule.
 #[derive(Clone, Debug, Args)]
 pub struct OrgansBench {
-    /// Gmsh file (.msh, in metres, z up) with the organs, one a physical group or connected part; our own organs by default.
+    /// Gmsh file (.msh, in metres, z up) with the organs, one a physical group or connected part;
+    /// our own organs by default.
     #[arg(long, value_name = "FILE", conflicts_with = "tets")]
     pub mesh: Option<PathBuf>,
     /// Elements of our own organs together, about.
@@ -36,7 +38,7 @@ pub struct OrgansBench {
     /// Worker threads; all by default.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Young's modulus [kPa].
+    /// Young's modulus (kPa).
     #[arg(long = "young", default_value = "12", value_parser = kilopascals)]
     pub young_modulus: f64,
     /// Poisson's ratio.
@@ -56,17 +58,20 @@ pub struct OrgansBench {
 /// The benchmark's outcome.
 #[derive(Clone, Debug, Serialize)]
 pub struct OrgansResult {
-    /// 1/60 s over the median wall time of a frame while a patch of the appendix is dragged at 10 mm/s.
+    /// 1/60 s over the median wall time of a frame while a patch of the appendix is dragged at 10
+    /// mm/s.
     pub real_time_factor: f64,
     /// The same with a patch of every organ shaken.
     pub real_time_factor_moving: f64,
     /// The same while the organs sag from rest under gravity, as the peers are timed.
     pub real_time_factor_sag: f64,
-    /// Median wall time of a frame while the appendix is dragged [ms].
+    /// Median wall time of a frame while the appendix is dragged (ms).
     pub frame_ms_median: f64,
-    /// Mean distance of the nodes at rest from their static equilibrium, over their mean displacement by gravity.
+    /// Mean distance of the nodes at rest from their static equilibrium, over their mean
+    /// displacement by gravity.
     pub static_sag_error: f64,
-    /// RMS distance from the oracle at the same substep over RMS displacement, worst of frames 15, 30 and 60 of the tube.
+    /// RMS distance from the oracle at the same substep over RMS displacement, worst of frames 15,
+    /// 30 and 60 of the tube.
     pub step_error: f64,
     /// Worker threads.
     pub threads: usize,
@@ -90,11 +95,11 @@ pub struct OrgansResult {
     pub tets: usize,
     /// The tube's errors at frames 15, 30 and 60.
     pub step_errors: [f64; 3],
-    /// Mean displacement of the free nodes by gravity in the static equilibrium [um].
+    /// Mean displacement of the free nodes by gravity in the static equilibrium (um).
     pub static_sag_um: f64,
-    /// How long the organs had settled when their sag was measured [s].
+    /// How long the organs had settled when their sag was measured (s).
     pub settled_s: f64,
-    /// Largest node speed then [m/s].
+    /// Largest node speed then (m/s).
     pub settled_speed_m_s: f64,
     /// The dragged scene's frames.
     pub drag: Timing,
@@ -238,7 +243,7 @@ impl Tube {
 
 fn document(r: &OrgansResult) -> Document {
     let head =
-        ["1/60 s frames", "median [ms]", "worst [ms]", "real time", "iterations", "inverted", "yielded", "fallbacks"];
+        ["1/60 s frames", "median (ms)", "worst (ms)", "real time", "iterations", "inverted", "yielded", "fallbacks"];
     let row = |name: String, t: &Timing| {
         vec![
             name,

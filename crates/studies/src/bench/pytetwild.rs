@@ -1,4 +1,5 @@
-//! fTetWild through the Python package `pytetwild`, as a peer to measure beside: a separate process.
+//! fTetWild through the Python package `pytetwild`, as a peer to measure beside: a separate
+//! process.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -30,7 +31,8 @@ impl Mesher for PytetwildMesher {
         let triangles = surface.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         write(&file("vertices"), vertices)?;
         write(&file("triangles"), triangles)?;
-        // A relative path is the user's, not the temporary folder's; a bare name is looked for in PATH.
+        // A relative path is the user's, not the temporary folder's; a bare name is looked for in
+        // PATH.
         let python = match self.python.components().count() {
             1 => self.python.clone(),
             _ => std::path::absolute(&self.python).unwrap_or_else(|_| self.python.clone()),

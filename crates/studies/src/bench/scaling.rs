@@ -1,4 +1,5 @@
-//! How stepping scales: with the number of elements, with threads, and with many small models beside one of the same size.
+//! How stepping scales: with the number of elements, with threads, and with many small models
+//! beside one of the same size.
 
 use super::machine::Machine;
 use super::many::{self, ManyRow};
@@ -23,7 +24,8 @@ const FRAMES: usize = 60;
 /// Frames that a measurement has at least, warm-up included.
 const LEAST_FRAMES: f64 = 6.0;
 
-/// Speed of the stepping from a thousand to a million elements, over threads, and of many small models at once.
+/// Speed of the stepping from a thousand to a million elements, over threads, and of many small
+/// models at once.
 #[derive(Clone, Debug, Args)]
 pub struct ScalingBench {
     /// Numbers of elements to aim at, ascending.
@@ -138,7 +140,8 @@ impl ScalingBench {
     }
 }
 
-/// What the fewest frames are expected to take [s], from the largest size measured so far, in proportion; not known, and so 0, for the first.
+/// What the fewest frames are expected to take (s), from the largest size measured so far, in
+/// proportion; not known, and so 0, for the first.
 fn expected_seconds(before: &[ScalingRow], schedule: &str, threads: usize, tets: usize) -> f64 {
     let same = before.iter().filter(|r| r.schedule == schedule && r.threads == threads);
     let largest = same.filter_map(|r| Some((r.tets, r.timing.as_ref()?.frame_ms_median))).max_by_key(|r| r.0);
@@ -203,14 +206,14 @@ fn plot(
     let line = |(k, (schedule, threads)): (usize, &(&str, usize))| {
         let rows = result.rows.iter().filter(|r| (r.schedule.as_str(), r.threads) == (schedule, *threads));
         let points = rows.filter_map(|r| r.timing.as_ref().map(|t| point(r, t))).collect();
-        Line { points, color: colors::organ(k), filled: false }
+        Line::new(points, colors::organ(k))
     };
     let lines = settings.iter().enumerate().map(line).collect();
     let limits = if title == "Real-time factor" { vec![1.0] } else { vec![] };
-    let plot = Plot { title, x: "elements", y, lines, bands: vec![], show: vec![], limits, log_x: true, log_y: true };
+    let plot = Plot { title, x: "elements", y, lines, limits, log_x: true, log_y: true, ..Plot::default() };
     let names: Vec<String> = settings.iter().map(|(s, t)| format!("{s}, {}", threads(*t))).collect();
     let legend = page::legend(names.iter().enumerate().map(|(k, name)| (name.as_str(), colors::organ(k))));
-    Ok(page::figure(&plot.svg()?, &format!("<b>{title}.</b>{legend}")))
+    Ok(plot.figure(&format!("<b>{title}.</b>{legend}"))?)
 }
 
 fn threads(n: usize) -> String {
@@ -224,7 +227,7 @@ fn sizes(result: &ScalingResult) -> Table {
         "Threads",
         "Elements",
         "Nodes",
-        "Frame [ms]",
+        "Frame (ms)",
         "Real time",
         "Iterations a frame",
         "Inverted",
@@ -262,10 +265,10 @@ fn many_table(result: &ScalingResult) -> Table {
         "Threads",
         "Models",
         "Elements",
-        "Many [ms]",
-        "One model [ms]",
+        "Many (ms)",
+        "One model (ms)",
         "Loss",
-        "Six organs [ms]",
+        "Six organs (ms)",
         "their elements",
         "Loss an element",
     ];

@@ -1,6 +1,8 @@
 //! How long frames of a scene take.
 
-use crate::{Error, Result};
+use crate::Result;
+use crate::statistics::median;
+use crate::study::stop_if_asked;
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
@@ -9,9 +11,9 @@ use trocar_testing::scenes::{FRAME, Run};
 /// Timed frames.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Timing {
-    /// Median wall time of a frame [ms].
+    /// Median wall time of a frame (ms).
     pub frame_ms_median: f64,
-    /// The slowest frame [ms].
+    /// The slowest frame (ms).
     pub frame_ms_worst: f64,
     /// A frame's 1/60 s over the median wall time.
     pub real_time_factor: f64,
@@ -28,7 +30,8 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Steps `warm_up` frames and then times `frames`, fewer when `seconds` of wall time are over (at least 3).
+    /// Steps `warm_up` frames and then times `frames`, fewer when `seconds` of wall time are over
+    /// (at least 3).
     ///
     /// # Errors
     /// A scene that diverges, or an interruption.
@@ -38,9 +41,7 @@ impl Timing {
         let mut iterations = 0;
         let whole = Instant::now();
         for frame in 0..warm_up + frames {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            stop_if_asked(progress)?;
             let clock = Instant::now();
             let report = run.frame()?;
             let took = clock.elapsed().as_secs_f64();
@@ -64,15 +65,5 @@ impl Timing {
         timing.real_time_factor = FRAME / median;
         timing.iterations_per_frame = iterations as f64 / count;
         Ok(timing)
-    }
-}
-
-/// The median, and sorted values; not a number without values.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[n / 2],
-        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
     }
 }

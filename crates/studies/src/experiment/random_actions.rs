@@ -1,9 +1,9 @@
 //! Random but legal actions in a scene's cell: whether anything breaks.
 
-use super::trials::{Resumed, Trials, resumed};
+use crate::Result;
 use crate::names::SceneChoice;
-use crate::study::{Job, Kind, Study};
-use crate::{Error, Result};
+use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::trials::{Outcomes, Resumed, resumed};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use trocar_cell::Cell;
@@ -17,7 +17,8 @@ use trocar_task::policy::RandomActions;
 use trocar_task::{ArmChannels, End, Episode, Policy};
 use trocar_workflow::scene_specimen;
 
-/// RCM deviation below which nothing is said of it (mm). An episode would end at the scene's own limit.
+/// RCM deviation below which nothing is said of it (mm). An episode would end at the scene's own
+/// limit.
 const ENDLESS_RCM_MM: f64 = 25.0;
 
 /// Random but legal actions in a scene's cell: whether tissue or arms break.
@@ -26,7 +27,8 @@ pub struct RandomActionsExperiment {
     /// The scene.
     #[command(flatten)]
     pub scene: SceneChoice,
-    /// First seed; every fourth (3, 7, ...) moves the tips, the others ask for coordinates in the ports.
+    /// First seed; every fourth (3, 7, ...) moves the tips, the others ask for coordinates in the
+    /// ports.
     #[arg(long, default_value_t = 0)]
     pub first_seed: u64,
     /// Number of seeds.
@@ -57,9 +59,9 @@ pub struct RandomActionsRow {
     pub min_volume_ratio: f64,
     /// Joints found beyond their limits, added up over all actions.
     pub joint_limits_broken: usize,
-    /// Largest RCM deviation [mm].
+    /// Largest RCM deviation (mm).
     pub rcm_max_mm: f64,
-    /// Largest force on an instrument [N].
+    /// Largest force on an instrument (N).
     pub force_max_n: f64,
     /// How often contact of an instrument with tissue was disabled.
     pub disabled_contacts: usize,
@@ -84,7 +86,7 @@ pub struct RandomActionsResult {
     pub unbroken: bool,
     /// What an earlier run had done.
     pub resumed: Resumed,
-    /// Wall time of everything [s].
+    /// Wall time of everything (s).
     pub seconds: f64,
     /// The report's path.
     pub report: String,
@@ -103,20 +105,19 @@ impl Study for RandomActionsExperiment {
         let places = specimen.organs.iter().flat_map(|o| &o.body.vertices);
         let sum: f64 = places.map(|p| p.x + 2.0 * p.y + 3.0 * p.z).sum();
         let settings = format!("{scene:?}\n{sum:?}\n{}", self.actions);
-        let trials = Trials::open(job.output(), "random-actions", &settings)?;
         let seeds: Vec<u64> = (0..self.seeds).map(|k| self.first_seed.saturating_add(k)).collect();
         let one = |seed: &u64, progress: &dyn Progress| run(&scene, &specimen, *seed, self.actions, progress);
-        let made =
-            trials.run("random actions", &seeds, |seed| format!("seed {seed}"), self.threads, job.progress, one)?;
+        let key = |seed: &u64| format!("seed {seed}");
+        let Outcomes { rows, resumed } = job.trials("random actions", &settings, &seeds, key, self.threads, one)?;
         let whole = |r: &RandomActionsRow| {
             r.diverged.is_none() && r.inverted_peak == 0 && r.joint_limits_broken == 0 && r.actions == self.actions
         };
         let result = RandomActionsResult {
             scene: scene.name.clone(),
-            actions: made.rows.iter().map(|r| r.actions).sum(),
-            unbroken: made.rows.iter().all(whole),
-            rows: made.rows,
-            resumed: made.resumed,
+            actions: rows.iter().map(|r| r.actions).sum(),
+            unbroken: rows.iter().all(whole),
+            rows,
+            resumed,
             seconds: job.seconds(),
             report: job.report(),
         };
@@ -150,9 +151,7 @@ fn run(
     let mut row = RandomActionsRow { seed, max_stretch: 1.0, min_volume_ratio: 1.0, ..RandomActionsRow::default() };
     'episode: while row.actions < actions && episode.end().is_none() {
         for action in policy.act(&episode)? {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            stop_if_asked(progress)?;
             let step = episode.step(&action)?;
             row.actions += 1;
             row.max_stretch = row.max_stretch.max(episode.max_stretch());
@@ -219,8 +218,8 @@ fn document(r: &RandomActionsResult) -> Document {
         "Inverted",
         "Stretch",
         "Least volume",
-        "RCM [mm]",
-        "Force [N]",
+        "RCM (mm)",
+        "Force (N)",
         "Contacts disabled",
         "Of blades",
         "Relaxed",

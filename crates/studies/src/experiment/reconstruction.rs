@@ -1,4 +1,5 @@
-//! Table I and Fig. 6(a): every phantom recorded, reconstructed with one set of settings, and measured against its truth.
+//! Table I and Fig. 6(a): every phantom recorded, reconstructed with one set of settings, and
+//! measured against its truth.
 
 use crate::names::{BackName, MesherName, Recorded, SensorName, phantoms_or_all};
 use crate::study::{Job, Kind, Study};
@@ -58,29 +59,32 @@ pub struct ReconstructionRow {
     pub watertight: bool,
     /// Elements with volume at or below 0.
     pub inverted: usize,
-    /// Smallest dihedral angle [degrees].
+    /// Smallest dihedral angle (degrees).
     pub min_dihedral_deg: f64,
-    /// Median over elements of the smallest dihedral angle [degrees].
+    /// Median over elements of the smallest dihedral angle (degrees).
     pub median_dihedral_deg: f64,
-    /// Median edge [mm].
+    /// Median edge (mm).
     pub median_edge_mm: f64,
-    /// SPEC R9: median absolute error of the surface through the recording camera against the composite's depth [mm].
+    /// SPEC R9: median absolute error of the surface through the recording camera against the
+    /// composite's depth (mm).
     pub depth_error_median_mm: f64,
-    /// The same, signed, surface minus depth [mm].
+    /// The same, signed, surface minus depth (mm).
     pub signed_error_median_mm: f64,
     /// Share of the organ's pixels that were compared.
     pub covered: f64,
-    /// The surface against the true depth, without noise and quantisation: median absolute error [mm].
+    /// The surface against the true depth, without noise and quantisation: median absolute error
+    /// (mm).
     pub truth_error_median_mm: f64,
-    /// The same, signed [mm].
+    /// The same, signed (mm).
     pub truth_error_signed_mm: f64,
-    /// Volume of the body [cm3].
+    /// Volume of the body (cm3).
     pub volume_cm3: f64,
-    /// Volume over that between the true front and the back modelled behind it (paper eq. 1), minus 1.
+    /// Volume over that between the true front and the back modelled behind it (paper eq. 1), minus
+    /// 1.
     pub volume_error: f64,
     /// Volume over the true organ's, minus 1: what the model of the unseen back is worth.
     pub volume_error_truth: f64,
-    /// Signed depth error of a surface made the paper's way, from a binary grid [mm].
+    /// Signed depth error of a surface made the paper's way, from a binary grid (mm).
     pub binary_grid_signed_error_mm: Option<f64>,
     /// Nodes in the paper's Table I.
     pub paper_nodes: Option<usize>,
@@ -95,7 +99,7 @@ pub struct PhantomFigures {
     pub phantom: String,
     /// The composite.
     pub composite: CompositeFigures,
-    /// Wall time of the reconstruction, report included [s].
+    /// Wall time of the reconstruction, report included (s).
     pub seconds: f64,
     /// Its report.
     pub report: String,
@@ -108,7 +112,7 @@ pub struct ReconstructionResult {
     pub organs: Vec<ReconstructionRow>,
     /// Every phantom.
     pub phantoms: Vec<PhantomFigures>,
-    /// Wall time of everything [s].
+    /// Wall time of everything (s).
     pub seconds: f64,
     /// The report's path.
     pub report: String,
@@ -201,7 +205,8 @@ fn rows(
     made.specimen.organs.iter().enumerate().map(row).collect()
 }
 
-/// What is asked of each organ: depth error, signed error [mm], volume error, dihedral angle [degrees].
+/// What is asked of each organ: depth error, signed error (mm), volume error, dihedral angle
+/// (degrees).
 const DEPTH_ERROR: f64 = 1.0;
 const SIGNED_ERROR: f64 = 0.3;
 const VOLUME_ERROR: f64 = 0.1;
@@ -250,17 +255,17 @@ fn table_i_beside_paper(result: &ReconstructionResult) -> Section {
         "(paper)",
         "Tetrahedra",
         "(paper)",
-        "Min. dihedral [\u{b0}]",
-        "Median dihedral [\u{b0}]",
-        "Median edge [mm]",
+        "Min. dihedral (\u{b0})",
+        "Median dihedral (\u{b0})",
+        "Median edge (mm)",
         "Watertight",
         "Inverted",
-        "Depth error [mm]",
-        "signed [mm]",
-        "binary grid, signed [mm]",
-        "against truth [mm]",
+        "Depth error (mm)",
+        "signed (mm)",
+        "binary grid, signed (mm)",
+        "against truth (mm)",
         "Covered",
-        "Volume [cm\u{b3}]",
+        "Volume (cm\u{b3})",
         "off the model",
         "off the truth",
     ];
@@ -308,7 +313,7 @@ fn errors(made: &[Reconstruction]) -> Result<Section> {
         let img = figures::img(&picture, "signed depth error of all organs")?;
         shown.push(page::figure(&img, &format!("<b>{}.</b>", page::escape(&r.specimen.name))));
     }
-    let bar = page::scale_bar(&colors::DIVERGING, "\u{2212}5", "surface minus measured depth [mm]", "+5");
+    let bar = page::scale_bar(&colors::DIVERGING, "\u{2212}5", "surface minus measured depth (mm)", "+5");
     let lead = "Blue: the surface lies nearer to the camera than measured; red: behind.";
     let section = Section::new("Depth error (Fig. 6a)", lead);
     Ok(shown.into_iter().fold(section, |s, f| s.figure(Columns::Three, f)).html(bar))

@@ -1,4 +1,5 @@
-//! The paper's rollouts made anew (Fig. 6(d, e)): 140 episodes of six controllers, as a campaign that goes on where it was left.
+//! The paper's rollouts made anew (Fig. 6(d, e)): 140 episodes of six controllers, as a campaign
+//! that goes on where it was left.
 
 use crate::names::SceneChoice;
 use crate::study::{Job, Kind, Study};
@@ -14,10 +15,10 @@ use trocar_task::policy::POLICIES;
 /// The page that stands beside the campaign's own.
 const PAGE: &str = "rollouts.html";
 
-/// Beyond this RCM deviation the paper's hardware stops [mm].
+/// Beyond this RCM deviation the paper's hardware stops (mm).
 const ABORT_MM: f64 = 5.0;
 
-/// The paper's threshold for RCM deviations [mm].
+/// The paper's threshold for RCM deviations (mm).
 const THRESHOLD_MM: f64 = 3.0;
 
 /// Fig. 6(d, e): 140 rollouts of six controllers; resumable, safe to interrupt at any time.
@@ -26,13 +27,15 @@ pub struct RolloutsExperiment {
     /// The scene.
     #[command(flatten)]
     pub scene: SceneChoice,
-    /// Rollouts of all six controllers together; the first controllers have one more if it does not divide.
+    /// Rollouts of all six controllers together; the first controllers have one more if it does not
+    /// divide.
     #[arg(long, default_value_t = 140)]
     pub rollouts: usize,
     /// Seed of each controller's first rollout; the next have the next.
     #[arg(long, visible_alias = "first-seed", default_value_t = 0)]
     pub seed: u64,
-    /// Rollouts at once; as many as the machine has cores by default. The result does not depend on it.
+    /// Rollouts at once; as many as the machine has cores by default. The result does not depend on
+    /// it.
     #[arg(long, default_value_t = 0)]
     pub jobs: usize,
 }
@@ -46,9 +49,9 @@ pub struct PaperRollouts {
     pub attached: usize,
     /// Of these, those that held it to the end.
     pub held_to_end: usize,
-    /// Median lift of the attached [mm].
+    /// Median lift of the attached (mm).
     pub lift_median_mm: f64,
-    /// Median of their peak RCM deviations [mm].
+    /// Median of their peak RCM deviations (mm).
     pub rcm_peak_median_mm: f64,
     /// Attached rollouts whose RCM deviation stayed within 3 mm.
     pub rcm_within_3_mm: usize,
@@ -82,11 +85,12 @@ pub struct RolloutsResult {
     pub diverged: usize,
     /// Rollouts that passed all stages.
     pub passed: usize,
-    /// Median over the attached of the greatest lift [mm]; None without any.
+    /// Median over the attached of the greatest lift (mm); None without any.
     pub lift_median_mm: Option<f64>,
-    /// Median over the attached of the largest RCM deviation of any arm in any physics step [mm], as the paper's is of peaks.
+    /// Median over the attached of the largest RCM deviation of any arm in any physics step (mm),
+    /// as the paper's is of peaks.
     pub rcm_peak_median_mm: Option<f64>,
-    /// Median over the attached of the grasping arm's median RCM deviation under load [mm].
+    /// Median over the attached of the grasping arm's median RCM deviation under load (mm).
     pub rcm_loaded_median_mm: Option<f64>,
     /// Attached rollouts in which no arm's RCM deviation was beyond 3 mm in any physics step.
     pub rcm_within_3_mm: usize,
@@ -94,7 +98,8 @@ pub struct RolloutsResult {
     pub rcm_within_5_mm: usize,
     /// Most inverted elements in any frame.
     pub inverted_peak: usize,
-    /// Suspensions of physics in all rollouts: contacts disabled, contacts of blades disabled, organs relaxed.
+    /// Suspensions of physics in all rollouts: contacts disabled, contacts of blades disabled,
+    /// organs relaxed.
     pub suspensions: [usize; 3],
     /// Controller by controller.
     pub by_policy: Vec<PolicyRow>,
@@ -112,7 +117,7 @@ impl Study for RolloutsExperiment {
     const NAME: &'static str = "rollouts";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some("Campaign folder: a new one, or one of an earlier run to resume.");
-    const KEEPS_OWN_FILES: bool = true;
+    const WRITES_OWN_FILES: bool = true;
     type Figures = RolloutsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RolloutsResult, Document)> {
@@ -211,9 +216,9 @@ fn beside_paper(r: &RolloutsResult) -> Table {
     let rows = vec![
         row("Attached", of(r.attached, r.rollouts), of(p.attached, p.rollouts)),
         row("Held to the end", of(r.held_to_end, r.attached), of(p.held_to_end, p.attached)),
-        row("Lift, median [mm]", or_dash(r.lift_median_mm, 1), fixed(p.lift_median_mm, 1)),
-        row("Peak RCM deviation, median [mm]", or_dash(r.rcm_peak_median_mm, 3), fixed(p.rcm_peak_median_mm, 2)),
-        row("RCM deviation under load, median of medians [mm]", or_dash(r.rcm_loaded_median_mm, 4), or_dash(None, 0)),
+        row("Lift, median (mm)", or_dash(r.lift_median_mm, 1), fixed(p.lift_median_mm, 1)),
+        row("Peak RCM deviation, median (mm)", or_dash(r.rcm_peak_median_mm, 3), fixed(p.rcm_peak_median_mm, 2)),
+        row("RCM deviation under load, median of medians (mm)", or_dash(r.rcm_loaded_median_mm, 4), or_dash(None, 0)),
         row("RCM within 3 mm", of(r.rcm_within_3_mm, r.attached), of(p.rcm_within_3_mm, p.attached)),
         row("RCM within 5 mm", of(r.rcm_within_5_mm, r.attached), of(p.rcm_within_5_mm, p.attached)),
     ];

@@ -1,8 +1,8 @@
 //! Fig. 6(c): phantoms A, B and C released into the cell; how fast they still move after a second.
 
+use crate::Result;
 use crate::names::{Recorded, SolverName, phantoms_or_all};
-use crate::study::{Job, Kind, Study};
-use crate::{Error, Result};
+use crate::study::{Job, Kind, Study, stop_if_asked};
 use clap::Args;
 use serde::Serialize;
 use trocar_cell::{FRAME, World};
@@ -15,21 +15,22 @@ use trocar_report::table::{count, fixed, percent};
 use trocar_workflow::phantoms;
 use trocar_workflow::solver_named;
 
-/// Speed under which every specimen must be ... [m/s]
+/// Speed under which every specimen must be ... (m/s)
 const SETTLED: f64 = 0.01;
-/// ... after this long [s].
+/// ... after this long (s).
 const AFTER: f64 = 1.0;
 
-/// How long is simulated [s].
+/// How long is simulated (s).
 const SECONDS: f64 = 1.5;
 
-/// What the paper says (section VII-C): phantom, speed after a second [m/s], share of the nodes that are fixed.
+/// What the paper says (section VII-C): phantom, speed after a second (m/s), share of the nodes
+/// that are fixed.
 const PAPER: [(&str, f64, f64); 3] =
     [("phantom-a", 0.007, 0.416), ("phantom-b", 0.136, 0.211), ("phantom-c", 0.029, 0.066)];
 
 /// Fig. 6(c): how fast phantoms A, B and C come to rest in the cell.
 #[derive(Clone, Debug, Args)]
-pub struct Settling {
+pub struct SettlingExperiment {
     /// Phantoms; all by default.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
@@ -51,9 +52,9 @@ pub struct SettlingOrgan {
     pub organ: String,
     /// Share of its nodes that are pinned.
     pub pinned: f64,
-    /// Its greatest node speed in any frame [m/s].
+    /// Its greatest node speed in any frame (m/s).
     pub peak_speed_m_s: f64,
-    /// Its greatest node speed after a second [m/s].
+    /// Its greatest node speed after a second (m/s).
     pub speed_m_s: f64,
 }
 
@@ -70,21 +71,21 @@ pub struct SettlingRow {
     pub pinned: f64,
     /// The paper's share.
     pub paper_pinned: Option<f64>,
-    /// Greatest node speed in any frame [m/s].
+    /// Greatest node speed in any frame (m/s).
     pub peak_speed_m_s: f64,
-    /// Greatest node speed after a second [m/s].
+    /// Greatest node speed after a second (m/s).
     pub speed_m_s: f64,
-    /// The paper's [m/s].
+    /// The paper's (m/s).
     pub paper_speed_m_s: Option<f64>,
     /// Below 0.01 m/s after a second, and from then on.
     pub settled: bool,
-    /// When it came below 0.01 m/s for good [s].
+    /// When it came below 0.01 m/s for good (s).
     pub settled_after_s: Option<f64>,
     /// What ended it, if anything did.
     pub event: Option<String>,
     /// Its organs.
     pub organs: Vec<SettlingOrgan>,
-    /// Time [s] and greatest node speed [m/s], frame by frame.
+    /// Time (s) and greatest node speed (m/s), frame by frame.
     pub speeds: Vec<(f64, f64)>,
 }
 
@@ -95,13 +96,13 @@ pub struct SettlingResult {
     pub phantoms: Vec<SettlingRow>,
     /// The schedule's name.
     pub schedule: String,
-    /// Wall time of everything [s].
+    /// Wall time of everything (s).
     pub seconds: f64,
     /// The report's path.
     pub report: String,
 }
 
-impl Study for Settling {
+impl Study for SettlingExperiment {
     const NAME: &'static str = "settling";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> =
@@ -147,9 +148,7 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
     let (mut speeds, mut event) = (Vec::with_capacity(frames), None);
     progress.begin(phantom, frames as u64);
     for frame in 1..=frames {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        stop_if_asked(progress)?;
         let report = world.step(&[]);
         progress.advance(1);
         speeds.push((frame as f64 * FRAME, report.max_speed));
@@ -199,21 +198,15 @@ fn document(result: &SettlingResult) -> Result<Document> {
          line is {SETTLED} m/s, below which each must be after a second.",
         page::escape(&result.schedule)
     );
-    let line = |(k, speeds): (usize, &Vec<(f64, f64)>)| Line {
-        points: speeds.clone(),
-        color: colors::organ(k),
-        filled: false,
-    };
+    let line = |(k, speeds): (usize, &Vec<(f64, f64)>)| Line::new(speeds.clone(), colors::organ(k));
     let plot = Plot {
         title: "Greatest node speed",
-        x: "time since release [s]",
-        y: "speed [m/s]",
+        x: "time since release (s)",
+        y: "speed (m/s)",
         lines: result.phantoms.iter().map(|p| &p.speeds).enumerate().map(line).collect(),
-        bands: vec![],
-        show: vec![],
         limits: vec![SETTLED],
-        log_x: false,
         log_y: true,
+        ..Plot::default()
     };
     let legend = page::legend(result.phantoms.iter().enumerate().map(|(k, p)| (p.phantom.as_str(), colors::organ(k))));
     let settled = result.phantoms.iter().filter(|p| p.settled).count();
@@ -238,8 +231,8 @@ fn beside_paper(result: &SettlingResult) -> Section {
         "Tetrahedra",
         "Pinned",
         "(paper)",
-        "Peak [m/s]",
-        "After 1 s [m/s]",
+        "Peak (m/s)",
+        "After 1 s (m/s)",
         "(paper)",
         "Settled after",
         "Event",
@@ -266,7 +259,7 @@ fn beside_paper(result: &SettlingResult) -> Section {
 }
 
 fn organs(result: &SettlingResult) -> Section {
-    let head = ["Organ", "Phantom", "Pinned", "Peak [m/s]", "After 1 s [m/s]"];
+    let head = ["Organ", "Phantom", "Pinned", "Peak (m/s)", "After 1 s (m/s)"];
     let rows: Vec<Vec<String>> = result
         .phantoms
         .iter()

@@ -32,7 +32,7 @@ pub struct RayRow {
     pub differing: Option<usize>,
     /// Rays looked at for that: all but those at edges.
     pub compared: Option<usize>,
-    /// Largest difference of hits there [m].
+    /// Largest difference of hits there (m).
     pub largest_difference_m: Option<f64>,
 }
 
@@ -55,7 +55,8 @@ pub(super) fn measure(
         .enumerate()
         .map(|(i, (o, d))| {
             let t = stage.cast(*o, *d).map_or(0.1, |m| m.t);
-            // A millimetre back, to where a golden spiral over the sphere points, far from its neighbour's.
+            // A millimetre back, to where a golden spiral over the sphere points, far from its
+            // neighbour's.
             let turn = i as f32 * 2.399_963_2;
             let z = 1.0 - 2.0 * ((i * 7_919) % 10_007) as f32 / 10_007.0;
             let r = (1.0 - z * z).max(0.0).sqrt();
@@ -99,7 +100,8 @@ impl RayRow {
         let per_second = rays.len() as f64 / theirs.seconds;
         self.embree_rays_per_second = Some(per_second);
         self.ratio = Some(self.rays_per_second / per_second);
-        // An edge of the picture: a neighbour misses, or is nearer or farther by more than a twentieth.
+        // An edge of the picture: a neighbour misses, or is nearer or farther by more than a
+        // twentieth.
         let inner = |i: usize| {
             let (u, v) = (i % width, i / width);
             if u == 0 || v == 0 || u + 1 == width || v + 1 == width {

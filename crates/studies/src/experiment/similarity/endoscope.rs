@@ -2,7 +2,7 @@
 
 use trocar_camera::{Camera, Endoscope};
 
-/// The thirty-degree endoscope's camera with pictures of another width [px].
+/// The thirty-degree endoscope's camera with pictures of another width (px).
 pub(super) fn endoscope_camera(width: usize) -> Camera {
     let camera = Endoscope::thirty_degrees().camera;
     let k = width as f64 / camera.width as f64;

@@ -1,5 +1,5 @@
-//! Filling of what an image does not know from what is around: coarser and coarser means, then back (pull and push: Gortler and others 1996,
-//! "The Lumigraph", section 3.4).
+//! Filling of what an image does not know from what is around: coarser and coarser means, then back
+//! (pull and push: Gortler and others 1996, "The Lumigraph", section 3.4).
 
 /// Values and whether they are known, row by row.
 #[derive(Clone)]

@@ -1,5 +1,6 @@
-//! Table IV's silhouettes and pictures (paper section VII-E): reconstructions rendered through the recovered recording camera beside the
-//! recordings, and through the endoscope beside an oblique view.
+//! Table IV's silhouettes and pictures (paper section VII-E): reconstructions rendered through the
+//! recovered recording camera beside the recordings, and through the endoscope beside an oblique
+//! view.
 
 mod endoscope;
 mod fill;
@@ -30,7 +31,8 @@ use trocar_report::document::Document;
 use trocar_workflow::phantoms::recorded;
 use trocar_workflow::reconstruct_recording;
 
-/// Silhouettes, SSIM and PSNR of rendered reconstructions beside what was filmed, and oblique views through the endoscope.
+/// Silhouettes, SSIM and PSNR of rendered reconstructions beside what was filmed, and oblique views
+/// through the endoscope.
 #[derive(Clone, Debug, Args)]
 pub struct SimilarityExperiment {
     /// Phantoms; all by default. The first is filmed from the side too.

@@ -1,5 +1,5 @@
-//! A phantom filmed through the endoscope from the side: its true surfaces and what was around them, ray traced wet in the endoscope's light, with
-//! a stereo camera's depth noise.
+//! A phantom filmed through the endoscope from the side: its true surfaces and what was around
+//! them, ray traced wet in the endoscope's light, with a stereo camera's depth noise.
 
 use super::endoscope::endoscope_camera;
 use super::measure::labelled;
@@ -15,13 +15,14 @@ use trocar_recording::{InstrumentRule, OrganInfo, Recording, RecordingInfo, Reco
 use trocar_render::{Appearance, Film, Light, Noise, RayGenerator, RenderSettings, Stage, render};
 use trocar_workflow::truth::DEPTH_UNIT;
 
-/// Width of the pictures [px].
+/// Width of the pictures (px).
 const WIDTH: usize = 848;
 /// Frames.
 const FRAMES: u32 = 3;
-/// Towards the endoscope from the organs' middle, in the recording frame (up is -z): 40 degrees above the horizon.
+/// Towards the endoscope from the organs' middle, in the recording frame (up is -z): 40 degrees
+/// above the horizon.
 const TOWARDS: DVec3 = DVec3::new(0.12, 0.76, -0.64);
-/// Distance from the organs' middle to the lens [m].
+/// Distance from the organs' middle to the lens (m).
 const DISTANCE: f64 = 0.12;
 /// An organ that shows fewer pixels is not reconstructed.
 const FEWEST_PIXELS: usize = 600;

@@ -85,7 +85,7 @@ fn cards(r: &SimilarityResult) -> [Card; 4] {
 
 fn table(r: &SimilarityResult) -> Section {
     let head =
-        ["Specimen", "What beside the first frame", "IoU", "SSIM", "PSNR [dB]", "matched SSIM", "matched PSNR [dB]"];
+        ["Specimen", "What beside the first frame", "IoU", "SSIM", "PSNR (dB)", "matched SSIM", "matched PSNR (dB)"];
     let cells = |l: &ImageMetrics| [l.ssim, l.psnr_db, l.ssim_matched, l.psnr_matched_db];
     let row = |name: &str, what: &str, iou: Option<f64>, [a, b, c, d]: [f64; 4]| {
         let iou = iou.map_or(String::new(), |v| fixed(v, 3));

@@ -8,7 +8,7 @@ use serde::Serialize;
 pub struct PaperSimilarity {
     /// Mean silhouette IoU.
     pub iou: f64,
-    /// SSIM and PSNR [dB] of its path-traced view.
+    /// SSIM and PSNR (dB) of its path-traced view.
     pub rendered: [f64; 2],
     /// The same after matching the exposure.
     pub matched: [f64; 2],
@@ -38,7 +38,7 @@ pub struct SimilarityResult {
     pub skipped: Vec<String>,
     /// The paper's figures.
     pub paper: PaperSimilarity,
-    /// Wall time of everything [s].
+    /// Wall time of everything (s).
     pub seconds: f64,
     /// The report's path.
     pub report: String,

@@ -1,4 +1,5 @@
-//! What a recording showed, put on stage: its organs and what is around them, coloured by the photograph less the light it was taken in.
+//! What a recording showed, put on stage: its organs and what is around them, coloured by the
+//! photograph less the light it was taken in.
 
 use super::fill::{Sparse, fill};
 use crate::{Error, Result};
@@ -15,13 +16,15 @@ use trocar_render::{Appearance, Film, Light, Picture, RayGenerator, RenderSettin
 const MOST_TRIANGLES: usize = 3_000_000;
 /// Columns and rows of pixels from vertex to vertex of what is around.
 const STEP: usize = 2;
-/// What is unknown under the organs lies so far behind its surroundings [m], so that it does not show through an organ's rim.
+/// What is unknown under the organs lies so far behind its surroundings (m), so that it does not
+/// show through an organ's rim.
 const SUNK: f64 = 3e-3;
-/// Colours are taken from the photograph where the organ is seen within this of its own front [m].
+/// Colours are taken from the photograph where the organ is seen within this of its own front (m).
 const OWN_FRONT: f64 = 2e-3;
-/// Surfaces steeper than this (cosine) are taken to get as much light as at it: what is left of a grazing photograph says little of a colour.
+/// Surfaces steeper than this (cosine) are taken to get as much light as at it: what is left of a
+/// grazing photograph says little of a colour.
 const STEEPEST: f64 = 0.2;
-/// How far an endoscope's light is from its lens [m].
+/// How far an endoscope's light is from its lens (m).
 pub(super) const BESIDE_LENS: f64 = 0.006;
 /// The brightest colour but for one in 200 becomes this albedo.
 const BRIGHTEST: f64 = 0.9;
@@ -29,7 +32,8 @@ const BRIGHTEST: f64 = 0.9;
 /// The light a recording was taken in, as far as it matters.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Illumination {
-    /// A lamp beside the lens, so far towards the picture's top [m]: light falls off with the square of the distance.
+    /// A lamp beside the lens, so far towards the picture's top (m): light falls off with the
+    /// square of the distance.
     Lamp { beside: f64 },
     /// From everywhere, as in a room.
     Room,
@@ -41,7 +45,8 @@ pub(super) struct Scenery {
     around: TriMesh,
     pub camera: Camera,
     illumination: Illumination,
-    /// The lamp's radiant intensity that makes the photograph of the albedos: radiance times square metres.
+    /// The lamp's radiant intensity that makes the photograph of the albedos: radiance times square
+    /// metres.
     power: f64,
 }
 
@@ -82,7 +87,8 @@ impl Scenery {
         Ok(Self { organs, around, camera, illumination, power })
     }
 
-    /// Labels through `camera` at the recording camera's place, organs alone: 1 + the organ's index.
+    /// Labels through `camera` at the recording camera's place, organs alone: 1 + the organ's
+    /// index.
     pub fn labels(&self, camera: &Camera) -> Result<Vec<u16>> {
         Ok(silhouettes(&self.organs, camera)?.labels)
     }
@@ -104,7 +110,8 @@ impl Scenery {
         Ok(render(&mut stage, &RayGenerator::new(*camera), &Pose::IDENTITY, &settings, &Film::default()).color)
     }
 
-    /// Everything through `camera` at `pose`, wet, in the light of an endoscope that makes a white surface `white_at` [m] before it white.
+    /// Everything through `camera` at `pose`, wet, in the light of an endoscope that makes a white
+    /// surface `white_at` (m) before it white.
     pub fn through_endoscope(&self, camera: &Camera, pose: &Pose, white_at: f64, samples: u32) -> Result<ColorImage> {
         let mut stage = self.stage(true)?;
         stage.lights.push(Light::endoscope(pose, BESIDE_LENS, white_at));
@@ -155,7 +162,8 @@ fn split(mesh: &mut TriMesh) {
     mesh.triangles = triangles;
 }
 
-/// Colours every vertex that the camera sees with the photograph between its pixels; others keep their colours.
+/// Colours every vertex that the camera sees with the photograph between its pixels; others keep
+/// their colours.
 fn project(mesh: &mut TriMesh, label: u16, photo: &ColorImage, seen: &Picture, camera: &Camera) {
     let (w, h) = (photo.width, photo.height);
     mesh.colors.resize(mesh.vertices.len(), [150, 60, 55]);
@@ -187,8 +195,8 @@ fn project(mesh: &mut TriMesh, label: u16, photo: &ColorImage, seen: &Picture, c
     }
 }
 
-/// The colours as they would be in even light, but for a common factor: the photograph's light over what a lamp of power 1 at `lamp`
-/// makes of a matte white surface.
+/// The colours as they would be in even light, but for a common factor: the photograph's light over
+/// what a lamp of power 1 at `lamp` makes of a matte white surface.
 fn unlit(mesh: &TriMesh, lamp: DVec3) -> Vec<[f64; 3]> {
     let mut normals = vec![DVec3::ZERO; mesh.vertices.len()];
     for t in 0..mesh.triangles.len() {
@@ -203,8 +211,8 @@ fn unlit(mesh: &TriMesh, lamp: DVec3) -> Vec<[f64; 3]> {
     (0..mesh.vertices.len()).map(color).collect()
 }
 
-/// What is around the organs as a height field over the image: the composite's depth and colour, smoothed a little, and filled under the
-/// organs and where nothing was measured.
+/// What is around the organs as a height field over the image: the composite's depth and colour,
+/// smoothed a little, and filled under the organs and where nothing was measured.
 pub(super) fn surroundings<'a>(
     photo: &ColorImage,
     depth: &DepthImage,

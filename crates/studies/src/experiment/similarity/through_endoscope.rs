@@ -1,4 +1,5 @@
-//! An oblique view through the endoscope's model beside the real frame (paper section VIII, the in-vivo extension).
+//! An oblique view through the endoscope's model beside the real frame (paper section VIII, the
+//! in-vivo extension).
 
 use super::endoscope::endoscope_camera;
 use super::measure::{Sides, SimilarityPictures, SimilarityRow, labelled, measure};
@@ -13,10 +14,12 @@ use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_recording::Recording;
 use trocar_workflow::reconstruct_recording;
 
-/// Where the endoscope's light would make a white surface white [m], in pictures of scenes that it did not light.
+/// Where the endoscope's light would make a white surface white (m), in pictures of scenes that it
+/// did not light.
 const WHITE_AT: f64 = 0.35;
 
-/// A phantom filmed through the endoscope from the side, reconstructed, and rendered through it again.
+/// A phantom filmed through the endoscope from the side, reconstructed, and rendered through it
+/// again.
 pub(super) fn from_the_side(
     samples: u32,
     phantom: &str,
@@ -34,8 +37,8 @@ pub(super) fn from_the_side(
     through_endoscope(samples, &name, &folder, &made, light, note, progress)
 }
 
-/// A reconstruction through the thirty-degree endoscope, whose lens stands where the recording camera stood, beside the recording's first
-/// frame as the endoscope's lens would have shown it.
+/// A reconstruction through the thirty-degree endoscope, whose lens stands where the recording
+/// camera stood, beside the recording's first frame as the endoscope's lens would have shown it.
 pub(super) fn through_endoscope(
     samples: u32,
     name: &str,

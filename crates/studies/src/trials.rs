@@ -1,10 +1,13 @@
-//! Trials that outlive an interruption: each finished one is a line of a file in the experiment's folder, and the next run takes it from there.
+//! Trials that outlive an interruption: each finished one is a line of a file in the experiment's
+//! folder, and the next run takes it from there.
 //!
-//! The file, `trials.jsonl`, begins with a line that names the experiment and a hash of everything the trials depend on: options, specimen, program. A trial's line is its key and its
-//! row, written at once and flushed, so that a run may be killed at any instant: a line that was torn is dropped, and its trial is run again. A file of other settings is put aside as
+//! The file, `trials.jsonl`, begins with a line that names the experiment and a hash of everything
+//! the trials depend on: options, specimen, program. A trial's line is its key and its row, written
+//! at once and flushed, so that a run may be killed at any instant: a line that was torn is
+//! dropped, and its trial is run again. A file of other settings is put aside as
 //! `trials.jsonl.old`, and everything starts anew. While a run uses the file it is locked.
 
-use super::side_by_side::side_by_side;
+use crate::side_by_side::side_by_side;
 use crate::{Error, Result};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -19,7 +22,7 @@ use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 /// The file in the experiment's folder.
 const FILE: &str = "trials.jsonl";
 
-/// No experiment writes as much [bytes]; what is longer is not read.
+/// No experiment writes as much (bytes); what is longer is not read.
 const LONGEST: u64 = 256 << 20;
 
 /// The first line.
@@ -46,21 +49,21 @@ pub struct Resumed {
 }
 
 /// What was taken from an earlier run, in sentences; `what` names the trials.
-pub(super) fn resumed(resumed: &Resumed, what: &str) -> Vec<String> {
+pub(crate) fn resumed(resumed: &Resumed, what: &str) -> Vec<String> {
     let earlier = (resumed.trials > 0).then(|| format!("{} {what} taken from an earlier run", resumed.trials));
     earlier.into_iter().chain(resumed.put_aside.clone()).collect()
 }
 
 /// Outcomes of trials in the items' order, and how many of them are an earlier run's.
 #[derive(Debug)]
-pub(super) struct Outcomes<R> {
+pub(crate) struct Outcomes<R> {
     pub rows: Vec<R>,
     pub resumed: Resumed,
 }
 
 /// The store of an experiment's finished trials.
 #[derive(Debug)]
-pub(super) struct Trials {
+pub(crate) struct Trials {
     path: PathBuf,
     file: Mutex<File>,
     /// By key: the row as it was written.
@@ -69,7 +72,9 @@ pub(super) struct Trials {
 }
 
 impl Trials {
-    /// Opens the store of `experiment` in `folder`, which exists, or begins it. `settings` is whatever decides the trials' outcome besides their keys; the program does, too, and is added.
+    /// Opens the store of `experiment` in `folder`, which exists, or begins it. `settings` is
+    /// whatever decides the trials' outcome besides their keys; the program does, too, and is
+    /// added.
     ///
     /// # Errors
     /// A file that cannot be read or written, or that another run is using.
@@ -106,13 +111,17 @@ impl Trials {
         Ok(Self { path, file: Mutex::new(file), done, put_aside })
     }
 
-    /// Does `run` for every item that no earlier run has finished, several at once on `threads` threads (0: all there are). `key` names an item, each by another name. The outcomes do
-    /// not depend on what was interrupted when: they are in the items' order, and numbers are kept to the bit.
+    /// Does `run` for every item that no earlier run has finished, several at once on `threads`
+    /// threads (0: all there are). `key` names an item, each by another name. The outcomes do not
+    /// depend on what was interrupted when: they are in the items' order, and numbers are kept to
+    /// the bit.
     ///
-    /// A row that does not come back as it was (one that holds an infinity, say) is not kept, and is made anew by every run.
+    /// A row that does not come back as it was (one that holds an infinity, say) is not kept, and
+    /// is made anew by every run.
     ///
     /// # Errors
-    /// That of the first trial that failed, an interruption, a file that cannot be written, two items of one name.
+    /// That of the first trial that failed, an interruption, a file that cannot be written, two
+    /// items of one name.
     pub fn run<T: Sync, R: Serialize + DeserializeOwned + Send>(
         &self,
         stage: &str,

@@ -1,12 +1,16 @@
-//! Fig. 6(b): which integrators stay bounded when specimen A is released under gravity, and how far each comes to rest from the true equilibrium.
+//! Fig. 6(b): which integrators stay bounded when specimen A is released under gravity, and how far
+//! each comes to rest from the true equilibrium.
 
-use super::integrator_forms::{Form, forms};
-use super::integrator_row::IntegratorRow;
+mod forms;
+mod row;
+
 use crate::names::Recorded;
-use crate::study::{Job, Kind, Study};
+use crate::study::{Job, Kind, Study, stop_if_asked};
 use crate::{Error, Result};
 use clap::Args;
+use forms::{Form, findings, forms};
 use glam::DVec3;
+use row::IntegratorRow;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -22,25 +26,29 @@ use trocar_tissue::{Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
 use trocar_workflow::phantoms;
 
-/// Speed at which a node has diverged [m/s], the paper's limit.
+/// Speed at which a node has diverged (m/s), the paper's limit.
 const SPEED_LIMIT: f64 = 20.0;
 
-/// The last share of the run, over which positions are averaged before they are compared with the equilibrium: tissue that is not damped swings around it.
+/// The last share of the run, over which positions are averaged before they are compared with the
+/// equilibrium: tissue that is not damped swings around it.
 const MEASURED_SHARE: f64 = 1.0 / 3.0;
 
-/// Viscosity over Young's modulus [s]: less than in the cell, where the explicit forms would need shorter steps than their elasticity asks for.
+/// Viscosity over Young's modulus (s): less than in the cell, where the explicit forms would need
+/// shorter steps than their elasticity asks for.
 const LIGHT_DAMPING: f64 = 0.02 / 15.0;
 
-/// Young's modulus [Pa] and Poisson's ratio of organs out of a file.
+/// Young's modulus (Pa) and Poisson's ratio of organs out of a file.
 const TISSUE: (f64, f64) = (12e3, 0.45);
 
-/// Fig. 6(b): which integrators stay bounded when specimen A is released, and how far each sags from the truth.
+/// Fig. 6(b): which integrators stay bounded when specimen A is released, and how far each sags
+/// from the truth.
 #[derive(Clone, Debug, Args)]
 pub struct IntegratorsExperiment {
-    /// Gmsh file (.msh, in metres, z up) with the organs, the lowest 42% of each pinned; phantom A, reconstructed, by default.
+    /// Gmsh file (.msh, in metres, z up) with the organs, the lowest 42% of each pinned; phantom A,
+    /// reconstructed, by default.
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
-    /// Simulated time [s].
+    /// Simulated time (s).
     #[arg(long, default_value_t = 1.0)]
     pub seconds: f64,
     /// Leave the tissue's dashpots out (with --mesh).
@@ -61,7 +69,7 @@ pub struct IntegratorsResult {
     pub integrators: Vec<IntegratorRow>,
     /// What the data say, in a sentence each.
     pub findings: Vec<String>,
-    /// The longest stable step of explicit integration [us].
+    /// The longest stable step of explicit integration (us).
     pub stable_step_us: f64,
     /// Where the organs are from.
     pub specimen: String,
@@ -69,13 +77,13 @@ pub struct IntegratorsResult {
     pub nodes: usize,
     /// Elements.
     pub tets: usize,
-    /// Mean displacement of the nodes in the static equilibrium [mm].
+    /// Mean displacement of the nodes in the static equilibrium (mm).
     pub sag_mm: f64,
     /// Whether dashpots were left out.
     pub undamped: bool,
     /// Worker threads.
     pub threads: usize,
-    /// Wall time of everything [s].
+    /// Wall time of everything (s).
     pub seconds: f64,
     /// The report's path.
     pub report: String,
@@ -109,7 +117,7 @@ impl Study for IntegratorsExperiment {
         }
         job.progress.end();
         let result = IntegratorsResult {
-            findings: super::integrator_forms::findings(&integrators),
+            findings: findings(&integrators),
             integrators,
             stable_step_us: 1e6 * stable,
             specimen,
@@ -149,7 +157,7 @@ impl IntegratorsExperiment {
 struct Equilibrium {
     rest: Vec<DVec3>,
     positions: Vec<DVec3>,
-    /// Mean displacement [m].
+    /// Mean displacement (m).
     sag: f64,
 }
 
@@ -179,9 +187,7 @@ fn measured(
     let first_measured = frames - ((MEASURED_SHARE * frames as f64) as usize).max(1);
     let (mut speeds, mut times, mut ended) = (Vec::with_capacity(frames), Vec::with_capacity(frames), None);
     for frame in 0..frames {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        stop_if_asked(progress)?;
         let clock = Instant::now();
         let report = stepper.step(model, &mut state, &[]);
         times.push(1e3 * clock.elapsed().as_secs_f64());
@@ -233,18 +239,16 @@ fn document(result: &IntegratorsResult) -> Result<Document> {
         if let [(t, v)] = points[..] {
             points = vec![(0.0, v), (t, v)];
         }
-        Line { points, color: color(k), filled: false }
+        Line::new(points, color(k))
     };
     let plot = Plot {
         title: "Greatest node speed",
-        x: "time since release [s]",
-        y: "speed [m/s]",
+        x: "time since release (s)",
+        y: "speed (m/s)",
         lines: result.integrators.iter().enumerate().map(line).collect(),
-        bands: vec![],
-        show: vec![],
         limits: vec![SPEED_LIMIT],
-        log_x: false,
         log_y: true,
+        ..Plot::default()
     };
     let legend = page::legend(result.integrators.iter().enumerate().map(|(k, r)| (r.name, color(k))));
     let bounded = Section::new("What stays bounded", lead)
@@ -288,11 +292,11 @@ fn rows(result: &IntegratorsResult) -> Section {
         "Settings",
         "The paper",
         "Outcome",
-        "Peak [m/s]",
-        "Last [m/s]",
+        "Peak (m/s)",
+        "Last (m/s)",
         "Sag over true sag",
         "Sag error",
-        "Frame [ms]",
+        "Frame (ms)",
     ];
     let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
     let row = |r: &IntegratorRow| {

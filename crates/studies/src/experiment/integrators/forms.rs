@@ -1,6 +1,7 @@
-//! The integrators that are compared, each as the paper or an engine has it and in its best form, and what the comparison says.
+//! The integrators that are compared, each as the paper or an engine has it and in its best form,
+//! and what the comparison says.
 
-use super::integrator_row::IntegratorRow;
+use super::row::IntegratorRow;
 use trocar_tissue::{Descent, Model, SolverSettings, Start};
 use trocar_tissue_reference::{Scheme, SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep};
 
@@ -21,7 +22,7 @@ const SMALL_RELAXATION: f64 = 0.1;
 /// A sag error above which "bounded" is not "right".
 const RIGHT: f64 = 0.1;
 
-/// Every integrator, for frames of `dt` [s].
+/// Every integrator, for frames of `dt` (s).
 pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
     let form = |name, settings: String, paper, scheme| Form { name, settings, paper, scheme };
     let stable = SemiImplicit::stable(model, dt);

@@ -1,40 +1,18 @@
-//! Table II and Fig. 7(a) to (c): four ways to hold the appendix, at five places and from three sides, and
-//! once more after it was dragged. Measured in the whole cell and with the appendix alone.
+//! The figures of the grasp designs: trials, rows of Table II, and the paper's.
 
-use super::lift_trials::{
-    AppendixSource, Condition, LiftTrial, Whole, appendix, design_name, divergence, peak_constraint,
-};
-use super::trials::{Outcomes, Resumed, Trials};
-use crate::{Error, Result, pages};
+use crate::experiment::appendix::Condition;
+use crate::names::design_name;
+use crate::statistics::median;
+use crate::trials::Resumed;
 use serde::{Deserialize, Serialize};
-use std::path::Path;
-use std::time::Instant;
-use trocar_cell::{Cell, CellEvent, clusters};
-use trocar_core::Progress;
-use trocar_scene::{GraspDesignName, MaterialOverride, Scene};
-use trocar_specimen::{Material, Specimen};
-use trocar_task::Recording;
-use trocar_task::policy::{AfterHold, Script};
-use trocar_workflow::REPORT;
-
-/// The file that makes a folder one of this experiment's.
-const MARKER: &str = "grasp-designs.json";
-
-/// Grip locations.
-const LOCATIONS: usize = 5;
-
-/// How far beside the appendix's middle the jaws come (m).
-const OFFSETS: [f64; 3] = [-0.002, 0.0, 0.002];
-
-/// How far the appendix is dragged before it is grasped again (m).
-const DRAGS: [f64; 2] = [0.005, 0.010];
+use trocar_scene::GraspDesignName;
 
 /// All designs, in the paper's order.
-pub(crate) const DESIGNS: [GraspDesignName; 4] =
+pub(super) const DESIGNS: [GraspDesignName; 4] =
     [GraspDesignName::Friction, GraspDesignName::RestPose, GraspDesignName::LivePose, GraspDesignName::Compliant];
 
 /// Designs that grasp again.
-const REGRASPS: [GraspDesignName; 3] =
+pub(super) const REGRASPS: [GraspDesignName; 3] =
     [GraspDesignName::RestPose, GraspDesignName::LivePose, GraspDesignName::Compliant];
 
 /// A row of the paper's Table II.
@@ -74,21 +52,6 @@ fn paper(design: GraspDesignName, regrasp: bool) -> Option<PaperGrasp> {
     }
 }
 
-/// The experiment's options.
-#[derive(Clone, Debug)]
-pub struct GraspDesignsExperiment {
-    /// The appendix.
-    pub appendix: AppendixSource,
-    /// In what it is lifted.
-    pub conditions: Vec<Condition>,
-    /// Jaw lift (m).
-    pub lift: f64,
-    /// Force of the jaws (N).
-    pub jaw_force: f64,
-    /// Trials at once; 0 for as many as the machine has threads.
-    pub threads: usize,
-}
-
 /// One trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspTrial {
@@ -118,8 +81,8 @@ pub struct GraspTrial {
     pub follow_ratio: f64,
     /// Slip (mm).
     pub slip_mm: f64,
-    /// Greatest snap over the nodes (mm); none for friction. Zero by construction for designs that capture
-    /// nodes where they are.
+    /// Greatest snap over the nodes (mm); none for friction. Zero by construction for designs that
+    /// capture nodes where they are.
     pub snap_mm: Option<f64>,
     /// Mean snap over the nodes (mm).
     pub snap_mean_mm: Option<f64>,
@@ -182,7 +145,8 @@ pub struct GraspDesignRow {
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest in any trial.
     pub min_volume_ratio: f64,
-    /// Suspensions of physics in all trials: contacts disabled, contacts of blades disabled, organs relaxed.
+    /// Suspensions of physics in all trials: contacts disabled, contacts of blades disabled, organs
+    /// relaxed.
     pub suspensions: [usize; 3],
     /// The paper's row.
     pub paper: Option<PaperGrasp>,
@@ -215,144 +179,8 @@ pub struct GraspDesignsResult {
     pub report: String,
 }
 
-/// A condition's scene and specimen, with the material of the paper.
-struct Ready {
-    condition: Condition,
-    scene: Scene,
-    specimen: Specimen,
-    places: Vec<f64>,
-}
-
-impl GraspDesignsExperiment {
-    /// Runs everything into the folder `output`: the phantom's recording and specimen, the figures and the
-    /// page. Trials that an earlier run in the folder finished are not run again.
-    ///
-    /// # Errors
-    /// A specimen without an appendix, an option out of range, a folder that cannot be written, an
-    /// interruption.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<GraspDesignsResult> {
-        let clock = Instant::now();
-        super::claim(output, MARKER)?;
-        let whole = self.appendix.read(output, progress)?;
-        let material = Material::default();
-        let ready: Vec<Ready> = self.conditions.iter().map(|c| ready(&whole, *c, material)).collect::<Result<_>>()?;
-        let tasks: Vec<(usize, LiftTrial)> =
-            ready.iter().enumerate().flat_map(|(k, r)| self.tasks(r).into_iter().map(move |t| (k, t))).collect();
-        let settings = format!("{} N, {} m, {}", self.jaw_force, self.lift, whole.fingerprint());
-        let store = Trials::open(output, "grasp-designs", &settings)?;
-        let one = |(k, task): &(usize, LiftTrial), progress: &dyn Progress| -> Result<GraspTrial> {
-            Ok(trial(task, &task.run(&ready[*k].scene, &ready[*k].specimen, progress)?))
-        };
-        let key = |(_, task): &(usize, LiftTrial)| key(task);
-        let Outcomes { rows: trials, resumed } = store.run("trials", &tasks, key, self.threads, progress, one)?;
-        let (nodes, tets) = whole.size();
-        let result = GraspDesignsResult {
-            rows: self.conditions.iter().flat_map(|c| rows(*c, &trials)).collect(),
-            trials,
-            lift_mm: 1e3 * self.lift,
-            jaw_force_n: self.jaw_force,
-            modulus_kpa: 1e-3 * material.young_modulus_pa,
-            density_kg_m3: material.density_kg_m3,
-            nodes,
-            tets,
-            resumed,
-            seconds: clock.elapsed().as_secs_f64(),
-            report: output.join(REPORT).display().to_string(),
-        };
-        super::write(&output.join(REPORT), pages::grasp_designs(&result)?.as_bytes())?;
-        let json = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
-        super::write(&output.join(MARKER), &json)?;
-        Ok(result)
-    }
-
-    fn tasks(&self, ready: &Ready) -> Vec<LiftTrial> {
-        let task = |design, at: f64, approach_offset, regrasp| LiftTrial {
-            condition: ready.condition,
-            script: Script { at, approach_offset, lift: self.lift, regrasp, retries: 0, after: AfterHold::Finish },
-            design,
-            jaw_force: self.jaw_force,
-        };
-        let mut tasks = Vec::new();
-        for design in DESIGNS {
-            tasks.extend(ready.places.iter().flat_map(|at| OFFSETS.map(|offset| task(design, *at, offset, None))));
-        }
-        for design in REGRASPS {
-            tasks.extend(ready.places.iter().flat_map(|at| DRAGS.map(|drag| task(design, *at, 0.0, Some(drag)))));
-        }
-        tasks
-    }
-}
-
-fn ready(whole: &Whole, condition: Condition, material: Material) -> Result<Ready> {
-    let (mut scene, specimen) = (whole.scene(condition)?, whole.specimen(condition));
-    appendix(&mut scene).material = MaterialOverride {
-        model: None,
-        young_modulus_pa: Some(material.young_modulus_pa),
-        poisson_ratio: Some(material.poisson_ratio),
-        density_kg_m3: Some(material.density_kg_m3),
-    };
-    let places = places(&scene, &specimen)?;
-    Ok(Ready { condition, scene, specimen, places })
-}
-
-/// Grip locations: evenly over the part of the organ that can be grasped and lifted.
-fn places(scene: &Scene, specimen: &Specimen) -> Result<Vec<f64>> {
-    let cell = Cell::new(scene, specimen, 1)?;
-    let bodies = cell.world().model.bodies();
-    let organ = bodies.iter().position(|b| b.name() == scene.task.organ).unwrap_or(0);
-    let clear: Vec<f64> = clusters(cell.world(), organ).iter().filter(|c| c.clear).map(|c| c.s).collect();
-    let (Some(first), Some(last)) = (clear.first(), clear.last()) else {
-        return Err(Error::Mismatch("no part of the appendix is clear of pins; pin less of it".to_owned()));
-    };
-    Ok((0..LOCATIONS).map(|k| first + (last - first) * k as f64 / (LOCATIONS - 1) as f64).collect())
-}
-
-/// A trial's name among all.
-fn key(task: &LiftTrial) -> String {
-    let (condition, design, script) = (task.condition.name(), design_name(task.design), &task.script);
-    let (at, offset, drag) = (script.at, script.approach_offset, script.regrasp);
-    format!("{condition}, {design} at {at}, offset {offset} m, drag {drag:?} m")
-}
-
-fn trial(task: &LiftTrial, made: &Recording) -> GraspTrial {
-    let (s, d) = (&made.summary, &made.summary.details);
-    let ties = task.design != GraspDesignName::Friction;
-    let attached = made.events.iter().rev().find(|(_, e)| matches!(e, CellEvent::Attached { .. }));
-    let start = attached.map_or(f64::INFINITY, |(time, _)| *time);
-    let lifted = made.channels.iter().filter(|c| c.time_s >= start - 1e-9);
-    GraspTrial {
-        condition: task.condition,
-        design: design_name(task.design).to_owned(),
-        asked: task.script.at,
-        at: s.grasp_at.unwrap_or(task.script.at),
-        offset_mm: 1e3 * task.script.approach_offset,
-        drag_mm: task.script.regrasp.map(|d| 1e3 * d),
-        attached: s.attached,
-        held: s.held,
-        divergence: divergence(made),
-        why: s.why.clone(),
-        lift_mm: s.lift_mm,
-        follow_ratio: s.follow_ratio.unwrap_or(0.0),
-        slip_mm: s.slip_mm.unwrap_or(0.0),
-        snap_mm: ties.then_some(d.snap_mm),
-        snap_mean_mm: ties.then_some(d.snap_mean_mm),
-        activation_step_mm: d.activation_step_mm,
-        displaced_mm: d.displaced_mm,
-        inverted_peak: s.inverted_peak,
-        min_volume_ratio: s.min_volume_ratio,
-        yielded_substeps: s.yielded_substeps,
-        closing_force_n: d.closing_force_n,
-        gap_mm: d.gap_mm,
-        peak_constraint_n: peak_constraint(made),
-        slipped: d.slipped,
-        torn: s.torn > 0,
-        suspensions: [s.disabled_contacts, s.disabled_blades, s.relaxed],
-        lifts: lifted.map(|c| (c.time_s - start, c.task.jaw_lift_mm, c.task.lift_mm)).collect(),
-    }
-}
-
 /// A row a design, those of the second grasp last.
-fn rows(condition: Condition, trials: &[GraspTrial]) -> Vec<GraspDesignRow> {
+pub(super) fn rows(condition: Condition, trials: &[GraspTrial]) -> Vec<GraspDesignRow> {
     let first = DESIGNS.iter().map(|d| (*d, false));
     let again = REGRASPS.iter().map(|d| (*d, true));
     first.chain(again).filter_map(|(design, regrasp)| row(condition, design, regrasp, trials)).collect()
@@ -364,7 +192,7 @@ fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[G
     let of: Vec<&GraspTrial> = trials.iter().filter(is).collect();
     let ended: Vec<&&GraspTrial> = of.iter().filter(|t| t.divergence.is_none()).collect();
     let values = |value: &dyn Fn(&GraspTrial) -> f64| -> Vec<f64> { ended.iter().map(|t| value(t)).collect() };
-    let median = |value: &dyn Fn(&GraspTrial) -> f64| crate::bench::median(&mut values(value));
+    let median = |value: &dyn Fn(&GraspTrial) -> f64| median(&mut values(value));
     let most = |value: &dyn Fn(&GraspTrial) -> f64| values(value).into_iter().fold(0.0, f64::max);
     let snaps = || of.iter().filter_map(|t| t.snap_mm);
     let sum = |k: usize| of.iter().map(|t| t.suspensions[k]).sum();

@@ -1,13 +1,14 @@
-//! What pictures cost: a policy's preview with an organ refitted, a path-traced frame, and rays a second beside Embree.
+//! What pictures cost: a policy's preview with an organ refitted, a path-traced frame, and rays a
+//! second beside Embree.
 
 mod rays;
 
 pub use rays::RayRow;
 
 use super::machine::Machine;
-use super::timing::median;
+use crate::Result;
+use crate::statistics::median;
 use crate::study::{Job, Kind, Study, stop_if_asked};
-use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -61,26 +62,27 @@ pub struct RenderBench {
 pub struct RenderBenchResult {
     /// The scene through its cameras; left out without a scene.
     pub cell: Option<CellRow>,
-    /// Median of a frame of 224 x 224 with colour, depth and labels, all deformed organs refitted and arms moved, hard shadows: of the scene through its first camera, or else of the stage of
-    /// loops of bowel [ms].
+    /// Median of a frame of 224 x 224 with colour, depth and labels, all deformed organs refitted
+    /// and arms moved, hard shadows: of the scene through its first camera, or else of the stage of
+    /// loops of bowel (ms).
     pub preview_224_ms: f64,
-    /// The same without shadows [ms].
+    /// The same without shadows (ms).
     pub preview_224_unshadowed_ms: f64,
-    /// The fastest frame with shadows [ms]: what the machine can do when it is left alone.
+    /// The fastest frame with shadows (ms): what the machine can do when it is left alone.
     pub preview_224_best_ms: f64,
-    /// Median of bringing the stage to where the cell is, or of the refit alone [ms].
+    /// Median of bringing the stage to where the cell is, or of the refit alone (ms).
     pub refit_ms: f64,
     /// Triangles of the loops of bowel.
     pub triangles: usize,
     /// Triangles of them that are refitted each frame.
     pub refitted_triangles: usize,
-    /// Median of a frame of 224 x 224 of the loops of bowel with hard shadows [ms].
+    /// Median of a frame of 224 x 224 of the loops of bowel with hard shadows (ms).
     pub loops_224_ms: f64,
-    /// The same without shadows [ms].
+    /// The same without shadows (ms).
     pub loops_224_unshadowed_ms: f64,
-    /// Building all trees anew [ms].
+    /// Building all trees anew (ms).
     pub build_ms: f64,
-    /// One frame of 1280 x 720 at `samples` paths a pixel [ms]; left out with 0 samples.
+    /// One frame of 1280 x 720 at `samples` paths a pixel (ms); left out with 0 samples.
     pub path_720p_ms: Option<f64>,
     /// Paths a pixel of it.
     pub samples: u32,
@@ -101,9 +103,9 @@ pub struct CellRow {
     pub scene: String,
     /// Triangles on the stage.
     pub triangles: usize,
-    /// Making the sight: field, arms, instruments, all trees [ms].
+    /// Making the sight: field, arms, instruments, all trees (ms).
     pub begin_ms: f64,
-    /// Median of bringing the stage to where the cell is [ms].
+    /// Median of bringing the stage to where the cell is (ms).
     pub follow_ms: f64,
     /// The cameras, 224 x 224.
     pub cameras: Vec<CameraRow>,
@@ -114,11 +116,11 @@ pub struct CellRow {
 pub struct CameraRow {
     /// Its name.
     pub camera: String,
-    /// Median of a frame with shadows, all that has moved included [ms].
+    /// Median of a frame with shadows, all that has moved included (ms).
     pub ms: f64,
-    /// The fastest [ms].
+    /// The fastest (ms).
     pub best_ms: f64,
-    /// Median without shadows [ms].
+    /// Median without shadows (ms).
     pub unshadowed_ms: f64,
 }
 
@@ -150,7 +152,7 @@ impl Set {
         Ok(Self { moving: shapes[MOVING], scene, stage, instruments, view })
     }
 
-    /// Median and least time of a frame [ms].
+    /// Median and least time of a frame (ms).
     fn preview(&mut self, shadows: bool) -> Result<(f64, f64)> {
         let Endoscope { camera, .. } = Endoscope::thirty_degrees();
         // The square middle of the endoscope's picture.
@@ -253,7 +255,8 @@ impl Study for RenderBench {
 }
 
 impl RenderBench {
-    /// The cell's cameras while the grasp-lift goes on: frames of all of them after each period, which is not timed.
+    /// The cell's cameras while the grasp-lift goes on: frames of all of them after each period,
+    /// which is not timed.
     fn cell(&self, name: &str, progress: &dyn Progress) -> Result<CellRow> {
         let scene = Scene::read(name)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
@@ -268,9 +271,7 @@ impl RenderBench {
         for frame in 0..FRAMES + FRAMES / 10 {
             let mut step =
                 |timed: &mut dyn FnMut(&mut CameraRig, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
-                    if progress.interrupted() {
-                        return Err(Error::Interrupted);
-                    }
+                    stop_if_asked(progress)?;
                     script.advance()?;
                     let clock = Instant::now();
                     timed(&mut sight, script.cell())?;
@@ -361,8 +362,8 @@ fn document(r: &RenderBenchResult) -> Document {
             row.largest_difference_m.map_or_else(dash, |x| fixed(1e6 * x, 2)),
         ]
     });
-    let head = ["Rays", "count", "ours [M/s]", "Embree [M/s]", "ratio", "differ", "most [\u{b5}m]"];
-    let pictures = ["224 x 224 pixels", "with shadows [ms]", "best [ms]", "without shadows [ms]"];
+    let head = ["Rays", "count", "ours (M/s)", "Embree (M/s)", "ratio", "differ", "most (\u{b5}m)"];
+    let pictures = ["224 x 224 pixels", "with shadows (ms)", "best (ms)", "without shadows (ms)"];
     Document::new("Render", "What pictures cost")
         .with(Section::new("Previews", "").table(Table::new(pictures, rows)).lines(lines))
         .with(Section::new("Rays on one thread", "").table(Table::new(head, rays.collect())))

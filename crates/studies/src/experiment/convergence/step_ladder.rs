@@ -1,13 +1,14 @@
-//! One substep of a scene, from the same state, with 1, 2, 4, ... iterations: how near to the oracle's minimum, and in what time.
+//! One substep of a scene, from the same state, with 1, 2, 4, ... iterations: how near to the
+//! oracle's minimum, and in what time.
 
-use crate::schedules::one_substep;
-use crate::{Error, Result};
+use crate::Result;
+use crate::study::stop_if_asked;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_testing::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
-use trocar_tissue::{SolverSettings, State, Stepper, ToolMotion};
+use trocar_tissue::{Descent, QuasiNewton, SolverSettings, State, Stepper, ToolMotion};
 use trocar_tissue_reference::OracleState;
 use trocar_workflow::solver_named;
 
@@ -17,7 +18,8 @@ const ORACLE_SUBSTEPS: usize = 4;
 /// Times that a step is repeated for its time.
 const REPEATS: usize = 5;
 
-/// The predictor's excess energy means something above this share of the kinetic energy that gravity gives in a substep.
+/// The predictor's excess energy means something above this share of the kinetic energy that
+/// gravity gives in a substep.
 const LEAST_EXCESS: f64 = 1e-4;
 
 /// One schedule with one number of iterations.
@@ -29,15 +31,15 @@ pub struct StepRow {
     pub iterations: usize,
     /// Whether that is the schedule's own number.
     pub own: bool,
-    /// The substep [ms].
+    /// The substep (ms).
     pub substep_ms: f64,
-    /// Least wall time of the substep on one thread, of five [ms].
+    /// Least wall time of the substep on one thread, of five (ms).
     pub wall_ms: f64,
-    /// RMS distance of the nodes from the oracle's [um].
+    /// RMS distance of the nodes from the oracle's (um).
     pub position_error_um: f64,
     /// The same over the RMS displacement from the rest shape.
     pub position_error: f64,
-    /// Incremental potential above the oracle's [J]; none where an element has no volume.
+    /// Incremental potential above the oracle's (J); none where an element has no volume.
     pub energy_error_j: Option<f64>,
     /// The same over that of the inertial predictor; none where that is as good as none.
     pub energy_error: Option<f64>,
@@ -45,7 +47,8 @@ pub struct StepRow {
     pub inverted: usize,
 }
 
-/// The state from which the substep is done: after how many frames of the scene; none for the static equilibrium.
+/// The state from which the substep is done: after how many frames of the scene; none for the
+/// static equilibrium.
 fn frames_before(scene: &str) -> Option<usize> {
     match scene {
         "sag" => None,
@@ -73,7 +76,7 @@ pub(super) fn climb(scene: &Scene, solvers: &[&str], most: usize, progress: &dyn
         }
         Some(frames) => {
             for k in 0..frames * ORACLE_SUBSTEPS {
-                stop_if(progress)?;
+                stop_if_asked(progress)?;
                 before = run.state.clone();
                 run.step(h, (k + 1) as f64 * h)?;
             }
@@ -86,7 +89,7 @@ pub(super) fn climb(scene: &Scene, solvers: &[&str], most: usize, progress: &dyn
         let schedule = solver_named(name)?;
         let ladder = Ladder::new(scene, &mut run, &start, frames.unwrap_or(0) as f64 * FRAME, schedule)?;
         for iterations in rungs(schedule, most) {
-            stop_if(progress)?;
+            stop_if_asked(progress)?;
             rows.push(ladder.row(&mut run, name, schedule, iterations)?);
         }
     }
@@ -102,8 +105,22 @@ fn rungs(schedule: SolverSettings, most: usize) -> Vec<usize> {
     all
 }
 
+/// Iterations of each substep of the schedule.
 fn own_iterations(schedule: SolverSettings) -> usize {
-    crate::schedules::iterations_of(schedule)
+    match schedule {
+        SolverSettings::Descent(descent) => descent.iterations,
+        SolverSettings::QuasiNewton(method) => method.iterations,
+    }
+}
+
+/// One substep of the schedule with this number of iterations and no early exit.
+fn one_substep(schedule: SolverSettings, iterations: usize) -> SolverSettings {
+    match schedule {
+        SolverSettings::Descent(descent) => SolverSettings::Descent(Descent { substeps: 1, iterations, ..descent }),
+        SolverSettings::QuasiNewton(method) => {
+            SolverSettings::QuasiNewton(QuasiNewton { substeps: 1, iterations, tolerance: 0.0, ..method })
+        }
+    }
 }
 
 /// What the rows of a schedule share.
@@ -115,9 +132,10 @@ struct Ladder<'a> {
     /// The minimum.
     truth: OracleState,
     energy: f64,
-    /// Energy of the inertial predictor above the minimum [J]; none where the predictor is as good as the minimum.
+    /// Energy of the inertial predictor above the minimum (J); none where the predictor is as good
+    /// as the minimum.
     predictor_excess: Option<f64>,
-    /// RMS displacement from rest at the minimum [m].
+    /// RMS displacement from rest at the minimum (m).
     displacement: f64,
     tools: Vec<ToolMotion>,
     /// Whether each node of each body is held.
@@ -212,8 +230,4 @@ fn positions(scene: &Scene, state: &OracleState) -> Vec<DVec3> {
 fn rms(a: &[DVec3], b: &[DVec3]) -> f64 {
     let sum: f64 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
     (sum / a.len().max(1) as f64).sqrt()
-}
-
-fn stop_if(progress: &dyn Progress) -> Result<()> {
-    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }

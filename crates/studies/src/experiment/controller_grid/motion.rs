@@ -1,4 +1,5 @@
-//! The test motion that controllers are judged by: both arms of the paper's cell at their start poses, free motion, a load on the tip, rest.
+//! The test motion that controllers are judged by: both arms of the paper's cell at their start
+//! poses, free motion, a load on the tip, rest.
 
 use crate::Result;
 use glam::{DQuat, DVec3};
@@ -15,35 +16,37 @@ const PHYSICS: usize = 480;
 const COMMANDS: usize = 30;
 const DT: f64 = 1.0 / PHYSICS as f64;
 
-/// The paper's arms: side, tilt at the start [degrees].
+/// The paper's arms: side, tilt at the start (degrees).
 const ARMS: [(f64, f64); 2] = [(-1.0, 13.3), (1.0, 18.3)];
-/// Insertion at the start [m].
+/// Insertion at the start (m).
 const INSERTION: f64 = 0.1;
 
-/// Corners of the straight moves from the start [mm], each reached in [`LEG`] seconds.
+/// Corners of the straight moves from the start (mm), each reached in [`LEG`] seconds.
 const CORNERS: [[f64; 3]; 5] = [[0.0; 3], [20.0, 12.0, 10.0], [-10.0, 18.0, -12.0], [-16.0, -12.0, 8.0], [0.0; 3]];
 const LEG: f64 = 1.4;
-/// Sums of sines: amplitude [mm] and frequency [Hz] along x, y and z.
+/// Sums of sines: amplitude (mm) and frequency (Hz) along x, y and z.
 const SINES: [[(f64, f64); 2]; 3] = [[(9.0, 0.35), (2.0, 1.1)], [(8.0, 0.45), (2.0, 0.9)], [(6.0, 0.3), (1.5, 1.3)]];
 
-/// The phases by their ends [s]: at rest until gravity's error has settled, corners, sines, a load of 1 N on the tip while it moves between two corners, rest.
+/// The phases by their ends (s): at rest until gravity's error has settled, corners, sines, a load
+/// of 1 N on the tip while it moves between two corners, rest.
 const SETTLED: f64 = 1.0;
 const CORNERS_END: f64 = SETTLED + 4.0 * LEG;
 const SINES_END: f64 = CORNERS_END + 6.0;
 const LOAD_END: f64 = SINES_END + 3.0;
 const END: f64 = LOAD_END + 2.5;
-/// Droop is that of the last part of the rest [s].
+/// Droop is that of the last part of the rest (s).
 const AT_REST: f64 = 0.5;
-/// The load [N] and how long it takes to come and go [s].
+/// The load (N) and how long it takes to come and go (s).
 const LOAD: f64 = 1.0;
 const LOAD_RAMP: f64 = 0.2;
-/// Longest delay that is looked for [s].
+/// Longest delay that is looked for (s).
 const LONGEST_LAG: f64 = 0.12;
-/// A knock on the tip [N] for so long [s], and how long the arm has to come back from it [s].
+/// A knock on the tip (N) for so long (s), and how long the arm has to come back from it (s).
 const KNOCK: f64 = 25.0;
 const KNOCK_TIME: f64 = 0.05;
 const KNOCK_REST: f64 = 1.5;
-/// After it the command leaps: from the start by these pivots [rad], insertion [m] and roll [rad], every so many steps, though no arm can follow.
+/// After it the command leaps: from the start by these pivots (rad), insertion (m) and roll (rad),
+/// every so many steps, though no arm can follow.
 const LEAPS: [[f64; 4]; 6] = [
     [0.2, -0.1, 0.05, 0.8],
     [-0.2, 0.2, 0.15, -0.6],
@@ -54,56 +57,61 @@ const LEAPS: [[f64; 4]; 6] = [
 ];
 const LEAP_STEPS: usize = 160;
 const LEAP_REST: f64 = 2.0;
-/// Farther from the port's centre than this after a rest nothing has come back [m].
+/// Farther from the port's centre than this after a rest nothing has come back (m).
 const BACK: f64 = 1e-3;
-/// An arm whose shaft leaves the centre farther than the hardware allows [m], or that does not come to rest [rad/s], is not stable.
+/// An arm whose shaft leaves the centre farther than the hardware allows (m), or that does not come
+/// to rest (rad/s), is not stable.
 const ASTRAY: f64 = trocar_robot::port::RCM_ABORT;
 const RESTLESS: f64 = 2e-3;
 
 /// What a controller comes to over both arms.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ControllerFigures {
-    /// RCM deviation that 95% of all steps stay below [mm], all phases after settling.
+    /// RCM deviation that 95% of all steps stay below (mm), all phases after settling.
     pub rcm_p95_mm: f64,
-    /// Its peak [mm].
+    /// Its peak (mm).
     pub rcm_peak_mm: f64,
-    /// Distance between the tip that the controller is asked for and the measured one at the same time, RMS in free motion [mm].
+    /// Distance between the tip that the controller is asked for and the measured one at the same
+    /// time, RMS in free motion (mm).
     pub tracking_rms_mm: f64,
-    /// The delay between the two that makes it least [s].
+    /// The delay between the two that makes it least (s).
     pub lag_s: f64,
-    /// The same distance to the raw command, as it is held between its 30 a second [mm].
+    /// The same distance to the raw command, as it is held between its 30 a second (mm).
     pub command_rms_mm: f64,
-    /// The delay behind the raw, held command [s].
+    /// The delay behind the raw, held command (s).
     pub command_lag_s: f64,
-    /// Distance between the two tips at rest, RMS, the worse arm [mm].
+    /// Distance between the two tips at rest, RMS, the worse arm (mm).
     pub droop_mm: f64,
-    /// Largest torque of any joint [N m].
+    /// Largest torque of any joint (N m).
     pub torque_peak: f64,
     /// Largest torque as a share of its joint's limit.
     pub torque_share: f64,
-    /// RCM deviation when the tip is knocked with 25 N for 50 ms and the command then leaps, peak [mm]; none where it does not
-    /// come back.
+    /// RCM deviation when the tip is knocked with 25 N for 50 ms and the command then leaps, peak
+    /// (mm); none where it does not come back.
     pub rough_rcm_mm: Option<f64>,
-    /// Fastest joint at rest against its reference, RMS over the end of the rest [rad/s].
+    /// Fastest joint at rest against its reference, RMS over the end of the rest (rad/s).
     pub restless_rad_s: f64,
-    /// Whether the shaft stayed within the hardware's limit, knocked too, and the arms came to rest.
+    /// Whether the shaft stayed within the hardware's limit, knocked too, and the arms came to
+    /// rest.
     pub stable: bool,
 }
 
 /// One step of a trace.
 #[derive(Clone, Debug, Serialize)]
 pub struct ControllerInstant {
-    /// Time [s].
+    /// Time (s).
     pub time_s: f64,
-    /// How far the raw command, the reference and the tip are from the start along the first move [mm].
+    /// How far the raw command, the reference and the tip are from the start along the first move
+    /// (mm).
     pub along_mm: [f64; 3],
-    /// Distance of the tip from the reference [mm].
+    /// Distance of the tip from the reference (mm).
     pub error_mm: f64,
-    /// RCM deviation [mm].
+    /// RCM deviation (mm).
     pub rcm_mm: f64,
 }
 
-/// An arm of the paper's cell in its start pose; the port is a sheet without thickness, as the paper's clearances have it.
+/// An arm of the paper's cell in its start pose; the port is a sheet without thickness, as the
+/// paper's clearances have it.
 fn arm((side, tilt): (f64, f64), settings: &ControllerSettings) -> Result<Manipulator> {
     let base = Pose { rotation: DQuat::from_rotation_z(FRAC_PI_2), translation: DVec3::new(0.45 * side, 0.0, 0.0) };
     let fr3 = SerialArm::franka_fr3()?.with_base(base)?;
@@ -115,7 +123,7 @@ fn arm((side, tilt): (f64, f64), settings: &ControllerSettings) -> Result<Manipu
     Ok(Manipulator::new(fr3, instrument, port, *settings, start)?)
 }
 
-/// Where the tip is sent from its start at `time` [s] [m].
+/// Where the tip is sent from its start at `time` (s) (m).
 fn way(time: f64) -> DVec3 {
     let corner = |k: usize| 1e-3 * DVec3::from_array(CORNERS[k.min(CORNERS.len() - 1)]);
     let smooth = |s: f64| s * s * s * (10.0 - 15.0 * s + 6.0 * s * s);
@@ -140,7 +148,7 @@ fn way(time: f64) -> DVec3 {
     }
 }
 
-/// The load on the tip [N].
+/// The load on the tip (N).
 fn load(time: f64) -> Wrench {
     let share = ((time - SINES_END) / LOAD_RAMP).min((LOAD_END - time) / LOAD_RAMP).clamp(0.0, 1.0);
     // A pull across the shaft, whose direction goes round.
@@ -207,14 +215,15 @@ impl Gathered {
     }
 }
 
-/// Mean square of the distance of `behind` from `ahead` as it was `steps` before [m2].
+/// Mean square of the distance of `behind` from `ahead` as it was `steps` before (m2).
 fn off(ahead: &[DVec3], behind: &[DVec3], steps: usize) -> f64 {
     let pairs = ahead.iter().zip(behind.iter().skip(steps));
     let (sum, count) = pairs.fold((0.0, 0usize), |(s, n), (a, b)| (s + a.distance_squared(*b), n + 1));
     sum / count.max(1) as f64
 }
 
-/// The delay of `behind` that makes its distance least [s]: the least whole step, and between steps by a parabola. Signals that lead have a negative one.
+/// The delay of `behind` that makes its distance least (s): the least whole step, and between steps
+/// by a parabola. Signals that lead have a negative one.
 fn delay(ahead: &[DVec3], behind: &[DVec3]) -> f64 {
     let most = (LONGEST_LAG / DT) as i64;
     let at =
@@ -231,7 +240,8 @@ fn delay(ahead: &[DVec3], behind: &[DVec3]) -> f64 {
     (least as f64 + shift) * DT
 }
 
-/// Knocks the tip and lets the command leap: the greatest RCM deviation [m], infinite where the arm does not come back.
+/// Knocks the tip and lets the command leap: the greatest RCM deviation (m), infinite where the arm
+/// does not come back.
 fn rough(which: (f64, f64), settings: &ControllerSettings) -> Result<f64> {
     let mut m = arm(which, settings)?;
     let start = m.commanded();
@@ -260,7 +270,7 @@ fn rough(which: (f64, f64), settings: &ControllerSettings) -> Result<f64> {
 }
 
 /// Sends both arms through the test motion.
-pub(super) fn judge(settings: &ControllerSettings) -> Result<ControllerFigures> {
+pub(super) fn evaluate(settings: &ControllerSettings) -> Result<ControllerFigures> {
     let (mut deviations, mut stable) = (Deviation::default(), true);
     let (mut squares, mut raw_squares, mut lags, mut raw_lags) = (0.0, 0.0, 0.0, 0.0);
     let mut jolt = 0.0_f64;
@@ -355,7 +365,7 @@ mod tests {
 
     #[test]
     fn the_default_controller_meets_the_papers_figures() {
-        let figures = judge(&ControllerSettings::default()).unwrap();
+        let figures = evaluate(&ControllerSettings::default()).unwrap();
         assert!(figures.stable && figures.rcm_p95_mm <= 0.34, "{figures:?}");
         assert!(figures.tracking_rms_mm <= 0.048 && figures.droop_mm <= 0.26, "{figures:?}");
         assert!((figures.command_lag_s - 1.0 / 30.0).abs() < 5e-3, "the reference's filter: {figures:?}");

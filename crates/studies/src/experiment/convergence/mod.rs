@@ -1,12 +1,16 @@
-//! How fast solvers converge: one substep of each scene from the same state with more and more iterations, against the oracle's minimum.
+//! How fast solvers converge: one substep of each scene from the same state with more and more
+//! iterations, against the oracle's minimum.
 
-use super::step_ladder::{self, StepRow};
+mod step_ladder;
+
 use crate::names::kilopascals;
 use crate::study::{Job, Kind, Study};
+use crate::trials::Outcomes;
 use crate::{Error, Result};
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use step_ladder::StepRow;
 use trocar_core::Progress;
 use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
@@ -16,13 +20,12 @@ use trocar_report::table::{count, fixed};
 use trocar_testing::scenes::{Organs, SCENES, Scene, material};
 use trocar_workflow::SOLVERS;
 
-/// The folder of finished cases in it.
-const CASES: &str = "cases";
-
-/// How near each iteration comes to the exact step: scenes, moduli and Poisson ratios, over iterations and over time.
+/// How near each iteration comes to the exact step: scenes, moduli and Poisson ratios, over
+/// iterations and over time.
 #[derive(Clone, Debug, Args)]
 pub struct ConvergenceExperiment {
-    /// Gmsh file (.msh, in metres, z up) with organs, of which the appendix is used; our own appendix by default.
+    /// Gmsh file (.msh, in metres, z up) with organs, of which the appendix is used; our own
+    /// appendix by default.
     #[arg(long, value_name = "FILE", conflicts_with = "tets")]
     pub mesh: Option<PathBuf>,
     /// Elements of our own appendix, about.
@@ -31,7 +34,7 @@ pub struct ConvergenceExperiment {
     /// Scenes (sag, drag, shake, tube, fall); all by default.
     #[arg(long = "scene")]
     pub scenes: Vec<String>,
-    /// Young's moduli [kPa].
+    /// Young's moduli (kPa).
     #[arg(long = "young", value_delimiter = ',', value_parser = kilopascals, default_value = "3,12,48")]
     pub young_moduli: Vec<f64>,
     /// Poisson's ratios.
@@ -47,7 +50,7 @@ pub struct ConvergenceExperiment {
 pub struct ConvergenceCase {
     /// The scene.
     pub scene: String,
-    /// Young's modulus [kPa].
+    /// Young's modulus (kPa).
     pub young_kpa: f64,
     /// Poisson's ratio.
     pub poisson: f64,
@@ -72,18 +75,10 @@ pub struct ConvergenceResult {
     pub nodes: usize,
     /// Cases that an earlier run had finished.
     pub reused: usize,
-    /// Wall time of this run [s].
+    /// Wall time of this run (s).
     pub seconds: f64,
     /// The report's path.
     pub report: String,
-}
-
-/// A finished case on disk.
-#[derive(Serialize, Deserialize)]
-struct Finished {
-    /// What it depends on besides its scene and material.
-    settings: String,
-    case: ConvergenceCase,
 }
 
 impl Study for ConvergenceExperiment {
@@ -103,41 +98,24 @@ impl Study for ConvergenceExperiment {
             None => Organs::analytic_appendix(self.tets)?,
         };
         job.claim()?;
-        let folder = job.output().join(CASES);
-        std::fs::create_dir_all(&folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
-        let settings = self.settings(&organs)?;
-        let total = scenes.len() * self.young_moduli.len() * self.poisson_ratios.len();
-        job.progress.begin("cases", total as u64);
-        let (mut cases, mut reused) = (Vec::with_capacity(total), 0);
+        let mut materials = Vec::new();
         for scene in &scenes {
             for young in &self.young_moduli {
-                for poisson in &self.poisson_ratios {
-                    let path = folder.join(format!("{scene}-{}kPa-{poisson}.json", young / 1e3));
-                    let case = match earlier(&path, &settings) {
-                        Some(case) => {
-                            reused += 1;
-                            case
-                        }
-                        None => {
-                            let case = self.case(&organs, scene, *young, *poisson, job.progress)?;
-                            let finished = Finished { settings: settings.clone(), case };
-                            write_json(&path, &finished)?;
-                            finished.case
-                        }
-                    };
-                    cases.push(case);
-                    job.progress.advance(1);
-                }
+                materials.extend(self.poisson_ratios.iter().map(|poisson| (scene.as_str(), *young, *poisson)));
             }
         }
-        job.progress.end();
+        let key = |(scene, young, poisson): &(&str, f64, f64)| format!("{scene}, {} kPa, {poisson}", young / 1e3);
+        // One case after the other: their times are measured.
+        let one = |case: &(&str, f64, f64), progress: &dyn Progress| self.case(&organs, *case, progress);
+        let Outcomes { rows: cases, resumed } =
+            job.trials("cases", &self.settings(&organs)?, &materials, key, 1, one)?;
         let result = ConvergenceResult {
             cases,
             schedules: SOLVERS.map(str::to_owned).into(),
             mesh: organs.source.clone(),
             tets: organs.tets(),
             nodes: organs.nodes(),
-            reused,
+            reused: resumed.trials,
             seconds: job.seconds(),
             report: job.report(),
         };
@@ -150,9 +128,7 @@ impl ConvergenceExperiment {
     fn case(
         &self,
         organs: &Organs,
-        scene: &str,
-        young: f64,
-        poisson: f64,
+        (scene, young, poisson): (&str, f64, f64),
         progress: &dyn Progress,
     ) -> Result<ConvergenceCase> {
         let made = Scene::named(scene, organs, material(young, poisson))
@@ -171,31 +147,16 @@ impl ConvergenceExperiment {
         let schedules =
             SOLVERS.iter().map(|s| trocar_workflow::solver_named(s)).collect::<std::result::Result<Vec<_>, _>>()?;
         Ok(format!(
-            "{} with {} nodes and {} tets, to {} iterations, {schedules:?}, version {}",
+            "{} with {} nodes and {} tets, to {} iterations, {schedules:?}",
             organs.source,
             organs.nodes(),
             organs.tets(),
-            self.most_iterations,
-            env!("CARGO_PKG_VERSION")
+            self.most_iterations
         ))
     }
 }
 
-/// A case that an earlier run finished with the same settings.
-fn earlier(path: &PathBuf, settings: &str) -> Option<ConvergenceCase> {
-    let finished: Finished = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
-    (finished.settings == settings).then_some(finished.case)
-}
-
-/// Writes beside the place and moves there, so that an interruption leaves no half of it.
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let bytes = serde_json::to_vec_pretty(value).map_err(|e| Error::Format(e.to_string()))?;
-    let beside = path.with_extension("part");
-    super::write(&beside, &bytes)?;
-    std::fs::rename(&beside, path).map_err(|source| Error::Io { path: path.to_owned(), source })
-}
-
-/// The material drawn in full colour: Young's modulus [kPa] and Poisson's ratio.
+/// The material drawn in full colour: Young's modulus (kPa) and Poisson's ratio.
 const BASE: (f64, f64) = (12.0, 0.45);
 
 /// What a scene is.
@@ -235,9 +196,9 @@ fn document(result: &ConvergenceResult) -> Result<Document> {
 
 fn plots(result: &ConvergenceResult, cases: &[&ConvergenceCase], mut section: Section) -> Result<Section> {
     type Value = fn(&StepRow) -> f64;
-    let over: [(&'static str, Value); 2] = [("iterations", |r| r.iterations as f64), ("wall time [ms]", |r| r.wall_ms)];
+    let over: [(&'static str, Value); 2] = [("iterations", |r| r.iterations as f64), ("wall time (ms)", |r| r.wall_ms)];
     let errors: [(&'static str, &'static str, Value); 2] = [
-        ("Position error", "RMS [\u{b5}m]", |r| r.position_error_um),
+        ("Position error", "RMS (\u{b5}m)", |r| r.position_error_um),
         ("Energy error", "over the predictor's", |r| r.energy_error.unwrap_or(f64::NAN)),
     ];
     for (title, y, error) in errors {
@@ -246,8 +207,7 @@ fn plots(result: &ConvergenceResult, cases: &[&ConvergenceCase], mut section: Se
             if lines.iter().all(|l| l.points.iter().all(|p| !p.1.is_finite())) {
                 continue;
             }
-            let plot =
-                Plot { title, x, y, lines, bands: vec![], show: vec![], limits: vec![], log_x: true, log_y: true };
+            let plot = Plot { title, x, y, lines, log_x: true, log_y: true, ..Plot::default() };
             let legend = result.schedules.iter().enumerate().map(|(k, name)| (name.as_str(), colors::organ(k)));
             section = section.plot(&plot, &format!("<b>{title}</b> over {x}.{}", page::legend(legend)))?;
         }
@@ -270,7 +230,7 @@ fn lines(
             let color = if full { colors::organ(k) } else { colors::mix(colors::organ(k), [150, 156, 162], 0.72) };
             for case in cases.iter().filter(|c| is_base(c) == full) {
                 let rows = case.rows.iter().filter(|r| r.schedule == *name);
-                lines.push(Line { points: rows.map(|r| (along(r), error(r))).collect(), color, filled: false });
+                lines.push(Line::new(rows.map(|r| (along(r), error(r))).collect(), color));
             }
         }
     }
@@ -286,12 +246,12 @@ fn failures(cases: &[&ConvergenceCase]) -> Vec<String> {
 fn own(result: &ConvergenceResult) -> Section {
     let head = [
         "Scene",
-        "E [kPa]",
+        "E (kPa)",
         "nu",
         "Schedule",
         "Iterations",
         "ms",
-        "RMS error [\u{b5}m]",
+        "RMS error (\u{b5}m)",
         "over displacement",
         "Energy",
         "Inverted",
