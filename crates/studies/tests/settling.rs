@@ -1,4 +1,4 @@
-//! Phantom B, which in the paper still moves at 0.136 m/s, comes to rest within a second.
+//! Phantom B, which moves at 0.136 m/s in the paper, comes to rest within a second.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use trocar_core::Silent;

@@ -1,8 +1,8 @@
-//! What a whole cell costs: two arms, two instruments, all organs, moving, no cameras.
+//! Speed of a whole cell: two arms, two instruments, all organs in motion, no cameras.
 //!
-//! The left arm does the scripted grasp-lift while the right arm swings in its port. A second cell
-//! in which organs pass through each other gets the same actions, period beside period, so that the
-//! cost of contact between organs is the difference.
+//! The left arm performs the scripted grasp-lift; the right arm swings in its port. A second cell
+//! without contact between organs gets the same actions, alternating with the first. The difference
+//! is the cost of that contact.
 
 use super::machine::Machine;
 use crate::Result;
@@ -22,7 +22,7 @@ use trocar_task::{Episode, Policy, SETTLE_S};
 use trocar_workflow::scene_specimen;
 use trocar_workflow::specimen_scene::{grasp_lift, task_organ};
 
-/// How the right arm swings: amplitude of its pivots (rad) and its frequency (Hz).
+/// Swing of the right arm: amplitude of the pivots (rad), frequency (Hz).
 const SWING: (f64, f64) = (0.1, 0.5);
 
 /// Speed of the whole two-arm cell, and the cost of its parts.
@@ -39,36 +39,36 @@ pub struct CellBench {
     pub threads: usize,
 }
 
-/// The benchmark's outcome. Times are means over control periods, in milliseconds of wall time.
+/// Figures of the benchmark. Times are means over control periods (ms of wall time).
 #[derive(Clone, Debug, Serialize)]
 pub struct CellBenchResult {
-    /// Simulated over wall time of the whole cell, from the settling on.
+    /// Simulated over wall time of the whole cell, after settling.
     pub real_time_factor: f64,
-    /// The same if organs passed through each other.
+    /// The same without contact between organs.
     pub real_time_factor_without_organ_contact: f64,
-    /// Controllers, ports and dynamics of the arms.
+    /// Controllers, ports and dynamics of the arms (ms).
     pub arms_ms: f64,
-    /// Contact of organs with each other: tissue with it less tissue without.
+    /// Contact between organs: tissue with it minus tissue without it (ms).
     pub contact_ms: f64,
-    /// Tissue without that: elasticity, supports, contact with the instruments, grasp.
+    /// Tissue without that contact: elasticity, supports, contact with instruments, grasp (ms).
     pub tissue_ms: f64,
-    /// All else: jaws, mouths, observations.
+    /// The rest: jaws, grasp detection, observations (ms).
     pub rest_ms: f64,
-    /// A control period, median.
+    /// Median of a control period (ms).
     pub median_ms: f64,
-    /// The slowest.
+    /// Slowest control period (ms).
     pub worst_ms: f64,
-    /// Length of a control period (ms).
+    /// Simulated length of a control period (ms).
     pub period_ms: f64,
-    /// Control periods that were timed.
+    /// Number of timed control periods.
     pub periods: usize,
-    /// The lift held.
+    /// Whether the grasper held the tissue at the end.
     pub attached: bool,
-    /// Organs.
+    /// Number of organs.
     pub organs: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
     /// Worker threads.
     pub threads: usize,
@@ -114,8 +114,7 @@ impl Study for CellBench {
                     swing(&mut action, right, episode.time());
                 }
                 let before = episode.cell().timing().all;
-                // Each first in every second period, so that what disturbs the machine disturbs
-                // both.
+                // The order alternates, so that disturbances of the machine affect both.
                 if times.len().is_multiple_of(2) {
                     episode.step(&action)?;
                     apart.step(&action)?;
@@ -159,10 +158,10 @@ impl Study for CellBench {
     }
 }
 
-/// The right arm's numbers of an action, which are the second five.
+/// Sets the two pivots of the right arm, which are entries 5 and 6 of an action.
 fn swing(action: &mut Action, at: &Setpoint, time: f64) {
     let phase = std::f64::consts::TAU * SWING.1 * time;
-    // It swings up from its start, away from the tissue and back.
+    // Upwards from the start, away from the tissue, and back.
     let turned = [at.0[0] + SWING.0 * phase.sin(), at.0[1] + 0.5 * SWING.0 * (1.0 - phase.cos())];
     if let Some(numbers) = action.numbers.get_mut(5..7) {
         numbers.copy_from_slice(&turned);
@@ -174,7 +173,7 @@ fn document(r: &CellBenchResult) -> Document {
         "",
         "times real time",
         "arms (ms)",
-        "contact of organs (ms)",
+        "organ contact (ms)",
         "tissue (ms)",
         "rest (ms)",
         "median (ms)",
@@ -183,10 +182,10 @@ fn document(r: &CellBenchResult) -> Document {
     let times = [r.arms_ms, r.contact_ms, r.tissue_ms, r.rest_ms, r.median_ms, r.worst_ms].map(|ms| fixed(ms, 2));
     let rows = vec![
         ["whole cell".to_owned(), fixed(r.real_time_factor, 2)].into_iter().chain(times).collect(),
-        vec!["without contact of organs".to_owned(), fixed(r.real_time_factor_without_organ_contact, 2)],
+        vec!["without contact between organs".to_owned(), fixed(r.real_time_factor_without_organ_contact, 2)],
     ];
     let line = format!(
-        "a control period lasts {} ms; {} periods, {} organs, {} nodes, {} tets; the lift {}; {} threads on {}",
+        "control period {} ms; {} periods, {} organs, {} nodes, {} tets; the lift {}; {} threads on {}",
         fixed(r.period_ms, 1),
         r.periods,
         r.organs,

@@ -1,11 +1,10 @@
-//! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole
-//! specimen with all contact, and without, frame beside frame.
+//! Cost of contact: the grasp-lift of a whole specimen with contact and without, frame by frame.
 //!
-//! Without contact there are two runs. In one nothing takes its place: jaws pass through tissue
-//! that stays at rest, and what is saved is contact and all motion that it causes. In the other
-//! every frame starts where the run with contact started it, and every node gets the force that
-//! contact did to it at the frame's end, so that tissue moves alike: what is saved is contact alone
-//! (finding it, its forces, and the iterations that its stiffness costs).
+//! Two runs have no contact. In the first nothing replaces it: the jaws pass through tissue at
+//! rest, so the difference is contact and all motion that it causes. In the second each frame
+//! starts from the state of the run with contact, and each node gets the force that contact had at
+//! the end of the frame. The tissue moves alike, so the difference is contact alone: detection,
+//! forces, and the iterations that its stiffness costs.
 
 use super::machine::Machine;
 use crate::names::{AppendixChoice, DesignName, design_name};
@@ -23,10 +22,10 @@ use trocar_task::{Episode, Policy, SETTLE_S};
 use trocar_workflow::Lift;
 use trocar_workflow::specimen_scene::{free_scene, task_organ};
 
-/// Phases that are timed: those in which the jaws are near the tissue.
+/// The timed phases: those with the jaws near the tissue.
 const PHASES: [&str; 6] = ["enter", "close", "lift", "hold", "lower", "open"];
 
-/// Most repetitions.
+/// Maximum of `--repeats`.
 const MAX_REPEATS: usize = 1000;
 
 /// Cost of contact with the gripper in a grasp-lift of all organs.
@@ -49,63 +48,59 @@ pub struct GraspBench {
     pub threads: usize,
 }
 
-/// One phase.
+/// Times of one phase.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraspPhaseTiming {
-    /// Its name; "all" for all of them.
+    /// Name of the phase; "all" for all phases.
     pub phase: &'static str,
-    /// Frames timed, of each run.
+    /// Timed frames of each run.
     pub frames: usize,
     /// Median wall time of a frame with contact (ms).
     pub with_contact_ms: f64,
-    /// The same without, under the forces that contact did (ms).
+    /// The same without contact, with its forces (ms).
     pub same_motion_ms: f64,
-    /// How far a node was from where contact had it after a frame under contact's forces, median
-    /// over the frames (mm).
+    /// Largest distance of a node between the two after a frame, median over the frames (mm).
     pub same_motion_off_mm: f64,
-    /// The same without contact and its forces (ms).
+    /// The same without contact and without its forces (ms).
     pub without_contact_ms: f64,
-    /// Mean number of the solver's iterations in a frame with contact, of all organs and substeps.
+    /// Mean solver iterations per frame with contact, over all organs and substeps.
     pub with_contact_iterations: f64,
-    /// The same without, under the forces that contact did.
+    /// The same without contact, with its forces.
     pub same_motion_iterations: f64,
-    /// The same without contact and its forces.
+    /// The same without contact and without its forces.
     pub without_contact_iterations: f64,
-    /// The slowest frame with contact (ms).
+    /// Slowest frame with contact (ms).
     pub worst_ms: f64,
-    /// Share of the time with contact that contact costs: more than the same motion without, from
-    /// the sums over the frames.
+    /// Share of contact in the time with contact: 1 minus the time of the same motion over it.
     pub own_share: f64,
-    /// Share of it that contact and all motion it causes cost: more than without contact and its
-    /// forces.
+    /// Share of contact and the motion it causes: 1 minus the time without contact over it.
     pub contact_share: f64,
 }
 
-/// The benchmark's outcome.
+/// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraspBenchResult {
-    /// 1/60 s over the median wall time of a frame with contact, all phases in which the gripper is
-    /// near.
+    /// 1/60 s over the median wall time of a frame with contact, in all timed phases.
     pub real_time_factor: f64,
-    /// The same without contact and its forces.
+    /// The same without contact and without its forces.
     pub real_time_factor_without_contact: f64,
-    /// Share of the time that contact costs: more than the same motion without.
+    /// Share of contact in the time with contact.
     pub own_share: f64,
-    /// Share of it that contact and all motion it causes cost.
+    /// Share of contact and the motion it causes.
     pub contact_share: f64,
-    /// Phase by phase, and all of them first.
+    /// All phases together, then each phase.
     pub phases: Vec<GraspPhaseTiming>,
-    /// The grasp design's name.
+    /// Name of the grasp design.
     pub design: &'static str,
-    /// It held, with contact.
+    /// Whether the lift with contact held.
     pub held: bool,
-    /// Organs.
+    /// Number of organs.
     pub organs: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
-    /// Times that they were run.
+    /// Repetitions.
     pub repeats: usize,
     /// Worker threads.
     pub threads: usize,
@@ -118,7 +113,7 @@ struct Frames {
     phase: &'static str,
     with: Frame,
     same_motion: Frame,
-    /// How far a node of the same motion was from where contact had it, at most (m).
+    /// Largest distance of a node between the same motion and the run with contact (m).
     off: f64,
     without: Frame,
 }
@@ -128,12 +123,12 @@ struct Frames {
 struct Frame {
     /// Wall time of the tissue (s).
     seconds: f64,
-    /// The solver's iterations.
+    /// Solver iterations.
     iterations: usize,
 }
 
 impl Frame {
-    /// The frames of a cell between two readings of its clock.
+    /// The difference between two readings of a cell's timing.
     fn between(before: Timing, after: Timing) -> Self {
         let seconds = (after.tissue - before.tissue).as_secs_f64();
         Self { seconds, iterations: after.iterations - before.iterations }
@@ -158,7 +153,7 @@ impl Study for GraspBench {
         let lift = Lift { design: Some(design), jaw_force: Some(self.jaw_force), ..Lift::default() };
         let organ = task_organ(&specimen, None)?;
         let mut scene = lift.arrange(free_scene(&specimen, &folder, organ, false)?)?;
-        // One tissue frame a control period, so that frames can be compared.
+        // One tissue frame per control period, so that frames can be compared.
         scene.rates.control_hz = 60;
         let (mut times, mut held) = (Vec::new(), false);
         let mut with = Episode::new(&scene, &specimen, self.threads)?;
@@ -170,7 +165,7 @@ impl Study for GraspBench {
             with.reset(0)?;
             let mut policy = Scripted::following(lift.script);
             let periods = scene.task.episode_s / with.cell().period();
-            progress.begin("three runs side by side", periods.round() as u64);
+            progress.begin("three runs", periods.round() as u64);
             times.extend(together(&mut with, &mut policy, [&mut same, &mut without], progress)?);
             progress.end();
             held = with.summary().held;
@@ -198,7 +193,8 @@ impl Study for GraspBench {
     }
 }
 
-/// Steps the runs frame by frame in changing order, so that what disturbs the machine disturbs all.
+/// Steps the runs frame by frame in alternating order, so that disturbances of the machine affect
+/// all.
 fn together(
     with: &mut Episode,
     policy: &mut Scripted,
@@ -283,8 +279,8 @@ fn document(r: &GraspBenchResult) -> Document {
         "Frames",
         "Contact (ms)",
         "Same motion (ms)",
-        "Off (mm)",
-        "Nothing (ms)",
+        "Distance (mm)",
+        "No contact (ms)",
         "Iterations",
         "Worst (ms)",
         "Own share",
@@ -306,7 +302,7 @@ fn document(r: &GraspBenchResult) -> Document {
         ]
     };
     let lines = [
-        "Same motion: every frame again without contact but with its forces. Nothing: no contact, no forces."
+        "Same motion: each frame again without contact but with its forces. No contact: without contact and its forces."
             .to_owned(),
         format!(
             "{}x real time with contact, {}x without; {} grasp, {}; {} organs, {} nodes, {} tets; {} threads on {}",
@@ -321,7 +317,7 @@ fn document(r: &GraspBenchResult) -> Document {
             r.machine.described()
         ),
     ];
-    Document::new("Grasp", "What contact with the gripper costs")
+    Document::new("Grasp", "Cost of contact with the gripper")
         .with(Section::new("Phases", "").table(Table::new(head, r.phases.iter().map(row).collect())).lines(lines))
 }
 
@@ -330,7 +326,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_share_is_of_the_time_with_contact() {
+    fn shares_are_of_the_time_with_contact() {
         let frame = |seconds| Frame { seconds, iterations: 8 };
         let frames = |phase, [with, same_motion, without]: [f64; 3]| Frames {
             phase,

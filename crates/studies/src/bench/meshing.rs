@@ -1,10 +1,10 @@
-//! What meshing costs: the lattice mesher from ten thousand to a million elements, and side by side
-//! with TetGen and fTetWild.
+//! Cost of meshing: the lattice mesher from ten thousand to a million elements, and beside TetGen
+//! and fTetWild.
 
 use super::pytetwild::PytetwildMesher;
+use crate::Result;
 use crate::names::Units;
 use crate::study::{Job, Kind, Study, stop_if_asked};
-use crate::Result;
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -17,22 +17,22 @@ use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
 use trocar_testing::scenes::ellipsoid;
 
-/// Half axes of the body that is meshed where no surface is named (m): 815 cm3, the paper's liver.
+/// Half axes of the default body (m): an ellipsoid of 815 cm3, the volume of the paper's liver.
 const LIVER: [f64; 3] = [0.105, 0.064, 0.029];
 
 /// The lattice mesher from ten thousand to a million elements, and beside TetGen and fTetWild.
 #[derive(Clone, Debug, Args)]
 pub struct MeshingBench {
-    /// Closed surfaces (.stl, .ply, .obj); an ellipsoid of a liver's size by default. The first is
-    /// the one meshed finer and finer.
+    /// Closed surfaces (.stl, .ply, .obj); by default an ellipsoid of the size of a liver. The
+    /// first is also meshed at all sizes.
     pub surfaces: Vec<PathBuf>,
     /// Unit of the surface files.
     #[arg(long, value_enum, default_value_t = Units::Mm)]
     pub units: Units,
-    /// Numbers of elements to aim at.
+    /// Target numbers of elements.
     #[arg(long, value_delimiter = ',', default_values_t = [10_000, 30_000, 100_000, 300_000, 1_000_000])]
     pub sizes: Vec<usize>,
-    /// Python that has the package pytetwild.
+    /// Python with the package pytetwild.
     #[arg(long, default_value = "python3")]
     pub python: PathBuf,
 }
@@ -40,13 +40,13 @@ pub struct MeshingBench {
 /// One mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshingRow {
-    /// The surface's name.
+    /// Name of the surface.
     pub surface: String,
-    /// `size` for the series over element counts, `peers` for the comparison.
+    /// `size` for the series over sizes, `peers` for the comparison of meshers.
     pub series: &'static str,
     /// The mesher and its settings.
     pub mesher: String,
-    /// Why there is no mesh; the figures are then 0.
+    /// Why meshing failed; then the figures are 0.
     pub failure: Option<String>,
     /// Nodes.
     pub nodes: usize,
@@ -62,24 +62,24 @@ pub struct MeshingRow {
     pub median_dihedral_deg: f64,
     /// Largest dihedral angle (degrees).
     pub max_dihedral_deg: f64,
-    /// Elements with volume at or below 0.
+    /// Number of inverted elements.
     pub inverted: usize,
     /// Median edge (mm).
     pub median_edge_mm: f64,
-    /// Volume over that of the surface, minus 1.
+    /// Volume of the mesh over that of the surface, minus 1.
     pub volume_error: f64,
 }
 
-/// The benchmark's outcome.
+/// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshingResult {
-    /// Every mesh.
+    /// All meshes.
     pub rows: Vec<MeshingRow>,
-    /// Time per element at the largest size over that at the smallest: 1 when the cost is linear.
+    /// Time per element at the largest size over that at the smallest: 1 if the cost is linear.
     pub linearity: Option<f64>,
     /// Worker threads.
     pub threads: usize,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
@@ -123,7 +123,7 @@ impl Study for MeshingBench {
 }
 
 impl MeshingBench {
-    /// The surfaces by name, repaired if need be.
+    /// The surfaces with their names, repaired if necessary.
     fn surfaces(&self) -> Result<Vec<(String, TriMesh)>> {
         if self.surfaces.is_empty() {
             return Ok(vec![("ellipsoid of 815 cm3".into(), ellipsoid(LIVER.into(), 3e-3))]);

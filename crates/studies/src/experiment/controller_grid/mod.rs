@@ -1,5 +1,5 @@
-//! The controller, chosen out of 182 configurations as the paper's was (SPEC K4): seven kinds,
-//! thirteen bandwidths, two damping ratios.
+//! The arms' controller, chosen from 182 configurations as in the paper: seven kinds, thirteen
+//! bandwidths, two damping ratios.
 
 mod motion;
 mod page;
@@ -10,11 +10,11 @@ use crate::study::{Job, Kind, Study};
 use crate::trials::Outcomes;
 use clap::Args;
 use motion::{evaluate, trace};
-use result::{BARS, ControllerGridResult, ControllerRow, MARGIN};
+use result::{ControllerGridResult, ControllerRow, MARGIN, TARGETS};
 use trocar_report::document::Document;
 use trocar_robot::manipulator::{ControllerSettings, Law};
 
-/// Kinds: a law, its integral action's or observer's bandwidth (rad/s).
+/// Kinds: law, and bandwidth of its integral action or observer (rad/s).
 const KINDS: [(Law, f64); 7] = [
     (Law::JointImpedance, 0.0),
     (Law::ComputedTorque, 0.0),
@@ -28,15 +28,14 @@ const KINDS: [(Law, f64); 7] = [
 const BANDWIDTHS: [f64; 13] = [15.0, 20.0, 25.0, 30.0, 40.0, 50.0, 60.0, 80.0, 100.0, 120.0, 150.0, 190.0, 240.0];
 /// Damping ratios.
 const DAMPINGS: [f64; 2] = [0.7, 1.0];
-/// One step in so many is kept of the chosen one's run.
+/// Every fourth step of the chosen controller's run is recorded.
 const EVERY: usize = 4;
 
-/// The arms' controller chosen out of 182 configurations: RCM deviation, tracking and droop under a
+/// The arms' controller chosen from 182 configurations: RCM deviation, tracking and droop with a
 /// wrong model and friction.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct ControllerGridExperiment {
-    /// Configurations at once; as many as the machine has threads by default. The figures do not
-    /// depend on it.
+    /// Configurations in parallel; all threads by default. The figures do not depend on it.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
 }
@@ -87,19 +86,21 @@ fn row(s: &ControllerSettings) -> Result<ControllerRow> {
     })
 }
 
-/// The place of the configuration that is chosen.
+/// Index of the chosen configuration: the lowest bandwidth, then the best, of those with the
+/// margin.
 fn choose(rows: &[ControllerRow]) -> Option<usize> {
-    let good = |k: &usize| rows[*k].share_of_bars() <= 1.0 - MARGIN;
+    let good = |k: &usize| rows[*k].share_of_targets() <= 1.0 - MARGIN;
     (0..rows.len()).filter(good).min_by(|&a, &b| {
         let (a, b) = (&rows[a], &rows[b]);
-        a.bandwidth.total_cmp(&b.bandwidth).then(a.share_of_bars().total_cmp(&b.share_of_bars()))
+        a.bandwidth.total_cmp(&b.bandwidth).then(a.share_of_targets().total_cmp(&b.share_of_targets()))
     })
 }
 
 impl Study for ControllerGridExperiment {
     const NAME: &'static str = "controller-grid";
     const KIND: Kind = Kind::Experiment;
-    const FOLDER: Option<&'static str> = Some("Folder for the report; finished configurations in it are used again.");
+    const FOLDER: Option<&'static str> =
+        Some("Output folder of the report. Finished configurations in it are used again.");
     type Figures = ControllerGridResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(ControllerGridResult, Document)> {
@@ -123,9 +124,9 @@ impl Study for ControllerGridExperiment {
             chosen_with_own_friction: chosen.map(own).transpose()?,
             chosen_is_default: chosen.is_some_and(|k| key(&grid[k]) == key(&ControllerSettings::default())),
             chosen: chosen.map(|k| rows[k].clone()),
-            bars: BARS,
+            bars: TARGETS,
             stable: rows.iter().filter(|r| r.figures.stable).count(),
-            within_bars: rows.iter().filter(|r| r.share_of_bars() <= 1.0).count(),
+            within_bars: rows.iter().filter(|r| r.share_of_targets() <= 1.0).count(),
             rows,
             trace: shown,
             plain_trace: plain,
@@ -144,7 +145,7 @@ mod tests {
     use crate::trials::Resumed;
     use motion::{ControllerFigures, ControllerInstant};
 
-    /// A result of made-up rows.
+    /// A made-up result.
     fn made_up_result() -> ControllerGridResult {
         let row = |k: usize, s: &ControllerSettings| {
             let size = 1.0 + k as f64;
@@ -182,7 +183,7 @@ mod tests {
             chosen,
             chosen_is_default: false,
             chosen_with_own_friction: None,
-            bars: BARS,
+            bars: TARGETS,
             stable: 181,
             within_bars: 150,
             trace: (0..400).map(instant).collect(),
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn there_are_182_and_no_two_are_one() {
+    fn there_are_182_different_configurations() {
         let mut keys: Vec<String> = grid().iter().map(key).collect();
         keys.sort();
         keys.dedup();
@@ -205,22 +206,22 @@ mod tests {
     }
 
     #[test]
-    fn the_softest_with_something_in_hand_is_chosen() {
+    fn the_lowest_bandwidth_with_the_margin_is_chosen() {
         let r = made_up_result();
         let chosen = r.chosen.unwrap();
-        assert!(chosen.share_of_bars() <= 1.0 - MARGIN);
-        for row in r.rows.iter().filter(|row| row.share_of_bars() <= 1.0 - MARGIN) {
+        assert!(chosen.share_of_targets() <= 1.0 - MARGIN);
+        for row in r.rows.iter().filter(|row| row.share_of_targets() <= 1.0 - MARGIN) {
             assert!(row.bandwidth >= chosen.bandwidth);
         }
-        assert!(r.rows[5].share_of_bars().is_infinite(), "unstable");
+        assert!(r.rows[5].share_of_targets().is_infinite(), "unstable");
         assert_eq!(choose(&r.rows[..4]), None);
     }
 
     #[test]
-    fn the_chosen_stands_beside_the_papers() {
+    fn the_page_shows_the_papers_figures() {
         let html = page::document(&made_up_result()).unwrap().page();
         assert_eq!(html.matches("<svg").count(), 4);
-        assert!(html.contains("182 configurations") && html.contains("the paper: 0.34 mm") && !html.contains("NaN"));
+        assert!(html.contains("182 configurations") && html.contains("paper 0.34 mm") && !html.contains("NaN"));
         assert_eq!(html.matches("card good").count(), 3);
         assert!(html.contains("Tracking against the command") && html.contains("1.137 N m"));
     }

@@ -11,18 +11,21 @@ use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{fixed, percent};
 use trocar_robot::manipulator::Law;
 
-/// Rows of the table.
+/// Number of rows of the table.
 const BEST: usize = 10;
-/// Half the size of a mark, as a share of its value.
+/// Half the size of a marker, as a share of its value.
 const MARK: f64 = 0.025;
-/// What of the run the response shows (s).
+/// Time range of the response plot (s).
 const RESPONSE: (f64, f64) = (0.9, 2.6);
 
 pub(super) fn document(r: &ControllerGridResult) -> Result<Document> {
     let lead = format!(
-        "{} configurations: seven kinds of control, thirteen bandwidths, two damping ratios. Each sends both arms of the cell through the same motion: corners, \
-         sines, 1\u{202f}N on the tip, rest; then it is knocked with 25\u{202f}N and told to leap; with links believed 2% and instruments 5% lighter than they are and 0.2\u{202f}N\u{202f}m of unknown friction in every joint, in place of the arm\u{2019}s own. \
-         Chosen is the softest with {} of every bar in hand: nothing in this plant (no noise of sensors, no give in the gears) charges for bandwidth, a real arm does.",
+        "{} configurations: seven kinds of control, thirteen bandwidths, two damping ratios. Both arms of the cell perform \
+         the same motion with each: corners, \
+         sines, 1\u{202f}N on the tip, rest, then impulses of 25\u{202f}N and steps of the command. The model assumes links \
+         2% and instruments 5% too light and no friction; every joint has 0.2\u{202f}N\u{202f}m instead of the arm\u{2019}s own. \
+         The lowest bandwidth that is {} below every target is chosen: this simulation has no sensor noise and no gear \
+         compliance, which limit the bandwidth of a real arm.",
         r.rows.len(),
         percent(MARGIN, 0)
     );
@@ -32,7 +35,7 @@ pub(super) fn document(r: &ControllerGridResult) -> Result<Document> {
         response(r)?,
         errors(r)?,
     ]);
-    let subtitle = "182 configurations on the same motion, and the one that is chosen";
+    let subtitle = "182 configurations on the same motion, and the chosen one";
     Ok(Document::new("Controllers", subtitle).with(section).with(friction(r)).with(best(r)))
 }
 
@@ -49,14 +52,14 @@ fn cards(r: &ControllerGridResult) -> Vec<Card> {
             if r.chosen_is_default { "the program\u{2019}s default" } else { "not the program\u{2019}s default" }
         );
         all.push(Card::new("Chosen", c.controller.clone(), gains));
-        let paper = |v: f64| format!("the paper: {v} mm");
+        let paper = |v: f64| format!("paper {v} mm");
         let note = paper(r.bars.rcm_p95_mm);
         all.push(Card::new("RCM deviation, p95", mm(f.rcm_p95_mm), note).met(f.rcm_p95_mm <= r.bars.rcm_p95_mm));
-        let note = format!("RMS, at the same time; {}", paper(r.bars.tracking_rms_mm));
+        let note = format!("RMS, without delay; {}", paper(r.bars.tracking_rms_mm));
         let met = f.tracking_rms_mm <= r.bars.tracking_rms_mm;
         all.push(Card::new("Tracking against the filtered reference", mm(f.tracking_rms_mm), note).met(met));
         let note = format!(
-            "RMS, at the same time; the command is held at 30 Hz and comes {} ms before the tip",
+            "RMS, without delay; the command is held at 30 Hz; the tip is {} ms behind it",
             fixed(1e3 * f.command_lag_s, 1)
         );
         all.push(Card::new("Tracking against the command", mm(f.command_rms_mm), note));
@@ -65,7 +68,7 @@ fn cards(r: &ControllerGridResult) -> Vec<Card> {
         let note = format!("behind the command, held at 30 Hz; {} ms behind the reference", fixed(1e3 * f.lag_s, 2));
         all.push(Card::new("Lag", format!("{} ms", fixed(1e3 * f.command_lag_s, 1)), note));
     }
-    let note = format!("knocked too; {} of them meet all bars", r.within_bars);
+    let note = format!("also under impulses; {} meet all targets", r.within_bars);
     all.push(Card::new("Stable", format!("{} of {}", r.stable, r.rows.len()), note));
     all
 }
@@ -75,7 +78,7 @@ fn color(controller: &str) -> [u8; 3] {
     colors::organ(Law::ALL.iter().position(|l| l.name() == controller).unwrap_or(7))
 }
 
-/// The plot has lines only: a mark on logarithmic axes is a cross of two short ones.
+/// A marker on logarithmic axes: a cross of two short lines, because plots have no markers.
 fn cross(x: f64, y: f64, size: f64, color: [u8; 3]) -> [Line; 2] {
     // The y axes span more decades on less length.
     let line = |points| Line::new(points, color);
@@ -83,7 +86,7 @@ fn cross(x: f64, y: f64, size: f64, color: [u8; 3]) -> [Line; 2] {
     [line(vec![(x * a, y), (x * b, y)]), line(vec![(x, y / tall), (x, y * tall)])]
 }
 
-/// All stable rows, one figure against another, with the chosen one and the paper's.
+/// Markers of all stable rows, the chosen one and the paper's point.
 fn marks(r: &ControllerGridResult, of: impl Fn(&ControllerRow) -> (f64, f64), paper: (f64, f64)) -> Vec<Line> {
     let mut lines = Vec::new();
     for row in r.rows.iter().filter(|row| row.figures.stable) {
@@ -101,7 +104,7 @@ fn marks(r: &ControllerGridResult, of: impl Fn(&ControllerRow) -> (f64, f64), pa
     lines
 }
 
-/// The paper's point.
+/// Colour of the paper's point.
 const PAPER: [u8; 3] = [200, 30, 40];
 
 fn legend(r: &ControllerGridResult) -> String {
@@ -121,7 +124,7 @@ fn scatter(r: &ControllerGridResult) -> Result<String> {
         log_y: true,
         ..Plot::default()
     };
-    let caption = format!("<b>All stable configurations</b>, the chosen one framed.{}", legend(r));
+    let caption = format!("<b>All stable configurations</b>; the chosen one has a frame.{}", legend(r));
     Ok(plot.figure(&caption)?)
 }
 
@@ -139,7 +142,7 @@ fn droops(r: &ControllerGridResult) -> Result<String> {
         log_y: true,
         ..Plot::default()
     };
-    let caption = "<b>Droop at rest</b> over the bandwidth; dashed the paper\u{2019}s. Without integral action or observer it falls with the stiffness.";
+    let caption = "<b>Droop at rest</b> over the bandwidth; dashed: the paper. Without integral action or observer it decreases with the stiffness.";
     Ok(plot.figure(caption)?)
 }
 
@@ -158,7 +161,7 @@ fn response(r: &ControllerGridResult) -> Result<String> {
     };
     let entries = names.iter().zip(colors).map(|(n, c)| (*n, c));
     let caption = format!(
-        "<b>The first move of the left arm</b>: the reference is a spline through the commands and behind them, the tip lies on it.{}",
+        "<b>The first move of the left arm</b>: the reference is a delayed spline through the commands; the tip follows it.{}",
         page::legend(entries)
     );
     Ok(plot.figure(&caption)?)
@@ -191,13 +194,13 @@ fn errors(r: &ControllerGridResult) -> Result<String> {
     Ok(plot.figure(&caption)?)
 }
 
-/// The chosen controller with the grid's friction and with the arm's own.
+/// The chosen controller with the friction of the grid and with that of the arm.
 fn friction(r: &ControllerGridResult) -> Section {
     let head = [
         "Friction in each joint",
         "RCM p95 (mm)",
         "Tracking against the reference (mm)",
-        "against the command (mm)",
+        "Tracking against the command (mm)",
         "Droop (mm)",
         "Stable",
     ];
@@ -215,15 +218,15 @@ fn friction(r: &ControllerGridResult) -> Section {
     let own = r.chosen_with_own_friction.iter().map(|f| row("the FR3\u{2019}s own, 1.137 and 0.763 N m", f));
     Section::new(
         "Friction",
-        "In the grid 0.2 N m in every joint take the place of the FR3\u{2019}s own Coulomb friction, which its model states as \
-         1.137 N m for joints 1 to 4 and 0.763 N m for joints 5 to 7. The chosen controller with both.",
+        "The grid uses 0.2 N m in every joint instead of the FR3\u{2019}s own Coulomb friction, which its model states as \
+         1.137 N m for joints 1 to 4 and 0.763 N m for joints 5 to 7. The table shows the chosen controller with both.",
     )
     .table(Table::new(head, grid.chain(own).collect()))
 }
 
 fn best(r: &ControllerGridResult) -> Section {
     let mut sorted: Vec<&ControllerRow> = r.rows.iter().collect();
-    sorted.sort_by(|a, b| a.share_of_bars().total_cmp(&b.share_of_bars()));
+    sorted.sort_by(|a, b| a.share_of_targets().total_cmp(&b.share_of_targets()));
     let chosen = r.chosen.iter().map(|c| ("chosen", c));
     let head = [
         "",
@@ -233,13 +236,13 @@ fn best(r: &ControllerGridResult) -> Section {
         "Correction (rad/s)",
         "RCM p95 (mm)",
         "Tracking against the reference (mm)",
-        "against the command (mm)",
+        "Tracking against the command (mm)",
         "Droop (mm)",
         "Lag (ms)",
-        "Knocked, RCM peak (mm)",
+        "RCM peak under impulses (mm)",
         "Peak torque (N m)",
-        "of its limit",
-        "Worst share of a bar",
+        "Peak torque over limit",
+        "Worst figure over target",
     ];
     let rows: Vec<Vec<String>> = chosen
         .chain(sorted.into_iter().take(BEST).map(|row| ("", row)))
@@ -259,11 +262,11 @@ fn best(r: &ControllerGridResult) -> Section {
                 fixed(f.rough_rcm_mm.unwrap_or(f64::NAN), 2),
                 fixed(f.torque_peak, 1),
                 percent(f.torque_share, 0),
-                percent(row.share_of_bars(), 0),
+                percent(row.share_of_targets(), 0),
             ]
         })
         .collect();
-    Section::new("The chosen and the best ten", "By their worst figure as a share of its bar.")
+    Section::new("The chosen and the best ten", "Sorted by the worst figure over its target.")
         .table(Table::new(head, rows))
         .lines(resumed(&r.resumed, "configurations"))
 }

@@ -25,17 +25,16 @@ const LIFTS: [f64; 2] = [0.015, 0.030];
 /// Young's moduli (Pa).
 const MODULI: [f64; 5] = [3e3, 6e3, 12e3, 24e3, 48e3];
 
-/// Pin rules, and the share of the lowest nodes along the whole organ that each pins besides the
-/// far end.
+/// Pin rules: name, and the share of the lowest nodes of the rest of the organ that is also pinned.
 const PINS: [(&str, f64); 2] = [("far-end", 0.0), ("far-end + band", 0.42)];
 
-/// Designs.
+/// Grasp designs.
 const DESIGNS: [GraspDesignName; 2] = [GraspDesignName::LivePose, GraspDesignName::Compliant];
 
 /// Organ coordinate of the grasp.
 const AT: f64 = 0.5;
 
-/// Scaled forces are the given one at this modulus (Pa).
+/// Modulus at which a scaled force equals the given force (Pa).
 const FORCE_AT: f64 = 12e3;
 
 /// Fig. 7(f): whether elements invert when the appendix is lifted by 15 and 30 mm, at five moduli and
@@ -127,7 +126,7 @@ impl ElementQualityExperiment {
 }
 
 impl Case<'_> {
-    /// Its name among all.
+    /// The unique name of the case.
     fn key(&self) -> String {
         let (condition, design) = (self.trial.condition.name(), self.trial.design_name());
         let (lift, force) = (self.trial.script.lift, if self.scaled { "scaled" } else { "one force" });

@@ -131,19 +131,19 @@ impl Setup {
     }
 }
 
-/// Grip locations: evenly over the part of the organ that can be grasped and lifted.
+/// Places at equal distances over the part of the organ that can be grasped and lifted.
 fn places(scene: &Scene, specimen: &Specimen) -> Result<Vec<f64>> {
     let cell = Cell::new(scene, specimen, 1)?;
     let bodies = cell.world().model.bodies();
     let organ = bodies.iter().position(|b| b.name() == scene.task.organ).unwrap_or(0);
     let clear: Vec<f64> = clusters(cell.world(), organ).iter().filter(|c| c.clear).map(|c| c.s).collect();
     let (Some(first), Some(last)) = (clear.first(), clear.last()) else {
-        return Err(Error::Mismatch("no part of the appendix is clear of pins; pin less of it".to_owned()));
+        return Err(Error::Mismatch("no part of the appendix is clear of pins; pin fewer nodes".to_owned()));
     };
     Ok((0..LOCATIONS).map(|k| first + (last - first) * k as f64 / (LOCATIONS - 1) as f64).collect())
 }
 
-/// A trial's name among all.
+/// The unique name of a trial.
 fn key(task: &LiftTrial) -> String {
     let (condition, design, script) = (task.condition.name(), design_name(task.design), &task.script);
     let (at, offset, drag) = (script.at, script.approach_offset, script.regrasp);

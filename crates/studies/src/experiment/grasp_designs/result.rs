@@ -11,28 +11,28 @@ use trocar_scene::GraspDesignName;
 pub(super) const DESIGNS: [GraspDesignName; 4] =
     [GraspDesignName::Friction, GraspDesignName::RestPose, GraspDesignName::LivePose, GraspDesignName::Compliant];
 
-/// Designs that grasp again.
+/// Designs with a second grasp.
 pub(super) const REGRASPS: [GraspDesignName; 3] =
     [GraspDesignName::RestPose, GraspDesignName::LivePose, GraspDesignName::Compliant];
 
 /// A row of the paper's Table II.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PaperGrasp {
-    /// Trials held.
+    /// Trials that held.
     pub held: usize,
     /// Trials.
     pub trials: usize,
     /// Trials that diverged.
     pub diverged: usize,
-    /// Lift (mm), median.
+    /// Median lift (mm).
     pub lift_mm: f64,
-    /// Slip (mm), median.
+    /// Median slip (mm).
     pub slip_mm: f64,
-    /// Snap (mm), least and greatest; none for friction.
+    /// Smallest and largest snap (mm); none for friction.
     pub snap_mm: Option<(f64, f64)>,
 }
 
-/// The paper's row for a design, again or not.
+/// The paper's row of a design, for the first or the second grasp.
 fn paper(design: GraspDesignName, regrasp: bool) -> Option<PaperGrasp> {
     let row = |held, trials, diverged, lift_mm, slip_mm, snap_mm| PaperGrasp {
         held,
@@ -55,25 +55,25 @@ fn paper(design: GraspDesignName, regrasp: bool) -> Option<PaperGrasp> {
 /// One trial.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GraspTrial {
-    /// In what the appendix was lifted.
+    /// The surroundings of the appendix.
     pub condition: Condition,
-    /// The design's name.
+    /// Name of the design.
     pub design: String,
-    /// Organ coordinate asked for.
+    /// Target organ coordinate.
     pub asked: f64,
     /// Organ coordinate of the grasped cluster.
     pub at: f64,
-    /// How far beside the appendix the jaws came (mm).
+    /// Sideways offset of the jaws (mm).
     pub offset_mm: f64,
-    /// How far it was dragged before (mm).
+    /// Drag before the grasp (mm); none for a first grasp.
     pub drag_mm: Option<f64>,
-    /// The jaws took hold of it.
+    /// Whether the jaws attached the appendix.
     pub attached: bool,
-    /// Follow ratio at least 0.80 and slip under 3 mm.
+    /// Whether it held: follow ratio at least 0.80 and slip under 3 mm.
     pub held: bool,
-    /// What ended it, if it diverged.
+    /// Why it diverged, if it did.
     pub divergence: Option<String>,
-    /// Why it did not pass, in one line.
+    /// Why it did not pass.
     pub why: Option<String>,
     /// Lift (mm).
     pub lift_mm: f64,
@@ -81,87 +81,86 @@ pub struct GraspTrial {
     pub follow_ratio: f64,
     /// Slip (mm).
     pub slip_mm: f64,
-    /// Greatest snap over the nodes (mm); none for friction. Zero by construction for designs that
+    /// Largest snap of a node (mm); none for friction. Zero by construction for designs that
     /// capture nodes where they are.
     pub snap_mm: Option<f64>,
     /// Mean snap over the nodes (mm).
     pub snap_mean_mm: Option<f64>,
-    /// Largest motion of any node in the first frame of the grasp (mm): what moved.
+    /// Largest motion of a node in the first frame of the grasp (mm).
     pub activation_step_mm: f64,
-    /// Mean distance of the nodes from their places at rest when the jaws closed (mm).
+    /// Mean displacement of the nodes from rest when the jaws closed (mm).
     pub displaced_mm: f64,
-    /// Most inverted elements in any frame.
+    /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest.
     pub min_volume_ratio: f64,
     /// Substeps in which the grasp yielded.
     pub yielded_substeps: usize,
-    /// Force with which tissue pushed the blades apart when they had closed (N).
+    /// Force of the tissue on the closed blades (N).
     pub closing_force_n: f64,
-    /// Gap between the blades then (mm).
+    /// Gap between the closed blades (mm).
     pub gap_mm: f64,
-    /// Largest pull of held nodes at the gripper (N).
+    /// Largest force of held nodes on the gripper (N).
     pub peak_constraint_n: f64,
-    /// Times that held tissue began to slide.
+    /// How often held tissue slipped.
     pub slipped: usize,
-    /// The tissue tore out.
+    /// Whether the tissue tore out.
     pub torn: bool,
-    /// Suspensions of physics: contacts disabled, contacts of blades disabled, organs relaxed.
+    /// Suspensions: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
-    /// Time since the grasp (s), lift of jaw and tissue (mm).
+    /// Time since the grasp (s), lift of the jaws and of the tissue (mm).
     pub lifts: Vec<(f64, f64, f64)>,
 }
 
 /// One row of Table II.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraspDesignRow {
-    /// In what the appendix was lifted.
+    /// The surroundings of the appendix.
     pub condition: Condition,
-    /// The design's name; "re-grasp, " before it for the second grasp of dragged tissue.
+    /// Name of the design; starts with "re-grasp, " for the second grasp of dragged tissue.
     pub design: String,
-    /// Trials held.
+    /// Trials that held.
     pub held: usize,
     /// Trials.
     pub trials: usize,
     /// Trials that diverged.
     pub diverged: usize,
-    /// Median lift of the others (mm); the paper's figure is a median, too.
+    /// Median lift of the other trials (mm). The paper's figure is also a median.
     pub lift_median_mm: f64,
-    /// Their median slip (mm).
+    /// Median slip of these trials (mm).
     pub slip_median_mm: f64,
-    /// Greatest slip (mm).
+    /// Largest slip (mm).
     pub slip_most_mm: f64,
-    /// Greatest snap (mm); none for friction.
+    /// Largest snap of a trial (mm); none for friction.
     pub snap_mm: Option<f64>,
-    /// Least snap of a trial (mm).
+    /// Smallest snap of a trial (mm).
     pub snap_least_mm: Option<f64>,
-    /// Median of the largest motion of any node in the first frame of the grasp (mm).
+    /// Median of the activation steps (mm).
     pub activation_step_median_mm: f64,
-    /// The greatest of these (mm).
+    /// Largest activation step (mm).
     pub activation_step_most_mm: f64,
     /// Median follow ratio.
     pub follow_ratio_median: f64,
-    /// Most inverted elements in any frame of any trial.
+    /// Largest number of inverted elements in any frame of any trial.
     pub inverted_peak: usize,
     /// Smallest volume of an element over its volume at rest in any trial.
     pub min_volume_ratio: f64,
-    /// Suspensions of physics in all trials: contacts disabled, contacts of blades disabled, organs
-    /// relaxed.
+    /// Suspensions in all trials: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
     /// The paper's row.
     pub paper: Option<PaperGrasp>,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraspDesignsResult {
-    /// A row a design and condition.
+    /// One row per design and condition.
     pub rows: Vec<GraspDesignRow>,
-    /// Every trial.
+    /// All trials.
     pub trials: Vec<GraspTrial>,
     /// Jaw lift (mm).
     pub lift_mm: f64,
-    /// Force of the jaws (N).
+    /// Closing force of the jaws (N).
     pub jaw_force_n: f64,
     /// Young's modulus (kPa).
     pub modulus_kpa: f64,
@@ -169,17 +168,17 @@ pub struct GraspDesignsResult {
     pub density_kg_m3: f64,
     /// Nodes of the appendix.
     pub nodes: usize,
-    /// Its elements.
+    /// Elements of the appendix.
     pub tets: usize,
-    /// What an earlier run had finished.
+    /// Trials of an earlier run.
     pub resumed: Resumed,
-    /// Wall time of everything (s).
+    /// Wall time (s).
     pub seconds: f64,
-    /// The page's path.
+    /// Path of the page.
     pub report: String,
 }
 
-/// A row a design, those of the second grasp last.
+/// One row per design; those of the second grasp are last.
 pub(super) fn rows(condition: Condition, trials: &[GraspTrial]) -> Vec<GraspDesignRow> {
     let first = DESIGNS.iter().map(|d| (*d, false));
     let again = REGRASPS.iter().map(|d| (*d, true));
@@ -221,7 +220,7 @@ fn row(condition: Condition, design: GraspDesignName, regrasp: bool, trials: &[G
 pub(crate) mod tests {
     use super::*;
 
-    /// A made-up trial whose figures go with `k`.
+    /// A made-up trial; its figures depend on `k`.
     fn made_up(design: GraspDesignName, k: usize, drag_mm: Option<f64>) -> GraspTrial {
         let value = k as f64;
         let ties = design != GraspDesignName::Friction;
@@ -256,7 +255,7 @@ pub(crate) mod tests {
         }
     }
 
-    /// A made-up result of every design.
+    /// A made-up result of all designs.
     pub(crate) fn made_up_result() -> GraspDesignsResult {
         let mut trials = Vec::new();
         for design in DESIGNS {
@@ -281,7 +280,7 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn rows_sum_up_their_trials() {
+    fn rows_summarize_their_trials() {
         let rows = made_up_result().rows;
         let names: Vec<&str> = rows.iter().map(|r| r.design.as_str()).collect();
         let again = ["re-grasp, rest-pose", "re-grasp, live-pose", "re-grasp, compliant"];

@@ -1,5 +1,5 @@
-//! Fig. 5: how far a shaft may lie beside the port's centre at each tilt, by the formula and by
-//! pushing one through the contact model.
+//! Fig. 5: lateral clearance of a shaft in a port over its tilt, by the formula and by pushing a
+//! shaft through the contact model.
 
 mod page;
 mod pushing;
@@ -14,23 +14,22 @@ use result::{PortBudgetResult, PortRoom, PortStart};
 use trocar_core::Progress;
 use trocar_report::document::Document;
 
-/// Tilts of the table (degrees): from 0 ...
-const LAST_TILT: f64 = 35.0;
-/// ... in steps of this.
+/// Largest tilt of the table (degrees).
+const MAX_TILT: f64 = 35.0;
+/// Step of the tilts of the table (degrees).
 const STEP: f64 = 0.5;
 
-/// What the paper says (section VI-A): the arm, its tilt at the start (degrees), the clearance
-/// there (mm).
+/// The paper's figures (section VI-A): arm, tilt at the start (degrees), clearance there (mm).
 const STARTS: [(&str, f64, f64); 2] = [("left", 13.3, 0.43), ("right", 18.3, 0.37)];
 
 /// The paper's tilt without clearance (degrees).
 const PAPER_LIMIT: f64 = 34.0;
 
-/// Tilts at which the room is measured to all sides (degrees).
+/// Tilts at which the clearance is measured in all directions (degrees).
 const AROUND: [f64; 5] = [0.0, 13.3, 18.3, 24.1, 30.0];
 
-/// Fig. 5: how far a shaft may lie beside its port's centre at each tilt, by the formula and by the
-/// contact model.
+/// Fig. 5: lateral clearance of a shaft in a port over its tilt, by the formula and by the contact
+/// model.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct PortBudgetExperiment {
     /// Diameter of the hole (mm).
@@ -39,10 +38,10 @@ pub struct PortBudgetExperiment {
     /// Diameter of the shaft (mm).
     #[arg(long, default_value = "5", value_parser = millimetres, allow_negative_numbers = true)]
     pub shaft: f64,
-    /// Thickness of the sheet (mm); at 0 the clearance is the paper's.
+    /// Thickness of the sheet (mm); 0 is the paper's formula.
     #[arg(long, default_value = "0", value_parser = millimetres, allow_negative_numbers = true)]
     pub thickness: f64,
-    /// Force of the push for the deviation under load (N).
+    /// Lateral force for the deviation under load (N).
     #[arg(long, default_value_t = 5.0, allow_negative_numbers = true)]
     pub push: f64,
 }
@@ -74,7 +73,7 @@ impl PortBudgetExperiment {
 
     fn measure(&self, pushing: &Pushing, progress: &dyn Progress) -> Result<PortBudgetResult> {
         let (port, radius) = (&pushing.port, pushing.radius);
-        let count = (LAST_TILT / STEP).round() as usize + 1;
+        let count = (MAX_TILT / STEP).round() as usize + 1;
         let mut rows = Vec::with_capacity(count);
         progress.begin("tilts", count as u64);
         for k in 0..count {
@@ -88,11 +87,11 @@ impl PortBudgetExperiment {
             tilt_deg,
             paper_mm,
             clearance_mm: 1e3 * port.clearance(radius, tilt_deg.to_radians()),
-            measured_mm: pushing.room(tilt_deg.to_radians(), 0.0).map(|r| 1e3 * r),
+            measured_mm: pushing.clearance(tilt_deg.to_radians(), 0.0).map(|r| 1e3 * r),
         };
         let around = |tilt_deg: f64| {
             let direction = |k: usize| 180.0 * k as f64 / DIRECTIONS as f64;
-            let room = |d: f64| pushing.room(tilt_deg.to_radians(), d.to_radians()).map(|r| (d, 1e3 * r));
+            let room = |d: f64| pushing.clearance(tilt_deg.to_radians(), d.to_radians()).map(|r| (d, 1e3 * r));
             PortRoom { tilt_deg, room: (0..=DIRECTIONS).filter_map(|k| room(direction(k))).collect() }
         };
         let differences = rows.iter().filter_map(|r| r.measured_mm.map(|m| (m - r.clearance_mm).abs()));
@@ -126,7 +125,7 @@ mod tests {
     }
 
     #[test]
-    fn the_contact_model_has_the_papers_budget() {
+    fn the_contact_model_agrees_with_the_paper() {
         let r = measured();
         assert!(r.largest_difference_mm < 1e-9);
         for start in &r.starts {
@@ -136,14 +135,14 @@ mod tests {
         assert!((r.measured_limit_deg.unwrap() - r.limit_deg.unwrap()).abs() < 1e-6);
         assert_eq!(r.rows.len(), 71);
         assert!(r.rows.last().unwrap().measured_mm.is_none(), "35 degrees do not fit");
-        // 5 N on 20 N/mm, a little more where the rim pushes aslant.
+        // 5 N over 20 N/mm; the direction of the rim's force adds a little.
         let upright = &r.rows[0];
         assert!((upright.pushed_mm - 0.75).abs() < 1e-6, "{}", upright.pushed_mm);
         assert!(r.rooms.iter().all(|room| room.room.len() == DIRECTIONS + 1));
     }
 
     #[test]
-    fn options_that_make_no_port_are_refused() {
+    fn invalid_options_are_refused() {
         let good = PortBudgetExperiment { hole: 6e-3, shaft: 5e-3, thickness: 0.0, push: 5.0 };
         let refused = |e: PortBudgetExperiment| e.pushing().err().unwrap().to_string();
         assert!(refused(PortBudgetExperiment { hole: f64::NAN, ..good }).contains("hole_diameter"));
@@ -153,10 +152,10 @@ mod tests {
     }
 
     #[test]
-    fn the_paper_stands_beside() {
+    fn the_page_shows_the_papers_figures() {
         let html = page::document(&measured()).unwrap().page();
         assert_eq!(html.matches("<svg").count(), 4);
-        assert_eq!(html.matches("card good").count(), 2, "both starts are the paper's");
+        assert_eq!(html.matches("card good").count(), 2, "both starts agree with the paper");
         assert!(
             html.contains("A 5 mm shaft in a 6 mm hole")
                 && html.contains("0.43")

@@ -9,18 +9,19 @@ use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::fixed;
 
-/// Every so many rows are in the page's table; the JSON has all.
+/// The tables show every fifth row; the JSON has all.
 const EVERY: usize = 5;
 
 pub(super) fn document(r: &PortBudgetResult) -> Result<Document> {
     let lead = format!(
-        "A {} mm shaft in a {} mm hole of a sheet {} mm thick. By the formula: (D \u{2212} d/cos \u{2212} t tan)/2 at each tilt, the paper\u{2019}s where t is 0. Measured: a shaft pushed sideways through \
-         the contact model until the rim pushes back.",
+        "A {} mm shaft in a {} mm hole of a sheet of {} mm. Formula: (D \u{2212} d/cos \u{2212} t tan)/2, the paper\u{2019}s for \
+         t = 0. Measured: a shaft pushed sideways in \
+         the contact model until it touches the rim.",
         r.shaft_mm, r.hole_mm, r.thickness_mm
     );
     let section =
         Section::new("Port budget", lead).cards(cards(r)).figures([clearance(r)?, sections(r), around(r)?, loaded(r)?]);
-    let subtitle = "How far a shaft may lie beside its port's centre";
+    let subtitle = "Lateral clearance of a shaft in its port";
     Ok(Document::new("Port budget", subtitle).with(section).with(starts(r)).with(rows(r)))
 }
 
@@ -29,12 +30,12 @@ fn cards(r: &PortBudgetResult) -> Vec<Card> {
     let start = |s: &PortStart| {
         let name = if s.arm == "left" { "Left arm's start" } else { "Right arm's start" };
         let near = s.measured_mm.is_some_and(|m| (m - s.paper_mm).abs() < 0.005);
-        let note = format!("at {}\u{b0}, measured; the paper: {} mm", s.tilt_deg, fixed(s.paper_mm, 2));
+        let note = format!("at {}\u{b0}, measured; paper {} mm", s.tilt_deg, fixed(s.paper_mm, 2));
         Card::new(name, format!("{} mm", fixed(s.measured_mm.unwrap_or(f64::NAN), 3)), note).met(near)
     };
     let mut all: Vec<Card> = r.starts.iter().map(start).collect();
-    let note = format!("formula {}; the paper: about {}\u{b0}", degrees(r.limit_deg), r.paper_limit_deg);
-    all.push(Card::new("No clearance from", degrees(r.measured_limit_deg), note));
+    let note = format!("formula {}; paper about {}\u{b0}", degrees(r.limit_deg), r.paper_limit_deg);
+    all.push(Card::new("Tilt without clearance", degrees(r.measured_limit_deg), note));
     let worst = format!("{:.0e} mm", r.largest_difference_mm);
     all.push(Card::new("Formula and contact model", worst, "largest difference, in the direction of the tilt"));
     all
@@ -56,7 +57,7 @@ fn clearance(r: &PortBudgetResult) -> Result<String> {
         .collect();
     let points = r.rows.iter().map(|row| (row.tilt_deg, row.clearance_mm)).collect();
     lines.push(Line::new(points, formula));
-    // The plot has lines only: a measured value is a short one.
+    // A measured value is a short line, because plots have no markers.
     for row in r.rows.iter().step_by(EVERY) {
         let points = row.measured_mm.map(|m| vec![(row.tilt_deg - 0.25, m), (row.tilt_deg + 0.25, m)]);
         lines.extend(points.map(|points| Line::new(points, measured)));
@@ -84,8 +85,8 @@ fn clearance(r: &PortBudgetResult) -> Result<String> {
     Ok(plot.figure(&caption)?)
 }
 
-/// The shaft's elliptic section in the hole's plane, pushed until it touches in the direction of
-/// the tilt.
+/// The elliptic section of the shaft in the plane of the hole, pushed in the direction of the tilt
+/// until it touches.
 fn sections(r: &PortBudgetResult) -> String {
     let hole = 0.5 * r.hole_mm;
     let step = 2.5 * hole;
@@ -120,16 +121,16 @@ fn sections(r: &PortBudgetResult) -> String {
     svg.push_str("</svg>");
     page::figure(
         &svg,
-        "<b>The shaft\u{2019}s section in the port\u{2019}s plane</b> at five tilts (to the right), pushed to the right until it touches.",
+        "<b>Section of the shaft in the plane of the port</b> at five tilts to the right, pushed to the right until it touches.",
     )
 }
 
 fn around(r: &PortBudgetResult) -> Result<String> {
     let line = |(k, points): (usize, &Vec<(f64, f64)>)| Line::new(points.clone(), colors::organ(k));
     let plot = Plot {
-        title: "Room to all sides",
-        x: "direction of the push from that of the tilt (\u{b0})",
-        y: "admissible deviation (mm)",
+        title: "Clearance in all directions",
+        x: "angle from the direction of the tilt (\u{b0})",
+        y: "clearance (mm)",
         lines: r.rooms.iter().map(|room| &room.room).enumerate().map(line).collect(),
         show: vec![0.0],
         ..Plot::default()
@@ -137,8 +138,9 @@ fn around(r: &PortBudgetResult) -> Result<String> {
     let names: Vec<String> = r.rooms.iter().map(|room| format!("{}\u{b0}", room.tilt_deg)).collect();
     let legend = page::legend(names.iter().enumerate().map(|(k, n)| (n.as_str(), colors::organ(k))));
     let caption = format!(
-        "<b>Admissible deviation</b> to all sides, measured. Across the tilt it is (D \u{2212} d)/2 up to acos \u{221a}(d/D), 24.1\u{b0} for 5 in 6 mm; beyond, the section is \
-         blunter than the hole and touches at two points.{legend}"
+        "<b>Measured clearance</b> in all directions. Across the tilt it is (D \u{2212} d)/2 up to acos \u{221a}(d/D), \
+         24.1\u{b0} for 5 in 6 mm. At larger tilts the section is \
+         flatter than the hole and touches at two points.{legend}"
     );
     Ok(plot.figure(&caption)?)
 }
@@ -160,9 +162,9 @@ fn loaded(r: &PortBudgetResult) -> Result<String> {
         ..Plot::default()
     };
     let push = format!("pushed with {} N", r.push_n);
-    let legend = page::legend([("free to every side", free), (push.as_str(), pushed)]);
+    let legend = page::legend([("free in every direction", free), (push.as_str(), pushed)]);
     let caption = format!(
-        "<b>Deviation under load</b>: the rim gives by {} N/mm (our assumption; the paper states none).{legend}",
+        "<b>Deviation under load</b>: stiffness of the rim {} N/mm (assumed; the paper states none).{legend}",
         fixed(r.stiffness_n_mm, 0)
     );
     Ok(plot.figure(&caption)?)
@@ -186,10 +188,10 @@ fn rows(r: &PortBudgetResult) -> Section {
     let head = [
         "Tilt (\u{b0})",
         "Formula (mm)",
-        "Measured, with the tilt (mm)",
-        "against it (mm)",
-        "across it (mm)",
-        "Least to any side (mm)",
+        "Measured, along the tilt (mm)",
+        "opposite (mm)",
+        "across (mm)",
+        "Smallest in any direction (mm)",
         "Pushed (mm)",
         "1 mm sheet (mm)",
         "2 mm sheet (mm)",
@@ -213,5 +215,5 @@ fn rows(r: &PortBudgetResult) -> Section {
             ]
         })
         .collect();
-    Section::new("Over tilt", "A dash: a centred shaft touches already.").table(Table::new(head, rows).on_page_only())
+    Section::new("Over tilt", "A dash: the centred shaft touches.").table(Table::new(head, rows).on_page_only())
 }

@@ -7,16 +7,16 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use trocar_robot::instrument::Instrument;
 use trocar_robot::port::{Port, RimState, Shaft, Twist};
 
-/// Directions of that, over half a turn; the other half is its mirror image.
+/// Number of directions over half a turn; the other half is symmetric.
 pub(super) const DIRECTIONS: usize = 90;
 
-/// No shaft is pushed farther than this share of the hole.
+/// Maximum push, as a share of the hole's diameter.
 const MAX_PUSH: f64 = 1.0;
 
-/// Halvings of a search: to the last digits.
-const HALVINGS: usize = 60;
+/// Steps of a bisection: to full precision.
+const BISECTIONS: usize = 60;
 
-/// A port and the shaft that is pushed in it.
+/// A port and the shaft in it.
 pub(super) struct Pushing {
     pub port: Port,
     pub radius: f64,
@@ -40,49 +40,51 @@ impl Pushing {
         Ok(Self { port, radius })
     }
 
-    /// A shaft tilted towards x whose axis goes through the port's plane at `at`.
+    /// A shaft tilted towards x; its axis crosses the plane of the port at `at`.
     fn shaft(&self, tilt: f64, at: DVec2) -> Shaft {
         let direction = DVec3::new(tilt.sin(), 0.0, tilt.cos());
         Shaft { base: at.extend(0.0) - 0.2 * direction, direction, radius: self.radius, length: 0.33 }
     }
 
-    /// What the rim does to a shaft at rest there, in the port's plane (N), and whether it touches.
+    /// Force of the rim on a shaft at rest at `at`, in the plane of the port (N), and whether it
+    /// touches.
     fn rim(&self, tilt: f64, at: DVec2) -> (DVec2, bool) {
         let shaft = self.shaft(tilt, at);
         let contacts = self.port.contacts(&shaft, &Twist::default(), &RimState::default());
         (contacts.on_shaft(shaft.base).0.truncate(), contacts.touching().next().is_some())
     }
 
-    /// The farthest push from the centre in a direction (from the tilt's) before something touches
-    /// (m); none where the centred shaft touches. What fits is convex, so halving finds it.
-    pub fn room(&self, tilt: f64, direction: f64) -> Option<f64> {
+    /// Largest push from the centre without contact (m), in a direction given from that of the tilt
+    /// (rad); none if the centred shaft touches. Bisection is exact because the free region is
+    /// convex.
+    pub fn clearance(&self, tilt: f64, direction: f64) -> Option<f64> {
         let along = DVec2::from_angle(direction);
         let touches = |d: f64| self.rim(tilt, d * along).1;
-        (!touches(0.0)).then(|| halve(0.0, MAX_PUSH * self.port.hole_diameter, touches))
+        (!touches(0.0)).then(|| bisect(0.0, MAX_PUSH * self.port.hole_diameter, touches))
     }
 
-    /// How far a push of `force` (N) takes the shaft in the direction of its tilt (m).
+    /// Deviation under a lateral force of `force` (N) in the direction of the tilt (m).
     fn pushed(&self, tilt: f64, force: f64) -> f64 {
-        halve(0.0, MAX_PUSH * self.port.hole_diameter, |d| -self.rim(tilt, d * DVec2::X).0.x >= force)
+        bisect(0.0, MAX_PUSH * self.port.hole_diameter, |d| -self.rim(tilt, d * DVec2::X).0.x >= force)
     }
 
-    /// The tilt at which a centred shaft touches (rad).
+    /// Tilt at which a centred shaft touches (rad).
     pub fn limit(&self) -> Option<f64> {
         let touches = |tilt: f64| self.rim(tilt, DVec2::ZERO).1;
-        (!touches(0.0)).then(|| halve(0.0, 85_f64.to_radians(), touches))
+        (!touches(0.0)).then(|| bisect(0.0, 85_f64.to_radians(), touches))
     }
 
     pub fn row(&self, tilt_deg: f64, push: f64) -> PortBudgetRow {
         let tilt = tilt_deg.to_radians();
-        let room = |direction: f64| self.room(tilt, direction).map(|r| 1e3 * r);
-        let all = (0..=DIRECTIONS).filter_map(|k| room(PI * k as f64 / DIRECTIONS as f64));
+        let clearance = |direction: f64| self.clearance(tilt, direction).map(|r| 1e3 * r);
+        let all = (0..=DIRECTIONS).filter_map(|k| clearance(PI * k as f64 / DIRECTIONS as f64));
         let thicker = |mm: f64| 1e3 * Port { thickness: 1e-3 * mm, ..self.port }.clearance(self.radius, tilt);
         PortBudgetRow {
             tilt_deg,
             clearance_mm: 1e3 * self.port.clearance(self.radius, tilt),
-            measured_mm: room(0.0),
-            measured_against_mm: room(PI),
-            measured_across_mm: room(FRAC_PI_2),
+            measured_mm: clearance(0.0),
+            measured_against_mm: clearance(PI),
+            measured_across_mm: clearance(FRAC_PI_2),
             measured_least_mm: all.reduce(f64::min),
             pushed_mm: 1e3 * self.pushed(tilt, push),
             thicker_mm: SHEETS.map(thicker),
@@ -90,9 +92,9 @@ impl Pushing {
     }
 }
 
-/// Where a condition begins to hold between `low` and `high`.
-fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
-    for _ in 0..HALVINGS {
+/// The largest value in [low, high] before `holds`, by bisection.
+fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..BISECTIONS {
         let middle = 0.5 * (low + high);
         if holds(middle) { high = middle } else { low = middle }
     }

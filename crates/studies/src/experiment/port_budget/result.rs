@@ -2,28 +2,27 @@
 
 use serde::Serialize;
 
-/// Sheets beside the one that was asked for (mm).
+/// Thicknesses of further sheets (mm).
 pub(super) const SHEETS: [f64; 2] = [1.0, 2.0];
 
-/// One tilt.
+/// Figures at one tilt.
 #[derive(Clone, Debug, Serialize)]
 pub struct PortBudgetRow {
-    /// Angle between the shaft and the port's normal (degrees).
+    /// Angle between the shaft and the normal of the port (degrees).
     pub tilt_deg: f64,
-    /// Lateral clearance by the formula (mm); negative where the shaft does not fit.
+    /// Lateral clearance by the formula (mm); negative if the shaft does not fit.
     pub clearance_mm: f64,
-    /// Farthest that a shaft is pushed in the direction of its tilt before the contact model
-    /// touches (mm); none where it does not fit.
+    /// Measured clearance in the direction of the tilt (mm); none if the shaft does not fit.
     pub measured_mm: Option<f64>,
-    /// The same against the direction of the tilt (mm).
+    /// The same in the opposite direction (mm).
     pub measured_against_mm: Option<f64>,
-    /// The same across it (mm).
+    /// The same across the tilt (mm).
     pub measured_across_mm: Option<f64>,
-    /// The least to any side (mm).
+    /// The smallest in any direction (mm).
     pub measured_least_mm: Option<f64>,
-    /// How far the push takes it in the direction of its tilt, the rim yielding (mm).
+    /// Deviation under the lateral force in the direction of the tilt, with the rim deformed (mm).
     pub pushed_mm: f64,
-    /// Clearance by the formula in thicker sheets, 1 and 2 mm (mm).
+    /// Clearance by the formula in sheets of 1 and 2 mm (mm).
     pub thicker_mm: [f64; 2],
 }
 
@@ -32,27 +31,26 @@ pub struct PortBudgetRow {
 pub struct PortStart {
     /// The arm.
     pub arm: &'static str,
-    /// Its tilt (degrees).
+    /// Tilt (degrees).
     pub tilt_deg: f64,
-    /// The paper's clearance (mm).
+    /// Clearance in the paper (mm).
     pub paper_mm: f64,
-    /// The formula's (mm).
+    /// Clearance by the formula (mm).
     pub clearance_mm: f64,
-    /// That of the contact model (mm).
+    /// Clearance in the contact model (mm).
     pub measured_mm: Option<f64>,
 }
 
-/// The room to all sides at one tilt.
+/// Clearance in all directions at one tilt.
 #[derive(Clone, Debug, Serialize)]
 pub struct PortRoom {
-    /// The tilt (degrees).
+    /// Tilt (degrees).
     pub tilt_deg: f64,
-    /// Direction of the push from that of the tilt (degrees), and the farthest before something
-    /// touches (mm).
+    /// Angle of the push from the direction of the tilt (degrees), and measured clearance (mm).
     pub room: Vec<(f64, f64)>,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct PortBudgetResult {
     /// Diameter of the hole (mm).
@@ -63,24 +61,25 @@ pub struct PortBudgetResult {
     pub thickness_mm: f64,
     /// Stiffness of the rim (N/mm).
     pub stiffness_n_mm: f64,
-    /// The push (N).
+    /// Lateral force (N).
     pub push_n: f64,
-    /// Every tilt.
+    /// All tilts.
     pub rows: Vec<PortBudgetRow>,
-    /// The paper's start poses.
+    /// Start poses of the paper.
     pub starts: Vec<PortStart>,
-    /// The room to all sides.
+    /// Clearance in all directions.
     pub rooms: Vec<PortRoom>,
-    /// Tilt without clearance by the formula (degrees); none where even an upright shaft has none.
+    /// Tilt without clearance by the formula (degrees); none if even an upright shaft has no
+    /// clearance.
     pub limit_deg: Option<f64>,
-    /// The tilt at which a centred shaft touches in the contact model (degrees).
+    /// Tilt at which a centred shaft touches in the contact model (degrees).
     pub measured_limit_deg: Option<f64>,
-    /// The paper's (degrees).
+    /// The same in the paper (degrees).
     pub paper_limit_deg: f64,
     /// Largest difference between formula and contact model in the direction of the tilt (mm).
     pub largest_difference_mm: f64,
     /// Wall time (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }

@@ -1,5 +1,5 @@
-//! Force at the tool mount: an instrument weighed in 54 noisy poses, many times over; and a small
-//! contact force after the tare.
+//! Force at the tool mount: an instrument weighed in 54 poses with noise, repeatedly; and a small
+//! contact force after taring.
 
 mod normal;
 mod page;
@@ -22,41 +22,41 @@ use trocar_robot::wrench::{
 /// The paper's weight of an instrument (N).
 const PAPER_WEIGHT: f64 = 4.7;
 
-/// Largest tilts that are compared for what they tell (degrees).
+/// Largest tilts that are compared (degrees).
 const TILTS: [f64; 6] = [5.0, 10.0, 20.0, 33.6, 60.0, 180.0];
 
-/// Readings a second at 30 frames a second that a frame averages.
+/// Readings averaged per frame.
 const READINGS: usize = 33;
-/// Frames a second.
+/// Frame rate (Hz).
 const RATE: f64 = 30.0;
-/// Frames that the tare takes.
+/// Frames averaged for taring.
 const TARE: usize = 30;
-/// How long nothing is touched, how long the contact force grows, and how long it then stays (s).
+/// Duration without contact, of the growing contact force, and of the constant force (s).
 const RAMP: [f64; 3] = [3.0, 12.0, 5.0];
-/// Its greatest value (N).
+/// Largest contact force (N).
 const PEAK: f64 = 0.05;
-/// How far the sensor's bias has drifted between weighing and reset (N).
+/// Drift of the sensor's bias between weighing and reset (N).
 const DRIFT: DVec3 = DVec3::new(0.04, -0.03, 0.06);
 /// Tilt of the shaft at reset and at the end (degrees).
 const TILT: [f64; 2] = [13.3, 18.3];
 
-/// The instrument weighed in 54 noisy poses, many times over; and a touch of tens of millinewtons
-/// after the tare.
+/// An instrument weighed in 54 poses with noise, repeatedly; and a contact force of tens of
+/// millinewtons after taring.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct WrenchExperiment {
-    /// Static poses of an identification.
+    /// Static poses per identification.
     #[arg(long, default_value_t = trocar_robot::wrench::STATIC_POSES)]
     pub poses: usize,
-    /// Largest tilt of the instrument in them (degrees).
+    /// Largest tilt of the instrument in these poses (degrees).
     #[arg(long, default_value = "60", value_parser = degrees, allow_negative_numbers = true)]
     pub tilt: f64,
-    /// Identifications, each with other noise.
+    /// Number of identifications, each with different noise.
     #[arg(long, default_value_t = 400)]
     pub runs: usize,
-    /// Noise of a force reading (N).
+    /// Standard deviation of a force reading (N).
     #[arg(long, default_value_t = 0.02, allow_negative_numbers = true)]
     pub force_noise: f64,
-    /// Noise of a torque reading (N m).
+    /// Standard deviation of a torque reading (N m).
     #[arg(long, default_value_t = 0.001, allow_negative_numbers = true)]
     pub torque_noise: f64,
     /// Seed of the noise.
@@ -71,7 +71,7 @@ impl Study for WrenchExperiment {
 
     fn run(&self, job: &Job<'_>) -> Result<(WrenchResult, Document)> {
         if !(1..=1_000_000).contains(&self.runs) {
-            let reason = format!("{} is not between 1 and 1,000,000", self.runs);
+            let reason = format!("{} must be in [1, 1000000]", self.runs);
             return Err(trocar_robot::Error::Invalid { what: "number of runs".into(), reason }.into());
         }
         let first = self.weigh(0, self.tilt)?;
@@ -163,7 +163,7 @@ impl WrenchExperiment {
         })
     }
 
-    /// An identification from noisy readings.
+    /// An identification from readings with noise.
     fn weigh(&self, run: u64, tilt: f64) -> Result<Identification> {
         let orientations = static_orientations(self.poses, tilt)?;
         let readings = orientations.into_iter().enumerate().map(|(k, orientation)| {
@@ -178,8 +178,8 @@ impl WrenchExperiment {
         Wrench { force: share * self.force_noise * of(0), torque: share * self.torque_noise * of(1) }
     }
 
-    /// The instrument in its port: tared at reset, then leaned to the other start tilt while a
-    /// contact force grows at the jaws.
+    /// The instrument in its port, tared at reset, then tilted to the other start tilt while a
+    /// contact force at the jaws grows.
     fn ramp(&self, load: &Identification) -> Result<Vec<WrenchFrame>> {
         let share = 1.0 / (READINGS as f64).sqrt();
         let noise = SensorNoise { force: share * self.force_noise, torque: share * self.torque_noise };
@@ -191,7 +191,7 @@ impl WrenchExperiment {
         let start = at(TILT[0]);
         let rest = |k: usize| drifted.reading(start, DOWN) + self.noise_at(&[self.seed, 2, k as u64], share);
         tared.tare(start, &(0..TARE).map(rest).collect::<Vec<_>>())?;
-        // Tissue pulls mostly down and a little aside.
+        // Tissue pulls mostly down and slightly sideways.
         let along = DVec3::new(0.3, 0.4, -0.866).normalize();
         let tip = Instrument::grasper().tip_in_flange().translation;
         let total: f64 = RAMP.iter().sum();
@@ -222,13 +222,13 @@ impl WrenchExperiment {
 /// Gravity in the cell.
 const DOWN: DVec3 = DVec3::new(0.0, 0.0, -GRAVITY);
 
-/// The grasper on a sensor that reads newtons when it carries nothing.
+/// The load of the grasper on a sensor with a bias.
 fn truth() -> LoadModel {
     let bias = Wrench { force: DVec3::new(1.2, -0.8, 2.0), torque: DVec3::new(0.05, -0.03, 0.02) };
     LoadModel::of(&Instrument::grasper(), bias)
 }
 
-/// The parameters' names and units, in the order of [`numbers`].
+/// Names and units of the parameters, in the order of [`numbers`].
 const NAMES: [(&str, &str); 10] = [
     ("mass", "kg"),
     ("m c, x", "kg m"),
@@ -273,13 +273,13 @@ mod tests {
 
     #[test]
     fn the_distribution_is_chi_squared() {
-        // Tables: medians and 95% of ten degrees of freedom.
+        // Tabulated median and 95% quantile.
         assert!((chi_squared_10(9.342) - 0.5).abs() < 1e-4 && (chi_squared_10(CHI_SQUARED_95) - 0.95).abs() < 1e-4);
         assert_eq!(chi_squared_10(0.0), 0.0);
     }
 
     #[test]
-    fn useless_options_are_refused() {
+    fn invalid_options_are_refused() {
         let good = WrenchExperiment { poses: 54, tilt: 1.0, runs: 10, force_noise: 0.02, torque_noise: 1e-3, seed: 1 };
         let dir = tempfile::tempdir().unwrap();
         let refused = |e: WrenchExperiment| study::run(&e, dir.path(), &Silent).err().unwrap().to_string();
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn everything_is_shown() {
+    fn the_page_shows_all_figures() {
         let html = page::document(&measured()).unwrap().page();
         assert_eq!(html.matches("<svg").count(), 4);
         assert_eq!(html.matches("<tr>").count(), 11);

@@ -10,7 +10,8 @@ use trocar_report::table::{count, fixed, percent};
 
 pub(super) fn document(r: &WrenchResult) -> Result<Document> {
     let lead = format!(
-        "The grasper weighed in {} poses tilted by up to {}\u{b0} (condition number {}), {} times with other noise: {} mN a force and {} mN m a torque. Each time ten numbers are estimated, with their covariance.",
+        "The grasper is weighed in {} poses tilted by up to {}\u{b0} (condition number {}), {} times with different noise: \
+         {} mN per force and {} mN m per torque. Each identification estimates ten parameters and their covariance.",
         r.poses,
         fixed(r.tilt_deg, 0),
         fixed(r.condition, 1),
@@ -19,7 +20,7 @@ pub(super) fn document(r: &WrenchResult) -> Result<Document> {
         fixed(1e3 * r.noise.torque, 1),
     );
     let weighing = Section::new("Weighing", lead).cards(cards(r)).figures([distances(r)?, tilts(r)?]);
-    let document = Document::new("Force at the tool mount", "An instrument weighed, tared and touched");
+    let document = Document::new("Force at the tool mount", "An instrument weighed, tared and in contact");
     Ok(document.with(weighing).with(touching(r)?).with(parameters(r)))
 }
 
@@ -32,21 +33,21 @@ fn cards(r: &WrenchResult) -> [Card; 4] {
         fixed(r.weight_predicted_mn, 2),
         r.paper_weight_n
     );
-    let seen = r.seen_from_mn.map_or("not seen".to_owned(), |f| format!("{} mN", fixed(f, 0)));
+    let seen = r.seen_from_mn.map_or("none".to_owned(), |f| format!("{} mN", fixed(f, 0)));
     [
         Card::new("Weight", format!("{} N", fixed(r.weight_n, 4)), weight).met(off < 4.0 * mean_deviation),
-        Card::new("Within the predicted 95%", percent(r.within_95, 1), "of all ten numbers together"),
+        Card::new("Within the predicted 95%", percent(r.within_95, 1), "of all ten parameters together"),
         Card::new(
             "Chi-squared",
             fixed(r.mean_distance_squared, 2),
             format!(
-                "mean, 10 is right; farthest from its distribution by {} (limit {})",
+                "mean; 10 is correct; largest difference from its distribution {} (limit {})",
                 fixed(r.largest_difference, 3),
                 fixed(r.difference_limit, 3)
             ),
         )
         .met(r.largest_difference < r.difference_limit),
-        Card::new("A touch is seen from", seen, "tared reading above three deviations for good")
+        Card::new("Detectable contact force", seen, "tared reading stays above three standard deviations")
             .met(r.seen_from_mn.is_some()),
     ]
 }
@@ -59,7 +60,7 @@ fn distances(r: &WrenchResult) -> Result<String> {
     let curve = (0..=120).map(|k| last * f64::from(k) / 120.0).map(|x| (x, chi_squared_10(x)));
     let plot = Plot {
         title: "Distances of the estimates from the truth",
-        x: "squared distance in predicted deviations",
+        x: "squared distance (predicted standard deviations)",
         y: "share below",
         lines: vec![Line::new(curve.collect(), right), Line::new(steps.collect(), found)],
         show: vec![0.0, 1.0],
@@ -67,7 +68,8 @@ fn distances(r: &WrenchResult) -> Result<String> {
         ..Plot::default()
     };
     let legend = page::legend([("estimates", found), ("chi-squared, 10 degrees", right)]);
-    Ok(plot.figure(&format!("<b>Estimates lie as far from the truth as predicted.</b>{legend}"))?)
+    Ok(plot
+        .figure(&format!("<b>Distances of the estimates from the truth</b> and the predicted distribution.{legend}"))?)
 }
 
 fn tilts(r: &WrenchResult) -> Result<String> {
@@ -75,7 +77,7 @@ fn tilts(r: &WrenchResult) -> Result<String> {
     let points = |value: &dyn Fn(&WrenchTilt) -> f64| r.tilts.iter().map(|t| (t.tilt_deg, value(t))).collect();
     let line = |color, value: &dyn Fn(&WrenchTilt) -> f64| Line::new(points(value), color);
     let plot = Plot {
-        title: "What the poses' tilt tells",
+        title: "Influence of the tilt",
         x: "largest tilt of the poses (\u{b0})",
         y: "mN, or condition",
         lines: vec![line(weight, &|t| t.weight_deviation_mn), line(condition, &|t| t.condition)],
@@ -83,8 +85,8 @@ fn tilts(r: &WrenchResult) -> Result<String> {
         log_y: true,
         ..Plot::default()
     };
-    let legend = page::legend([("deviation of the weight (mN)", weight), ("condition number", condition)]);
-    let caption = format!("<b>Poses must be tilted</b> to tell weight from bias.{legend}");
+    let legend = page::legend([("standard deviation of the weight (mN)", weight), ("condition number", condition)]);
+    let caption = format!("<b>Only tilted poses</b> separate weight from bias.{legend}");
     Ok(plot.figure(&caption)?)
 }
 
@@ -108,22 +110,20 @@ fn touching(r: &WrenchResult) -> Result<Section> {
     let figures = [
         page::figure(
             &before.svg()?,
-            "<b>What the sensor reads</b> along the contact force, weight and bias included: the touch is a hundredth of it.",
+            "<b>Sensor reading</b> along the contact force, with weight and bias: the contact force is a hundredth of it.",
         ),
-        page::figure(
-            &after.svg()?,
-            &format!("<b>After the weight is taken off</b>; kind of the force: contact.{legend}"),
-        ),
+        page::figure(&after.svg()?, &format!("<b>Contact force</b>, without the weight.{legend}")),
     ];
     let first = r.ramp.first().map_or(f64::NAN, |f| f.deviation_mn);
     let lead = format!(
-        "The sensor\u{2019}s bias has drifted since the weighing. At reset the instrument is tared; then it is leaned from 13.3 to 18.3\u{b0} while tissue pulls at its jaws, up to 50 mN. A frame is the mean of \
-         33 readings; its predicted deviation is {} mN. RMS error {} mN tared, {} mN not tared.",
+        "The bias of the sensor has drifted since the weighing. The instrument is tared at reset, then tilted from 13.3 to \
+         18.3\u{b0} while tissue pulls at its jaws with up to 50 mN. A frame is the mean of \
+         33 readings; its predicted standard deviation is {} mN. RMS error {} mN tared, {} mN not tared.",
         fixed(first, 1),
         fixed(r.tared_error_mn, 1),
         fixed(r.untared_error_mn, 1)
     );
-    Ok(Section::new("A touch of tens of millinewtons", lead).figures(figures))
+    Ok(Section::new("A contact force of tens of millinewtons", lead).figures(figures))
 }
 
 fn parameters(r: &WrenchResult) -> Section {
@@ -143,5 +143,5 @@ fn parameters(r: &WrenchResult) -> Section {
             ]
         })
         .collect();
-    Section::new("Every parameter", "").table(Table::new(head, rows))
+    Section::new("Parameters", "").table(Table::new(head, rows))
 }

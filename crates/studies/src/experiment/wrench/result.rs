@@ -3,29 +3,30 @@
 use serde::Serialize;
 use trocar_robot::wrench::{ForceKind, SensorNoise};
 
-/// 95% of chi-squared with ten degrees of freedom are below.
+/// The 95% quantile of chi-squared with ten degrees of freedom.
 pub(super) const CHI_SQUARED_95: f64 = 18.307;
 
 /// One parameter of the load.
 #[derive(Clone, Debug, Serialize)]
 pub struct WrenchParameter {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// Its unit.
+    /// Unit.
     pub unit: &'static str,
-    /// What it is.
+    /// True value.
     pub truth: f64,
-    /// Mean of the estimates less the truth.
+    /// Mean of the estimates minus the true value.
     pub bias: f64,
     /// Standard deviation of the estimates.
     pub spread: f64,
-    /// The predicted one.
+    /// Predicted standard deviation.
     pub predicted: f64,
-    /// Share of the estimates within 1.96 predicted deviations of the truth; 0.95 is right.
+    /// Share of the estimates within 1.96 predicted standard deviations of the true value; 0.95 is
+    /// correct.
     pub within: f64,
 }
 
-/// What poses of one largest tilt tell.
+/// An identification with another largest tilt.
 #[derive(Clone, Debug, Serialize)]
 pub struct WrenchTilt {
     /// Largest tilt (degrees).
@@ -36,78 +37,78 @@ pub struct WrenchTilt {
     pub weight_deviation_mn: f64,
 }
 
-/// One frame of the ramp. Forces along the contact force.
+/// One frame of the ramp. Forces are along the contact force.
 #[derive(Clone, Debug, Serialize)]
 pub struct WrenchFrame {
     /// Time (s).
     pub time_s: f64,
-    /// The contact force there is (mN).
+    /// True contact force (mN).
     pub truth_mn: f64,
-    /// What the sensor reads, weight and bias included (N).
+    /// Sensor reading, with weight and bias (N).
     pub raw_n: f64,
-    /// With the identified load taken off, not tared (mN).
+    /// Reading minus the identified load, not tared (mN).
     pub untared_mn: f64,
-    /// Tared (mN).
+    /// The same, tared (mN).
     pub tared_mn: f64,
-    /// Its predicted standard deviation (mN).
+    /// Predicted standard deviation of the tared force (mN).
     pub deviation_mn: f64,
-    /// What kind of force it is.
+    /// Kind of the force.
     pub kind: ForceKind,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct WrenchResult {
-    /// Static poses of an identification.
+    /// Static poses per identification.
     pub poses: usize,
-    /// Largest tilt in them (degrees).
+    /// Largest tilt of these poses (degrees).
     pub tilt_deg: f64,
-    /// Identifications.
+    /// Number of identifications.
     pub runs: usize,
     /// Noise of one reading (N, N m).
     pub noise: SensorNoise,
     /// Condition number of the equations.
     pub condition: f64,
-    /// Weight: mean of the estimates (N).
+    /// Mean of the estimates of the weight (N).
     pub weight_n: f64,
-    /// Standard deviation of the estimates (mN).
+    /// Standard deviation of these estimates (mN).
     pub weight_spread_mn: f64,
-    /// The predicted one (mN).
+    /// Predicted standard deviation (mN).
     pub weight_predicted_mn: f64,
     /// The paper's weight (N).
     pub paper_weight_n: f64,
-    /// Mean of the squared distance from the truth in predicted deviations; 10 is right.
+    /// Mean squared distance from the truth in predicted standard deviations; 10 is correct.
     pub mean_distance_squared: f64,
     /// Share of the estimates within the predicted 95% ellipsoid.
     pub within_95: f64,
-    /// Largest difference between the distances' distribution and chi-squared's (Kolmogorov and
-    /// Smirnov) ...
+    /// Largest difference between the distribution of the distances and chi-squared
+    /// (Kolmogorov-Smirnov).
     pub largest_difference: f64,
-    /// ... and what it exceeds once in twenty where all is right.
+    /// Value that this difference exceeds in 5% of correct experiments.
     pub difference_limit: f64,
-    /// Mean of the residuals' chi-squared over its degrees of freedom; 1 is right.
+    /// Mean chi-squared of the residuals over its degrees of freedom; 1 is correct.
     pub residual: f64,
-    /// Every parameter.
+    /// All parameters.
     pub parameters: Vec<WrenchParameter>,
-    /// Squared distances, in order.
+    /// Squared distances, sorted.
     pub distances: Vec<f64>,
-    /// What poses of other tilts would tell.
+    /// Identifications with other largest tilts.
     pub tilts: Vec<WrenchTilt>,
-    /// The ramp, frame by frame.
+    /// Frames of the ramp.
     pub ramp: Vec<WrenchFrame>,
     /// RMS error of the tared force (mN).
     pub tared_error_mn: f64,
     /// RMS error of the untared force (mN).
     pub untared_error_mn: f64,
-    /// The contact force from which the tared reading stays above three deviations (mN).
+    /// Contact force from which the tared reading stays above three standard deviations (mN).
     pub seen_from_mn: Option<f64>,
     /// Wall time (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
-/// Share of chi-squared with ten degrees of freedom below `x`.
+/// Cumulative distribution of chi-squared with ten degrees of freedom.
 pub(super) fn chi_squared_10(x: f64) -> f64 {
     let half = 0.5 * x;
     let terms = (1..5).scan(1.0, |term, k| {
