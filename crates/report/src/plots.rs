@@ -1,4 +1,5 @@
-//! Line plots as inline SVG. Text and axes take the page's ink through `currentColor`.
+//! Line plots as inline SVG. Text and axes have the text colour of the page, through
+//! `currentColor`.
 
 use crate::axis::{Axis, decimal, log_label};
 use crate::{Error, Result, page};
@@ -7,7 +8,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 const SIZE: (u32, u32) = (560, 300);
 
-/// Drawn in this colour, which nothing else has, then replaced by the page's.
+/// Placeholder colour of text and axes, replaced by `currentColor`.
 const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_HEX: &str = "\"#010203\"";
 
@@ -90,7 +91,7 @@ impl Plot<'_> {
         let Some((left, right)) = range(lines.iter().flatten().map(|p| p.0)) else {
             return Ok(format!("<p class=\"lead\">Nothing to plot for {}.</p>", page::escape(self.title)));
         };
-        // Values that are a little off a power of ten still show it.
+        // Room for values next to a power of ten.
         let beside = if self.log_x { 0.04 * (right - left) } else { 0.0 };
         let x_range = (left - beside, right + beside);
         let shown = self.show.iter().chain(&self.limits).filter(|y| shown_on(self.log_y, **y)).map(|y| scale(*y));
@@ -131,7 +132,7 @@ impl Plot<'_> {
             }
             let (left, _) = chart.backend_coord(&(a, y1));
             let (right, y) = chart.backend_coord(&(b, y1));
-            // About 6 pixels a letter: a name that does not fit its band is left out.
+            // A letter is about 6 pixels wide; a name that does not fit its band is not drawn.
             if right - left > 6 * band.name.len() as i32 {
                 let style = text(12).pos(Pos::new(HPos::Center, VPos::Bottom));
                 let label = Text::new(band.name.clone(), ((left + right) / 2, y - 5), style);
@@ -170,8 +171,7 @@ impl Plot<'_> {
         root.present().map_err(|e| e.to_string())
     }
 
-    /// The drawing as part of the page: no size of its own, no namespace (HTML knows it), the
-    /// page's ink.
+    /// The drawing as inline SVG: without size and namespace, in the text colour of the page.
     fn inline(&self, svg: &str) -> String {
         let body = svg.find("<svg").and_then(|a| svg[a..].find('>').map(|b| &svg[a + b + 1..])).unwrap_or("</svg>");
         format!(
@@ -188,7 +188,7 @@ fn text(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&INK)
 }
 
-/// Smallest and largest value, widened where they are one; `None` without values.
+/// Smallest and largest value, apart by at least a small amount; none without values.
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     (low <= high).then(|| if high - low > 1e-12 { (low, high) } else { (low, low + low.abs().max(1.0)) })
@@ -215,7 +215,7 @@ mod tests {
     }
 
     #[test]
-    fn a_plot_names_its_units_and_loads_nothing() {
+    fn a_plot_has_its_units_and_loads_nothing() {
         let svg = plot((0..100).map(|i| (f64::from(i) * 0.02, f64::from(i))).collect(), false);
         assert!(svg.contains("time (s)") && svg.contains("lift (mm)") && svg.contains("settle"));
         assert!(svg.contains("currentColor") && !svg.contains(INK_HEX) && !svg.contains("http"));
@@ -223,14 +223,14 @@ mod tests {
     }
 
     #[test]
-    fn odd_data_do_not_panic() {
+    fn unusual_data_do_not_panic() {
         assert!(plot(vec![], false).contains("Nothing to plot"));
         assert!(plot(vec![(f64::NAN, 1.0), (0.0, f64::INFINITY)], false).contains("Nothing to plot"));
         assert!(plot(vec![(0.0, 0.0), (1.0, -1.0)], true).contains("Nothing to plot"));
         assert!(plot(vec![(1.0, 2.0)], false).contains("<svg"));
         assert!(plot(vec![(0.0, 1e-9), (1.0, 1e5)], true).contains("10⁻⁹"));
         assert!(plot(vec![(0.0, 1e300), (1.0, -1e300)], false).contains("<svg"));
-        // What summaries write of what has blown up.
+        // Values of diverged runs.
         assert!(plot(vec![(0.0, 0.0), (1.0, f64::MAX), (f64::MAX, 1.0)], false).contains("<svg"));
     }
 

@@ -1,5 +1,5 @@
-//! Table IV's silhouettes and pictures (paper section VII-E): reconstructions rendered through the
-//! recovered recording camera beside the recordings, and through the endoscope beside an oblique
+//! Silhouettes and pictures of Table IV (paper section VII-E): reconstructions rendered through the
+//! recovered recording camera against the recordings, and through the endoscope against an oblique
 //! view.
 
 mod endoscope;
@@ -31,20 +31,20 @@ use trocar_report::document::Document;
 use trocar_workflow::phantoms::recorded;
 use trocar_workflow::reconstruct_recording;
 
-/// Silhouettes, SSIM and PSNR of rendered reconstructions beside what was filmed, and oblique views
+/// Silhouettes, SSIM and PSNR of rendered reconstructions against the recordings, and oblique views
 /// through the endoscope.
 #[derive(Clone, Debug, Args)]
 pub struct SimilarityExperiment {
-    /// Phantoms; all by default. The first is filmed from the side too.
+    /// Phantoms; all by default. The first is also recorded from the side.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
     /// How they are recorded.
     #[command(flatten)]
     pub recorded: Recorded,
-    /// Folder with the real recordings; what it lacks is left out.
+    /// Folder of real recordings; missing ones are skipped.
     #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
     pub data: PathBuf,
-    /// Paths a pixel.
+    /// Paths per pixel.
     #[arg(long, default_value_t = 16)]
     pub samples: u32,
 }
@@ -53,7 +53,7 @@ impl Study for SimilarityExperiment {
     const NAME: &'static str = "similarity";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> =
-        Some("Folder for recordings, specimens, pictures and the report; finished recordings in it are used again.");
+        Some("Output folder of recordings, specimens, pictures and report. Finished recordings in it are used again.");
     type Figures = SimilarityResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(SimilarityResult, Document)> {
@@ -104,7 +104,8 @@ impl Study for SimilarityExperiment {
 }
 
 impl SimilarityExperiment {
-    /// A reconstruction through its recording camera beside the recording's first frame.
+    /// Compares a reconstruction, rendered through its recording camera, with the first frame of
+    /// the recording.
     fn beside_recording(
         &self,
         name: &str,

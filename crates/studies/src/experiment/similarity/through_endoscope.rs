@@ -1,5 +1,5 @@
-//! An oblique view through the endoscope's model beside the real frame (paper section VIII, the
-//! in-vivo extension).
+//! An oblique view through the endoscope's model beside the real frame (paper section VIII, in-vivo
+//! extension).
 
 use super::endoscope::endoscope_camera;
 use super::measure::{Sides, SimilarityPictures, SimilarityRow, labelled, measure};
@@ -14,12 +14,12 @@ use trocar_reconstruct::{Reconstruction, Settings};
 use trocar_recording::Recording;
 use trocar_workflow::reconstruct_recording;
 
-/// Where the endoscope's light would make a white surface white (m), in pictures of scenes that it
-/// did not light.
+/// Distance at which the endoscope's light renders a white surface white (m), for scenes recorded
+/// in other light.
 const WHITE_AT: f64 = 0.35;
 
-/// A phantom filmed through the endoscope from the side, reconstructed, and rendered through it
-/// again.
+/// A phantom recorded through the endoscope from the side, reconstructed, and rendered through the
+/// endoscope.
 pub(super) fn from_the_side(
     samples: u32,
     phantom: &str,
@@ -37,8 +37,8 @@ pub(super) fn from_the_side(
     through_endoscope(samples, &name, &folder, &made, light, note, progress)
 }
 
-/// A reconstruction through the thirty-degree endoscope, whose lens stands where the recording
-/// camera stood, beside the recording's first frame as the endoscope's lens would have shown it.
+/// Compares a reconstruction, rendered through the thirty-degree endoscope at the pose of the
+/// recording camera, with the first frame of the recording seen through the endoscope's lens.
 pub(super) fn through_endoscope(
     samples: u32,
     name: &str,
@@ -85,11 +85,11 @@ pub(super) fn through_endoscope(
     Ok((row, pictures))
 }
 
-/// A mask through the map, the nearest pixel each.
+/// The mask, remapped to the nearest pixels.
 fn masked(map: &UndistortionMap, mask: &Mask) -> Mask {
     let at = |p: &glam::DVec2| {
         let (x, y) = (p.x.round(), p.y.round());
-        // Written so that NaN is outside.
+        // NaN is outside.
         let inside = x >= 0.0 && y >= 0.0 && x < mask.width as f64 && y < mask.height as f64;
         inside && mask.set[y as usize * mask.width + x as usize]
     };
