@@ -8,7 +8,8 @@ use crate::study::Entry;
 pub fn page(entry: &dyn Entry, command: &str, commit: &str, body: &str) -> String {
     let (kind, name) = (entry.kind().name(), entry.name());
     format!(
-        "<!-- trocar {kind} {name}; schema {}; commit {commit} -->\n\nMeasured by `{command}` at commit {commit}.\n\n{body}",
+        "<!-- trocar {kind} {name}; schema {}; commit {commit} -->\n\nMeasured by `{command}` at commit \
+         {commit}.\n\n{body}",
         entry.schema()
     )
 }

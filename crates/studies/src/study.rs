@@ -55,11 +55,11 @@ pub trait Study: Args {
     fn run(&self, job: &Job<'_>) -> Result<(Self::Figures, Document)>;
 }
 
-/// Ends an interrupted study.
+/// Stops an interrupted study.
 ///
 /// # Errors
 /// [`Error::Interrupted`] if the user asked to stop.
-pub(crate) fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
+pub(crate) fn check_interrupted(progress: &dyn Progress) -> Result<()> {
     if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
 

@@ -89,7 +89,8 @@ impl Trials {
             Found::Trials { header: earlier, trials, good } if earlier == header => (done, length) = (trials, good),
             Found::Trials { trials, .. } => {
                 put_aside = Some(format!(
-                    "{} trials of another program, specimen or other options were renamed to {FILE}.old; all trials run again",
+                    "{} trials of another program, specimen or other options were renamed to {FILE}.old; all trials \
+                     run again",
                     trials.len()
                 ));
                 std::fs::rename(&path, path.with_extension("jsonl.old")).map_err(io)?;

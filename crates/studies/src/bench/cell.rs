@@ -8,7 +8,7 @@ use super::machine::Machine;
 use crate::Result;
 use crate::names::SceneChoice;
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -109,7 +109,7 @@ impl Study for CellBench {
                 break;
             }
             for mut action in chunk {
-                stop_if_asked(progress)?;
+                check_interrupted(progress)?;
                 if let Some(right) = &right {
                     swing(&mut action, right, episode.time());
                 }

@@ -6,7 +6,7 @@
 use super::machine::Machine;
 use crate::names::SceneChoice;
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -204,7 +204,7 @@ impl EpisodeBench {
         progress.begin("path-traced frames", PATH_FRAMES as u64);
         let clock = Instant::now();
         for _ in 0..PATH_FRAMES {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             rig.render(episode.cell(), camera, [1280, 720], &settings)?;
             progress.advance(1);
         }
@@ -225,7 +225,7 @@ impl EpisodeBench {
         let (clock, mut pictures) = (Instant::now(), Duration::ZERO);
         'episode: while episode.end().is_none() {
             for action in scripted.act(episode)? {
-                stop_if_asked(progress)?;
+                check_interrupted(progress)?;
                 let ended = episode.step(&action)?.end.is_some();
                 let clock_pictures = Instant::now();
                 for camera in &self.cameras {
@@ -288,8 +288,8 @@ fn document(r: &EpisodeBenchResult) -> Document {
     if !r.repeatable {
         lines.push("the runs ended in DIFFERENT states".to_owned());
     }
-    let lead = "The scripted controller does the scene's task. The first row's pictures are previews for policies: small, and \
-                without shadows; the second row's are what the paper's figures look like.";
+    let lead = "The scripted controller performs the task of the scene. The pictures of the first row are previews \
+                for policies, small and without shadows; those of the second row are like the paper's figures.";
     Document::new("Episode", "Speed of a whole episode")
         .with(Section::new("Episode", lead).table(Table::new(head, rows)).lines(lines))
 }

@@ -9,7 +9,7 @@
 use super::machine::Machine;
 use crate::names::{AppendixChoice, DesignName, design_name};
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -209,7 +209,7 @@ fn together(
             return Ok(times);
         }
         for action in chunk {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             let clocks = (with.cell().timing(), without.timing());
             let before = with.cell().moment();
             if times.len().is_multiple_of(2) {

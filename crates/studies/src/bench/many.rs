@@ -1,7 +1,7 @@
 //! Many small models in parallel, beside one model of the same total size.
 
 use crate::statistics::median;
-use crate::study::stop_if_asked;
+use crate::study::check_interrupted;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
@@ -63,7 +63,7 @@ pub(super) fn measure(
             let mut times: [Vec<f64>; 3] = Default::default();
             let whole = Instant::now();
             for frame in 0..WARM_UP + FRAMES {
-                stop_if_asked(progress)?;
+                check_interrupted(progress)?;
                 let took = [
                     timed(|| step_all(&mut many, threads))?,
                     timed(|| Ok(one.frame().map(|_| ())?))?,

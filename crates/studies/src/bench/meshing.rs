@@ -4,7 +4,7 @@
 use super::pytetwild::PytetwildMesher;
 use crate::Result;
 use crate::names::Units;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -94,7 +94,7 @@ impl Study for MeshingBench {
         let mut rows = Vec::new();
         let mut measure =
             |name: &str, series: &'static str, surface: &TriMesh, mesher: &dyn Mesher, runs: usize| -> Result<()> {
-                stop_if_asked(job.progress)?;
+                check_interrupted(job.progress)?;
                 rows.push(row(name, series, surface, mesher, runs));
                 job.progress.advance(1);
                 Ok(())
@@ -111,7 +111,7 @@ impl Study for MeshingBench {
             measure(name, "peers", surface, &PytetwildMesher { python: self.python.clone() }, 1)?;
         }
         job.progress.end();
-        stop_if_asked(job.progress)?;
+        check_interrupted(job.progress)?;
         let per_tet = |r: Option<&MeshingRow>| r.filter(|r| r.tets > 0).map(|r| r.ns_per_tet);
         let mut of_size: Vec<&MeshingRow> = rows.iter().filter(|r| r.series == "size").collect();
         of_size.sort_by_key(|r| r.tets);
@@ -192,12 +192,13 @@ fn document(result: &MeshingResult) -> Result<Document> {
     let linear = result.linearity.map_or(String::new(), |ratio| {
         format!(" Time per element at the largest size over that at the smallest: {}.", fixed(ratio, 2))
     });
-    let lead = format!("The lattice mesher on one surface, finer and finer, {} threads.{linear}", result.threads);
+    let lead = format!("The lattice mesher on one surface at increasing sizes, {} threads.{linear}", result.threads);
     let cost = Section::new("Cost", lead).figures(figures).table(rows(of("size")));
     let peers = Section::new(
-        "Side by side",
-        "One surface, one run each on the same machine. The lattice mesher at the default settings (2.2 mm, or about 50,000 \
-         elements), TetGen at the paper's, fTetWild at its own; the time of the last two holds the start of their process.",
+        "Comparison",
+        "One surface, one run each on the same machine. The lattice mesher at the default settings (2.2 mm, or about \
+         50,000 elements), TetGen with those of the paper, fTetWild with its own. The times of the last two include \
+         the start of their process.",
     )
     .table(rows(of("peers")));
     Ok(Document::new("Meshing", "From closed surfaces to tetrahedra").with(cost).with(peers))

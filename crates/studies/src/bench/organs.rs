@@ -3,7 +3,7 @@
 use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::{SolverName, kilopascals};
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -155,7 +155,7 @@ impl Study for OrgansBench {
         progress.begin("sag", frames as u64 + 1);
         let mut settled_speed_m_s = 0.0;
         for _ in 0..frames {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             settled_speed_m_s = run.frame()?.max_speed;
             progress.advance(1);
         }
@@ -228,7 +228,7 @@ impl Tube {
             tube.inverted = tube.inverted.max(report.inverted);
             tube.yielded += report.grasp_limited;
             for substep in 0..substeps {
-                stop_if_asked(progress)?;
+                check_interrupted(progress)?;
                 oracle.step(h, frame as f64 * FRAME + (substep + 1) as f64 * h)?;
                 progress.advance(1);
             }

@@ -157,17 +157,18 @@ const MAX_LOSS: f64 = 0.1;
 fn document(result: &ScalingResult) -> Result<Document> {
     let m = &result.machine;
     let load = m.load.map_or(String::new(), |l| {
-        let busy = if l > 0.5 { "; the machine was not idle, so the figures are too low" } else { "" };
+        let busy = if l > 0.5 { "; the machine was not idle: the figures are too low" } else { "" };
         format!(", load {} at the start{busy}", fixed(l, 1))
     });
     let lead = format!(
-        "Our own six organs (fewer at the smallest sizes), finer and finer, the lowest 42% of each pinned and a patch of each shaken. Median of up to 60 frames of \
+        "Our own six organs (fewer at the smallest sizes), the lowest 42% of each pinned and a patch of each shaken. \
+         Median of up to 60 frames of \
          1/60 s; {} cores{load}. The dashed line is real time.",
         m.cores
     );
     let plots = [
         plot(result, "Real-time factor", "times real time", &|r, t| (r.tets as f64, t.real_time_factor))?,
-        plot(result, "Time per element", "\u{b5}s a frame", &|r, t| {
+        plot(result, "Time per element", "\u{b5}s per frame", &|r, t| {
             (r.tets as f64, 1e3 * t.frame_ms_median / r.tets as f64)
         })?,
     ];
@@ -176,7 +177,8 @@ fn document(result: &ScalingResult) -> Result<Document> {
     if !result.many.is_empty() {
         let section = Section::new(
             "Many small models",
-            "Each small model is an appendix with a stepper of its own; they are shared out among the threads. The same appendixes stand in one model beside them, and \
+            "Each small model is an appendix with its own stepper; the models are divided among the threads. For \
+             comparison: one model with the same appendixes, and \
              six organs of the same total size.",
         );
         document = document.with(section.cards(cards(result)).table(many_table(result)));
@@ -228,7 +230,7 @@ fn sizes(result: &ScalingResult) -> Table {
         "Nodes",
         "Frame (ms)",
         "Real time",
-        "Iterations a frame",
+        "Iterations per frame",
         "Inverted",
         "Yielded",
     ];
@@ -269,8 +271,8 @@ fn many_table(result: &ScalingResult) -> Table {
         "One model (ms)",
         "Loss",
         "Six organs (ms)",
-        "their elements",
-        "Loss an element",
+        "Elements of organs",
+        "Loss per element",
     ];
     let row = |r: &ManyRow| {
         vec![

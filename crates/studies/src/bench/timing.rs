@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::statistics::median;
-use crate::study::stop_if_asked;
+use crate::study::check_interrupted;
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
@@ -41,7 +41,7 @@ impl Timing {
         let mut iterations = 0;
         let whole = Instant::now();
         for frame in 0..warm_up + frames {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             let clock = Instant::now();
             let report = run.frame()?;
             let took = clock.elapsed().as_secs_f64();

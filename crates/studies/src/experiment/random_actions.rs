@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::names::SceneChoice;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::trials::{Outcomes, Resumed, resumed};
 use clap::Args;
 use serde::{Deserialize, Serialize};
@@ -152,7 +152,7 @@ fn run(
     let mut row = RandomActionsRow { seed, max_stretch: 1.0, min_volume_ratio: 1.0, ..RandomActionsRow::default() };
     'episode: while row.actions < actions && episode.end().is_none() {
         for action in policy.act(&episode)? {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             let step = episode.step(&action)?;
             row.actions += 1;
             row.max_stretch = row.max_stretch.max(episode.max_stretch());

@@ -2,7 +2,7 @@
 
 use crate::Result;
 use crate::names::{Recorded, SolverName, phantoms_or_all};
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use serde::Serialize;
 use trocar_cell::{FRAME, World};
@@ -147,7 +147,7 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
     let (mut speeds, mut event) = (Vec::with_capacity(frames), None);
     progress.begin(phantom, frames as u64);
     for frame in 1..=frames {
-        stop_if_asked(progress)?;
+        check_interrupted(progress)?;
         let report = world.step(&[]);
         progress.advance(1);
         speeds.push((frame as f64 * FRAME, report.max_speed));

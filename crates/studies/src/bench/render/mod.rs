@@ -8,7 +8,7 @@ pub use rays::RayRow;
 use super::machine::Machine;
 use crate::Result;
 use crate::statistics::median;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -213,7 +213,7 @@ impl Study for RenderBench {
         progress.begin("measurements", 5);
         let step = || {
             progress.advance(1);
-            stop_if_asked(progress)
+            check_interrupted(progress)
         };
         let cell = (self.scene != "none").then(|| self.cell(&self.scene, progress)).transpose()?;
         let clock = Instant::now();
@@ -272,7 +272,7 @@ impl RenderBench {
         for frame in 0..FRAMES + FRAMES / 10 {
             let mut step =
                 |timed: &mut dyn FnMut(&mut CameraRig, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
-                    stop_if_asked(progress)?;
+                    check_interrupted(progress)?;
                     script.advance()?;
                     let clock = Instant::now();
                     timed(&mut rig, script.cell())?;

@@ -20,12 +20,12 @@ const RESPONSE: (f64, f64) = (0.9, 2.6);
 
 pub(super) fn document(r: &ControllerGridResult) -> Result<Document> {
     let lead = format!(
-        "{} configurations: seven kinds of control, thirteen bandwidths, two damping ratios. Both arms of the cell perform \
-         the same motion with each: corners, \
-         sines, 1\u{202f}N on the tip, rest, then impulses of 25\u{202f}N and steps of the command. The model assumes links \
-         2% and instruments 5% too light and no friction; every joint has 0.2\u{202f}N\u{202f}m instead of the arm\u{2019}s own. \
-         The lowest bandwidth that is {} below every target is chosen: this simulation has no sensor noise and no gear \
-         compliance, which limit the bandwidth of a real arm.",
+        "{} configurations: seven kinds of control, thirteen bandwidths, two damping ratios. Both arms of the cell \
+         perform the same motion with each: corners, sines, 1\u{202f}N on the tip, rest, then impulses of \
+         25\u{202f}N and steps of the command. The model assumes links 2% and instruments 5% too light and no \
+         friction; every joint has 0.2\u{202f}N\u{202f}m instead of the arm\u{2019}s own. The lowest bandwidth that \
+         is {} below every target is chosen: this simulation has no sensor noise and no gear compliance, which limit \
+         the bandwidth of a real arm.",
         r.rows.len(),
         percent(MARGIN, 0)
     );
@@ -142,7 +142,8 @@ fn droops(r: &ControllerGridResult) -> Result<String> {
         log_y: true,
         ..Plot::default()
     };
-    let caption = "<b>Droop at rest</b> over the bandwidth; dashed: the paper. Without integral action or observer it decreases with the stiffness.";
+    let caption = "<b>Droop at rest</b> over the bandwidth; dashed: the paper. Without integral action or observer \
+                   it decreases with the stiffness.";
     Ok(plot.figure(caption)?)
 }
 
@@ -161,7 +162,8 @@ fn response(r: &ControllerGridResult) -> Result<String> {
     };
     let entries = names.iter().zip(colors).map(|(n, c)| (*n, c));
     let caption = format!(
-        "<b>The first move of the left arm</b>: the reference is a delayed spline through the commands; the tip follows it.{}",
+        "<b>The first move of the left arm</b>: the reference is a delayed spline through the commands; the tip \
+         follows it.{}",
         page::legend(entries)
     );
     Ok(plot.figure(&caption)?)
@@ -218,8 +220,9 @@ fn friction(r: &ControllerGridResult) -> Section {
     let own = r.chosen_with_own_friction.iter().map(|f| row("the FR3\u{2019}s own, 1.137 and 0.763 N m", f));
     Section::new(
         "Friction",
-        "The grid uses 0.2 N m in every joint instead of the FR3\u{2019}s own Coulomb friction, which its model states as \
-         1.137 N m for joints 1 to 4 and 0.763 N m for joints 5 to 7. The table shows the chosen controller with both.",
+        "The grid uses 0.2 N m in every joint instead of the FR3\u{2019}s own Coulomb friction, which its model \
+         states as 1.137 N m for joints 1 to 4 and 0.763 N m for joints 5 to 7. The table shows the chosen \
+         controller with both.",
     )
     .table(Table::new(head, grid.chain(own).collect()))
 }

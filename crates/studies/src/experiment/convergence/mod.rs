@@ -168,7 +168,8 @@ fn described(scene: &str) -> &'static str {
             "Pinned within 10 mm of one end, the middle lifted at 30 mm/s, after 0.25 s: large, slow, global motion."
         }
         _ => {
-            "Free fall for 0.1 s. The predictor of implicit Euler is the exact step, so no excess energy can be compared."
+            "Free fall for 0.1 s. The predictor of implicit Euler is the exact step, so no excess energy can be \
+             compared."
         }
     }
 }
@@ -276,10 +277,9 @@ fn default_iterations(result: &ConvergenceResult) -> Section {
     }
     Section::new(
         "With the default iterations of each schedule",
-        "One substep. <i>Over displacement</i>: over the RMS distance from the rest shape. <i>Energy</i>: \
-         the incremental potential above the minimum, over that of the \
-         inertial predictor; single precision limits it to about 1e-10. The plots show 12 kPa and nu 0.45 in full colour and the \
-         other materials pale.",
+        "One substep. <i>Over displacement</i>: over the RMS distance from the rest shape. <i>Energy</i>: the \
+         incremental potential above the minimum, over that of the inertial predictor; single precision limits it to \
+         about 1e-10. The plots show 12 kPa and nu 0.45 in full colour and the other materials pale.",
     )
     .table(Table::new(head, rows))
 }

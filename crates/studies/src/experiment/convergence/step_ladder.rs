@@ -2,7 +2,7 @@
 //! minimum found by the oracle, and wall time.
 
 use crate::Result;
-use crate::study::stop_if_asked;
+use crate::study::check_interrupted;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
@@ -76,7 +76,7 @@ pub(super) fn measure(scene: &Scene, solvers: &[&str], max: usize, progress: &dy
         }
         Some(frames) => {
             for k in 0..frames * ORACLE_SUBSTEPS {
-                stop_if_asked(progress)?;
+                check_interrupted(progress)?;
                 before = run.state.clone();
                 run.step(h, (k + 1) as f64 * h)?;
             }
@@ -89,7 +89,7 @@ pub(super) fn measure(scene: &Scene, solvers: &[&str], max: usize, progress: &dy
         let schedule = solver_named(name)?;
         let ladder = Ladder::new(scene, &mut run, &start, frames.unwrap_or(0) as f64 * FRAME, schedule)?;
         for iterations in iteration_counts(schedule, max) {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             rows.push(ladder.row(&mut run, name, schedule, iterations)?);
         }
     }

@@ -33,9 +33,10 @@ fn section(r: &ElementQualityResult, (condition, scaled): (Condition, bool)) -> 
         r.rows.iter().filter(|row| (row.condition, row.scaled) == (condition, scaled)).collect();
     let force = if scaled { "N at 12 kPa and in proportion at other moduli" } else { "N at all moduli" };
     let lead = format!(
-        "{}. The appendix is grasped in its middle and lifted, at five moduli. The jaw force is {} {force}. The far end is \
-         pinned; in half of the cases also the lowest 42% of the nodes. Paper: 170 to 180 of 8,072 elements inverted at \
-         15 mm; at 30 mm three of three runs diverged at 3 and 6 kPa, one of three at 12 and 24 kPa, none at 48 kPa.",
+        "{}. The appendix is grasped in its middle and lifted, at five moduli. The jaw force is {} {force}. The far \
+         end is pinned; in half of the cases also the lowest 42% of the nodes. Paper: 170 to 180 of 8,072 elements \
+         inverted at 15 mm; at 30 mm three of three runs diverged at 3 and 6 kPa, one of three at 12 and 24 kPa, \
+         none at 48 kPa.",
         condition.described(),
         fixed(r.jaw_force_n, 2),
     );
@@ -45,7 +46,7 @@ fn section(r: &ElementQualityResult, (condition, scaled): (Condition, bool)) -> 
     let smallest = rows.iter().map(|row| row.min_volume_ratio).fold(f64::INFINITY, f64::min);
     let sum = |k: usize| rows.iter().map(|row| row.suspensions[k]).sum();
     let cards = [
-        Card::new("Inverted", count(inverted), "most in any frame of any case").met(inverted == 0),
+        Card::new("Inverted", count(inverted), "largest number in any frame of any case").met(inverted == 0),
         Card::new("Diverged", format!("{diverged} of {}", rows.len()), "cases").met(diverged == 0),
         Card::new("Held", format!("{held} of {}", rows.len()), "cases"),
         Card::new("Smallest volume", fixed(smallest, 3), "of an element over its volume at rest"),

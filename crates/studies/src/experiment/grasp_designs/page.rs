@@ -54,9 +54,9 @@ fn conditions(r: &GraspDesignsResult) -> Vec<Condition> {
 
 fn lead(r: &GraspDesignsResult, condition: Condition) -> String {
     format!(
-        "{}. The appendix settles. The jaws approach one of five places, in the middle or 2 mm to either side, close with \
-         {} N, lift by {} mm in one second and hold for another. <i>Re-grasp</i>: the tissue is first dragged sideways by \
-         5 or 10 mm, released, and grasped again.",
+        "{}. The appendix settles. The jaws approach one of five places, in the middle or 2 mm to either side, close \
+         with {} N, lift by {} mm in one second and hold for another. <i>Re-grasp</i>: the tissue is first dragged \
+         sideways by 5 or 10 mm, released, and grasped again.",
         condition.described(),
         fixed(r.jaw_force_n, 2),
         fixed(r.lift_mm, 0),
@@ -104,7 +104,7 @@ fn table_ii(r: &GraspDesignsResult, condition: Condition) -> Table {
             fixed(row.lift_median_mm, 1),
             fixed(row.slip_median_mm, 2),
             range(row.snap_least_mm.zip(row.snap_mm)),
-            format!("{} (most {})", fixed(row.activation_step_median_mm, 2), fixed(row.activation_step_most_mm, 2)),
+            format!("{} (max. {})", fixed(row.activation_step_median_mm, 2), fixed(row.activation_step_most_mm, 2)),
             count(row.inverted_peak),
             fixed(row.min_volume_ratio, 2),
             suspensions(row.suspensions),
@@ -184,8 +184,8 @@ fn snaps(r: &GraspDesignsResult, condition: Condition) -> Result<String> {
         points.sort_by(|a, b| a.0.total_cmp(&b.0));
         points
     };
-    let caption = "<b>Snap of the second grasp</b>, mean over the nodes, over the displacement of the tissue from rest. \
-                   Paper: slope 0.91 for rest-pose, zero for live-pose.";
+    let caption = "<b>Snap of the second grasp</b>, mean over the nodes, over the displacement of the tissue from \
+                   rest. Paper: slope 0.91 for rest-pose, zero for live-pose.";
     plot("snap of the second grasp", "displacement from rest (mm)", "mean snap (mm)", points, caption)
 }
 

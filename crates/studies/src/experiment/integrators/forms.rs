@@ -131,7 +131,8 @@ fn sags(rows: &[IntegratorRow]) -> Option<String> {
     let (error, ratio) = (paper.sag_error?, paper.sag_ratio?);
     Some(if error > MAX_SAG_ERROR {
         format!(
-            "Bounded is not correct: Vertex Block Descent as in the paper stays slow and sags {ratio:.1} times as far as the equilibrium."
+            "Bounded is not correct: Vertex Block Descent as in the paper stays slow and sags {ratio:.1} times as \
+             far as the equilibrium."
         )
     } else {
         format!("The sag of Vertex Block Descent as in the paper is within {:.1}% of the equilibrium.", 100.0 * error)

@@ -5,7 +5,7 @@ mod forms;
 mod row;
 
 use crate::names::Recorded;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
 use forms::{Form, findings, forms};
@@ -187,7 +187,7 @@ fn measured(
     let first_measured = frames - ((AVERAGED_SHARE * frames as f64) as usize).max(1);
     let (mut speeds, mut times, mut ended) = (Vec::with_capacity(frames), Vec::with_capacity(frames), None);
     for frame in 0..frames {
-        stop_if_asked(progress)?;
+        check_interrupted(progress)?;
         let clock = Instant::now();
         let report = stepper.step(model, &mut state, &[]);
         times.push(1e3 * clock.elapsed().as_secs_f64());
@@ -317,8 +317,9 @@ fn rows(result: &IntegratorsResult) -> Section {
         ]
     };
     let lead = format!(
-        "<i>Sag error</i>: mean distance of the nodes from the static equilibrium (Newton\u{2019}s method in double precision) over their mean displacement in it, positions \
-         averaged over the last third of the run. Frames on {} threads.",
+        "<i>Sag error</i>: mean distance of the nodes from the static equilibrium (Newton\u{2019}s method in double \
+         precision) over their mean displacement in it, positions averaged over the last third of the run. Frames on \
+         {} threads.",
         result.threads
     );
     Section::new("All integrators", lead).table(Table::new(head, result.integrators.iter().map(row).collect()))

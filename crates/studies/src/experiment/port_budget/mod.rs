@@ -7,7 +7,7 @@ mod result;
 
 use crate::Result;
 use crate::names::millimetres;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use pushing::{DIRECTIONS, Pushing};
 use result::{PortBudgetResult, PortRoom, PortStart};
@@ -77,7 +77,7 @@ impl PortBudgetExperiment {
         let mut rows = Vec::with_capacity(count);
         progress.begin("tilts", count as u64);
         for k in 0..count {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             rows.push(pushing.row(k as f64 * STEP, self.push));
             progress.advance(1);
         }

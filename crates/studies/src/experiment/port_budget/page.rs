@@ -14,9 +14,8 @@ const EVERY: usize = 5;
 
 pub(super) fn document(r: &PortBudgetResult) -> Result<Document> {
     let lead = format!(
-        "A {} mm shaft in a {} mm hole of a sheet of {} mm. Formula: (D \u{2212} d/cos \u{2212} t tan)/2, the paper\u{2019}s for \
-         t = 0. Measured: a shaft pushed sideways in \
-         the contact model until it touches the rim.",
+        "A {} mm shaft in a {} mm hole of a sheet of {} mm. Formula: (D \u{2212} d/cos \u{2212} t tan)/2, the \
+         paper\u{2019}s for t = 0. Measured: a shaft pushed sideways in the contact model until it touches the rim.",
         r.shaft_mm, r.hole_mm, r.thickness_mm
     );
     let section =
@@ -105,9 +104,10 @@ fn sections(r: &PortBudgetResult) -> String {
         let thin = 0.02 * hole;
         let _ = write!(
             svg,
-            "<circle cx=\"{x:.3}\" cy=\"{y:.3}\" r=\"{hole:.3}\" fill=\"none\" stroke=\"currentColor\" stroke-width=\"{thin:.3}\"/>\
-             <ellipse cx=\"{:.3}\" cy=\"{y:.3}\" rx=\"{:.3}\" ry=\"{:.3}\" fill=\"{}\" fill-opacity=\"0.35\" stroke=\"{}\" stroke-width=\"{thin:.3}\"/>\
-             <text x=\"{x:.3}\" y=\"{:.3}\" font-size=\"{:.3}\" text-anchor=\"middle\" fill=\"currentColor\">{}\u{b0}</text>",
+            "<circle cx=\"{x:.3}\" cy=\"{y:.3}\" r=\"{hole:.3}\" fill=\"none\" stroke=\"currentColor\" \
+             stroke-width=\"{thin:.3}\"/><ellipse cx=\"{:.3}\" cy=\"{y:.3}\" rx=\"{:.3}\" ry=\"{:.3}\" fill=\"{}\" \
+             fill-opacity=\"0.35\" stroke=\"{}\" stroke-width=\"{thin:.3}\"/><text x=\"{x:.3}\" y=\"{:.3}\" \
+             font-size=\"{:.3}\" text-anchor=\"middle\" fill=\"currentColor\">{}\u{b0}</text>",
             x + pushed,
             0.5 * r.shaft_mm / cos,
             0.5 * r.shaft_mm,
@@ -121,7 +121,8 @@ fn sections(r: &PortBudgetResult) -> String {
     svg.push_str("</svg>");
     page::figure(
         &svg,
-        "<b>Section of the shaft in the plane of the port</b> at five tilts to the right, pushed to the right until it touches.",
+        "<b>Section of the shaft in the plane of the port</b> at five tilts to the right, pushed to the right until \
+         it touches.",
     )
 }
 

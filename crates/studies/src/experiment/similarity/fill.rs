@@ -10,7 +10,7 @@ pub(super) struct Sparse<const N: usize> {
     pub known: Vec<bool>,
 }
 
-/// The values of all pixels. Without any known pixel the values are returned unchanged.
+/// The values of all pixels; 0 if no pixel is known.
 pub(super) fn fill<const N: usize>(image: &Sparse<N>) -> Vec<[f64; N]> {
     let (w, h) = (image.width, image.height);
     if image.known.iter().all(|k| *k) || w.max(h) <= 1 {

@@ -17,7 +17,7 @@ pub use result::SimilarityResult;
 
 use crate::Result;
 use crate::names::{Recorded, phantoms_or_all};
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use measure::{Sides, SimilarityPictures, labelled, measure};
 use result::PAPER;
@@ -115,7 +115,7 @@ impl SimilarityExperiment {
         note: &str,
         progress: &dyn Progress,
     ) -> Result<(SimilarityRow, SimilarityPictures)> {
-        stop_if_asked(progress)?;
+        check_interrupted(progress)?;
         let recording = Recording::open(&folder.join("recording"))?;
         let (first, second) = (recording.frame(0)?, (recording.len() > 1).then(|| recording.frame(1)).transpose()?);
         let scenery = Scenery::new(made, light)?;

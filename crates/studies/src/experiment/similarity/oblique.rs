@@ -5,7 +5,7 @@ use super::endoscope::endoscope_camera;
 use super::measure::labelled;
 use super::scenery::{BESIDE_LENS, surroundings};
 use crate::Result;
-use crate::study::stop_if_asked;
+use crate::study::check_interrupted;
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, DepthNoise, Mask};
@@ -53,7 +53,7 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
     let mut writer: Option<RecordingWriter> = None;
     progress.begin("oblique frames", u64::from(FRAMES));
     for frame in 0..FRAMES {
-        if let Err(e) = stop_if_asked(progress) {
+        if let Err(e) = check_interrupted(progress) {
             progress.end();
             return Err(e);
         }

@@ -34,8 +34,8 @@ pub(super) fn document(
     }
     for (row, pictures) in r.oblique.iter().zip(oblique) {
         let lead = format!(
-            "An oblique view through the thirty-degree endoscope (86.2 x 54.6 degrees) at the place of the recording camera, \
-             beside the real frame seen through that lens. {}.",
+            "An oblique view through the thirty-degree endoscope (86.2 x 54.6 degrees) at the place of the recording \
+             camera, beside the real frame seen through that lens. {}.",
             page::escape(&capital(&row.note))
         );
         let title = format!("Oblique view: {}", row.specimen);
@@ -106,8 +106,8 @@ fn table(r: &SimilarityResult) -> Section {
     rows.push(row("paper", "rendered", Some(p.iou), both(p.rendered, p.matched)));
     rows.push(row("", "second frame", None, both(none, p.second_frame)));
     rows.push(row("", "mean colour", None, both(none, p.mean_colour)));
-    let lead = "Within the masks of the organs, without instruments. SSIM after Wang and others (2004), 8-bit sRGB, mean over the \
-                channels. Matching scales each channel by least squares.";
+    let lead = "Within the masks of the organs, without instruments. SSIM after Wang and others (2004), 8-bit sRGB, \
+                mean over the channels. Matching scales each channel by least squares.";
     Section::new("Beside the paper", lead).table(Table::new(head, rows))
 }
 

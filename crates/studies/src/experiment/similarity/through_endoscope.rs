@@ -6,7 +6,7 @@ use super::measure::{Sides, SimilarityPictures, SimilarityRow, labelled, measure
 use super::oblique;
 use super::scenery::{BESIDE_LENS, Illumination, Scenery};
 use crate::Result;
-use crate::study::stop_if_asked;
+use crate::study::check_interrupted;
 use std::path::Path;
 use trocar_camera::{CameraModel, ColorImage, Mask, UndistortionMap};
 use trocar_core::{Pose, Progress};
@@ -48,7 +48,7 @@ pub(super) fn through_endoscope(
     note: &str,
     progress: &dyn Progress,
 ) -> Result<(SimilarityRow, SimilarityPictures)> {
-    stop_if_asked(progress)?;
+    check_interrupted(progress)?;
     let recording = Recording::open(&folder.join("recording"))?;
     let first = recording.frame(0)?;
     let second = (recording.len() > 1).then(|| recording.frame(1)).transpose()?;

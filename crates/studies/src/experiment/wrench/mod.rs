@@ -7,7 +7,7 @@ mod result;
 
 use crate::Result;
 use crate::names::degrees;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use glam::{DQuat, DVec3};
 use normal::normals;
@@ -95,7 +95,7 @@ impl WrenchExperiment {
         let (mut distances, mut residual) = (Vec::with_capacity(self.runs), 0.0);
         progress.begin("identifications", self.runs as u64);
         for run in 0..self.runs {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             let found = self.weigh(run as u64, self.tilt)?;
             distances.push(found.distance_squared(&self::truth()));
             residual += found.chi_squared / found.degrees as f64;

@@ -10,8 +10,9 @@ use trocar_report::table::{count, fixed, percent};
 
 pub(super) fn document(r: &WrenchResult) -> Result<Document> {
     let lead = format!(
-        "The grasper is weighed in {} poses tilted by up to {}\u{b0} (condition number {}), {} times with different noise: \
-         {} mN per force and {} mN m per torque. Each identification estimates ten parameters and their covariance.",
+        "The grasper is weighed in {} poses tilted by up to {}\u{b0} (condition number {}), {} times with different \
+         noise: {} mN per force and {} mN m per torque. Each identification estimates ten parameters and their \
+         covariance.",
         r.poses,
         fixed(r.tilt_deg, 0),
         fixed(r.condition, 1),
@@ -28,7 +29,7 @@ fn cards(r: &WrenchResult) -> [Card; 4] {
     let off = 1e3 * (r.weight_n - r.paper_weight_n).abs();
     let mean_deviation = r.weight_predicted_mn / (r.runs as f64).sqrt();
     let weight = format!(
-        "spread {} mN, predicted {} mN; the paper: {} N",
+        "spread {} mN, predicted {} mN; paper {} N",
         fixed(r.weight_spread_mn, 2),
         fixed(r.weight_predicted_mn, 2),
         r.paper_weight_n
@@ -110,15 +111,16 @@ fn touching(r: &WrenchResult) -> Result<Section> {
     let figures = [
         page::figure(
             &before.svg()?,
-            "<b>Sensor reading</b> along the contact force, with weight and bias: the contact force is a hundredth of it.",
+            "<b>Sensor reading</b> along the contact force, with weight and bias: the contact force is a hundredth \
+             of it.",
         ),
         page::figure(&after.svg()?, &format!("<b>Contact force</b>, without the weight.{legend}")),
     ];
     let first = r.ramp.first().map_or(f64::NAN, |f| f.deviation_mn);
     let lead = format!(
-        "The bias of the sensor has drifted since the weighing. The instrument is tared at reset, then tilted from 13.3 to \
-         18.3\u{b0} while tissue pulls at its jaws with up to 50 mN. A frame is the mean of \
-         33 readings; its predicted standard deviation is {} mN. RMS error {} mN tared, {} mN not tared.",
+        "The bias of the sensor has drifted since the weighing. The instrument is tared at reset, then tilted from \
+         13.3 to 18.3\u{b0} while tissue pulls at its jaws with up to 50 mN. A frame is the mean of 33 readings; its \
+         predicted standard deviation is {} mN. RMS error {} mN tared, {} mN not tared.",
         fixed(first, 1),
         fixed(r.tared_error_mn, 1),
         fixed(r.untared_error_mn, 1)
