@@ -1,5 +1,5 @@
-//! Fig. 7(f): whether elements invert or lifts diverge when a cluster of the appendix is lifted high
-//! against its pins. Measured in the whole cell and with the appendix alone.
+//! Fig. 7(f): whether elements invert or lifts diverge when a cluster of the appendix is lifted
+//! high against its pins. Measured in the whole cell and with the appendix alone.
 
 mod page;
 mod result;
@@ -37,8 +37,8 @@ const AT: f64 = 0.5;
 /// Modulus at which a scaled force equals the given force (Pa).
 const FORCE_AT: f64 = 12e3;
 
-/// Fig. 7(f): whether elements invert when the appendix is lifted by 15 and 30 mm, at five moduli and
-/// with two pin rules.
+/// Fig. 7(f): whether elements invert when the appendix is lifted by 15 and 30 mm, at five moduli
+/// and with two pin rules.
 #[derive(Clone, Debug, Args)]
 pub struct ElementQualityExperiment {
     /// The appendix.
@@ -50,8 +50,8 @@ pub struct ElementQualityExperiment {
     /// Closing force of the jaws (N), the same for all moduli.
     #[arg(long, default_value_t = trocar_cell::JAW_FORCE)]
     pub jaw_force: f64,
-    /// Also run all cases with a jaw force proportional to the modulus (--jaw-force at 12 kPa): tissue
-    /// of every modulus is squeezed alike.
+    /// Also run all cases with a jaw force proportional to the modulus (--jaw-force at 12 kPa):
+    /// tissue of every modulus is squeezed alike.
     #[arg(long)]
     pub scaled_force: bool,
     /// Cases in parallel; all threads by default. The figures do not depend on it.
