@@ -6,9 +6,6 @@ pub const VIEW_GROUND: [u8; 3] = [33, 39, 45];
 /// Outline of instruments.
 pub const INSTRUMENT: [u8; 3] = [0, 229, 255];
 
-/// Metal of the gripper.
-pub const METAL: [u8; 3] = [196, 202, 208];
-
 /// Colour of organ `index`, distinguishable with most kinds of colour vision (after M. Okabe and K.
 /// Ito).
 pub fn organ(index: usize) -> [u8; 3] {

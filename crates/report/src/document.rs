@@ -191,12 +191,6 @@ impl Document {
         self
     }
 
-    /// Adds sections.
-    #[must_use]
-    pub fn with_all(self, sections: impl IntoIterator<Item = Section>) -> Self {
-        sections.into_iter().fold(self, Self::with)
-    }
-
     /// The HTML page.
     pub fn page(&self) -> String {
         page::page(&self.title, &self.subtitle, &self.sections.iter().map(Section::page).collect::<String>())

@@ -70,8 +70,8 @@ pub struct ControllerFigures {
     pub rcm_p95_mm: f64,
     /// Peak of the RCM deviation (mm).
     pub rcm_peak_mm: f64,
-    /// RMS distance in free motion between the reference of the tip and the measured tip, without
-    /// delay (mm).
+    /// RMS distance in free motion between the reference of the tip and the measured tip at equal
+    /// times (mm).
     pub tracking_rms_mm: f64,
     /// Delay between the two that minimises the distance (s).
     pub lag_s: f64,

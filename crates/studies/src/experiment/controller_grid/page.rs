@@ -55,11 +55,11 @@ fn cards(r: &ControllerGridResult) -> Vec<Card> {
         let paper = |v: f64| format!("paper {v} mm");
         let note = paper(r.bars.rcm_p95_mm);
         all.push(Card::new("RCM deviation, p95", mm(f.rcm_p95_mm), note).met(f.rcm_p95_mm <= r.bars.rcm_p95_mm));
-        let note = format!("RMS, without delay; {}", paper(r.bars.tracking_rms_mm));
+        let note = format!("RMS, at equal times; {}", paper(r.bars.tracking_rms_mm));
         let met = f.tracking_rms_mm <= r.bars.tracking_rms_mm;
         all.push(Card::new("Tracking against the filtered reference", mm(f.tracking_rms_mm), note).met(met));
         let note = format!(
-            "RMS, without delay; the command is held at 30 Hz; the tip is {} ms behind it",
+            "RMS, at equal times; the command is held at 30 Hz; the tip is {} ms behind it",
             fixed(1e3 * f.command_lag_s, 1)
         );
         all.push(Card::new("Tracking against the command", mm(f.command_rms_mm), note));

@@ -3,8 +3,10 @@
 use crate::Result;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::path::Path;
 use trocar_camera::metrics::{ImageMetrics, compare, iou, mean_colour, union};
 use trocar_camera::{ColorImage, Mask};
+use trocar_recording::{Recording, RgbdFrame};
 
 /// Figures of one specimen: silhouettes, and the picture within the organs, against a real frame.
 #[derive(Clone, Debug, Serialize)]
@@ -55,6 +57,13 @@ pub(super) struct Sides<'a> {
     /// The second frame, and its covered pixels.
     pub second: Option<(&'a ColorImage, &'a Mask)>,
     pub composite: Option<&'a ColorImage>,
+}
+
+/// The first frame of the recording in `folder`, and the second if there is one.
+pub(super) fn first_frames(folder: &Path) -> Result<(RgbdFrame, Option<RgbdFrame>)> {
+    let recording = Recording::open(&folder.join("recording"))?;
+    let second = (recording.len() > 1).then(|| recording.frame(1)).transpose()?;
+    Ok((recording.frame(0)?, second))
 }
 
 /// Returns the figures and the compared pictures.

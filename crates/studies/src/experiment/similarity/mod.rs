@@ -19,14 +19,13 @@ use crate::Result;
 use crate::names::{Recorded, phantoms_or_all};
 use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
-use measure::{Sides, SimilarityPictures, labelled, measure};
+use measure::{Sides, SimilarityPictures, first_frames, labelled, measure};
 use result::PAPER;
 use scenery::{Illumination, Scenery};
 use std::path::{Path, PathBuf};
 use through_endoscope::{from_the_side, through_endoscope};
 use trocar_core::Progress;
 use trocar_reconstruct::{Reconstruction, Settings};
-use trocar_recording::Recording;
 use trocar_report::document::Document;
 use trocar_workflow::phantoms::recorded;
 use trocar_workflow::reconstruct_recording;
@@ -116,8 +115,7 @@ impl SimilarityExperiment {
         progress: &dyn Progress,
     ) -> Result<(SimilarityRow, SimilarityPictures)> {
         check_interrupted(progress)?;
-        let recording = Recording::open(&folder.join("recording"))?;
-        let (first, second) = (recording.frame(0)?, (recording.len() > 1).then(|| recording.frame(1)).transpose()?);
+        let (first, second) = first_frames(folder)?;
         let scenery = Scenery::new(made, light)?;
         let camera = scenery.camera;
         let labels = scenery.labels(&camera)?;

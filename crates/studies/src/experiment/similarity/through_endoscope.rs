@@ -2,7 +2,7 @@
 //! extension).
 
 use super::endoscope::endoscope_camera;
-use super::measure::{Sides, SimilarityPictures, SimilarityRow, labelled, measure};
+use super::measure::{Sides, SimilarityPictures, SimilarityRow, first_frames, labelled, measure};
 use super::oblique;
 use super::scenery::{BESIDE_LENS, Illumination, Scenery};
 use crate::Result;
@@ -11,7 +11,6 @@ use std::path::Path;
 use trocar_camera::{CameraModel, ColorImage, Mask, UndistortionMap};
 use trocar_core::{Pose, Progress};
 use trocar_reconstruct::{Reconstruction, Settings};
-use trocar_recording::Recording;
 use trocar_workflow::reconstruct_recording;
 
 /// Distance at which the endoscope's light renders a white surface white (m), for scenes recorded
@@ -49,9 +48,7 @@ pub(super) fn through_endoscope(
     progress: &dyn Progress,
 ) -> Result<(SimilarityRow, SimilarityPictures)> {
     check_interrupted(progress)?;
-    let recording = Recording::open(&folder.join("recording"))?;
-    let first = recording.frame(0)?;
-    let second = (recording.len() > 1).then(|| recording.frame(1)).transpose()?;
+    let (first, second) = first_frames(folder)?;
     let scenery = Scenery::new(made, light)?;
     let scope = endoscope_camera(scenery.camera.width);
     let map = CameraModel::from(scenery.camera).undistortion_map(&scope);

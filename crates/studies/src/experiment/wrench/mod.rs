@@ -219,7 +219,7 @@ impl WrenchExperiment {
     }
 }
 
-/// Gravity in the cell.
+/// Gravity in the cell (m/s2).
 const DOWN: DVec3 = DVec3::new(0.0, 0.0, -GRAVITY);
 
 /// The load of the grasper on a sensor with a bias.
