@@ -5,7 +5,7 @@ use clap::{Args, ValueEnum};
 use std::path::{Path, PathBuf};
 use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
-use trocar_scene::GraspDesignName;
+use trocar_scene::{GraspDesignName, ScheduleName};
 use trocar_specimen::Specimen;
 use trocar_workflow::phantoms;
 
@@ -80,6 +80,15 @@ pub enum SolverName {
 }
 
 impl SolverName {
+    /// The schedule of a scene.
+    pub fn schedule(self) -> ScheduleName {
+        match self {
+            Self::Paper => ScheduleName::Paper,
+            Self::Fast => ScheduleName::Fast,
+            Self::Adaptive => ScheduleName::Adaptive,
+        }
+    }
+
     /// The name in reports and JSON.
     pub fn name(self) -> &'static str {
         match self {

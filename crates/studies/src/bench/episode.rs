@@ -227,12 +227,12 @@ impl EpisodeBench {
             for action in scripted.act(episode)? {
                 check_interrupted(progress)?;
                 let ended = episode.step(&action)?.end.is_some();
-                let clock_pictures = Instant::now();
+                let before_pictures = Instant::now();
                 for camera in &self.cameras {
                     let size = [self.size; 2];
                     rig.render(episode.cell(), camera, size, &RenderSettings::Preview { shadows: false })?;
                 }
-                pictures += clock_pictures.elapsed();
+                pictures += before_pictures.elapsed();
                 if ended {
                     break 'episode;
                 }

@@ -89,26 +89,14 @@ pub(super) fn findings(rows: &[IntegratorRow]) -> Vec<String> {
 
 /// Whether the finding of the paper holds for the method or only for its settings.
 fn method_finding(method: &str, rows: &[&IntegratorRow]) -> String {
-    let named = |chosen: &dyn Fn(&IntegratorRow) -> bool| -> Vec<String> {
-        rows.iter().filter(|r| chosen(r)).map(|r| format!("{} ({})", r.name, r.settings)).collect()
+    let unbounded: Vec<String> =
+        rows.iter().filter(|r| !r.bounded).map(|r| format!("{} ({})", r.name, r.settings)).collect();
+    let bounded = |decimals: usize, chosen: &dyn Fn(f64) -> bool| -> Vec<String> {
+        let errors = rows.iter().filter_map(|r| Some((r, r.sag_error.filter(|e| chosen(*e))?)));
+        errors.map(|(r, e)| format!("{} ({}; sag error {:.decimals$}%)", r.name, r.settings, 100.0 * e)).collect()
     };
-    let unbounded = named(&|r| !r.bounded);
-    let right: Vec<String> = rows
-        .iter()
-        .filter_map(|r| {
-            r.sag_error
-                .filter(|e| *e <= MAX_SAG_ERROR)
-                .map(|e| format!("{} ({}; sag error {:.2}%)", r.name, r.settings, 100.0 * e))
-        })
-        .collect();
-    let wrong: Vec<String> = rows
-        .iter()
-        .filter_map(|r| {
-            r.sag_error
-                .filter(|e| e.is_nan() || *e > MAX_SAG_ERROR)
-                .map(|e| format!("{} ({}; sag error {:.0}%)", r.name, r.settings, 100.0 * e))
-        })
-        .collect();
+    let right = bounded(2, &|e| e <= MAX_SAG_ERROR);
+    let wrong = bounded(0, &|e| e.is_nan() || e > MAX_SAG_ERROR);
     let verdict = match (unbounded.is_empty(), right.is_empty()) {
         (false, false) => format!("{method}: whether it stays bounded depends on its settings"),
         (true, _) => format!("{method}: bounded with all settings"),
