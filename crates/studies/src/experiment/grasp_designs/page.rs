@@ -63,7 +63,7 @@ fn lead(r: &GraspDesignsResult, condition: Condition) -> String {
     )
 }
 
-/// Trials held by each design. The target is the share that the paper held, or all.
+/// Trials held by each design, with our targets (of 15 trials).
 fn cards(r: &GraspDesignsResult, condition: Condition) -> Vec<Card> {
     let card = |(name, target): (&'static str, usize)| {
         let row = r.rows.iter().find(|row| row.condition == condition && row.design == name)?;
