@@ -1,6 +1,7 @@
-//! The integrators that are compared, each as the paper or an engine has it and in its best form, and what the comparison says.
+//! The compared integrators: each with the settings of the paper or of an engine, and with its best
+//! settings; and findings from the comparison.
 
-use super::integrator_row::IntegratorRow;
+use super::row::IntegratorRow;
 use trocar_tissue::{Descent, Model, SolverSettings, Start};
 use trocar_tissue_reference::{Scheme, SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep};
 
@@ -12,16 +13,16 @@ pub(super) struct Form {
     pub scheme: Scheme,
 }
 
-/// What the paper says of both explicit integration and XPBD (section VII-B).
+/// The paper's finding on explicit integration and XPBD (section VII-B).
 const DIVERGES: &str = "20 m/s in the first frame";
 
-/// The relaxation with which Newton's solver stays slow.
+/// A relaxation with which Newton's XPBD stays bounded.
 const SMALL_RELAXATION: f64 = 0.1;
 
-/// A sag error above which "bounded" is not "right".
-const RIGHT: f64 = 0.1;
+/// Maximum sag error of a correct result.
+const MAX_SAG_ERROR: f64 = 0.1;
 
-/// Every integrator, for frames of `dt` [s].
+/// All integrators, for frames of `dt` (s).
 pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
     let form = |name, settings: String, paper, scheme| Form { name, settings, paper, scheme };
     let stable = SemiImplicit::stable(model, dt);
@@ -80,60 +81,49 @@ pub(super) fn forms(model: &Model, dt: f64) -> Vec<Form> {
     ]
 }
 
-/// What the rows say.
+/// Findings from the rows.
 pub(super) fn findings(rows: &[IntegratorRow]) -> Vec<String> {
     let of = |start: &str| rows.iter().filter(|r| r.name.starts_with(start)).collect::<Vec<_>>();
     ["Semi-implicit Euler", "XPBD"].iter().map(|method| method_finding(method, &of(method))).chain(sags(rows)).collect()
 }
 
-/// Whether the paper's finding about a method is one of the method or of its settings.
+/// Whether the finding of the paper holds for the method or only for its settings.
 fn method_finding(method: &str, rows: &[&IntegratorRow]) -> String {
-    let named = |chosen: &dyn Fn(&IntegratorRow) -> bool| -> Vec<String> {
-        rows.iter().filter(|r| chosen(r)).map(|r| format!("{} ({})", r.name, r.settings)).collect()
+    let unbounded: Vec<String> =
+        rows.iter().filter(|r| !r.bounded).map(|r| format!("{} ({})", r.name, r.settings)).collect();
+    let bounded = |decimals: usize, chosen: &dyn Fn(f64) -> bool| -> Vec<String> {
+        let errors = rows.iter().filter_map(|r| Some((r, r.sag_error.filter(|e| chosen(*e))?)));
+        errors.map(|(r, e)| format!("{} ({}; sag error {:.decimals$}%)", r.name, r.settings, 100.0 * e)).collect()
     };
-    let unbounded = named(&|r| !r.bounded);
-    let right: Vec<String> = rows
-        .iter()
-        .filter_map(|r| {
-            r.sag_error
-                .filter(|e| *e <= RIGHT)
-                .map(|e| format!("{} ({}; sag off by {:.2}%)", r.name, r.settings, 100.0 * e))
-        })
-        .collect();
-    let wrong: Vec<String> = rows
-        .iter()
-        .filter_map(|r| {
-            r.sag_error
-                .filter(|e| e.is_nan() || *e > RIGHT)
-                .map(|e| format!("{} ({}; sag off by {:.0}%)", r.name, r.settings, 100.0 * e))
-        })
-        .collect();
+    let right = bounded(2, &|e| e <= MAX_SAG_ERROR);
+    let wrong = bounded(0, &|e| e.is_nan() || e > MAX_SAG_ERROR);
     let verdict = match (unbounded.is_empty(), right.is_empty()) {
-        (false, false) => format!("{method}: that it does not stay bounded is true of settings, not of the method"),
-        (true, _) => format!("{method}: it stayed bounded in every form"),
-        (false, true) => format!("{method}: no form was both bounded and right"),
+        (false, false) => format!("{method}: whether it stays bounded depends on its settings"),
+        (true, _) => format!("{method}: bounded with all settings"),
+        (false, true) => format!("{method}: no settings are bounded and correct"),
     };
     let part = |what: &str, names: &[String]| {
         if names.is_empty() { String::new() } else { format!("; {what}: {}", names.join(", ")) }
     };
     format!(
         "{verdict}{}{}{}.",
-        part("it diverges as", &unbounded),
-        part("bounded, but wrong, as", &wrong),
-        part("bounded and right as", &right)
+        part("diverges", &unbounded),
+        part("bounded, but wrong", &wrong),
+        part("bounded and correct", &right)
     )
 }
 
-/// How wrong bounded states are.
+/// The sag error of Vertex Block Descent as in the paper, which is bounded.
 fn sags(rows: &[IntegratorRow]) -> Option<String> {
     let paper = rows.iter().find(|r| r.name.starts_with("Vertex Block Descent"))?;
     let (error, ratio) = (paper.sag_error?, paper.sag_ratio?);
-    Some(if error > RIGHT {
+    Some(if error > MAX_SAG_ERROR {
         format!(
-            "Bounded is not right: Vertex Block Descent as in the paper stays slow, and sags {ratio:.1} times as far as it should."
+            "Bounded is not correct: Vertex Block Descent as in the paper stays slow and sags {ratio:.1} times as \
+             far as the equilibrium."
         )
     } else {
-        format!("Vertex Block Descent as in the paper sags within {:.1}% of what it should.", 100.0 * error)
+        format!("The sag of Vertex Block Descent as in the paper is within {:.1}% of the equilibrium.", 100.0 * error)
     })
 }
 
@@ -159,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn findings_say_what_the_rows_say() {
+    fn findings_follow_from_the_rows() {
         let found = findings(&[
             row("Semi-implicit Euler", None),
             row("XPBD a", None),
@@ -167,13 +157,13 @@ mod tests {
             row("XPBD c", Some(9.0)),
             row("Vertex Block Descent as in the paper", Some(9.5)),
         ]);
-        assert!(found[0].starts_with("Semi-implicit Euler: no form was both"), "{}", found[0]);
+        assert!(found[0].starts_with("Semi-implicit Euler: no settings are bounded"), "{}", found[0]);
         assert!(
-            found[1].contains("true of settings") && found[1].contains("XPBD b (so; sag off by 4.00%)"),
+            found[1].contains("depends on its settings") && found[1].contains("XPBD b (so; sag error 4.00%)"),
             "{}",
             found[1]
         );
-        assert!(found[1].contains("wrong, as: XPBD c"), "{}", found[1]);
+        assert!(found[1].contains("but wrong: XPBD c"), "{}", found[1]);
         assert!(found[2].contains("10.5 times"), "{}", found[2]);
     }
 }

@@ -1,11 +1,12 @@
-//! Trials side by side.
+//! Trials in parallel.
 
 use crate::{Error, Result};
 use rayon::prelude::*;
 use trocar_core::Progress;
 
-/// Does `run` for every item, several at once on `threads` threads (0: all there are), after `finished` others; the outcomes are in the items' order.
-pub(super) fn side_by_side<T: Sync, R: Send>(
+/// Calls `run` for every item on `threads` threads (0: all) and returns the outcomes in the order
+/// of the items. `finished` counts earlier items in the progress.
+pub(crate) fn side_by_side<T: Sync, R: Send>(
     stage: &str,
     items: &[T],
     (finished, threads): (usize, usize),
@@ -32,7 +33,7 @@ pub(super) fn side_by_side<T: Sync, R: Send>(
     outcomes
 }
 
-/// Lets a trial know that it is to stop and hears nothing of it: trials run at once.
+/// Passes the request to stop to a trial and drops its progress: trials run in parallel.
 struct Quiet<'a>(&'a dyn Progress);
 
 impl Progress for Quiet<'_> {

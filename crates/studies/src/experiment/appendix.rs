@@ -1,78 +1,104 @@
-//! What the grasp experiments share: the appendix in the whole cell or alone, and lifts of it.
+//! Lifts of the appendix, in the whole cell or alone: what the grasp studies share.
 
+use crate::names::{AppendixChoice, design_name};
 use crate::{Error, Result};
+use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use trocar_core::Progress;
-use trocar_phantom::RecordOptions;
 use trocar_scene::{GraspDesignName, OrganOverride, PinEnd, PinRule, Scene, SpecimenSource};
 use trocar_specimen::{End, Pins, Specimen};
 use trocar_task::policy::{Script, Scripted};
 use trocar_task::{Episode, Recording, run};
+use trocar_workflow::Lift;
 use trocar_workflow::specimen_scene::{free_scene, grasp_lift};
-use trocar_workflow::{Lift, phantoms};
 use xxhash_rust::xxh3::Xxh3;
 
-/// The organ of these experiments.
+/// The organ that is lifted.
 const ORGAN: &str = "appendix";
 
 /// The scene of the whole cell.
 const CELL: &str = "cell-a";
 
-/// In what the appendix is lifted.
+/// Help text of `--output`.
+pub(super) const FOLDER: &str = "Output folder of recording, specimen, trials and report. A finished recording in it \
+                                 is used again, and so are finished trials with the same settings: an interrupted \
+                                 run resumes.";
+
+/// The surroundings of the appendix.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Condition {
-    /// The paper's cell: all organs, which touch each other, and dynamic arms in ports.
+    /// The whole cell: all organs in contact, and dynamic arms in ports.
     Cell,
     /// The appendix alone, lifted by an ideal arm without a port.
     Appendix,
 }
 
 impl Condition {
-    /// Its name in tables and files.
+    /// The name in tables and files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Cell => "cell",
             Self::Appendix => "appendix",
         }
     }
+
+    /// The end of a title.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Cell => "in the whole cell",
+            Self::Appendix => "with the appendix alone",
+        }
+    }
+
+    /// A sentence without its full stop.
+    pub fn described(self) -> &'static str {
+        match self {
+            Self::Cell => "The paper\u{2019}s cell: all organs in contact, and a dynamic arm in its port",
+            Self::Appendix => "The appendix alone, lifted by an ideal arm without a port",
+        }
+    }
 }
 
-/// Where the appendix comes from.
-#[derive(Clone, Debug)]
-pub struct AppendixSource {
-    /// A specimen folder; phantom A, recorded and reconstructed, when `None`.
-    pub specimen: Option<PathBuf>,
-    /// How the phantom is filmed.
-    pub record: RecordOptions,
+/// Values of `--condition`.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+pub enum ConditionName {
+    /// The whole cell: organs in contact, and a dynamic arm in its port.
+    Cell,
+    /// The appendix alone, lifted by an ideal arm without a port.
+    Appendix,
+    /// Both, one after the other.
+    Both,
+}
+
+impl ConditionName {
+    pub(super) fn conditions(self) -> &'static [Condition] {
+        match self {
+            Self::Cell => &[Condition::Cell],
+            Self::Appendix => &[Condition::Appendix],
+            Self::Both => &[Condition::Cell, Condition::Appendix],
+        }
+    }
 }
 
 /// A specimen with an appendix, and its folder.
 pub(super) struct Whole {
-    pub specimen: Specimen,
-    pub folder: PathBuf,
+    specimen: Specimen,
+    folder: PathBuf,
 }
 
-impl AppendixSource {
-    /// The specimen; a phantom is made in the folder `output`.
-    pub(super) fn read(&self, output: &Path, progress: &dyn Progress) -> Result<Whole> {
-        let (specimen, folder) = match &self.specimen {
-            Some(folder) => (Specimen::read(folder)?, folder.clone()),
-            None => {
-                let folder = output.join("phantom-a");
-                (phantoms::specimen("phantom-a", &self.record, &folder, progress)?, folder.join("specimen"))
-            }
-        };
+impl Whole {
+    /// Reads the specimen; a phantom is made in the folder `output`.
+    pub fn read(choice: &AppendixChoice, output: &Path, progress: &dyn Progress) -> Result<Self> {
+        let (specimen, folder) = choice.read(output, progress)?;
         if !specimen.organs.iter().any(|o| o.name == ORGAN) {
             let names = specimen.organs.iter().map(|o| o.name.as_str()).collect::<Vec<_>>().join(", ");
             return Err(Error::Mismatch(format!("the specimen has no organ '{ORGAN}'; it has {names}")));
         }
-        Ok(Whole { specimen, folder })
+        Ok(Self { specimen, folder })
     }
-}
 
-impl Whole {
     /// The specimen of a condition: all of it, or the appendix alone.
     pub fn specimen(&self, condition: Condition) -> Specimen {
         let mut specimen = self.specimen.clone();
@@ -100,7 +126,7 @@ impl Whole {
         organ.map_or((0, 0), |o| (o.body.vertices.len(), o.body.tets.len()))
     }
 
-    /// All of the specimen that a trial depends on, in a few words.
+    /// A hash of the specimen, for the settings of trials.
     pub fn fingerprint(&self) -> String {
         let mut hasher = Xxh3::new();
         hasher.update(&trocar_task::specimen_hash(&self.specimen).to_le_bytes());
@@ -108,13 +134,13 @@ impl Whole {
     }
 }
 
-/// The appendix's part of a scene, to be changed.
+/// The settings of the appendix in a scene.
 pub(super) fn appendix(scene: &mut Scene) -> &mut OrganOverride {
     scene.organs.entry(ORGAN.to_owned()).or_default()
 }
 
-/// Pins the end of the appendix as the scene, or else the specimen, has it, and the lowest `share` of the nodes
-/// of all the rest. An organ that is not pinned at an end stays as it is.
+/// Pins the end of the appendix as the scene, or else the specimen, says, and the lowest `share` of
+/// all other nodes. Changes nothing if no end of the organ is pinned.
 pub(super) fn pin_end_and_band(scene: &mut Scene, specimen: &Specimen, share: f64) {
     let own = specimen.organs.iter().find(|o| o.name == ORGAN).map(|o| o.pins);
     let (end, length) = match (&appendix(scene).pins, own) {
@@ -134,7 +160,7 @@ pub(super) struct LiftTrial {
     pub condition: Condition,
     pub script: Script,
     pub design: GraspDesignName,
-    /// Force of the jaws (N).
+    /// Closing force of the jaws (N).
     pub jaw_force: f64,
 }
 
@@ -142,7 +168,7 @@ impl LiftTrial {
     /// Lifts the appendix of `specimen` in `scene`.
     ///
     /// # Errors
-    /// An option out of range, a scene that cannot be built, an interruption.
+    /// An option out of range, an invalid scene, an interruption.
     pub fn run(&self, scene: &Scene, specimen: &Specimen, progress: &dyn Progress) -> Result<Recording> {
         let lift =
             Lift { script: self.script, design: Some(self.design), jaw_force: Some(self.jaw_force), ..Lift::default() };
@@ -156,24 +182,36 @@ impl LiftTrial {
         });
         if stopped { Err(Error::Interrupted) } else { Ok(recording?) }
     }
-}
 
-/// The design's name.
-pub(crate) fn design_name(design: GraspDesignName) -> &'static str {
-    match design {
-        GraspDesignName::Friction => "friction",
-        GraspDesignName::RestPose => "rest-pose",
-        GraspDesignName::LivePose => "live-pose",
-        GraspDesignName::Compliant => "compliant",
+    /// The name of the design.
+    pub fn design_name(&self) -> String {
+        design_name(self.design).to_owned()
     }
 }
 
-/// What ended a recording, if it diverged.
+/// Why a recorded lift diverged; `None` if it did not.
 pub(super) fn divergence(recording: &Recording) -> Option<String> {
     recording.summary.diverged.then(|| recording.summary.why.clone().unwrap_or_else(|| "diverged".to_owned()))
 }
 
-/// Largest pull of held nodes at any instrument (N).
+/// Largest force of held nodes on any instrument (N).
 pub(super) fn peak_constraint(recording: &Recording) -> f64 {
     recording.summary.arms.iter().map(|a| a.peak_constraint_n).fold(0.0, f64::max)
+}
+
+/// Disabled contacts, disabled contacts of blades, and relaxed organs, as text.
+pub(super) fn suspensions(counts: [usize; 3]) -> String {
+    if counts == [0; 3] { "0".to_owned() } else { counts.map(|n| n.to_string()).join("/") }
+}
+
+/// The last column of a table of lifts: why the lift failed, slips and tears, `other`.
+pub(super) fn remarks(
+    divergence: Option<&String>,
+    why: Option<&String>,
+    (slipped, torn): (usize, bool),
+    other: Option<String>,
+) -> String {
+    let slips = (slipped > 0).then(|| format!("slipped {slipped} times"));
+    let torn = torn.then(|| "torn".to_owned());
+    [divergence.or(why).cloned(), slips, torn, other].into_iter().flatten().collect::<Vec<_>>().join("; ")
 }

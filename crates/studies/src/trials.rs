@@ -1,10 +1,12 @@
-//! Trials that outlive an interruption: each finished one is a line of a file in the experiment's folder, and the next run takes it from there.
+//! Finished trials on disk: an interrupted study resumes from them.
 //!
-//! The file, `trials.jsonl`, begins with a line that names the experiment and a hash of everything the trials depend on: options, specimen, program. A trial's line is its key and its
-//! row, written at once and flushed, so that a run may be killed at any instant: a line that was torn is dropped, and its trial is run again. A file of other settings is put aside as
-//! `trials.jsonl.old`, and everything starts anew. While a run uses the file it is locked.
+//! The file `trials.jsonl` in the output folder begins with the name of the study and a hash of
+//! everything that the trials depend on: options, specimen, program. Each finished trial is one
+//! more line, its key and its row, flushed at once. The run can be killed at any time: an
+//! incomplete line is dropped and its trial runs again. A file with another hash is renamed to
+//! `trials.jsonl.old` and all trials run again. The file is locked while a run uses it.
 
-use super::side_by_side::side_by_side;
+use crate::side_by_side::side_by_side;
 use crate::{Error, Result};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -16,11 +18,11 @@ use std::sync::{Mutex, OnceLock, PoisonError};
 use trocar_core::Progress;
 use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
-/// The file in the experiment's folder.
+/// The file in the output folder.
 const FILE: &str = "trials.jsonl";
 
-/// No experiment writes as much [bytes]; what is longer is not read.
-const LONGEST: u64 = 256 << 20;
+/// A longer file is not read (bytes).
+const MAX_BYTES: u64 = 256 << 20;
 
 /// The first line.
 #[derive(Debug, Serialize, Deserialize, PartialEq, Eq)]
@@ -36,43 +38,44 @@ struct Line<R> {
     row: R,
 }
 
-/// What was taken from an earlier run.
+/// Trials of an earlier run.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Resumed {
-    /// Trials that an earlier run had finished.
+    /// Trials that were used again.
     pub trials: usize,
-    /// Why trials of an earlier run were put aside, if there were any.
+    /// Why trials of an earlier run were not used, if there were any.
     pub put_aside: Option<String>,
 }
 
-/// What was taken from an earlier run, in sentences; `what` names the trials.
-pub(super) fn resumed(resumed: &Resumed, what: &str) -> Vec<String> {
-    let earlier = (resumed.trials > 0).then(|| format!("{} {what} taken from an earlier run", resumed.trials));
+/// Sentences about an earlier run; `what` names the trials.
+pub(crate) fn resumed(resumed: &Resumed, what: &str) -> Vec<String> {
+    let earlier = (resumed.trials > 0).then(|| format!("{} {what} of an earlier run were used again", resumed.trials));
     earlier.into_iter().chain(resumed.put_aside.clone()).collect()
 }
 
-/// Outcomes of trials in the items' order, and how many of them are an earlier run's.
+/// Rows in the order of the items.
 #[derive(Debug)]
-pub(super) struct Outcomes<R> {
+pub(crate) struct Outcomes<R> {
     pub rows: Vec<R>,
     pub resumed: Resumed,
 }
 
-/// The store of an experiment's finished trials.
+/// The finished trials of a study.
 #[derive(Debug)]
-pub(super) struct Trials {
+pub(crate) struct Trials {
     path: PathBuf,
     file: Mutex<File>,
-    /// By key: the row as it was written.
+    /// Rows by key.
     done: BTreeMap<String, serde_json::Value>,
     put_aside: Option<String>,
 }
 
 impl Trials {
-    /// Opens the store of `experiment` in `folder`, which exists, or begins it. `settings` is whatever decides the trials' outcome besides their keys; the program does, too, and is added.
+    /// Opens the file of `study` in `folder`, which must exist. `settings` is everything that a row
+    /// depends on besides its key; the program is added.
     ///
     /// # Errors
-    /// A file that cannot be read or written, or that another run is using.
+    /// A file that cannot be read or written, or that another run uses.
     pub fn open(folder: &Path, experiment: &str, settings: &str) -> Result<Self> {
         let settings = format!("{:016x}", xxh3_64(format!("{settings}\n{}", program()).as_bytes()));
         let header = Header { experiment: experiment.to_owned(), settings };
@@ -86,18 +89,19 @@ impl Trials {
             Found::Trials { header: earlier, trials, good } if earlier == header => (done, length) = (trials, good),
             Found::Trials { trials, .. } => {
                 put_aside = Some(format!(
-                    "{} trials of other settings, another specimen or another program were put aside as {FILE}.old; all start anew",
+                    "{} trials of another program, specimen or other options were renamed to {FILE}.old; all trials \
+                     run again",
                     trials.len()
                 ));
                 std::fs::rename(&path, path.with_extension("jsonl.old")).map_err(io)?;
                 file = claim(&path)?;
             }
             Found::TooLong => {
-                let reason = format!("is longer than {} MiB, so it is no list of trials; move it away", LONGEST >> 20);
+                let reason = format!("is longer than {} MiB and is not a file of trials; move it", MAX_BYTES >> 20);
                 return Err(Error::Exists { path, reason });
             }
         }
-        // What is torn goes; what follows is written after the last whole line.
+        // Drops an incomplete last line.
         file.set_len(length).map_err(io)?;
         file.seek(SeekFrom::End(0)).map_err(io)?;
         if length == 0 {
@@ -106,13 +110,15 @@ impl Trials {
         Ok(Self { path, file: Mutex::new(file), done, put_aside })
     }
 
-    /// Does `run` for every item that no earlier run has finished, several at once on `threads` threads (0: all there are). `key` names an item, each by another name. The outcomes do
-    /// not depend on what was interrupted when: they are in the items' order, and numbers are kept to the bit.
+    /// Calls `run` for every item without a finished row, on `threads` threads (0: all). `key`
+    /// names an item uniquely. Rows are in the order of the items and the same to the bit, however
+    /// often the study was interrupted.
     ///
-    /// A row that does not come back as it was (one that holds an infinity, say) is not kept, and is made anew by every run.
+    /// A row that cannot be read back, such as one with an infinity, is not stored; every run
+    /// computes it again.
     ///
     /// # Errors
-    /// That of the first trial that failed, an interruption, a file that cannot be written, two items of one name.
+    /// The first error of a trial, an interruption, an unwritable file, two items with one key.
     pub fn run<T: Sync, R: Serialize + DeserializeOwned + Send>(
         &self,
         stage: &str,
@@ -126,7 +132,7 @@ impl Trials {
         let mut sorted: Vec<&String> = keys.iter().collect();
         sorted.sort_unstable();
         if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-            return Err(Error::Mismatch(format!("two trials are named '{}'; each needs a name of its own", pair[0])));
+            return Err(Error::Mismatch(format!("two trials are named '{}'; names must be unique", pair[0])));
         }
         let earlier = |key: &String| self.done.get(key).and_then(|row| R::deserialize(row).ok());
         let mut rows: Vec<Option<R>> = keys.iter().map(earlier).collect();
@@ -134,7 +140,7 @@ impl Trials {
         let finished = items.len() - missing.len();
         let made = side_by_side(stage, &missing, (finished, threads), progress, |k, progress| {
             let row = run(&items[*k], progress)?;
-            self.keep(&keys[*k], &row)?;
+            self.store(&keys[*k], &row)?;
             Ok(row)
         })?;
         for (k, row) in missing.into_iter().zip(made) {
@@ -144,47 +150,47 @@ impl Trials {
         Ok(Outcomes { rows: rows.into_iter().flatten().collect(), resumed })
     }
 
-    fn keep<R: Serialize + DeserializeOwned>(&self, trial: &str, row: &R) -> Result<()> {
+    fn store<R: Serialize + DeserializeOwned>(&self, trial: &str, row: &R) -> Result<()> {
         let format = |e: serde_json::Error| Error::Format(e.to_string());
         let row = serde_json::to_value(row).map_err(format)?;
         if R::deserialize(&row).is_err() {
             return Ok(());
         }
-        // A trial that panicked did so outside of this.
+        // A panic cannot happen while the lock is held, so a poisoned lock is valid.
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let line = Line { trial: trial.to_owned(), row };
         append(&mut file, &line).map_err(|source| Error::Io { path: self.path.clone(), source })
     }
 }
 
-/// Opens the file, made if it is not there, for this run alone.
+/// Opens or creates the file and locks it.
 fn claim(path: &Path) -> Result<File> {
     let io = |source| Error::Io { path: path.to_owned(), source };
     let file = OpenOptions::new().read(true).write(true).create(true).truncate(false).open(path).map_err(io)?;
     match file.try_lock() {
         Err(std::fs::TryLockError::WouldBlock) => {
-            let reason = "is in use by another run; wait for it or name another folder".to_owned();
+            let reason = "is in use by another run; wait for it or choose another folder".to_owned();
             Err(Error::Exists { path: path.to_owned(), reason })
         }
-        // A file system without locks is no reason not to run.
+        // Some file systems have no locks.
         _ => Ok(file),
     }
 }
 
-/// What a file holds.
+/// The content of a file.
 enum Found {
-    /// Nothing, or no whole header.
+    /// Empty, or without a complete header.
     Nothing,
-    /// Whole lines up to `good` bytes.
+    /// Complete lines up to byte `good`.
     Trials { header: Header, trials: BTreeMap<String, serde_json::Value>, good: u64 },
-    /// More than is read.
+    /// Longer than [`MAX_BYTES`].
     TooLong,
 }
 
 fn read(file: &mut File) -> std::io::Result<Found> {
     let mut bytes = Vec::new();
-    Read::by_ref(file).take(LONGEST + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LONGEST {
+    Read::by_ref(file).take(MAX_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_BYTES {
         return Ok(Found::TooLong);
     }
     let mut lines = bytes.split_inclusive(|b| *b == b'\n').filter(|line| line.ends_with(b"\n"));
@@ -200,7 +206,7 @@ fn read(file: &mut File) -> std::io::Result<Found> {
     Ok(Found::Trials { header, trials, good })
 }
 
-/// Writes one line in one call, so that only a line that is being written can be torn.
+/// Writes a line in one call: only the last line can be incomplete.
 fn append(file: &mut File, value: &impl Serialize) -> std::io::Result<()> {
     let mut line = serde_json::to_vec(value)?;
     line.push(b'\n');
@@ -208,7 +214,7 @@ fn append(file: &mut File, value: &impl Serialize) -> std::io::Result<()> {
     file.flush()
 }
 
-/// What stands for the program: trials of one build say nothing of another's.
+/// Identifies the program: trials of another build are not used.
 fn program() -> &'static str {
     static PROGRAM: OnceLock<String> = OnceLock::new();
     let hash = || -> Option<u64> {
@@ -238,12 +244,12 @@ mod tests {
     }
 
     fn row(item: usize) -> Row {
-        // Values that decimal digits do not give exactly.
+        // Values without an exact decimal form.
         let value = (item as f64 + 0.1).sqrt() * 1e-7;
         Row { item, value, note: item.is_multiple_of(2).then(|| "ein \"Satz\"\nmit Umbruch".to_owned()) }
     }
 
-    /// Runs 12 trials; the outcome and how often a trial was run.
+    /// Runs 12 trials. Returns the outcome, and how many trials ran.
     fn run(folder: &Path, settings: &str, progress: &dyn Progress) -> (Result<Outcomes<Row>>, usize) {
         let items: Vec<usize> = (0..12).collect();
         let count = AtomicUsize::new(0);
@@ -263,9 +269,9 @@ mod tests {
     }
 
     #[test]
-    fn an_interrupted_run_goes_on_where_it_stopped() {
+    fn an_interrupted_run_resumes() {
         let unbroken: Vec<Row> = (0..12).map(row).collect();
-        // Two trials run at once, so that one more may be finished than was asked for.
+        // Two trials run in parallel: one more may finish than was asked for.
         for stop in [0, 1, 5, 9] {
             let dir = tempfile::tempdir().unwrap();
             let (outcome, first) = run(dir.path(), "a", &StopAfter::new(stop as u64));
@@ -280,20 +286,20 @@ mod tests {
     }
 
     #[test]
-    fn a_torn_line_is_run_again_wherever_it_was_torn() {
+    fn an_incomplete_line_runs_again() {
         let dir = tempfile::tempdir().unwrap();
         let file = dir.path().join(FILE);
         run(dir.path(), "a", &Silent).0.unwrap();
         let whole = std::fs::read(&file).unwrap();
         let lines = |bytes: &[u8]| bytes.iter().filter(|b| **b == b'\n').count();
         for length in 0..whole.len() {
-            // Every place in the first lines, and some in all the others.
+            // Every byte of the first lines, and some of the others.
             if length > 400 && !length.is_multiple_of(37) {
                 continue;
             }
             std::fs::write(&file, &whole[..length]).unwrap();
             let (outcome, again) = run(dir.path(), "a", &Silent);
-            assert_eq!(outcome.unwrap().rows, (0..12).map(row).collect::<Vec<_>>(), "torn after {length} bytes");
+            assert_eq!(outcome.unwrap().rows, (0..12).map(row).collect::<Vec<_>>(), "cut after {length} bytes");
             assert_eq!(again, 12 - lines(&whole[..length]).saturating_sub(1));
         }
         std::fs::write(&file, [&whole[..], b"\xff{}\n{\"trial\":1}\n"].concat()).unwrap();
@@ -302,7 +308,7 @@ mod tests {
     }
 
     #[test]
-    fn other_settings_start_anew_and_say_so() {
+    fn other_settings_run_all_trials_again() {
         let dir = tempfile::tempdir().unwrap();
         assert_eq!(run(dir.path(), "a", &Silent).0.unwrap().resumed, Resumed::default());
         let (outcome, count) = run(dir.path(), "b", &Silent);
@@ -313,7 +319,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_kept_is_run_again_and_two_of_a_name_or_a_folder_are_refused() {
+    fn unreadable_rows_run_again_and_equal_names_and_shared_folders_are_refused() {
         let dir = tempfile::tempdir().unwrap();
         let trials = Trials::open(dir.path(), "test", "").unwrap();
         let key = |k: &f64| k.to_string();

@@ -1,12 +1,16 @@
-//! How fast solvers converge: one substep of each scene from the same state with more and more iterations, against the oracle's minimum.
+//! Convergence of solvers: one substep of each scene from the same state with more and more
+//! iterations, compared with the minimum found by the oracle.
 
-use super::step_ladder::{self, StepRow};
+mod step_ladder;
+
 use crate::names::kilopascals;
 use crate::study::{Job, Kind, Study};
+use crate::trials::Outcomes;
 use crate::{Error, Result};
 use clap::Args;
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use step_ladder::StepRow;
 use trocar_core::Progress;
 use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
@@ -16,80 +20,70 @@ use trocar_report::table::{count, fixed};
 use trocar_testing::scenes::{Organs, SCENES, Scene, material};
 use trocar_workflow::SOLVERS;
 
-/// The folder of finished cases in it.
-const CASES: &str = "cases";
-
-/// How near each iteration comes to the exact step: scenes, moduli and Poisson ratios, over iterations and over time.
+/// Error of each iteration against the exact step: scenes, moduli and Poisson's ratios, over
+/// iterations and over time.
 #[derive(Clone, Debug, Args)]
 pub struct ConvergenceExperiment {
-    /// Gmsh file (.msh, in metres, z up) with organs, of which the appendix is used; our own appendix by default.
+    /// Gmsh file (.msh, in metres, z up) with an appendix; our own appendix by default.
     #[arg(long, value_name = "FILE", conflicts_with = "tets")]
     pub mesh: Option<PathBuf>,
-    /// Elements of our own appendix, about.
+    /// Approximate number of elements of our own appendix.
     #[arg(long, default_value_t = 2_500)]
     pub tets: usize,
     /// Scenes (sag, drag, shake, tube, fall); all by default.
     #[arg(long = "scene")]
     pub scenes: Vec<String>,
-    /// Young's moduli [kPa].
+    /// Young's moduli (kPa).
     #[arg(long = "young", value_delimiter = ',', value_parser = kilopascals, default_value = "3,12,48")]
     pub young_moduli: Vec<f64>,
     /// Poisson's ratios.
     #[arg(long = "poisson", value_delimiter = ',', default_values_t = [0.3, 0.45, 0.49])]
     pub poisson_ratios: Vec<f64>,
-    /// Most iterations; they double from 1.
+    /// Maximum number of iterations; they double from 1.
     #[arg(long = "iterations", default_value_t = 512)]
-    pub most_iterations: usize,
+    pub max_iterations: usize,
 }
 
-/// A scene with a material: what is kept when the experiment is interrupted.
+/// A scene with a material: the unit of resume.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ConvergenceCase {
     /// The scene.
     pub scene: String,
-    /// Young's modulus [kPa].
+    /// Young's modulus (kPa).
     pub young_kpa: f64,
     /// Poisson's ratio.
     pub poisson: f64,
     /// Why there are no rows, if there are none.
     pub failure: Option<String>,
-    /// Every schedule with every number of iterations.
+    /// All schedules with all numbers of iterations.
     pub rows: Vec<StepRow>,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct ConvergenceResult {
-    /// Every scene with every material.
+    /// All scenes with all materials.
     pub cases: Vec<ConvergenceCase>,
-    /// The schedules' names.
+    /// Names of the schedules.
     pub schedules: Vec<String>,
-    /// Where the appendix is from.
+    /// Source of the appendix.
     pub mesh: String,
-    /// Its elements.
+    /// Elements of the appendix.
     pub tets: usize,
-    /// Its nodes.
+    /// Nodes of the appendix.
     pub nodes: usize,
-    /// Cases that an earlier run had finished.
+    /// Cases of an earlier run that were used again.
     pub reused: usize,
-    /// Wall time of this run [s].
+    /// Wall time of this run (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
-}
-
-/// A finished case on disk.
-#[derive(Serialize, Deserialize)]
-struct Finished {
-    /// What it depends on besides its scene and material.
-    settings: String,
-    case: ConvergenceCase,
 }
 
 impl Study for ConvergenceExperiment {
     const NAME: &'static str = "convergence";
     const KIND: Kind = Kind::Experiment;
-    const FOLDER: Option<&'static str> = Some("Folder for the report; finished cases in it are kept and used again.");
+    const FOLDER: Option<&'static str> = Some("Output folder of the report. Finished cases in it are used again.");
     type Figures = ConvergenceResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(ConvergenceResult, Document)> {
@@ -103,41 +97,24 @@ impl Study for ConvergenceExperiment {
             None => Organs::analytic_appendix(self.tets)?,
         };
         job.claim()?;
-        let folder = job.output().join(CASES);
-        std::fs::create_dir_all(&folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
-        let settings = self.settings(&organs)?;
-        let total = scenes.len() * self.young_moduli.len() * self.poisson_ratios.len();
-        job.progress.begin("cases", total as u64);
-        let (mut cases, mut reused) = (Vec::with_capacity(total), 0);
+        let mut materials = Vec::new();
         for scene in &scenes {
             for young in &self.young_moduli {
-                for poisson in &self.poisson_ratios {
-                    let path = folder.join(format!("{scene}-{}kPa-{poisson}.json", young / 1e3));
-                    let case = match earlier(&path, &settings) {
-                        Some(case) => {
-                            reused += 1;
-                            case
-                        }
-                        None => {
-                            let case = self.case(&organs, scene, *young, *poisson, job.progress)?;
-                            let finished = Finished { settings: settings.clone(), case };
-                            write_json(&path, &finished)?;
-                            finished.case
-                        }
-                    };
-                    cases.push(case);
-                    job.progress.advance(1);
-                }
+                materials.extend(self.poisson_ratios.iter().map(|poisson| (scene.as_str(), *young, *poisson)));
             }
         }
-        job.progress.end();
+        let key = |(scene, young, poisson): &(&str, f64, f64)| format!("{scene}, {} kPa, {poisson}", young / 1e3);
+        // On one thread, because times are measured.
+        let one = |case: &(&str, f64, f64), progress: &dyn Progress| self.case(&organs, *case, progress);
+        let Outcomes { rows: cases, resumed } =
+            job.trials("cases", &self.settings(&organs)?, &materials, key, 1, one)?;
         let result = ConvergenceResult {
             cases,
             schedules: SOLVERS.map(str::to_owned).into(),
             mesh: organs.source.clone(),
             tets: organs.tets(),
             nodes: organs.nodes(),
-            reused,
+            reused: resumed.trials,
             seconds: job.seconds(),
             report: job.report(),
         };
@@ -150,14 +127,12 @@ impl ConvergenceExperiment {
     fn case(
         &self,
         organs: &Organs,
-        scene: &str,
-        young: f64,
-        poisson: f64,
+        (scene, young, poisson): (&str, f64, f64),
         progress: &dyn Progress,
     ) -> Result<ConvergenceCase> {
         let made = Scene::named(scene, organs, material(young, poisson))
             .map_err(Error::from)
-            .and_then(|scene| step_ladder::climb(&scene, &SOLVERS, self.most_iterations, progress));
+            .and_then(|scene| step_ladder::measure(&scene, &SOLVERS, self.max_iterations, progress));
         let (rows, failure) = match made {
             Ok(rows) => (rows, None),
             Err(Error::Interrupted) => return Err(Error::Interrupted),
@@ -166,63 +141,50 @@ impl ConvergenceExperiment {
         Ok(ConvergenceCase { scene: scene.to_owned(), young_kpa: young / 1e3, poisson, failure, rows })
     }
 
-    /// What rows depend on besides scene and material.
+    /// Everything that rows depend on besides scene and material.
     fn settings(&self, organs: &Organs) -> Result<String> {
         let schedules =
             SOLVERS.iter().map(|s| trocar_workflow::solver_named(s)).collect::<std::result::Result<Vec<_>, _>>()?;
         Ok(format!(
-            "{} with {} nodes and {} tets, to {} iterations, {schedules:?}, version {}",
+            "{} with {} nodes and {} tets, to {} iterations, {schedules:?}",
             organs.source,
             organs.nodes(),
             organs.tets(),
-            self.most_iterations,
-            env!("CARGO_PKG_VERSION")
+            self.max_iterations
         ))
     }
 }
 
-/// A case that an earlier run finished with the same settings.
-fn earlier(path: &PathBuf, settings: &str) -> Option<ConvergenceCase> {
-    let finished: Finished = serde_json::from_slice(&std::fs::read(path).ok()?).ok()?;
-    (finished.settings == settings).then_some(finished.case)
-}
-
-/// Writes beside the place and moves there, so that an interruption leaves no half of it.
-fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
-    let bytes = serde_json::to_vec_pretty(value).map_err(|e| Error::Format(e.to_string()))?;
-    let beside = path.with_extension("part");
-    super::write(&beside, &bytes)?;
-    std::fs::rename(&beside, path).map_err(|source| Error::Io { path: path.to_owned(), source })
-}
-
-/// The material drawn in full colour: Young's modulus [kPa] and Poisson's ratio.
+/// The material drawn in full colour: Young's modulus (kPa), Poisson's ratio.
 const BASE: (f64, f64) = (12.0, 0.45);
 
-/// What a scene is.
+/// A description of a scene.
 fn described(scene: &str) -> &'static str {
     match scene {
-        "sag" => "At rest under gravity, the lowest 42% of the nodes pinned: the exact step moves nothing.",
-        "drag" => "A patch is pulled up at 10 mm/s, 0.2 s after it began.",
-        "shake" => "A patch is shaken by 1 mm at 7.3 Hz, 0.17 s after it began.",
+        "sag" => "At rest under gravity, the lowest 42% of the nodes pinned: the exact step moves no node.",
+        "drag" => "A patch is pulled up at 10 mm/s, after 0.2 s.",
+        "shake" => "A patch is shaken by 1 mm at 7.3 Hz, after 0.17 s.",
         "tube" => {
-            "Pinned within 10 mm of one end, the middle lifted at 30 mm/s, 0.25 s after it began: large, slow, global motion."
+            "Pinned within 10 mm of one end, the middle lifted at 30 mm/s, after 0.25 s: large, slow, global motion."
         }
         _ => {
-            "Nothing holds it; it falls since 0.1 s. The predictor of implicit Euler is its exact step, so there is no excess energy to compare with."
+            "Free fall for 0.1 s. The predictor of implicit Euler is the exact step, so no excess energy can be \
+             compared."
         }
     }
 }
 
 fn document(result: &ConvergenceResult) -> Result<Document> {
     let lead = format!(
-        "One substep of {} ({} elements, {} nodes) from one state, with 1, 2, 4, \u{2026} iterations, against the minimum that Newton's method finds in double \
-         precision for the same substep. Time is that of the substep on one thread, the least of five.",
+        "One substep of {} ({} elements, {} nodes) from one state, with 1, 2, 4, \u{2026} iterations, \
+         compared with the minimum that Newton's method finds in double \
+         precision for the same substep. The time is that of the substep on one thread, the least of five.",
         page::escape(&result.mesh),
         count(result.tets),
         count(result.nodes)
     );
     let subtitle = "Position and energy error of one substep, over iterations and over time";
-    let mut document = Document::new("Convergence", subtitle).with(Section::new("What was done", lead));
+    let mut document = Document::new("Convergence", subtitle).with(Section::new("Method", lead));
     for scene in SCENES {
         let cases: Vec<&ConvergenceCase> = result.cases.iter().filter(|c| c.scene == scene).collect();
         if !cases.is_empty() {
@@ -230,14 +192,14 @@ fn document(result: &ConvergenceResult) -> Result<Document> {
                 document.with(plots(result, &cases, Section::new(scene, described(scene)))?.lines(failures(&cases)));
         }
     }
-    Ok(document.with(own(result)))
+    Ok(document.with(default_iterations(result)))
 }
 
 fn plots(result: &ConvergenceResult, cases: &[&ConvergenceCase], mut section: Section) -> Result<Section> {
     type Value = fn(&StepRow) -> f64;
-    let over: [(&'static str, Value); 2] = [("iterations", |r| r.iterations as f64), ("wall time [ms]", |r| r.wall_ms)];
+    let over: [(&'static str, Value); 2] = [("iterations", |r| r.iterations as f64), ("wall time (ms)", |r| r.wall_ms)];
     let errors: [(&'static str, &'static str, Value); 2] = [
-        ("Position error", "RMS [\u{b5}m]", |r| r.position_error_um),
+        ("Position error", "RMS (\u{b5}m)", |r| r.position_error_um),
         ("Energy error", "over the predictor's", |r| r.energy_error.unwrap_or(f64::NAN)),
     ];
     for (title, y, error) in errors {
@@ -246,8 +208,7 @@ fn plots(result: &ConvergenceResult, cases: &[&ConvergenceCase], mut section: Se
             if lines.iter().all(|l| l.points.iter().all(|p| !p.1.is_finite())) {
                 continue;
             }
-            let plot =
-                Plot { title, x, y, lines, bands: vec![], show: vec![], limits: vec![], log_x: true, log_y: true };
+            let plot = Plot { title, x, y, lines, log_x: true, log_y: true, ..Plot::default() };
             let legend = result.schedules.iter().enumerate().map(|(k, name)| (name.as_str(), colors::organ(k)));
             section = section.plot(&plot, &format!("<b>{title}</b> over {x}.{}", page::legend(legend)))?;
         }
@@ -255,7 +216,7 @@ fn plots(result: &ConvergenceResult, cases: &[&ConvergenceCase], mut section: Se
     Ok(section)
 }
 
-/// A line a schedule and material, the base material last and in full colour.
+/// One line per schedule and material, the base material last and in full colour.
 fn lines(
     result: &ConvergenceResult,
     cases: &[&ConvergenceCase],
@@ -270,7 +231,7 @@ fn lines(
             let color = if full { colors::organ(k) } else { colors::mix(colors::organ(k), [150, 156, 162], 0.72) };
             for case in cases.iter().filter(|c| is_base(c) == full) {
                 let rows = case.rows.iter().filter(|r| r.schedule == *name);
-                lines.push(Line { points: rows.map(|r| (along(r), error(r))).collect(), color, filled: false });
+                lines.push(Line::new(rows.map(|r| (along(r), error(r))).collect(), color));
             }
         }
     }
@@ -282,16 +243,16 @@ fn failures(cases: &[&ConvergenceCase]) -> Vec<String> {
     failed.map(|(c, why)| format!("{} kPa, nu {}: {why}", c.young_kpa, c.poisson)).collect()
 }
 
-/// Every case with the schedules' own iterations.
-fn own(result: &ConvergenceResult) -> Section {
+/// All cases with the default iterations of the schedules.
+fn default_iterations(result: &ConvergenceResult) -> Section {
     let head = [
         "Scene",
-        "E [kPa]",
+        "E (kPa)",
         "nu",
         "Schedule",
         "Iterations",
         "ms",
-        "RMS error [\u{b5}m]",
+        "RMS error (\u{b5}m)",
         "over displacement",
         "Energy",
         "Inverted",
@@ -315,10 +276,10 @@ fn own(result: &ConvergenceResult) -> Section {
         }
     }
     Section::new(
-        "With each schedule's own iterations",
-        "One substep. <i>Over displacement</i>: over the RMS distance from the rest shape. <i>Energy</i>: the incremental potential above the minimum, over that of the \
-         inertial predictor; what single precision leaves of it is about 1e-10. In the plots full colour is 12 kPa and nu 0.45, pale the \
-         other materials.",
+        "With the default iterations of each schedule",
+        "One substep. <i>Over displacement</i>: over the RMS distance from the rest shape. <i>Energy</i>: the \
+         incremental potential above the minimum, over that of the inertial predictor; single precision limits it to \
+         about 1e-10. The plots show 12 kPa and nu 0.45 in full colour and the other materials pale.",
     )
     .table(Table::new(head, rows))
 }

@@ -1,13 +1,14 @@
-//! What pictures cost: a policy's preview with an organ refitted, a path-traced frame, and rays a second beside Embree.
+//! Cost of pictures: a preview for policies with deforming organs, a path-traced frame, and rays
+//! per second beside Embree.
 
 mod rays;
 
 pub use rays::RayRow;
 
 use super::machine::Machine;
-use super::timing::median;
-use crate::study::{Job, Kind, Study, stop_if_asked};
-use crate::{Error, Result};
+use crate::Result;
+use crate::statistics::median;
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -24,105 +25,107 @@ use trocar_testing::scenes::{LaparoscopicScene, endoscope_view};
 use trocar_workflow::ScriptedLift;
 use trocar_workflow::scene_specimen;
 
-/// The organ that deforms.
+/// Index of the organ that deforms.
 const MOVING: usize = 1;
-/// Frames that are timed, after a tenth as many that are not.
+/// Timed frames. A tenth as many warm-up frames come first.
 const FRAMES: usize = 60;
 
-/// What pictures cost: a preview for policies, a path-traced frame, rays beside Embree.
+/// Cost of pictures: a preview for policies, a path-traced frame, rays beside Embree.
 #[derive(Clone, Debug, Args)]
 pub struct RenderBench {
-    /// Triangles of the organs, about; a fifth of them deform.
+    /// Approximate number of triangles of the organs; a fifth of them deform.
     #[arg(long, default_value_t = 100_000)]
     pub triangles: usize,
-    /// Paths a pixel of the large picture; 0 leaves it out.
+    /// Paths per pixel of the large picture; 0 for none.
     #[arg(long, default_value_t = 64)]
     pub samples: u32,
-    /// Side of the square image of rays that are cast beside Embree.
+    /// Side of the square image of rays cast beside Embree.
     #[arg(long, default_value_t = 1024)]
     pub rays: usize,
-    /// Python that has the package embreex.
+    /// Python with the package embreex.
     #[arg(long, default_value = "python3")]
     pub python: PathBuf,
-    /// Where to write the large picture (PNG).
+    /// Output file of the large picture (PNG).
     #[arg(long, value_name = "FILE")]
     pub picture: Option<PathBuf>,
-    /// Scene file or built-in scene whose cameras are measured; none for none.
+    /// Scene file or built-in scene whose cameras are measured; "none" for none.
     #[arg(long, default_value = "cell-a")]
     pub scene: String,
-    /// Folder of made phantoms, where the scene's phantom is made once and kept
-    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    /// Folder of phantoms. A phantom is made once and used again (default: $TROCAR_PHANTOMS, else
+    /// trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }
 
-/// The benchmark's outcome.
+/// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct RenderBenchResult {
-    /// The scene through its cameras; left out without a scene.
+    /// The cameras of the scene; none without a scene.
     pub cell: Option<CellRow>,
-    /// Median of a frame of 224 x 224 with colour, depth and labels, all deformed organs refitted and arms moved, hard shadows: of the scene through its first camera, or else of the stage of
-    /// loops of bowel [ms].
+    /// Median time of a frame of 224 x 224 with colour, depth, labels and hard shadows, after all
+    /// organs deformed and all arms moved: of the first camera of the scene, without a scene of the
+    /// loops of bowel (ms).
     pub preview_224_ms: f64,
-    /// The same without shadows [ms].
+    /// The same without shadows (ms).
     pub preview_224_unshadowed_ms: f64,
-    /// The fastest frame with shadows [ms]: what the machine can do when it is left alone.
+    /// Fastest frame with shadows (ms): the speed of an undisturbed machine.
     pub preview_224_best_ms: f64,
-    /// Median of bringing the stage to where the cell is, or of the refit alone [ms].
+    /// Median time of updating the stage from the cell; without a scene, of refitting the loops of
+    /// bowel (ms).
     pub refit_ms: f64,
     /// Triangles of the loops of bowel.
     pub triangles: usize,
-    /// Triangles of them that are refitted each frame.
+    /// Triangles of them refitted in each frame.
     pub refitted_triangles: usize,
-    /// Median of a frame of 224 x 224 of the loops of bowel with hard shadows [ms].
+    /// Median time of a frame of 224 x 224 of the loops of bowel with hard shadows (ms).
     pub loops_224_ms: f64,
-    /// The same without shadows [ms].
+    /// The same without shadows (ms).
     pub loops_224_unshadowed_ms: f64,
-    /// Building all trees anew [ms].
+    /// Building all trees of the loops of bowel (ms).
     pub build_ms: f64,
-    /// One frame of 1280 x 720 at `samples` paths a pixel [ms]; left out with 0 samples.
+    /// One frame of 1280 x 720 with `samples` paths per pixel (ms); none with 0 samples.
     pub path_720p_ms: Option<f64>,
-    /// Paths a pixel of it.
+    /// Paths per pixel of that frame.
     pub samples: u32,
-    /// Rays on one thread, by kind of ray, beside Embree.
+    /// Rays on one thread, by kind.
     pub rays: Vec<RayRow>,
     /// Why Embree was not measured.
     pub embree_failure: Option<String>,
     /// Worker threads for pictures.
     pub threads: usize,
-    /// Where this was measured.
+    /// The machine.
     pub machine: Machine,
 }
 
-/// A cell through its cameras.
+/// The cameras of a cell.
 #[derive(Clone, Debug, Serialize)]
 pub struct CellRow {
-    /// The scene.
+    /// Name of the scene.
     pub scene: String,
     /// Triangles on the stage.
     pub triangles: usize,
-    /// Making the sight: field, arms, instruments, all trees [ms].
+    /// Building the stage: organs, arms, instruments, all trees (ms).
     pub begin_ms: f64,
-    /// Median of bringing the stage to where the cell is [ms].
+    /// Median time of updating the stage from the cell (ms).
     pub follow_ms: f64,
-    /// The cameras, 224 x 224.
+    /// The cameras, with pictures of 224 x 224.
     pub cameras: Vec<CameraRow>,
 }
 
 /// One camera of a cell.
 #[derive(Clone, Debug, Serialize)]
 pub struct CameraRow {
-    /// Its name.
+    /// Name of the camera.
     pub camera: String,
-    /// Median of a frame with shadows, all that has moved included [ms].
+    /// Median time of a frame with shadows, the update of the stage included (ms).
     pub ms: f64,
-    /// The fastest [ms].
+    /// Fastest frame with shadows (ms).
     pub best_ms: f64,
-    /// Median without shadows [ms].
+    /// Median time of a frame without shadows (ms).
     pub unshadowed_ms: f64,
 }
 
-/// The scene on a stage.
+/// The loops of bowel on a stage.
 struct Set {
     scene: LaparoscopicScene,
     stage: Stage,
@@ -150,10 +153,10 @@ impl Set {
         Ok(Self { moving: shapes[MOVING], scene, stage, instruments, view })
     }
 
-    /// Median and least time of a frame [ms].
+    /// Median and least time of a frame (ms).
     fn preview(&mut self, shadows: bool) -> Result<(f64, f64)> {
         let Endoscope { camera, .. } = Endoscope::thirty_degrees();
-        // The square middle of the endoscope's picture.
+        // The square centre of the endoscope's picture.
         let scale = 224.0 / camera.height as f64;
         let policy = Camera {
             width: 224,
@@ -210,7 +213,7 @@ impl Study for RenderBench {
         progress.begin("measurements", 5);
         let step = || {
             progress.advance(1);
-            stop_if_asked(progress)
+            check_interrupted(progress)
         };
         let cell = (self.scene != "none").then(|| self.cell(&self.scene, progress)).transpose()?;
         let clock = Instant::now();
@@ -253,13 +256,14 @@ impl Study for RenderBench {
 }
 
 impl RenderBench {
-    /// The cell's cameras while the grasp-lift goes on: frames of all of them after each period, which is not timed.
+    /// Times the cameras of the cell during the grasp-lift, after each control period, which is not
+    /// timed.
     fn cell(&self, name: &str, progress: &dyn Progress) -> Result<CellRow> {
         let scene = Scene::read(name)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let mut script = ScriptedLift::new(&scene, &specimen, 0)?;
         let clock = Instant::now();
-        let mut sight = CameraRig::new(&scene, &specimen, script.cell())?;
+        let mut rig = CameraRig::new(&scene, &specimen, script.cell())?;
         let begin_ms = 1e3 * clock.elapsed().as_secs_f64();
         let names: Vec<String> = scene.cameras.iter().map(|c| c.name.clone()).collect();
         let mut shadowed = vec![Vec::new(); names.len()];
@@ -268,23 +272,21 @@ impl RenderBench {
         for frame in 0..FRAMES + FRAMES / 10 {
             let mut step =
                 |timed: &mut dyn FnMut(&mut CameraRig, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
-                    if progress.interrupted() {
-                        return Err(Error::Interrupted);
-                    }
+                    check_interrupted(progress)?;
                     script.advance()?;
                     let clock = Instant::now();
-                    timed(&mut sight, script.cell())?;
+                    timed(&mut rig, script.cell())?;
                     if frame >= FRAMES / 10 {
                         times.push(1e3 * clock.elapsed().as_secs_f64());
                     }
                     Ok(())
                 };
-            // A camera and a kind a period, so that all that moves has moved before each.
+            // One camera and one kind per period: everything has moved before each picture.
             let k = frame % names.len().max(1);
             let see = |shadows: bool| {
                 let camera = &names[k];
-                move |sight: &mut CameraRig, cell: &Cell| -> Result<()> {
-                    std::hint::black_box(sight.render(cell, camera, [224; 2], &RenderSettings::Preview { shadows })?);
+                move |rig: &mut CameraRig, cell: &Cell| -> Result<()> {
+                    std::hint::black_box(rig.render(cell, camera, [224; 2], &RenderSettings::Preview { shadows })?);
                     Ok(())
                 }
             };
@@ -292,7 +294,7 @@ impl RenderBench {
                 step(&mut see(true), &mut shadowed[k])?;
                 step(&mut see(false), &mut plain[k])?;
             }
-            step(&mut |sight, cell| Ok(sight.update(cell)?), &mut follow)?;
+            step(&mut |rig, cell| Ok(rig.update(cell)?), &mut follow)?;
         }
         let rows = names.into_iter().zip(shadowed.iter_mut().zip(&mut plain));
         let cameras = rows
@@ -302,7 +304,7 @@ impl RenderBench {
                 CameraRow { camera, ms, best_ms, unshadowed_ms: median(plain) }
             })
             .collect();
-        let (scene, triangles, follow_ms) = (scene.name, sight.triangles(), median(&mut follow));
+        let (scene, triangles, follow_ms) = (scene.name, rig.triangles(), median(&mut follow));
         Ok(CellRow { scene, triangles, begin_ms, follow_ms, cameras })
     }
 
@@ -325,7 +327,7 @@ fn document(r: &RenderBenchResult) -> Document {
         |name: String, shadowed: String, best: String, plain: f64| vec![name, shadowed, best, fixed(plain, 1)];
     if let Some(cell) = &r.cell {
         lines.push(format!(
-            "{}: {} triangles, made in {} ms; following the cell {} ms",
+            "{}: {} triangles, built in {} ms; updated from the cell in {} ms",
             cell.scene,
             count(cell.triangles),
             fixed(cell.begin_ms, 0),
@@ -337,7 +339,7 @@ fn document(r: &RenderBenchResult) -> Document {
     }
     rows.push(picture("loops of bowel".to_owned(), fixed(r.loops_224_ms, 1), String::new(), r.loops_224_unshadowed_ms));
     lines.push(format!(
-        "loops of bowel: {} triangles, {} of them refitted each frame; all trees again {} ms; {} threads on {}",
+        "loops of bowel: {} triangles, {} of them refitted each frame; all trees built in {} ms; {} threads on {}",
         count(r.triangles),
         count(r.refitted_triangles),
         fixed(r.build_ms, 0),
@@ -361,9 +363,9 @@ fn document(r: &RenderBenchResult) -> Document {
             row.largest_difference_m.map_or_else(dash, |x| fixed(1e6 * x, 2)),
         ]
     });
-    let head = ["Rays", "count", "ours [M/s]", "Embree [M/s]", "ratio", "differ", "most [\u{b5}m]"];
-    let pictures = ["224 x 224 pixels", "with shadows [ms]", "best [ms]", "without shadows [ms]"];
-    Document::new("Render", "What pictures cost")
+    let head = ["Rays", "count", "ours (M/s)", "Embree (M/s)", "ratio", "differ", "largest difference (\u{b5}m)"];
+    let pictures = ["224 x 224 pixels", "with shadows (ms)", "best (ms)", "without shadows (ms)"];
+    Document::new("Render", "Cost of pictures")
         .with(Section::new("Previews", "").table(Table::new(pictures, rows)).lines(lines))
         .with(Section::new("Rays on one thread", "").table(Table::new(head, rays.collect())))
 }

@@ -1,21 +1,17 @@
-//! Normal numbers by key instead of by order: the same for any number of threads.
+//! Normal numbers that depend on a key, not on their order: the same for any number of threads.
 
 use glam::DVec3;
 use std::f64::consts::TAU;
+use trocar_core::{Random, mix};
 
-/// Three independent normal numbers of standard deviation 1 for a list of keys (SplitMix64's finaliser; Box and Muller).
+/// Three independent numbers of the standard normal distribution for a list of keys.
+///
+/// The bits differ from those of [`Random::normal`]; published figures depend on them.
 pub(super) fn normals(keys: &[u64]) -> DVec3 {
-    let key = keys.iter().fold(0, |h, k| scramble(h ^ *k));
-    let uniform = |k: u64| ((scramble(key ^ scramble(k)) >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
+    let random = Random::from_keys(keys);
+    let uniform = |k: u64| ((random.bits(mix(k)) >> 11) as f64 + 0.5) / (1_u64 << 53) as f64;
     let one = |k: u64| (-2.0 * uniform(2 * k).ln()).sqrt() * (TAU * uniform(2 * k + 1)).cos();
     DVec3::new(one(0), one(1), one(2))
-}
-
-fn scramble(x: u64) -> u64 {
-    let z = x.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    let z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
 }
 
 #[cfg(test)]

@@ -1,12 +1,16 @@
-//! Fig. 6(b): which integrators stay bounded when specimen A is released under gravity, and how far each comes to rest from the true equilibrium.
+//! Fig. 6(b): which integrators stay bounded when specimen A is released under gravity, and how far
+//! each is from the equilibrium.
 
-use super::integrator_forms::{Form, forms};
-use super::integrator_row::IntegratorRow;
+mod forms;
+mod row;
+
 use crate::names::Recorded;
-use crate::study::{Job, Kind, Study};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
+use forms::{Form, findings, forms};
 use glam::DVec3;
+use row::IntegratorRow;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -22,28 +26,32 @@ use trocar_tissue::{Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
 use trocar_workflow::phantoms;
 
-/// Speed at which a node has diverged [m/s], the paper's limit.
+/// Node speed that counts as divergence (m/s): the limit of the paper.
 const SPEED_LIMIT: f64 = 20.0;
 
-/// The last share of the run, over which positions are averaged before they are compared with the equilibrium: tissue that is not damped swings around it.
-const MEASURED_SHARE: f64 = 1.0 / 3.0;
+/// Share of the run, at its end, over which positions are averaged before the comparison with the
+/// equilibrium. Undamped tissue oscillates around it.
+const AVERAGED_SHARE: f64 = 1.0 / 3.0;
 
-/// Viscosity over Young's modulus [s]: less than in the cell, where the explicit forms would need shorter steps than their elasticity asks for.
+/// Viscosity over Young's modulus (s). It is lower than in the cell, where the explicit integrators
+/// would need shorter steps than for the elasticity.
 const LIGHT_DAMPING: f64 = 0.02 / 15.0;
 
-/// Young's modulus [Pa] and Poisson's ratio of organs out of a file.
+/// Young's modulus (Pa) and Poisson's ratio of organs from a file.
 const TISSUE: (f64, f64) = (12e3, 0.45);
 
-/// Fig. 6(b): which integrators stay bounded when specimen A is released, and how far each sags from the truth.
+/// Fig. 6(b): which integrators stay bounded when specimen A is released, and the sag error of
+/// each.
 #[derive(Clone, Debug, Args)]
 pub struct IntegratorsExperiment {
-    /// Gmsh file (.msh, in metres, z up) with the organs, the lowest 42% of each pinned; phantom A, reconstructed, by default.
+    /// Gmsh file (.msh, in metres, z up) with the organs, the lowest 42% of each pinned; by default
+    /// phantom A, reconstructed.
     #[arg(long, value_name = "FILE")]
     pub mesh: Option<PathBuf>,
-    /// Simulated time [s].
+    /// Simulated time (s).
     #[arg(long, default_value_t = 1.0)]
     pub seconds: f64,
-    /// Leave the tissue's dashpots out (with --mesh).
+    /// Remove the damping of the tissue (with --mesh).
     #[arg(long, requires = "mesh")]
     pub undamped: bool,
     /// Worker threads; all by default.
@@ -54,30 +62,30 @@ pub struct IntegratorsExperiment {
     pub recorded: Recorded,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct IntegratorsResult {
-    /// Every integrator.
+    /// All integrators.
     pub integrators: Vec<IntegratorRow>,
-    /// What the data say, in a sentence each.
+    /// Findings, one sentence each.
     pub findings: Vec<String>,
-    /// The longest stable step of explicit integration [us].
+    /// Largest stable step of explicit integration (us).
     pub stable_step_us: f64,
-    /// Where the organs are from.
+    /// Source of the organs.
     pub specimen: String,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
-    /// Mean displacement of the nodes in the static equilibrium [mm].
+    /// Mean displacement of the nodes in the static equilibrium (mm).
     pub sag_mm: f64,
-    /// Whether dashpots were left out.
+    /// Whether the damping was removed.
     pub undamped: bool,
     /// Worker threads.
     pub threads: usize,
-    /// Wall time of everything [s].
+    /// Wall time (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
@@ -85,12 +93,12 @@ impl Study for IntegratorsExperiment {
     const NAME: &'static str = "integrators";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> =
-        Some("Folder for recording, specimen and report; a finished recording in it is used again.");
+        Some("Output folder of recording, specimen and report. A finished recording in it is used again.");
     type Figures = IntegratorsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(IntegratorsResult, Document)> {
         if !(self.seconds >= 3.0 * FRAME && self.seconds <= 60.0) {
-            return Err(Error::Mismatch(format!("{} s are to be simulated; 0.05 to 60 make sense", self.seconds)));
+            return Err(Error::Mismatch(format!("--seconds {}: must be in [0.05, 60]", self.seconds)));
         }
         let organs = self.mesh.as_deref().map(Organs::read).transpose()?;
         job.claim()?;
@@ -109,7 +117,7 @@ impl Study for IntegratorsExperiment {
         }
         job.progress.end();
         let result = IntegratorsResult {
-            findings: super::integrator_forms::findings(&integrators),
+            findings: findings(&integrators),
             integrators,
             stable_step_us: 1e6 * stable,
             specimen,
@@ -127,17 +135,17 @@ impl Study for IntegratorsExperiment {
 }
 
 impl IntegratorsExperiment {
-    /// Organs of a file, the lowest 42% of each one's nodes pinned.
+    /// Organs from a file, the lowest 42% of the nodes of each pinned.
     fn pinned(&self, organs: &Organs) -> Result<Model> {
         let tissue = material(TISSUE.0, TISSUE.1);
         let viscosity = if self.undamped { 0.0 } else { LIGHT_DAMPING * TISSUE.0 };
         Ok(Scene::sag(organs, trocar_tissue::Material { viscosity, ..tissue })?.model)
     }
 
-    /// Phantom A as the cell has it.
+    /// Phantom A with the materials and supports of the cell.
     fn phantom(&self, job: &Job<'_>) -> Result<Model> {
         if self.undamped {
-            return Err(Error::Mismatch("the cell's organs are damped; name a mesh for undamped ones".to_owned()));
+            return Err(Error::Mismatch("--undamped needs --mesh: the organs of the cell are damped".to_owned()));
         }
         let specimen =
             phantoms::specimen("phantom-a", &self.recorded.options(), &job.output().join("phantom-a"), job.progress)?;
@@ -145,11 +153,11 @@ impl IntegratorsExperiment {
     }
 }
 
-/// Where the organs come to rest in truth.
+/// The static equilibrium of the organs.
 struct Equilibrium {
     rest: Vec<DVec3>,
     positions: Vec<DVec3>,
-    /// Mean displacement [m].
+    /// Mean displacement (m).
     sag: f64,
 }
 
@@ -176,18 +184,16 @@ fn measured(
     let mut stepper = form.scheme.stepper(model, FRAME, threads)?;
     let mut state = State::new(model);
     let mut mean = vec![DVec3::ZERO; truth.rest.len()];
-    let first_measured = frames - ((MEASURED_SHARE * frames as f64) as usize).max(1);
+    let first_measured = frames - ((AVERAGED_SHARE * frames as f64) as usize).max(1);
     let (mut speeds, mut times, mut ended) = (Vec::with_capacity(frames), Vec::with_capacity(frames), None);
     for frame in 0..frames {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        check_interrupted(progress)?;
         let clock = Instant::now();
         let report = stepper.step(model, &mut state, &[]);
         times.push(1e3 * clock.elapsed().as_secs_f64());
         progress.advance(1);
         let end = (frame + 1) as f64 * FRAME;
-        // A state that is not a number has no speed: it is over the limit all the same.
+        // A state with NaN has no speed; it counts as over the limit.
         let lost = matches!(report.divergence, Some(trocar_tissue::Divergence::NonFinite { .. }));
         speeds.push((end, if lost { SPEED_LIMIT } else { report.max_speed.min(SPEED_LIMIT) }));
         if let Some(event) = report.divergence {
@@ -219,43 +225,41 @@ fn measured(
 }
 
 fn document(result: &IntegratorsResult) -> Result<Document> {
-    let damping = if result.undamped { "without dashpots" } else { "with the cell's dashpots" };
+    let damping = if result.undamped { "undamped" } else { "damped as in the cell" };
     let lead = format!(
-        "{} ({} elements, {} nodes), at rest in its rest shape, released under gravity {damping}. The greatest speed of any node at the end of each frame of 1/60 s; the \
-         dashed line is the paper's limit of {SPEED_LIMIT} m/s, at which a run ends here. Nothing is clamped.",
+        "{} ({} elements, {} nodes), released at rest in its rest shape under gravity, {damping}. The plot shows the \
+         largest node speed at the end of each frame of 1/60 s. The \
+         dashed line is the paper's limit of {SPEED_LIMIT} m/s, at which a run ends. Speeds are not clamped.",
         page::escape(&result.specimen),
         count(result.tets),
         count(result.nodes),
     );
     let line = |(k, row): (usize, &IntegratorRow)| {
-        // A run that ends in its first frame is a short mark rather than a point.
+        // A run that ends in its first frame is drawn as a short line.
         let mut points = row.speeds.clone();
         if let [(t, v)] = points[..] {
             points = vec![(0.0, v), (t, v)];
         }
-        Line { points, color: color(k), filled: false }
+        Line::new(points, color(k))
     };
     let plot = Plot {
-        title: "Greatest node speed",
-        x: "time since release [s]",
-        y: "speed [m/s]",
+        title: "Largest node speed",
+        x: "time since release (s)",
+        y: "speed (m/s)",
         lines: result.integrators.iter().enumerate().map(line).collect(),
-        bands: vec![],
-        show: vec![],
         limits: vec![SPEED_LIMIT],
-        log_x: false,
         log_y: true,
+        ..Plot::default()
     };
     let legend = page::legend(result.integrators.iter().enumerate().map(|(k, r)| (r.name, color(k))));
-    let bounded = Section::new("What stays bounded", lead)
-        .cards(cards(result))
-        .plot(&plot, &format!("<b>Fig. 6(b) anew.</b>{legend}"))?;
-    let findings = Section::new("What the data say", "").lines(result.findings.iter().cloned());
-    let document = Document::new("Integrators", "Which stay bounded, and which are right");
+    let bounded =
+        Section::new("Boundedness", lead).cards(cards(result)).plot(&plot, &format!("<b>Fig. 6(b).</b>{legend}"))?;
+    let findings = Section::new("Findings", "").lines(result.findings.iter().cloned());
+    let document = Document::new("Integrators", "Which stay bounded, and how exact they are");
     Ok(document.with(bounded).with(findings).with(rows(result)))
 }
 
-/// There are more forms than hues of organs; the last ones have their own.
+/// There are more integrators than organ colours.
 fn color(k: usize) -> [u8; 3] {
     match k {
         0..8 => colors::organ(k),
@@ -271,13 +275,13 @@ fn cards(result: &IntegratorsResult) -> [Card; 4] {
         rows.filter_map(|r| r.sag_error).min_by(f64::total_cmp).map_or("none".to_owned(), |e| percent(e, 2))
     };
     [
-        Card::new("Bounded", format!("{bounded} of {}", result.integrators.len()), "ran to the end below 20 m/s"),
+        Card::new("Bounded", format!("{bounded} of {}", result.integrators.len()), "below 20 m/s to the end"),
         Card::new(
             "Stable explicit step",
             format!("{} \u{b5}s", fixed(result.stable_step_us, 1)),
             "2/\u{3c9} of the stiffest mode at rest",
         ),
-        Card::new("XPBD's least sag error", best("XPBD"), "of its bounded forms"),
+        Card::new("Smallest sag error of XPBD", best("XPBD"), "of its bounded settings"),
         Card::new("Sag", format!("{} mm", fixed(result.sag_mm, 4)), "mean displacement in the static equilibrium"),
     ]
 }
@@ -286,13 +290,13 @@ fn rows(result: &IntegratorsResult) -> Section {
     let head = [
         "Integrator",
         "Settings",
-        "The paper",
+        "Paper",
         "Outcome",
-        "Peak [m/s]",
-        "Last [m/s]",
-        "Sag over true sag",
+        "Peak (m/s)",
+        "Last (m/s)",
+        "Sag over equilibrium",
         "Sag error",
-        "Frame [ms]",
+        "Frame (ms)",
     ];
     let or_dash = |v: Option<String>| v.unwrap_or_else(|| "\u{2013}".to_owned());
     let row = |r: &IntegratorRow| {
@@ -313,9 +317,10 @@ fn rows(result: &IntegratorsResult) -> Section {
         ]
     };
     let lead = format!(
-        "<i>Sag error</i>: mean distance of the nodes from the static equilibrium (Newton\u{2019}s method in double precision) over their mean displacement in it, positions \
-         averaged over the last third of the run. Frames on {} threads.",
+        "<i>Sag error</i>: mean distance of the nodes from the static equilibrium (Newton\u{2019}s method in double \
+         precision) over their mean displacement in it, positions averaged over the last third of the run. Frames on \
+         {} threads.",
         result.threads
     );
-    Section::new("Every form", lead).table(Table::new(head, result.integrators.iter().map(row).collect()))
+    Section::new("All integrators", lead).table(Table::new(head, result.integrators.iter().map(row).collect()))
 }

@@ -1,67 +1,70 @@
-//! One substep of a scene, from the same state, with 1, 2, 4, ... iterations: how near to the oracle's minimum, and in what time.
+//! One substep of a scene from the same state with 1, 2, 4, ... iterations: error against the
+//! minimum found by the oracle, and wall time.
 
-use crate::schedules::one_substep;
-use crate::{Error, Result};
+use crate::Result;
+use crate::study::check_interrupted;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use trocar_core::Progress;
 use trocar_testing::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
-use trocar_tissue::{SolverSettings, State, Stepper, ToolMotion};
+use trocar_tissue::{Descent, QuasiNewton, SolverSettings, State, Stepper, ToolMotion};
 use trocar_tissue_reference::OracleState;
 use trocar_workflow::solver_named;
 
-/// Steps of the oracle a frame on the way to the state.
+/// Oracle steps per frame before the measured substep.
 const ORACLE_SUBSTEPS: usize = 4;
 
-/// Times that a step is repeated for its time.
+/// Repetitions of a timed substep.
 const REPEATS: usize = 5;
 
-/// The predictor's excess energy means something above this share of the kinetic energy that gravity gives in a substep.
-const LEAST_EXCESS: f64 = 1e-4;
+/// The excess energy of the predictor is used above this share of the kinetic energy that gravity
+/// adds in a substep.
+const MIN_EXCESS: f64 = 1e-4;
 
 /// One schedule with one number of iterations.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StepRow {
-    /// The schedule's name.
+    /// Name of the schedule.
     pub schedule: String,
     /// Iterations of the substep.
     pub iterations: usize,
-    /// Whether that is the schedule's own number.
+    /// Whether this is the default number of the schedule.
     pub own: bool,
-    /// The substep [ms].
+    /// Length of the substep (ms).
     pub substep_ms: f64,
-    /// Least wall time of the substep on one thread, of five [ms].
+    /// Least wall time of five substeps on one thread (ms).
     pub wall_ms: f64,
-    /// RMS distance of the nodes from the oracle's [um].
+    /// RMS distance of the nodes from the oracle's (um).
     pub position_error_um: f64,
     /// The same over the RMS displacement from the rest shape.
     pub position_error: f64,
-    /// Incremental potential above the oracle's [J]; none where an element has no volume.
+    /// Incremental potential above the oracle's (J); none with an inverted element.
     pub energy_error_j: Option<f64>,
-    /// The same over that of the inertial predictor; none where that is as good as none.
+    /// The same over that of the inertial predictor; none if the predictor is as good as the
+    /// minimum.
     pub energy_error: Option<f64>,
-    /// Elements with volume at or below 0.
+    /// Number of inverted elements.
     pub inverted: usize,
 }
 
-/// The state from which the substep is done: after how many frames of the scene; none for the static equilibrium.
+/// Frames of the scene before the substep; none for the static equilibrium.
 fn frames_before(scene: &str) -> Option<usize> {
     match scene {
         "sag" => None,
         "drag" => Some(12),
-        // A quarter of a period into the second one.
+        // A quarter into the second period.
         "shake" => Some(10),
         "tube" => Some(15),
         _ => Some(6),
     }
 }
 
-/// All rows of a scene.
+/// Measures all rows of a scene.
 ///
 /// # Errors
-/// A state that the oracle does not reach, a step that it cannot do, an interruption.
-pub(super) fn climb(scene: &Scene, solvers: &[&str], most: usize, progress: &dyn Progress) -> Result<Vec<StepRow>> {
+/// An oracle that does not converge, an interruption.
+pub(super) fn measure(scene: &Scene, solvers: &[&str], max: usize, progress: &dyn Progress) -> Result<Vec<StepRow>> {
     let mut run = OracleRun::new(scene);
     let h = FRAME / ORACLE_SUBSTEPS as f64;
     let mut before = run.state.clone();
@@ -73,7 +76,7 @@ pub(super) fn climb(scene: &Scene, solvers: &[&str], most: usize, progress: &dyn
         }
         Some(frames) => {
             for k in 0..frames * ORACLE_SUBSTEPS {
-                stop_if(progress)?;
+                check_interrupted(progress)?;
                 before = run.state.clone();
                 run.step(h, (k + 1) as f64 * h)?;
             }
@@ -85,42 +88,56 @@ pub(super) fn climb(scene: &Scene, solvers: &[&str], most: usize, progress: &dyn
     for name in solvers {
         let schedule = solver_named(name)?;
         let ladder = Ladder::new(scene, &mut run, &start, frames.unwrap_or(0) as f64 * FRAME, schedule)?;
-        for iterations in rungs(schedule, most) {
-            stop_if(progress)?;
+        for iterations in iteration_counts(schedule, max) {
+            check_interrupted(progress)?;
             rows.push(ladder.row(&mut run, name, schedule, iterations)?);
         }
     }
     Ok(rows)
 }
 
-/// 1, 2, 4, ... and the schedule's own number.
-fn rungs(schedule: SolverSettings, most: usize) -> Vec<usize> {
-    let doubling = std::iter::successors(Some(1_usize), |k| k.checked_mul(2)).take_while(|k| *k <= most);
-    let mut all: Vec<usize> = doubling.chain([own_iterations(schedule)]).collect();
+/// 1, 2, 4, ... and the default number of the schedule.
+fn iteration_counts(schedule: SolverSettings, max: usize) -> Vec<usize> {
+    let doubling = std::iter::successors(Some(1_usize), |k| k.checked_mul(2)).take_while(|k| *k <= max);
+    let mut all: Vec<usize> = doubling.chain([default_iterations(schedule)]).collect();
     all.sort_unstable();
     all.dedup();
     all
 }
 
-fn own_iterations(schedule: SolverSettings) -> usize {
-    crate::schedules::iterations_of(schedule)
+/// Default iterations of a substep of the schedule.
+fn default_iterations(schedule: SolverSettings) -> usize {
+    match schedule {
+        SolverSettings::Descent(descent) => descent.iterations,
+        SolverSettings::QuasiNewton(method) => method.iterations,
+    }
 }
 
-/// What the rows of a schedule share.
+/// One substep of the schedule with this number of iterations and no early exit.
+fn one_substep(schedule: SolverSettings, iterations: usize) -> SolverSettings {
+    match schedule {
+        SolverSettings::Descent(descent) => SolverSettings::Descent(Descent { substeps: 1, iterations, ..descent }),
+        SolverSettings::QuasiNewton(method) => {
+            SolverSettings::QuasiNewton(QuasiNewton { substeps: 1, iterations, tolerance: 0.0, ..method })
+        }
+    }
+}
+
+/// Shared by the rows of a schedule.
 struct Ladder<'a> {
     scene: &'a Scene,
     start: &'a State,
-    /// The start as the oracle sees it: rounded as the stepper's.
+    /// The start state of the oracle, rounded like the stepper's.
     before: OracleState,
     /// The minimum.
     truth: OracleState,
     energy: f64,
-    /// Energy of the inertial predictor above the minimum [J]; none where the predictor is as good as the minimum.
+    /// Energy of the inertial predictor above the minimum (J); none if the predictor is as good.
     predictor_excess: Option<f64>,
-    /// RMS displacement from rest at the minimum [m].
+    /// RMS displacement from rest at the minimum (m).
     displacement: f64,
     tools: Vec<ToolMotion>,
-    /// Whether each node of each body is held.
+    /// Held nodes: body and node.
     held: Vec<(usize, usize)>,
     h: f64,
 }
@@ -152,7 +169,7 @@ impl<'a> Ladder<'a> {
         let predictor_excess = total(run, &predictor)? - energy;
         let bodies = scene.model.bodies().iter();
         let mass: f64 = bodies.map(|b| (0..b.len()).map(|i| b.mass(i)).sum::<f64>()).sum();
-        let least = LEAST_EXCESS * 0.5 * mass * (h * scene.model.gravity()).length_squared();
+        let least = MIN_EXCESS * 0.5 * mass * (h * scene.model.gravity()).length_squared();
         let along = tools(scene, time, time + FRAME);
         let share = h / FRAME;
         let displacement = rms(&positions(scene, &truth), &rest_positions(&scene.model));
@@ -184,7 +201,7 @@ impl<'a> Ladder<'a> {
         }
         let mut reached = OracleState::from_state(model, &state);
         let error = rms(&positions(self.scene, &reached), &positions(self.scene, &self.truth));
-        // A held node's rounding is no error of the solver, and the force on it makes much of it.
+        // The rounding of held nodes is no error of the solver, but would dominate the energy.
         for (body, node) in &self.held {
             reached.positions_mut(*body)[*node] = self.truth.positions(*body)[*node];
         }
@@ -193,7 +210,7 @@ impl<'a> Ladder<'a> {
         Ok(StepRow {
             schedule: name.to_owned(),
             iterations,
-            own: iterations == own_iterations(schedule),
+            own: iterations == default_iterations(schedule),
             substep_ms: 1e3 * self.h,
             wall_ms: times.iter().copied().fold(f64::INFINITY, f64::min),
             position_error_um: 1e6 * error,
@@ -212,8 +229,4 @@ fn positions(scene: &Scene, state: &OracleState) -> Vec<DVec3> {
 fn rms(a: &[DVec3], b: &[DVec3]) -> f64 {
     let sum: f64 = a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum();
     (sum / a.len().max(1) as f64).sqrt()
-}
-
-fn stop_if(progress: &dyn Progress) -> Result<()> {
-    if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
