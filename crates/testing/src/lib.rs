@@ -1,12 +1,12 @@
-//! What tests and benchmarks share: damaged files for every reader ([`assault`]), and with the feature `scenes` the scenes
-//! that are stepped and drawn (`scenes`).
+//! Shared parts of tests and benchmarks: damaged files for every reader ([`fuzz_reader`]), and with
+//! the feature `scenes` scenes to step and draw.
 
-mod assault;
 mod damage;
+mod fuzz;
 mod peak;
 #[cfg(feature = "scenes")]
 pub mod scenes;
 
-pub use assault::{Allowance, assault, cases};
 pub use damage::damage;
+pub use fuzz::{Allowance, cases, fuzz_reader};
 pub use peak::{PEAK, Peak};

@@ -6,7 +6,9 @@ use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use trocar_campaign::{Campaign, CampaignResult, Kept, Plan, PolicyRow, PolicySpec, lift_and_rcm, lifts, median};
+use trocar_campaign::{
+    Campaign, CampaignResult, EpisodeRecord, Manifest, PolicyRow, PolicySpec, lift_and_rcm, lifts, median,
+};
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::table::{count, fixed};
@@ -133,11 +135,11 @@ impl Study for RolloutsExperiment {
             retry_failed: false,
             phantoms: self.scene.phantoms.clone(),
         };
-        let (store, plan) = campaign.keep(job.output(), Some(self.rollouts), job.progress)?;
-        let (made, kept) = (store.finish(&plan)?, store.kept(&plan)?);
+        let (store, manifest) = campaign.run_episodes(job.output(), Some(self.rollouts), job.progress)?;
+        let (made, records) = (store.write_results(&manifest)?, store.records(&manifest)?);
         let page = job.output().join(PAGE);
-        let result = RolloutsResult::of(made, &kept, page.display().to_string());
-        let document = document(&plan, &result, &kept)?;
+        let result = RolloutsResult::of(made, &records, page.display().to_string());
+        let document = document(&manifest, &result, &records)?;
         store.write(PAGE, document.page().as_bytes())?;
         let text = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
         store.write("rollouts.json", &text)?;
@@ -146,26 +148,26 @@ impl Study for RolloutsExperiment {
 }
 
 impl RolloutsResult {
-    fn of(made: CampaignResult, kept: &[Kept], report: String) -> Self {
-        let attached: Vec<&Kept> = kept.iter().filter(|k| k.summary.attached).collect();
+    fn of(made: CampaignResult, records: &[EpisodeRecord], report: String) -> Self {
+        let attached: Vec<&EpisodeRecord> = records.iter().filter(|k| k.summary.attached).collect();
         let within = |mm: f64| attached.iter().filter(|k| k.summary.rcm_peak_mm <= mm).count();
         Self {
             scene: made.scene,
-            rollouts: kept.len(),
+            rollouts: records.len(),
             attached: attached.len(),
             held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
-            diverged: kept.iter().filter(|k| k.summary.diverged).count(),
+            diverged: records.iter().filter(|k| k.summary.diverged).count(),
             passed: made.passed,
             lift_median_mm: median(attached.iter().map(|k| k.summary.lift_mm).collect()),
             rcm_peak_median_mm: median(attached.iter().map(|k| k.summary.rcm_peak_mm).collect()),
             rcm_loaded_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
             rcm_within_3_mm: within(THRESHOLD_MM),
             rcm_within_5_mm: within(ABORT_MM),
-            inverted_peak: kept.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+            inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
             suspensions: [
-                kept.iter().map(|k| k.summary.disabled_contacts).sum(),
-                kept.iter().map(|k| k.summary.disabled_blades).sum(),
-                kept.iter().map(|k| k.summary.relaxed).sum(),
+                records.iter().map(|k| k.summary.disabled_contacts).sum(),
+                records.iter().map(|k| k.summary.disabled_blades).sum(),
+                records.iter().map(|k| k.summary.relaxed).sum(),
             ],
             by_policy: made.policies,
             paper: PAPER,
@@ -176,14 +178,14 @@ impl RolloutsResult {
     }
 }
 
-fn document(plan: &Plan, r: &RolloutsResult, kept: &[Kept]) -> Result<Document> {
+fn document(manifest: &Manifest, r: &RolloutsResult, records: &[EpisodeRecord]) -> Result<Document> {
     let lead = format!(
         "{} rollouts of {} by {} controllers, seeds from {}. The paper\u{2019}s 140 are by six other controllers: \
          compare shares of the attached rollouts.",
         r.rollouts,
         page::escape(&r.scene),
-        plan.policies.len(),
-        plan.seed
+        manifest.policies.len(),
+        manifest.seed
     );
     let cards = [
         Card::new("Held to the end", format!("{} of {}", r.held_to_end, r.attached), "of the attached; paper 83 of 84")
@@ -200,7 +202,7 @@ fn document(plan: &Plan, r: &RolloutsResult, kept: &[Kept]) -> Result<Document> 
     ];
     let outcome = Section::new("Outcome", lead).cards(cards).table(beside_paper(r));
     let spread = Section::new("Lift and RCM deviation", "All rollouts that attached the organ.")
-        .figures([lift_and_rcm(plan, kept)?, lifts(plan, kept)?]);
+        .figures([lift_and_rcm(manifest, records)?, lifts(manifest, records)?]);
     let by_controller = Section::new("Controllers", "").table(controllers(&r.by_policy));
     let subtitle = "Lift and RCM deviation of six controllers, beside the paper's Fig. 6(d, e)";
     Ok(Document::new("Rollouts", subtitle).with(outcome).with(spread).with(by_controller))

@@ -1,22 +1,22 @@
-//! What can go wrong with scenes.
+//! Errors of scenes.
 
-/// Result of scenes.
+/// Result of this module.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A scene that cannot be made or stepped.
+/// A scene could not be made or stepped.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// There is no such scene, or its organs do not fit it.
+    /// An unknown scene, or organs that do not fit it.
     #[error("{0}")]
     Mismatch(String),
-    /// A scene blew up.
+    /// A scene diverged.
     #[error("scene '{scene}', frame {frame}: {why}")]
     Diverged {
         /// The scene.
         scene: &'static str,
-        /// Its frame.
+        /// The frame.
         frame: usize,
-        /// What happened.
+        /// The reason.
         why: String,
     },
     /// A mesh is unusable.

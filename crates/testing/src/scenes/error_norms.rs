@@ -1,4 +1,4 @@
-//! How far two sets of positions are apart, over how far the second is from a third.
+//! Errors of positions relative to the displacement.
 
 use glam::DVec3;
 

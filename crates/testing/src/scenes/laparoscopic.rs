@@ -1,19 +1,20 @@
-//! A laparoscopic view of procedural organs, for the renderer's benchmark and picture tests: tubes and a bed, two instruments.
+//! A laparoscopic view of procedural organs, a bed and two instruments, for the renderer's
+//! benchmark and picture tests.
 
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 
-/// What is on the stage, in metres, the camera at [`view`].
+/// The surfaces of the view (m). The camera is at [`view`].
 pub struct LaparoscopicScene {
     /// Organs: coloured surfaces.
     pub organs: Vec<TriMesh>,
-    /// An instrument's surface, shaft along z, its tip at the origin.
+    /// The surface of an instrument, with its shaft along z and its tip at the origin.
     pub instrument: TriMesh,
 }
 
 impl LaparoscopicScene {
-    /// Five loops of bowel over a bed, each of about `organ_triangles`.
+    /// Four loops of bowel over a bed, each of about `organ_triangles`.
     pub fn new(organ_triangles: usize) -> Self {
         let sides = ((organ_triangles as f64 / 8.0).sqrt().round() as usize).max(6);
         let rings = (organ_triangles / (2 * sides)).max(6);
@@ -23,13 +24,13 @@ impl LaparoscopicScene {
         Self { organs, instrument: rod(0.0025, 0.3, 24) }
     }
 
-    /// Vertices of organ `index` while it moves, at time `t` [s].
+    /// Vertices of the moving organ `index` at the time `t` (s).
     pub fn moved(&self, index: usize, t: f64) -> Vec<DVec3> {
         let lift = |p: &DVec3| 0.008 * (std::f64::consts::TAU * t).sin() * (60.0 * p.x).cos();
         self.organs[index].vertices.iter().map(|p| *p + DVec3::new(0.0, 0.0, lift(p))).collect()
     }
 
-    /// Pose of one of the two instruments at time `t` [s].
+    /// Pose of one of the two instruments at the time `t` (s).
     pub fn instrument_pose(&self, right: bool, t: f64) -> Pose {
         let side = if right { 1.0 } else { -1.0 };
         let tip = DVec3::new(side * (0.012 + 0.004 * (2.0 * t).sin()), -0.012, 0.022);
@@ -55,16 +56,16 @@ fn bowel(index: usize, rings: usize, sides: usize) -> TriMesh {
     for i in 0..=rings {
         let s = i as f64 / rings as f64;
         let along = (centre(s + 1e-4) - centre(s - 1e-4)).normalize();
-        // Axes that turn with the tube and never flip.
+        // Axes that turn with the tube without flips.
         let x = along.cross(DVec3::Z).normalize();
         let y = x.cross(along);
-        // Haustra: the tube is gathered every few centimetres.
+        // Haustra: constrictions every few centimetres.
         let gathered = 0.0115 * (1.0 + 0.10 * (110.0 * s + place).sin() + 0.03 * (190.0 * s).sin());
         for j in 0..sides {
             let angle = std::f64::consts::TAU * j as f64 / sides as f64;
             let ripple = 1.0 + 0.03 * (3.0 * angle + 20.0 * s).sin();
             mesh.vertices.push(centre(s) + (x * angle.cos() + y * angle.sin()) * gathered * ripple);
-            // Vessels: a net of thin dark red lines on pink, with veins between.
+            // Vessels: a net of thin dark red lines on pink.
             let warp = angle + 0.8 * (31.0 * s + place).sin() + 0.3 * (83.0 * s).sin();
             let field = (2.0 * warp + 24.0 * s).sin() + 0.8 * (61.0 * s + 2.0 * (2.0 * angle + place).sin()).sin();
             let line = (field.abs() / 0.16).min(1.0);

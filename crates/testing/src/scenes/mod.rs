@@ -1,7 +1,9 @@
-//! The scenes that benchmarks, experiments and tests step: the same ones, built in one place.
+//! Scenes for benchmarks, experiments and tests.
 //!
-//! [`Organs`] are read from a mesh file or made by ourselves. A [`Scene`] is a model of them with patches of nodes that are carried along a path: [`Scene::sag`],
-//! [`Scene::drag`], [`Scene::shake`], [`Scene::moving`], [`Scene::tube`], [`Scene::fall`]. [`Run`] steps it by a schedule, [`OracleRun`] by the oracle.
+//! [`Organs`] are read from a mesh file or procedural. A [`Scene`] is a model of them with patches
+//! of nodes that move along a path: [`Scene::sag`], [`Scene::drag`], [`Scene::shake`],
+//! [`Scene::moving`], [`Scene::tube`], [`Scene::fall`]. [`Run`] steps it by a solver, [`OracleRun`]
+//! by the oracle.
 
 mod error;
 mod error_norms;

@@ -1,4 +1,4 @@
-//! The organs that scenes are made of: out of a mesh file, or our own without one.
+//! Organs of scenes: read from a mesh file, or procedural.
 
 use super::error::{Error, Result};
 use super::shapes::{self, BentTube};
@@ -7,33 +7,33 @@ use std::path::Path;
 use trocar_geometry::io::read_msh_groups;
 use trocar_geometry::{LatticeMesher, TetMesh};
 
-/// The name by which the appendix is known.
+/// Name of the appendix.
 const APPENDIX: &str = "appendix";
 
-/// Organs are smaller than this [m]; a larger one is in another unit.
-const LARGEST: f64 = 3.0;
+/// Maximum size of an organ (m); a larger one is in another unit.
+const MAX_SIZE: f64 = 3.0;
 
 /// One organ.
 #[derive(Clone, Debug)]
 pub struct Organ {
-    /// Its name; a number where the file has none.
+    /// Its name; a number if the file has none.
     pub name: String,
-    /// Its shape at rest [m], z up.
+    /// Its rest shape (m), z up.
     pub mesh: TetMesh,
 }
 
-/// Organs and which of them is the appendix.
+/// Organs, one of which is the appendix.
 #[derive(Clone, Debug)]
 pub struct Organs {
     /// The organs.
     pub organs: Vec<Organ>,
-    /// Index of the appendix: the organ of that name or, failing names, the most slender one.
+    /// Index of the appendix: the organ of that name, or without one the most slender organ.
     pub appendix: usize,
-    /// Where they are from, for people.
+    /// Their source, for people.
     pub source: String,
 }
 
-/// Our own organs: name, share of the elements, half axes of an ellipsoid [m]. Sizes after specimen A.
+/// Procedural organs: name, share of the elements, half axes of an ellipsoid (m), after specimen A.
 const ELLIPSOIDS: [(&str, f64, [f64; 3]); 5] = [
     ("cecum", 0.34, [0.0350, 0.0110, 0.0076]),
     ("bowel 1", 0.18, [0.0290, 0.0065, 0.0056]),
@@ -42,23 +42,25 @@ const ELLIPSOIDS: [(&str, f64, [f64; 3]); 5] = [
     ("stomach", 0.08, [0.0170, 0.0085, 0.0051]),
 ];
 
-/// Our own appendix: share of the elements, length, radius at the base [m], taper, bend [rad].
+/// Procedural appendix: share of the elements, length (m), radius at the base (m), taper, bend
+/// (rad).
 const TUBE: (f64, f64, f64, f64, f64) = (0.185, 0.085, 0.00455, 0.85, 1.8);
 
-/// Elements for each of our own organs below which there are fewer organs.
-const LEAST: usize = 900;
+/// Minimum number of elements per procedural organ; with fewer, there are fewer organs.
+const MIN_TETS: usize = 900;
 
-/// Gap between our own organs [m].
+/// Gap between procedural organs (m).
 const GAP: f64 = 4e-3;
 
-/// Edge of the triangles of our own organs' surfaces [m].
+/// Edge of the triangles of procedural surfaces (m).
 const SPACING: f64 = 1e-3;
 
 impl Organs {
-    /// Reads a Gmsh file in metres: an organ each physical group or, in a file without groups, each connected part.
+    /// Reads a Gmsh file in metres: one organ per physical group, or per connected part in a file
+    /// without groups.
     ///
     /// # Errors
-    /// A file that cannot be read; one that is not in metres.
+    /// A file that cannot be read or is not in metres.
     pub fn read(path: &Path) -> Result<Self> {
         let mut organs = Vec::new();
         for (name, mesh) in read_msh_groups(path)? {
@@ -71,7 +73,7 @@ impl Organs {
         }
         let source = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         if let Some((low, high)) =
-            organs.iter().find_map(|o| o.mesh.bounds().filter(|(a, b)| (b - a).max_element() > LARGEST))
+            organs.iter().find_map(|o| o.mesh.bounds().filter(|(a, b)| (b - a).max_element() > MAX_SIZE))
         {
             let size = high - low;
             return Err(Error::Mismatch(format!(
@@ -85,13 +87,14 @@ impl Organs {
         Self::of(organs, source)
     }
 
-    /// Our own organs, of about `tets` elements together: a bent tube of the appendix's size and five ellipsoids, side by side, meshed by
-    /// the lattice mesher. An organ falls apart with less than some hundred elements: where there are too few, there are fewer ellipsoids.
+    /// Procedural organs of about `tets` elements in total, side by side: a bent tube of the
+    /// appendix's size and up to five ellipsoids, from the lattice mesher. An organ of less than
+    /// some hundred elements falls apart, so there are fewer ellipsoids for a small `tets`.
     ///
     /// # Errors
-    /// So few elements that an organ cannot be meshed.
+    /// Too few elements to mesh an organ.
     pub fn analytic(tets: usize) -> Result<Self> {
-        let count = (tets / LEAST).clamp(1, ELLIPSOIDS.len() + 1);
+        let count = (tets / MIN_TETS).clamp(1, ELLIPSOIDS.len() + 1);
         let ellipsoids = &ELLIPSOIDS[ELLIPSOIDS.len() + 1 - count..];
         let whole = TUBE.0 + ellipsoids.iter().map(|e| e.1).sum::<f64>();
         let share = |share: f64| (share / whole * tets as f64).round() as usize;
@@ -111,25 +114,25 @@ impl Organs {
         Self::of(organs, "our own organs".into())
     }
 
-    /// Our own appendix alone, of about `tets` elements.
+    /// Only the procedural appendix, of about `tets` elements.
     ///
     /// # Errors
-    /// So few elements that it cannot be meshed.
+    /// Too few elements to mesh it.
     pub fn analytic_appendix(tets: usize) -> Result<Self> {
         Self::of(vec![Organ { name: APPENDIX.into(), mesh: analytic_appendix(tets)? }], "our own appendix".into())
     }
 
-    /// The appendix alone.
+    /// Only the appendix.
     pub fn only_appendix(&self) -> Self {
         Self { organs: vec![self.organs[self.appendix].clone()], appendix: 0, source: self.source.clone() }
     }
 
-    /// Nodes of all organs.
+    /// Number of nodes of all organs.
     pub fn nodes(&self) -> usize {
         self.organs.iter().map(|o| o.mesh.vertices.len()).sum()
     }
 
-    /// Elements of all organs.
+    /// Number of elements of all organs.
     pub fn tets(&self) -> usize {
         self.organs.iter().map(|o| o.mesh.tets.len()).sum()
     }
@@ -142,7 +145,7 @@ impl Organs {
         };
         match named.or_else(most_slender) {
             Some(appendix) => Ok(Self { organs, appendix, source }),
-            None => Err(Error::Mismatch(format!("{source}: there is no organ in it"))),
+            None => Err(Error::Mismatch(format!("{source}: the file has no organ; it must have at least one"))),
         }
     }
 }
@@ -156,7 +159,8 @@ fn mesh(surface: &trocar_geometry::TriMesh, tets: usize) -> Result<TetMesh> {
     Ok(LatticeMesher::fit(surface, 0.0, tets)?.1)
 }
 
-/// Area cubed over volume squared: 8 pi times length over radius for a long tube, 36 pi for a ball, whatever the size.
+/// Area cubed over volume squared: 8 pi times length over radius for a long tube, and 36 pi for a
+/// ball of any size.
 fn slenderness(mesh: &TetMesh) -> f64 {
     mesh.boundary().0.area().powi(3) / mesh.volume().powi(2)
 }
@@ -181,7 +185,7 @@ fn parts(mesh: &TetMesh) -> Vec<TetMesh> {
     let mut within = vec![0; mesh.vertices.len()];
     let mut parts: Vec<TetMesh> = Vec::new();
     for (i, position) in mesh.vertices.iter().enumerate() {
-        // The smallest node of a part is its root, and comes first.
+        // The root of a part is its smallest node, so it comes first.
         let r = root(&mut parent, i as u32) as usize;
         if part_of_root[r] == usize::MAX {
             part_of_root[r] = parts.len();

@@ -1,4 +1,4 @@
-//! A scene stepped: by a schedule, and by the oracle.
+//! Runs of a scene by a solver and by the oracle.
 
 use super::error::{Error, Result};
 use super::scene::{FRAME, Patch, Scene};
@@ -6,21 +6,21 @@ use glam::DVec3;
 use trocar_tissue::{Grasp, Model, SolverSettings, State, StepReport, Stepper, ToolMotion};
 use trocar_tissue_reference::{Held, Oracle, OracleState};
 
-/// A scene stepped by a schedule, frame by frame.
+/// A run of a scene by a solver, frame by frame.
 pub struct Run<'a> {
     scene: &'a Scene,
     stepper: Stepper,
-    /// The state now.
+    /// The present state.
     pub state: State,
-    /// Frames so far.
+    /// Number of frames so far.
     frames: usize,
 }
 
 impl<'a> Run<'a> {
-    /// Prepares; at the beginning the organs are at rest in their rest shapes, and the patches are grasped.
+    /// A run that begins with resting organs in their rest shapes and grasped patches.
     ///
     /// # Errors
-    /// A schedule or threads that cannot be had.
+    /// Invalid solver settings, threads that cannot start.
     pub fn new(scene: &'a Scene, schedule: SolverSettings, threads: usize) -> Result<Self> {
         let stepper = Stepper::new(&scene.model, schedule, FRAME, threads)?;
         let mut state = State::new(&scene.model);
@@ -42,14 +42,14 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// World positions of the nodes of all bodies, one body after the other [m].
+    /// World positions of the nodes of all bodies, one body after the other (m).
     pub fn positions(&self) -> Vec<DVec3> {
         let model = &self.scene.model;
         (0..model.bodies().len()).flat_map(|b| self.state.positions(model, b)).collect()
     }
 }
 
-/// Grasps on a scene's patches where they are now, the tools at the beginning of their ways.
+/// Grasps of a scene's patches in `state`, with the tools at the start of their paths.
 pub fn grasps(scene: &Scene, state: &State) -> Vec<Grasp> {
     let grasp = |(tool, patch): (usize, &Patch)| {
         Grasp::capture(&scene.model, state, patch.body, &patch.nodes, tool, &patch.motion.pose(0.0))
@@ -57,57 +57,58 @@ pub fn grasps(scene: &Scene, state: &State) -> Vec<Grasp> {
     scene.patches.iter().enumerate().map(grasp).collect()
 }
 
-/// The tools' motions between two times [s].
+/// Motions of the tools between two times (s).
 pub fn tools(scene: &Scene, from: f64, to: f64) -> Vec<ToolMotion> {
     scene.patches.iter().map(|p| ToolMotion { from: p.motion.pose(from), to: p.motion.pose(to) }).collect()
 }
 
-/// A scene stepped by the oracle, substep by substep.
+/// A run of a scene by the oracle, substep by substep.
 pub struct OracleRun<'a> {
     scene: &'a Scene,
     oracle: Oracle,
     grasps: Vec<Grasp>,
-    /// The state now.
+    /// The present state.
     pub state: OracleState,
 }
 
 impl<'a> OracleRun<'a> {
-    /// Prepares; begins as [`Run`] does.
+    /// A run that begins as [`Run`] does.
     pub fn new(scene: &'a Scene) -> Self {
         let grasps = grasps(scene, &State::new(&scene.model));
         Self { scene, oracle: Oracle::new(&scene.model), grasps, state: OracleState::new(&scene.model) }
     }
 
-    /// Where held nodes are to be when the time is `time` [s].
+    /// Prescribed positions of held nodes at `time` (s).
     pub fn held(&self, time: f64) -> Vec<Held> {
         let of = |grasp: &Grasp| Held::by(grasp, &self.scene.patches[grasp.tool].motion.pose(time));
         self.grasps.iter().flat_map(of).collect()
     }
 
-    /// Advances by a step of `dt` [s] whose end is at `end` [s] on the tools' ways: in straight lines between frames, as a stepper's tools go.
+    /// Advances by a step of `dt` (s) that ends at `end` (s). Tools move in straight lines between
+    /// frames, as those of a stepper.
     ///
     /// # Errors
-    /// A step that the oracle cannot take.
+    /// A step that fails.
     pub fn step(&mut self, dt: f64, end: f64) -> Result<()> {
         let held = self.held_between_frames(end);
         self.oracle.step(&self.scene.model, &mut self.state, dt, &held)?;
         Ok(())
     }
 
-    /// As [`Self::held`], in straight lines between frames.
+    /// As [`Self::held`], but in straight lines between frames.
     pub fn held_between_frames(&self, time: f64) -> Vec<Held> {
         let frames = time / FRAME;
-        // Rounding must not take a frame's end for the next one's beginning.
+        // Rounding must not move the end of a frame into the next one.
         let whole = (frames + 1e-9).floor();
         let motions = tools(self.scene, whole * FRAME, (whole + 1.0) * FRAME);
         let of = |grasp: &Grasp| Held::by(grasp, &motions[grasp.tool].at((frames - whole).max(0.0)));
         self.grasps.iter().flat_map(of).collect()
     }
 
-    /// Goes to the static equilibrium, held nodes at the beginning of their ways.
+    /// Finds the static equilibrium with held nodes at the start of their paths.
     ///
     /// # Errors
-    /// An equilibrium that the oracle cannot find.
+    /// An equilibrium that is not found.
     pub fn settle(&mut self) -> Result<()> {
         let held = self.held(0.0);
         self.oracle.settle(&self.scene.model, &mut self.state, &held)?;
@@ -119,13 +120,13 @@ impl<'a> OracleRun<'a> {
         &mut self.oracle
     }
 
-    /// World positions of the nodes of all bodies, one body after the other [m].
+    /// World positions of the nodes of all bodies, one body after the other (m).
     pub fn positions(&self) -> Vec<DVec3> {
         (0..self.scene.model.bodies().len()).flat_map(|b| self.state.positions(b).iter().copied()).collect()
     }
 }
 
-/// Rest positions of the nodes of all bodies, one body after the other [m].
+/// Rest positions of the nodes of all bodies, one body after the other (m).
 pub fn rest_positions(model: &Model) -> Vec<DVec3> {
     model.bodies().iter().flat_map(|b| b.rest_positions().iter().copied()).collect()
 }

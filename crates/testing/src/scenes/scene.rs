@@ -9,105 +9,107 @@ use trocar_core::Pose;
 use trocar_geometry::OrganAxis;
 use trocar_tissue::{BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, pins};
 
-/// Length of a frame [s].
+/// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 60.0;
 
-/// Standard gravity [m/s2].
+/// Standard gravity (m/s²).
 const GRAVITY: f64 = 9.80665;
 
-/// Share of each organ's nodes, the lowest, that are pinned.
+/// Share of pinned nodes of each organ: the lowest ones.
 const PINNED: f64 = 0.42;
 
-/// Radius of a patch around an organ's highest point [m].
+/// Radius of a patch around an organ's highest point (m).
 const PATCH: f64 = 4e-3;
 
-/// A patch is at the highest point of this share of an organ's nodes, the nearest to its middle.
+/// A patch is at the highest point among this share of an organ's nodes nearest to its middle.
 const MIDDLE: f64 = 0.25;
 
-/// Drag: speed [m/s] and how far before it turns back [m].
+/// Drag: speed (m/s) and distance to the turning point (m).
 const DRAG: (f64, f64) = (10e-3, 10e-3);
 
-/// Shake: amplitude [m] and frequency [Hz].
+/// Shake: amplitude (m) and frequency (Hz).
 const SHAKE: (f64, f64) = (1e-3, 7.3);
 
-/// Tube: length of the pinned end, half length of the lifted part [m], speed [m/s], time [s].
+/// Tube: length of the pinned end (m).
 const TUBE_END: f64 = 10e-3;
+/// Tube: half length of the lifted part (m).
 const TUBE_GRIP: f64 = 5e-3;
+/// Tube: speed (m/s) and duration (s) of the lift.
 const TUBE_LIFT: (f64, f64) = (30e-3, 1.0);
 
-/// The names of the scenes with one moving organ, as experiments go through them.
+/// Names of the scenes with one moving organ, in the order of experiments.
 pub const SCENES: [&str; 5] = ["sag", "drag", "shake", "tube", "fall"];
 
-/// How a patch moves along z.
+/// Motion of a patch along z.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Motion {
-    /// Up, and back down, again and again, at one speed.
+    /// Up and down repeatedly at constant speed.
     Drag {
-        /// Speed [m/s].
+        /// Speed (m/s).
         speed: f64,
-        /// Height at which it turns back [m].
+        /// Height of the turning point (m).
         reach: f64,
     },
     /// Up and down as a sine.
     Shake {
-        /// Amplitude [m].
+        /// Amplitude (m).
         amplitude: f64,
-        /// Frequency [Hz].
+        /// Frequency (Hz).
         frequency: f64,
     },
-    /// Up, and then held.
+    /// Up, and then still.
     Lift {
-        /// Speed [m/s].
+        /// Speed (m/s).
         speed: f64,
-        /// How long [s].
+        /// Duration (s).
         seconds: f64,
     },
 }
 
 impl Motion {
-    /// Height over the beginning after `time` [s].
+    /// Height above the start after `time` (s).
     pub fn height(&self, time: f64) -> f64 {
         match *self {
             Self::Drag { speed, reach } => {
-                let way = (speed * time).rem_euclid(2.0 * reach);
-                way.min(2.0 * reach - way)
+                let distance = (speed * time).rem_euclid(2.0 * reach);
+                distance.min(2.0 * reach - distance)
             }
             Self::Shake { amplitude, frequency } => amplitude * (TAU * frequency * time).sin(),
             Self::Lift { speed, seconds } => speed * time.min(seconds),
         }
     }
 
-    /// Pose of the tool after `time` [s].
+    /// Pose of the tool after `time` (s).
     pub fn pose(&self, time: f64) -> Pose {
         Pose { translation: DVec3::Z * self.height(time), ..Pose::IDENTITY }
     }
 }
 
-/// Nodes of a body that a tool carries.
+/// Nodes of a body that move with a tool.
 #[derive(Clone, Debug)]
 pub struct Patch {
     /// The body.
     pub body: usize,
     /// Its nodes.
     pub nodes: Vec<u32>,
-    /// The way.
+    /// The motion.
     pub motion: Motion,
 }
 
-/// A model and what is done to it.
+/// A model with moving patches.
 #[derive(Clone, Debug)]
 pub struct Scene {
     /// Its name.
     pub name: &'static str,
     /// The model.
     pub model: Model,
-    /// What is carried; the tool's number is the place in this list.
+    /// The moving patches; the index is that of the tool.
     pub patches: Vec<Patch>,
-    /// The body that is looked at: the appendix.
+    /// Index of the appendix, which is measured.
     pub appendix: usize,
 }
 
-/// Stable neo-Hookean tissue of 1200 kg/m3, damped as in the cell.
+/// Stable neo-Hookean tissue of 1200 kg/m³ with the viscosity of the cell.
 pub fn material(young_modulus: f64, poisson_ratio: f64) -> Material {
     Material {
         model: ConstitutiveModel::StableNeoHookean,
@@ -119,10 +121,10 @@ pub fn material(young_modulus: f64, poisson_ratio: f64) -> Material {
 }
 
 impl Scene {
-    /// The scene of this name, out of [`SCENES`].
+    /// The scene of this name, one of [`SCENES`].
     ///
     /// # Errors
-    /// Another name; as the scenes.
+    /// An unknown name; the errors of the scenes.
     pub fn named(name: &str, organs: &Organs, material: Material) -> Result<Self> {
         match name {
             "sag" => Self::sag(organs, material),
@@ -130,7 +132,7 @@ impl Scene {
             "shake" => Self::shake(organs, material),
             "tube" => Self::tube(organs, material),
             "fall" => Self::fall(organs, material),
-            _ => Err(Error::Mismatch(format!("there is no scene '{name}'; there are {}", SCENES.join(", ")))),
+            _ => Err(Error::Mismatch(format!("there is no scene '{name}'; it must be one of {}", SCENES.join(", ")))),
         }
     }
 
@@ -143,7 +145,7 @@ impl Scene {
         Self::of("sag", &organs.organs, organs.appendix, material, banded)
     }
 
-    /// As [`Self::sag`], with a patch of the appendix pulled up at 10 mm/s by 10 mm, back down, and again.
+    /// As [`Self::sag`], with a patch of the appendix that moves up and down by 10 mm at 10 mm/s.
     ///
     /// # Errors
     /// As [`Self::sag`].
@@ -154,7 +156,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// As [`Self::sag`], with a patch of the appendix shaken up and down by 1 mm at 7.3 Hz.
+    /// As [`Self::sag`], with a patch of the appendix that oscillates by 1 mm at 7.3 Hz.
     ///
     /// # Errors
     /// As [`Self::sag`].
@@ -164,7 +166,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// As [`Self::shake`], but a patch of every organ is shaken, so that none is ever at rest.
+    /// As [`Self::shake`], with an oscillating patch on every organ, so that none is at rest.
     ///
     /// # Errors
     /// As [`Self::sag`].
@@ -174,8 +176,8 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The appendix alone, pinned within 10 mm of one end only, its nodes within 5 mm of mid-length lifted at 30 mm/s for a second: the large,
-    /// slow, global motion of a grasped appendix.
+    /// Only the appendix, pinned within 10 mm of one end. Its nodes within 5 mm of mid-length are
+    /// lifted at 30 mm/s for a second, which is the large and slow motion of a grasped appendix.
     ///
     /// # Errors
     /// As [`Self::sag`]; an appendix whose axis cannot be found or that is too short.
@@ -203,7 +205,7 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The appendix alone, free.
+    /// Only the appendix, without pins.
     ///
     /// # Errors
     /// As [`Self::sag`].
@@ -211,7 +213,8 @@ impl Scene {
         Self::of("fall", std::slice::from_ref(&organs.organs[organs.appendix]), 0, material, |_| Vec::new())
     }
 
-    /// The appendix `count` times in one model, the lowest 42% of each one's nodes pinned, each one shaken.
+    /// The appendix `count` times in one model. Each has its lowest 42% of nodes pinned and
+    /// oscillates.
     ///
     /// # Errors
     /// As [`Self::sag`].
@@ -237,7 +240,8 @@ impl Scene {
         Ok(Self { name, model: builder.build()?, patches: Vec::new(), appendix })
     }
 
-    /// Free nodes around the highest point near the middle of a body, none of them in an element with a pinned one; the highest free node where there are no such.
+    /// Free nodes around the highest point near the middle of a body, without nodes of elements
+    /// that have pinned nodes. If there are none, the highest free node.
     fn patch(&self, body: usize, motion: Motion) -> Patch {
         let b = &self.model.bodies()[body];
         let (nodes, pinned) = (b.rest_positions(), b.pinned());

@@ -1,9 +1,10 @@
-//! Shapes of organs by their signed distance, for scenes and benchmarks that need no file.
+//! Shapes of procedural organs by signed distance.
 
 use glam::DVec3;
 use trocar_geometry::{SignedDistance, TriMesh, isosurface, sample_everywhere};
 
-/// An ellipsoid around the origin by its half axes [m]; the value is a distance near its surface.
+/// An ellipsoid around the origin by its half axes (m). Its value is a distance only near the
+/// surface.
 pub struct Ellipsoid(pub DVec3);
 
 impl SignedDistance for Ellipsoid {
@@ -13,18 +14,20 @@ impl SignedDistance for Ellipsoid {
     }
 }
 
-/// Points along a tube's centreline.
+/// Number of points along a tube's centreline.
 const POINTS: usize = 49;
 
-/// A round tube along a curve in the plane z = 0, S-shaped as an appendix lies, with hemispheres at its ends.
+/// A round tube along an S-shaped curve in the plane z = 0, with hemispheres at its ends, like an
+/// appendix.
 pub struct BentTube {
-    /// Points of the centreline and the radius there [m].
+    /// Points of the centreline with the radius there (m).
     points: Vec<(DVec3, f64)>,
 }
 
 impl BentTube {
-    /// A tube of this length and radius at its base [m], thinner towards its tip by the factor `taper`; its heading turns by `bend` [rad] per
-    /// length over its first two thirds and back at 0.6 of that over the last.
+    /// A tube of this length (m) and radius at its base (m). The radius at the tip is smaller by
+    /// the factor `taper`. The heading turns by `bend` (rad) per length over the first two thirds,
+    /// and back at 0.6 of that rate over the last.
     pub fn new(length: f64, radius: f64, taper: f64, bend: f64) -> Self {
         let ds = 1.0 / (POINTS - 1) as f64;
         let (mut at, mut heading) = (DVec3::ZERO, 0.0_f64);
@@ -55,12 +58,12 @@ impl SignedDistance for BentTube {
     }
 }
 
-/// The ellipsoid's surface, by triangles of about `spacing` [m].
+/// The ellipsoid's surface, with triangles of about `spacing` (m).
 pub fn ellipsoid(half: DVec3, spacing: f64) -> TriMesh {
     isosurface(&sample_everywhere(&Ellipsoid(half), (-half, half), spacing), 0.0)
 }
 
-/// The tube's surface, by triangles of about `spacing` [m].
+/// The tube's surface, with triangles of about `spacing` (m).
 pub fn tube(tube: &BentTube, spacing: f64) -> TriMesh {
     isosurface(&sample_everywhere(tube, tube.bounds(), spacing), 0.0)
 }

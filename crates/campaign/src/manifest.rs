@@ -1,53 +1,54 @@
-//! What a campaign consists of: policies, seeds, and one job for each pair.
+//! The manifest of a campaign: scene, policies and seeds, and one job for each policy and seed.
 
+use crate::policy_spec::PolicySpec;
 use crate::remote;
-use crate::source::PolicySpec;
 use serde::{Deserialize, Serialize};
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_task::{scene_hash, specimen_hash};
 use trocar_workflow::{Error, Result};
 
-/// Most episodes of a policy.
-const MOST_EPISODES: usize = 100_000;
+/// Maximum number of episodes per policy.
+const MAX_EPISODES: usize = 100_000;
 
 /// One episode of a campaign.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Job {
     /// The policy.
     pub policy: PolicySpec,
-    /// Its place among the policy's episodes.
+    /// Index among the policy's episodes.
     pub index: usize,
     /// The seed.
     pub seed: u64,
 }
 
-/// Version of this program, and hash of the sources that decide what an episode is.
+/// Version of this program and hash of the sources that an episode depends on.
 pub(super) fn program() -> String {
-    format!("{} {}", env!("CARGO_PKG_VERSION"), trocar_workflow::EPISODE_MAKERS)
+    format!("{} {}", env!("CARGO_PKG_VERSION"), trocar_workflow::EPISODE_SOURCE_HASH)
 }
 
-/// Whether there can be such a campaign, as far as that can be said without its specimen. `most` is how many `experiment rollouts` was asked for.
+/// Checks the options of a campaign, without its specimen. `max_episodes` is the value of
+/// `--rollouts`, from which `experiment rollouts` computes `episodes`.
 ///
 /// # Errors
-/// Names the option and says what can be.
-pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, most: Option<usize>) -> Result<()> {
+/// Names the option and its allowed values.
+pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, max_episodes: Option<usize>) -> Result<()> {
     let wrong = |why: String| Err(Error::Mismatch(why));
     if policies.is_empty() {
         return wrong("a campaign needs a --policy".to_owned());
     }
-    if !(1..=MOST_EPISODES).contains(&episodes) {
-        return wrong(match most {
-            Some(most) => {
-                format!("--rollouts {most}: it must be in [1, {}]", MOST_EPISODES.saturating_mul(policies.len()))
+    if !(1..=MAX_EPISODES).contains(&episodes) {
+        return wrong(match max_episodes {
+            Some(count) => {
+                format!("--rollouts {count}: it must be in [1, {}]", MAX_EPISODES.saturating_mul(policies.len()))
             }
-            None => format!("--episodes {episodes}: it must be in [1, {MOST_EPISODES}]"),
+            None => format!("--episodes {episodes}: it must be in [1, {MAX_EPISODES}]"),
         });
     }
     for (k, policy) in policies.iter().enumerate() {
         let name = &policy.name;
         if policies[..k].iter().any(|p| p.name == *name) {
-            let source = policy.shown();
+            let source = policy.display_source();
             return wrong(format!("two policies are named '{name}'; name one, as in --policy b={source}"));
         }
         if policy.is_remote() {
@@ -59,41 +60,46 @@ pub(super) fn check(policies: &[PolicySpec], episodes: usize, seed: u64, most: O
         return wrong(format!("--seed {seed}: the last of {episodes} seeds would be greater than {}", u64::MAX));
     }
     if last.is_some_and(|s| i64::try_from(s).is_err()) && policies.iter().any(PolicySpec::is_remote) {
-        let most = i64::MAX;
-        return wrong(format!("--seed {seed}: seeds for servers and Python policies must be at most {most}"));
+        let max = i64::MAX;
+        return wrong(format!("--seed {seed}: seeds for servers and Python policies must be at most {max}"));
     }
     Ok(())
 }
 
-/// What a campaign is: its folder's `campaign.json`.
+/// The contents of `campaign.json`, which identifies a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Plan {
-    /// Version of the program, and hash of the sources that decide what an episode is: one table is not made by two programs.
+pub struct Manifest {
+    /// Version of the program and hash of the sources that an episode depends on. Different
+    /// programs cannot write one table.
     pub program: String,
     /// Name of the scene.
     pub scene: String,
     /// Its task.
     pub task: String,
-    /// Hash of scene and arms' models, hexadecimal.
+    /// Hash of the scene and the models of its arms, hexadecimal.
     pub scene_hash: String,
-    /// Hash of what is simulated of the specimen.
+    /// Hash of the simulated parts of the specimen, hexadecimal.
     pub specimen_hash: String,
-    /// RCM threshold of the scene [mm].
+    /// RCM threshold of the scene (mm).
     pub rcm_threshold_mm: f64,
     /// The policies.
     pub policies: Vec<PolicySpec>,
-    /// Episodes of each.
+    /// Number of episodes per policy.
     pub episodes: usize,
-    /// Seed of the first.
+    /// Seed of the first episode.
     pub seed: u64,
-    /// Most episodes of all policies together; None for all. Policies take turns, so that the first have one more than the last.
-    #[serde(default)]
-    pub most: Option<usize>,
+    /// Maximum number of episodes of all policies together; `None` for all. Policies take turns, so
+    /// the first may have one episode more than the last.
+    #[serde(default, rename = "most")]
+    pub max_episodes: Option<usize>,
 }
 
-impl Plan {
+impl Manifest {
+    /// The manifest of `episodes` episodes per policy, whose seeds begin at `seed`.
+    ///
     /// # Errors
-    /// No policy, two of one name, a server that cannot be connected to as it is written, too many episodes, seeds that are none, an arm's model that cannot be read.
+    /// No policy, two of one name, an address that is invalid, too many episodes, seeds out of
+    /// range, an arm model that cannot be read.
     pub fn new(
         scene: &Scene,
         specimen: &Specimen,
@@ -113,26 +119,20 @@ impl Plan {
             policies: policies.to_vec(),
             episodes,
             seed,
-            most: None,
+            max_episodes: None,
         })
     }
 
-    /// The same with no more than `most` episodes of all policies together.
-    #[must_use]
-    pub fn at_most(self, most: usize) -> Self {
-        Self { most: Some(most), ..self }
-    }
-
-    /// How many episodes there are in all.
+    /// Total number of episodes.
     pub fn count(&self) -> usize {
         let all = self.episodes.saturating_mul(self.policies.len());
-        self.most.map_or(all, |most| most.min(all))
+        self.max_episodes.map_or(all, |max| max.min(all))
     }
 
-    /// All jobs; the policies take turns, so that a campaign that was stopped compares what it has.
+    /// All jobs. Policies take turns, so that an interrupted campaign can still compare them.
     pub fn jobs(&self) -> impl Iterator<Item = Job> + '_ {
         let all = (0..self.episodes).flat_map(move |index| {
-            // Plans are checked: no seed is beyond the last.
+            // `check` excludes an overflow.
             let seed = self.seed.saturating_add(index as u64);
             self.policies.iter().map(move |policy| Job { policy: policy.clone(), index, seed })
         });
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn the_first_policies_have_one_episode_more() {
         let policies = POLICIES.map(|p| PolicySpec::parse(p).unwrap()).to_vec();
-        let plan = Plan {
+        let manifest = Manifest {
             program: String::new(),
             scene: String::new(),
             task: String::new(),
@@ -158,18 +158,18 @@ mod tests {
             policies,
             episodes: 24,
             seed: 7,
-            most: None,
+            max_episodes: None,
         };
-        assert_eq!((plan.count(), plan.jobs().count()), (144, 144));
-        let plan = plan.at_most(140);
-        let jobs: Vec<Job> = plan.jobs().collect();
+        assert_eq!((manifest.count(), manifest.jobs().count()), (144, 144));
+        let manifest = Manifest { max_episodes: Some(140), ..manifest };
+        let jobs: Vec<Job> = manifest.jobs().collect();
         let of = |name: &str| jobs.iter().filter(|j| j.policy.name == name).count();
         assert_eq!(POLICIES.map(of), [24, 24, 23, 23, 23, 23]);
         assert!(jobs.iter().all(|j| j.seed == 7 + j.index as u64));
     }
 
     #[test]
-    fn what_cannot_be_run_is_refused_by_its_option() {
+    fn wrong_options_are_refused_by_name() {
         let spec = |text: &str| PolicySpec::parse(text).unwrap();
         let (scripted, server) = (vec![spec("scripted")], vec![spec("a=ws://127.0.0.1:1")]);
         let said = |policies: &[PolicySpec], episodes, seed, most| {
@@ -178,7 +178,7 @@ mod tests {
         assert_eq!(said(&scripted, 2, u64::MAX - 1, None), "");
         assert_eq!(said(&server, 2, i64::MAX as u64 - 1, None), "");
         assert!(said(&scripted, 0, 0, None).starts_with("--episodes 0"));
-        // What the user wrote is named, not what was made of it.
+        // The option that the user wrote is named.
         assert!(said(&scripted, 900_000, 0, Some(900_000)).starts_with("--rollouts 900000: "));
         assert!(said(&scripted, 2, u64::MAX, None).starts_with("--seed 18446744073709551615: "));
         assert!(said(&server, 2, i64::MAX as u64, None).starts_with("--seed 9223372036854775807: "));
@@ -189,12 +189,12 @@ mod tests {
     }
 
     #[test]
-    fn the_program_is_all_that_decides_what_an_episode_is() {
+    fn the_hash_covers_every_crate_that_an_episode_depends_on() {
         let hashed: Vec<&str> = trocar_workflow::EPISODE_SOURCES.split(' ').collect();
         for file in ["remote/src", "campaign/src/remote.rs", "../Cargo.lock"] {
             assert!(hashed.contains(&file), "{file} is not among {hashed:?}");
         }
-        // Whatever an episode, its policies or what they see is made of.
+        // All crates that episodes, remote policies and camera pictures depend on.
         let crates = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
         let mut open = vec!["task".to_owned(), "sensors".to_owned(), "remote".to_owned()];
         let mut seen = Vec::new();

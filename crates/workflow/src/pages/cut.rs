@@ -1,4 +1,4 @@
-//! The section on a cut: what it parted, and what became of the pieces.
+//! The section on a cut and its pieces.
 
 use trocar_cell::SeveredPiece;
 use trocar_report::page::{self, Card};
@@ -17,7 +17,7 @@ pub(super) fn section(s: &Severed) -> String {
             c.pieces.iter().map(|p| p.name.clone()).collect::<Vec<_>>().join(", "),
         ),
         Card::new(
-            "Held on",
+            "Held after the cut",
             if s.held { "yes" } else { "no" },
             format!("jaws rose {} mm, tissue in them {} mm", fixed(s.jaw_rise_mm, 1), fixed(s.held_rise_mm, 1)),
         )
@@ -25,15 +25,15 @@ pub(super) fn section(s: &Severed) -> String {
         Card::new(
             "Cut face",
             format!("{} mm\u{b2}", fixed(c.area_mm2, 0)),
-            format!("{} faces, one side", count(c.faces)),
+            format!("{} faces on one side", count(c.faces)),
         ),
         Card::new(
-            "Volume kept",
-            if c.volume_error > 0.0 { format!("to {:.0e}", c.volume_error) } else { "to the bit".to_owned() },
+            "Volume error",
+            if c.volume_error > 0.0 { format!("{:.0e}", c.volume_error) } else { "none".to_owned() },
             format!("{} mm\u{b3} before and after", fixed(c.volume_before_mm3, 0)),
         )
         .met(c.volume_error < 1e-6),
-        Card::new("Inverted since", count(inverted), "elements in any frame").met(inverted == 0),
+        Card::new("Inverted since the cut", count(inverted), "elements, maximum of any frame").met(inverted == 0),
         Card::new(
             "Blades",
             format!("{} to {} rad", fixed(c.opened_rad, 2), fixed(c.closed_rad, 2)),
@@ -59,9 +59,9 @@ fn pieces(pieces: &[SeveredPiece]) -> String {
         "Pinned",
         "In the jaws",
         "Elements",
-        "Volume before [mm\u{b3}]",
-        "after [mm\u{b3}]",
-        "Rose since [mm]",
+        "Volume before (mm\u{b3})",
+        "after (mm\u{b3})",
+        "Rise since the cut (mm)",
     ];
     let row = |p: &SeveredPiece| {
         vec![

@@ -1,4 +1,4 @@
-//! What a user writes after `--policy`: a name and where the policy comes from, without secrets in either.
+//! The value of `--policy`: a name and the source of the policy. Neither shows secrets.
 
 use serde::{Deserialize, Serialize};
 use trocar_remote::Endpoint;
@@ -6,18 +6,23 @@ use trocar_task::policy::POLICIES;
 use trocar_workflow::{Error, Result};
 use xxhash_rust::xxh3::xxh3_64;
 
-/// A policy of a campaign, by what the user wrote: `scripted`, `ws://HOST:PORT`, `python:MODULE:NAME` or `python:FILE.py:NAME`, or `NAME=` and one of those.
+/// A policy as the user names it: `scripted`, `ws://HOST:PORT`, `python:MODULE:NAME` or
+/// `python:FILE.py:NAME`, or `NAME=` and one of those.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PolicySpec {
-    /// Its name in tables and folders. A server's that was given none is its scheme, host and port.
+    /// Its name in tables and folders. A server without a given name has its scheme, host and port.
     pub name: String,
-    /// What it is. A server's address is whole: what stands after its `?` or `#` may be a secret, and is in no file of the campaign.
+    /// Its source. The address of a server may have a secret after its `?` or `#`, which no file of
+    /// the campaign shows.
     pub source: String,
 }
 
 impl PolicySpec {
+    /// Parses the value of `--policy`.
+    ///
     /// # Errors
-    /// Says what can be written: a text that is no policy, an address that cannot be connected to by this build or has a password in it.
+    /// A text that is no policy, an address that is invalid, needs another build, or has a
+    /// password.
     pub fn parse(text: &str) -> Result<Self> {
         let (name, source) = match text.split_once('=') {
             Some((name, source)) if !name.contains([':', '/']) => (Some(name), source),
@@ -27,7 +32,7 @@ impl PolicySpec {
         let (shown, unnamed) = if is_address(source) {
             let (address, place) = (without_query(source), place(source));
             if place.contains('@') {
-                // Neither is shown: which part is the secret is the user's to know.
+                // Neither is shown, because either may be the secret.
                 let scheme = scheme(source);
                 return wrong(
                     scheme,
@@ -61,18 +66,19 @@ impl PolicySpec {
         Ok(Self { name, source: source.to_owned() })
     }
 
-    /// Whether another process is the policy: a server or a Python callable.
+    /// Whether the policy runs in another process: a server or a Python callable.
     pub(super) fn is_remote(&self) -> bool {
         self.source.contains(':')
     }
 
-    /// Its source for messages.
-    pub(super) fn shown(&self) -> &str {
+    /// Its source without secrets, for messages.
+    pub(super) fn display_source(&self) -> &str {
         if is_address(&self.source) { without_query(&self.source) } else { &self.source }
     }
 
-    /// This as it stands in files. What an address has after its `?` or `#` may be a token: a hash of it is kept, which tells another policy from this one.
-    pub(super) fn stored(&self) -> Self {
+    /// The form for files. The part of an address after its `?` or `#` may be a token, so it is
+    /// replaced by its hash, which still distinguishes policies.
+    pub(super) fn redacted(&self) -> Self {
         let address = without_query(&self.source);
         let source = if is_address(&self.source) && address.len() < self.source.len() {
             format!("{address}?hidden-{:016x}", xxh3_64(&self.source.as_bytes()[address.len() + 1..]))
@@ -82,10 +88,10 @@ impl PolicySpec {
         Self { name: self.name.clone(), source }
     }
 
-    /// Whether this is the policy that a file calls `stored`.
-    pub(super) fn is(&self, stored: &Self) -> bool {
-        // The whole address is what older files have.
-        self.source == stored.source || self.stored().source == stored.source
+    /// Whether this is the policy `stored` of a file.
+    pub(super) fn matches(&self, stored: &Self) -> bool {
+        // Older files have the whole address.
+        self.source == stored.source || self.redacted().source == stored.source
     }
 }
 
@@ -102,7 +108,7 @@ fn without_query(address: &str) -> &str {
     address.split(['?', '#']).next().unwrap_or("")
 }
 
-/// Host and port of an address, with what stands before them.
+/// The part of an address between its scheme and its path: host and port, and any user name.
 fn place(address: &str) -> &str {
     let rest = without_query(address).split_once("://").map_or("", |(_, rest)| rest);
     rest.split('/').next().unwrap_or("")
@@ -113,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn policies_are_named_for_folders() {
+    fn names_are_fit_for_folders() {
         let name = |text| PolicySpec::parse(text).map(|p| (p.name, p.source));
         let pair = |a: &str, b: &str| (a.to_owned(), b.to_owned());
         assert_eq!(name("scripted").unwrap(), pair("scripted", "scripted"));
@@ -154,12 +160,12 @@ mod tests {
         let said = PolicySpec::parse("ws://h:0/?secret").unwrap_err().to_string();
         assert!(!said.contains("secret"), "{said}");
         let spec = PolicySpec::parse("ws://h:1/a?token=secret").unwrap();
-        let stored = spec.stored();
+        let stored = spec.redacted();
         assert!(secret.iter().all(|s| !format!("{stored:?}").contains(s)), "{stored:?}");
-        assert!(spec.is(&stored) && spec.is(&spec));
-        let fragment = PolicySpec::parse("ws://h:1/a#secret").map(|spec| format!("{:?}", spec.stored()));
+        assert!(spec.matches(&stored) && spec.matches(&spec));
+        let fragment = PolicySpec::parse("ws://h:1/a#secret").map(|spec| format!("{:?}", spec.redacted()));
         assert!(fragment.is_ok_and(|stored| !stored.contains("secret")));
         let other = PolicySpec::parse("ws://h:1/a?token=other").unwrap();
-        assert!(!other.is(&stored), "another query is another policy");
+        assert!(!other.matches(&stored), "another query is another policy");
     }
 }

@@ -1,4 +1,4 @@
-//! Moving pictures as files: animated WebP, and MP4 through the program ffmpeg.
+//! Video files: animated WebP, and MP4 by the program ffmpeg.
 
 use crate::{Error, Result};
 use std::io::Write;
@@ -10,22 +10,22 @@ use webp::{AnimEncoder, AnimFrame, WebPConfig};
 /// Quality of WebP, 0 to 100.
 const QUALITY: f32 = 72.0;
 
-/// Most bytes of frames that are kept for WebP.
-const MOST_BYTES: usize = 2 << 30;
+/// Maximum memory of the frames of a WebP (bytes).
+const MAX_BYTES: usize = 2 << 30;
 
-/// A moving picture that is being made. Nothing is at its place before it is finished.
-pub(crate) enum Moving {
-    /// Frames with their times [ms].
+/// Writes a video. Its file appears when it is finished.
+pub(crate) enum VideoWriter {
+    /// Frames with their times (ms).
     Webp(Vec<(ColorImage, i32)>),
-    /// The encoder, once the first frame says its size, and the file that it writes.
+    /// The partial file and the encoder, which starts with the first frame, whose size it needs.
     Mp4 { part: PathBuf, encoder: Option<Child> },
 }
 
-impl Moving {
-    /// Begins one that will be at `output`; `extension` says which.
+impl VideoWriter {
+    /// Begins the video `output` in the format `extension`.
     ///
     /// # Errors
-    /// An MP4 without ffmpeg, a folder that is not there.
+    /// An MP4 without ffmpeg, a folder that does not exist.
     pub fn begin(output: &Path, extension: &str) -> Result<Self> {
         let folder = output.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !folder.is_dir() {
@@ -43,17 +43,17 @@ impl Moving {
             let reason = ".mp4 needs the program ffmpeg, which is not installed; install it, or write a .webp";
             return Err(Error::Mismatch(format!("{}: {reason}", output.display())));
         }
-        Ok(Self::Mp4 { part: beside(output), encoder: None })
+        Ok(Self::Mp4 { part: partial_path(output), encoder: None })
     }
 
-    /// Adds a frame that is shown from `time_ms` on; `hz` frames are shown a second.
+    /// Adds a frame that begins at `time_ms` in a video of `hz` frames per second.
     ///
     /// # Errors
-    /// Frames that do not fit into memory, an encoder that stopped.
+    /// Too many frames for memory, an encoder that stopped.
     pub fn add(&mut self, frame: ColorImage, time_ms: f64, hz: u32) -> Result<()> {
         match self {
             Self::Webp(frames) => {
-                if (frames.len() + 1) * frame.pixels.len() * 3 > MOST_BYTES {
+                if (frames.len() + 1) * frame.pixels.len() * 3 > MAX_BYTES {
                     let reason = "the frames of a .webp are more than 2 GiB; choose a smaller --size, or .mp4";
                     return Err(Error::Mismatch(reason.to_owned()));
                 }
@@ -76,17 +76,17 @@ impl Moving {
         }
     }
 
-    /// Puts it in its place.
+    /// Writes the file `output`.
     ///
     /// # Errors
-    /// A picture that cannot be encoded or written.
+    /// A video that cannot be encoded or written.
     pub fn finish(mut self, output: &Path) -> Result<()> {
         match &mut self {
             Self::Webp(frames) => {
-                let part = beside(output);
+                let part = partial_path(output);
                 let written = std::fs::write(&part, webp(frames)?).and_then(|()| std::fs::rename(&part, output));
                 written.map_err(|source| {
-                    // What could not be written whole is not left behind.
+                    // A partial file must not stay.
                     let _ = std::fs::remove_file(&part);
                     Error::Io { path: output.to_owned(), source }
                 })
@@ -105,18 +105,18 @@ impl Moving {
     }
 }
 
-/// Where a picture is while it is not whole.
-fn beside(output: &Path) -> PathBuf {
+/// Path of the partial file.
+fn partial_path(output: &Path) -> PathBuf {
     let name = output.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     output.with_file_name(format!(".{}-{name}", std::process::id()))
 }
 
-impl Drop for Moving {
-    /// One that was not finished leaves nothing behind.
+impl Drop for VideoWriter {
+    /// Removes the partial file of an unfinished video.
     fn drop(&mut self) {
         if let Self::Mp4 { part, encoder } = self {
             if let Some(mut child) = encoder.take() {
-                // An encoder that is gone already needs no end.
+                // The encoder may have ended already.
                 let _ = child.kill();
                 let _ = child.wait();
             }
@@ -125,13 +125,13 @@ impl Drop for Moving {
     }
 }
 
-/// Frames with their times [ms] as an animated WebP that goes on for ever.
+/// Encodes frames with their times (ms) as an animated WebP that repeats for ever.
 ///
 /// # Errors
 /// Frames that cannot be encoded.
 pub fn webp(frames: &[(ColorImage, i32)]) -> Result<Vec<u8>> {
     let Some((first, _)) = frames.first() else { return Err(Error::NoFrames) };
-    let failed = |why: &str| Error::Format(format!("the moving picture cannot be encoded: {why}"));
+    let failed = |why: &str| Error::Format(format!("the video cannot be encoded: {why}"));
     let mut config = WebPConfig::new().map_err(|()| failed("libwebp has another version"))?;
     config.quality = QUALITY;
     config.method = 4;

@@ -1,8 +1,8 @@
-//! Pictures out of pictures: smaller ones, labels and depth in colours.
+//! Conversions of pictures: averages, and colours of labels and depth.
 
 use trocar_camera::ColorImage;
 
-/// A picture of `finer` times the size, averaged.
+/// The picture reduced by the factor `finer`, by averaging.
 pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
     if finer <= 1 {
         return image.clone();
@@ -18,7 +18,7 @@ pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
     ColorImage { width, height, pixels: (0..width * height).map(pixel).collect() }
 }
 
-/// Colours far from each other: steps of the golden angle round the circle of hues.
+/// A colour per label. Hues are steps of the golden angle, so that neighbours differ most.
 pub(crate) fn label_color(label: u16) -> [u8; 3] {
     if label == 0 {
         return [0; 3];
@@ -37,15 +37,15 @@ pub(crate) fn label_color(label: u16) -> [u8; 3] {
     rgb.map(|c| (255.0 * light * (0.18 + 0.82 * c)) as u8)
 }
 
-/// Depth in colours from near (bright) to far; black where there is none.
+/// Depth in colours from near (bright) to far; black without depth.
 pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
-    // Whole millimetres: what is flat has one rank, not that of its rounding.
+    // Depth is rounded to millimetres, so that a flat area has one rank.
     let whole = |d: f32| (d * 1e3).round() * 1e-3;
     let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).map(whole).collect();
     valid.sort_by(f32::total_cmp);
     let at = |share: f64| valid.get((share * valid.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(1.0);
     let (near, far) = (at(0.01), at(0.97));
-    // Viridis by its corners.
+    // Samples of the colour map Viridis.
     let stops: [[f64; 3]; 6] = [
         [253.0, 231.0, 37.0],
         [122.0, 209.0, 81.0],
@@ -58,7 +58,7 @@ pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
         if *d <= 0.0 {
             return [0; 3];
         }
-        // Half by depth and half by how many pixels are nearer, so that what lies flat on a table is not all one colour.
+        // Half by depth and half by rank, so that a flat object on a table is not all one colour.
         let rank = valid.partition_point(|v| *v < whole(*d)) as f64 / valid.len().max(1) as f64;
         let share = f64::from((d - near) / (far - near).max(1e-6));
         let x = 5.0 * (0.5 * share.clamp(0.0, 1.0) + 0.5 * rank).min(0.9999);

@@ -1,4 +1,4 @@
-//! Sections on the camera's input and the fit: the frame, the composite, masks, and depth errors of
+//! Sections on the recorded images and the fit: input frame, composite, masks, and depth errors of
 //! the surfaces.
 
 use super::organ_views;
@@ -77,7 +77,10 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
     overlays::outline(&mut input, &r.instruments, INSTRUMENT);
     let input = page::figure(
         &figures::img(&input, "input frame with the instruments outlined")?,
-        &format!("<b>Input.</b> The window's centre frame as recorded.{}", page::legend([("instruments", INSTRUMENT)])),
+        &format!(
+            "<b>Input.</b> The recorded frame at the window's centre.{}",
+            page::legend([("instruments", INSTRUMENT)])
+        ),
     );
     let composite = page::figure(
         &figures::img(&r.background, "composite without instruments")?,
@@ -106,14 +109,14 @@ pub(super) fn images(r: &Reconstruction) -> Result<String> {
         top.push(page::figure(&photograph, "<b>Composite,</b> for comparison."));
         top.push(page::figure(
             &rendered,
-            "<b>Surfaces through the recording camera.</b> Rendered anew with the camera's own lens; \
-             they should lie where the photograph shows them.",
+            "<b>Surfaces through the recording camera,</b> rendered with its lens; they should lie where the \
+             photograph shows them.",
         ));
     }
     Ok(page::section(
         "What the camera saw",
-        "Moving instruments are removed by looking through time: each pixel keeps the median of the frames in which \
-         it is free.",
+        "Instruments that move are removed over time: each pixel is the median of the frames in which no instrument \
+         covers it.",
         &page::grid(Columns::Two, &top),
     ))
 }
@@ -124,7 +127,7 @@ fn depth_figure(r: &Reconstruction) -> Result<String> {
     let low = quantile(&valid, 0.005).unwrap_or(0.0);
     let high = quantile(&valid, 0.995).unwrap_or(1.0);
     let img = figures::img(&overlays::depth(&r.depth, (low, high)), "composite depth in false colours")?;
-    let bar = page::scale_bar(&SEQUENTIAL, &fixed(1e3 * low, 0), "depth [mm]", &fixed(1e3 * high, 0));
+    let bar = page::scale_bar(&SEQUENTIAL, &fixed(1e3 * low, 0), "depth (mm)", &fixed(1e3 * high, 0));
     Ok(page::figure(&img, &format!("<b>Composite depth.</b> Distance along the view; black: no depth.{bar}")))
 }
 
@@ -138,7 +141,7 @@ pub(super) fn depth_errors(r: &Reconstruction) -> Result<String> {
     for organ in &r.organs {
         overlays::error(&mut all, &organ.depth_error, &organ.compared);
     }
-    let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "surface minus measured depth [mm]", "+5");
+    let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "surface minus measured depth (mm)", "+5");
     let map = page::figure(
         &figures::img(&all, "signed depth error of all organs")?,
         &format!("<b>Depth error.</b> Blue: the surface is nearer to the camera than measured; red: farther.{bar}"),
@@ -158,7 +161,7 @@ pub(super) fn depth_errors(r: &Reconstruction) -> Result<String> {
         each.push(page::figure(&img, &error_caption(organ)));
     }
     Ok(page::section(
-        "How well the surfaces fit the depth",
+        "Fit of the surfaces to the depth",
         "Each organ's surface is rendered through the recording camera and compared with the composite depth inside its mask.",
         &(page::grid(Columns::Two, &[map, spread]) + &page::grid(Columns::Three, &each)),
     ))
@@ -201,8 +204,8 @@ fn histogram(r: &Reconstruction) -> Result<String> {
     };
     let plot = Plot {
         title: "distribution of the depth error",
-        x: "surface minus measured depth [mm]",
-        y: "share of pixels [%]",
+        x: "surface minus measured depth (mm)",
+        y: "share of pixels (%)",
         lines: r.organs.iter().enumerate().map(line).collect(),
         bands: vec![],
         show: vec![0.0],

@@ -1,26 +1,26 @@
-//! What moving pictures are of: something that goes on a control period at a time.
+//! Sources of videos: motions that advance one control period at a time.
 
 use super::script::ScriptedLift;
-use crate::replayed::Replayed;
+use crate::episode_replay::EpisodeReplay;
 use crate::{Error, Result};
 use trocar_cell::Cell;
 use trocar_core::Progress;
 
-/// A cell in which something goes on.
-pub(crate) trait Play {
-    /// What it is, in a word.
+/// A motion in a cell.
+pub(crate) trait Playback {
+    /// A noun for messages.
     fn name(&self) -> &'static str;
-    /// The cell as it is now.
+    /// The cell in its present state.
     fn cell(&self) -> &Cell;
-    /// Control periods to its end, where that is known.
+    /// Number of control periods, if known.
     fn periods(&self) -> Option<usize>;
-    /// Does one control period; false when it is over.
+    /// Advances one control period. Returns false at the end.
     fn advance(&mut self) -> Result<bool>;
-    /// Where it is not what was recorded, if anything was.
-    fn differs(&self) -> Option<String>;
+    /// The first difference from a recording, if there is one.
+    fn difference(&self) -> Option<String>;
 }
 
-impl Play for ScriptedLift {
+impl Playback for ScriptedLift {
     fn name(&self) -> &'static str {
         "grasp-lift"
     }
@@ -37,12 +37,12 @@ impl Play for ScriptedLift {
         ScriptedLift::advance(self)
     }
 
-    fn differs(&self) -> Option<String> {
+    fn difference(&self) -> Option<String> {
         None
     }
 }
 
-impl Play for Replayed<'_> {
+impl Playback for EpisodeReplay<'_> {
     fn name(&self) -> &'static str {
         "episode"
     }
@@ -56,23 +56,23 @@ impl Play for Replayed<'_> {
     }
 
     fn advance(&mut self) -> Result<bool> {
-        Ok(Replayed::advance(self))
+        Ok(EpisodeReplay::advance(self))
     }
 
-    fn differs(&self) -> Option<String> {
-        Replayed::differs(self).map(str::to_owned)
+    fn difference(&self) -> Option<String> {
+        EpisodeReplay::difference(self).map(str::to_owned)
     }
 }
 
-/// Goes on to a time [s], or to the end.
+/// Advances to a time (s), or to the end.
 ///
 /// # Errors
-/// A time after the end, a step that cannot be done, an interruption.
-pub(crate) fn until(play: &mut dyn Play, time: Option<f64>, progress: &dyn Progress) -> Result<()> {
-    let most = play.periods();
+/// A time after the end, a step that fails, an interruption.
+pub(crate) fn until(play: &mut dyn Playback, time: Option<f64>, progress: &dyn Progress) -> Result<()> {
+    let periods = play.periods();
     let period = play.cell().period();
     let wanted = time.map(|t| (t / period).ceil() as usize);
-    let total = wanted.or(most).map_or(1, |n| n.min(most.unwrap_or(n)) as u64);
+    let total = wanted.or(periods).map_or(1, |n| n.min(periods.unwrap_or(n)) as u64);
     stage(progress, "simulate", total, || {
         while time.is_none_or(|time| play.cell().time() < time - 1e-9) {
             if progress.interrupted() {
@@ -89,7 +89,7 @@ pub(crate) fn until(play: &mut dyn Play, time: Option<f64>, progress: &dyn Progr
     })
 }
 
-/// Does the work of a stage, which is over also where the work fails.
+/// Runs `work` as a stage of `progress`, which also ends if the work fails.
 pub(crate) fn stage<T>(progress: &dyn Progress, name: &str, total: u64, work: impl FnOnce() -> Result<T>) -> Result<T> {
     progress.begin(name, total);
     let done = work();
@@ -102,7 +102,7 @@ mod tests {
     use super::*;
     use std::sync::atomic::{AtomicI32, Ordering};
 
-    /// Stages that are begun and not over.
+    /// Number of open stages.
     struct Open(AtomicI32);
 
     impl Progress for Open {
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn a_stage_is_over_where_its_work_fails() {
+    fn a_stage_ends_if_its_work_fails() {
         let open = Open(AtomicI32::new(0));
         let during = stage(&open, "simulate", 1, || Ok(open.0.load(Ordering::Relaxed)));
         assert_eq!(during.unwrap(), 1);
