@@ -50,8 +50,8 @@ fn main() -> ExitCode {
             tools::fetch();
             ExitCode::SUCCESS
         }
-        ["figures", names @ ..] => code(told(figures::run(names))),
-        ["peers"] => code(told(peers::run())),
+        ["figures", names @ ..] => code(told(&figures::run(names))),
+        ["peers"] => code(told(&peers::run())),
         ["fuzz"] => fuzz(1_000_000),
         ["fuzz", cases] => match cases.parse() {
             Ok(cases) => fuzz(cases),
@@ -72,8 +72,8 @@ fn code(passed: bool) -> ExitCode {
 }
 
 /// Prints why something failed; says whether it succeeded.
-fn told(result: Result<(), String>) -> bool {
-    if let Err(why) = &result {
+fn told(result: &Result<(), String>) -> bool {
+    if let Err(why) = result {
         eprintln!("{why}");
     }
     result.is_ok()

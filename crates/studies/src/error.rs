@@ -38,7 +38,7 @@ pub enum Error {
     Work(trocar_workflow::Error),
     /// A tissue scene that cannot be built or stepped.
     #[error(transparent)]
-    TissueScene(#[from] trocar_testing::scenes::Error),
+    TissueScene(#[from] crate::scenes::Error),
     /// An error of the oracle or of a comparator.
     #[error(transparent)]
     Reference(#[from] trocar_tissue_reference::Error),

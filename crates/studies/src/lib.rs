@@ -10,6 +10,7 @@ mod error;
 mod experiment;
 pub mod names;
 pub mod registry;
+pub mod scenes;
 mod side_by_side;
 mod statistics;
 pub mod study;

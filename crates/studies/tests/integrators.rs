@@ -4,8 +4,8 @@
 use trocar_core::Silent;
 use trocar_studies::IntegratorsExperiment;
 use trocar_studies::names::Recorded;
+use trocar_studies::scenes::Organs;
 use trocar_studies::study::run;
-use trocar_testing::scenes::Organs;
 
 #[test]
 fn the_papers_finding_depends_on_settings() {

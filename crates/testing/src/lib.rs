@@ -1,11 +1,8 @@
-//! Shared parts of tests and benchmarks: damaged files for every reader ([`fuzz_reader`]), and with
-//! the feature `scenes` scenes to step and draw.
+//! Damaged files for the tests of every reader: [`fuzz_reader`].
 
 mod damage;
 mod fuzz;
 mod peak;
-#[cfg(feature = "scenes")]
-pub mod scenes;
 
 pub use damage::damage;
 pub use fuzz::{Allowance, cases, fuzz_reader};

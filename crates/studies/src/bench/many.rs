@@ -1,12 +1,12 @@
 //! Many small models in parallel, beside one model of the same total size.
 
+use crate::scenes::{self, Organs, Run, Scene, material};
 use crate::statistics::median;
 use crate::study::check_interrupted;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_testing::scenes::{self, Organs, Run, Scene, material};
 use trocar_workflow::{SOLVERS, solver_named};
 
 /// Warm-up frames, and maximum number of timed frames.

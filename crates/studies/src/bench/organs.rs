@@ -3,6 +3,7 @@
 use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::{SolverName, kilopascals};
+use crate::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
 use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
@@ -11,7 +12,6 @@ use std::path::PathBuf;
 use trocar_core::Progress;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed, percent};
-use trocar_testing::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
 use trocar_tissue::Material;
 use trocar_workflow::solver_named;
 

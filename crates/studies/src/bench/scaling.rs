@@ -3,6 +3,7 @@
 use super::machine::Machine;
 use super::many::{self, ManyRow};
 use super::timing::Timing;
+use crate::scenes::{Organs, Run, Scene, material};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -13,7 +14,6 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_testing::scenes::{Organs, Run, Scene, material};
 use trocar_workflow::{SOLVERS, solver_named};
 
 /// Warm-up frames, and maximum number of timed frames.

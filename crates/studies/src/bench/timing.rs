@@ -1,12 +1,12 @@
 //! Wall times of frames of a scene.
 
 use crate::Result;
+use crate::scenes::{FRAME, Run};
 use crate::statistics::median;
 use crate::study::check_interrupted;
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_testing::scenes::{FRAME, Run};
 
 /// Wall times of frames.
 #[derive(Clone, Debug, Default, Serialize)]

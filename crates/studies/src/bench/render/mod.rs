@@ -7,6 +7,7 @@ pub use rays::RayRow;
 
 use super::machine::Machine;
 use crate::Result;
+use crate::scenes::{LaparoscopicScene, endoscope_view};
 use crate::statistics::median;
 use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
@@ -21,7 +22,6 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
 use trocar_sensors::CameraRig;
-use trocar_testing::scenes::{LaparoscopicScene, endoscope_view};
 use trocar_workflow::ScriptedLift;
 use trocar_workflow::scene_specimen;
 

@@ -4,6 +4,7 @@
 mod step_ladder;
 
 use crate::names::kilopascals;
+use crate::scenes::{Organs, SCENES, Scene, material};
 use crate::study::{Job, Kind, Study};
 use crate::trials::Outcomes;
 use crate::{Error, Result};
@@ -17,7 +18,6 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page;
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed};
-use trocar_testing::scenes::{Organs, SCENES, Scene, material};
 use trocar_workflow::SOLVERS;
 
 /// Error of each iteration against the exact step: scenes, moduli and Poisson's ratios, over

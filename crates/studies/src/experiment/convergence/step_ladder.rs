@@ -2,12 +2,12 @@
 //! minimum found by the oracle, and wall time.
 
 use crate::Result;
+use crate::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
 use crate::study::check_interrupted;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_testing::scenes::{FRAME, OracleRun, Scene, grasps, rest_positions, tools};
 use trocar_tissue::{Descent, QuasiNewton, SolverSettings, State, Stepper, ToolMotion};
 use trocar_tissue_reference::OracleState;
 use trocar_workflow::solver_named;

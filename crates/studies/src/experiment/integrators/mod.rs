@@ -5,6 +5,7 @@ mod forms;
 mod row;
 
 use crate::names::Recorded;
+use crate::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
 use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
@@ -21,7 +22,6 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_testing::scenes::{FRAME, Organs, Scene, material, mean_error, rest_positions};
 use trocar_tissue::{Model, SolverSettings, State};
 use trocar_tissue_reference::{Oracle, OracleState, stable_explicit_step};
 use trocar_workflow::phantoms;
