@@ -134,8 +134,15 @@ fn check_python(build: python::Build) -> bool {
 /// Runs the tests named `damage_never_panics` of all crates; each takes its share of the cases.
 fn fuzz(cases: usize) -> ExitCode {
     /// Crates with such a test.
-    const CRATES: [&str; 6] =
-        ["trocar-geometry", "trocar-recording", "trocar-remote", "trocar-robot", "trocar-scene", "trocar-specimen"];
+    const CRATES: [&str; 7] = [
+        "trocar-camera",
+        "trocar-geometry",
+        "trocar-recording",
+        "trocar-remote",
+        "trocar-robot",
+        "trocar-scene",
+        "trocar-specimen",
+    ];
     let share = cases.div_ceil(CRATES.len()).to_string();
     for name in CRATES {
         eprintln!("\n== {name}: {share} cases");

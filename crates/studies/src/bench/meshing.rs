@@ -90,6 +90,7 @@ impl Study for MeshingBench {
 
     fn run(&self, job: &Job<'_>) -> Result<(MeshingResult, Document)> {
         let surfaces = self.surfaces()?;
+        job.claim()?;
         job.progress.begin("meshes", (self.sizes.len() + 3 * surfaces.len()) as u64);
         let mut rows = Vec::new();
         let mut measure =

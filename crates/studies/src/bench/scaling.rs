@@ -82,6 +82,7 @@ impl Study for ScalingBench {
     type Figures = ScalingResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(ScalingResult, Document)> {
+        job.claim()?;
         let machine = Machine::here();
         let settings = SOLVERS.len() * self.threads.len();
         let mut rows: Vec<ScalingRow> = Vec::new();
