@@ -118,6 +118,10 @@ impl Reason<'_, '_> {
         let events = self.facts.events;
         let attached = |e: &CellEvent| matches!(e, CellEvent::Attached { arm, .. } if self.grasps(*arm));
         let from = events.iter().rposition(|(_, e)| attached(e)).map_or(0, |k| k + 1);
+        let slid = events[from..].iter().find_map(|(time, e)| match e {
+            CellEvent::Slipped { arm } if self.grasps(*arm) => Some(*time),
+            _ => None,
+        });
         let ended = events[from..].iter().find_map(|(time, e)| match e {
             CellEvent::ContactDisabled { arm, organ, .. } if self.grasps(*arm) => Some(format!(
                 "contact disabled: at {time:.1} s the grasper had pierced or strained the {organ} and let go of it"
@@ -125,17 +129,18 @@ impl Reason<'_, '_> {
             CellEvent::Torn { arm, force_n } if self.grasps(*arm) => {
                 Some(format!("torn: the {organ} tore out of the jaws at {time:.1} s, at {force_n:.1} N"))
             }
-            CellEvent::Released { arm } if self.grasps(*arm) => Some(format!("let go: the jaws opened at {time:.1} s")),
+            CellEvent::Released { arm } if self.grasps(*arm) => {
+                // Jaws that open after tissue has slid in them did not lose it by opening.
+                Some(match slid.filter(|first| first < time) {
+                    Some(first) => format!(
+                        "slipped: the {organ} slid in the jaws from {first:.1} s on; they opened at {time:.1} s"
+                    ),
+                    None => format!("let go: the jaws opened at {time:.1} s"),
+                })
+            }
             _ => None,
         });
-        let slipped = || {
-            events[from..].iter().rev().find_map(|(time, e)| match e {
-                CellEvent::Slipped { arm } if self.grasps(*arm) => {
-                    Some(format!("slipped: the {organ} began to slide at {time:.1} s and is out of the jaws"))
-                }
-                _ => None,
-            })
-        };
+        let slipped = || slid.map(|first| format!("slipped: the {organ} slid out of the jaws from {first:.1} s on"));
         ended.or_else(slipped).unwrap_or_else(|| format!("the jaws do not hold the {organ}"))
     }
 
