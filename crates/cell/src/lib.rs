@@ -32,4 +32,5 @@ pub use gripper::{Gripper, MAX_ANGLE};
 pub use jaw::{JAW_FORCE, Jaw};
 pub use jaw_region::{CONTACT_SKIN, JawRegion, TissueInJaws, attached};
 pub use severance::{Severance, SeveredPiece};
+pub use target::reach_into;
 pub use world::{FRAME, Surroundings, VISCOSITY_TIME, World};

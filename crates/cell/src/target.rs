@@ -10,6 +10,6 @@ const REACH: f64 = 0.009;
 const REACH_EDGES: f64 = 1.5;
 
 /// How far jaws reach from the middle of what they pinch of organ `organ` (m).
-pub(crate) fn reach_into(world: &World, organ: usize) -> f64 {
+pub fn reach_into(world: &World, organ: usize) -> f64 {
     REACH.max(REACH_EDGES * world.model.bodies()[organ].median_edge())
 }

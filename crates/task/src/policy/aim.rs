@@ -2,7 +2,7 @@
 
 use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
-use trocar_cell::{Cell, Cluster, Reached, Setpoint, clusters};
+use trocar_cell::{Cell, Cluster, Reached, Setpoint, clusters, reach_into};
 use trocar_core::Pose;
 
 /// Nodes within this organ coordinate to either side tell where the organ is there.
@@ -10,9 +10,6 @@ const SLICE: f64 = 0.04;
 
 /// How far to either side the direction of the organ is taken from.
 const CHORD: f64 = 0.08;
-
-/// Jaws hold nodes within this distance of the middle of what they pinch (m).
-const REACH: f64 = 0.009;
 
 /// A cluster clear of pins is preferred to one that is not, even if it is this much farther along
 /// the organ.
@@ -57,7 +54,8 @@ fn along(cell: &Cell, body: usize, s: f64) -> DVec3 {
 /// lie in `range` come first, if there are any.
 fn cluster_in_range(cell: &Cell, body: usize, s: f64, range: [f64; 2]) -> Option<Cluster> {
     let world = cell.world();
-    let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, REACH)).collect();
+    let reach = reach_into(world, body);
+    let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, reach)).collect();
     let clear = |c: &Cluster| c.clear && c.nodes.len() >= FEWEST && (range[0]..=range[1]).contains(&c.s);
     if all.iter().any(clear) {
         all.retain(clear);
@@ -69,7 +67,8 @@ fn cluster_in_range(cell: &Cell, body: usize, s: f64, range: [f64; 2]) -> Option
 /// clear of pins is preferred even if it is a little farther along the organ.
 fn cluster_at(cell: &Cell, body: usize, s: f64) -> Option<Cluster> {
     let world = cell.world();
-    let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, REACH)).collect();
+    let reach = reach_into(world, body);
+    let mut all: Vec<_> = clusters(world, body).iter().map(|c| c.within_reach(world, body, reach)).collect();
     let rank = |c: &Cluster| (c.s - s).abs() + if c.clear { 0.0 } else { CLEAR_WORTH };
     all.sort_by(|a, b| rank(a).total_cmp(&rank(b)));
     let enough = all.iter().position(|c| c.nodes.len() >= FEWEST).unwrap_or(0);
