@@ -1,12 +1,17 @@
-//! Hashes of sources: of those that make phantoms' specimens, so that one which was kept is used
-//! only as long as it would be made the same, and of those that decide what an episode is, so that
-//! one campaign is not made by two programs.
+//! Hashes the sources that results depend on: those of phantom specimens, so that a cached specimen
+//! is reused only if it would be made the same, and those of episodes, so that two different
+//! programs do not write one campaign.
+//!
+//! A hash covers the version of the crates, which share one, and every listed source that exists.
+//! In the repository these are all sources, so that every change counts. In a published package the
+//! other crates are not beside this one; a published version never changes, so its number is
+//! enough.
 
 use std::path::{Path, PathBuf};
 use xxhash_rust::xxh3::Xxh3;
 
-/// Crates whose code decides what a phantom's specimen is.
-const MAKERS: [&str; 9] = [
+/// Crates that make the specimen of a phantom.
+const SPECIMEN_SOURCES: [&str; 9] = [
     "camera/src",
     "core/src",
     "geometry/src",
@@ -18,9 +23,9 @@ const MAKERS: [&str; 9] = [
     "specimen/src",
 ];
 
-/// What decides what an episode is: crates, what policies of other processes are shown and how they
-/// are asked, and the versions of all that is built in.
-const PLAYERS: [&str; 14] = [
+/// What an episode depends on: crates, the observations of remote policies, and the versions of all
+/// dependencies.
+const EPISODE_SOURCES: [&str; 14] = [
     "camera/src",
     "cell/src",
     "core/src",
@@ -38,24 +43,24 @@ const PLAYERS: [&str; 14] = [
 ];
 
 fn main() -> std::io::Result<()> {
-    println!("cargo:rustc-env=TROCAR_SPECIMEN_MAKERS={:016x}", hash_of(&MAKERS)?);
-    println!("cargo:rustc-env=TROCAR_EPISODE_MAKERS={:016x}", hash_of(&PLAYERS)?);
-    // A test compares it with what is depended on.
-    println!("cargo:rustc-env=TROCAR_EPISODE_SOURCES={}", PLAYERS.join(" "));
+    println!("cargo:rustc-env=TROCAR_SPECIMEN_SOURCE_HASH={:016x}", hash_of(&SPECIMEN_SOURCES)?);
+    println!("cargo:rustc-env=TROCAR_EPISODE_SOURCE_HASH={:016x}", hash_of(&EPISODE_SOURCES)?);
+    // A test compares the list with the dependencies of the crates.
+    println!("cargo:rustc-env=TROCAR_EPISODE_SOURCES={}", EPISODE_SOURCES.join(" "));
     Ok(())
 }
 
-/// Hash of files, and of all files in folders; both as seen from the folder of the crates.
+/// Hash of the version and of all files at `sources`, which are relative to the folder of the
+/// crates.
 fn hash_of(sources: &[&str]) -> std::io::Result<u64> {
     let mut hash = Xxh3::new();
-    for name in sources {
-        let place = Path::new("..").join(name);
-        println!("cargo:rerun-if-changed={}", place.display());
+    hash.update(env!("CARGO_PKG_VERSION").as_bytes());
+    for source in sources {
+        let path = Path::new("..").join(source);
         let mut files = Vec::new();
-        if place.is_dir() {
-            list(&place, &mut files)?;
-        } else {
-            files.push(place);
+        list(&path, &mut files)?;
+        if !files.is_empty() {
+            println!("cargo:rerun-if-changed={}", path.display());
         }
         files.sort();
         for file in files {
@@ -63,16 +68,18 @@ fn hash_of(sources: &[&str]) -> std::io::Result<u64> {
             hash.update(&std::fs::read(&file)?);
         }
     }
+    // Without any existing source, Cargo would rerun this script at every change of the package.
+    println!("cargo:rerun-if-changed=build.rs");
     Ok(hash.digest())
 }
 
-fn list(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
-    for entry in std::fs::read_dir(folder)? {
-        let path = entry?.path();
-        if path.is_dir() {
-            list(&path, files)?;
-        } else {
-            files.push(path);
+/// Adds `path`, or all files in it, to `files`. A path that does not exist has none.
+fn list(path: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    if path.is_file() {
+        files.push(path.to_owned());
+    } else if path.is_dir() {
+        for entry in std::fs::read_dir(path)? {
+            list(&entry?.path(), files)?;
         }
     }
     Ok(())

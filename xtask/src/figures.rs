@@ -37,7 +37,8 @@ fn tables() -> Result<Vec<String>, String> {
     Ok(names)
 }
 
-/// The command of a table: the one that its file names, or the study of this name with its defaults.
+/// The command of a table: the one that its file names, or the study of this name with its
+/// defaults.
 fn words(program: &Path, name: &str, file: &Path) -> Result<Vec<String>, String> {
     let text = std::fs::read_to_string(file).unwrap_or_default();
     if let Some(words) = command_of(&text) {

@@ -1,5 +1,5 @@
-//! The project's own commands. `cargo xtask test` is what continuous integration runs and what a contributor runs before
-//! sending a change.
+//! The project's own commands. `cargo xtask test` is what continuous integration runs and what a
+//! contributor runs before sending a change.
 
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
@@ -13,7 +13,8 @@ use std::process::{Command, ExitCode};
 /// A check: its name, the arguments of cargo, environment variables.
 type Check = (&'static str, &'static [&'static str], &'static [(&'static str, &'static str)]);
 
-/// The checks in their order: cheap ones first. Everything is built in release mode, because the tests simulate.
+/// The checks in their order: cheap ones first. Everything is built in release mode, because the
+/// tests simulate.
 const TEST: &[Check] = &[
     ("formatting", &["fmt", "--all", "--check"], &[]),
     ("lints", &["clippy", "--workspace", "--all-targets", "--release", "--locked", "--", "-D", "warnings"], &[]),
@@ -49,8 +50,8 @@ fn main() -> ExitCode {
             tools::fetch();
             ExitCode::SUCCESS
         }
-        ["figures", names @ ..] => code(told(figures::run(names))),
-        ["peers"] => code(told(peers::run())),
+        ["figures", names @ ..] => code(told(&figures::run(names))),
+        ["peers"] => code(told(&peers::run())),
         ["fuzz"] => fuzz(1_000_000),
         ["fuzz", cases] => match cases.parse() {
             Ok(cases) => fuzz(cases),
@@ -71,8 +72,8 @@ fn code(passed: bool) -> ExitCode {
 }
 
 /// Prints why something failed; says whether it succeeded.
-fn told(result: Result<(), String>) -> bool {
-    if let Err(why) = &result {
+fn told(result: &Result<(), String>) -> bool {
+    if let Err(why) = result {
         eprintln!("{why}");
     }
     result.is_ok()

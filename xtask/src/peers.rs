@@ -1,12 +1,15 @@
-//! Our stepping beside public solvers, on one mesh, in one run, on one machine: Newton's VBD (8 substeps of 10 iterations) and MuJoCo's flex (one step of 1/60 s a frame).
+//! Our stepping beside public solvers, on one mesh, in one run, on one machine: Newton's VBD (8
+//! substeps of 10 iterations) and MuJoCo's flex (one step of 1/60 s a frame).
 //!
-//! The peers' scripts and meshes stand beside the repository (`../shared/peers`) and are copied; the peers come from PyPI into an environment of their own. Runs alternate, so that
-//! a busy machine slows all of them; every figure is the median over the rounds.
+//! The peers' scripts and meshes stand beside the repository (`../shared/peers`) and are copied;
+//! the peers come from PyPI into an environment of their own. Runs alternate, so that a busy
+//! machine slows all of them; every figure is the median over the rounds.
 //!
-//! MuJoCo's script and ours time as many frames. The peers' scripts know one motion, the organs sagging from rest under
-//! gravity; ours is timed on the same sag, and on a drag of the appendix, which is harder. The table says what each did.
-//! MuJoCo is timed without and with a pool of two threads, and the faster counts. Newton's kernels on a CPU run on one
-//! thread whatever is set, so that is its best.
+//! MuJoCo's script and ours time as many frames. The peers' scripts know one motion, the organs
+//! sagging from rest under gravity; ours is timed on the same sag, and on a drag of the appendix,
+//! which is harder. The table says what each did. MuJoCo is timed without and with a pool of two
+//! threads, and the faster counts. Newton's kernels on a CPU run on one thread whatever is set, so
+//! that is its best.
 
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -18,7 +21,8 @@ const PACKAGES: [&str; 5] = ["newton==1.8.0", "warp-lang==1.19.0", "mujoco==4.0.
 const SCRIPTS: &str = "../shared/peers";
 /// Where everything is put.
 const FOLDER: &str = "target/peers";
-/// The mesh: synthetic organs with the paper's counts of nodes and elements, not the paper's specimen A.
+/// The mesh: synthetic organs with the paper's counts of nodes and elements, not the paper's
+/// specimen A.
 const MESH: &str = "specimen_a";
 /// Rounds of runs.
 const ROUNDS: usize = 2;
@@ -35,7 +39,8 @@ struct Solver {
     run: fn(&Places) -> Outcome<Figures>,
 }
 
-/// Real-time factor by wall time, by CPU time of one thread where that is known, and error of the static sag.
+/// Real-time factor by wall time, by CPU time of one thread where that is known, and error of the
+/// static sag.
 #[derive(Clone, Copy)]
 struct Figures {
     wall: f64,
@@ -74,7 +79,8 @@ const SAG: &str = "120 frames of sag";
 /// Peers come first in [`SOLVERS`]: Newton, and MuJoCo without and with a pool of threads.
 const PEERS: usize = 3;
 
-/// Sets everything up, runs everything, prints the table and writes it to `target/peers/table.json`.
+/// Sets everything up, runs everything, prints the table and writes it to
+/// `target/peers/table.json`.
 pub fn run() -> Outcome<()> {
     let places = set_up()?;
     let mut measured: Vec<Vec<Outcome<Figures>>> = SOLVERS.iter().map(|_| Vec::new()).collect();

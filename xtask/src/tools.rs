@@ -1,6 +1,6 @@
-//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo, OpenCV, Embree, scikit-image,
-//! openpi's client and server, the TetGen program.
-//! Without them these tests are skipped, and say so.
+//! What some tests compare with and is not part of the project: ONNX Runtime's library, MuJoCo,
+//! OpenCV, Embree, scikit-image, openpi's client and server, the TetGen program. Without them these
+//! tests are skipped, and say so.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -4,7 +4,7 @@ mod common;
 
 use common::{ROS, SAMPLE};
 use trocar_camera::CameraModel;
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -23,7 +23,7 @@ fn damaged_files_are_errors() {
         ("opencv.json".to_owned(), json.to_string().into_bytes()),
     ];
     seeds.iter().for_each(|(name, bytes)| assert!(CameraModel::parse_calibration(bytes).is_ok(), "{name}"));
-    assault(&seeds, Allowance { fixed: 4 << 20, per_byte: 1000 }, |_, bytes| {
+    fuzz_reader(&seeds, Allowance { fixed: 4 << 20, per_byte: 1000 }, |_, bytes| {
         if let Ok(model) = CameraModel::parse_calibration(bytes) {
             // Every accepted file gives a usable model.
             for (u, v) in [(0.0, 0.0), (1e5, -3.0), (320.0, 200.0)] {

@@ -1,125 +1,133 @@
-//! A campaign run on this machine: what is missing, many at once.
+//! A campaign on this machine: runs the missing episodes, several at once.
 
+use crate::csv_table::csv_table;
+use crate::manifest::{self, Manifest};
 use crate::page;
-use crate::pictures;
-use crate::plan::{self, Plan};
-use crate::served::{Served, serve_all};
-use crate::source::PolicySpec;
+use crate::policy_server::{POLL_INTERVAL, PolicyServer, start_servers};
+use crate::policy_spec::PolicySpec;
 use crate::store::{self, Store};
-use crate::table::{self, CampaignResult};
+use crate::table::CampaignResult;
+use crate::videos;
 use crate::worker::Worker;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_workflow::{Error, Result, refuse_overlap, scene_specimen};
 
-/// How often it is looked whether the user asks to stop.
-const GLANCE: Duration = Duration::from_millis(50);
-
-/// Most episodes at once for each core; each has a cell of its own. Up to [`LEAST_JOBS`] are always allowed: policies that are waited for need no core.
+/// Maximum number of parallel episodes per core. Each has its own cell in memory.
 const JOBS_PER_CORE: usize = 8;
-/// See there.
-const LEAST_JOBS: usize = 32;
+/// This many parallel episodes are allowed on any machine, because waiting for a server needs no
+/// core.
+const MIN_JOB_LIMIT: usize = 32;
 
-/// What a campaign is to do on this machine.
+/// A campaign on this machine.
 #[derive(Clone, Debug)]
 pub struct Campaign {
     /// Scene file or name of a built-in scene.
     pub scene: String,
     /// The policies.
     pub policies: Vec<PolicySpec>,
-    /// Episodes of each.
+    /// Number of episodes per policy.
     pub episodes: usize,
-    /// Seed of the first episode; the next have the next. All policies get the same.
+    /// Seed of the first episode; the following episodes have the following seeds. All policies
+    /// have the same seeds.
     pub seed: u64,
-    /// Episodes at once, 0 for as many as the machine has cores. Results do not depend on it.
+    /// Number of parallel episodes; 0 for one per core. Results do not depend on it.
     pub jobs: usize,
-    /// Episodes that ended because their policy failed are done again.
+    /// Runs episodes again whose policy failed.
     pub retry_failed: bool,
-    /// Folder in which a scene's phantom is recorded and reconstructed; what is there is used again.
+    /// Folder of made phantoms. The scene's phantom is made there once and reused.
     pub phantoms: PathBuf,
 }
 
 impl Campaign {
-    /// Runs what is missing in the campaign folder `output`, then writes the table and the report there.
+    /// Runs the missing episodes of the campaign in the folder `output`, then writes its table and
+    /// report.
     ///
     /// # Errors
-    /// One line that names the file, field or option. Finished episodes stay; an interruption ([`Error::Stopped`]) loses only those under way, and leaves table and report of what is kept.
+    /// One line that names the file, field or option. Finished episodes stay. An interruption
+    /// ([`Error::Stopped`]) loses only running episodes; table and report then show the finished
+    /// ones.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<CampaignResult> {
-        let (store, plan) = self.keep(output, None, progress)?;
-        store.finish(&plan)
+        let (store, manifest) = self.run_episodes(output, None, progress)?;
+        store.write_results(&manifest)
     }
 
-    /// Runs what is missing, no more than `most` episodes in all, and films some failures and successes: what is kept, and of what.
+    /// Runs the missing episodes of the campaign in `output`, at most `max_episodes` in total, and
+    /// renders videos of some failures and successes. Returns the campaign's store and manifest.
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn keep(&self, output: &Path, most: Option<usize>, progress: &dyn Progress) -> Result<(Store, Plan)> {
+    pub fn run_episodes(
+        &self,
+        output: &Path,
+        max_episodes: Option<usize>,
+        progress: &dyn Progress,
+    ) -> Result<(Store, Manifest)> {
         let scene = Scene::read(&self.scene)?;
         refuse_overlap(Path::new(&self.scene), output)?;
-        // What can be said without the specimen is said before one is made, which takes minutes.
-        plan::check(&self.policies, self.episodes, self.seed, most)?;
+        // Making a specimen takes minutes, so everything that does not need it is checked first.
+        manifest::check(&self.policies, self.episodes, self.seed, max_episodes)?;
         let cores = std::thread::available_parallelism().map_or(1, usize::from);
-        let allowed = JOBS_PER_CORE.saturating_mul(cores).max(LEAST_JOBS);
+        let allowed = JOBS_PER_CORE.saturating_mul(cores).max(MIN_JOB_LIMIT);
         if self.jobs > allowed {
             let reason = format!("--jobs {}: it must be at most {allowed} on {cores} cores", self.jobs);
             return Err(Error::Mismatch(reason));
         }
-        store::look(output, &self.policies, self.seed)?;
-        // A policy that cannot be loaded is reported before anything is built or written.
+        store::check_compatible(output, &self.policies, self.seed)?;
+        // Policies are loaded before anything is built or written.
         let missing = |p: &&PolicySpec| self.retry_failed || !store::has_episodes(output, &p.name, self.episodes);
         let policies: Vec<&PolicySpec> = self.policies.iter().filter(missing).collect();
-        let served = serve_all(&policies, progress)?;
+        let servers = start_servers(&policies, progress)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
-        let plan = Plan::new(&scene, &specimen, &self.policies, self.episodes, self.seed)?;
-        let plan = most.map_or(plan.clone(), |most| plan.at_most(most));
-        let store = Store::open(output, &plan)?;
+        let mut manifest = Manifest::new(&scene, &specimen, &self.policies, self.episodes, self.seed)?;
+        manifest.max_episodes = max_episodes;
+        let store = Store::open(output, &manifest)?;
         let workers = if self.jobs == 0 { cores } else { self.jobs };
         let done = self
-            .run_missing(&scene, &specimen, &plan, &store, workers, served, progress)
-            .and_then(|()| store.film(&plan, &scene, &specimen, progress));
+            .run_missing(&scene, &specimen, &manifest, &store, workers, servers, progress)
+            .and_then(|()| store.write_videos(&manifest, &scene, &specimen, progress));
         match done {
-            Ok(()) => Ok((store, plan)),
+            Ok(()) => Ok((store, manifest)),
             Err(Error::Interrupted) => {
                 progress.end();
-                let kept = store.finish(&plan)?.episodes;
-                Err(Error::Stopped { kept, planned: plan.count() })
+                let kept = store.write_results(&manifest)?.episodes;
+                Err(Error::Stopped { kept, planned: manifest.count() })
             }
             Err(why) => Err(why),
         }
     }
 
-    /// Runs the episodes that are not kept yet, `workers` at once.
+    /// Runs the episodes that are not stored yet, `workers` in parallel.
     #[allow(clippy::too_many_arguments, reason = "the parts of one campaign")]
     fn run_missing(
         &self,
         scene: &Scene,
         specimen: &Specimen,
-        plan: &Plan,
+        manifest: &Manifest,
         store: &Store,
         workers: usize,
-        served: BTreeMap<String, Served>,
+        servers: BTreeMap<String, PolicyServer>,
         progress: &dyn Progress,
     ) -> Result<()> {
-        let missing = store.missing(plan, self.retry_failed)?;
+        let missing = store.missing(manifest, self.retry_failed)?;
         let workers = workers.min(missing.len());
         progress.begin("episodes", missing.len() as u64);
         let (next, stop) = (AtomicUsize::new(0), Arc::new(AtomicBool::new(false)));
-        let at_work = AtomicUsize::new(workers);
+        let running = AtomicUsize::new(workers);
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
-        let served = Mutex::new(served);
+        let servers = Mutex::new(servers);
         let work = |first: bool| -> Result<()> {
-            let mut worker = Worker::new(scene, specimen)?.stopped_by(Arc::clone(&stop));
+            let mut worker = Worker::new(scene, specimen)?.with_stop_flag(Arc::clone(&stop));
             if first {
-                let served = served.lock().map(|mut s| std::mem::take(&mut *s)).unwrap_or_default();
-                worker = worker.with_served(served);
-                // All policies are made ready at once, not when their first jobs come.
-                worker.start(missing.iter().map(|job| &job.policy))?;
+                let servers = servers.lock().map(|mut s| std::mem::take(&mut *s)).unwrap_or_default();
+                worker = worker.with_servers(servers);
+                // Policies that fail to load must stop the campaign before its first episode.
+                worker.prepare(missing.iter().map(|job| &job.policy))?;
             }
             while let Some(job) = missing.get(next.fetch_add(1, Ordering::Relaxed)) {
                 let files = worker.run_until(job, &|| progress.interrupted())?;
@@ -130,24 +138,25 @@ impl Campaign {
         };
         std::thread::scope(|scope| {
             for k in 0..workers {
-                let (work, at_work, stop, first_error) = (&work, &at_work, &stop, &first_error);
+                let (work, running, stop, first_error) = (&work, &running, &stop, &first_error);
                 scope.spawn(move || {
-                    let _leaves = Leaves(at_work);
+                    let _guard = RunningGuard(running);
                     if let Err(why) = work(k == 0) {
-                        // The first is told; those of the others are its consequence. So it is kept before they hear that they are to stop.
-                        if let Ok(mut told) = first_error.lock() {
-                            told.get_or_insert(why);
+                        // Errors of other workers follow from this one, so it is stored before the
+                        // stop flag is set.
+                        if let Ok(mut first) = first_error.lock() {
+                            first.get_or_insert(why);
                         }
                         stop.store(true, Ordering::SeqCst);
                     }
                 });
             }
-            // Whoever waits for a server is told by the flag.
-            while at_work.load(Ordering::Relaxed) > 0 {
+            // A worker that waits for a server checks only the flag.
+            while running.load(Ordering::Relaxed) > 0 {
                 if progress.interrupted() {
                     stop.store(true, Ordering::SeqCst);
                 }
-                std::thread::sleep(GLANCE);
+                std::thread::sleep(POLL_INTERVAL);
             }
         });
         if let Some(why) = first_error.into_inner().ok().flatten() {
@@ -158,35 +167,41 @@ impl Campaign {
     }
 }
 
-/// Counts a worker less when it goes, however it goes.
-struct Leaves<'a>(&'a AtomicUsize);
+/// Counts a worker as ended when it is dropped, also by a panic.
+struct RunningGuard<'a>(&'a AtomicUsize);
 
-impl Drop for Leaves<'_> {
+impl Drop for RunningGuard<'_> {
     fn drop(&mut self) {
         self.0.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
 impl Store {
-    /// Films the first failures and successes that have no moving picture yet, for the report.
+    /// Renders videos of the first failures and successes that have none yet, for the report.
     ///
     /// # Errors
-    /// A kept episode that is damaged, a picture that cannot be written, an interruption.
-    pub fn film(&self, plan: &Plan, scene: &Scene, specimen: &Specimen, progress: &dyn Progress) -> Result<()> {
-        pictures::film(self, plan, &self.kept(plan)?, scene, specimen, progress)
+    /// A damaged episode, a video that cannot be written, an interruption.
+    pub fn write_videos(
+        &self,
+        manifest: &Manifest,
+        scene: &Scene,
+        specimen: &Specimen,
+        progress: &dyn Progress,
+    ) -> Result<()> {
+        videos::write(self, manifest, &self.records(manifest)?, scene, specimen, progress)
     }
 
-    /// Makes the table and the report out of the episodes that are kept.
+    /// Writes table, report and `result.json` of the stored episodes.
     ///
     /// # Errors
-    /// A kept episode that is damaged, by its name; a file that cannot be written.
-    pub fn finish(&self, plan: &Plan) -> Result<CampaignResult> {
-        let kept = self.kept(plan)?;
-        let result = CampaignResult::of(plan, &kept, self.folder());
-        // All three are made before the first is written, so that they are of the same episodes.
-        let csv = table::csv(&kept)?;
-        let page =
-            page::campaign(plan, &result, &kept, self).map_err(|why| self.unreadable_channels(&kept).unwrap_or(why))?;
+    /// A damaged episode, by its folder; a file that cannot be written.
+    pub fn write_results(&self, manifest: &Manifest) -> Result<CampaignResult> {
+        let records = self.records(manifest)?;
+        let result = CampaignResult::of(manifest, &records, self.folder());
+        // All three are made before the first is written, so that they show the same episodes.
+        let csv = csv_table(&records)?;
+        let page = page::campaign(manifest, &result, &records, self)
+            .map_err(|why| self.unreadable_channels(&records).unwrap_or(why))?;
         let text = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
         self.write("table.csv", csv.as_bytes())?;
         self.write("report.html", page.as_bytes())?;

@@ -1,20 +1,22 @@
-//! How far episodes came: for each policy and stage a bar with its Wilson interval, as inline SVG.
+//! Share of episodes that pass each stage: a bar with its Wilson interval per policy and stage, as
+//! inline SVG.
 
 use crate::table::{CampaignResult, StageCount};
 use std::fmt::Write;
 use trocar_report::colors;
 use trocar_report::page::{escape, hex};
 
-/// Size of the picture's parts [px]: names of policies, a row, the heads of columns, the count beside a bar.
+/// Sizes (px): names of policies, a row, the heads of columns, the count beside a bar, the picture.
 const NAMES: usize = 120;
 const ROW: usize = 34;
 const HEAD: usize = 26;
 const COUNT: usize = 62;
 const WIDTH: usize = 1120;
-/// Longest name that is written out [characters].
-const LONGEST: usize = 16;
+/// Longer names of policies are cut to this (characters).
+const MAX_NAME_LENGTH: usize = 16;
 
-/// A row a policy, a column a stage: the share that passed it, filled; what it may be, as a whisker; the count.
+/// One row per policy, one column per stage: the share that passed as a filled bar, its interval as
+/// a whisker, and the count.
 pub(super) fn funnel(r: &CampaignResult) -> String {
     let Some(first) = r.policies.first().filter(|p| !p.stages.is_empty()) else { return String::new() };
     let column = (WIDTH - NAMES) / first.stages.len();
@@ -29,7 +31,7 @@ pub(super) fn funnel(r: &CampaignResult) -> String {
     }
     for (k, policy) in r.policies.iter().enumerate() {
         let y = HEAD + k * ROW;
-        let name: String = policy.policy.chars().take(LONGEST).collect();
+        let name: String = policy.policy.chars().take(MAX_NAME_LENGTH).collect();
         let _ = write!(svg, "<text x=\"0\" y=\"{}\">{}</text>", y + 18, escape(&name));
         for (n, stage) in policy.stages.iter().enumerate() {
             bar(&mut svg, [NAMES + n * column, y], column - COUNT, stage, policy.episodes, &hex(colors::organ(k)));

@@ -1,27 +1,32 @@
-//! Campaigns: many episodes of one scene by several policies, in parallel, killed at any moment and gone on with.
+//! Campaigns: many episodes of one scene by several policies, in parallel. A campaign can be killed
+//! at any time and resumed.
 //!
-//! A [`Plan`] says which episodes there are, a [`Store`] keeps each finished one in a folder of its own, a [`Worker`] runs one after the other. [`Campaign::run`] puts them together on this
-//! machine; the Python package does the same over many. An episode's bits depend on scene, specimen, policy and seed alone, so who ran it where does not matter.
+//! A [`Manifest`] lists the episodes. A [`Store`] holds each finished episode in its own folder. A
+//! [`Worker`] runs one episode after the other. [`Campaign::run`] combines them on this machine;
+//! the Python package distributes them over several. The bits of an episode depend only on scene,
+//! specimen, policy and seed, and not on the worker or the order.
 
 mod campaign;
+mod csv_table;
+mod episode;
 mod funnel;
+mod manifest;
 mod page;
-mod pictures;
-mod plan;
+mod plots;
+mod policy_server;
+mod policy_spec;
 mod remote;
-mod served;
-mod single;
-mod source;
 mod store;
 mod table;
+mod videos;
 mod worker;
 
 pub use campaign::Campaign;
-pub use page::{lift_and_rcm, lifts};
-pub use plan::{Job, Plan};
-pub use single::run_episode;
-pub use source::PolicySpec;
-pub use store::{Files, Kept, Store};
+pub use episode::run_episode;
+pub use manifest::{Job, Manifest};
+pub use plots::{lift_and_rcm, lifts};
+pub use policy_spec::PolicySpec;
+pub use store::{EpisodeFiles, EpisodeRecord, Store};
 pub use table::{CampaignResult, Comparison, EndCounts, Interval, PolicyRow, StageCount, median};
 pub use trocar_workflow::{Error, Result};
 pub use worker::Worker;

@@ -1,10 +1,14 @@
-//! Policies of other processes, by openpi's protocol: a server that runs already, or a Python callable that is served for as long as it is needed.
+//! Policies in other processes, by openpi's protocol: a running server, or a Python callable that a
+//! child process serves.
 //!
-//! What they are shown: `observation/state` (the numbers of [`trocar_task::STATE_NAMES`]), `observation/images/NAME` for each camera of the scene but the recording one, `prompt`,
-//! `episode/seed` and `episode/step`. What they answer: `actions`, a chunk of absolute targets (two pivots [rad], insertion [m], roll [rad], jaw opening, for each arm), of which up to 8 are done.
+//! An observation has `observation/state` (the numbers of [`trocar_task::STATE_NAMES`]),
+//! `observation/images/NAME` for each camera of the scene except the recording camera, `prompt`,
+//! `episode/seed` and `episode/step`. The reply has `actions`: a chunk of absolute targets, for
+//! each arm two pivots (rad), insertion (m), roll (rad) and jaw opening. Up to 8 of them are
+//! executed.
 
-use crate::served::{PYTHON_SOURCE, Served, interpreter, serve};
-use crate::source::PolicySpec;
+use crate::policy_server::{PYTHON_SOURCE, PolicyServer, interpreter};
+use crate::policy_spec::PolicySpec;
 use std::collections::hash_map::RandomState;
 use std::hash::{BuildHasher, Hasher};
 use std::sync::Arc;
@@ -20,42 +24,42 @@ use trocar_task::policy::CHUNK;
 use trocar_task::{Bounds, Episode, Policy};
 use trocar_workflow::{Error, Result};
 
-/// The camera that policies do not see through: no hospital has it.
+/// The camera that policies do not see, because it exists only for recordings.
 const RECORDING: &str = "recording";
 
-/// The key that a server may want.
+/// Environment variable with the server's key.
 const KEY: &str = "TROCAR_POLICY_KEY";
-/// Longest wait for a reply [s], unless this says another.
+/// Environment variable with the timeout of a reply (s).
 const TIMEOUT: &str = "TROCAR_POLICY_TIMEOUT_S";
 
-/// A policy of another process.
-pub(super) struct Remote {
+/// A policy in another process.
+pub(super) struct RemotePolicy {
     name: String,
     endpoint: Endpoint,
     module: Option<String>,
-    /// The interpreter that serves it.
+    /// The interpreter of a Python policy.
     python: String,
-    child: Option<Served>,
+    server: Option<PolicyServer>,
     client: Option<Client>,
     bounds: Bounds,
     specimen: Specimen,
-    /// What the cameras see, with where the specimen was when it was made; made in the first episode, and anew where the specimen lies elsewhere.
-    sight: Option<(Frame, CameraRig)>,
+    /// The cameras, with the placement of the specimen for which they were made.
+    rig: Option<(Frame, CameraRig)>,
     stop: Arc<AtomicBool>,
     cameras: Vec<(String, [usize; 2])>,
     prompt: String,
     seed: u64,
-    /// The server is still to be told that an episode begins.
-    begins: bool,
-    /// The connection is an earlier episode's and was not asked in this one: it may be dead without having been seen to be.
-    left: bool,
-    /// RoboArena's name of the episode at hand.
+    /// The server must be reset for a new episode.
+    needs_reset: bool,
+    /// The connection is unused since an earlier episode, so it may have closed unnoticed.
+    stale: bool,
+    /// RoboArena's name of the running episode.
     session: String,
 }
 
-impl Remote {
-    /// A server's policy, or a Python policy. `served` is the latter's server if it runs already;
-    /// otherwise `$TROCAR_PYTHON`, or `python`, or `python3` starts it.
+impl RemotePolicy {
+    /// A server's policy, or a Python policy. `server` is the running server of a Python policy;
+    /// without one, `$TROCAR_PYTHON`, `python` or `python3` starts it.
     ///
     /// # Errors
     /// A Python policy that cannot be loaded.
@@ -65,7 +69,7 @@ impl Remote {
         episode: &Episode,
         stop: Arc<AtomicBool>,
         python: Option<&str>,
-        served: Option<Served>,
+        server: Option<PolicyServer>,
     ) -> Result<Self> {
         let scene = episode.scene();
         let module = spec.source.strip_prefix(PYTHON_SOURCE).map(str::to_owned);
@@ -80,64 +84,66 @@ impl Remote {
             endpoint,
             module,
             python: interpreter(python),
-            child: None,
+            server: None,
             client: None,
             bounds,
             specimen: specimen.clone(),
-            sight: None,
+            rig: None,
             stop,
             cameras,
             prompt: trocar_task::prompt(scene),
             seed: 0,
-            begins: false,
-            left: false,
+            needs_reset: false,
+            stale: false,
             session: String::new(),
         };
-        if let Some(served) = served {
-            made.endpoint.url.clone_from(&served.url);
-            made.child = Some(served);
+        if let Some(server) = server {
+            made.use_server(server);
         }
-        match made.serve() {
+        match made.start_server() {
             Err(_) if made.stop.load(Ordering::Relaxed) => Err(Error::Interrupted),
             Err(why) => Err(Error::Mismatch(why)),
             Ok(()) => Ok(made),
         }
     }
 
-    /// Serves the callable, if it is one and its server does not run.
-    fn serve(&mut self) -> std::result::Result<(), String> {
-        if self.child.as_mut().is_some_and(Served::has_ended) {
-            (self.child, self.client) = (None, None);
+    fn use_server(&mut self, server: PolicyServer) {
+        self.endpoint.url.clone_from(&server.url);
+        (self.server, self.client) = (Some(server), None);
+    }
+
+    /// Starts the server of a Python policy unless it runs.
+    fn start_server(&mut self) -> std::result::Result<(), String> {
+        if self.server.as_mut().is_some_and(PolicyServer::has_ended) {
+            (self.server, self.client) = (None, None);
         }
         if let Some(module) = &self.module
-            && self.child.is_none()
+            && self.server.is_none()
         {
-            let served = serve(&self.python, module, &self.stop)?;
-            self.endpoint.url.clone_from(&served.url);
-            self.child = Some(served);
-            self.client = None;
+            let server = PolicyServer::start(&self.python, module, &self.stop)?;
+            self.use_server(server);
         }
         Ok(())
     }
 
-    /// Makes the connection when it is first needed and after it was lost, and tells a server that an episode begins.
+    /// Connects if there is no connection, and resets the server for a new episode.
     fn connect(&mut self) -> std::result::Result<&mut Client, String> {
-        self.serve()?;
+        self.start_server()?;
         let said = |e: trocar_remote::Error| e.to_string();
-        if self.begins
+        if self.needs_reset
             && let Some(client) = &mut self.client
             && client.reset(&session(client, &self.session).map_err(said)?).is_ok()
         {
-            self.begins = false;
+            self.needs_reset = false;
         }
-        if self.begins || self.client.as_ref().is_none_or(|c| !c.is_connected()) {
+        if self.needs_reset || self.client.as_ref().is_none_or(|c| !c.is_connected()) {
             self.client = None;
             let mut client = Client::connect(&self.endpoint).map_err(said)?;
-            if self.begins {
+            if self.needs_reset {
                 client.reset(&session(&client, &self.session).map_err(said)?).map_err(said)?;
-                self.begins = false;
+                self.needs_reset = false;
             }
-            (self.client, self.left) = (Some(client), false);
+            (self.client, self.stale) = (Some(client), false);
         }
         self.client.as_mut().ok_or_else(|| "there is no connection".to_owned())
     }
@@ -149,13 +155,13 @@ impl Remote {
         let array = Array::from_f32(&[state.len()], &state).map_err(said)?;
         seen.insert("observation/state".to_owned(), Value::Array(array));
         let scene = episode.arranged_scene();
-        if self.sight.as_ref().is_none_or(|(placed, _)| *placed != scene.placement) {
-            let sight = CameraRig::new(&scene, &self.specimen, episode.cell()).map_err(|e| e.to_string())?;
-            self.sight = Some((scene.placement, sight));
+        if self.rig.as_ref().is_none_or(|(placed, _)| *placed != scene.placement) {
+            let rig = CameraRig::new(&scene, &self.specimen, episode.cell()).map_err(|e| e.to_string())?;
+            self.rig = Some((scene.placement, rig));
         }
-        let Some((_, sight)) = &mut self.sight else { return Err("there are no cameras".to_owned()) };
+        let Some((_, rig)) = &mut self.rig else { return Err("there are no cameras".to_owned()) };
         for (camera, size) in &self.cameras {
-            let picture = sight
+            let picture = rig
                 .render(episode.cell(), camera, *size, &RenderSettings::Preview { shadows: false })
                 .map_err(|e| e.to_string())?;
             let pixels = picture.color.pixels.as_flattened().to_vec();
@@ -163,7 +169,8 @@ impl Remote {
             seen.insert(format!("observation/images/{camera}"), Value::Array(array));
         }
         seen.insert("prompt".to_owned(), Value::Text(self.prompt.clone()));
-        let seed = i64::try_from(self.seed).map_err(|_| format!("the seed {} is beyond {}", self.seed, i64::MAX))?;
+        let seed = i64::try_from(self.seed)
+            .map_err(|_| format!("the seed is {}; it must be at most {}", self.seed, i64::MAX))?;
         seen.insert("episode/seed".to_owned(), Value::Int(seed));
         seen.insert("episode/step".to_owned(), Value::Int(episode.rows().len() as i64));
         Ok(seen)
@@ -179,19 +186,19 @@ impl Remote {
                 Ok(reply) => break reply,
                 Err(why) => why,
             };
-            // A child that has died says why on its last line.
-            let last = self.child.as_mut().and_then(|c| c.last_words());
+            // A server that has ended gives the reason in its last line.
+            let last = self.server.as_mut().and_then(|c| c.error_line());
             if last.is_some() {
-                self.child = None;
+                self.server = None;
             }
-            // Whoever went between two episodes is asked once more, on a new connection.
-            if std::mem::take(&mut self.left) && why.is_disconnection() {
-                (self.client, self.begins) = (None, true);
+            // A connection that closed between two episodes is made once more.
+            if std::mem::take(&mut self.stale) && why.is_disconnection() {
+                (self.client, self.needs_reset) = (None, true);
                 continue;
             }
-            return Err(last.map_or_else(|| why.to_string(), |words| format!("{why}; its last words: {words}")));
+            return Err(last.map_or_else(|| why.to_string(), |line| format!("{why}; its last line: {line}")));
         };
-        self.left = false;
+        self.stale = false;
         let steps = reply.actions.horizon().min(CHUNK);
         (0..steps)
             .filter_map(|k| reply.actions.step(k))
@@ -200,14 +207,15 @@ impl Remote {
     }
 }
 
-/// Where the policy `spec` is asked, with what the environment says of it. A Python callable has no address before it is served.
+/// The endpoint of the policy `spec`, with key and timeout of the environment. A Python callable
+/// has no address before it is served.
 ///
 /// # Errors
-/// An address, a key or a longest wait that cannot be used.
+/// An address, a key or a timeout that is invalid.
 pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
     let is_python = spec.source.starts_with(PYTHON_SOURCE);
     let mut endpoint = Endpoint::new(if is_python { "ws://127.0.0.1:1" } else { &spec.source });
-    // Its address is a random port, which says nothing to a reader and differs from run to run.
+    // Its address is a random port, which must not appear in results.
     endpoint.label = is_python.then(|| spec.source.clone());
     endpoint.api_key = std::env::var(KEY).ok();
     if let Ok(text) = std::env::var(TIMEOUT) {
@@ -220,23 +228,24 @@ pub(super) fn endpoint(spec: &PolicySpec) -> Result<Endpoint> {
     Ok(endpoint)
 }
 
-/// What each message has besides: the episode's name, where a RoboArena server asks for one.
+/// The additional entry of each message to a RoboArena server that asks for session names.
 fn session(client: &Client, name: &str) -> trocar_remote::Result<Observation> {
     let asked = client.server_config()?.is_some_and(|c| c.needs_session_id);
     Ok(asked.then(|| ("session_id".to_owned(), Value::Text(name.to_owned()))).into_iter().collect())
 }
 
-impl Policy for Remote {
+impl Policy for RemotePolicy {
     fn name(&self) -> &str {
         &self.name
     }
 
     fn begin(&mut self, _episode: &Episode, seed: u64) -> trocar_task::Result<()> {
         self.seed = seed;
-        // A server that keeps a history is told before the first observation, on whatever connection there is then.
-        self.begins = true;
-        self.left = self.client.is_some();
-        // No two episodes have the same, not even of one policy and seed: several processes may ask one server.
+        // A server with a history is reset before the first observation.
+        self.needs_reset = true;
+        self.stale = self.client.is_some();
+        // Several processes may use one server with the same policy and seed, so the name is
+        // random.
         self.session = format!("{}-{seed}-{:016x}", self.name, RandomState::new().build_hasher().finish());
         Ok(())
     }

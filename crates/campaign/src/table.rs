@@ -1,11 +1,11 @@
-//! A campaign in figures: how many episodes of each policy passed which stage, with intervals; policies compared on the same seeds.
+//! The figures of a campaign: episodes of each policy that passed each stage, with intervals, and
+//! comparisons of policies on the same seeds.
 
-use crate::plan::Plan;
-use crate::store::Kept;
+use crate::manifest::Manifest;
+use crate::store::EpisodeRecord;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use trocar_task::End;
-use trocar_workflow::{Error, Result};
 
 /// Half-width of a 95% interval in standard deviations.
 const Z: f64 = 1.959_964;
@@ -15,14 +15,15 @@ const Z: f64 = 1.959_964;
 pub struct Interval {
     /// The share.
     pub share: f64,
-    /// The least ...
+    /// Lower end.
     pub low: f64,
-    /// ... and the most that it may be.
+    /// Upper end.
     pub high: f64,
 }
 
 impl Interval {
-    /// Of `count` among `all`, by E. B. Wilson, "Probable inference, the law of succession, and statistical inference", 1927.
+    /// The share of `count` among `all` with its Wilson interval (E. B. Wilson, "Probable
+    /// inference, the law of succession, and statistical inference", 1927).
     pub fn wilson(count: usize, all: usize) -> Self {
         if all == 0 {
             return Self { share: 0.0, low: 0.0, high: 1.0 };
@@ -31,27 +32,27 @@ impl Interval {
         let (z2, scale) = (Z * Z, 1.0 + Z * Z / n);
         let middle = (p + z2 / (2.0 * n)) / scale;
         let half = Z * (p * (1.0 - p) / n + z2 / (4.0 * n * n)).sqrt() / scale;
-        // Of none the low end is 0 and of all the high end is 1, which rounding misses.
+        // Rounding would miss the exact ends at 0 and 1.
         let low = if count == 0 { 0.0 } else { (middle - half).max(0.0) };
         let high = if count == all { 1.0 } else { (middle + half).min(1.0) };
         Self { share: p, low, high }
     }
 }
 
-/// How many episodes passed a stage.
+/// Number of episodes that passed a stage.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageCount {
     /// The stage.
     pub stage: &'static str,
-    /// Episodes.
+    /// Episodes that passed it.
     pub passed: usize,
     /// Their share.
     pub interval: Interval,
-    /// When it passed, median [s].
+    /// Median time at which it passed (s).
     pub median_s: Option<f64>,
 }
 
-/// Episodes by how they ended; the names are those of an episode's `end`.
+/// Numbers of episodes by their end. The JSON keys are the values of an episode's `end`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub struct EndCounts {
@@ -87,79 +88,79 @@ impl EndCounts {
     }
 }
 
-/// A policy in figures.
+/// The figures of a policy.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PolicyRow {
     /// Its name.
     pub policy: String,
-    /// Episodes that are kept.
+    /// Stored episodes.
     pub episodes: usize,
-    /// Those that passed all stages.
+    /// Episodes that passed all stages.
     pub passed: usize,
     /// Their share.
     pub interval: Interval,
-    /// Stage by stage.
+    /// The stages in order.
     pub stages: Vec<StageCount>,
     /// Mean score, 0 to 1.
     pub mean_score: f64,
-    /// Episodes by how they ended.
+    /// Episodes by their end.
     pub ends: EndCounts,
-    /// Episodes in which the organ was attached, and those that held it to the end.
+    /// Episodes with a grasp of the organ.
     pub attached: usize,
-    /// See there.
+    /// Episodes that held the organ to the end.
     pub held_to_end: usize,
-    /// Median lift of the attached [mm].
+    /// Median lift over episodes with a grasp (mm).
     pub lift_median_mm: Option<f64>,
-    /// Median over the attached of the grasping arm's median RCM deviation under load [mm].
+    /// Median over episodes with a grasp of the median RCM deviation under load (mm).
     pub rcm_median_mm: Option<f64>,
-    /// Largest RCM deviation of any episode [mm].
+    /// Largest RCM deviation of any episode (mm).
     pub rcm_max_mm: Option<f64>,
-    /// Attached episodes whose RCM deviation stayed within the scene's threshold, and within 5 mm.
+    /// Episodes with a grasp whose RCM deviation stayed within the scene's threshold.
     pub rcm_within: usize,
-    /// See there.
+    /// Episodes with a grasp whose RCM deviation stayed within 5 mm.
     pub rcm_within_5_mm: usize,
-    /// Median of the organ coordinate of the first grasp, with the least and greatest.
+    /// Organ coordinate of the first grasp: median, minimum, maximum.
     pub grasp_at: Option<[f64; 3]>,
-    /// Median over episodes of the peak contact force [N], and of the peak constraint force [N].
+    /// Median over episodes of the peak contact force (N).
     pub peak_contact_n: Option<f64>,
-    /// See there.
+    /// Median over episodes of the peak constraint force (N).
     pub peak_constraint_n: Option<f64>,
-    /// And of the peak force with which tissue pushed blades apart [N].
+    /// Median over episodes of the peak force with which tissue pushed blades apart (N).
     pub peak_jaw_n: Option<f64>,
-    /// Median over episodes of the delay of the measured tip behind the commanded one [ms].
+    /// Median over episodes of the delay of the measured tip behind the commanded tip (ms).
     pub lag_ms: Option<f64>,
-    /// Most inverted elements.
+    /// Maximum number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// Suspensions of physics in all episodes: times that contact of an instrument was disabled.
+    /// Number of times that contact of an instrument was disabled: a suspension of physics.
     pub disabled_contacts: usize,
-    /// Times that contact of blades that hold tissue was disabled.
+    /// Number of times that contact of blades that hold tissue was disabled.
     pub disabled_blades: usize,
-    /// Times that an organ was relaxed outside of time.
+    /// Number of times that an organ was relaxed outside of time.
     pub relaxed: usize,
-    /// Why the policy failed, in the first episode that ended so.
+    /// Reason of the policy's first failure.
     pub policy_error: Option<String>,
 }
 
 /// Two policies on the same seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// The one.
+    /// The first policy.
     pub a: String,
-    /// The other.
+    /// The second policy.
     pub b: String,
-    /// Seeds that both have.
+    /// Number of seeds that both have.
     pub seeds: usize,
-    /// Only the one passed.
+    /// Seeds on which only the first passed.
     pub only_a: usize,
-    /// Only the other passed.
+    /// Seeds on which only the second passed.
     pub only_b: usize,
-    /// How likely a split as uneven is by chance alone: McNemar's exact test, both sides.
+    /// Two-sided p-value of McNemar's exact test.
     pub p: f64,
-    /// Mean of the difference of scores, a less b.
+    /// Mean difference of scores, first minus second.
     pub score_difference: f64,
 }
 
-/// A campaign in figures.
+/// The figures of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CampaignResult {
     /// The scene.
@@ -168,19 +169,19 @@ pub struct CampaignResult {
     pub task: String,
     /// Seed of the first episode.
     pub seed: u64,
-    /// Episodes that are kept.
+    /// Stored episodes.
     pub episodes: usize,
-    /// Episodes that are to be in all.
+    /// Episodes of the whole campaign.
     pub planned: usize,
-    /// Those of all policies that passed.
+    /// Episodes of all policies that passed.
     pub passed: usize,
-    /// Policy by policy.
+    /// The policies in order.
     pub policies: Vec<PolicyRow>,
-    /// Pair by pair.
+    /// The pairs of policies.
     pub comparisons: Vec<Comparison>,
-    /// One hash over all final states: two campaigns with the same did the same.
+    /// One hash over all final states. Equal hashes mean equal episodes.
     pub hash: String,
-    /// The report.
+    /// Path of the report.
     pub report: String,
 }
 
@@ -192,31 +193,32 @@ impl PolicyRow {
 }
 
 impl CampaignResult {
-    /// Of the episodes `kept` so far.
-    pub(super) fn of(plan: &Plan, kept: &[Kept], folder: &Path) -> Self {
-        let of = |name: &str| kept.iter().filter(|k| k.name == name).collect::<Vec<_>>();
-        // A policy of which nothing is kept yet has the stages of the others.
-        let stages: Vec<&'static str> =
-            kept.first().map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
-        let policies = plan.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, plan)).collect();
+    /// The figures of the stored episodes `records`.
+    pub(super) fn of(manifest: &Manifest, records: &[EpisodeRecord], folder: &Path) -> Self {
+        let of = |name: &str| records.iter().filter(|k| k.name == name).collect::<Vec<_>>();
+        // A policy without episodes has the stages of the others.
+        let stages: Vec<&'static str> = records
+            .first()
+            .map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
+        let policies = manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
         let mut comparisons = Vec::new();
-        for (k, a) in plan.policies.iter().enumerate() {
-            for b in &plan.policies[k + 1..] {
+        for (k, a) in manifest.policies.iter().enumerate() {
+            for b in &manifest.policies[k + 1..] {
                 comparisons.extend(compare(&of(&a.name), &of(&b.name)));
             }
         }
         let mut hash = xxhash_rust::xxh3::Xxh3::new();
-        for k in kept {
+        for k in records {
             let end = k.summary.end.as_ref().map_or("", |e| e.name());
             hash.update(format!("{} {} {} {end}\n", k.name, k.index, k.state_hash).as_bytes());
         }
         Self {
-            scene: plan.scene.clone(),
-            task: plan.task.clone(),
-            seed: plan.seed,
-            episodes: kept.len(),
-            planned: plan.count(),
-            passed: kept.iter().filter(|k| k.summary.passed).count(),
+            scene: manifest.scene.clone(),
+            task: manifest.task.clone(),
+            seed: manifest.seed,
+            episodes: records.len(),
+            planned: manifest.count(),
+            passed: records.iter().filter(|k| k.summary.passed).count(),
             policies,
             comparisons,
             hash: format!("{:016x}", hash.digest()),
@@ -225,36 +227,36 @@ impl CampaignResult {
     }
 }
 
-fn row(name: &str, kept: &[&Kept], names: &[&'static str], plan: &Plan) -> PolicyRow {
-    let all = kept.len();
+fn row(name: &str, records: &[&EpisodeRecord], names: &[&'static str], manifest: &Manifest) -> PolicyRow {
+    let all = records.len();
     let stages = names.iter().enumerate().map(|(n, stage)| {
-        let times: Vec<f64> = kept.iter().filter_map(|k| k.summary.progress.stages.get(n)?.time_s).collect();
-        let passed = kept.iter().filter(|k| k.summary.progress.stages.get(n).is_some_and(|s| s.passed)).count();
+        let times: Vec<f64> = records.iter().filter_map(|k| k.summary.progress.stages.get(n)?.time_s).collect();
+        let passed = records.iter().filter(|k| k.summary.progress.stages.get(n).is_some_and(|s| s.passed)).count();
         StageCount { stage, passed, interval: Interval::wilson(passed, all), median_s: median(times) }
     });
-    let passed = kept.iter().filter(|k| k.summary.passed).count();
-    let attached: Vec<&&Kept> = kept.iter().filter(|k| k.summary.attached).collect();
-    let ends = EndCounts::of(kept.iter().map(|k| k.summary.end.as_ref()));
-    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| median(kept.iter().map(|k| k.peak(of)).collect());
-    let policy_error = kept.iter().find_map(|k| match &k.summary.end {
+    let passed = records.iter().filter(|k| k.summary.passed).count();
+    let attached: Vec<&&EpisodeRecord> = records.iter().filter(|k| k.summary.attached).collect();
+    let ends = EndCounts::of(records.iter().map(|k| k.summary.end.as_ref()));
+    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| median(records.iter().map(|k| k.peak(of)).collect());
+    let policy_error = records.iter().find_map(|k| match &k.summary.end {
         Some(End::PolicyError { why }) => Some(why.clone()),
         _ => None,
     });
-    let places: Vec<f64> = kept.iter().filter_map(|k| k.summary.grasp_at).collect();
+    let places: Vec<f64> = records.iter().filter_map(|k| k.summary.grasp_at).collect();
     PolicyRow {
         policy: name.to_owned(),
         episodes: all,
         passed,
         interval: Interval::wilson(passed, all),
         stages: stages.collect(),
-        mean_score: kept.iter().map(|k| k.summary.score).sum::<f64>() / all.max(1) as f64,
+        mean_score: records.iter().map(|k| k.summary.score).sum::<f64>() / all.max(1) as f64,
         ends,
         attached: attached.len(),
         held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
         lift_median_mm: median(attached.iter().map(|k| k.summary.lift_mm).collect()),
         rcm_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
-        rcm_max_mm: kept.iter().map(|k| k.summary.rcm_peak_mm).max_by(f64::total_cmp),
-        rcm_within: attached.iter().filter(|k| k.summary.rcm_peak_mm <= plan.rcm_threshold_mm).count(),
+        rcm_max_mm: records.iter().map(|k| k.summary.rcm_peak_mm).max_by(f64::total_cmp),
+        rcm_within: attached.iter().filter(|k| k.summary.rcm_peak_mm <= manifest.rcm_threshold_mm).count(),
         rcm_within_5_mm: attached.iter().filter(|k| k.summary.rcm_peak_mm <= 5.0).count(),
         grasp_at: median(places.clone()).map(|middle| {
             let (low, high) = places.iter().fold((1.0_f64, 0.0_f64), |(l, h), s| (l.min(*s), h.max(*s)));
@@ -263,17 +265,17 @@ fn row(name: &str, kept: &[&Kept], names: &[&'static str], plan: &Plan) -> Polic
         peak_contact_n: peak(|a| a.peak_contact_n),
         peak_constraint_n: peak(|a| a.peak_constraint_n),
         peak_jaw_n: peak(|a| a.peak_jaw_n),
-        lag_ms: median(kept.iter().filter_map(|k| k.lag_ms()).collect()),
-        inverted_peak: kept.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
-        disabled_contacts: kept.iter().map(|k| k.summary.disabled_contacts).sum(),
-        disabled_blades: kept.iter().map(|k| k.summary.disabled_blades).sum(),
-        relaxed: kept.iter().map(|k| k.summary.relaxed).sum(),
+        lag_ms: median(records.iter().filter_map(|k| k.lag_ms()).collect()),
+        inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+        disabled_contacts: records.iter().map(|k| k.summary.disabled_contacts).sum(),
+        disabled_blades: records.iter().map(|k| k.summary.disabled_blades).sum(),
+        relaxed: records.iter().map(|k| k.summary.relaxed).sum(),
         policy_error,
     }
 }
 
-fn compare(a: &[&Kept], b: &[&Kept]) -> Option<Comparison> {
-    let pairs: Vec<(&Kept, &Kept)> =
+fn compare(a: &[&EpisodeRecord], b: &[&EpisodeRecord]) -> Option<Comparison> {
+    let pairs: Vec<(&EpisodeRecord, &EpisodeRecord)> =
         a.iter().filter_map(|x| b.iter().find(|y| y.seed == x.seed).map(|y| (*x, *y))).collect();
     let (first, second) = pairs.first()?;
     let only_a = pairs.iter().filter(|(x, y)| x.summary.passed && !y.summary.passed).count();
@@ -290,10 +292,11 @@ fn compare(a: &[&Kept], b: &[&Kept]) -> Option<Comparison> {
     })
 }
 
-/// Probability that fair coins fall at least as unevenly as `a` to `b`, on either side (McNemar's exact test).
+/// Two-sided p-value of McNemar's exact test: probability that `a + b` fair coins split at least as
+/// unevenly as `a` to `b`.
 fn mcnemar(a: usize, b: usize) -> f64 {
     let (n, few) = (a + b, a.min(b));
-    // In logarithms: 2^-n is nothing for long campaigns.
+    // In logarithms, because 2^-n underflows for long campaigns.
     let mut log = -(n as f64) * std::f64::consts::LN_2;
     let mut tail = 0.0;
     for k in 0..=few {
@@ -303,84 +306,11 @@ fn mcnemar(a: usize, b: usize) -> f64 {
     (2.0 * tail).min(1.0)
 }
 
-/// The middle of some values; None of nothing.
+/// The median; `None` without values.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let n = values.len();
     (n > 0).then(|| 0.5 * (values[(n - 1) / 2] + values[n / 2]))
-}
-
-/// One line an episode. After the hash come when each stage of the task passed [s], empty where it did not.
-pub(super) fn csv(kept: &[Kept]) -> Result<String> {
-    let format = |e: csv::Error| Error::Format(e.to_string());
-    let stages = kept.first().map_or(&[][..], |k| &k.summary.progress.stages);
-    let times: Vec<String> = stages.iter().map(|s| format!("{}_time_s", s.stage.name())).collect();
-    let mut table = csv::Writer::from_writer(Vec::new());
-    let head = [
-        "policy",
-        "episode",
-        "seed",
-        "passed",
-        "stages",
-        "score",
-        "end",
-        "why",
-        "duration_s",
-        "attached",
-        "grasp_at",
-        "held_to_end",
-        "lift_mm",
-        "slip_mm",
-        "rcm_peak_mm",
-        "rcm_loaded_median_mm",
-        "lag_ms",
-        "peak_contact_n",
-        "peak_constraint_n",
-        "peak_jaw_n",
-        "inverted_peak",
-        "disabled_contacts",
-        "disabled_blades",
-        "relaxed",
-        "state_hash",
-    ];
-    table.write_record(head.into_iter().chain(times.iter().map(String::as_str))).map_err(format)?;
-    let or_nothing = |x: Option<f64>| x.map_or(String::new(), |x| x.to_string());
-    for k in kept {
-        let s = &k.summary;
-        let end = s.end.as_ref().map_or(String::new(), |e| e.name().to_owned());
-        let why = if s.passed { None } else { s.why.clone().or_else(|| s.end.as_ref().map(ToString::to_string)) };
-        let record = [
-            k.name.clone(),
-            k.index.to_string(),
-            k.seed.to_string(),
-            s.passed.to_string(),
-            s.stage.to_string(),
-            s.score.to_string(),
-            end,
-            why.unwrap_or_default(),
-            s.duration_s.to_string(),
-            s.attached.to_string(),
-            or_nothing(s.grasp_at),
-            s.held_to_end.to_string(),
-            s.lift_mm.to_string(),
-            or_nothing(s.slip_mm),
-            s.rcm_peak_mm.to_string(),
-            or_nothing(k.loaded_rcm_mm()),
-            or_nothing(k.lag_ms()),
-            k.peak(|a| a.peak_contact_n).to_string(),
-            k.peak(|a| a.peak_constraint_n).to_string(),
-            k.peak(|a| a.peak_jaw_n).to_string(),
-            s.inverted_peak.to_string(),
-            s.disabled_contacts.to_string(),
-            s.disabled_blades.to_string(),
-            s.relaxed.to_string(),
-            k.state_hash.clone(),
-        ];
-        let times = (0..times.len()).map(|n| or_nothing(s.progress.stages.get(n).and_then(|p| p.time_s)));
-        table.write_record(record.into_iter().chain(times)).map_err(format)?;
-    }
-    let bytes = table.into_inner().map_err(|e| Error::Format(e.to_string()))?;
-    String::from_utf8(bytes).map_err(|e| Error::Format(e.to_string()))
 }
 
 #[cfg(test)]

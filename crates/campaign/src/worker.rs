@@ -1,10 +1,10 @@
-//! Runs jobs one after the other: one cell, built once, and the policies that were asked for so far.
+//! Runs jobs one after the other in one cell. Policies are made when first needed and reused.
 
-use crate::plan::Job;
-use crate::remote::Remote;
-use crate::served::Served;
-use crate::source::PolicySpec;
-use crate::store::Files;
+use crate::manifest::Job;
+use crate::policy_server::PolicyServer;
+use crate::policy_spec::PolicySpec;
+use crate::remote::RemotePolicy;
+use crate::store::EpisodeFiles;
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry;
 use std::sync::Arc;
@@ -14,17 +14,17 @@ use trocar_specimen::Specimen;
 use trocar_task::{Episode, Policy, policy, run};
 use trocar_workflow::{Error, Result};
 
-/// An episode's cell with policies.
+/// A cell with policies, which runs one job at a time.
 pub struct Worker {
     specimen: Specimen,
     episode: Episode,
-    /// By their names.
+    /// By name.
     policies: BTreeMap<String, Box<dyn Policy + Send>>,
     stop: Arc<AtomicBool>,
-    /// The interpreter that serves Python policies, if `$TROCAR_PYTHON` names none.
+    /// Interpreter of Python policies unless `$TROCAR_PYTHON` names one.
     python: Option<String>,
-    /// Servers of Python policies that run already, by the policies' names.
-    served: BTreeMap<String, Served>,
+    /// Running servers of Python policies, by policy name.
+    servers: BTreeMap<String, PolicyServer>,
 }
 
 impl Worker {
@@ -40,47 +40,48 @@ impl Worker {
             policies: BTreeMap::new(),
             stop: Arc::default(),
             python: None,
-            served: BTreeMap::new(),
+            servers: BTreeMap::new(),
         })
     }
 
-    /// The same, which gives up what it does when `flag` becomes true.
+    /// Stops running work when `flag` becomes true.
     #[must_use]
-    pub fn stopped_by(mut self, flag: Arc<AtomicBool>) -> Self {
+    pub fn with_stop_flag(mut self, flag: Arc<AtomicBool>) -> Self {
         self.stop = flag;
         self
     }
 
-    /// The same, whose `python:` policies the interpreter `python` serves, unless `$TROCAR_PYTHON` names another.
+    /// Serves `python:` policies by the interpreter `python`, unless `$TROCAR_PYTHON` names
+    /// another.
     #[must_use]
-    pub fn served_by(mut self, python: Option<String>) -> Self {
+    pub fn with_python(mut self, python: Option<String>) -> Self {
         self.python = python;
         self
     }
 
-    /// The same, with servers of Python policies that run already, by the policies' names.
+    /// Uses running servers of Python policies, by policy name.
     #[must_use]
-    pub(super) fn with_served(mut self, served: BTreeMap<String, Served>) -> Self {
-        self.served = served;
+    pub(super) fn with_servers(mut self, servers: BTreeMap<String, PolicyServer>) -> Self {
+        self.servers = servers;
         self
     }
 
-    /// Makes `policies` ready, so that one that can never act is known before any episode is run.
+    /// Makes `policies`, so that one that cannot act is reported before the first episode.
     ///
     /// # Errors
-    /// A Python policy that cannot be loaded; [`trocar_workflow::Error::Interrupted`] when the flag says so.
-    pub fn start<'a>(&mut self, policies: impl IntoIterator<Item = &'a PolicySpec>) -> Result<()> {
+    /// A Python policy that cannot be loaded; [`Error::Interrupted`] if the stop flag is set.
+    pub fn prepare<'a>(&mut self, policies: impl IntoIterator<Item = &'a PolicySpec>) -> Result<()> {
         policies.into_iter().try_for_each(|spec| self.policy(spec).map(|_| ()))
     }
 
-    /// The policy of `spec`, made when it is first asked for.
+    /// The policy of `spec`; the first call makes it.
     fn policy(&mut self, spec: &PolicySpec) -> Result<(&mut Episode, &mut (dyn Policy + Send))> {
         let made = match self.policies.entry(spec.name.clone()) {
             Entry::Occupied(made) => made.into_mut(),
             Entry::Vacant(place) => place.insert(if spec.is_remote() {
                 let stop = Arc::clone(&self.stop);
-                let served = self.served.remove(&spec.name);
-                Box::new(Remote::new(spec, &self.specimen, &self.episode, stop, self.python.as_deref(), served)?)
+                let server = self.servers.remove(&spec.name);
+                Box::new(RemotePolicy::new(spec, &self.specimen, &self.episode, stop, self.python.as_deref(), server)?)
             } else {
                 policy::named(&spec.source)?
             }),
@@ -88,27 +89,29 @@ impl Worker {
         Ok((&mut self.episode, made.as_mut()))
     }
 
-    /// Runs `job` and gives the files of its episode. A policy that fails ends its episode, which is a result.
+    /// Runs `job` and returns the files of its episode. A policy that fails ends its episode, which
+    /// is a result and not an error.
     ///
     /// # Errors
-    /// An episode that cannot be begun, a Python policy that cannot be loaded; [`trocar_workflow::Error::Interrupted`] when the flag says so.
-    pub fn run(&mut self, job: &Job) -> Result<Files> {
+    /// An episode that cannot begin, a Python policy that cannot be loaded;
+    /// [`Error::Interrupted`] if the stop flag is set.
+    pub fn run(&mut self, job: &Job) -> Result<EpisodeFiles> {
         self.run_until(job, &|| false)
     }
 
-    /// The same, which also gives up between two steps when `given_up` says so.
+    /// As [`run`](Self::run), and also stops between two steps when `interrupted` returns true.
     ///
     /// # Errors
     /// As [`run`](Self::run).
-    pub fn run_until(&mut self, job: &Job, given_up: &dyn Fn() -> bool) -> Result<Files> {
+    pub fn run_until(&mut self, job: &Job, interrupted: &dyn Fn() -> bool) -> Result<EpisodeFiles> {
         let flag = Arc::clone(&self.stop);
-        let stopped = || flag.load(Ordering::Relaxed) || given_up();
+        let stopped = || flag.load(Ordering::Relaxed) || interrupted();
         let (episode, policy) = self.policy(&job.policy)?;
         let recording = run(episode, policy, job.seed, &mut |_| !stopped());
         if stopped() {
-            // A policy that was waited for ends as one that failed; it did not.
+            // The stop flag ends a waiting policy like a failure; it is none.
             return Err(Error::Interrupted);
         }
-        Files::of(&recording?)
+        EpisodeFiles::of(&recording?)
     }
 }

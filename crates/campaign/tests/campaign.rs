@@ -1,4 +1,5 @@
-//! Campaigns on this machine: names with dots, damaged files, an interruption, options that cannot be, and what the table holds.
+//! Campaigns on this machine: names with dots, damaged files, interruptions, wrong options, and the
+//! contents of the table.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -9,14 +10,15 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
 use tempfile::TempDir;
-use trocar_campaign::{Campaign, Files, Job, Plan, PolicySpec, Store, run_episode};
+use trocar_campaign::{Campaign, EpisodeFiles, Job, Manifest, PolicySpec, Store, run_episode};
 use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::{SpecimenSource, TaskName};
 use trocar_task::EpisodeFile;
 use trocar_workflow::EpisodeRun;
 
-/// A coarse tube on disk and a scene around it, in which arms reach for half a second; the endoscope alone looks on.
+/// A coarse tube on disk, and a scene of it in which arms reach for half a second before the
+/// endoscope.
 fn scene(folder: &Path) -> PathBuf {
     common::two_tubes(common::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
     let mut scene = common::resection();
@@ -47,9 +49,9 @@ fn episodes_of_names_with_dots_are_done_again_side_by_side() {
     let scene = trocar_scene::Scene::read(&scene(dir.path()).display().to_string()).unwrap();
     let specimen = common::two_tubes(common::ONE_END, 4e-3);
     let policies = ["v1.0=random", "v1.1=random"].map(|p| PolicySpec::parse(p).unwrap());
-    let plan = Plan::new(&scene, &specimen, &policies, 40, 0).unwrap();
-    let store = Store::open(&dir.path().join("campaign"), &plan).unwrap();
-    let jobs: Vec<Job> = plan.jobs().collect();
+    let manifest = Manifest::new(&scene, &specimen, &policies, 40, 0).unwrap();
+    let store = Store::open(&dir.path().join("campaign"), &manifest).unwrap();
+    let jobs: Vec<Job> = manifest.jobs().collect();
     let next = AtomicUsize::new(0);
     let together = Barrier::new(4);
     // Twice: what is there goes aside the second time.
@@ -59,7 +61,7 @@ fn episodes_of_names_with_dots_are_done_again_side_by_side() {
             let k = next.fetch_add(1, Ordering::SeqCst);
             let Some(job) = jobs.get(k % jobs.len()).filter(|_| k < 6 * jobs.len()) else { return Ok(()) };
             let text = format!("{k}").into_bytes();
-            store.put(job, &Files(vec![("result.json".to_owned(), text)]))?;
+            store.put(job, &EpisodeFiles(vec![("result.json".to_owned(), text)]))?;
         }
     };
     std::thread::scope(|scope| {
@@ -118,7 +120,7 @@ fn an_interrupted_campaign_has_a_table_of_what_is_kept_and_says_how_to_go_on() {
     let table = || std::fs::read_to_string(folder.join("table.csv")).unwrap();
     for (most, kept) in [(0, 0), (1, 1), (2, 3)] {
         let why = campaign(dir.path(), &two, 3).run(&folder, &StopAfter::new(most as u64)).unwrap_err();
-        let said = format!("{kept} of 6 episodes are kept");
+        let said = format!("{kept} of 6 episodes are finished");
         assert!(why.to_string().contains(&said) && why.to_string().contains("continues"), "{why}");
         assert_eq!(table().lines().count(), 1 + kept);
         let result: serde_json::Value =

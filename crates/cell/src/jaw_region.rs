@@ -53,7 +53,7 @@ impl JawRegion {
         Self { gripper: *gripper, to_gripper: gripper.pose.inverse(), length }
     }
 
-    /// Whether a point [m, world] is in the wedge; on its faces counts as in.
+    /// Whether a point (m, world) is in the wedge; on its faces counts as in.
     pub fn contains(&self, p: DVec3) -> bool {
         self.holds(self.to_gripper.transform(p), 0.0)
     }
@@ -65,7 +65,7 @@ impl JawRegion {
         along && q.z.abs() <= 0.5 * BLADE_WIDTH && q.y.abs() <= self.gripper.half_gap(r) + beyond
     }
 
-    /// The part of a body of elements `tets` with nodes at `positions` [m, world] that is grasped
+    /// The part of a body of elements `tets` with nodes at `positions` (m, world) that is grasped
     /// when the jaws close on it now; `None` when that is none.
     ///
     /// Elements are looked at in five points, their middle and half way from there to each corner,

@@ -193,7 +193,7 @@ fn a_free_arm_refuses_what_it_cannot_do_and_keeps_the_speed_limits() {
     assert!((cell.measured_cp("left").unwrap().translation.y - 0.462).abs() < 1e-12);
 }
 
-/// The tip's pose with `at` [m] in mid-mouth of an arm, jaws across x.
+/// The tip's pose with `at` (m) in mid-mouth of an arm, jaws across x.
 fn over(cell: &Cell, arm: &str, at: DVec3, beyond: f64) -> Pose {
     let x = cell.workspace(arm).unwrap().direction_to(at);
     let z = (DVec3::X - DVec3::X.dot(x) * x).normalize();

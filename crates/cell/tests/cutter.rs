@@ -9,7 +9,7 @@ use glam::DVec3;
 use trocar_cell::{Gripper, MAX_ANGLE, World};
 use trocar_tissue::{Compliance, Grasp, SolverSettings, ToolMotion};
 
-/// Volume of all bodies as they are now [m3].
+/// Volume of all bodies as they are now (m3).
 fn volume(world: &World) -> f64 {
     let of = |k: usize| {
         let (tets, vertices) = (world.model.bodies()[k].tets().to_vec(), world.state.positions(&world.model, k));

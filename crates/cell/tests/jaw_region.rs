@@ -10,7 +10,7 @@ use trocar_tissue::SolverSettings;
 
 const REACH: f64 = 0.009;
 
-/// Jaws over the tube at `x` [m] along it, `aside` of its axis and `above` of where they hold it in
+/// Jaws over the tube at `x` (m) along it, `aside` of its axis and `above` of where they hold it in
 /// mid-mouth.
 fn jaws(x: f64, aside: f64, above: f64, angle: f64) -> Gripper {
     let up = -DVec3::Z;

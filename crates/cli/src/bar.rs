@@ -7,13 +7,14 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 use trocar_core::Progress;
 
-/// What is shown of the stage at hand.
+/// The display of the current stage.
 enum Shown {
     Bar(ProgressBar),
     Lines(Lines),
 }
 
-/// Shows one bar a stage, or a line now and then when standard error is no terminal; nothing on request.
+/// Shows one bar per stage, or occasional lines if standard error is no terminal. Shows nothing if
+/// quiet.
 pub struct Bar {
     current: Mutex<Option<Shown>>,
     stop: Arc<AtomicBool>,
@@ -21,11 +22,12 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// Takes over Ctrl-C (and the request to terminate): long work then stops at its next frame and cleans up.
+    /// Handles Ctrl-C and the request to terminate: long work stops at its next frame and cleans
+    /// up.
     pub fn new(quiet: bool) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let handler = Arc::clone(&stop);
-        // Without a handler Ctrl-C still ends the program, only less tidily.
+        // Without a handler, Ctrl-C ends the program without cleaning up.
         let _ = ctrlc::set_handler(move || handler.store(true, Ordering::Relaxed));
         Self { current: Mutex::new(None), stop, quiet }
     }

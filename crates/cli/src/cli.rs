@@ -16,7 +16,8 @@ pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, So
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 
-/// Trocar: recordings of a surgical field become organs that deform, and policies are scored in them.
+/// Trocar makes deformable organs from recordings of a surgical field, and scores robot policies on
+/// them.
 #[derive(Debug, Parser)]
 #[command(version, max_term_width = 110)]
 pub struct Cli {
@@ -34,9 +35,11 @@ pub struct Cli {
 /// The commands.
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Record a phantom, reconstruct it, lift its appendix, and open the report: no downloads, no GPU.
+    /// Record a phantom, reconstruct it, lift its appendix, and open the report: no downloads, no
+    /// GPU.
     Demo(Demo),
-    /// Make a recording with known ground truth: a procedural anatomy filmed by a simulated depth camera.
+    /// Make a recording with known ground truth: a procedural anatomy filmed by a simulated depth
+    /// camera.
     Record(Record),
     /// Describe a recording: frames, cameras, depth, organs, and what is missing.
     Inspect(Inspect),
@@ -45,17 +48,19 @@ pub enum Command {
     Segment(Segment),
     /// Reconstruct watertight tetrahedral organs from an RGB-D recording or a surface file.
     Reconstruct(Reconstruct),
-    /// List, print, write and check scene files. A scene file describes the whole two-arm cell in TOML.
+    /// List, print, write and check scene files. A scene file describes the whole two-arm cell in
+    /// TOML.
     Scene(Scene),
-    /// Render a picture of a specimen, a scene or an episode through one of its cameras, or a video of
-    /// a scene's scripted grasp-lift or of an episode.
+    /// Render a picture of a specimen, a scene or an episode through one of its cameras, or a video
+    /// of a scene's scripted grasp-lift or of an episode.
     Render(Render),
     /// Run a scripted grasp-lift on a specimen or in a scene, and write a report.
     Simulate(Simulate),
-    /// Score policies over many episodes: a table with confidence intervals and a report. Safe to kill at
-    /// any time; the same command continues.
+    /// Score policies over many episodes: a table with confidence intervals and a report. Safe to
+    /// kill at any time; the same command continues.
     Evaluate(Evaluate),
-    /// Run one episode of a scene's task by a policy: actions, channels, figures and a report in a folder.
+    /// Run one episode of a scene's task by a policy: actions, channels, figures and a report in a
+    /// folder.
     Episode(Episode),
     /// Replay a recorded episode and verify every step.
     Replay(Replay),
@@ -90,8 +95,9 @@ pub struct Demo {
 /// Arguments of `record`.
 #[derive(Debug, Args)]
 pub struct Record {
-    /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix), phantom-b (rabbit: bowel bloc, small
-    /// bowel, appendix, cecum, stomach), phantom-c (pig: liver, gallbladder).
+    /// The phantom: phantom-a (rabbit: cecum, three bowel segments, stomach, appendix), phantom-b
+    /// (rabbit: bowel bloc, small bowel, appendix, cecum, stomach), phantom-c (pig: liver,
+    /// gallbladder).
     pub phantom: String,
     /// Recording folder to write.
     #[arg(short, long)]
@@ -173,10 +179,10 @@ pub struct Reconstruct {
     /// SAM 2.1, for organs that have only points.
     #[command(flatten)]
     pub sam: Sam,
-    /// How thick organs are taken to be behind their fronts.
+    /// Assumed thickness of organs behind their visible fronts.
     #[arg(long, value_enum, default_value_t = BackName::Rounded)]
     pub back: BackName,
-    /// Make the surface from a binary grid of 1.5 mm, as the paper does, for comparison.
+    /// Make the surface from a binary grid of 1.5 mm as in the paper, for comparison.
     #[arg(long)]
     pub binary_grid: bool,
     /// The mesher that fills the surface with tetrahedra.
@@ -191,8 +197,8 @@ pub struct Reconstruct {
 /// Arguments of `simulate`.
 #[derive(Debug, Args)]
 pub struct Simulate {
-    /// Specimen folder; or a scene file or built-in scene such as cell-a, where the left arm of the cell
-    /// does the same task.
+    /// Specimen folder, scene file, or built-in scene such as cell-a. In a scene, an arm of the
+    /// cell does the task.
     pub specimen: PathBuf,
     /// The task.
     #[arg(long, value_enum, default_value_t = Task::GraspLift)]
@@ -200,8 +206,8 @@ pub struct Simulate {
     /// Organ to grasp; by default the appendix, or the first organ without one.
     #[arg(long)]
     pub organ: Option<String>,
-    /// Place of the grasp along the organ, from 0 (base) to 1 (tip); by default 0.5, or 0.7 with --sever,
-    /// which needs room on the base's side.
+    /// Place of the grasp along the organ, from 0 (base) to 1 (tip); by default 0.5, or 0.7 with
+    /// --sever, which needs space towards the base.
     #[arg(long, allow_negative_numbers = true)]
     pub at: Option<f64>,
     /// Lift of the jaws (mm).
@@ -216,11 +222,11 @@ pub struct Simulate {
     /// Distance of the grasp from the organ's axis, across the organ (mm).
     #[arg(long, default_value_t = 0.0, allow_negative_numbers = true)]
     pub approach_offset: f64,
-    /// First grasp, drag the tissue sideways by this distance (mm), let go, and grasp again.
+    /// Grasp first, drag the tissue sideways by this distance (mm), release it, and grasp again.
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     pub regrasp: Option<f64>,
-    /// After the hold, cut the organ between the grasp and its pins with a second instrument and lift the
-    /// loose piece further; --sever=S cuts at organ coordinate S.
+    /// After the hold, cut the organ between the grasp and its pins with a second instrument and
+    /// lift the loose piece further; --sever=S cuts at organ coordinate S.
     #[arg(long, value_name = "S", num_args = 0..=1, require_equals = true, allow_negative_numbers = true)]
     pub sever: Option<Option<f64>>,
     /// Solver settings of the tissue; by default fast, or the scene's.
@@ -229,7 +235,7 @@ pub struct Simulate {
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// Folder of phantoms; the scene's phantom is made there once and reused
     /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
@@ -241,6 +247,6 @@ pub struct Simulate {
 /// Tasks by name.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Task {
-    /// Settle, grasp, lift, hold, lower, open; with --sever cut after the hold and lift further.
+    /// Settle, grasp, lift, hold, lower, open; with --sever, cut after the hold and lift further.
     GraspLift,
 }

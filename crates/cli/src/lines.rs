@@ -1,34 +1,34 @@
-//! Progress as a plain line now and then, for standard error that goes into a file.
+//! Progress as occasional plain lines, for standard error that goes into a file.
 
 use indicatif::HumanDuration;
 use std::time::{Duration, Instant};
 
-/// The shortest time between two lines.
-const EVERY: Duration = Duration::from_secs(30);
+/// Minimum time between two lines.
+const LINE_INTERVAL: Duration = Duration::from_secs(30);
 
-/// How far a stage is, and when that was told.
+/// The progress of a stage, and the time of its last line.
 pub struct Lines {
     stage: String,
     total: u64,
     done: u64,
-    begun: Instant,
-    told: Instant,
+    start: Instant,
+    last_line: Instant,
 }
 
 impl Lines {
-    /// A stage that begins `now`. Nothing is told of one that is over before a line is due.
+    /// A stage that begins `now`. A short stage gets no line.
     pub fn begin(stage: &str, total: u64, now: Instant) -> Self {
-        Self { stage: stage.to_owned(), total, done: 0, begun: now, told: now }
+        Self { stage: stage.to_owned(), total, done: 0, start: now, last_line: now }
     }
 
-    /// Counts `units` more; the line that is due `now`, if one is.
+    /// Adds `units`. Returns a line if one is due `now`.
     pub fn advance(&mut self, units: u64, now: Instant) -> Option<String> {
         self.done = self.done.saturating_add(units);
-        if now.saturating_duration_since(self.told) < EVERY || self.done == 0 {
+        if now.saturating_duration_since(self.last_line) < LINE_INTERVAL || self.done == 0 {
             return None;
         }
-        self.told = now;
-        let passed = now.saturating_duration_since(self.begun);
+        self.last_line = now;
+        let passed = now.saturating_duration_since(self.start);
         let share = self.total.saturating_sub(self.done) as f64 / self.done as f64;
         let left = Duration::try_from_secs_f64(passed.as_secs_f64() * share).unwrap_or(Duration::MAX);
         let (stage, done, total) = (&self.stage, self.done, self.total);
@@ -49,7 +49,7 @@ mod tests {
         assert_eq!(lines.advance(5, at(40)).as_deref(), Some("episodes: 10 of 100 after 40s, 6m left"));
         assert_eq!(lines.advance(10, at(60)), None);
         assert_eq!(lines.advance(30, at(100)).as_deref(), Some("episodes: 50 of 100 after 2m, 2m left"));
-        // More than was said, and nothing at all.
+        // More units than the total, and none.
         assert!(lines.advance(u64::MAX, at(1000)).unwrap().ends_with(" 0s left"));
         let mut long = Lines::begin("steps", u64::MAX, begun);
         assert_eq!(long.advance(0, at(50)), None);

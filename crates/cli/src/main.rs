@@ -1,4 +1,4 @@
-//! The command line: parses, calls, prints; no logic of its own.
+//! The command line. It parses arguments, calls the library and prints results.
 
 #![allow(clippy::print_stderr, reason = "this is a command-line program")]
 
@@ -13,9 +13,9 @@ use std::process::ExitCode;
 
 /// Exit code of bad input, as clap uses it for bad arguments.
 const BAD_INPUT: u8 = 2;
-/// Exit code of a run the user stopped (128 + SIGINT).
+/// Exit code of an interrupted command (128 + SIGINT).
 const INTERRUPTED: u8 = 130;
-/// Exit code of work that was done and whose result could not be printed.
+/// Exit code of a finished command whose result could not be printed.
 const NOT_PRINTED: u8 = 1;
 
 fn main() -> ExitCode {
@@ -26,10 +26,9 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) if progress.was_interrupted() => {
             match error {
-                // It says what is kept and how to go on.
                 trocar_studies::Error::Work(trocar_workflow::Error::Stopped { .. }) => eprintln!("{error}"),
-                trocar_studies::Error::Interrupted => eprintln!("interrupted; nothing half-written was left behind"),
-                _ => eprintln!("interrupted; nothing half-written was left behind ({error})"),
+                trocar_studies::Error::Interrupted => eprintln!("interrupted; no partial output was left"),
+                _ => eprintln!("interrupted; no partial output was left ({error})"),
             }
             ExitCode::from(INTERRUPTED)
         }

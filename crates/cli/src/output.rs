@@ -1,10 +1,10 @@
-//! What is printed: one JSON object for machines, or lines for people.
+//! Output: one JSON object, or lines for people.
 
 use serde::Serialize;
 use std::io::{ErrorKind, Write};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Set once a result could not be handed over: the work was done, and nobody has it.
+/// Whether a result could not be printed.
 static LOST: AtomicBool = AtomicBool::new(false);
 
 /// Whether a result could not be printed; the program then ends with an error.
@@ -17,7 +17,7 @@ fn lose(why: impl std::fmt::Display) {
     LOST.store(true, Ordering::Relaxed);
 }
 
-/// Prints `value` as JSON, or what `text` says for people.
+/// Prints `value` as JSON, or as the text for people that `text` returns.
 pub fn print<T: Serialize>(json: bool, value: &T, text: impl FnOnce(&T) -> String) {
     let line = if json {
         match serde_json::to_string(value) {
@@ -30,16 +30,16 @@ pub fn print<T: Serialize>(json: bool, value: &T, text: impl FnOnce(&T) -> Strin
     self::line(&line);
 }
 
-/// Prints a line, or several.
+/// Prints one or more lines.
 pub fn line(text: &str) {
     match writeln!(std::io::stdout(), "{text}") {
-        // Nobody reads on: that is theirs to decide.
+        // A closed pipe means that the reader wants no more, which is no error.
         Err(e) if e.kind() != ErrorKind::BrokenPipe => lose(format_args!("standard output: {e}")),
         _ => {}
     }
 }
 
-/// Rows with aligned columns: the first left, the others right.
+/// A table with its first column aligned left and the others right.
 pub fn table(header: &[&str], rows: &[Vec<String>]) -> String {
     let mut widths: Vec<usize> = header.iter().map(|h| h.chars().count()).collect();
     for row in rows {

@@ -11,7 +11,7 @@ fn trocar(arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_trocar")).args(arguments).output().unwrap()
 }
 
-/// Runs the command, which must fail with one line that contains every one of `words`, and must not have made `output`.
+/// Runs the command, which must fail with one line that contains all `words`, without `output`.
 fn refused(arguments: &[&str], output: &Path, words: &[&str]) {
     let parent = output.parent().unwrap();
     let entries = || parent.read_dir().map_or(0, Iterator::count);
@@ -27,7 +27,7 @@ fn refused(arguments: &[&str], output: &Path, words: &[&str]) {
     assert_eq!(entries(), before, "{arguments:?} left something beside {output:?}");
 }
 
-/// A whole recording of a few small frames, made by the phantom's own recorder, to be spoiled.
+/// A valid recording of a few small frames, which tests damage.
 struct Fixture {
     dir: TempDir,
 }
@@ -45,7 +45,7 @@ impl Fixture {
         self.dir.path().join("recording").join(name)
     }
 
-    /// Spoils the recording, expects it refused, and mends it again.
+    /// Damages the recording, expects an error, and restores it.
     fn spoiled(&self, name: &str, spoil: impl FnOnce(&Path), words: &[&str]) {
         let file = self.file(name);
         let kept = fs::read(&file).unwrap();
@@ -134,7 +134,7 @@ fn the_input_is_never_replaced() {
         assert!(said.contains("overlaps the input"), "{said}");
     }
     assert!(fixture.file("recording.toml").is_file() && !inside.exists());
-    // Beside it is fine, named from where the user stands too.
+    // A folder beside it is valid, also by a relative path.
     let beside = Command::new(env!("CARGO_BIN_EXE_trocar"))
         .args(["reconstruct", "recording", "-o", "specimen", "--quiet"])
         .current_dir(home)
@@ -142,7 +142,7 @@ fn the_input_is_never_replaced() {
         .unwrap();
     assert!(beside.status.success(), "{}", String::from_utf8_lossy(&beside.stderr));
     assert!(home.join("specimen/specimen.toml").is_file());
-    // A recording with no truth is somebody's own.
+    // A recording without truth is not one of ours.
     fs::remove_dir_all(fixture.file("truth")).unwrap();
     let result = trocar(&["record", "phantom-a", "--frames", "1", "-o", recording.to_str().unwrap()]);
     assert_eq!(result.status.code(), Some(2));

@@ -1,4 +1,5 @@
-//! `trocar evaluate`: the same twice and with any number of jobs; killed at any moment and gone on with; folders that are not its own; policies that fail.
+//! `trocar evaluate`: repeats and any number of jobs give the same results; campaigns are killed
+//! and resumed; other folders are refused; policies fail.
 //!
 //! `TROCAR_TEST_KILLS=50` kills more often.
 
@@ -16,7 +17,7 @@ use trocar_remote::{Array, Call, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::{SpecimenSource, TaskName};
 use trocar_task::Random;
 
-/// A coarse tube on disk and a scene around it, in which arms reach for `seconds`; no camera.
+/// A coarse tube on disk, and a scene of it in which arms reach for `seconds`, without cameras.
 fn scene(folder: &Path, seconds: f64) -> PathBuf {
     let specimen = folder.join("tube");
     if !specimen.exists() {
@@ -47,13 +48,13 @@ fn table(folder: &Path) -> String {
     std::fs::read_to_string(folder.join("table.csv")).unwrap()
 }
 
-/// The kept episodes, with when their results were written.
+/// The stored episodes, with the times of their results.
 fn kept(folder: &Path) -> BTreeMap<PathBuf, SystemTime> {
     let mut all = BTreeMap::new();
     for policy in std::fs::read_dir(folder.join("episodes")).into_iter().flatten() {
         for episode in std::fs::read_dir(policy.unwrap().path()).unwrap() {
             let result = episode.unwrap().path().join("result.json");
-            // A folder that has its name has all its files.
+            // A folder with its final name has all files.
             let written = std::fs::metadata(&result).unwrap().modified().unwrap();
             all.insert(result, written);
         }
@@ -76,7 +77,7 @@ fn campaigns_are_the_same_twice_and_with_any_number_of_jobs() {
     let (hash, first) = run("one", "1");
     assert_eq!(first.lines().count(), 9, "{first}");
     assert_eq!((hash.clone(), first.clone()), run("two", "2"));
-    // What is finished is not done again, and more episodes go on from there.
+    // Finished episodes are not run again, and more episodes can follow.
     let before = kept(&dir.path().join("one"));
     assert_eq!((hash.clone(), first), run("one", "1"));
     assert_eq!(before, kept(&dir.path().join("one")));
@@ -97,7 +98,7 @@ fn a_campaign_that_is_killed_loses_nothing_and_repeats_nothing() {
     let (whole, broken) = (dir.path().join("whole"), dir.path().join("broken"));
     let clock = std::time::Instant::now();
     let unbroken = json(&evaluate(&scene, &whole, &more).output().unwrap());
-    // A start takes a good part of it, so most kills fall on episodes under way and some on the start.
+    // The start takes much of the time, so most kills hit running episodes and some hit the start.
     let each = clock.elapsed().mul_f64(2.5 / kills as f64);
     let random = Random::new(7, "kills");
     let (mut seen, mut under_way): (BTreeMap<PathBuf, SystemTime>, usize) = (BTreeMap::new(), 0);
@@ -105,7 +106,7 @@ fn a_campaign_that_is_killed_loses_nothing_and_repeats_nothing() {
         let mut child = evaluate(&scene, &broken, &more).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
         let most = each.max(Duration::from_millis(300));
         std::thread::sleep(most.mul_f64(random.unit(kill)));
-        // Not the end of the process by itself: SIGKILL.
+        // The process was ended by SIGKILL.
         child.kill().unwrap();
         child.wait().unwrap();
         let now = kept(&broken);
@@ -148,7 +149,7 @@ fn other_folders_scenes_and_seeds_are_refused_in_one_line() {
     refused(&long, &folder, &[], "another scene");
     refused(&short, &folder, &["--seed", "1"], "another seed");
     refused(&short, &folder, &["--policy", "genius"], "genius");
-    // An address that cannot be connected to is no failed episode.
+    // An invalid address is an error and no failed episode.
     for (address, why) in [("a=ws://", "host"), ("ws://h:0", "port"), ("ws://user:word@h", "TROCAR_POLICY_KEY")] {
         refused(&short, &folder, &["--policy", address], why);
     }
@@ -161,7 +162,7 @@ fn other_folders_scenes_and_seeds_are_refused_in_one_line() {
     refused(&short, &folder, &[], "campaign.json");
 }
 
-/// A chunk of `rows` actions of `dim` numbers that are all `value`.
+/// A chunk of `rows` actions of `dim` numbers equal to `value`.
 fn chunk(rows: usize, dim: usize, value: f64) -> Result<Map, String> {
     let array = Array::from_f64(&[rows, dim], &vec![value; rows * dim]).map_err(|e| e.to_string())?;
     Ok(Map::from([("actions".to_owned(), Value::from(array))]))
@@ -171,7 +172,7 @@ fn chunk(rows: usize, dim: usize, value: f64) -> Result<Map, String> {
 fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
     let dir = TempDir::new().unwrap();
     let scene = scene(dir.path(), 0.5);
-    // Each seed another mistake, in the second chunk, so that episodes have begun.
+    // Each seed makes another mistake in the second chunk, after the episode has begun.
     let server = Loopback::start(&LoopbackOptions::default(), |call| {
         let Call::Infer(map) = call else { return Ok(Map::new()) };
         let number = |name: &str| match map.get(name) {
@@ -212,7 +213,7 @@ fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
         assert!(said.contains(why) && !said.contains('\n'), "seed {seed}: {said}");
         assert!(episode["duration_s"].as_f64().unwrap() > 0.0);
     }
-    // A server that has died: the same episodes are there, and what is tried again fails with a reason.
+    // After the server's end, finished episodes stay, and repeated ones fail with a reason.
     let url = server.url();
     drop(server);
     let before = table(&folder);
@@ -223,7 +224,7 @@ fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
     assert_eq!(result["policies"][0]["ends"]["policy-error"], 1);
     let report = std::fs::read_to_string(gone.join("report.html")).unwrap();
     assert!(report.contains("connect"), "the page tells why");
-    // So does the text, with what to do.
+    // The text says so, too, with the remedy.
     let mut command = Command::new(env!("CARGO_BIN_EXE_trocar"));
     command.args(["-q", "evaluate"]).arg(&scene).arg("-o").arg(&gone).args(["--policy", &url, "--episodes", "1"]);
     let output = command.output().unwrap();
@@ -250,6 +251,6 @@ fn an_interrupted_campaign_says_what_is_kept_and_how_to_go_on() {
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     assert_eq!(output.status.code(), Some(130), "{said}");
     let kept = kept(&folder).len();
-    assert!(said.contains(&format!("{kept} of 1000 episodes are kept")) && said.contains("continues"), "{said}");
+    assert!(said.contains(&format!("{kept} of 1000 episodes are finished")) && said.contains("continues"), "{said}");
     assert_eq!(table(&folder).lines().count(), 1 + kept);
 }

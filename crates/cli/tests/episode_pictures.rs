@@ -1,4 +1,4 @@
-//! `trocar render EPISODE`: an episode is done again and filmed, at its end or at a time; what is missing or another is told in a line.
+//! `trocar render EPISODE`: pictures and videos of a replayed episode, and one-line errors.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "what tests share may panic and tell what is skipped")]
 
@@ -47,7 +47,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
         trocar(&[&["render", source, "-o", out, "--json"][..], &SMALL[..], more].concat())
     };
 
-    // A still at the end, by the folder and by the file; another at a time.
+    // Pictures at the end, by the folder and by the file, and at a time.
     let end = said(&render(&run, &at("end.png"), &[]));
     assert_eq!((&end["frames"], &end["differs"]), (&1.into(), &serde_json::Value::Null));
     assert!((end["time_s"].as_f64().unwrap() - 0.5).abs() < 0.02, "{end}");
@@ -58,7 +58,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
     assert!((early["time_s"].as_f64().unwrap() - 0.1).abs() < 0.02 && early["files"].as_array().unwrap().len() == 4);
     assert_ne!(read("end.png"), read("early.png"));
 
-    // The whole of it: 15 frames a second, the last the still's moment or the one before.
+    // The video has 15 frames per second.
     let film = said(&render(&run, &at("film.webp"), &[]));
     assert_eq!(film["frames"], 8, "{film}");
     let bytes = std::fs::read(at("film.webp")).unwrap();
@@ -85,7 +85,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
     refused(&run, "no.webp", &["--at", "0.1"], &["--at", ".png"]);
     refused("cell-a", "no.png", &["--specimen", "tube"], &["--specimen is only for episodes"]);
     refused(&at("none.trocar"), "no.png", &[], &["none.trocar", "No such file"]);
-    // The specimen has moved, then is another one.
+    // The specimen is in another folder, then another specimen.
     std::fs::rename(dir.path().join("tube"), dir.path().join("moved")).unwrap();
     refused(&run, "no.png", &[], &["tube"]);
     let found = said(&render(&run, &at("found.png"), &["--specimen", &at("moved")]));
@@ -99,7 +99,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
     bytes[last] ^= 1;
     std::fs::write(at("bad.trocar"), bytes).unwrap();
     refused(&at("bad.trocar"), "no.png", &[], &["bad.trocar", "checksum"]);
-    // Nothing half-written is left.
+    // No partial file is left.
     let hidden = std::fs::read_dir(dir.path())
         .unwrap()
         .filter(|e| e.as_ref().unwrap().file_name().to_string_lossy().starts_with('.'));

@@ -119,7 +119,7 @@ fn settings_of_the_mesh_are_kept() {
     assert!(provenance.contains("BinaryGrid") && provenance.contains("Fitted"), "{provenance}");
 }
 
-/// A moving organ is warned of in text and JSON; the page is marked.
+/// Text, JSON and page warn of a moving organ.
 #[test]
 fn a_moving_organ_is_warned_of() {
     let dir = tempfile::tempdir().unwrap();
@@ -190,7 +190,7 @@ fn a_phantom_is_kept_for_every_working_folder() {
     assert_eq!(made, kept, "the second run uses the first one's phantom");
 }
 
-/// The sensor's noise is not taken for motion: no organ of any phantom moves.
+/// Sensor noise is not motion: no organ of any phantom moves.
 #[test]
 fn still_phantoms_get_no_warning() {
     let dir = tempfile::tempdir().unwrap();

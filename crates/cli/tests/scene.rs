@@ -1,4 +1,4 @@
-//! `trocar scene`: what it prints is right for people and for machines, and mistakes give one line and exit code 2.
+//! `trocar scene`: its text and JSON; mistakes give one line and exit code 2.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -23,7 +23,7 @@ fn what_is_shown_is_in_order() {
     for form in [&["scene", "show", "cell-a"][..], &["scene", "show", "cell-a", "--canonical"]] {
         std::fs::write(&file, printed(form)).unwrap();
         let text = printed(&["scene", "check", path]);
-        assert!(text.contains("is in order: scene 'cell-a', task appendix-resection"), "{text}");
+        assert!(text.contains("is valid: scene 'cell-a', task appendix-resection"), "{text}");
         let checked: serde_json::Value = serde_json::from_str(&printed(&["scene", "check", path, "--json"])).unwrap();
         assert_eq!(checked["arms"], serde_json::json!(["left", "right"]));
         assert_eq!(checked["organs"].as_array().unwrap().len(), 6);
@@ -41,7 +41,8 @@ fn mistakes_are_one_line() {
     let text = "name = 'bad'\n[specimen]\nphantom = 'phantom-a'\n[safety]\nrcm_abort_mm = 0.005\n";
     std::fs::write(&file, text).unwrap();
     let path = file.to_str().unwrap();
-    let expected = format!("error: {path}: line 5: safety.rcm_abort_mm is 0.005; 0.01 to 50 mm; 0.005 m is 5 mm\n");
+    let expected =
+        format!("error: {path}: line 5: safety.rcm_abort_mm is 0.005; it must be in [0.01, 50] mm; 0.005 m is 5 mm\n");
     for action in ["check", "show"] {
         let output = trocar(&["scene", action, path]);
         assert_eq!(output.status.code(), Some(2));

@@ -1,6 +1,6 @@
-//! What the program says, word by word: the help of every command, errors of wrong inputs, and the text
-//! of report pages. `INSTA_UPDATE=always cargo test -p trocar-cli --test snapshots` writes the files of
-//! `tests/snapshots` again; read the difference before it is committed.
+//! Texts of the program: help of every command, errors, and report pages. `INSTA_UPDATE=always
+//! cargo test -p trocar-cli --test snapshots` writes the files of `tests/snapshots` again; read the
+//! difference before you commit it.
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
@@ -53,7 +53,7 @@ fn the_help_of_every_command() {
     assert!(count > 30, "{count} commands");
 }
 
-/// A folder of wrong and right inputs: a specimen, scenes, surfaces, and files that are none.
+/// A folder of valid and invalid inputs.
 fn inputs() -> TempDir {
     let here = TempDir::new().unwrap();
     let at = |name: &str| here.path().join(name);
@@ -72,7 +72,7 @@ fn inputs() -> TempDir {
     here
 }
 
-/// A scene around the specimen `tube` in which arms reach for `seconds`; the endoscope alone looks on.
+/// A scene of the specimen `tube` in which arms reach for `seconds` before the endoscope.
 fn reach(seconds: f64) -> String {
     let mut scene = common::resection();
     scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
@@ -82,7 +82,7 @@ fn reach(seconds: f64) -> String {
     scene.to_toml().unwrap()
 }
 
-/// Paths and words of systems differ from those of Unix.
+/// Paths and error texts of other systems differ from those of Unix.
 #[cfg(unix)]
 #[test]
 fn errors_of_wrong_inputs() {
@@ -146,7 +146,7 @@ fn errors_of_wrong_inputs() {
     assert_eq!(std::fs::read_dir(here.path()).unwrap().count(), before, "a wrong input leaves nothing");
 }
 
-/// The texts of a page, one a line: without style sheet, drawings and pictures, with `#` for every number.
+/// The texts of a page, one per line, without style sheet and pictures, with `#` for every number.
 fn texts(html: &str) -> String {
     let mut rest = html.to_owned();
     for (from, to) in [("<style", "</style>"), ("<svg", "</svg>")] {

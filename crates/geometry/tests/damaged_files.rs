@@ -5,7 +5,7 @@
 use std::path::Path;
 use trocar_geometry::io::{Unit, read_msh, read_msh_groups, read_surface, write_msh, write_ply};
 use trocar_geometry::{TetMesh, TriMesh, repair};
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -116,7 +116,7 @@ fn damage_never_panics() {
     let seeds: Vec<(String, Vec<u8>)> =
         valid_files().into_iter().enumerate().map(|(i, (ext, bytes))| (format!("{i}.{ext}"), bytes)).collect();
     let folder = tempfile::tempdir().unwrap();
-    assault(&seeds, ALLOWANCE, |name, bytes| {
+    fuzz_reader(&seeds, ALLOWANCE, |name, bytes| {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
         if let Err(message) = read(&path) {

@@ -1,8 +1,8 @@
-//! Campaigns in pieces, so that Python may spread their jobs over machines: the plan with its store
-//! here, workers anywhere.
+//! Parts of campaigns, so that Python can distribute their jobs over machines: the manifest with
+//! its store, and workers.
 //!
-//! Jobs and results are JSON text and bytes, which any transport carries. Plan, store, table and
-//! report are those of `trocar evaluate`.
+//! Jobs and results are JSON text and bytes, which any transport carries. Manifest, store, table
+//! and report are those of `trocar evaluate`.
 
 use crate::error::{evaluate, wrong};
 use crate::prepare;
@@ -12,17 +12,17 @@ use pyo3::types::PyBytes;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard};
-use trocar_campaign::{Error, Files, Job, Plan, PolicySpec, Store};
+use trocar_campaign::{EpisodeFiles, Error, Job, Manifest, PolicySpec, Store};
 use trocar_core::Progress;
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 
-/// A campaign's plan and its folder, which no other process writes meanwhile.
+/// A campaign's manifest and its folder, which is locked against other processes.
 #[pyclass(frozen, module = "trocar._native")]
 pub struct Campaign {
     scene: Scene,
     specimen: Specimen,
-    plan: Plan,
+    manifest: Manifest,
     store: Mutex<Store>,
 }
 
@@ -37,12 +37,12 @@ fn job(text: &str) -> PyResult<Job> {
     serde_json::from_str(text).map_err(|e| wrong(format!("job: {e}")))
 }
 
-/// An episode's files as they cross: (name, bytes).
-type Crossing = Vec<(String, Vec<u8>)>;
+/// An episode's files as (name, bytes).
+type FileList = Vec<(String, Vec<u8>)>;
 
 #[pymethods]
 impl Campaign {
-    /// Begins the campaign in the folder `output`, or goes on with it.
+    /// Opens or creates the campaign in the folder `output`.
     #[new]
     fn new(
         py: Python<'_>,
@@ -64,52 +64,54 @@ impl Campaign {
             }
             let scene = prepare::scene(scene, None, None)?;
             let specimen = prepare::specimen(&scene, &phantoms)?;
-            let plan = Plan::new(&scene, &specimen, &specs, episodes, seed).map_err(|e| evaluate(&e))?;
-            let store = Mutex::new(Store::open(&output, &plan).map_err(|e| evaluate(&e))?);
-            Ok(Self { scene, specimen, plan, store })
+            let manifest = Manifest::new(&scene, &specimen, &specs, episodes, seed).map_err(|e| evaluate(&e))?;
+            let store = Mutex::new(Store::open(&output, &manifest).map_err(|e| evaluate(&e))?);
+            Ok(Self { scene, specimen, manifest, store })
         })
     }
 
-    /// The plan as JSON text, which workers compare with what they have.
+    /// The manifest as JSON text, which workers compare with their own.
     #[getter]
     fn plan(&self) -> PyResult<String> {
-        serde_json::to_string(&self.plan).map_err(wrong)
+        serde_json::to_string(&self.manifest).map_err(wrong)
     }
 
-    /// Jobs that are not done, as JSON texts.
+    /// Jobs without a stored episode, as JSON texts.
     #[pyo3(signature = (retry_failed=false))]
     fn missing(&self, retry_failed: bool) -> PyResult<Vec<String>> {
-        let jobs = self.store()?.missing(&self.plan, retry_failed).map_err(|e| evaluate(&e))?;
+        let jobs = self.store()?.missing(&self.manifest, retry_failed).map_err(|e| evaluate(&e))?;
         jobs.iter().map(|j| serde_json::to_string(j).map_err(wrong)).collect()
     }
 
-    /// Keeps a finished episode.
+    /// Stores a finished episode.
     #[pyo3(signature = (job, files))]
-    fn put(&self, py: Python<'_>, job: &str, files: Crossing) -> PyResult<()> {
+    fn put(&self, py: Python<'_>, job: &str, files: FileList) -> PyResult<()> {
         let job = self::job(job)?;
-        if !self.plan.jobs().any(|j| j == job) {
-            return Err(wrong("job: is none of this campaign"));
+        if !self.manifest.jobs().any(|j| j == job) {
+            return Err(wrong("job: it is not part of this campaign"));
         }
-        py.detach(|| self.store()?.put(&job, &Files(files)).map_err(|e| evaluate(&e)))
+        py.detach(|| self.store()?.put(&job, &EpisodeFiles(files)).map_err(|e| evaluate(&e)))
     }
 
-    /// Films failures unless that takes too long now, makes table and report, and gives
-    /// `result.json` as text.
+    /// Writes table and report, and returns `result.json` as text. `films` renders missing videos
+    /// first, which takes long.
     #[pyo3(signature = (films=true))]
     fn finish(&self, py: Python<'_>, films: bool) -> PyResult<String> {
         py.detach(|| {
             let store = self.store()?;
             if films {
-                store.film(&self.plan, &self.scene, &self.specimen, &Signals::new()).map_err(|e| evaluate(&e))?;
+                store
+                    .write_videos(&self.manifest, &self.scene, &self.specimen, &Signals::new())
+                    .map_err(|e| evaluate(&e))?;
             }
-            let result = store.finish(&self.plan).map_err(|e| evaluate(&e))?;
+            let result = store.write_results(&self.manifest).map_err(|e| evaluate(&e))?;
             serde_json::to_string_pretty(&result).map_err(wrong)
         })
     }
 }
 
-/// What tells workers to give up: Python shows its signals to its main thread alone, and a worker
-/// that waits for a policy looks at nothing else.
+/// A flag that stops workers. Python delivers signals only to its main thread, and a worker that
+/// waits for a policy checks only this flag.
 #[pyclass(frozen, module = "trocar._native")]
 #[derive(Default)]
 pub struct Stop(Arc<AtomicBool>);
@@ -121,13 +123,13 @@ impl Stop {
         Self::default()
     }
 
-    /// Ends within moments whatever workers with this do or wait for; it cannot be taken back.
+    /// Stops all workers with this flag soon. It cannot be reset.
     fn set(&self) {
         self.0.store(true, Ordering::Relaxed);
     }
 }
 
-/// A cell that runs one job after the other.
+/// A cell that runs one job at a time.
 #[pyclass(frozen, module = "trocar._native")]
 pub struct Worker {
     worker: Mutex<trocar_campaign::Worker>,
@@ -136,19 +138,19 @@ pub struct Worker {
 
 impl Worker {
     fn worker(&self) -> PyResult<MutexGuard<'_, trocar_campaign::Worker>> {
-        self.worker.lock().map_err(|_| wrong("the worker failed before; make another"))
+        self.worker.lock().map_err(|_| wrong("the worker failed before; make a new one"))
     }
 }
 
-/// Gives up what has been asked to stop.
-fn go_on(stop: &AtomicBool) -> PyResult<()> {
+/// Returns an error if the flag is set.
+fn check_stop(stop: &AtomicBool) -> PyResult<()> {
     if stop.load(Ordering::Relaxed) { Err(evaluate(&Error::Interrupted)) } else { Ok(()) }
 }
 
 #[pymethods]
 impl Worker {
-    /// Builds the cell of `scene`; it must be what `plan` is of. `stop` ends what it does; `python`
-    /// serves `python:` policies, unless `$TROCAR_PYTHON` names another interpreter.
+    /// Builds the cell of `scene`, which must be that of the manifest `plan`. `stop` stops its
+    /// work. `python` serves `python:` policies, unless `$TROCAR_PYTHON` names another interpreter.
     #[new]
     #[pyo3(signature = (scene, phantoms, plan, *, stop=None, python=None))]
     fn new(
@@ -160,36 +162,36 @@ impl Worker {
         python: Option<String>,
     ) -> PyResult<Self> {
         let stop = stop.map(|s| Arc::clone(&s.0)).unwrap_or_default();
-        let plan: Plan = serde_json::from_str(plan).map_err(|e| wrong(format!("plan: {e}")))?;
+        let manifest: Manifest = serde_json::from_str(plan).map_err(|e| wrong(format!("plan: {e}")))?;
         py.detach(|| {
             let scene = prepare::scene(scene, None, None)?;
             let specimen = prepare::specimen(&scene, &phantoms)?;
-            let own = Plan::new(&scene, &specimen, &plan.policies, plan.episodes, plan.seed).map_err(|e| evaluate(&e))?;
-            if own != plan {
+            let own = Manifest::new(&scene, &specimen, &manifest.policies, manifest.episodes, manifest.seed).map_err(|e| evaluate(&e))?;
+            if own != manifest {
                 return Err(wrong(
                     "this worker has another scene, specimen or program than the campaign; give all machines the same files",
                 ));
             }
-            go_on(&stop)?;
+            check_stop(&stop)?;
             let worker = trocar_campaign::Worker::new(&scene, &specimen).map_err(|e| evaluate(&e))?;
-            let worker = Mutex::new(worker.stopped_by(Arc::clone(&stop)).served_by(python));
+            let worker = Mutex::new(worker.with_stop_flag(Arc::clone(&stop)).with_python(python));
             Ok(Self { worker, stop })
         })
     }
 
-    /// Makes the policies of `jobs` ready; ValueError for a Python policy that cannot be loaded.
+    /// Makes the policies of `jobs`. Raises ValueError for a Python policy that cannot be loaded.
     fn start(&self, py: Python<'_>, jobs: Vec<String>) -> PyResult<()> {
         let jobs: Vec<Job> = jobs.iter().map(|j| job(j)).collect::<PyResult<_>>()?;
-        py.detach(|| self.worker()?.start(jobs.iter().map(|j| &j.policy)).map_err(|e| evaluate(&e)))
+        py.detach(|| self.worker()?.prepare(jobs.iter().map(|j| &j.policy)).map_err(|e| evaluate(&e)))
     }
 
-    /// Runs a job and gives its episode's files: names and bytes.
+    /// Runs a job and returns its episode's files: names and bytes.
     fn run<'py>(&self, py: Python<'py>, job: &str) -> PyResult<Vec<(String, Bound<'py, PyBytes>)>> {
         let job = self::job(job)?;
         let signals = Signals::new();
         let files = py.detach(|| {
-            // A job may have waited for its turn.
-            go_on(&self.stop)?;
+            // The flag may have been set while this job waited for the worker.
+            check_stop(&self.stop)?;
             self.worker()?.run_until(&job, &|| signals.interrupted()).map_err(|e| evaluate(&e))
         })?;
         Ok(files.0.into_iter().map(|(name, bytes)| (name, PyBytes::new(py, &bytes))).collect())

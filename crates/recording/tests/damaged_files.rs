@@ -7,7 +7,7 @@ mod common;
 use common::{info, write};
 use std::fs;
 use trocar_recording::Recording;
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -39,7 +39,7 @@ fn damage_never_panics() {
         "masks/instruments/000000.png",
     ];
     let seeds: Vec<(String, Vec<u8>)> = names.map(|n| (n.to_owned(), fs::read(dir.join(n)).unwrap())).into();
-    assault(&seeds, ALLOWANCE, |name, bytes| {
+    fuzz_reader(&seeds, ALLOWANCE, |name, bytes| {
         let path = dir.join(name);
         fs::write(&path, bytes).unwrap();
         let tell = |e: trocar_recording::Error| {

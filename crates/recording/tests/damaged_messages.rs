@@ -12,7 +12,7 @@ use common::messages::{ALL, decode_all, fixture, log, read_all};
 use std::io::Cursor;
 use std::path::Path;
 use trocar_recording::messages::{Topic, find_rgbd_topics, open_reader};
-use trocar_testing::{Allowance, PEAK, Peak, assault, cases};
+use trocar_testing::{Allowance, PEAK, Peak, cases, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -42,7 +42,7 @@ fn damage_never_panics() {
     let seeds: Vec<(String, Vec<u8>)> =
         (0..messages.len()).flat_map(|i| [file(i), (format!("message {i}"), messages[i].1.clone())]).collect();
     let (mut opened, mut decoded, mut direct) = (0, 0, 0);
-    assault(&seeds, ALLOWANCE, |name, bytes| {
+    fuzz_reader(&seeds, ALLOWANCE, |name, bytes| {
         if let Some(i) = name.strip_prefix("message ") {
             direct += usize::from(decode_all(&messages[i.parse::<usize>().unwrap()].0, bytes));
         } else if let Ok(log) = open_reader(Path::new("damaged"), Box::new(Cursor::new(bytes.to_vec()))) {

@@ -8,7 +8,7 @@ use common::{actions, after_request, array, endpoint, floats, linger, observatio
 use std::io::Write;
 use std::sync::Mutex;
 use trocar_remote::{ActionLimits, Client, Error, Value, pack, unpack};
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -27,7 +27,7 @@ fn damage_never_panics() {
         ("reply".to_owned(), actions(array(text("<f4"), &[4, 3], &floats(&[0.5; 12])))),
     ];
     let mut refused = 0;
-    assault(&seeds, ALLOWANCE, |_, bytes| {
+    fuzz_reader(&seeds, ALLOWANCE, |_, bytes| {
         let outcome = unpack(bytes).and_then(|value| {
             if let Value::Map(map) = &value {
                 let packed = pack(map).unwrap();

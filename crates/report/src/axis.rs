@@ -1,20 +1,21 @@
-//! An axis of a plot: where its ticks are, and what is written at them.
+//! An axis of a plot: positions and labels of its ticks.
 
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
 use plotters::coord::types::RangedCoordf64;
 use plotters::prelude::Ranged;
 use std::ops::Range;
 
-/// An axis with ticks of its own.
+/// An axis with its ticks.
 pub struct Axis {
     inner: RangedCoordf64,
     ticks: Vec<f64>,
 }
 
 impl Axis {
-    /// From `low` to `high`, which are exponents of ten on a logarithmic axis, with about `most` ticks.
-    pub fn new(log: bool, low: f64, high: f64, most: usize) -> Self {
-        Self { inner: (low..high).into(), ticks: ticks(log, low, high, most) }
+    /// An axis from `low` to `high` with about `max` ticks. On a logarithmic axis the ends are
+    /// exponents of ten.
+    pub fn new(log: bool, low: f64, high: f64, max: usize) -> Self {
+        Self { inner: (low..high).into(), ticks: ticks(log, low, high, max) }
     }
 }
 
@@ -27,7 +28,7 @@ impl Ranged for Axis {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        // No ticks between ticks.
+        // No minor ticks.
         if hint.weight().allow_light_points() { Vec::new() } else { self.ticks.clone() }
     }
 
@@ -36,7 +37,7 @@ impl Ranged for Axis {
     }
 }
 
-/// A tick's value with as many decimals as the axis' span needs.
+/// The label of a tick, with the decimals that the span of the axis needs.
 pub fn decimal(value: f64, span: f64) -> String {
     let decimals = (1.0 - (span / 5.0).log10().floor()).clamp(0.0, 6.0) as usize;
     let text = format!("{value:.decimals$}");
@@ -47,14 +48,15 @@ pub fn decimal(value: f64, span: f64) -> String {
     }
 }
 
-/// Where an axis from `low` to `high` has ticks, about `most` of them. A logarithmic axis, whose ends are exponents of ten, has them at 1, 2 and 5 times powers of ten; at the powers alone, or at
-/// every so many, where that is enough; and at every whole multiple where it is so short that fewer than three would be left.
-fn ticks(log: bool, low: f64, high: f64, most: usize) -> Vec<f64> {
+/// Tick positions of an axis from `low` to `high`, about `max`. A logarithmic axis, whose ends are
+/// exponents of ten, has ticks at powers of ten, or at every nth power; a short one at 1, 2 and 5
+/// times powers of ten, or at all whole multiples if fewer than three would be left.
+fn ticks(log: bool, low: f64, high: f64, max: usize) -> Vec<f64> {
     if !log {
         let axis: RangedCoordf64 = (low..high).into();
-        return axis.key_points(most);
+        return axis.key_points(max);
     }
-    // Ends that are a rounding short of a tick still show it.
+    // Ticks at the ends are kept despite rounding.
     let reached = |v: &f64| (low - 1e-9..=high + 1e-9).contains(v);
     let decades = || (low.floor() as i64)..=(high.ceil() as i64);
     let powers: Vec<f64> = decades().map(|d| d as f64).filter(reached).collect();
@@ -69,7 +71,8 @@ fn ticks(log: bool, low: f64, high: f64, most: usize) -> Vec<f64> {
     if steps.len() > 2 { steps } else { at(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 9.0]) }
 }
 
-/// The label of a tick at 10 to `exponent`, which is a small whole multiple of a power of ten: a plain number where that is short, else 10 to a power.
+/// The label of a tick at 10 to `exponent`, a small whole multiple of a power of ten: a plain
+/// number if it is short, else a power of ten.
 pub fn log_label(exponent: f64) -> String {
     let decade = (exponent + 1e-9).floor();
     let multiple = 10f64.powf(exponent - decade).round();
@@ -80,7 +83,7 @@ pub fn log_label(exponent: f64) -> String {
     if multiple == 1.0 { power } else { format!("{multiple}\u{b7}{power}") }
 }
 
-/// 10 to a whole power.
+/// A whole power of ten.
 fn power_of_ten(exponent: f64) -> String {
     let digit = |c: char| match c {
         '-' => '\u{207b}',
@@ -97,7 +100,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn ticks_read_well() {
+    fn ticks_have_short_labels() {
         assert_eq!(decimal(0.25, 1.0), "0.25");
         assert_eq!(decimal(-0.0, 1.0), "0");
         assert_eq!(decimal(-5.0, 20.0), "\u{2212}5");

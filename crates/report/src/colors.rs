@@ -1,15 +1,13 @@
-//! Colours: of organs, of depths, of signed errors.
+//! Colours of organs, depths and signed errors.
 
-/// Ground of rendered views; reads well on a light and on a dark page.
+/// Background of rendered views; readable on a light and on a dark page.
 pub const VIEW_GROUND: [u8; 3] = [33, 39, 45];
 
 /// Outline of instruments.
 pub const INSTRUMENT: [u8; 3] = [0, 229, 255];
 
-/// Metal of the gripper.
-pub const METAL: [u8; 3] = [196, 202, 208];
-
-/// Colour of organ `index`; told apart by most kinds of colour vision (after Okabe and Ito's choice of hues).
+/// Colour of organ `index`, distinguishable with most kinds of colour vision (after M. Okabe and K.
+/// Ito).
 pub fn organ(index: usize) -> [u8; 3] {
     const HUES: [[u8; 3]; 8] = [
         [230, 150, 20],
@@ -24,7 +22,7 @@ pub fn organ(index: usize) -> [u8; 3] {
     HUES[index % HUES.len()]
 }
 
-/// Stops of the sequential map: dark violet to yellow, lightness rising evenly.
+/// Stops of the sequential map: dark violet to yellow, with linearly increasing lightness.
 pub const SEQUENTIAL: [[u8; 3]; 7] =
     [[66, 10, 90], [66, 62, 133], [46, 104, 142], [32, 144, 140], [57, 182, 118], [145, 213, 66], [250, 230, 40]];
 
@@ -32,7 +30,7 @@ pub const SEQUENTIAL: [[u8; 3]; 7] =
 pub const DIVERGING: [[u8; 3]; 7] =
     [[24, 68, 150], [70, 132, 196], [160, 198, 226], [247, 247, 245], [246, 178, 142], [214, 92, 72], [150, 14, 38]];
 
-/// Colour at `t` in 0..=1 along `stops`; values outside take the end's colour, NaN the first's.
+/// Colour at `t` in [0, 1] along `stops`; clamped outside; NaN is the first stop.
 pub fn map(stops: &[[u8; 3]], t: f64) -> [u8; 3] {
     let last = stops.len() - 1;
     let t = if t.is_nan() { 0.0 } else { t };
@@ -41,7 +39,7 @@ pub fn map(stops: &[[u8; 3]], t: f64) -> [u8; 3] {
     mix(stops[i], stops[(i + 1).min(last)], x - i as f64)
 }
 
-/// `a` at `t` = 0, `b` at 1.
+/// Linear interpolation from `a` (`t` = 0) to `b` (`t` = 1).
 pub fn mix(a: [u8; 3], b: [u8; 3], t: f64) -> [u8; 3] {
     std::array::from_fn(|c| (f64::from(a[c]) * (1.0 - t) + f64::from(b[c]) * t).round() as u8)
 }
@@ -67,7 +65,7 @@ mod tests {
     }
 
     #[test]
-    fn the_sequential_map_gets_lighter_all_along() {
+    fn the_sequential_map_gets_lighter() {
         let lumas: Vec<u8> = SEQUENTIAL.iter().map(|c| luma(*c)).collect();
         assert!(lumas.windows(2).all(|w| w[1] > w[0] + 10), "{lumas:?}");
     }

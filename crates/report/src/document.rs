@@ -1,5 +1,5 @@
-//! A document: sections of figures of merit, tables, plots and pictures. It is written as an HTML
-//! page, as lines for a terminal, or as Markdown for the docs.
+//! A document: sections with figures of merit, tables, plots and pictures. It is written as an HTML
+//! page, as text for a terminal, or as Markdown for the docs.
 
 use crate::Result;
 use crate::figures;
@@ -17,7 +17,7 @@ pub struct Document {
     sections: Vec<Section>,
 }
 
-/// A titled part of a document.
+/// A section of a document.
 #[derive(Clone, Debug, Default)]
 pub struct Section {
     title: String,
@@ -25,7 +25,7 @@ pub struct Section {
     blocks: Vec<Block>,
 }
 
-/// What a section consists of.
+/// A part of a section.
 #[derive(Clone, Debug)]
 enum Block {
     Cards(Vec<Card>),
@@ -44,12 +44,12 @@ pub struct Table {
 }
 
 impl Table {
-    /// A table with its column names, units in brackets.
+    /// A table with the names of its columns, units in round brackets.
     pub fn new<T: Into<String>>(head: impl IntoIterator<Item = T>, rows: Vec<Vec<String>>) -> Self {
         Self { head: head.into_iter().map(Into::into).collect(), rows, only_page: false }
     }
 
-    /// The same table, shown on the page and neither in the terminal nor in the docs: it is long.
+    /// The same table on the page only, for long tables.
     #[must_use]
     pub fn on_page_only(self) -> Self {
         Self { only_page: true, ..self }
@@ -60,14 +60,14 @@ impl Table {
         table::plain(&head, &self.rows)
     }
 
-    /// Aligned columns: the first to the left, the others to the right.
+    /// Aligned columns: the first left, the others right.
     fn text(&self) -> String {
         let cells = |row: &[String]| row.iter().map(|c| plain(c)).collect::<Vec<_>>();
         let lines: Vec<Vec<String>> =
             std::iter::once(self.head.as_slice()).chain(self.rows.iter().map(Vec::as_slice)).map(cells).collect();
         let columns = self.head.len();
         let mut widths = vec![0; columns];
-        // A row that ends early says why in its last cell, which is as long as it is.
+        // A shorter row ends in a message, which may be long.
         for line in lines.iter().filter(|line| line.len() == columns) {
             for (width, cell) in widths.iter_mut().zip(line) {
                 *width = (*width).max(cell.chars().count());
@@ -127,23 +127,23 @@ impl Section {
         self
     }
 
-    /// A plot above its caption (HTML). Plots and pictures that follow each other share a grid of two columns.
+    /// A plot above its caption (HTML). Consecutive plots and pictures share a grid of two columns.
     ///
     /// # Errors
     /// A plot that cannot be drawn.
     pub fn plot(self, plot: &Plot<'_>, caption: &str) -> Result<Self> {
-        Ok(self.figure(Columns::Two, page::figure(&plot.svg()?, caption)))
+        Ok(self.figure(Columns::Two, plot.figure(caption)?))
     }
 
-    /// A picture above its caption (HTML); `alt` is its description in plain text.
+    /// A picture above its caption (HTML); `alt` is its description (plain text).
     ///
     /// # Errors
-    /// A picture whose pixels do not fit its size.
+    /// A picture whose number of pixels differs from its size.
     pub fn picture(self, picture: &ColorImage, alt: &str, caption: &str) -> Result<Self> {
         Ok(self.figure(Columns::Two, page::figure(&figures::img(picture, alt)?, caption)))
     }
 
-    /// A figure (HTML) in a grid of so many columns.
+    /// A figure (HTML) in a grid of `columns`.
     #[must_use]
     pub fn figure(mut self, columns: Columns, figure: String) -> Self {
         match self.blocks.last_mut() {
@@ -159,7 +159,7 @@ impl Section {
         figures.into_iter().fold(self, |section, figure| section.figure(Columns::Two, figure))
     }
 
-    /// HTML that only the page shows.
+    /// HTML on the page only.
     #[must_use]
     pub fn html(mut self, html: impl Into<String>) -> Self {
         self.blocks.push(Block::Html(html.into()));
@@ -179,30 +179,24 @@ impl Section {
 }
 
 impl Document {
-    /// An empty document with its title and subtitle (plain texts).
+    /// An empty document with its title and subtitle (plain text).
     pub fn new(title: impl Into<String>, subtitle: impl Into<String>) -> Self {
         Self { title: title.into(), subtitle: subtitle.into(), sections: Vec::new() }
     }
 
-    /// The document with one more section.
+    /// Adds a section.
     #[must_use]
     pub fn with(mut self, section: Section) -> Self {
         self.sections.push(section);
         self
     }
 
-    /// The document with more sections.
-    #[must_use]
-    pub fn with_all(self, sections: impl IntoIterator<Item = Section>) -> Self {
-        sections.into_iter().fold(self, Self::with)
-    }
-
-    /// The whole HTML page.
+    /// The HTML page.
     pub fn page(&self) -> String {
         page::page(&self.title, &self.subtitle, &self.sections.iter().map(Section::page).collect::<String>())
     }
 
-    /// What a terminal shows: tables, figures of merit and sentences.
+    /// The text for a terminal: tables, figures of merit and sentences.
     pub fn text(&self) -> String {
         let mut out = String::new();
         for block in self.sections.iter().flat_map(|s| &s.blocks) {
@@ -224,7 +218,8 @@ impl Document {
         out
     }
 
-    /// What the docs include: sections with a table or figures of merit, without plots and pictures.
+    /// The Markdown for the docs: sections with a table or figures of merit, without plots and
+    /// pictures.
     pub fn markdown(&self) -> String {
         let mut out = String::new();
         for section in &self.sections {
@@ -259,7 +254,7 @@ impl Document {
     }
 }
 
-/// Plain ASCII where a terminal or a program that reads its output may expect it.
+/// Replaces typographic characters by ASCII, for terminals and for programs that read the output.
 fn plain(text: &str) -> String {
     text.replace(['\u{202f}', '\u{a0}'], " ")
         .replace(['\u{2212}', '\u{2013}'], "-")
@@ -273,7 +268,7 @@ mod tests {
 
     fn made_up() -> Document {
         let table = Table::new(
-            ["Organ", "Error [mm]"],
+            ["Organ", "Error (mm)"],
             vec![vec!["liver".into(), "\u{2212}0.12".into()], vec!["a|b".into(), "1\u{202f}000".into()]],
         );
         let long = Table::new(["only the page"], vec![vec!["has this".into()]]).on_page_only();
@@ -287,7 +282,7 @@ mod tests {
     }
 
     #[test]
-    fn the_page_escapes_texts_and_keeps_html() {
+    fn the_page_escapes_text_and_keeps_html() {
         let page = made_up().page();
         assert!(page.contains("Errors &lt;1&gt;") && page.contains("<i>All</i>") && page.contains("found &amp; kept"));
         assert!(page.contains("has this") && page.contains("card good"));
@@ -298,15 +293,15 @@ mod tests {
         let text = made_up().text();
         assert_eq!(
             text,
-            "Worst: 0.12 mm; of two\n  Organ  Error [mm]\n  liver       -0.12\n  a|b         1 000\nfound & kept\n"
+            "Worst: 0.12 mm; of two\n  Organ  Error (mm)\n  liver       -0.12\n  a|b         1 000\nfound & kept\n"
         );
     }
 
     #[test]
-    fn the_docs_have_tables_and_figures_of_merit() {
+    fn markdown_has_tables_and_figures_of_merit() {
         let markdown = made_up().markdown();
         assert!(markdown.starts_with("**Together**\n\n- Worst: 0.12 mm (of two)\n"));
-        assert!(markdown.contains("| Organ | Error [mm] |\n| --- | --: |\n| liver | \u{2212}0.12 |\n| a\\|b |"));
+        assert!(markdown.contains("| Organ | Error (mm) |\n| --- | --: |\n| liver | \u{2212}0.12 |\n| a\\|b |"));
         assert!(!markdown.contains("has this"));
     }
 }

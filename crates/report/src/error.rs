@@ -1,23 +1,23 @@
-//! What can go wrong while a page is drawn.
+//! Errors of pages, plots and pictures.
 
-/// Result of this crate.
+/// The result type of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// A plot or picture that cannot be drawn.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// A picture whose pixels are not as many as its size says.
+    /// A picture whose number of pixels differs from its size.
     #[error("{0}")]
     Mismatch(String),
-    /// A plot could not be drawn.
+    /// A plot that cannot be drawn.
     #[error("plot '{plot}': {reason}")]
     Plot {
-        /// Its title.
+        /// Title of the plot.
         plot: String,
-        /// What the drawing library said.
+        /// The error of the drawing library.
         reason: String,
     },
-    /// A picture could not be encoded.
+    /// A picture that cannot be encoded.
     #[error("a picture cannot be encoded: {0}")]
     Picture(#[from] image::ImageError),
 }

@@ -10,16 +10,16 @@ use image::codecs::{
 use image::{ExtendedColorType, ImageEncoder, RgbImage, imageops};
 use trocar_camera::ColorImage;
 
-/// Wider pictures are reduced: the page shows 1100 CSS pixels at most.
+/// Maximum width (px): a page shows at most 1100 CSS pixels.
 const MAX_WIDTH: u32 = 1280;
 
-/// Quality of photographs (0 to 100): no visible blocks on a screen.
+/// JPEG quality (0 to 100), without visible blocks.
 const JPEG_QUALITY: u8 = 90;
 
-/// An `<img>` of `picture`; `alt` is plain text. Lossless where that costs little, else a JPEG.
+/// An `<img>` of `picture`; `alt` is plain text. PNG if it is small, else JPEG.
 ///
 /// # Errors
-/// When the pixels are not as many as the size says.
+/// A picture whose number of pixels differs from its size.
 pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
     let rgb = to_rgb(picture)?;
     let rgb = if rgb.width() > MAX_WIDTH {
@@ -43,7 +43,7 @@ pub fn img(picture: &ColorImage, alt: &str) -> Result<String> {
     Ok(img_of_bytes(kind, &bytes, width as usize, height as usize, alt))
 }
 
-/// An `<img>` of an encoded picture of the type `image/{kind}`.
+/// An `<img>` of an encoded picture of type `image/{kind}`.
 pub fn img_of_bytes(kind: &str, bytes: &[u8], width: usize, height: usize, alt: &str) -> String {
     format!(
         "<img src=\"data:image/{kind};base64,{}\" width=\"{width}\" height=\"{height}\" alt=\"{}\">",

@@ -1,5 +1,5 @@
-//! Pages as single HTML files: tables, plots, pictures. Nothing here knows what is shown; no scripts, nothing loaded from
-//! elsewhere.
+//! Results as documents: tables, plots and pictures in single HTML files, as text and as Markdown.
+//! The crate knows no study and no simulator. Pages have no scripts and load nothing.
 
 mod axis;
 pub mod colors;

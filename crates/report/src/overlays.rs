@@ -3,10 +3,10 @@
 use crate::colors::{self, DIVERGING, SEQUENTIAL};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 
-/// The signed-error map spans plus and minus this [m].
+/// Range of the map of signed errors: plus and minus this (m).
 pub const ERROR_SPAN: f64 = 5e-3;
 
-/// Draws the rim of `mask`, two pixels wide, inside it.
+/// Draws the rim of `mask`, two pixels wide, inside the mask.
 pub fn outline(picture: &mut ColorImage, mask: &Mask, color: [u8; 3]) {
     let (w, h) = (mask.width as isize, mask.height as isize);
     let inside = |x: isize, y: isize| x >= 0 && y >= 0 && x < w && y < h && mask.set[(y * w + x) as usize];
@@ -20,26 +20,26 @@ pub fn outline(picture: &mut ColorImage, mask: &Mask, color: [u8; 3]) {
     }
 }
 
-/// Lays `color` over the mask, `opacity` in 0..=1.
+/// Blends `color` over the mask, with `opacity` in [0, 1].
 pub fn tint(picture: &mut ColorImage, mask: &Mask, color: [u8; 3], opacity: f64) {
     for (pixel, _) in picture.pixels.iter_mut().zip(&mask.set).filter(|(_, set)| **set) {
         *pixel = colors::mix(*pixel, color, opacity);
     }
 }
 
-/// Tints and outlines `mask` in `picture`, in the colour that organ `index` has everywhere.
+/// Tints and outlines `mask` in the colour of organ `index`.
 pub fn overlay(picture: &mut ColorImage, mask: &Mask, index: usize) {
     tint(picture, mask, colors::organ(index), 0.42);
     outline(picture, mask, colors::organ(index));
 }
 
-/// A darkened grey version, as a ground for coloured maps.
+/// A darkened grey version, the background of coloured maps.
 pub fn dimmed(picture: &ColorImage) -> ColorImage {
     let grey = |c: &[u8; 3]| [colors::luma(*c) / 2; 3];
     ColorImage { pixels: picture.pixels.iter().map(grey).collect(), ..*picture }
 }
 
-/// Depth in false colours between `range` [m]; black where there is none.
+/// Depth in false colours over `range` (m); black without depth.
 pub fn depth(depth: &DepthImage, range: (f64, f64)) -> ColorImage {
     let span = (range.1 - range.0).max(f64::MIN_POSITIVE);
     let color = |d: &f32| {
@@ -48,15 +48,15 @@ pub fn depth(depth: &DepthImage, range: (f64, f64)) -> ColorImage {
     ColorImage { width: depth.width, height: depth.height, pixels: depth.depth.iter().map(color).collect() }
 }
 
-/// Paints signed errors [m] where `compared` is set.
+/// Draws signed errors (m) where `compared` is set.
 pub fn error(picture: &mut ColorImage, error: &[f32], compared: &Mask) {
     for ((pixel, e), _) in picture.pixels.iter_mut().zip(error).zip(&compared.set).filter(|(_, set)| **set) {
         *pixel = colors::map(&DIVERGING, 0.5 + 0.5 * f64::from(*e) / ERROR_SPAN);
     }
 }
 
-/// Smallest box (x0, y0, x1, y1; ends excluded) around the mask grown by `margin` pixels and by what makes it at least
-/// `aspect` wide to high; `None` for an empty mask.
+/// Smallest box (x0, y0, x1, y1; ends excluded) around the mask with `margin` pixels, widened to
+/// the ratio `aspect` of width to height; none for an empty mask.
 pub fn crop_box(mask: &Mask, margin: usize, aspect: f64) -> Option<[usize; 4]> {
     let set = || mask.set.iter().enumerate().filter(|(_, s)| **s).map(|(i, _)| (i % mask.width, i / mask.width));
     let x0 = set().map(|p| p.0).min()?.saturating_sub(margin);

@@ -1,8 +1,8 @@
-//! The page: frame, style sheet, building blocks, and the escaping of every text that comes from a file.
+//! Building blocks of an HTML page: frame, style sheet, escaping of texts.
 
 use std::fmt::Write;
 
-/// Text as HTML shows it verbatim, in element content and in quoted attributes.
+/// Escapes text for HTML elements and quoted attributes.
 pub fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -18,12 +18,12 @@ pub fn escape(text: &str) -> String {
     out
 }
 
-/// `#rrggbb`.
+/// The colour as `#rrggbb`.
 pub fn hex([r, g, b]: [u8; 3]) -> String {
     format!("#{r:02x}{g:02x}{b:02x}")
 }
 
-/// The whole document. `title` and `subtitle` are plain text, `body` is HTML.
+/// The whole page. `title` and `subtitle` are plain text, `body` is HTML.
 pub fn page(title: &str, subtitle: &str, body: &str) -> String {
     let (title, subtitle) = (escape(title), escape(subtitle));
     format!(
@@ -38,18 +38,18 @@ pub fn page(title: &str, subtitle: &str, body: &str) -> String {
     )
 }
 
-/// A titled part of the page. `title` is plain text, `lead` and `body` are HTML.
+/// A section. `title` is plain text, `lead` and `body` are HTML.
 pub fn section(title: &str, lead: &str, body: &str) -> String {
     let lead = if lead.is_empty() { String::new() } else { format!("<p class=\"lead\">{lead}</p>\n") };
     format!("<section>\n<h2>{}</h2>\n{lead}{body}\n</section>\n", escape(title))
 }
 
-/// A picture or plot (HTML) over its caption (HTML).
+/// A picture or plot (HTML) above its caption (HTML).
 pub fn figure(content: &str, caption: &str) -> String {
     format!("<figure>{content}<figcaption>{caption}</figcaption></figure>\n")
 }
 
-/// How many figures stand beside each other on a wide screen.
+/// Columns of a grid on a wide screen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Columns {
     /// Two.
@@ -58,7 +58,7 @@ pub enum Columns {
     Three,
 }
 
-/// Figures beside each other, under each other on a narrow screen.
+/// A grid of figures; one column on a narrow screen.
 pub fn grid(columns: Columns, figures: &[String]) -> String {
     let class = match columns {
         Columns::Two => "g2",
@@ -67,26 +67,26 @@ pub fn grid(columns: Columns, figures: &[String]) -> String {
     format!("<div class=\"grid {class}\">\n{}</div>\n", figures.concat())
 }
 
-/// One figure of merit: plain texts.
+/// One figure of merit (plain texts).
 #[derive(Clone, Debug)]
 pub struct Card {
-    /// What it is.
+    /// Name.
     pub name: &'static str,
-    /// Its value.
+    /// Value.
     pub value: String,
-    /// A remark below it.
+    /// Remark.
     pub note: String,
-    /// Whether the value meets its target; `None` where there is none.
+    /// Whether the value meets its target; none without a target.
     pub met: Option<bool>,
 }
 
 impl Card {
-    /// Without a target.
+    /// A figure without a target.
     pub fn new(name: &'static str, value: impl Into<String>, note: impl Into<String>) -> Self {
         Self { name, value: value.into(), note: note.into(), met: None }
     }
 
-    /// The same with a target that is met or is not.
+    /// The same with a target that is met or missed.
     #[must_use]
     pub fn met(self, met: bool) -> Self {
         Self { met: Some(met), ..self }
@@ -115,12 +115,12 @@ pub fn cards(cards: &[Card]) -> String {
     out
 }
 
-/// A warning (plain text) that stands out in red.
+/// A warning (plain text) in red.
 pub fn warning(text: &str) -> String {
     format!("<p class=\"warning\"><b>Warning.</b> {}</p>\n", escape(text))
 }
 
-/// Colours and what they mean.
+/// A legend: names (plain text) and colours.
 pub fn legend<'a>(entries: impl IntoIterator<Item = (&'a str, [u8; 3])>) -> String {
     let mut out = String::from("<span class=\"legend\">");
     for (name, color) in entries {
@@ -130,7 +130,7 @@ pub fn legend<'a>(entries: impl IntoIterator<Item = (&'a str, [u8; 3])>) -> Stri
     out
 }
 
-/// A colour bar with its end values and, between them, its unit (plain texts).
+/// A colour bar with its end values and its unit (plain texts).
 pub fn scale_bar(stops: &[[u8; 3]], low: &str, unit: &str, high: &str) -> String {
     let colors: Vec<String> = stops.iter().map(|c| hex(*c)).collect();
     format!(
@@ -143,7 +143,7 @@ pub fn scale_bar(stops: &[[u8; 3]], low: &str, unit: &str, high: &str) -> String
     )
 }
 
-/// Plain texts as a bulleted list; nothing where there are none.
+/// A list of plain texts; empty without items.
 pub fn list(items: &[String]) -> String {
     if items.is_empty() {
         return String::new();
@@ -152,7 +152,7 @@ pub fn list(items: &[String]) -> String {
     format!("<ul>{}</ul>\n", items.join(""))
 }
 
-/// Names and values, plain texts, in two columns.
+/// Names and values (plain texts) in two columns.
 pub fn definitions(entries: &[(&str, String)]) -> String {
     let mut out = String::from("<dl>");
     for (name, value) in entries {

@@ -1,65 +1,85 @@
-//! Line plots as inline SVG. Text and axes take the page's ink through `currentColor`.
+//! Line plots as inline SVG. Text and axes have the text colour of the page, through
+//! `currentColor`.
 
 use crate::axis::{Axis, decimal, log_label};
-use crate::{Error, Result};
+use crate::{Error, Result, page};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 const SIZE: (u32, u32) = (560, 300);
 
-/// Drawn in this colour, which nothing else has, then replaced by the page's.
+/// Placeholder colour of text and axes, replaced by `currentColor`.
 const INK: RGBColor = RGBColor(1, 2, 3);
 const INK_HEX: &str = "\"#010203\"";
 
-/// What is larger has blown up and is left out: an axis round it would have no room left in a double.
-const MOST: f64 = 1e300;
+/// Larger values have diverged and are not drawn: the range of the axis would overflow.
+const MAX_VALUE: f64 = 1e300;
 
 /// A curve.
 pub struct Line {
-    /// Its points.
+    /// Points (x, y).
     pub points: Vec<(f64, f64)>,
-    /// sRGB.
+    /// Colour (sRGB).
     pub color: [u8; 3],
-    /// Fill down to zero.
+    /// Fills the area down to zero.
     pub filled: bool,
 }
 
-/// A span along x that is shaded and named.
+impl Line {
+    /// A line that is not filled.
+    pub fn new(points: Vec<(f64, f64)>, color: [u8; 3]) -> Self {
+        Self { points, color, filled: false }
+    }
+}
+
+/// A shaded interval of the x axis.
 pub struct Band {
-    /// Its name.
+    /// Its label.
     pub name: String,
-    /// Where it begins on the x axis.
+    /// Start on the x axis.
     pub from: f64,
-    /// And ends.
+    /// End on the x axis.
     pub to: f64,
 }
 
-/// What is plotted.
+/// A line plot.
+#[derive(Default)]
 pub struct Plot<'a> {
-    /// For screen readers and errors.
+    /// Title, for screen readers and error messages.
     pub title: &'a str,
-    /// Axis labels with their units.
+    /// Label of the x axis, with its unit.
     pub x: &'a str,
-    /// Of the y axis.
+    /// Label of the y axis, with its unit.
     pub y: &'a str,
     /// Lines.
     pub lines: Vec<Line>,
-    /// Bands behind them.
+    /// Bands behind the lines.
     pub bands: Vec<Band>,
-    /// Values that the y axis shows in any case.
+    /// Values that the y axis always includes.
     pub show: Vec<f64>,
     /// Dashed horizontal lines.
     pub limits: Vec<f64>,
-    /// Logarithmic x axis; values at or below 0 are left out.
+    /// Logarithmic x axis; values at or below 0 are not drawn.
     pub log_x: bool,
-    /// Logarithmic y axis; values at or below 0 are left out.
+    /// Logarithmic y axis; values at or below 0 are not drawn.
     pub log_y: bool,
 }
 
 impl Plot<'_> {
-    /// The plot as an `<svg>`, or a sentence when there is nothing to plot.
+    /// The plot above its caption (HTML), as a `<figure>`.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn.
+    pub fn figure(&self, caption: &str) -> Result<String> {
+        Ok(page::figure(&self.svg()?, caption))
+    }
+
+    /// The plot as an `<svg>`; a sentence if there is nothing to plot.
+    ///
+    /// # Errors
+    /// A plot that cannot be drawn.
     pub fn svg(&self) -> Result<String> {
-        let shown_on = |log: bool, v: f64| v.abs() <= MOST && (!log || v > 0.0);
+        let shown_on = |log: bool, v: f64| v.abs() <= MAX_VALUE && (!log || v > 0.0);
         let keep = |&(x, y): &(f64, f64)| shown_on(self.log_x, x) && shown_on(self.log_y, y);
         let scale = |y: f64| if self.log_y { y.log10() } else { y };
         let along = |x: f64| if self.log_x { x.log10() } else { x };
@@ -69,9 +89,9 @@ impl Plot<'_> {
             .map(|l| l.points.iter().filter(|p| keep(p)).map(|&(x, y)| (along(x), scale(y))).collect())
             .collect();
         let Some((left, right)) = range(lines.iter().flatten().map(|p| p.0)) else {
-            return Ok(format!("<p class=\"lead\">Nothing to plot for {}.</p>", crate::page::escape(self.title)));
+            return Ok(format!("<p class=\"lead\">Nothing to plot for {}.</p>", page::escape(self.title)));
         };
-        // Values that are a little off a power of ten still show it.
+        // Room for values next to a power of ten.
         let beside = if self.log_x { 0.04 * (right - left) } else { 0.0 };
         let x_range = (left - beside, right + beside);
         let shown = self.show.iter().chain(&self.limits).filter(|y| shown_on(self.log_y, **y)).map(|y| scale(*y));
@@ -112,7 +132,7 @@ impl Plot<'_> {
             }
             let (left, _) = chart.backend_coord(&(a, y1));
             let (right, y) = chart.backend_coord(&(b, y1));
-            // About 6 pixels a letter: a name that does not fit its band is left out.
+            // A letter is about 6 pixels wide; a name that does not fit its band is not drawn.
             if right - left > 6 * band.name.len() as i32 {
                 let style = text(12).pos(Pos::new(HPos::Center, VPos::Bottom));
                 let label = Text::new(band.name.clone(), ((left + right) / 2, y - 5), style);
@@ -151,14 +171,14 @@ impl Plot<'_> {
         root.present().map_err(|e| e.to_string())
     }
 
-    /// The drawing as part of the page: no size of its own, no namespace (HTML knows it), the page's ink.
+    /// The drawing as inline SVG: without size and namespace, in the text colour of the page.
     fn inline(&self, svg: &str) -> String {
         let body = svg.find("<svg").and_then(|a| svg[a..].find('>').map(|b| &svg[a + b + 1..])).unwrap_or("</svg>");
         format!(
             "<svg viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\">{}",
             SIZE.0,
             SIZE.1,
-            crate::page::escape(self.title),
+            page::escape(self.title),
             body.trim_end().replace(INK_HEX, "\"currentColor\"")
         )
     }
@@ -168,7 +188,7 @@ fn text(size: u32) -> TextStyle<'static> {
     ("sans-serif", size).into_font().color(&INK)
 }
 
-/// Smallest and largest value, widened where they are one; `None` without values.
+/// Smallest and largest value, apart by at least a small amount; none without values.
 fn range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
     (low <= high).then(|| if high - low > 1e-12 { (low, high) } else { (low, low + low.abs().max(1.0)) })
@@ -181,47 +201,44 @@ mod tests {
     fn plot(points: Vec<(f64, f64)>, log_y: bool) -> String {
         Plot {
             title: "lift <over> time",
-            x: "time [s]",
-            y: "lift [mm]",
-            lines: vec![Line { points, color: [10, 20, 30], filled: false }],
+            x: "time (s)",
+            y: "lift (mm)",
+            lines: vec![Line::new(points, [10, 20, 30])],
             bands: vec![Band { name: "settle".into(), from: 0.0, to: 2.0 }],
             show: vec![0.0],
             limits: vec![3.0],
-            log_x: false,
             log_y,
+            ..Plot::default()
         }
         .svg()
         .unwrap()
     }
 
     #[test]
-    fn a_plot_names_its_units_and_loads_nothing() {
+    fn a_plot_has_its_units_and_loads_nothing() {
         let svg = plot((0..100).map(|i| (f64::from(i) * 0.02, f64::from(i))).collect(), false);
-        assert!(svg.contains("time [s]") && svg.contains("lift [mm]") && svg.contains("settle"));
+        assert!(svg.contains("time (s)") && svg.contains("lift (mm)") && svg.contains("settle"));
         assert!(svg.contains("currentColor") && !svg.contains(INK_HEX) && !svg.contains("http"));
         assert!(svg.contains("lift &lt;over&gt; time") && svg.ends_with("</svg>"));
     }
 
     #[test]
-    fn odd_data_do_not_panic() {
+    fn unusual_data_do_not_panic() {
         assert!(plot(vec![], false).contains("Nothing to plot"));
         assert!(plot(vec![(f64::NAN, 1.0), (0.0, f64::INFINITY)], false).contains("Nothing to plot"));
         assert!(plot(vec![(0.0, 0.0), (1.0, -1.0)], true).contains("Nothing to plot"));
         assert!(plot(vec![(1.0, 2.0)], false).contains("<svg"));
         assert!(plot(vec![(0.0, 1e-9), (1.0, 1e5)], true).contains("10⁻⁹"));
         assert!(plot(vec![(0.0, 1e300), (1.0, -1e300)], false).contains("<svg"));
-        // What summaries write of what has blown up.
+        // Values of diverged runs.
         assert!(plot(vec![(0.0, 0.0), (1.0, f64::MAX), (f64::MAX, 1.0)], false).contains("<svg"));
     }
 
     #[test]
     fn both_axes_may_be_logarithmic() {
         let points = vec![(0.0, 1.0), (1_039.0, 0.5), (10_000.0, 5.0), (99_900.0, 50.0)];
-        let line = Line { points, color: [10, 20, 30], filled: false };
-        let (title, x, y) = ("speed", "elements", "times");
-        let (lines, limits) = (vec![line], vec![1.0]);
-        let plot = Plot { title, x, y, lines, bands: vec![], show: vec![], limits, log_x: true, log_y: true };
-        let svg = plot.svg().unwrap();
+        let (lines, limits) = (vec![Line::new(points, [10, 20, 30])], vec![1.0]);
+        let svg = Plot { title: "speed", lines, limits, log_x: true, log_y: true, ..Plot::default() }.svg().unwrap();
         assert!(["10³", "10⁴", "10⁵"].iter().all(|tick| svg.contains(tick)), "{svg}");
     }
 }

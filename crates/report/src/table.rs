@@ -1,4 +1,4 @@
-//! Tables of plain texts, and numbers as they stand in them.
+//! Tables of plain texts, and the format of their numbers.
 
 use crate::page;
 use std::fmt::Write;
@@ -16,7 +16,7 @@ pub fn count(n: usize) -> String {
     out
 }
 
-/// A number with fixed decimals and a true minus; a dash where it is not finite.
+/// A number with fixed decimals and a true minus sign; a dash if it is not finite.
 pub fn fixed(value: f64, decimals: usize) -> String {
     if !value.is_finite() {
         return "\u{2013}".to_owned();
@@ -34,7 +34,7 @@ pub fn percent(share: f64, decimals: usize) -> String {
     format!("{}\u{202f}%", fixed(100.0 * share, decimals))
 }
 
-/// Rows of two or three plain texts under a head.
+/// An HTML table of plain texts.
 pub fn plain(head: &[&str], rows: &[Vec<String>]) -> String {
     let cells = |tag: &str, texts: &mut dyn Iterator<Item = &str>| {
         texts.map(|t| format!("<{tag}>{}</{tag}>", page::escape(t))).collect::<String>()
@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn numbers_read_well() {
+    fn numbers_are_typeset() {
         assert_eq!(count(1_234_567), "1\u{202f}234\u{202f}567");
         assert_eq!(count(999), "999");
         assert_eq!(fixed(-0.001, 2), "0.00");

@@ -1,4 +1,4 @@
-//! Rendered views: where the camera stands, and bodies cut open.
+//! Rendered views: poses of cameras, and sections of bodies.
 
 use crate::colors::VIEW_GROUND;
 use glam::DVec3;
@@ -8,7 +8,7 @@ use trocar_core::Pose;
 use trocar_geometry::{TetMesh, TriMesh};
 use trocar_render::phong::{Instance, PhongScene};
 
-/// A camera and where it stands.
+/// A camera and its pose.
 #[derive(Clone, Copy, Debug)]
 pub struct View {
     /// The camera.
@@ -18,7 +18,8 @@ pub struct View {
 }
 
 impl View {
-    /// The nearest view along `-from` (a direction towards the eye) that shows all of `points` with a margin.
+    /// The closest view along `-from` (a direction to the eye) that shows all `points` with a
+    /// margin.
     pub fn framing(points: &[DVec3], from: DVec3, up: DVec3, (width, height): (usize, usize)) -> Self {
         const HALF_ANGLE: f64 = 0.26;
         const MARGIN: f64 = 1.08;
@@ -29,7 +30,8 @@ impl View {
         let turned = Pose::look_at(DVec3::ZERO, -from, up);
         let local: Vec<DVec3> =
             points.iter().filter(|p| p.is_finite()).map(|p| turned.inverse().transform(*p)).collect();
-        // Four planes through the eye bound what is seen; along x and along y the eye sits where the outermost ones meet.
+        // Four planes through the eye bound the view. Along x and along y the eye is where the
+        // outermost planes meet.
         let most = |f: &dyn Fn(&DVec3) -> f64| local.iter().map(f).fold(f64::NEG_INFINITY, f64::max);
         let (right, left) = (most(&|p| p.x - tan_x * p.z), most(&|p| -p.x - tan_x * p.z));
         let (down, above) = (most(&|p| p.y - tan_y * p.z), most(&|p| -p.y - tan_y * p.z));
@@ -39,7 +41,8 @@ impl View {
         Self { camera, pose: Pose { translation: turned.transform(eye), ..turned } }
     }
 
-    /// A picture of `instances`, lit from above the viewer's left shoulder, anti-aliased, creases darkened.
+    /// Renders `instances` with anti-aliasing and ambient occlusion, lit from above the viewer's
+    /// left shoulder.
     pub fn picture(&self, instances: Vec<Instance>, samples: usize) -> ColorImage {
         let light = self.pose.rotation * DVec3::new(-0.45, -0.8, -0.9);
         let wires = instances.iter().any(|i| i.shading.wireframe);
@@ -49,8 +52,8 @@ impl View {
     }
 }
 
-/// Surface of what a cut through the middle of the nodes leaves of a body: `skin` where the body ends, `inside` where the cut laid it bare. Vertices
-/// are not shared between the two, so that each face has one colour.
+/// Surface of a body, or of the half behind a plane through its centre: `skin` is the colour of the
+/// outer surface, `inside` that of the section. Faces of different colours share no vertices.
 pub fn shell(body: &TetMesh, cut: Option<DVec3>, skin: [u8; 3], inside: [u8; 3]) -> TriMesh {
     let Some(normal) = cut else {
         let mut surface = body.boundary().0;
@@ -97,7 +100,7 @@ mod tests {
     }
 
     #[test]
-    fn framing_nothing_is_still_a_view() {
+    fn framing_no_points_is_a_view() {
         let view = View::framing(&[], DVec3::Z, DVec3::Z, (48, 30));
         assert!(view.pose.translation.is_finite());
     }

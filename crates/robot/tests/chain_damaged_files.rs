@@ -7,7 +7,7 @@ mod common;
 
 use common::files::{MJCF, URDF};
 use trocar_robot::chain::SerialArm;
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -19,7 +19,7 @@ const ALLOWANCE: Allowance = Allowance { fixed: 1 << 20, per_byte: 100 };
 fn damage_never_panics() {
     let seeds = [("arm.urdf".to_owned(), URDF.as_bytes().to_vec()), ("arm.xml".to_owned(), MJCF.as_bytes().to_vec())];
     let folder = tempfile::tempdir().unwrap();
-    assault(&seeds, ALLOWANCE, |name, bytes| {
+    fuzz_reader(&seeds, ALLOWANCE, |name, bytes| {
         let path = folder.path().join(name);
         std::fs::write(&path, bytes).unwrap();
         let read = if name.ends_with("urdf") {

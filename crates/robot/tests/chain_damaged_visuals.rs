@@ -7,7 +7,7 @@ mod common;
 
 use common::files::{shown_mjcf, shown_urdf};
 use trocar_robot::chain::{mjcf_visuals, urdf_visuals};
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -42,5 +42,5 @@ fn damage_and_cuts_never_panic() {
             read(name, &good[..end]);
         }
     }
-    assault(&seeds, ALLOWANCE, read);
+    fuzz_reader(&seeds, ALLOWANCE, read);
 }

@@ -5,7 +5,7 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use trocar_specimen::{End, Material, MaterialModel, Pins};
 
-/// The name, in a filtered pair, of what the organs lie on. No organ may have it.
+/// Name of the ground under the organs in a filtered pair. No organ may have it.
 pub const FIELD: &str = "field";
 
 /// The specimen: a folder, or a built-in phantom. One of `path` and `phantom`.
@@ -54,11 +54,11 @@ impl SpecimenSource {
     }
 }
 
-/// What the scene says of an organ otherwise than the specimen does.
+/// Changes of the scene to an organ of the specimen.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct OrganOverride {
-    /// Material; what is left out stays as the specimen has it.
+    /// Material; other properties stay those of the specimen.
     pub material: MaterialOverride,
     /// Which nodes are held where they were recorded; the specimen's rule if left out.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -91,7 +91,7 @@ fn material_models(_: &mut SchemaGenerator) -> Schema {
 }
 
 impl MaterialOverride {
-    /// The specimen's `material` with what the scene says otherwise.
+    /// The specimen's `material` with the scene's changes.
     pub fn applied_to(&self, material: Material) -> Material {
         Material {
             model: self.model.unwrap_or(material.model),
@@ -172,7 +172,7 @@ pub enum ScheduleName {
     Adaptive,
 }
 
-/// How tissue is stepped and what it feels.
+/// Solver and contact of the tissue.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Tissue {
@@ -184,9 +184,9 @@ pub struct Tissue {
     pub tip_rest_offset_mm: f64,
     /// Coulomb friction of tissue on tissue and of instruments on tissue.
     pub friction: f64,
-    /// Pairs that do not touch: two organs, or an organ and `field`, what the organs lie on.
+    /// Pairs without contact: two organs, or an organ and `field`, the ground under the organs.
     pub filtered_pairs: Vec<[String; 2]>,
-    /// What the organs lie on.
+    /// The ground under the organs.
     pub support: Support,
 }
 
@@ -204,7 +204,7 @@ impl Default for Tissue {
     }
 }
 
-/// What the organs lie on.
+/// The ground under the organs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Support {

@@ -205,7 +205,7 @@ impl Arm {
     }
 }
 
-/// A controller by name, with what is set otherwise than it has it.
+/// A controller by name, with changed gains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Controller {
@@ -331,13 +331,13 @@ impl Instrument {
     }
 }
 
-/// What the controllers believe wrongly (SPEC K4).
+/// Errors of the controllers' model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GravityError {
-    /// Share by which every link is believed lighter than it is.
+    /// Share by which the model's links are too light.
     pub link_mass_share: f64,
-    /// Share by which the instrument is believed lighter than it is.
+    /// Share by which the model's instrument is too light.
     pub instrument_mass_share: f64,
     /// Coulomb friction in each joint that the controller knows nothing of (N m).
     pub joint_friction_nm: f64,

@@ -1,4 +1,4 @@
-//! What can go wrong with a scene file.
+//! Errors of scene files.
 
 use std::path::PathBuf;
 
@@ -13,25 +13,25 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// The file does not say what a scene should.
+    /// The contents of the file are wrong.
     #[error("{file}: {reason}")]
     Invalid {
         /// The file, or the name of a built-in scene.
         file: String,
-        /// Line, field, what is wrong with it, what would be right.
+        /// Line and field, what is wrong, and what would be right.
         reason: String,
     },
     /// Neither a file nor a built-in scene.
-    #[error("no scene '{name}'; a TOML file, or one of the built-in scenes {known}{hint}", hint = nearest.as_ref().map(|n| format!("; did you mean '{n}'?")).unwrap_or_default())]
+    #[error("no scene '{name}'; it must be a TOML file or one of the built-in scenes {known}{hint}", hint = nearest.as_ref().map(|n| format!("; did you mean '{n}'?")).unwrap_or_default())]
     Unknown {
-        /// What was asked for.
+        /// The given name.
         name: String,
         /// The built-in scenes.
         known: String,
-        /// The one most like it.
+        /// The most similar built-in scene.
         nearest: Option<String>,
     },
     /// The scene cannot be written as TOML.

@@ -20,7 +20,7 @@ pub struct Port {
     #[serde(default = "hole")]
     pub hole_diameter_mm: f64,
     /// Thickness of the wall (mm); of a wall of 0 the hole is one edge, as in the paper's formula
-    /// of the clearance (SPEC K3). One of 2 mm leaves a shaft of 5 mm in 6 mm 19 degrees of tilt.
+    /// of the clearance. One of 2 mm leaves a shaft of 5 mm in 6 mm 19 degrees of tilt.
     #[serde(default = "sheet")]
     pub sheet_thickness_mm: f64,
     /// Diameter of the piece of abdominal wall that pictures show round the hole (mm); of 0 they

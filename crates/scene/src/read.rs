@@ -7,7 +7,7 @@ use std::path::Path;
 use trocar_specimen::{Specimen, line_of, nearest, parse_toml};
 
 /// Largest scene file (bytes); the paper's has about 8,000.
-const MOST_BYTES: u64 = 1 << 20;
+const MAX_BYTES: u64 = 1 << 20;
 
 impl Scene {
     /// The scene of that path or built-in name, checked whole: what it names by path is there, and
@@ -35,10 +35,10 @@ impl Scene {
         let io = |source| Error::Io { path: path.to_owned(), source };
         let mut text = String::new();
         let file = std::fs::File::open(path).map_err(io)?;
-        file.take(MOST_BYTES + 1).read_to_string(&mut text).map_err(io)?;
+        file.take(MAX_BYTES + 1).read_to_string(&mut text).map_err(io)?;
         let name = path.display().to_string();
-        if text.len() as u64 > MOST_BYTES {
-            let reason = format!("larger than {MOST_BYTES} bytes; a scene is a few thousand");
+        if text.len() as u64 > MAX_BYTES {
+            let reason = format!("the file has more than {MAX_BYTES} bytes; a scene file has a few thousand");
             return Err(Error::Invalid { file: name, reason });
         }
         Self::parse(&text, &name, path.parent().unwrap_or(Path::new("")))

@@ -26,10 +26,10 @@ pub struct Scene {
     /// Pose of the specimen, which is that of its recording camera, in the cell frame.
     #[serde(default = "placement")]
     pub placement: Frame,
-    /// What is said of organs otherwise than in the specimen, by their names.
+    /// Changes to organs of the specimen, by name.
     #[serde(default, rename = "organ")]
     pub organs: BTreeMap<String, OrganOverride>,
-    /// How tissue is stepped and what it feels.
+    /// Solver and contact of the tissue.
     #[serde(default)]
     pub tissue: Tissue,
     /// How often things happen.
@@ -44,16 +44,16 @@ pub struct Scene {
     /// The instruments; the paper's two if left out.
     #[serde(default = "instruments", rename = "instrument")]
     pub instruments: Vec<Instrument>,
-    /// What the controllers believe wrongly.
+    /// Errors of the controllers' model.
     #[serde(default)]
     pub gravity_error: GravityError,
     /// The cameras; the paper's three if left out.
     #[serde(default = "CellCamera::paper", rename = "camera")]
     pub cameras: Vec<CellCamera>,
-    /// What an episode asks for.
+    /// The task of an episode.
     #[serde(default)]
     pub task: Task,
-    /// What is unsafe.
+    /// Safety limits.
     #[serde(default)]
     pub safety: Safety,
     /// The folder that paths in the scene start from; not in the file.

@@ -1,4 +1,4 @@
-//! What an episode asks for, when its stages count as done, and what is unsafe.
+//! The task of an episode, the gates of its stages, and safety limits.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -42,7 +42,7 @@ pub enum GraspDesignName {
     Compliant,
 }
 
-/// What an episode asks for.
+/// The task of an episode.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Task {
@@ -50,7 +50,7 @@ pub struct Task {
     pub name: TaskName,
     /// The organ it is about.
     pub organ: String,
-    /// Longest episode (s).
+    /// Maximum duration of an episode (s).
     pub episode_s: f64,
     /// How the grasper holds: friction, rest-pose, live-pose or compliant.
     pub grasp: GraspDesignName,
@@ -164,7 +164,7 @@ impl Default for Variation {
     }
 }
 
-/// What is unsafe (SPEC E2).
+/// Safety limits.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Safety {

@@ -7,8 +7,8 @@ use trocar_scene::{Builtin, Scene};
 /// Marks, in the changed text, the line that the message names.
 const HERE: char = '§';
 
-/// What is changed in cell-a, into what, and what is then said after the file and the line. Where
-/// another line is named than the changed one, it goes before, between two `@`.
+/// A text of cell-a, its replacement, and the message after file and line. A message for another
+/// line begins with that line's text between two `@`.
 struct Case(&'static str, &'static str, &'static str);
 
 fn said(text: &str, folder: &Path) -> String {
@@ -80,58 +80,62 @@ fn units() {
         Case(
             "hole_diameter_mm = 6.0",
             "hole_diameter_mm = 0.006§",
-            "port[0].hole_diameter_mm is 0.006; 1 to 50 mm; 0.006 m is 6 mm",
+            "port[0].hole_diameter_mm is 0.006; it must be in [1, 50] mm; 0.006 m is 6 mm",
         ),
         Case(
             "centre_m = [-0.045, 0.46, 0.16]",
             "centre_m = [-50, 460, 130]§",
-            "port[0].centre_m[0] is -50; -5 to 5 m; -50 mm is -0.05 m",
+            "port[0].centre_m[0] is -50; it must be in [-5, 5] m; -50 mm is -0.05 m",
         ),
         Case(
             "tilt_deg = 13.3",
             "tilt_deg = 0.2321§",
-            "arm[0].start.tilt_deg is 0.2321; 0, or 1 to 33.5 degrees, where the shaft fills the hole, less the variation of 1; 0.2321 rad is 13.2984 degrees",
+            "arm[0].start.tilt_deg is 0.2321; it must be 0 or in [1, 32.5] degrees: the shaft touches the hole at 33.5, and the variation is 1; 0.2321 rad is 13.2984 degrees",
         ),
         Case(
             "jaw_max_angle_deg = 60.0",
             "jaw_max_angle_deg = 1.0472§",
-            "instrument[0].jaw_max_angle_deg is 1.0472; 5 to 120 degrees; 1.0472 rad is 60.0001 degrees",
+            "instrument[0].jaw_max_angle_deg is 1.0472; it must be in [5, 120] degrees; 1.0472 rad is 60.0001 degrees",
         ),
         Case(
             "width_deg = 86.2",
             "width_deg = 1.5045§",
-            "camera[0].lens.width_deg is 1.5045; 5 to 170 degrees; 1.5045 rad is 86.2015 degrees",
+            "camera[0].lens.width_deg is 1.5045; it must be in [5, 170] degrees; 1.5045 rad is 86.2015 degrees",
         ),
         Case(
             "mass_kg = 0.4793",
             "mass_kg = 479.3§",
-            "instrument[0].mass_kg is 479.3; 0.005 to 10 kg; 479.3 g is 0.4793 kg",
+            "instrument[0].mass_kg is 479.3; it must be in [0.005, 10] kg; 479.3 g is 0.4793 kg",
         ),
         Case(
             "joint_friction_nm = 0.2",
             "joint_friction_nm = 200§",
-            "gravity_error.joint_friction_nm is 200; 0 to 20 N m; 200 N mm is 0.2 N m",
+            "gravity_error.joint_friction_nm is 200; it must be in [0, 20] N m; 200 N mm is 0.2 N m",
         ),
         Case(
             "[organ.cecum.pins]",
             "[organ.cecum.material]\nyoung_modulus_pa = 30§\n[organ.cecum.pins]",
-            "organ.cecum.material.young_modulus_pa is 30; 100 to 1e9 Pa; 30 kPa is 30000 Pa",
+            "organ.cecum.material.young_modulus_pa is 30; it must be in [100, 1e9] Pa; 30 kPa is 30000 Pa",
         ),
         Case(
             "[organ.cecum.pins]",
             "[organ.cecum.material]\ndensity_kg_m3 = 1.2§\n[organ.cecum.pins]",
-            "organ.cecum.material.density_kg_m3 is 1.2; 100 to 30000 kg/m3; 1.2 g/cm3 is 1200 kg/m3",
+            "organ.cecum.material.density_kg_m3 is 1.2; it must be in [100, 30000] kg/m3; 1.2 g/cm3 is 1200 kg/m3",
         ),
         Case(
             "insertion_mm = 100.0",
             "insertion_mm = 0.07§ ",
-            "arm[0].start.insertion_mm is 0.07; 21 to 321 mm; 0.07 m is 70 mm",
+            "arm[0].start.insertion_mm is 0.07; it must be in [21, 321] mm; 0.07 m is 70 mm",
         ),
-        Case("episode_s = 40.0", "episode_s = 40000§", "task.episode_s is 40000; 0.1 to 3600 s; 40000 ms is 40 s"),
+        Case(
+            "episode_s = 40.0",
+            "episode_s = 40000§",
+            "task.episode_s is 40000; it must be in [0.1, 3600] s; 40000 ms is 40 s",
+        ),
         Case(
             "model = \"franka_fr3\"            #",
             "model = \"franka_fr3\"\nposture_deg = [0.0, -0.785, 0.0, -2.356, 0.0, 1.571, 0.785]§ #",
-            "arm[0].posture_deg[3] is -2.356; -174.299 to -8.6975 degrees; -2.356 rad is -134.989 degrees",
+            "arm[0].posture_deg[3] is -2.356; it must be in [-174.299, -8.6975] degrees; -2.356 rad is -134.989 degrees",
         ),
     ]);
 }
@@ -139,79 +143,83 @@ fn units() {
 #[test]
 fn numbers() {
     check(&[
-        Case("episode_s = 40.0", "episode_s = nan§", "task.episode_s is NaN; 0.1 to 3600 s"),
+        Case("episode_s = 40.0", "episode_s = nan§", "task.episode_s is NaN; it must be in [0.1, 3600] s"),
         Case(
             "centre_m = [0.045, 0.46, 0.16]",
             "centre_m = [0.045, inf, 0.16]§",
-            "port[1].centre_m[1] is inf; -5 to 5 m",
+            "port[1].centre_m[1] is inf; it must be in [-5, 5] m",
         ),
         Case(
             "position_m = [-0.012, 0.48, 0.17]",
             "position_m = [-0.012, 0.48, nan]§",
-            "placement.position_m[2] is NaN; -5 to 5 m",
+            "placement.position_m[2] is NaN; it must be in [-5, 5] m",
         ),
-        Case("lift_mm = 8.0", "lift_mm = -8.0§", "task.gates.lift_mm is -8; 0.1 to 100 mm"),
+        Case("lift_mm = 8.0", "lift_mm = -8.0§", "task.gates.lift_mm is -8; it must be in [0.1, 100] mm"),
         Case(
             "sheet_thickness_mm = 0.0",
             "sheet_thickness_mm = 1e300§",
-            "port[0].sheet_thickness_mm is 1e300; 0 to 50 mm",
+            "port[0].sheet_thickness_mm is 1e300; it must be in [0, 50] mm",
         ),
-        Case("jaw_force_n = 0.5", "jaw_force_n = 0§", "instrument[0].jaw_force_n is 0; 0.01 to 40 N"),
-        Case("friction = 0.6\nfiltered", "friction = -0.6§\nfiltered", "tissue.friction is -0.6; 0 to 5"),
-        Case("jaw = 0.5", "jaw = 30§", "arm[0].start.jaw is 30; 0 to 1"),
-        Case("control_hz = 30 ", "control_hz = 0§ ", "rates.control_hz is 0; 1 to 1000 Hz"),
-        Case("size_px = [848, 480]", "size_px = [0, 480]§", "camera[1].size_px[0] is 0; 1 to 8192 px"),
-        Case("link_mass_share = 0.02", "link_mass_share = 2§", "gravity_error.link_mass_share is 2; -0.5 to 0.5"),
+        Case("jaw_force_n = 0.5", "jaw_force_n = 0§", "instrument[0].jaw_force_n is 0; it must be in [0.01, 40] N"),
+        Case("friction = 0.6\nfiltered", "friction = -0.6§\nfiltered", "tissue.friction is -0.6; it must be in [0, 5]"),
+        Case("jaw = 0.5", "jaw = 30§", "arm[0].start.jaw is 30; it must be in [0, 1]"),
+        Case("control_hz = 30 ", "control_hz = 0§ ", "rates.control_hz is 0; it must be in [1, 1000] Hz"),
+        Case("size_px = [848, 480]", "size_px = [0, 480]§", "camera[1].size_px[0] is 0; it must be in [1, 8192] px"),
+        Case(
+            "link_mass_share = 0.02",
+            "link_mass_share = 2§",
+            "gravity_error.link_mass_share is 2; it must be in [-0.5, 0.5]",
+        ),
         Case(
             "rotation_wxyz = [0.0, 1.0, 0.0, 0.0]",
             "rotation_wxyz = [0.0, 2.0, 0.0, 0.0]§",
-            "placement.rotation_wxyz has length 2; a unit quaternion, scalar first: [0, 1, 0, 0]",
+            "placement.rotation_wxyz has length 2; it must be a unit quaternion, scalar first: [0, 1, 0, 0]",
         ),
         Case(
             "rotation_wxyz = [0.0, 1.0, 0.0, 0.0]",
             "rotation_wxyz = [0.0, 0.0, 0.0, 0.0]§",
-            "placement.rotation_wxyz has length 0; a unit quaternion, scalar first",
+            "placement.rotation_wxyz has length 0; it must be a unit quaternion, scalar first",
         ),
         Case(
             "rotation_wxyz = [0.7071067811865476, 0.0, 0.0, 0.7071067811865476]   #",
             "rotation_wxyz = [nan, 0.0, 0.0, 1.0]§ #",
-            "arm[0].base.rotation_wxyz has length NaN; a unit quaternion, scalar first",
+            "arm[0].base.rotation_wxyz has length NaN; it must be a unit quaternion, scalar first",
         ),
         Case(
             "normal = [0.0, 0.0, 1.0]        #",
             "normal = [0.0, 1.0, 1.0]§ #",
-            "port[0].normal has length 1.41421; a unit vector: [0, 0.707107, 0.707107]",
+            "port[0].normal has length 1.41421; it must be a unit vector: [0, 0.707107, 0.707107]",
         ),
         Case(
             "lens = { kind = \"field-of-view\", width_deg = 86.2, height_deg = 54.6 }",
             "lens = { kind = \"opencv\", fx_px = -700, fy_px = 700, cx_px = 640, cy_px = 360 }§",
-            "camera[0].lens.fx_px is -700; 1 to 1000000 px",
+            "camera[0].lens.fx_px is -700; it must be in [1, 1000000] px",
         ),
         Case(
             "lens = { kind = \"field-of-view\", width_deg = 86.2, height_deg = 54.6 }",
             "lens = { kind = \"opencv\", fx_px = 700, fy_px = 700, cx_px = 640, cy_px = 360, distortion = [0.1, 0.2] }§",
-            "camera[0].lens.distortion has 2 coefficients; k1 k2 p1 p2 [k3 [k4 k5 k6]]: 4, 5 or 8",
+            "camera[0].lens.distortion has 2 coefficients; it must have 4, 5 or 8: k1 k2 p1 p2 [k3 [k4 k5 k6]]",
         ),
         Case(
             "target_m = [0.0, 0.456, 0.035]",
             "target_m = [0.0, 0.42, 0.115]§",
-            "camera[0].view.target_m is where eye_m is; another point",
+            "camera[0].view.target_m is equal to eye_m; it must be another point",
         ),
         Case(
             "up = [0.0, 1.0, 0.0]",
             "up = [0.0, 0.0, 1.0]§",
-            "camera[1].view.up has no direction across the view; the direction of the image's top",
+            "camera[1].view.up is zero or parallel to the view; it must be the direction of the image's top",
         ),
         Case("share = 0.42", "share = 42§", "organ.cecum.pins.share is 42; it must be in [0, 1]"),
         Case(
             "length = 0.14",
             "length = 0.84",
-            "@[organ.appendix.pins]@organ.appendix.pins has a length and a band_length of 1.14 together; at most 1",
+            "@[organ.appendix.pins]@organ.appendix.pins has a length and a band_length of 1.14 together; it must be at most 1",
         ),
         Case(
             "name = \"default\"",
             "name = \"default\"\ngains = { stiffness = -1.0 }§",
-            "arm[0].controller.gains.stiffness is -1; 0 or more, and finite",
+            "arm[0].controller.gains.stiffness is -1; it must be at least 0 and finite",
         ),
     ]);
 }
@@ -222,7 +230,7 @@ fn names() {
         Case(
             "name = \"cell-a\"",
             "name = \"Cell A\"§",
-            "name is 'Cell A'; lower-case letters, digits, '-' and '_', 1 to 64 of them",
+            "name is 'Cell A'; it must be 1 to 64 lower-case letters, digits, '-' and '_'",
         ),
         Case(
             "phantom = \"phantom-a\"",
@@ -232,13 +240,17 @@ fn names() {
         Case(
             "phantom = \"phantom-a\" ",
             "path = \"here\"\nphantom = \"phantom-a\" ",
-            "@[specimen]@specimen has a path and a phantom; one of them",
+            "@[specimen]@specimen has a path and a phantom; it must have one of them",
         ),
-        Case("phantom = \"phantom-a\" ", "", "@[specimen]@specimen has neither a path nor a phantom; one of them"),
+        Case(
+            "phantom = \"phantom-a\" ",
+            "",
+            "@[specimen]@specimen has neither a path nor a phantom; it must have one of them",
+        ),
         Case(
             "phantom = \"phantom-a\" ",
             "path = \"nowhere\"§ ",
-            "specimen.path is nowhere, which is no specimen; a folder with a specimen.toml",
+            "specimen.path is nowhere, which is no specimen; it must be a folder with a specimen.toml",
         ),
         Case(
             "[organ.cecum.pins]",
@@ -248,17 +260,17 @@ fn names() {
         Case(
             "filtered_pairs = []",
             "filtered_pairs = [[\"stomach\", \"fild\"]]§",
-            "tissue.filtered_pairs[0][1] is 'fild'; a pair is of the specimen's organs and the field: cecum, bowel-1, bowel-2, bowel-3, stomach, appendix, field; did you mean 'field'?",
+            "tissue.filtered_pairs[0][1] is 'fild'; it must be one of the specimen's organs or the field: cecum, bowel-1, bowel-2, bowel-3, stomach, appendix, field; did you mean 'field'?",
         ),
         Case(
             "filtered_pairs = []",
             "filtered_pairs = [[\"stomach\", \"field\"], [\"field\", \"stomach\"]]§",
-            "tissue.filtered_pairs[1] is the pair of tissue.filtered_pairs[0] again; once is enough",
+            "tissue.filtered_pairs[1] is the pair of tissue.filtered_pairs[0] again; remove one of them",
         ),
         Case(
             "filtered_pairs = []",
             "filtered_pairs = [[\"field\", \"field\"]]§",
-            "tissue.filtered_pairs[0] is 'field' twice; two organs, or an organ and the field",
+            "tissue.filtered_pairs[0] is 'field' twice; it must be two organs, or an organ and the field",
         ),
         Case(
             "organ = \"appendix\"",
@@ -278,37 +290,37 @@ fn names() {
         Case(
             "name = \"right\"\ncentre",
             "name = \"left\"§\ncentre",
-            "port[1].name is 'left', as that of port[0] is; names are unique",
+            "port[1].name is 'left', which port[0] already has; names must be unique",
         ),
         Case(
             "name = \"cutter\"\nkind",
             "name = \"grasper\"§\nkind",
-            "instrument[1].name is 'grasper', as that of instrument[0] is; names are unique",
+            "instrument[1].name is 'grasper', which instrument[0] already has; names must be unique",
         ),
         Case(
             "name = \"right\"\nmodel",
             "name = \"left\"§\nmodel",
-            "arm[1].name is 'left', as that of arm[0] is; names are unique",
+            "arm[1].name is 'left', which arm[0] already has; names must be unique",
         ),
         Case(
             "name = \"d405\"",
             "name = \"endoscope\"§",
-            "camera[1].name is 'endoscope', as that of camera[0] is; names are unique",
+            "camera[1].name is 'endoscope', which camera[0] already has; names must be unique",
         ),
         Case(
             "model = \"franka_fr3\"            #",
             "model = \"franka_fr4\"§ #",
-            "arm[0].model is 'franka_fr4'; franka_fr3, or a file that ends in .urdf, .xml or .mjcf",
+            "arm[0].model is 'franka_fr4'; it must be franka_fr3 or a file that ends in .urdf, .xml or .mjcf",
         ),
         Case(
             "model = \"franka_fr3\"            #",
             "model = \"../arms/absent.urdf\"§ #",
-            "arm[0].model is ../arms/absent.urdf, which is no file; a path from the scene file's folder",
+            "arm[0].model is ../arms/absent.urdf, which is no file; it must be a path from the scene file's folder",
         ),
         Case(
             "model = \"franka_fr3\"            #",
             "model = \"franka_fr3\"\nposture_deg = [0.0]§ #",
-            "arm[0].posture_deg has 1 angles; an FR3 has 7 joints",
+            "arm[0].posture_deg has 1 angles; it must have 7 for an FR3",
         ),
     ]);
 }
@@ -319,52 +331,68 @@ fn parts_fit() {
         Case(
             "physics_hz = 480",
             "physics_hz = 500§",
-            "rates.physics_hz is 500, no multiple of control_hz, 30; a multiple, such as 480",
+            "rates.physics_hz is 500, which is no multiple of control_hz (30); it must be a multiple, such as 480",
         ),
         Case(
             "shaft_diameter_mm = 5.0",
             "shaft_diameter_mm = 8.0",
-            "@instrument = \"grasper\"@arm[0].instrument is 'grasper', whose shaft of 8 mm does not go through the hole of 6 mm of port 'left'; a thinner shaft or a larger hole",
+            "@instrument = \"grasper\"@arm[0].instrument is 'grasper', whose shaft of 8 mm does not go through the hole of 6 mm of port 'left'; choose a thinner shaft or a larger hole",
         ),
         Case(
             "tilt_deg = 18.3",
             "tilt_deg = 34§",
-            "arm[1].start.tilt_deg is 34; 0, or 1 to 33.5 degrees, where the shaft fills the hole, less the variation of 1",
+            "arm[1].start.tilt_deg is 34; it must be 0 or in [1, 32.5] degrees: the shaft touches the hole at 33.5, and the variation is 1",
         ),
         Case(
             "tilt_deg = 18.3",
             "tilt_deg = 33§",
-            "arm[1].start.tilt_deg is 33; 0, or 1 to 33.5 degrees, where the shaft fills the hole, less the variation of 1",
+            "arm[1].start.tilt_deg is 33; it must be 0 or in [1, 32.5] degrees: the shaft touches the hole at 33.5, and the variation is 1",
         ),
         Case(
             "centre_m = [-0.045, 0.46, 0.16]",
             "centre_m = [-0.045, 0.96, 0.16]",
-            "@port = \"left\"@arm[0].port is 'left', which is out of reach: the flange would start 1.024 m from the shoulder; at most 0.855 m",
+            "@port = \"left\"@arm[0].port is 'left', which is out of reach: the flange would start 1.024 m from the shoulder; it must be at most 0.855 m",
         ),
         Case(
             "position_m = [0.45, 0.0, 0.0]",
             "position_m = [-0.3, 0.0, 0.0]§",
-            "arm[1].base.position_m is 0.15 m from that of arm[0]; bases are 0.2 m or more apart",
+            "arm[1].base.position_m is 0.15 m from that of arm[0]; it must be at least 0.2 m",
         ),
         Case(
             "centre_m = [0.045, 0.46, 0.16]",
             "centre_m = [-0.043, 0.46, 0.16]§",
-            "port[1].centre_m is 2 mm from that of port[0]; holes do not overlap",
+            "port[1].centre_m is 2 mm from that of port[0]; holes must not overlap",
         ),
-        Case("port = \"right\"", "port = \"left\"§", "arm[1].port is 'left', which arm[0] has; each its own"),
+        Case(
+            "port = \"right\"",
+            "port = \"left\"§",
+            "arm[1].port is 'left', which arm[0] already has; each arm needs its own",
+        ),
         Case(
             "instrument = \"cutter\"",
             "instrument = \"grasper\"§",
-            "arm[1].instrument is 'grasper', which arm[0] has; each its own",
+            "arm[1].instrument is 'grasper', which arm[0] already has; each arm needs its own",
         ),
         Case(
             "kind = \"cutter\"",
             "kind = \"grasper\"",
-            "@name = \"appendix-resection\"@task.name is 'appendix-resection', but no arm has a cutter; an arm with a cutter",
+            "@name = \"appendix-resection\"@task.name is 'appendix-resection', but no arm has a cutter; it needs an arm with a cutter",
         ),
-        Case("grasp_to = 0.70", "grasp_to = 0.20§", "task.gates.grasp_to is 0.2; above grasp_from, 0.3"),
-        Case("cut_open = 0.50", "cut_open = 0.10§", "task.gates.cut_open is 0.1; above cut_closed, 0.15"),
-        Case("rcm_abort_mm = 5.0", "rcm_abort_mm = 2.0§", "safety.rcm_abort_mm is 2; above rcm_threshold_mm, 3"),
+        Case(
+            "grasp_to = 0.70",
+            "grasp_to = 0.20§",
+            "task.gates.grasp_to is 0.2; it must be greater than grasp_from (0.3)",
+        ),
+        Case(
+            "cut_open = 0.50",
+            "cut_open = 0.10§",
+            "task.gates.cut_open is 0.1; it must be greater than cut_closed (0.15)",
+        ),
+        Case(
+            "rcm_abort_mm = 5.0",
+            "rcm_abort_mm = 2.0§",
+            "safety.rcm_abort_mm is 2; it must be greater than rcm_threshold_mm (3)",
+        ),
     ]);
 }
 
@@ -377,7 +405,10 @@ fn long_lists() {
         format!("name = 'many'\n[specimen]\nphantom = 'phantom-a'\n{cameras}")
     };
     Scene::parse(&scene(16), "scene.toml", "".as_ref()).unwrap();
-    assert_eq!(said(&scene(17), "".as_ref()), "scene.toml: line 4: camera has more than 16 entries; 16 or fewer");
+    assert_eq!(
+        said(&scene(17), "".as_ref()),
+        "scene.toml: line 4: camera has more than 16 entries; it must have at most 16"
+    );
 }
 
 #[test]
@@ -388,10 +419,14 @@ fn files() {
         std::fs::write(&path, content).unwrap();
         Scene::read_file(&path).unwrap_err().to_string().replace(&root.path().display().to_string(), "")
     };
-    assert_eq!(read(&[b' '; (1 << 20) + 1]), "/scene.toml: larger than 1048576 bytes; a scene is a few thousand");
+    assert_eq!(
+        read(&[b' '; (1 << 20) + 1]),
+        "/scene.toml: the file has more than 1048576 bytes; a scene file has a few thousand"
+    );
     assert_eq!(read(&[0xff, 0xfe]), "/scene.toml: stream did not contain valid UTF-8");
     assert_eq!(read(b""), "/scene.toml: line 1: missing field `name`");
-    let unknown = "no scene 'cell-b'; a TOML file, or one of the built-in scenes cell-a; did you mean 'cell-a'?";
+    let unknown =
+        "no scene 'cell-b'; it must be a TOML file or one of the built-in scenes cell-a; did you mean 'cell-a'?";
     assert_eq!(Scene::read("cell-b").unwrap_err().to_string(), unknown);
     let absent = Scene::read("absent/scene.toml").unwrap_err().to_string();
     assert_eq!(absent, "absent/scene.toml: No such file or directory (os error 2)");

@@ -1,9 +1,9 @@
-//! Damaged scenes give a scene or a one-line error: never a panic, a hang, or more memory than
-//! their size calls for.
+//! Damaged scenes give a scene or a one-line error: no panic, no hang, no memory beyond what their
+//! size needs.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use trocar_scene::{BUILTINS, Scene};
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -22,7 +22,7 @@ fn damage_never_panics() {
         seeds.push((format!("canonical {}", builtin.name), canonical.into_bytes()));
     }
     let mut refused = 0;
-    assault(&seeds, ALLOWANCE, |_, bytes| {
+    fuzz_reader(&seeds, ALLOWANCE, |_, bytes| {
         std::fs::write(&path, bytes).unwrap();
         match Scene::read_file(&path) {
             Ok(scene) => drop(scene.to_toml().unwrap()),

@@ -21,5 +21,5 @@ mod visuals;
 
 pub use camera::OUTSIDE;
 pub use error::{Error, Result};
-pub use rig::{CameraRig, SensorNoise};
+pub use rig::{CameraRig, PICTURE_SIDES, SensorNoise};
 pub use trocar_camera::DepthNoise;

@@ -6,7 +6,7 @@ mod common;
 
 use std::fs;
 use trocar_specimen::Specimen;
-use trocar_testing::{Allowance, PEAK, Peak, assault};
+use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]
 static ALLOCATOR: &Peak = &PEAK;
@@ -21,7 +21,7 @@ fn damage_never_panics() {
     common::specimen().write(&dir).unwrap();
     let names = ["specimen.toml", "appendix.msh", "appendix.ply", "bowel-1.msh", "background.png"];
     let seeds: Vec<(String, Vec<u8>)> = names.map(|n| (n.to_owned(), fs::read(dir.join(n)).unwrap())).into();
-    assault(&seeds, ALLOWANCE, |name, bytes| {
+    fuzz_reader(&seeds, ALLOWANCE, |name, bytes| {
         let path = dir.join(name);
         fs::write(&path, bytes).unwrap();
         if let Err(e) = Specimen::read(&dir) {

@@ -1,21 +1,23 @@
-//! Tables for the docs: Markdown whose first line says by which command, commit and schema it was made.
+//! Tables for the docs: Markdown files that say which command, commit and schema made them.
 
 use crate::registry::STUDIES;
 use crate::study::Entry;
 
-/// The file's content: the first line names study, schema and commit; then the command, then the table.
+/// The content of a file: a first line with study, schema and commit, then the command, then the
+/// table.
 pub fn page(entry: &dyn Entry, command: &str, commit: &str, body: &str) -> String {
     let (kind, name) = (entry.kind().name(), entry.name());
     format!(
-        "<!-- trocar {kind} {name}; schema {}; commit {commit} -->\n\nMeasured by `{command}` at commit {commit}.\n\n{body}",
+        "<!-- trocar {kind} {name}; schema {}; commit {commit} -->\n\nMeasured by `{command}` at commit \
+         {commit}.\n\n{body}",
         entry.schema()
     )
 }
 
-/// Checks that `text` was written by a study that still exists and whose table still has that schema.
+/// Checks that the study of `text` exists and that its table still has the same schema.
 ///
 /// # Errors
-/// What is wrong, in a sentence.
+/// A sentence that says what is wrong.
 pub fn check(text: &str) -> Result<(), String> {
     let first = text.lines().next().unwrap_or_default();
     let inner = first.strip_prefix("<!-- trocar ").and_then(|l| l.strip_suffix(" -->"));
@@ -23,7 +25,7 @@ pub fn check(text: &str) -> Result<(), String> {
         inner.and_then(|l| <[&str; 3]>::try_from(l.split("; ").collect::<Vec<_>>()).ok())
     else {
         return Err(format!(
-            "the first line is '{first:.80}'; `cargo xtask figures` writes study, schema and commit there"
+            "the first line is '{first:.80}', without study, schema and commit; run `cargo xtask figures`"
         ));
     };
     let Some(entry) = STUDIES.iter().find(|e| format!("{} {}", e.kind().name(), e.name()) == study) else {

@@ -1,48 +1,48 @@
-//! What can go wrong in a study.
+//! Errors of studies.
 
 use std::path::PathBuf;
 
-/// Result of this crate.
+/// The result type of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A study that cannot be run.
+/// An error of a study.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The parts of the input do not belong together.
+    /// Invalid options or inputs.
     #[error("{0}")]
     Mismatch(String),
-    /// A file is in the way.
+    /// A file or folder that exists and is not overwritten.
     #[error("{path} {reason}", path = path.display())]
     Exists {
-        /// The file.
+        /// The path.
         path: PathBuf,
-        /// Why it stays.
+        /// Why it is not overwritten.
         reason: String,
     },
     /// The user asked to stop.
     #[error("interrupted")]
     Interrupted,
-    /// A result cannot be written down.
+    /// A result that cannot be converted to JSON or text.
     #[error("the result cannot be written: {0}")]
     Format(String),
-    /// A file cannot be written.
+    /// A file that cannot be read or written.
     #[error("{path}: {source}", path = path.display())]
     Io {
-        /// The file.
+        /// The path.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// A part of the product failed.
+    /// An error of another crate.
     #[error(transparent)]
     Work(trocar_workflow::Error),
-    /// A scene of tissue cannot be made or stepped.
+    /// A tissue scene that cannot be built or stepped.
     #[error(transparent)]
-    TissueScene(#[from] trocar_testing::scenes::Error),
-    /// The oracle or a comparator failed.
+    TissueScene(#[from] crate::scenes::Error),
+    /// An error of the oracle or of a comparator.
     #[error(transparent)]
     Reference(#[from] trocar_tissue_reference::Error),
-    /// Two pictures cannot be compared.
+    /// Two pictures that cannot be compared.
     #[error(transparent)]
     Similarity(#[from] trocar_camera::metrics::Error),
 }
@@ -56,7 +56,7 @@ impl From<trocar_workflow::Error> for Error {
     }
 }
 
-/// Errors that the product has a name for.
+/// Errors that `trocar_workflow::Error` wraps.
 macro_rules! through_work {
     ($($crate_name:ident),*) => {
         $(impl From<$crate_name::Error> for Error {

@@ -1,21 +1,25 @@
-//! The paper's tables and figures, and benchmarks: one file each, behind one trait.
+//! The paper's tables and figures, and the benchmarks: one file or folder each, behind one trait.
 //!
-//! A [`study::Study`] has options, runs, and gives its figures and a document of them. [`registry::STUDIES`]
-//! lists all. Command line, JSON, page, progress and the tables for the docs come from there.
+//! A [`study::Study`] has options; its run gives figures and a document. [`registry::STUDIES`]
+//! lists all studies. Command line, JSON, page, progress and the tables for the docs come from the
+//! trait.
 
 mod bench;
 pub mod docs;
 mod error;
 mod experiment;
 pub mod names;
-mod pages;
 pub mod registry;
-mod schedules;
+pub mod scenes;
+mod side_by_side;
+mod statistics;
 pub mod study;
+mod trials;
 
-pub use bench::{EpisodeBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
+pub use bench::{CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
 pub use error::{Error, Result};
 pub use experiment::{
-    ControllerGridExperiment, ConvergenceExperiment, IntegratorsExperiment, PortBudget, RandomActionsExperiment,
-    ReconstructionExperiment, RolloutsExperiment, Settling, SimilarityExperiment, Weighing,
+    ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
+    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment, RolloutsExperiment,
+    SettlingExperiment, SimilarityExperiment, WrenchExperiment,
 };

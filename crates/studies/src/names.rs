@@ -1,35 +1,39 @@
-//! Options that several studies have: choices by name, and numbers in the units that people write.
+//! Options shared by several studies: named choices, and numbers in common units.
 
+use crate::Result;
 use clap::{Args, ValueEnum};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_scene::{GraspDesignName, ScheduleName};
+use trocar_specimen::Specimen;
+use trocar_workflow::phantoms;
 
-/// A length written in millimetres, in metres.
+/// Parses a length in millimetres; returns metres.
 ///
 /// # Errors
-/// A text that is no number.
-pub(crate) fn millimetres(text: &str) -> Result<f64, std::num::ParseFloatError> {
+/// A text that is not a number.
+pub(crate) fn millimetres(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|mm| 1e-3 * mm)
 }
 
-/// A pressure written in kilopascals, in pascals.
+/// Parses a pressure in kilopascals; returns pascals.
 ///
 /// # Errors
-/// A text that is no number.
-pub(crate) fn kilopascals(text: &str) -> Result<f64, std::num::ParseFloatError> {
+/// A text that is not a number.
+pub(crate) fn kilopascals(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(|kpa| 1e3 * kpa)
 }
 
-/// An angle written in degrees, in radians.
+/// Parses an angle in degrees; returns radians.
 ///
 /// # Errors
-/// A text that is no number.
-pub(crate) fn degrees(text: &str) -> Result<f64, std::num::ParseFloatError> {
+/// A text that is not a number.
+pub(crate) fn degrees(text: &str) -> std::result::Result<f64, std::num::ParseFloatError> {
     text.parse::<f64>().map(f64::to_radians)
 }
 
-/// The phantoms that were named, or all.
+/// The named phantoms; all if none is named.
 pub(crate) fn phantoms_or_all(named: &[String]) -> Vec<String> {
     if named.is_empty() { trocar_phantom::NAMES.iter().map(|n| (*n).to_owned()).collect() } else { named.to_vec() }
 }
@@ -37,46 +41,46 @@ pub(crate) fn phantoms_or_all(named: &[String]) -> Vec<String> {
 /// How phantoms are recorded.
 #[derive(Clone, Copy, Debug, Args)]
 pub struct Recorded {
-    /// Frames of each recording (the composite's window holds 181; the paper recorded 1,790).
+    /// Frames per recording. The window of the composite has 181; the paper recorded 1,790.
     #[arg(long, default_value_t = 181)]
     pub frames: usize,
-    /// Seed of the anatomies and of the camera's noise.
+    /// Seed of the anatomies and of the camera noise.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
 }
 
 impl Recorded {
-    /// The recorder's options.
+    /// The options of the recorder.
     pub fn options(&self) -> RecordOptions {
         RecordOptions { frames: self.frames, seed: self.seed, ..RecordOptions::default() }
     }
 }
 
-/// A scene, and where its phantom is kept.
+/// A scene, and the folder of its phantom.
 #[derive(Clone, Debug, Args)]
 pub struct SceneChoice {
     /// Scene file or built-in scene.
     #[arg(default_value = "cell-a")]
     pub scene: String,
-    /// Folder of made phantoms, where a scene's phantom is made once and kept
-    /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
+    /// Folder of phantoms. A phantom is made once and used again (default: $TROCAR_PHANTOMS, else
+    /// trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
 }
 
-/// Solvers by name.
+/// A solver.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum SolverName {
-    /// Vertex Block Descent, 8 substeps of 10 sweeps from the inertial predictor: the paper's.
+    /// Vertex Block Descent as in the paper: 8 substeps of 10 sweeps, from the inertial predictor.
     Paper,
     /// The warped, prefactored quasi-Newton method.
     Fast,
-    /// The paper's sweeps from the adaptive start.
+    /// Vertex Block Descent from the adaptive start.
     Adaptive,
 }
 
 impl SolverName {
-    /// The schedule of a scene of this name.
+    /// The schedule of a scene.
     pub fn schedule(self) -> ScheduleName {
         match self {
             Self::Paper => ScheduleName::Paper,
@@ -85,7 +89,7 @@ impl SolverName {
         }
     }
 
-    /// Its name in reports and JSON.
+    /// The name in reports and JSON.
     pub fn name(self) -> &'static str {
         match self {
             Self::Paper => "paper",
@@ -95,17 +99,28 @@ impl SolverName {
     }
 }
 
-/// Grasp designs by name.
+/// A grasp design.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum DesignName {
-    /// Nothing but the friction of two blades that press.
+    /// Friction of two closing blades.
     Friction,
-    /// Tied to the jaws where the undeformed organ was: the paper's, which jumps.
+    /// Nodes tied to the jaws at their places in the undeformed organ, as in the paper: the tissue
+    /// snaps.
     RestPose,
-    /// Tied to the jaws where it is when they close: the paper's, which does not.
+    /// Nodes tied to the jaws where they are when the jaws close, as in the paper.
     LivePose,
-    /// As live-pose on springs that slide and tear.
+    /// Like live-pose, through springs that slip and tear.
     Compliant,
+}
+
+/// The name of a design in reports and JSON.
+pub(crate) fn design_name(design: GraspDesignName) -> &'static str {
+    match design {
+        GraspDesignName::Friction => "friction",
+        GraspDesignName::RestPose => "rest-pose",
+        GraspDesignName::LivePose => "live-pose",
+        GraspDesignName::Compliant => "compliant",
+    }
 }
 
 impl From<DesignName> for GraspDesignName {
@@ -119,12 +134,12 @@ impl From<DesignName> for GraspDesignName {
     }
 }
 
-/// Models of the unseen back by name.
+/// A model of the unseen back.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum BackName {
-    /// As round as the silhouette is wide, as in the paper. Flat organs become too thick.
+    /// As thick as the silhouette is wide, as in the paper. Flat organs become too thick.
     Rounded,
-    /// As high as the front rises above its rim, and the same below.
+    /// As thick behind the rim as the front is above it.
     Fitted,
 }
 
@@ -137,12 +152,12 @@ impl From<BackName> for trocar_reconstruct::BackRule {
     }
 }
 
-/// Meshers by name.
+/// A mesher.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum MesherName {
     /// Isosurface stuffing: no slivers, fine at the surface, coarse inside.
     Lattice,
-    /// The TetGen program at the paper's settings (Debian: apt install tetgen).
+    /// The program TetGen with the settings of the paper (Debian: apt install tetgen).
     Tetgen,
 }
 
@@ -155,7 +170,7 @@ impl From<MesherName> for trocar_reconstruct::MesherRule {
     }
 }
 
-/// Unit of lengths in a surface file.
+/// Unit of length of a surface file.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum Units {
     /// Millimetres.
@@ -176,12 +191,12 @@ impl From<Units> for trocar_geometry::io::Unit {
     }
 }
 
-/// Kinds of depth noise by name.
+/// A kind of depth noise.
 #[derive(Clone, Copy, Debug, ValueEnum)]
 pub enum SensorName {
-    /// Independent from pixel to pixel and frame to frame.
+    /// Independent between pixels and frames.
     Plain,
-    /// Like stereo matching's too: smooth over several pixels, slow to change, silhouettes fattened.
+    /// Like stereo matching: smooth over several pixels, slow in time, with widened silhouettes.
     Stereo,
 }
 
@@ -194,13 +209,29 @@ impl From<SensorName> for trocar_phantom::Sensor {
     }
 }
 
-/// Which appendix.
+/// The source of the appendix.
 #[derive(Clone, Debug, Args)]
 pub struct AppendixChoice {
-    /// A specimen folder with an organ named appendix; phantom A, recorded and reconstructed, by default.
+    /// Specimen folder with an organ named appendix; by default phantom A, recorded and
+    /// reconstructed.
     #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,
     /// How phantom A is recorded.
     #[command(flatten)]
     pub recorded: Recorded,
+}
+
+impl AppendixChoice {
+    /// The specimen and its folder. A phantom is recorded and reconstructed in the folder `output`.
+    ///
+    /// # Errors
+    /// A specimen that cannot be read, or a phantom that cannot be made.
+    pub(crate) fn read(&self, output: &Path, progress: &dyn Progress) -> Result<(Specimen, PathBuf)> {
+        if let Some(folder) = &self.specimen {
+            return Ok((Specimen::read(folder)?, folder.clone()));
+        }
+        let folder = output.join("phantom-a");
+        let specimen = phantoms::specimen("phantom-a", &self.recorded.options(), &folder, progress)?;
+        Ok((specimen, folder.join("specimen")))
+    }
 }

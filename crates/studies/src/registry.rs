@@ -1,31 +1,32 @@
-//! All studies. A new one adds its file and a line here.
+//! The list of all studies.
 
-use crate::bench::{CellSpeed, EpisodeBench, GraspCost, MeshingBench, OrgansBench, RenderBench, ScalingBench};
+use crate::bench::{CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
 use crate::experiment::{
-    ControllerGridExperiment, ConvergenceExperiment, ElementQuality, GraspDesigns, IntegratorsExperiment, PortBudget,
-    RandomActionsExperiment, ReconstructionExperiment, RolloutsExperiment, Settling, SimilarityExperiment, Weighing,
+    ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
+    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment, RolloutsExperiment,
+    SettlingExperiment, SimilarityExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 
-/// Every study in the order in which the command line lists them.
+/// All studies, in the order of the command line.
 pub static STUDIES: &[&dyn Entry] = &[
     &Of::<ReconstructionExperiment>::NEW,
     &Of::<ConvergenceExperiment>::NEW,
     &Of::<IntegratorsExperiment>::NEW,
-    &Of::<Settling>::NEW,
-    &Of::<GraspDesigns>::NEW,
-    &Of::<ElementQuality>::NEW,
-    &Of::<PortBudget>::NEW,
+    &Of::<SettlingExperiment>::NEW,
+    &Of::<GraspDesignsExperiment>::NEW,
+    &Of::<ElementQualityExperiment>::NEW,
+    &Of::<PortBudgetExperiment>::NEW,
     &Of::<ControllerGridExperiment>::NEW,
-    &Of::<Weighing>::NEW,
+    &Of::<WrenchExperiment>::NEW,
     &Of::<RandomActionsExperiment>::NEW,
     &Of::<RolloutsExperiment>::NEW,
     &Of::<SimilarityExperiment>::NEW,
     &Of::<MeshingBench>::NEW,
     &Of::<OrgansBench>::NEW,
     &Of::<ScalingBench>::NEW,
-    &Of::<GraspCost>::NEW,
-    &Of::<CellSpeed>::NEW,
+    &Of::<GraspBench>::NEW,
+    &Of::<CellBench>::NEW,
     &Of::<EpisodeBench>::NEW,
     &Of::<RenderBench>::NEW,
 ];

@@ -1,9 +1,11 @@
-//! What a study is: options, a run, figures, and a document of them. The command line, the JSON, the
-//! page, the table for the docs, progress and interruption come from here; a study is one file.
+//! The trait of a study: options, a run, figures and a document. It gives every study its command,
+//! JSON, page, table for the docs, progress, resume and interruption.
 
+use crate::trials::{Outcomes, Trials};
 use crate::{Error, Result};
 use clap::{Arg, ArgMatches, Args, Command, value_parser};
 use serde::Serialize;
+use serde::de::DeserializeOwned;
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -11,17 +13,17 @@ use trocar_core::Progress;
 use trocar_report::document::Document;
 use trocar_workflow::REPORT;
 
-/// Which command runs a study.
+/// The command that runs a study.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// `trocar experiment`: a table or figure of the paper.
     Experiment,
-    /// `trocar bench`: speed.
+    /// `trocar bench`: a benchmark.
     Bench,
 }
 
 impl Kind {
-    /// The command's name.
+    /// The name of the command.
     pub fn name(self) -> &'static str {
         match self {
             Self::Experiment => "experiment",
@@ -30,50 +32,50 @@ impl Kind {
     }
 }
 
-/// A table or figure of the paper, or a benchmark. The options are the fields of the type; the doc
-/// comment of the type is the command's help.
+/// A table or figure of the paper, or a benchmark. The fields of the type are the options; its doc
+/// comment is the help text of the command.
 pub trait Study: Args {
-    /// Its name on the command line.
+    /// The name on the command line.
     const NAME: &'static str;
-    /// Which command runs it.
+    /// The command that runs it.
     const KIND: Kind;
-    /// Version of its table in the docs: increase it when a column or a row changes its meaning.
+    /// Version of the table in the docs. Increase it when a column or row changes its meaning.
     const SCHEMA: u32 = 1;
-    /// Help of `--output`; `None` if the study writes no folder.
-    const FOLDER: Option<&'static str> = Some("Folder for the report.");
-    /// Whether the study keeps its own page and JSON in the folder, as campaigns do.
-    const KEEPS_OWN_FILES: bool = false;
-    /// What is printed with `--json`.
+    /// Help text of `--output`; `None` if the study writes no folder.
+    const FOLDER: Option<&'static str> = Some("Output folder of the report.");
+    /// Whether the study writes its own files into the output folder, instead of page and JSON.
+    const WRITES_OWN_FILES: bool = false;
+    /// The content of `--json`.
     type Figures: Serialize;
 
     /// Measures.
     ///
     /// # Errors
-    /// Options out of range, inputs that cannot be read, an interruption.
+    /// Options out of range, unreadable inputs, an interruption.
     fn run(&self, job: &Job<'_>) -> Result<(Self::Figures, Document)>;
 }
 
 /// Stops an interrupted study.
 ///
 /// # Errors
-/// [`Error::Interrupted`] when the user asked to stop.
-pub(crate) fn stop_if_asked(progress: &dyn Progress) -> Result<()> {
+/// [`Error::Interrupted`] if the user asked to stop.
+pub(crate) fn check_interrupted(progress: &dyn Progress) -> Result<()> {
     if progress.interrupted() { Err(Error::Interrupted) } else { Ok(()) }
 }
 
-/// Where a study writes, and how it reports progress.
+/// One run of a study: output folder, progress, clock.
 pub struct Job<'a> {
     output: PathBuf,
-    marker: String,
-    /// Progress and the request to stop.
+    study: &'static str,
+    /// Progress, and the request to stop.
     pub progress: &'a dyn Progress,
     clock: Instant,
 }
 
 impl<'a> Job<'a> {
-    /// A job of study `S` that writes to the folder `output`.
+    /// A run of study `S` with output folder `output`.
     pub fn new<S: Study>(output: &Path, progress: &'a dyn Progress) -> Self {
-        Self { output: output.to_owned(), marker: format!("{}.json", S::NAME), progress, clock: Instant::now() }
+        Self { output: output.to_owned(), study: S::NAME, progress, clock: Instant::now() }
     }
 
     /// The output folder.
@@ -81,47 +83,74 @@ impl<'a> Job<'a> {
         &self.output
     }
 
-    /// The report's path, as figures name it.
+    /// The path of the report, as it is in the JSON.
     pub fn report(&self) -> String {
         self.output.join(REPORT).display().to_string()
     }
 
-    /// Wall time since the start of the job (s).
+    /// Wall time since the start (s).
     pub fn seconds(&self) -> f64 {
         self.clock.elapsed().as_secs_f64()
     }
 
-    /// Creates the output folder, which must be new, empty, or of an earlier run of this study. A
-    /// study that fails on its options leaves no folder if it checks them before this call.
+    /// The JSON file of the study. A folder that holds it is the output of an earlier run.
+    fn marker(&self) -> PathBuf {
+        self.output.join(format!("{}.json", self.study))
+    }
+
+    /// Creates the output folder. It must be new, empty, or the output of an earlier run of this
+    /// study. Check the options first: then invalid options leave no folder.
     ///
     /// # Errors
-    /// A folder of something else, or one that cannot be written.
+    /// A folder with other content, or one that cannot be written.
     pub fn claim(&self) -> Result<()> {
-        let (output, marker) = (&self.output, &self.marker);
+        let (output, marker) = (&self.output, self.marker());
         let io = |source| Error::Io { path: output.clone(), source };
-        let path = output.join(marker);
-        if output.exists() && !path.is_file() && output.read_dir().map_err(io)?.next().is_some() {
-            let reason =
-                format!("holds no {marker}, so it is no earlier experiment and is not written to; name a new folder");
+        if marker.is_file() {
+            return Ok(());
+        }
+        if output.exists() && output.read_dir().map_err(io)?.next().is_some() {
+            let reason = format!(
+                "is not empty and holds no {}.json of an earlier run; choose another output folder",
+                self.study
+            );
             return Err(Error::Exists { path: output.clone(), reason });
         }
         std::fs::create_dir_all(output).map_err(io)?;
-        if path.is_file() { Ok(()) } else { write(&path, b"{}\n") }
+        write(&marker, b"{}\n")
+    }
+
+    /// Runs the trials that no earlier run in the output folder has finished, on `threads` threads
+    /// (0: all). `key` names a trial uniquely; `settings` is everything else that its row depends
+    /// on. The folder must exist. See [`crate::trials`].
+    ///
+    /// # Errors
+    /// The first error of a trial, an interruption, an unwritable file, two trials with one name.
+    pub(crate) fn trials<T: Sync, R: Serialize + DeserializeOwned + Send>(
+        &self,
+        stage: &str,
+        settings: &str,
+        items: &[T],
+        key: impl Fn(&T) -> String,
+        threads: usize,
+        run: impl Fn(&T, &dyn Progress) -> Result<R> + Sync,
+    ) -> Result<Outcomes<R>> {
+        Trials::open(&self.output, self.study, settings)?.run(stage, items, key, threads, self.progress, run)
     }
 }
 
-/// Runs `study` into the folder `output`: its page and its figures as JSON.
+/// Runs `study` and writes its page and its figures as JSON into the folder `output`.
 ///
 /// # Errors
-/// Those of the study; a file that cannot be written.
+/// Those of the study; an unwritable file.
 pub fn run<S: Study>(study: &S, output: &Path, progress: &dyn Progress) -> Result<(S::Figures, Document)> {
     let job = Job::new::<S>(output, progress);
     let (figures, document) = study.run(&job)?;
-    if S::FOLDER.is_some() && !S::KEEPS_OWN_FILES {
+    if S::FOLDER.is_some() && !S::WRITES_OWN_FILES {
         job.claim()?;
         write(&output.join(REPORT), document.page().as_bytes())?;
         let json = serde_json::to_vec_pretty(&figures).map_err(|e| Error::Format(e.to_string()))?;
-        write(&output.join(&job.marker), &json)?;
+        write(&job.marker(), &json)?;
     }
     Ok((figures, document))
 }
@@ -130,28 +159,28 @@ fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     std::fs::write(path, bytes).map_err(|source| Error::Io { path: path.to_owned(), source })
 }
 
-/// What a study leaves for the terminal and the docs.
+/// The output of a study for the terminal and the docs.
 #[derive(Clone, Debug)]
 pub struct Printed {
     /// The figures as one JSON object.
     pub json: String,
-    /// Lines for people.
+    /// Plain text for the terminal.
     pub text: String,
-    /// The table for the docs.
+    /// Markdown for the docs.
     pub docs: String,
 }
 
-/// A study whose type is not known: what the command line lists.
+/// A study behind a trait object, as the command line lists it.
 pub trait Entry: Sync {
-    /// Its name.
+    /// The name.
     fn name(&self) -> &'static str;
-    /// Which command runs it.
+    /// The command that runs it.
     fn kind(&self) -> Kind;
-    /// Version of its table in the docs.
+    /// Version of the table in the docs.
     fn schema(&self) -> u32;
-    /// Its command with all options.
+    /// The command with all options.
     fn command(&self) -> Command;
-    /// Runs it with the options of `matches`.
+    /// Runs the study with the options of `matches`.
     ///
     /// # Errors
     /// Those of the study.
@@ -180,24 +209,15 @@ impl<S: Study> Entry for Of<S> {
     }
 
     fn command(&self) -> Command {
-        let docs = Arg::new("docs")
-            .long("docs")
-            .value_name("FILE")
-            .value_parser(value_parser!(PathBuf))
-            .help("Also write the table as Markdown for the docs.");
+        let path = |name: &'static str, value: &'static str| {
+            Arg::new(name).long(name).value_name(value).value_parser(value_parser!(PathBuf))
+        };
+        let docs = path("docs", "FILE").help("Also write the table as Markdown for the docs.");
         let command = S::augment_args(Command::new(S::NAME)).arg(docs);
         let Some(help) = S::FOLDER else { return command };
-        // clap keeps what it is given for as long as the program runs.
+        // clap takes static texts only.
         let folder: &'static str = Box::leak(format!("trocar-{}/{}", S::KIND.name(), S::NAME).into_boxed_str());
-        let output = Arg::new("output")
-            .short('o')
-            .long("output")
-            .value_name("FOLDER")
-            .visible_alias("resume")
-            .value_parser(value_parser!(PathBuf))
-            .default_value(folder)
-            .help(help);
-        command.arg(output)
+        command.arg(path("output", "FOLDER").short('o').visible_alias("resume").default_value(folder).help(help))
     }
 
     fn run(&self, matches: &ArgMatches, progress: &dyn Progress) -> Result<Printed> {

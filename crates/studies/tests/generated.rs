@@ -1,11 +1,11 @@
-//! The tables in `docs/generated` are of studies that exist, and of their present schema.
+//! The studies of the tables in `docs/generated` exist and have the same schema.
 
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use std::path::Path;
 
 #[test]
-fn committed_tables_are_of_the_present_schema() {
+fn committed_tables_have_the_current_schema() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/generated");
     let Ok(entries) = folder.read_dir() else { return };
     let mut wrong = Vec::new();

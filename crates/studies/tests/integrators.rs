@@ -1,14 +1,14 @@
-//! The comparison of integrators on a tiny mesh: what diverges, what stays bounded, what is written.
+//! The comparison of integrators on a small mesh: which diverge, which stay bounded, and the files.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use trocar_core::Silent;
 use trocar_studies::IntegratorsExperiment;
 use trocar_studies::names::Recorded;
+use trocar_studies::scenes::Organs;
 use trocar_studies::study::run;
-use trocar_testing::scenes::Organs;
 
 #[test]
-fn the_papers_finding_is_one_of_settings() {
+fn the_papers_finding_depends_on_settings() {
     let folder = tempfile::tempdir().unwrap();
     let mesh = folder.path().join("appendix.msh");
     let organs = Organs::analytic_appendix(1200).unwrap();
@@ -30,14 +30,14 @@ fn the_papers_finding_is_one_of_settings() {
     let small = row("XPBD, neo-Hookean, small steps");
     assert!(small.bounded && small.sag_error.unwrap() < 0.1, "{:?}", small.sag_error);
     assert!(row("Vertex Block Descent as in the paper").bounded);
-    assert!(result.findings.iter().any(|f| f.contains("XPBD: that it does not stay bounded is true of settings")));
+    assert!(result.findings.iter().any(|f| f.contains("XPBD: whether it stays bounded depends on its settings")));
     let page = std::fs::read_to_string(output.join("report.html")).unwrap();
     assert!(page.contains("<svg") && page.contains("six strains"));
     let json: serde_json::Value =
         serde_json::from_slice(&std::fs::read(output.join("integrators.json")).unwrap()).unwrap();
     assert_eq!(json["integrators"].as_array().unwrap().len(), result.integrators.len());
 
-    // A folder of something else is not written into.
+    // A folder with other content is refused.
     let foreign = folder.path().join("foreign");
     std::fs::create_dir(&foreign).unwrap();
     std::fs::write(foreign.join("thesis.txt"), "mine").unwrap();

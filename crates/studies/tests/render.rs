@@ -1,4 +1,5 @@
-//! The renderer's benchmark, and its rays against Embree's. The latter is skipped, saying so, where Embree is not.
+//! The benchmark of the renderer, and its rays against Embree's. The comparison is skipped, with a
+//! message, without Embree.
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
@@ -8,7 +9,7 @@ use trocar_studies::RenderBench;
 use trocar_studies::study::run;
 
 #[test]
-fn rays_end_where_embrees_do() {
+fn rays_agree_with_embree() {
     let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
     let (scene, phantoms) = ("none".to_owned(), std::path::PathBuf::new());
     let bench = RenderBench { triangles: 20_000, samples: 0, rays: 200, python, picture: None, scene, phantoms };

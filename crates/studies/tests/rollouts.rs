@@ -1,4 +1,4 @@
-//! Options of the rollouts that cannot be.
+//! Invalid options of the rollouts.
 
 use tempfile::TempDir;
 use trocar_core::Silent;
@@ -7,7 +7,7 @@ use trocar_studies::names::SceneChoice;
 use trocar_studies::study::run;
 
 #[test]
-fn too_many_rollouts_are_refused_by_their_option() {
+fn too_many_rollouts_are_refused() {
     let dir = TempDir::new().unwrap();
     let rollouts = RolloutsExperiment {
         scene: SceneChoice { scene: "cell-a".to_owned(), phantoms: dir.path().join("phantoms") },
@@ -17,6 +17,6 @@ fn too_many_rollouts_are_refused_by_their_option() {
     };
     let folder = dir.path().join("campaign");
     let why = run(&rollouts, &folder, &Silent).unwrap_err().to_string();
-    assert!(why.starts_with("--rollouts 900000000: "), "the command's own option: {why}");
-    assert!(!folder.exists(), "nothing was begun");
+    assert!(why.starts_with("--rollouts 900000000: "), "names the option: {why}");
+    assert!(!folder.exists(), "no folder is created");
 }

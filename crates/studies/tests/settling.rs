@@ -1,15 +1,15 @@
-//! Phantom B, which in the paper still moves at 0.136 m/s, comes to rest within a second.
+//! Phantom B, which moves at 0.136 m/s in the paper, comes to rest within a second.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use trocar_core::Silent;
-use trocar_studies::Settling;
+use trocar_studies::SettlingExperiment;
 use trocar_studies::names::{Recorded, SolverName};
 use trocar_studies::study::run;
 
 #[test]
 fn phantom_b_settles() {
     let folder = tempfile::tempdir().unwrap();
-    let experiment = Settling {
+    let experiment = SettlingExperiment {
         phantoms: vec!["phantom-b".into()],
         recorded: Recorded { frames: 9, seed: 1 },
         schedule: SolverName::Adaptive,
@@ -22,5 +22,5 @@ fn phantom_b_settles() {
     let fastest = b.organs.iter().map(|o| o.speed_m_s).fold(0.0, f64::max);
     assert!((fastest - b.speed_m_s).abs() < 1e-6, "{fastest} {}", b.speed_m_s);
     assert!(std::fs::read_to_string(folder.path().join("report.html")).unwrap().contains("phantom-b"));
-    assert!(run(&Settling { phantoms: vec!["none".into()], ..experiment }, folder.path(), &Silent).is_err());
+    assert!(run(&SettlingExperiment { phantoms: vec!["none".into()], ..experiment }, folder.path(), &Silent).is_err());
 }

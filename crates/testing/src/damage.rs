@@ -3,7 +3,7 @@
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::Rng;
 
-/// Numbers that readers trip over, as text.
+/// Extreme numbers as text.
 const WORDS: [&str; 12] = [
     "-1",
     "0",
@@ -19,7 +19,7 @@ const WORDS: [&str; 12] = [
     "\u{feff}",
 ];
 
-/// Whole numbers that readers trip over as lengths and counts.
+/// Extreme lengths and counts.
 const EXTREMES: [u64; 14] = [
     0,
     1,
@@ -37,7 +37,7 @@ const EXTREMES: [u64; 14] = [
     u64::MAX,
 ];
 
-/// A damaged copy of `good`; what is spliced in comes from it or another of the `seeds`.
+/// A damaged copy of `good`. Spliced parts come from `seeds`.
 pub fn damage(good: &[u8], seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) -> Vec<u8> {
     let mut bytes = good.to_vec();
     for _ in 0..1 + below(rng, 4) {
@@ -50,13 +50,13 @@ fn once(bytes: &mut Vec<u8>, seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) {
     let at = below(rng, bytes.len() + 1);
     let here = |bytes: &Vec<u8>, length: usize| at..(at + length).min(bytes.len());
     match below(rng, 9) {
-        // Cut short.
+        // Truncate.
         0 => bytes.truncate(at),
-        // One bit.
+        // Flip a bit.
         1 => here(bytes, 1).for_each(|i| bytes[i] ^= 1 << below(rng, 8)),
-        // One byte.
+        // Replace a byte.
         2 => here(bytes, 1).for_each(|i| bytes[i] = rng.next_u32() as u8),
-        // A number of 1, 2, 4 or 8 bytes at an extreme, in either order of bytes.
+        // Replace a number of 1, 2, 4 or 8 bytes by an extreme one, in either byte order.
         3 | 4 => {
             let size = 1 << below(rng, 4);
             let value = EXTREMES[below(rng, EXTREMES.len())];
@@ -66,25 +66,25 @@ fn once(bytes: &mut Vec<u8>, seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) {
                 bytes[i] = v;
             }
         }
-        // A stretch away.
+        // Remove a range.
         5 => {
             let length = below(rng, 64);
             bytes.drain(here(bytes, length));
         }
-        // A stretch twice.
+        // Repeat a range.
         6 => {
             let length = below(rng, 64);
             let copy = bytes[here(bytes, length)].to_vec();
             bytes.splice(at..at, copy);
         }
-        // A stretch of another file.
+        // Insert a range of another file.
         7 => {
             let other = &seeds[below(rng, seeds.len())].1;
             let from = below(rng, other.len() + 1);
             let copy = other[from..(from + below(rng, 256)).min(other.len())].to_vec();
             bytes.splice(at..at, copy);
         }
-        // A word in place of the one that stands here.
+        // Replace a word.
         _ => {
             let end = (at..bytes.len()).find(|i| bytes[*i].is_ascii_whitespace()).unwrap_or(bytes.len());
             let word = WORDS[below(rng, WORDS.len())];
@@ -93,7 +93,7 @@ fn once(bytes: &mut Vec<u8>, seeds: &[(String, Vec<u8>)], rng: &mut Pcg64Mcg) {
     }
 }
 
-/// A number from 0 to `n` - 1; 0 for 0.
+/// A random number in [0, n); 0 for n = 0.
 fn below(rng: &mut Pcg64Mcg, n: usize) -> usize {
     (rng.next_u64() % n.max(1) as u64) as usize
 }

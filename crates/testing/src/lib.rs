@@ -1,12 +1,9 @@
-//! What tests and benchmarks share: damaged files for every reader ([`assault`]), and with the feature `scenes` the scenes
-//! that are stepped and drawn (`scenes`).
+//! Damaged files for the tests of every reader: [`fuzz_reader`].
 
-mod assault;
 mod damage;
+mod fuzz;
 mod peak;
-#[cfg(feature = "scenes")]
-pub mod scenes;
 
-pub use assault::{Allowance, assault, cases};
 pub use damage::damage;
+pub use fuzz::{Allowance, cases, fuzz_reader};
 pub use peak::{PEAK, Peak};

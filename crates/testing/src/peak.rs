@@ -1,9 +1,9 @@
-//! The system's allocator, which knows the most that was allocated at a time.
+//! The system's allocator with a measurement of peak memory.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// An allocator that counts. Threads are counted together.
+/// An allocator that counts allocated bytes of all threads.
 #[derive(Debug)]
 pub struct Peak {
     now: AtomicUsize,
@@ -11,18 +11,18 @@ pub struct Peak {
     start: AtomicUsize,
 }
 
-/// To be installed by a test binary: `#[global_allocator] static ALLOCATOR: &Peak = &PEAK;`
+/// A test binary installs it by `#[global_allocator] static ALLOCATOR: &Peak = &PEAK;`
 pub static PEAK: Peak = Peak { now: AtomicUsize::new(0), most: AtomicUsize::new(0), start: AtomicUsize::new(0) };
 
 impl Peak {
-    /// Counts from here on.
+    /// Begins a measurement.
     pub fn start(&self) {
         let now = self.now.load(Ordering::Relaxed);
         self.start.store(now, Ordering::Relaxed);
         self.most.store(now, Ordering::Relaxed);
     }
 
-    /// The most bytes that were allocated at a time since [`Peak::start`], beyond those of then.
+    /// Peak memory since [`Peak::start`], minus the memory in use then (bytes).
     pub fn since_start(&self) -> usize {
         self.most.load(Ordering::Relaxed).saturating_sub(self.start.load(Ordering::Relaxed))
     }

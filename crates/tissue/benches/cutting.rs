@@ -15,7 +15,7 @@ use trocar_tissue::{Cut, SolverSettings, State, Stepper, sever};
 /// Repetitions; the fastest counts.
 const TIMES: usize = 30;
 
-/// Of all [ms].
+/// Of all (ms).
 fn least(times: &[Duration]) -> f64 {
     1e3 * times.iter().min().map_or(0.0, Duration::as_secs_f64)
 }

@@ -47,7 +47,7 @@ fn main() {
     }
 }
 
-/// Least times of a frame with the paper's sweeps, and with twice as many [ms].
+/// Least times of a frame with the paper's sweeps, and with twice as many (ms).
 fn times(model: &Model, threads: usize, repetitions: usize) -> [f64; 2] {
     let mut runs = [SWEEPS, 2 * SWEEPS].map(|iterations| {
         let schedule = SolverSettings::Descent(Descent { substeps: SUBSTEPS, iterations, start: Start::Adaptive });

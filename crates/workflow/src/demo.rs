@@ -1,8 +1,8 @@
-//! The demonstration: record, reconstruct, grasp-lift and report in a row.
+//! The demonstration: record a phantom, reconstruct it, lift its appendix, and write a report.
 
 use crate::lift::Lift;
-use crate::lifted::LiftResult;
-use crate::workflow::{Reconstructed, reconstruct_recording};
+use crate::lift_result::LiftResult;
+use crate::reconstruct::{Reconstructed, reconstruct_recording};
 use crate::{Result, pages};
 use serde::Serialize;
 use std::path::Path;
@@ -11,7 +11,7 @@ use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_reconstruct::Settings;
 
-/// How the demonstration is run.
+/// Settings of the demonstration.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Demo {
     /// Frames of the recording.
@@ -22,27 +22,28 @@ pub struct Demo {
     pub threads: usize,
 }
 
-/// The demonstration in figures.
+/// The figures of the demonstration.
 #[derive(Clone, Debug, Serialize)]
 pub struct DemoResult {
     /// Number of organs.
     pub organs: usize,
-    /// How many of their surfaces close.
+    /// Number of watertight surfaces.
     pub watertight: usize,
-    /// The grasp-lift (inverted_rest, lift_mm, slip_mm, snap_mm, inverted_peak, diverged, ...).
+    /// The figures of the grasp-lift.
     #[serde(flatten)]
     pub lift: LiftResult,
-    /// The reconstruction.
+    /// The figures of the reconstruction.
     pub reconstructed: Reconstructed,
-    /// Wall time of everything [s].
+    /// Total wall time (s).
     pub seconds: f64,
 }
 
 impl Demo {
-    /// Runs everything into the folder `output`: `recording/`, `specimen/` and `run/`, the last with the whole report.
+    /// Writes `recording/`, `specimen/` and `run/` into the folder `output`. The report is in
+    /// `run/`.
     ///
     /// # Errors
-    /// When the folder cannot be written, or it holds something that is not an earlier demonstration.
+    /// A folder that cannot be written, or that holds something else than an earlier demonstration.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<DemoResult> {
         let clock = Instant::now();
         let [recording, specimen, run] = ["recording", "specimen", "run"].map(|name| output.join(name));

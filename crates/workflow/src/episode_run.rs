@@ -1,9 +1,9 @@
-//! `trocar episode`, `trocar replay` and `trocar sweep`: from scenes and files to folders and verdicts.
+//! `trocar episode`, `trocar replay` and `trocar sweep`.
 
 use crate::pages;
 use crate::phantoms::scene_specimen;
+use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::recorder::Recorder;
-use crate::workflow::{REPORT, refuse_overlap};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -22,38 +22,40 @@ use trocar_task::{
 pub struct EpisodeRun {
     /// Scene file or name of a built-in scene.
     pub scene: String,
-    /// Name of the policy: one of [`policy::POLICIES`]. [`run_policy`](Self::run_policy) takes any other.
+    /// Name of the policy, one of [`policy::POLICIES`]; [`run_policy`](Self::run_policy) ignores
+    /// it.
     pub policy: String,
     /// The episode's seed.
     pub seed: u64,
     /// Worker threads, 0 for all.
     pub threads: usize,
-    /// Folder in which a scene's phantom is recorded and reconstructed; what is there is used again.
+    /// Folder of made phantoms. The scene's phantom is made there once and reused.
     pub phantoms: PathBuf,
 }
 
-/// An episode that was run, in figures.
+/// The figures of a finished episode.
 #[derive(Clone, Debug, Serialize)]
-pub struct EpisodeMade {
-    /// The figures.
+pub struct EpisodeOutput {
+    /// The contents of its `result.json`.
     #[serde(flatten)]
     pub result: EpisodeResult,
-    /// Wall time of the episode (s), its reset included and pictures left out.
+    /// Wall time of the episode (s), with its reset and without pictures.
     pub wall_s: f64,
-    /// Simulated over wall time.
+    /// Simulated time over wall time.
     pub real_time_factor: f64,
-    /// Its folder.
+    /// The episode's folder.
     pub folder: String,
     /// The page's path.
     pub report: String,
 }
 
 impl EpisodeRun {
-    /// Runs it into the folder `output`: episode file, channels, result and page.
+    /// Runs the episode and writes episode file, channels, result and page into the folder
+    /// `output`.
     ///
     /// # Errors
-    /// One line that names the file, field or option; `output` is then left as it was.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<EpisodeMade> {
+    /// One line that names the file, field or option; `output` then stays unchanged.
+    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<EpisodeOutput> {
         let chosen = policy::named(&self.policy)?;
         self.run_policy(output, progress, |_, _| Ok(chosen))
     }
@@ -61,31 +63,31 @@ impl EpisodeRun {
     /// Checks the scene and the folder `output`, before anything is built.
     ///
     /// # Errors
-    /// A scene that cannot be read; a folder of something else.
+    /// A scene that cannot be read; a folder with other contents.
     pub fn check(&self, output: &Path) -> Result<Scene> {
         let scene = Scene::read(&self.scene)?;
         refuse_overlap(Path::new(&self.scene), output)?;
-        // It removes itself.
+        // The staged folder is removed when it is dropped.
         StagedFolder::create(output, RESULT_FILE)?;
         Ok(scene)
     }
 
-    /// The same by the policy that `make` gives for the episode.
+    /// Runs the episode by the policy that `make` returns.
     ///
     /// # Errors
-    /// As [`run`](Self::run); what `make` says.
+    /// As [`run`](Self::run); an error of `make`.
     pub fn run_policy(
         &self,
         output: &Path,
         progress: &dyn Progress,
         make: impl FnOnce(&Specimen, &Episode) -> Result<Box<dyn Policy + Send>>,
-    ) -> Result<EpisodeMade> {
+    ) -> Result<EpisodeOutput> {
         let scene = self.check(output)?;
         let staged = StagedFolder::create(output, RESULT_FILE)?;
         let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
         let mut episode = Episode::new(&scene, &specimen, self.threads)?;
         let mut chosen = make(&specimen, &episode)?;
-        // The page shows the specimen where the seed has it.
+        // The seed may move the specimen, and the page must show it there.
         episode.reset(self.seed)?;
         let rig = CameraRig::new(&episode.arranged_scene(), &specimen, episode.cell())?;
         let mut recorder = Recorder::new(rig).stills_only();
@@ -110,11 +112,11 @@ impl EpisodeRun {
         }
         staged.commit()?;
         let (folder, report) = (output.display().to_string(), output.join(REPORT).display().to_string());
-        Ok(EpisodeMade { result: recording.result(), wall_s, real_time_factor, folder, report })
+        Ok(EpisodeOutput { result: recording.result(), wall_s, real_time_factor, folder, report })
     }
 }
 
-/// `name` in the folder `path`, or `path` itself where it is no folder.
+/// The file `name` in the folder `path`, or `path` itself if it is no folder.
 fn inside(path: &Path, name: &str) -> Result<PathBuf> {
     if !path.is_dir() {
         return Ok(path.to_owned());
@@ -123,10 +125,10 @@ fn inside(path: &Path, name: &str) -> Result<PathBuf> {
     if file.is_file() {
         return Ok(file);
     }
-    Err(Error::Mismatch(format!("{}: the folder has no {name}; an episode's folder has one", path.display())))
+    Err(Error::Mismatch(format!("{}: the folder has no {name}; name the folder of an episode", path.display())))
 }
 
-/// The episode in a file, or in an episode's folder.
+/// Reads an episode from its file or folder.
 ///
 /// # Errors
 /// A file that is missing or damaged.
@@ -134,10 +136,11 @@ pub fn read_episode(path: &Path) -> Result<EpisodeFile> {
     Ok(EpisodeFile::read(&inside(path, EPISODE_FILE)?)?)
 }
 
-/// Does the episode in `file` again and compares every step. The specimen is the scene's, or that in the folder `specimen`.
+/// Replays the episode in `file` and compares every step. The specimen is that of the scene, or the
+/// one in the folder `specimen`.
 ///
 /// # Errors
-/// A file that is damaged, a scene or specimen that cannot be built. What differs is a verdict.
+/// A file that is damaged, a scene or specimen that cannot be built. A difference is no error.
 pub fn replay(
     file: &Path,
     specimen: Option<&Path>,
@@ -160,14 +163,14 @@ pub fn replay(
     Ok(verdict)
 }
 
-/// Judges stored channels at every combination of the gates that `ranges` say.
+/// Scores stored channels at every combination of the gates in `ranges`.
 ///
 /// # Errors
 /// A file that is damaged or named twice, a range that cannot be read.
 pub fn sweep_files(files: &[PathBuf], ranges: &[String], progress: &dyn Progress) -> Result<Sweep> {
     let ranges: Vec<GateRange> = ranges.iter().map(|r| GateRange::parse(r)).collect::<std::result::Result<_, _>>()?;
     if let Some((_, twice)) = files.iter().enumerate().find(|(k, f)| files[..*k].contains(f)) {
-        return Err(Error::Mismatch(format!("{}: given twice; it would count twice", twice.display())));
+        return Err(Error::Mismatch(format!("{}: given twice; name each file once", twice.display())));
     }
     let files: Vec<PathBuf> = files.iter().map(|f| inside(f, CHANNELS_FILE)).collect::<Result<_>>()?;
     progress.begin("channels", files.len() as u64);

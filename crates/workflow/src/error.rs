@@ -1,17 +1,17 @@
-//! What can go wrong while results and reports are made.
+//! Errors of the commands.
 
 use std::path::PathBuf;
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A result or report that cannot be made.
+/// A result or report could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The parts of the input do not belong together (sizes or counts differ).
+    /// An input or option is wrong.
     #[error("{0}")]
     Mismatch(String),
-    /// The recording's truth does not fit the recording.
+    /// The truth of a recording does not match the recording.
     #[error("{path}: {reason}", path = path.display())]
     Truth {
         /// The file.
@@ -19,16 +19,16 @@ pub enum Error {
         /// What is wrong and what would be right.
         reason: String,
     },
-    /// A file is in the way.
+    /// A file or folder exists and is not overwritten.
     #[error("{path} {reason}", path = path.display())]
     Exists {
         /// The file.
         path: PathBuf,
-        /// Why it stays.
+        /// Why it is not overwritten.
         reason: String,
     },
-    /// A moving picture has no frames.
-    #[error("the moving picture has no frames")]
+    /// A video has no frames.
+    #[error("the video has no frames")]
     NoFrames,
     /// An image or camera is unusable.
     #[error(transparent)]
@@ -41,23 +41,23 @@ pub enum Error {
         /// The output.
         output: PathBuf,
     },
-    /// Something does not fit on the renderer's stage.
+    /// A scene cannot be rendered.
     #[error(transparent)]
     Render(#[from] trocar_render::Error),
-    /// The user asked to stop.
+    /// The user interrupted the work.
     #[error("interrupted")]
     Interrupted,
-    /// The user asked a campaign to stop.
+    /// The user interrupted a campaign.
     #[error(
-        "interrupted; {kept} of {planned} episodes are kept, with their table and report; the same command continues"
+        "interrupted; {kept} of {planned} episodes are finished, with their table and report; the same command continues"
     )]
     Stopped {
-        /// Episodes that are kept.
+        /// Number of finished episodes.
         kept: usize,
-        /// Episodes that are to be in all.
+        /// Number of episodes of the whole campaign.
         planned: usize,
     },
-    /// A result cannot be written down.
+    /// A result cannot be serialised.
     #[error("the result cannot be written: {0}")]
     Format(String),
     /// A file cannot be written.
@@ -65,7 +65,7 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
     /// A mesh is unusable.
@@ -83,7 +83,7 @@ pub enum Error {
     /// A port, an instrument or a measurement of force is unusable.
     #[error(transparent)]
     Robot(#[from] trocar_robot::Error),
-    /// Something cannot be found in a picture.
+    /// A picture cannot be segmented.
     #[error(transparent)]
     Segment(#[from] trocar_segment::Error),
     /// A page cannot be drawn.
@@ -101,15 +101,15 @@ pub enum Error {
     /// An episode cannot be run, or its files are unusable.
     #[error(transparent)]
     Task(trocar_task::Error),
-    /// A camera of the cell cannot see.
+    /// A camera of the cell cannot render.
     #[error(transparent)]
     Sensors(#[from] trocar_sensors::Error),
-    /// A task cannot be run.
+    /// A cell cannot be built or stepped.
     #[error(transparent)]
     Cell(trocar_cell::Error),
 }
 
-/// What was interrupted inside is interrupted outside.
+/// Keeps interruptions apart from other errors.
 impl From<trocar_cell::Error> for Error {
     fn from(error: trocar_cell::Error) -> Self {
         match error {

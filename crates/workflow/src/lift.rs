@@ -1,10 +1,11 @@
-//! `trocar simulate`: a scripted grasp-lift as an episode, of a specimen alone or in a scene's cell.
+//! `trocar simulate`: a scripted grasp-lift as an episode, of a specimen alone or in a scene's
+//! cell.
 
-use crate::lifted::{LiftResult, Lifted};
+use crate::lift_result::{FinishedLift, LiftResult};
 use crate::phantoms::scene_specimen;
+use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::recorder::Recorder;
 use crate::specimen_scene::{free_scene, grasp_lift, task_organ};
-use crate::workflow::{REPORT, refuse_overlap};
 use crate::{Error, Result, pages};
 use std::path::Path;
 use std::time::Instant;
@@ -15,24 +16,24 @@ use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::policy::{AfterHold, Script, Scripted};
 use trocar_task::{Channels, Episode, Policy, RESULT_FILE, run_watched};
 
-/// Forces that jaws can close with (N), as in scenes.
+/// Range of the closing force of jaws (N), as in scenes.
 const JAW_FORCE_RANGE_N: std::ops::RangeInclusive<f64> = 0.01..=40.0;
 
-/// Share of the jaws' lift that the lift gate asks of the tissue.
-const FOLLOWED: f64 = 0.8;
+/// The lift gate as a share of the jaws' lift.
+const LIFT_GATE_SHARE: f64 = 0.8;
 
-/// A lift that is run with pictures.
+/// Settings of a scripted grasp-lift.
 #[derive(Clone, Debug)]
 pub struct Lift {
-    /// What the script does.
+    /// The motion script.
     pub script: Script,
-    /// The organ; that of the scene's task, or the appendix, or the first if left out.
+    /// The organ. By default that of the scene's task, the appendix, or the first organ.
     pub organ: Option<String>,
-    /// How the jaws hold; the scene's if left out.
+    /// Grasp design; by default the scene's.
     pub design: Option<GraspDesignName>,
-    /// Force of the grasper's jaws (N); the scene's if left out.
+    /// Closing force of the grasper's jaws (N); by default the scene's.
     pub jaw_force: Option<f64>,
-    /// How tissue is stepped; the scene's if left out.
+    /// Solver settings of the tissue; by default the scene's.
     pub schedule: Option<ScheduleName>,
     /// Worker threads, 0 for all.
     pub threads: usize,
@@ -45,7 +46,7 @@ impl Default for Lift {
     }
 }
 
-/// A policy that notes in which phase each of its actions was made.
+/// A scripted policy that records the phase of each action.
 struct Phased {
     inner: Scripted,
     phases: Vec<&'static str>,
@@ -74,18 +75,19 @@ impl Policy for Phased {
 }
 
 impl Lift {
-    /// Runs the lift on the specimen in folder `specimen`, alone with ideal arms, into the folder `output`.
+    /// Runs the lift on the specimen in the folder `specimen`, with ideal arms and no cell, and
+    /// writes the folder `output`.
     ///
     /// # Errors
-    /// One line that names the file, organ or option; `output` is then left as it was.
+    /// One line that names the file, organ or option; `output` then stays unchanged.
     pub fn run_specimen(&self, specimen: &Path, output: &Path, progress: &dyn Progress) -> Result<LiftResult> {
         refuse_overlap(specimen, output)?;
         let read = Specimen::read(specimen)?;
         Ok(self.write_specimen(&read, specimen, None, output, progress)?.result)
     }
 
-    /// Runs the lift in the cell of a scene (a file or the name of a built-in one) into the folder `output`.
-    /// A scene's phantom is made below the folder `phantoms`.
+    /// Runs the lift in the cell of a scene, which is a file or the name of a built-in scene, and
+    /// writes the folder `output`. The scene's phantom is made in the folder `phantoms`.
     ///
     /// # Errors
     /// As [`run_specimen`](Self::run_specimen).
@@ -110,7 +112,7 @@ impl Lift {
         Ok(lifted.result)
     }
 
-    /// Runs the lift on `specimen`, which is that of `folder`; `before` goes first on the page.
+    /// Runs the lift on `specimen`, which was read from `folder`. The page begins with `before`.
     pub(crate) fn write_specimen(
         &self,
         specimen: &Specimen,
@@ -118,7 +120,7 @@ impl Lift {
         before: Option<&str>,
         output: &Path,
         progress: &dyn Progress,
-    ) -> Result<Lifted> {
+    ) -> Result<FinishedLift> {
         self.script.check()?;
         let staged = StagedFolder::create(output, RESULT_FILE)?;
         let organ = task_organ(specimen, self.organ.as_deref())?;
@@ -129,10 +131,10 @@ impl Lift {
         Ok(lifted)
     }
 
-    /// The scene with what this lift asks for otherwise.
+    /// The scene with the settings of this lift.
     ///
     /// # Errors
-    /// A cut without a cutter, an option out of range.
+    /// A cut in a scene without a cutter, an option out of range.
     pub fn arrange(&self, mut scene: Scene) -> Result<Scene> {
         if let Some(force) = self.jaw_force {
             if !JAW_FORCE_RANGE_N.contains(&force) {
@@ -153,18 +155,21 @@ impl Lift {
         if self.script.regrasp.is_some() {
             scene.task.first_grasp = Some(GraspDesignName::LivePose);
         }
-        scene.task.gates.lift_mm = (1e3 * FOLLOWED * self.script.lift).max(0.1);
+        scene.task.gates.lift_mm = (1e3 * LIFT_GATE_SHARE * self.script.lift).max(0.1);
         if matches!(self.script.after, AfterHold::Cut(_)) {
             scene.task.sever = true;
             if scene.arm_with(InstrumentKind::Cutter).is_none() {
-                return Err(Error::Mismatch(format!("scene '{}' has no cutter for --sever", scene.name)));
+                return Err(Error::Mismatch(format!(
+                    "scene '{}' has no cutter; --sever needs an arm with one",
+                    scene.name
+                )));
             }
         }
         scene.validate()?;
         Ok(scene)
     }
 
-    fn lift(&self, scene: Scene, specimen: &Specimen, output: &Path, progress: &dyn Progress) -> Result<Lifted> {
+    fn lift(&self, scene: Scene, specimen: &Specimen, output: &Path, progress: &dyn Progress) -> Result<FinishedLift> {
         let scene = self.arrange(scene)?;
         let mut episode = Episode::new(&scene, specimen, self.threads)?;
         let mut recorder = Recorder::new(CameraRig::new(&scene, specimen, episode.cell())?);
@@ -197,15 +202,15 @@ impl Lift {
             real_time_factor: simulated_s / wall_s.max(1e-9),
             report: output.join(REPORT).display().to_string(),
         };
-        Ok(Lifted { result, recording, phases: policy.phases, pictures })
+        Ok(FinishedLift { result, recording, phases: policy.phases, pictures })
     }
 }
 
-/// Writes the run: figures, episode file, channels as Parquet and as CSV, page.
+/// Writes figures, episode file, channels as Parquet and CSV, and page.
 fn write(
     staged: StagedFolder,
     specimen: &Specimen,
-    lifted: &Lifted,
+    lifted: &FinishedLift,
     before: Option<&str>,
     progress: &dyn Progress,
 ) -> Result<()> {

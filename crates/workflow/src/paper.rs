@@ -1,4 +1,4 @@
-//! The paper's figures, to be put beside ours.
+//! Figures of the paper, for comparison.
 
 /// An organ of Table I.
 pub struct PaperOrgan {
@@ -10,7 +10,7 @@ pub struct PaperOrgan {
     pub nodes: usize,
     /// Tetrahedra.
     pub tets: usize,
-    /// Young's modulus [kPa].
+    /// Young's modulus (kPa).
     pub young_modulus_kpa: f64,
 }
 

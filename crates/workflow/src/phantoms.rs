@@ -1,6 +1,6 @@
 //! Phantoms as specimens: recorded, unless an earlier run left the recording, and reconstructed.
 
-use crate::workflow::reconstruct_recording;
+use crate::reconstruct::reconstruct_recording;
 use crate::{Error, Result};
 use std::fs::File;
 use std::io::ErrorKind;
@@ -41,7 +41,7 @@ const STAMP: &str = "made-by.txt";
 /// A phantom that is not known, a folder that cannot be written.
 pub fn specimen(phantom: &str, options: &RecordOptions, folder: &Path, progress: &dyn Progress) -> Result<Specimen> {
     let (settings, [recording, specimen]) = (Settings::default(), ["recording", "specimen"].map(|n| folder.join(n)));
-    let stamp = format!("{phantom}\n{options:?}\n{settings:?}\n{}\n", env!("TROCAR_SPECIMEN_MAKERS"));
+    let stamp = format!("{phantom}\n{options:?}\n{settings:?}\n{}\n", env!("TROCAR_SPECIMEN_SOURCE_HASH"));
     let path = folder.join(STAMP);
     let io = |source| Error::Io { path: path.clone(), source };
     std::fs::create_dir_all(folder).map_err(io)?;

@@ -1,7 +1,7 @@
 //! Pictures of an episode while it runs, for its page.
 
-use crate::moving::webp;
-use crate::rendering::colors::{averaged, shown};
+use crate::picture_colors::{averaged, shown};
+use crate::video::webp;
 use crate::{Error, Result};
 use std::time::{Duration, Instant};
 use trocar_camera::ColorImage;
@@ -10,60 +10,71 @@ use trocar_render::RenderSettings;
 use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
 use trocar_task::{Episode, Step};
 
-/// Size of the stills and of the moving picture (px). Each is rendered at twice the size and averaged.
-const STILL: [usize; 2] = [640, 360];
-const FILM: [usize; 2] = [448, 252];
+/// Sizes of stills and video (px). Both are rendered at twice the size and averaged.
+const STILL_SIZE: [usize; 2] = [640, 360];
+const VIDEO_SIZE: [usize; 2] = [448, 252];
 
-/// Maximum number of stills of an episode, without that of its end: jaws may close many times.
+/// Maximum number of stills of an episode, without the last: jaws may close many times.
 const MAX_STILLS: usize = 7;
 
-/// Time between frames of the moving picture (s), and maximum number of them.
+/// Time between frames of the video (s), and maximum number of frames.
 const FRAME_INTERVAL: f64 = 0.1;
 const MAX_FRAMES: usize = 150;
 
-/// What was seen.
+/// Pictures of an episode.
 #[derive(Clone, Debug, Default)]
 pub struct Pictures {
     /// Captions and pictures.
     pub stills: Vec<(String, ColorImage)>,
-    /// Animated WebP and its size.
-    pub film: Option<(Vec<u8>, [usize; 2])>,
+    /// Animated WebP and its size (px).
+    pub video: Option<(Vec<u8>, [usize; 2])>,
 }
 
-/// Watches an episode through the scene's cameras.
+/// Records pictures of an episode through the scene's cameras.
 pub(crate) struct Recorder {
     rig: CameraRig,
-    /// The camera that watches, and the one that measures depth.
+    /// The camera of stills and video.
     camera: String,
+    /// The camera of the depth picture.
     depth: Option<String>,
     stills: Vec<(String, ColorImage)>,
     frames: Vec<(ColorImage, i32)>,
-    /// Whether a moving picture is recorded, too.
-    films: bool,
+    /// Whether a video is recorded.
+    records_video: bool,
     lifted: bool,
     spent: Duration,
     failed: Option<Error>,
 }
 
 impl Recorder {
-    /// Stills and a moving picture through the camera `endoscope` or else the first one, and the depth of
-    /// `d405` at the end.
+    /// Records stills and a video through the camera `endoscope`, or the first camera without one,
+    /// and the depth of `d405` at the end.
     pub fn new(rig: CameraRig) -> Self {
         let name = |wanted: &str| rig.cameras().iter().find(|c| **c == wanted).map(|c| (*c).to_owned());
         let camera = name("endoscope").or_else(|| rig.cameras().first().map(|c| (*c).to_owned()));
         let depth = name("d405");
         let (stills, frames) = (Vec::new(), Vec::new());
         let camera = camera.unwrap_or_default();
-        Self { rig, camera, depth, stills, frames, films: true, lifted: false, spent: Duration::ZERO, failed: None }
+        Self {
+            rig,
+            camera,
+            depth,
+            stills,
+            frames,
+            records_video: true,
+            lifted: false,
+            spent: Duration::ZERO,
+            failed: None,
+        }
     }
 
-    /// Stills alone.
+    /// Records only stills.
     #[must_use]
     pub fn stills_only(self) -> Self {
-        Self { films: false, depth: None, ..self }
+        Self { records_video: false, depth: None, ..self }
     }
 
-    /// Sees the episode at its start or after a step.
+    /// Records the episode at its start or after `step`.
     pub fn record(&mut self, episode: &Episode, step: Option<&Step>) {
         let clock = Instant::now();
         if self.failed.is_none()
@@ -74,7 +85,7 @@ impl Recorder {
         self.spent += clock.elapsed();
     }
 
-    /// Wall time that pictures took.
+    /// Wall time spent on pictures.
     pub fn spent(&self) -> Duration {
         self.spent
     }
@@ -92,44 +103,44 @@ impl Recorder {
             self.lifted = true;
             self.still(cell, "Lifted")?;
         }
-        if self.films
+        if self.records_video
             && cell.time() >= FRAME_INTERVAL * self.frames.len() as f64 - 1e-9
             && self.frames.len() < MAX_FRAMES
         {
-            let picture = self.rig.render(cell, &self.camera, FILM.map(|n| 2 * n), &RenderSettings::preview())?;
+            let picture = self.rig.render(cell, &self.camera, VIDEO_SIZE.map(|n| 2 * n), &RenderSettings::preview())?;
             self.frames.push((averaged(&picture.color, 2), (1e3 * cell.time()).round() as i32));
         }
         Ok(())
     }
 
     fn still(&mut self, cell: &Cell, what: &str) -> Result<()> {
-        if self.stills.len() < MAX_STILLS { self.see(cell, what) } else { Ok(()) }
+        if self.stills.len() < MAX_STILLS { self.add_still(cell, what) } else { Ok(()) }
     }
 
-    fn see(&mut self, cell: &Cell, what: &str) -> Result<()> {
-        let picture = self.rig.render(cell, &self.camera, STILL.map(|n| 2 * n), &RenderSettings::preview())?;
+    fn add_still(&mut self, cell: &Cell, what: &str) -> Result<()> {
+        let picture = self.rig.render(cell, &self.camera, STILL_SIZE.map(|n| 2 * n), &RenderSettings::preview())?;
         let caption = format!("{what}, {:.2} s; {}", cell.time(), self.camera);
         self.stills.push((caption, averaged(&picture.color, 2)));
         Ok(())
     }
 
-    /// All pictures, the last of the end.
+    /// Returns all pictures, with one of the end.
     ///
     /// # Errors
-    /// What went wrong while it watched.
+    /// The first error of any picture.
     pub fn finish(mut self, cell: &Cell) -> Result<Pictures> {
         if let Some(error) = self.failed {
             return Err(error);
         }
-        self.see(cell, "At the end")?;
+        self.add_still(cell, "At the end")?;
         if let Some(depth) = self.depth.clone() {
-            let picture = self.rig.render(cell, &depth, STILL.map(|n| 2 * n), &RenderSettings::preview())?;
+            let picture = self.rig.render(cell, &depth, STILL_SIZE.map(|n| 2 * n), &RenderSettings::preview())?;
             self.stills.push((format!("{depth} at the end"), averaged(&picture.color, 2)));
             self.rig.noise = SensorNoise { depth: Some(DepthNoise::default()), ..SensorNoise::default() };
-            let picture = self.rig.render(cell, &depth, STILL, &RenderSettings::Preview { shadows: false })?;
+            let picture = self.rig.render(cell, &depth, STILL_SIZE, &RenderSettings::Preview { shadows: false })?;
             self.stills.push((format!("Depth of {depth} with its noise, near is bright"), shown(&picture.depth)));
         }
-        let film = if self.frames.len() > 1 { Some((webp(&self.frames)?, FILM)) } else { None };
-        Ok(Pictures { stills: self.stills, film })
+        let video = if self.frames.len() > 1 { Some((webp(&self.frames)?, VIDEO_SIZE)) } else { None };
+        Ok(Pictures { stills: self.stills, video })
     }
 }

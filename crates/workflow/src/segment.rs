@@ -44,7 +44,7 @@ pub struct Segmented {
 
 /// A file that SAM 2.1 needs, for printing.
 #[derive(Clone, Debug, Serialize)]
-pub struct Wanted {
+pub struct WeightFile {
     /// Its name, or how it is recognised.
     pub name: &'static str,
     /// Its purpose.
@@ -56,8 +56,8 @@ pub struct Wanted {
 }
 
 /// The files that SAM 2.1 needs, and which of them are present.
-pub fn wanted_weights(folder: Option<&Path>) -> Vec<Wanted> {
-    let of = |w: WantedFile| Wanted {
+pub fn weight_files(folder: Option<&Path>) -> Vec<WeightFile> {
+    let of = |w: WantedFile| WeightFile {
         name: w.name,
         purpose: w.purpose,
         found: w.found.map(|p| p.display().to_string()),

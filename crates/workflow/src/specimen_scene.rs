@@ -1,4 +1,4 @@
-//! Scenes for specimens: the specimen alone with ideal arms, or placed in the paper's cell.
+//! Scenes for specimens: the specimen with ideal arms, or in the paper's cell.
 
 use crate::{Error, Result};
 use glam::{DQuat, DVec3};
@@ -14,27 +14,28 @@ use trocar_specimen::Specimen;
 /// Height at which the lowest tissue lies in the cell (m), as in the paper's cell.
 const BED_HEIGHT: f64 = 0.02;
 
-/// The organ's middle lies no higher than this in the cell (m); thick specimens lie lower for it.
+/// Maximum height of the organ's middle in the cell (m). Thick specimens are lowered to it.
 const MAX_MIDDLE_HEIGHT: f64 = 0.055;
 
-/// Turns about the vertical that are tried.
+/// Number of tried turns about the vertical.
 const TURNS: i32 = 24;
 
-/// Where the organ's middle lies in the cell (m): below the ports' midpoint of the paper's cell.
+/// Place of the organ's middle in the cell, x and y (m): below the midpoint of the ports.
 const MIDDLE: [f64; 2] = [0.0, 0.46];
 
-/// Free instruments start this far above the highest tissue (m), and a cutter this far beside the grasper.
+/// Distance of a free instrument from the highest tissue at the start (m).
 const START_ABOVE: f64 = 0.04;
+/// Distance of a free cutter from the grasper at the start (m).
 const CUTTER_BESIDE: f64 = 0.06;
 
-/// Force that no command of a free instrument pushes beyond (N): that of a strong hand.
+/// Force limit of a free instrument (N): that of a strong hand.
 const FREE_FORCE_LIMIT_N: f64 = 40.0;
 
-/// The organ of `specimen` that a task is about: the one of that name, or the appendix if there is one, or
-/// else the first.
+/// The organ of a task on `specimen`: the one of this name, or by default the appendix or the first
+/// organ.
 ///
 /// # Errors
-/// Names the organs of a specimen that does not have it.
+/// An organ that the specimen does not have; names those that it has.
 pub fn task_organ<'a>(specimen: &'a Specimen, name: Option<&'a str>) -> Result<&'a str> {
     let names: Vec<&str> = specimen.organs.iter().map(|o| o.name.as_str()).collect();
     match name {
@@ -52,8 +53,8 @@ pub fn task_organ<'a>(specimen: &'a Specimen, name: Option<&'a str>) -> Result<&
     }
 }
 
-/// The specimen in `folder` alone, with a grasper that moves freely, and a cutter if `sever`: a scene of one
-/// or two ideal arms without ports, whose task is a grasp-lift of `organ`.
+/// A scene of the specimen in `folder` and one or two ideal arms without ports: a grasper, and a
+/// cutter if `sever`. Its task is a grasp-lift of `organ`.
 ///
 /// # Errors
 /// A specimen without that organ.
@@ -82,9 +83,9 @@ pub fn free_scene(specimen: &Specimen, folder: &Path, organ: &str, sever: bool) 
     Ok(scene)
 }
 
-/// The paper's cell with the specimen in `folder` placed so that both tools reach `organ`: its middle below
-/// the ports' midpoint, turned about the vertical to where the tools miss it by least. And how near they
-/// come.
+/// The paper's cell with the specimen in `folder`, and the reach of its tools. The specimen is
+/// placed so that both tools reach `organ`: with its middle below the midpoint of the ports, and
+/// turned about the vertical to the smallest miss of the tools.
 ///
 /// # Errors
 /// A specimen without that organ.
@@ -98,7 +99,7 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
     let missed = |reach: &[ToolReach]| reach.iter().map(|r| r.missed_mm).fold(0.0, f64::max);
     let mut best: Option<(Scene, Vec<ToolReach>)> = None;
     for k in 0..TURNS {
-        // Small turns to either side first, so that of equals the least is taken.
+        // Small turns come first, so that the smallest of equal ones is used.
         let turn = if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 };
         let turn = std::f64::consts::TAU * f64::from(turn) / f64::from(TURNS);
         scene.placement = rounded(frame(&placed(specimen, organ, turn)?));
@@ -113,8 +114,8 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
     best.ok_or_else(|| Error::Mismatch("the specimen cannot be placed".to_owned()))
 }
 
-/// A grasp-lift of `organ` anywhere along it that goes on until its policy has finished, from the same
-/// start every time.
+/// A grasp-lift of `organ` at any place along it, until its policy has finished. All episodes have
+/// the same start.
 pub fn grasp_lift(organ: &str) -> Task {
     let still = Variation {
         tilt_deg: 0.0,
@@ -135,9 +136,9 @@ pub fn grasp_lift(organ: &str) -> Task {
     }
 }
 
-/// The pose that brings the middle of `organ` below the ports' midpoint and the lowest tissue to the bed,
-/// with the specimen turned by `turn` (rad) about the vertical.
-pub(crate) fn placed(specimen: &Specimen, organ: &str, turn: f64) -> Result<Pose> {
+/// The pose of the specimen with the middle of `organ` below the midpoint of the ports, the lowest
+/// tissue on the bed, and a turn of `turn` (rad) about the vertical.
+fn placed(specimen: &Specimen, organ: &str, turn: f64) -> Result<Pose> {
     let name = task_organ(specimen, Some(organ))?;
     let upright = DQuat::from_rotation_arc(specimen.up.normalize(), DVec3::Z);
     let rotation = (DQuat::from_rotation_z(turn) * upright).normalize();
@@ -157,7 +158,7 @@ pub(crate) fn frame(pose: &Pose) -> Frame {
     Frame { position_m: pose.translation.to_array(), rotation_wxyz: [q.w, q.x, q.y, q.z] }
 }
 
-/// The frame with nine decimals, for people to read and change.
+/// The frame with nine decimals, for people to read and edit.
 fn rounded(frame: Frame) -> Frame {
     // Adding zero makes a negative zero positive.
     let round = |x: f64| (x * 1e9).round() / 1e9 + 0.0;
@@ -169,7 +170,7 @@ pub(crate) fn source(folder: &Path) -> SpecimenSource {
     SpecimenSource { path: Some(folder.display().to_string()), phantom: None, seed: 1 }
 }
 
-/// A close look at the organ from the front, and one at all of the specimen.
+/// Two cameras: one close to the organ from the front, and one that sees the whole specimen.
 fn cameras(specimen: &Specimen, placement: &Pose, organ: &str) -> Vec<CellCamera> {
     let bounds = |of: &dyn Fn(&str) -> bool| {
         let points = specimen.organs.iter().filter(|o| of(&o.name)).flat_map(|o| &o.body.vertices);

@@ -234,7 +234,7 @@ fn a_reconstruction_is_shown_whole() {
     keep("reconstruction.html", &html);
     // 4 of the camera, 2 side by side, 2 of the truth, 4 of the bodies, 1 + 4 of the depth error.
     assert_eq!(check(&html), 17);
-    for text in ["Composite against the truth", "mm]", "90.3", "&lt;script&gt;"] {
+    for text in ["Composite against the truth", "(mm)", "90.3", "&lt;script&gt;"] {
         assert!(html.contains(text), "{text}");
     }
     let mut named = r.clone();

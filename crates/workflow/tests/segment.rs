@@ -10,7 +10,7 @@ use trocar_camera::Mask;
 use trocar_core::Silent;
 use trocar_reconstruct::{Settings, reconstruct};
 use trocar_recording::{InstrumentInfo, InstrumentRule, Recording, RecordingInfo};
-use trocar_workflow::{Segment, inspect, wanted_weights};
+use trocar_workflow::{Segment, inspect, weight_files};
 
 /// Networks with SAM's interface that select by colour; `None`, with a message, without ONNX
 /// Runtime.
@@ -81,7 +81,7 @@ fn without_sam_metal_is_detected_and_points_are_refused() {
     assert!(error.contains("corrected by hand"), "{error}");
     let error = Segment::default().run(&dir, &root.path().join("other"), &Silent).unwrap_err().to_string();
     assert!(error.contains("recording.toml") && error.contains("--sam FOLDER"), "{error}");
-    assert!(wanted_weights(None).iter().all(|w| w.found.is_none() || w.name.contains("ONNX Runtime")));
+    assert!(weight_files(None).iter().all(|w| w.found.is_none() || w.name.contains("ONNX Runtime")));
 }
 
 /// `instruments = "none"` leaves the frames without masks, whatever is marked; a recording in which

@@ -27,7 +27,7 @@ pub fn specimen(pins: Pins) -> Specimen {
     meshed(pins, 2.2e-3)
 }
 
-/// The same in elements of edge `edge` [m].
+/// The same in elements of edge `edge` (m).
 pub fn meshed(pins: Pins, edge: f64) -> Specimen {
     let half = DVec3::new(HALF_LENGTH, RADIUS, RADIUS);
     let body = LatticeMesher::uniform(edge).mesh_shape(&Tube, (-half, half)).unwrap();
@@ -52,7 +52,7 @@ pub fn meshed(pins: Pins, edge: f64) -> Specimen {
     }
 }
 
-/// The tube in elements of edge `edge` [m], and a second one, 25 mm beside it and 12 mm lower,
+/// The tube in elements of edge `edge` (m), and a second one, 25 mm beside it and 12 mm lower,
 /// which keeps the cell's floor away from the first.
 pub fn two_tubes(pins: Pins, edge: f64) -> Specimen {
     let mut both = meshed(pins, edge);

@@ -8,8 +8,8 @@ use std::path::PathBuf;
 pub struct Episode {
     /// Scene file, or a built-in scene such as cell-a.
     pub scene: String,
-    /// The policy: scripted, noise, delay, offset, greedy, random; ws://HOST:PORT for an openpi server;
-    /// python:FILE.py:NAME or python:MODULE:NAME for a Python callable. NAME=... names it.
+    /// The policy: scripted, noise, delay, offset, greedy, random; ws://HOST:PORT for an openpi
+    /// server; python:FILE.py:NAME or python:MODULE:NAME for a Python callable. NAME=... names it.
     #[arg(long, default_value = "scripted")]
     pub policy: String,
     /// Seed of the start and of the policy's random numbers.
@@ -18,7 +18,7 @@ pub struct Episode {
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// Folder of phantoms; the scene's phantom is made there once and reused
     /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
@@ -30,7 +30,7 @@ pub struct Episode {
 /// Arguments of `replay`.
 #[derive(Debug, Args)]
 pub struct Replay {
-    /// Episode folder, or the episode file in it.
+    /// Episode folder, or its episode.trocar.
     pub file: PathBuf,
     /// Replay the episode and compare the state after every step.
     #[arg(long)]
@@ -41,7 +41,7 @@ pub struct Replay {
     /// Worker threads; all by default. The result does not depend on them.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Folder of made phantoms, where a scene's phantom is made once and kept
+    /// Folder of phantoms; the scene's phantom is made there once and reused
     /// (default: $TROCAR_PHANTOMS, else trocar/phantoms in the user's cache)
     #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
     pub phantoms: PathBuf,
@@ -53,8 +53,8 @@ pub struct Sweep {
     /// Episode folders, or their channels.parquet files.
     #[arg(required = true)]
     pub channels: Vec<PathBuf>,
-    /// A gate and its values: lift_mm=4..12 (nine values), lift_mm=4..12:0.5 or cut_closed=0.15,0.3.
-    /// Several gates give every combination.
+    /// A gate and its values: lift_mm=4..12 (nine values), lift_mm=4..12:0.5 or
+    /// cut_closed=0.15,0.3. Several gates give every combination.
     #[arg(long = "gate", value_name = "NAME=VALUES", required = true)]
     pub gates: Vec<String>,
 }

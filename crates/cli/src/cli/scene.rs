@@ -15,16 +15,17 @@ pub struct Scene {
 pub enum SceneAction {
     /// List the built-in scenes.
     List,
-    /// Print a scene: a built-in one with its comments, or a file completed with all default values.
+    /// Print a scene: a built-in scene with its comments, or a file with all default values.
     Show {
         /// A built-in scene, or a scene file.
         name: String,
-        /// Print a built-in scene in the form that replays use: every value, fixed order, no comments.
+        /// Print a built-in scene in the form of replays: all values, in fixed order, without
+        /// comments.
         #[arg(long)]
         canonical: bool,
     },
-    /// Write a scene file for a specimen: the paper's cell, with the specimen placed within reach of both
-    /// tools.
+    /// Write a scene file for a specimen: the paper's cell, with the specimen placed within reach
+    /// of both tools.
     New {
         /// Specimen folder.
         specimen: std::path::PathBuf,
@@ -35,8 +36,8 @@ pub enum SceneAction {
         #[arg(short, long)]
         output: Option<std::path::PathBuf>,
     },
-    /// Check a scene file: what is wrong, where, and what would be right; and whether the tools reach the
-    /// task's organ.
+    /// Check a scene file and whether the tools reach the task's organ. Prints the first mistake
+    /// with its line and a correction.
     Check {
         /// A scene file, or a built-in scene.
         file: String,

@@ -1,4 +1,4 @@
-//! Which study is run, with its options: whatever studies there are.
+//! The subcommands of `experiment` and `bench`, from the registry of studies.
 
 use clap::{ArgMatches, Args, Command, Error, FromArgMatches, Subcommand, error::ErrorKind};
 use trocar_studies::registry::STUDIES;
@@ -7,7 +7,7 @@ use trocar_studies::study::Kind;
 /// Arguments of `experiment`.
 #[derive(Debug, Args)]
 pub struct Experiment {
-    /// Which one.
+    /// The study.
     #[command(subcommand)]
     pub study: ExperimentChoice,
 }
@@ -15,12 +15,12 @@ pub struct Experiment {
 /// Arguments of `bench`.
 #[derive(Debug, Args)]
 pub struct Bench {
-    /// Which one.
+    /// The study.
     #[command(subcommand)]
     pub study: BenchChoice,
 }
 
-/// A study that was chosen.
+/// The chosen study.
 #[derive(Debug)]
 pub struct StudyChoice {
     /// Its name.

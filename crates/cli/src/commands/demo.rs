@@ -12,7 +12,7 @@ pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result
     let result = demo.run(&arguments.output, progress)?;
     output::print(json, &result, |r: &DemoResult| {
         format!(
-            "{}\n\n{}\n\nall of it in {:.0} s; report {}",
+            "{}\n\n{}\n\n{:.0} s in total; report {}",
             reconstruct::text(&r.reconstructed),
             simulate::text(&r.lift),
             r.seconds,
@@ -25,13 +25,13 @@ pub fn run(arguments: &cli::Demo, json: bool, progress: &dyn Progress) -> Result
     Ok(())
 }
 
-/// Shows a file in the user's browser if there is a desktop; the path is printed anyway.
+/// Opens a file in the browser if there is a desktop.
 fn open(path: &Path) {
     let desktop = cfg!(target_os = "macos")
         || cfg!(windows)
         || std::env::var_os("DISPLAY").is_some()
         || std::env::var_os("WAYLAND_DISPLAY").is_some();
     if desktop && open::that_detached(path).is_err() {
-        eprintln!("no browser could be started; open the report by hand");
+        eprintln!("the browser cannot be started; open the report yourself");
     }
 }

@@ -8,7 +8,7 @@ use trocar_campaign::run_episode;
 use trocar_core::Progress;
 use trocar_task::ArmSummary;
 use trocar_workflow::{
-    EpisodeHeader, EpisodeMade, EpisodeRun, Error, Result, counted, read_episode, replay, sweep_files,
+    EpisodeHeader, EpisodeOutput, EpisodeRun, Error, Result, counted, read_episode, replay, sweep_files,
 };
 
 pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Result<()> {
@@ -25,24 +25,24 @@ pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Res
     Ok(())
 }
 
-/// What an episode file says of itself.
+/// The header of an episode file.
 #[derive(Serialize)]
-struct Told<'a> {
+struct EpisodeSummary<'a> {
     steps: usize,
     #[serde(flatten)]
     header: &'a EpisodeHeader,
 }
 
-/// Replays and verifies an episode, or prints its header. A difference is printed and is an error, so
-/// that scripts notice it.
+/// Verifies an episode by a replay, or prints its header. A difference is an error, so that scripts
+/// notice it.
 pub fn replay_file(arguments: &cli::Replay, json: bool, progress: &dyn Progress) -> Result<()> {
     if !arguments.verify {
         let file = read_episode(&arguments.file)?;
-        output::print(json, &Told { steps: file.steps.len(), header: &file.header }, |told| {
-            let h = told.header;
+        output::print(json, &EpisodeSummary { steps: file.steps.len(), header: &file.header }, |summary| {
+            let h = summary.header;
             format!(
                 "{} by {} with seed {}, recorded by trocar {}; scene {}, specimen {}; --verify replays and compares every step",
-                counted(told.steps, "step"),
+                counted(summary.steps, "step"),
                 h.policy,
                 h.seed,
                 h.program,
@@ -72,12 +72,12 @@ pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Res
         };
         let rows: Vec<Vec<String>> = s.rows.iter().map(row).collect();
         let episodes = counted(s.episodes, "episode");
-        format!("{episodes}; how many pass each stage:\n{}", output::table(&header, &rows))
+        format!("{episodes}; passed stages:\n{}", output::table(&header, &rows))
     });
     Ok(())
 }
 
-fn text(made: &EpisodeMade) -> String {
+fn text(made: &EpisodeOutput) -> String {
     let (r, s) = (&made.result, &made.result.summary);
     let stages = s.progress.stages.iter().map(|p| match p.time_s {
         Some(time) => format!("{} at {time:.2} s", p.stage.name()),
@@ -99,7 +99,7 @@ fn text(made: &EpisodeMade) -> String {
         _ => "no grasp".to_owned(),
     };
     format!(
-        "{}, {} by {} with seed {}: {} ({} of {} stages)\n{}\n{grasp}; {} inverted at worst{remarks}\n{}\n{:.1} s simulated in {:.1} s ({:.2}x real time), state {}\nfolder {}; report {}",
+        "{}, {} by {} with seed {}: {} ({} of {} stages)\n{}\n{grasp}; at most {} inverted{remarks}\n{}\n{:.1} s simulated in {:.1} s ({:.2}x real time), state {}\nfolder {}; report {}",
         r.scene,
         r.task,
         r.policy,
@@ -119,11 +119,11 @@ fn text(made: &EpisodeMade) -> String {
     )
 }
 
-/// An arm in one line.
+/// One line on an arm.
 fn arm(a: &ArmSummary) -> String {
     let lag = a.lag_ms.map_or("lag not measured".to_owned(), |lag| format!("lag {lag:.0} ms"));
     format!(
-        "{}: {}; {lag}; peaks of {:.2} N contact, {:.2} N constraint",
+        "{}: {}; {lag}; peak contact {:.2} N, peak constraint {:.2} N",
         a.arm,
         rcm(a),
         a.peak_contact_n,
@@ -131,7 +131,7 @@ fn arm(a: &ArmSummary) -> String {
     )
 }
 
-/// The RCM deviation of an arm, or why there is none.
+/// The RCM deviation of an arm, or why it was not measured.
 pub fn rcm(a: &ArmSummary) -> String {
     match (a.rcm_median_mm, a.rcm_p95_mm, a.rcm_max_mm) {
         (Some(median), Some(p95), Some(max)) => {

@@ -33,7 +33,7 @@ pub fn run(arguments: &Reconstruct, json: bool, progress: &dyn Progress) -> Resu
     Ok(())
 }
 
-/// The specimen as a table for people.
+/// The specimen as text.
 pub fn text(r: &Reconstructed) -> String {
     let number = |x: Option<f64>| x.map_or("-".to_owned(), |x| format!("{x:.2}"));
     let rows: Vec<Vec<String>> = r
@@ -59,13 +59,13 @@ pub fn text(r: &Reconstructed) -> String {
         "organ",
         "nodes",
         "tets",
-        "min dihedral deg",
-        "edge mm",
-        "cm3",
+        "min dihedral (deg)",
+        "edge (mm)",
+        "volume (cm3)",
         "closed",
         "inverted",
-        "|err| mm",
-        "err mm",
+        "|error| (mm)",
+        "error (mm)",
         "covered",
     ];
     let mut out = output::table(&header, &rows);

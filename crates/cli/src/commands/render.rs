@@ -5,7 +5,7 @@ use crate::output;
 use trocar_core::Progress;
 use trocar_workflow::{Rendered, Rendering, Result, counted};
 
-/// Paths a pixel unless the user says otherwise.
+/// Default number of paths per pixel.
 const SAMPLES: u32 = 64;
 
 pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()> {
@@ -30,11 +30,14 @@ pub fn run(arguments: &Render, json: bool, progress: &dyn Progress) -> Result<()
 fn text(r: &Rendered) -> String {
     let seen: Vec<String> = r.seen.iter().map(|s| format!("{} {:.1}%", s.name, 1e2 * s.share)).collect();
     let how = if r.samples > 0 {
-        format!("{} a pixel", counted(r.samples as usize, "path"))
+        format!("{} per pixel", counted(r.samples as usize, "path"))
     } else {
         "direct light".to_owned()
     };
-    let note = r.differs.as_ref().map_or(String::new(), |why| format!("\nnot the recorded episode: {why}"));
+    let note = r
+        .differs
+        .as_ref()
+        .map_or(String::new(), |why| format!("\nthe replay differs from the recorded episode: {why}"));
     format!(
         "{}: {} x {}, {}, {how}, {} triangles, {:.1} s; at {:.2} s\n{}\n{}{note}",
         r.camera,

@@ -44,7 +44,7 @@ fn show(name: &str, canonical: bool, json: bool) -> Result<()> {
     Ok(())
 }
 
-/// What a scene in order holds.
+/// The parts of a valid scene.
 #[derive(Serialize)]
 struct Checked {
     name: String,
@@ -52,13 +52,13 @@ struct Checked {
     organs: Vec<String>,
     arms: Vec<&'static str>,
     cameras: Vec<String>,
-    /// How near each tool comes to the task's organ; empty where the specimen has to be made first.
+    /// Reach of each tool; empty if the specimen must be made first.
     reach: Vec<ToolReach>,
 }
 
-/// A scene that was made.
+/// A new scene.
 #[derive(Serialize)]
-struct Made {
+struct NewScene {
     scene: Scene,
     reach: Vec<ToolReach>,
 }
@@ -81,14 +81,14 @@ fn new(folder: &Path, organ: Option<&str>, output: Option<&Path>, json: bool) ->
         std::fs::write(path, &text).map_err(|source| Error::Io { path: path.to_owned(), source })?;
     }
     let said = reach_lines(&reach, organ);
-    output::print(json, &Made { scene, reach }, |_| match output {
-        Some(path) => format!("{}: a scene around {}\n{}", path.display(), folder.display(), said.join("\n")),
+    output::print(json, &NewScene { scene, reach }, |_| match output {
+        Some(path) => format!("{}: a scene with {}\n{}", path.display(), folder.display(), said.join("\n")),
         None => text.trim_end().to_owned(),
     });
     Ok(())
 }
 
-/// One line a tool.
+/// One line per tool.
 fn reach_lines(reach: &[ToolReach], organ: &str) -> Vec<String> {
     let line = |r: &ToolReach| {
         let (arm, kind) = (r.arm.name(), if r.kind == InstrumentKind::Grasper { "grasper" } else { "cutter" });
@@ -100,8 +100,8 @@ fn reach_lines(reach: &[ToolReach], organ: &str) -> Vec<String> {
     reach.iter().map(line).collect()
 }
 
-/// Prints a note where a tool does not reach the organ of the scene's task: an episode would fail after its
-/// whole time. Says nothing of scenes whose specimen has to be made first.
+/// Prints a note if a tool does not reach the organ of the scene's task, because every episode
+/// would time out. Prints nothing if the specimen must be made first.
 pub fn note_reach(name: &str) {
     let Ok(scene) = Scene::read(name) else { return };
     let Some(Source::Folder(path)) = scene.specimen.source().filter(|_| scene.task.needs_organ()) else { return };
@@ -132,7 +132,7 @@ fn check(file: &str, json: bool) -> Result<()> {
     output::print(json, &checked, |c| {
         let mut rows = vec![
             match c.reach.iter().all(ToolReach::reaches) {
-                true => format!("{file} is in order: scene '{}', task {}", c.name, c.task),
+                true => format!("{file} is valid: scene '{}', task {}", c.name, c.task),
                 false => format!("{file}: scene '{}', task {}", c.name, c.task),
             },
             format!("organs   {}", c.organs.join(", ")),
@@ -145,7 +145,7 @@ fn check(file: &str, json: bool) -> Result<()> {
     let missed = checked.reach.iter().find(|r| !r.reaches());
     missed.map_or(Ok(()), |r| {
         let (arm, mm) = (r.arm.name(), r.missed_mm);
-        let right = "move the placement, or let `trocar scene new SPECIMEN` place it";
+        let right = "change the placement, or make the scene by `trocar scene new SPECIMEN`";
         Err(Error::Mismatch(format!("{file}: placement: the {arm} arm misses the {organ} by {mm:.0} mm; {right}")))
     })
 }

@@ -2,12 +2,12 @@
 
 use crate::{cli, output};
 use trocar_core::Progress;
-use trocar_workflow::{Result, Segment, Segmented, Wanted, counted, wanted_weights};
+use trocar_workflow::{Result, Segment, Segmented, WeightFile, counted, weight_files};
 
 pub fn run(arguments: &cli::Segment, json: bool, progress: &dyn Progress) -> Result<()> {
     // clap requires both unless --weights is given.
     let (Some(recording), Some(masks), false) = (&arguments.recording, &arguments.output, arguments.weights) else {
-        output::print(json, &wanted_weights(arguments.sam.folder.as_deref()), |files| list(files));
+        output::print(json, &weight_files(arguments.sam.folder.as_deref()), |files| list(files));
         return Ok(());
     };
     let segment = Segment { sam: arguments.sam.folder.clone(), onnxruntime: arguments.sam.onnxruntime.clone() };
@@ -15,8 +15,8 @@ pub fn run(arguments: &cli::Segment, json: bool, progress: &dyn Progress) -> Res
     Ok(())
 }
 
-fn list(files: &[Wanted]) -> String {
-    let line = |w: &Wanted| {
+fn list(files: &[WeightFile]) -> String {
+    let line = |w: &WeightFile| {
         let state =
             w.found.as_ref().map_or_else(|| format!("missing; {}", w.how_to_get), |path| format!("found: {path}"));
         format!("{}\n  {}\n  {state}", w.name, w.purpose)

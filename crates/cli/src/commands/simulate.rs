@@ -9,14 +9,14 @@ use trocar_task::Severed;
 use trocar_task::policy::{AfterHold, CutAt, Script};
 use trocar_workflow::{Lift, LiftResult, Result, counted};
 
-/// Organ coordinate of the grasp unless the user says otherwise, and where a cut needs room on the base's
-/// side.
+/// Default organ coordinate of the grasp.
 const AT: f64 = 0.5;
+/// Default with a cut, which needs space towards the base.
 const AT_WITH_CUT: f64 = 0.7;
 
 pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<()> {
     let Task::GraspLift = arguments.task;
-    // A specimen is a folder; what is none is a scene.
+    // Specimens are folders; anything else is a scene.
     let name = arguments.specimen.to_string_lossy();
     let is_file = arguments.specimen.is_file() || arguments.specimen.extension().is_some_and(|e| e == "toml");
     let scene = !arguments.specimen.is_dir() && (is_file || Builtin::named(&name).is_some());
@@ -48,7 +48,7 @@ pub fn run(arguments: &Simulate, json: bool, progress: &dyn Progress) -> Result<
     Ok(())
 }
 
-/// A run in a few lines for people.
+/// A run as text.
 pub fn text(r: &LiftResult) -> String {
     let s = &r.episode.summary;
     let d = &s.details;
@@ -66,11 +66,11 @@ pub fn text(r: &LiftResult) -> String {
             d.activation_step_mm,
             if s.held { "held" } else { "NOT held" },
         ),
-        _ => "nothing grasped: NOT held".to_owned(),
+        _ => "no grasp: NOT held".to_owned(),
     };
     let mut text = format!(
         "{}: {} at s = {:.2}, {grasp}\n\
-         peaks of {:.2} N contact, {:.2} N constraint; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, {} at worst, smallest volume {:.0}% of rest; pins drift {:.6} mm; {}",
+         peak contact {:.2} N, peak constraint {:.2} N; {:.4} m/s after settling, {:.2} s of kinetic damping to {:.4} m/s; {} inverted at rest, at most {} in any frame, smallest volume {:.0}% of rest; pins drift {:.6} mm; {}",
         r.episode.scene,
         d.organ,
         r.at,
@@ -107,7 +107,7 @@ pub fn text(r: &LiftResult) -> String {
     )
 }
 
-/// A cut in a few lines for people.
+/// A cut as text.
 fn cut(s: &Severed) -> String {
     let c = &s.cut;
     if c.pieces.is_empty() {

@@ -21,7 +21,7 @@ pub fn run(choice: &StudyChoice, kind: Kind, json: bool, progress: &dyn Progress
     Ok(())
 }
 
-/// The command that was typed, without its options that decide no figure.
+/// The typed command without options that do not change figures.
 fn command() -> String {
     let mut words = vec!["trocar".to_owned()];
     let mut typed = std::env::args().skip(1);
@@ -38,7 +38,7 @@ fn command() -> String {
     words.join(" ")
 }
 
-/// The commit of the repository in which the program was started; with `+` where files were changed.
+/// The commit of the repository in which the program runs; with `+` if files are changed.
 fn commit() -> String {
     let git = |arguments: &[&str]| {
         let run = Command::new("git").args(arguments).stderr(Stdio::null()).output().ok()?;

@@ -1,4 +1,4 @@
-//! The specimen, what is said of its organs, and their tissue.
+//! Checks of the specimen, the settings of its organs, and their tissue.
 
 use super::{Checked, Problem, join, name, number, numbers, one_of, point, problem, quaternion};
 use crate::{FIELD, MaterialOverride, PHANTOMS, PinEnd, PinRule, Scene, Source};
@@ -12,7 +12,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
         let at = format!("organ.{organ}");
         name(&at, organ)?;
         if organ == FIELD {
-            return Err(problem(at, format!(" is no organ; '{FIELD}' is what the organs lie on")));
+            return Err(problem(at, format!(" is no organ; '{FIELD}' is the ground under the organs")));
         }
         material(&join(&at, "material"), &said.material)?;
         if let Some(rule) = &said.pins {
@@ -34,9 +34,9 @@ pub(super) fn check(scene: &Scene) -> Checked {
 fn specimen(scene: &Scene) -> Checked {
     let given = &scene.specimen;
     match (given.path.is_some(), given.phantom.is_some()) {
-        (true, true) => return Err(problem("specimen", " has a path and a phantom; one of them".into())),
+        (true, true) => return Err(problem("specimen", " has a path and a phantom; it must have one of them".into())),
         (false, false) => {
-            return Err(problem("specimen", " has neither a path nor a phantom; one of them".into()));
+            return Err(problem("specimen", " has neither a path nor a phantom; it must have one of them".into()));
         }
         _ => {}
     }
@@ -46,7 +46,8 @@ fn specimen(scene: &Scene) -> Checked {
         }
         Some(Source::Folder(path)) if !scene.resolve(path).join("specimen.toml").is_file() => {
             let folder = scene.resolve(path);
-            let reason = format!(" is {}, which is no specimen; a folder with a specimen.toml", folder.display());
+            let reason =
+                format!(" is {}, which is no specimen; it must be a folder with a specimen.toml", folder.display());
             Err(problem("specimen.path", reason.replace(['\n', '\r'], " ")))
         }
         _ => Ok(()),
@@ -55,7 +56,7 @@ fn specimen(scene: &Scene) -> Checked {
 
 fn material(at: &str, said: &MaterialOverride) -> Checked {
     let fields = [
-        // Nothing in a body is softer than 100 Pa, but 12 for 12 kPa is often meant.
+        // No tissue is softer than 100 Pa; a smaller number is most likely in kPa.
         ("young_modulus_pa", said.young_modulus_pa, 100.0..=1e9),
         ("poisson_ratio", said.poisson_ratio, 0.0..=0.4999),
         ("density_kg_m3", said.density_kg_m3, 100.0..=30_000.0),
@@ -65,11 +66,11 @@ fn material(at: &str, said: &MaterialOverride) -> Checked {
             number(&join(at, key), value, &range)?;
         }
     }
-    // The specimen's own ranges, should they become narrower than these.
+    // The ranges of the specimen crate apply, too.
     said.applied_to(Material::default()).validate().map_err(|reason| field_of(at, &reason))
 }
 
-/// The specimen's own checks say "field is value; what would be right".
+/// Converts a message of the specimen crate, "field is value; it must be ...".
 fn field_of(at: &str, reason: &str) -> Problem {
     let (key, rest) = reason.split_once(' ').unwrap_or((reason, ""));
     problem(join(at, key), format!(" {rest}"))
@@ -79,14 +80,15 @@ fn pins(at: &str, rule: &PinRule) -> Checked {
     rule.pins(End::Base).validate().map_err(|reason| field_of(at, &reason))?;
     match *rule {
         PinRule::End { length, band_length, .. } if length + band_length > 1.0 => {
-            let reason = format!(" has a length and a band_length of {} together; at most 1", length + band_length);
+            let reason =
+                format!(" has a length and a band_length of {} together; it must be at most 1", length + band_length);
             Err(problem(at, reason))
         }
         _ => Ok(()),
     }
 }
 
-/// What is said of organs is said of the specimen's, whose names are `organs`.
+/// Checks that all named organs are among `organs`, those of the specimen.
 pub(crate) fn check_organs(scene: &Scene, organs: &[String]) -> Checked {
     let known: Vec<&str> = organs.iter().map(String::as_str).collect();
     for organ in scene.organs.keys() {
@@ -98,22 +100,26 @@ pub(crate) fn check_organs(scene: &Scene, organs: &[String]) -> Checked {
     for (i, pair) in scene.tissue.filtered_pairs.iter().enumerate() {
         let at = format!("tissue.filtered_pairs[{i}]");
         for (k, member) in pair.iter().enumerate() {
-            one_of(&format!("{at}[{k}]"), member, "a pair is of the specimen's organs and the field", &touching)?;
+            one_of(&format!("{at}[{k}]"), member, "it must be one of the specimen's organs or the field", &touching)?;
         }
         if pair[0] == pair[1] && pair[0] == FIELD {
-            return Err(problem(at, format!(" is '{FIELD}' twice; two organs, or an organ and the field")));
+            return Err(problem(at, format!(" is '{FIELD}' twice; it must be two organs, or an organ and the field")));
         }
         let same = |other: &[String; 2]| {
             (&other[0], &other[1]) == (&pair[0], &pair[1]) || (&other[0], &other[1]) == (&pair[1], &pair[0])
         };
         if let Some(first) = scene.tissue.filtered_pairs[..i].iter().position(same) {
-            return Err(problem(at, format!(" is the pair of tissue.filtered_pairs[{first}] again; once is enough")));
+            return Err(problem(
+                at,
+                format!(" is the pair of tissue.filtered_pairs[{first}] again; remove one of them"),
+            ));
         }
     }
     let far = |rule: &PinRule| matches!(rule, PinRule::End { end: PinEnd::Far, .. });
     for (organ, said) in &scene.organs {
         if said.pins.as_ref().is_some_and(far) && scene.grasping_arm().is_none() {
-            let reason = " is 'far', from the arm that grasps, but no arm has a grasper; base or tip".to_owned();
+            let reason =
+                " is 'far' (from the grasping arm), but no arm has a grasper; it must be base or tip".to_owned();
             return Err(problem(format!("organ.{organ}.pins.end"), reason));
         }
     }

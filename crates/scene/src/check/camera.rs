@@ -1,11 +1,11 @@
-//! Cameras that can be.
+//! Checks of cameras.
 
 use super::{Checked, join, names, number, numbers, point, problem, quaternion};
 use crate::{CellCamera, Lens, Scene, View};
 use glam::DVec3;
 
 /// Largest side of an image (px).
-const MOST_PIXELS: f64 = 8192.0;
+const MAX_PIXELS: f64 = 8192.0;
 
 pub(super) fn check(scene: &Scene) -> Checked {
     names("camera", scene.cameras.iter().map(|c| c.name.as_str()))?;
@@ -18,7 +18,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
 fn one(at: &str, camera: &CellCamera) -> Checked {
     for (key, size) in [("size_px", camera.size_px), ("policy_size_px", camera.policy_size_px)] {
         for (k, pixels) in size.iter().enumerate() {
-            number(&format!("{at}.{key}[{k}]"), f64::from(*pixels), &(1.0..=MOST_PIXELS))?;
+            number(&format!("{at}.{key}[{k}]"), f64::from(*pixels), &(1.0..=MAX_PIXELS))?;
         }
     }
     number(&join(at, "oblique_deg"), camera.oblique_deg, &(-120.0..=120.0))?;
@@ -38,11 +38,11 @@ fn view(at: &str, view: &View) -> Checked {
             point(&join(at, "target_m"), target_m)?;
             let ahead = DVec3::from(target_m) - DVec3::from(eye_m);
             if ahead.length() < 1e-6 {
-                return Err(problem(join(at, "target_m"), " is where eye_m is; another point".into()));
+                return Err(problem(join(at, "target_m"), " is equal to eye_m; it must be another point".into()));
             }
             let up = DVec3::from(up).try_normalize();
             if up.is_none_or(|up| up.cross(ahead.normalize()).length() < 1e-3) {
-                let reason = " has no direction across the view; the direction of the image's top".into();
+                let reason = " is zero or parallel to the view; it must be the direction of the image's top".into();
                 return Err(problem(join(at, "up"), reason));
             }
             Ok(())
@@ -67,7 +67,10 @@ fn lens(at: &str, lens: &Lens) -> Checked {
                 ],
             )?;
             if !matches!(distortion.len(), 0 | 4 | 5 | 8) {
-                let reason = format!(" has {} coefficients; k1 k2 p1 p2 [k3 [k4 k5 k6]]: 4, 5 or 8", distortion.len());
+                let reason = format!(
+                    " has {} coefficients; it must have 4, 5 or 8: k1 k2 p1 p2 [k3 [k4 k5 k6]]",
+                    distortion.len()
+                );
                 return Err(problem(join(at, "distortion"), reason));
             }
             let range = -1e3..=1e3;

@@ -1,4 +1,4 @@
-//! Arms, ports and instruments: each in its range, all there, and such that they fit.
+//! Checks of arms, ports and instruments: ranges, references, and whether they fit together.
 
 use super::unit::{hint, show};
 use super::{Checked, join, name, names, number, numbers, one_of, point, problem, quaternion, unit};
@@ -6,12 +6,12 @@ use crate::cell::SIMPLE;
 use crate::{Arm, ArmModel, Drive, Frame, Instrument, Port, Scene, Start};
 use glam::DVec3;
 
-/// Height of the FR3's shoulder above its base, and how far its flange gets from there (m)
-/// (Franka's data sheet: reach 855 mm).
+/// Height of the FR3's shoulder above its base (m).
 const FR3_SHOULDER: f64 = 0.333;
+/// Reach of the FR3's flange from its shoulder (m), from Franka's data sheet.
 const FR3_REACH: f64 = 0.855;
 
-/// Limits of the FR3's joints (rad) (Franka's data sheet).
+/// Limits of the FR3's joints (rad), from Franka's data sheet.
 const FR3_LIMITS: [(f64, f64); 7] = [
     (-2.7437, 2.7437),
     (-1.7837, 1.7837),
@@ -22,14 +22,14 @@ const FR3_LIMITS: [(f64, f64); 7] = [
     (-3.0159, 3.0159),
 ];
 
-/// Bases nearer to each other than this are in the same place (m): the FR3's is 0.2 m wide.
+/// Minimum distance of bases (m): the width of the FR3's base.
 const BASE_WIDTH: f64 = 0.2;
 
-/// A tilt below this that is not 0 was meant in radians (degrees).
-const LEAST_TILT: f64 = 1.0;
+/// Minimum tilt other than 0 (degrees). A smaller one is most likely in radians.
+const MIN_TILT: f64 = 1.0;
 
-/// Most joints of an arm.
-const MOST_JOINTS: usize = 16;
+/// Maximum number of joints of an arm.
+const MAX_JOINTS: usize = 16;
 
 pub(super) fn check(scene: &Scene) -> Checked {
     rates(scene)?;
@@ -51,7 +51,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
         ],
     )?;
     if !(1..=2).contains(&scene.arms.len()) {
-        return Err(problem("arm", format!(" is a list of {}; one or two arms", scene.arms.len())));
+        return Err(problem("arm", format!(" has {} entries; it must have one or two", scene.arms.len())));
     }
     names("arm", scene.arms.iter().map(|a| a.name.name()))?;
     for (i, one) in scene.arms.iter().enumerate() {
@@ -69,7 +69,7 @@ fn rates(scene: &Scene) -> Checked {
     }
     let below = (rates.physics_hz / rates.control_hz).max(1) * rates.control_hz;
     let reason = format!(
-        " is {}, no multiple of control_hz, {}; a multiple, such as {below}",
+        " is {}, which is no multiple of control_hz ({}); it must be a multiple, such as {below}",
         rates.physics_hz, rates.control_hz
     );
     Err(problem("rates.physics_hz", reason))
@@ -118,7 +118,7 @@ fn arm(at: &str, one: &Arm, scene: &Scene) -> Checked {
         frame(&join(at, "base"), base)?;
     }
     if one.drive == Drive::Dynamics && one.base.is_none() {
-        let reason = " is missing; the pose of the arm's base in the cell, or drive = \"ideal\" for an arm without one";
+        let reason = " is missing; it must be the pose of the arm's base in the cell, unless drive = \"ideal\"";
         return Err(problem(join(at, "base"), reason.to_owned()));
     }
     posture(&join(at, "posture_deg"), one)?;
@@ -126,16 +126,16 @@ fn arm(at: &str, one: &Arm, scene: &Scene) -> Checked {
     for (gain, value) in &one.controller.gains {
         let field = format!("{at}.controller.gains.{gain}");
         name(&format!("{at}.controller.gains"), gain)?;
-        // Gains are in units of their controller: no range fits all of them.
+        // Gains have the units of their controller, so they have no common range.
         if !(0.0..=1e12).contains(value) {
-            return Err(problem(field, format!(" is {}; 0 or more, and finite", show(*value))));
+            return Err(problem(field, format!(" is {}; it must be at least 0 and finite", show(*value))));
         }
     }
     if let Some(port) = &one.port {
         let ports: Vec<&str> = scene.ports.iter().map(|p| p.name.as_str()).collect();
         one_of(&join(at, "port"), port, "the ports are", &ports)?;
     } else if one.drive == Drive::Dynamics {
-        let reason = " is missing; the name of a port, or drive = \"ideal\" for an arm that moves freely";
+        let reason = " is missing; it must be the name of a port, unless drive = \"ideal\"";
         return Err(problem(join(at, "port"), reason.to_owned()));
     }
     let held: Vec<&str> = scene.instruments.iter().map(|i| i.name.as_str()).collect();
@@ -151,28 +151,34 @@ fn model(at: &str, one: &Arm, scene: &Scene) -> Checked {
     let field = join(at, "model");
     let shown: String = one.model.chars().take(200).flat_map(char::escape_default).collect();
     match one.source() {
-        None => Err(problem(field, format!(" is '{shown}'; franka_fr3, or a file that ends in .urdf, .xml or .mjcf"))),
+        None => Err(problem(
+            field,
+            format!(" is '{shown}'; it must be franka_fr3 or a file that ends in .urdf, .xml or .mjcf"),
+        )),
         Some(ArmModel::Urdf(file) | ArmModel::Mjcf(file)) if !scene.resolve(file).is_file() => {
             let path = scene.resolve(file).display().to_string().replace(['\n', '\r'], " ");
-            Err(problem(field, format!(" is {path}, which is no file; a path from the scene file's folder")))
+            Err(problem(field, format!(" is {path}, which is no file; it must be a path from the scene file's folder")))
         }
         _ => Ok(()),
     }
 }
 
-/// What an arm looks like is said by a word or by a file that is there.
+/// Checks the shapes of an arm: the word for simple ones, or an existing file.
 fn shapes(field: &str, one: &Arm, scene: &Scene) -> Checked {
     let Some(said) = one.shapes.as_deref().filter(|said| *said != SIMPLE) else { return Ok(()) };
     let shown: String = said.chars().take(200).flat_map(char::escape_default).collect();
     let end = said.to_ascii_lowercase();
     if ![".urdf", ".xml", ".mjcf"].iter().any(|e| end.ends_with(e)) {
-        return Err(problem(field, format!(" is '{shown}'; simple, or a file that ends in .urdf, .xml or .mjcf")));
+        return Err(problem(
+            field,
+            format!(" is '{shown}'; it must be simple or a file that ends in .urdf, .xml or .mjcf"),
+        ));
     }
     if scene.resolve(said).is_file() {
         return Ok(());
     }
     let path = scene.resolve(said).display().to_string().replace(['\n', '\r'], " ");
-    Err(problem(field, format!(" is {path}, which is no file; a path from the scene file's folder")))
+    Err(problem(field, format!(" is {path}, which is no file; it must be a path from the scene file's folder")))
 }
 
 fn posture(field: &str, one: &Arm) -> Checked {
@@ -181,8 +187,9 @@ fn posture(field: &str, one: &Arm) -> Checked {
         return Ok(());
     }
     let fr3 = one.source() == Some(ArmModel::FrankaFr3);
-    if fr3 && given.len() != FR3_LIMITS.len() || given.len() > MOST_JOINTS {
-        let right = if fr3 { "an FR3 has 7 joints".to_owned() } else { format!("at most {MOST_JOINTS}") };
+    if fr3 && given.len() != FR3_LIMITS.len() || given.len() > MAX_JOINTS {
+        let right =
+            if fr3 { "it must have 7 for an FR3".to_owned() } else { format!("it must have at most {MAX_JOINTS}") };
         return Err(problem(field, format!(" has {} angles; {right}", given.len())));
     }
     for (k, angle) in given.iter().enumerate() {
@@ -192,27 +199,27 @@ fn posture(field: &str, one: &Arm) -> Checked {
     Ok(())
 }
 
-/// An arm without a port has a direction and a start.
+/// Checks an arm without a port, which has a direction and a start.
 fn free(at: &str, one: &Arm) -> Checked {
     if let Some(direction) = &one.direction {
         unit(&join(at, "direction"), direction, "a unit vector")?;
     }
     let at = join(at, "start");
     let Some(position) = one.start.position_m else {
-        let reason = " is missing; an arm without a port needs it: where the pivot of its jaw starts in the cell";
+        let reason = " is missing; it must be the start of the jaw's pivot in the cell, because the arm has no port";
         return Err(problem(join(&at, "position_m"), reason.to_owned()));
     };
     point(&join(&at, "position_m"), position)?;
     numbers(&at, &[("roll_deg", one.start.roll_deg, -180.0..=180.0), ("jaw", one.start.jaw, 0.0..=1.0)])
 }
 
-/// The instrument goes through the port, leans no farther than the hole lets it, and the arm gets
-/// there.
+/// Checks that the instrument fits through the port, that its tilt is possible in the hole, and
+/// that the arm reaches the port.
 fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f64) -> Checked {
     let (shaft, hole) = (instrument.shaft_diameter_mm, port.hole_diameter_mm);
     let Some(limit) = port.tilt_limit(shaft) else {
         let reason = format!(
-            " is '{}', whose shaft of {} mm does not go through the hole of {} mm of port '{}'; a thinner shaft or a larger hole",
+            " is '{}', whose shaft of {} mm does not go through the hole of {} mm of port '{}'; choose a thinner shaft or a larger hole",
             instrument.name,
             show(shaft),
             show(hole),
@@ -223,7 +230,7 @@ fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f
     let at = join(at, "start");
     for (key, given) in [("direction", one.direction.is_some()), ("start.position_m", one.start.position_m.is_some())] {
         if given {
-            let reason = format!(" is for arms without a port; this one works through port '{}'", port.name);
+            let reason = format!(" is only for arms without a port; this arm has port '{}'", port.name);
             return Err(problem(join(at.trim_end_matches(".start"), key), reason));
         }
     }
@@ -232,14 +239,14 @@ fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f
     if one.source() != Some(ArmModel::FrankaFr3) {
         return Ok(());
     }
-    // The flange is at the instrument's other end; a mount of its own moves it by no more than its
+    // The flange is at the other end of the instrument. A mount moves it by at most the mount's
     // length.
     let flange = one.start.tip(port) - instrument.length() * one.start.direction(port);
     let shoulder = base.pose().transform(FR3_SHOULDER * DVec3::Z);
     let far = flange.distance(shoulder) - DVec3::from(instrument.mount.position_m).length();
     if far > FR3_REACH {
         let reason = format!(
-            " is '{}', which is out of reach: the flange would start {} m from the shoulder; at most {FR3_REACH} m",
+            " is '{}', which is out of reach: the flange would start {} m from the shoulder; it must be at most {FR3_REACH} m",
             port.name,
             show((far * 1e3).round() / 1e3)
         );
@@ -249,21 +256,19 @@ fn fits(at: &str, one: &Arm, port: &Port, instrument: &Instrument, varies_deg: f
 }
 
 fn start(at: &str, start: &Start, limit_deg: f64, varies_deg: f64, instrument: &Instrument) -> Checked {
-    let most = limit_deg - varies_deg;
+    let max = limit_deg - varies_deg;
     let tilt = start.tilt_deg;
-    if tilt != 0.0 && !(LEAST_TILT..=most).contains(&tilt) {
-        let limit = (limit_deg * 10.0).floor() / 10.0;
-        let why = if varies_deg > 0.0 {
-            format!(
-                "{} degrees, where the shaft fills the hole, less the variation of {}",
-                show(limit),
-                show(varies_deg)
-            )
-        } else {
-            format!("{} degrees, where the shaft fills the hole", show(limit))
-        };
-        let reason =
-            format!(" is {}; 0, or {LEAST_TILT} to {why}{}", show(tilt), hint("degrees", tilt, &(LEAST_TILT..=most)));
+    if tilt != 0.0 && !(MIN_TILT..=max).contains(&tilt) {
+        let tenths = |degrees: f64| show((degrees * 10.0).floor() / 10.0);
+        let variation =
+            if varies_deg > 0.0 { format!(", and the variation is {}", show(varies_deg)) } else { String::new() };
+        let reason = format!(
+            " is {}; it must be 0 or in [{MIN_TILT}, {}] degrees: the shaft touches the hole at {}{variation}{}",
+            show(tilt),
+            tenths(max),
+            tenths(limit_deg),
+            hint("degrees", tilt, &(MIN_TILT..=max))
+        );
         return Err(problem(join(at, "tilt_deg"), reason));
     }
     numbers(
@@ -277,13 +282,13 @@ fn start(at: &str, start: &Start, limit_deg: f64, varies_deg: f64, instrument: &
     )
 }
 
-/// No two arms share a place, a port or an instrument, and no two holes overlap.
+/// Checks that no two arms share a place, a port or an instrument, and that holes do not overlap.
 fn apart(scene: &Scene) -> Checked {
     for (i, port) in scene.ports.iter().enumerate() {
         for (k, other) in scene.ports[..i].iter().enumerate() {
             let far = 1e3 * DVec3::from(port.centre_m).distance(other.centre_m.into());
             if far < 0.5 * (port.hole_diameter_mm + other.hole_diameter_mm) {
-                let reason = format!(" is {} mm from that of port[{k}]; holes do not overlap", show(far));
+                let reason = format!(" is {} mm from that of port[{k}]; holes must not overlap", show(far));
                 return Err(problem(format!("port[{i}].centre_m"), reason));
             }
         }
@@ -292,7 +297,7 @@ fn apart(scene: &Scene) -> Checked {
     if let (Some(one), Some(other)) = (&one.base, &other.base) {
         let far = DVec3::from(one.position_m).distance(other.position_m.into());
         if far < BASE_WIDTH {
-            let reason = format!(" is {} m from that of arm[0]; bases are {BASE_WIDTH} m or more apart", show(far));
+            let reason = format!(" is {} m from that of arm[0]; it must be at least {BASE_WIDTH} m", show(far));
             return Err(problem("arm[1].base.position_m", reason));
         }
     }
@@ -300,7 +305,10 @@ fn apart(scene: &Scene) -> Checked {
     for ((key, first), (_, second)) in names(one).into_iter().zip(names(other)) {
         let (Some(first), Some(second)) = (first, second) else { continue };
         if first == second {
-            return Err(problem(format!("arm[1].{key}"), format!(" is '{second}', which arm[0] has; each its own")));
+            return Err(problem(
+                format!("arm[1].{key}"),
+                format!(" is '{second}', which arm[0] already has; each arm needs its own"),
+            ));
         }
     }
     Ok(())

@@ -1,5 +1,5 @@
-//! What a scene must be beyond its form: ranges, units, names, and parts that fit together. The
-//! first mistake is reported.
+//! Checks of a parsed scene: ranges, units, names, and parts that fit together. The first mistake
+//! is reported.
 
 mod anatomy;
 mod camera;
@@ -19,14 +19,14 @@ pub(crate) use anatomy::check_organs;
 pub(crate) struct Problem {
     /// Path of the field.
     pub field: String,
-    /// What follows it in the message: " is 3; what would be right".
+    /// The rest of the message: " is 3; it must be ...".
     pub reason: String,
 }
 
 /// Result of a check.
 pub(crate) type Checked = Result<(), Problem>;
 
-/// Checks all that can be seen without the specimen's organs.
+/// Checks everything that does not depend on the specimen's organs.
 pub(crate) fn check(scene: &Scene) -> Checked {
     name("name", &scene.name)?;
     anatomy::check(scene)?;
@@ -35,22 +35,22 @@ pub(crate) fn check(scene: &Scene) -> Checked {
     task::check(scene)
 }
 
-/// A mistake of the field `at`.
+/// A mistake in the field `at`.
 fn problem(at: impl Into<String>, reason: String) -> Problem {
     Problem { field: at.into(), reason }
 }
 
-/// `{at}.{key}`, the key alone at the top.
+/// `{at}.{key}`, or the key alone at the top level.
 fn join(at: &str, key: &str) -> String {
     if at.is_empty() { key.to_owned() } else { format!("{at}.{key}") }
 }
 
-/// Numbers lie in their ranges; the key's ending is their unit.
+/// Checks that numbers are in their ranges. The end of a key is its unit.
 fn numbers(at: &str, fields: &[(&str, f64, RangeInclusive<f64>)]) -> Checked {
     fields.iter().try_for_each(|(key, value, range)| number(&join(at, key), *value, range))
 }
 
-/// One number lies in its range.
+/// Checks that a number is in its range.
 fn number(field: &str, value: f64, range: &RangeInclusive<f64>) -> Checked {
     if range.contains(&value) {
         return Ok(());
@@ -58,21 +58,23 @@ fn number(field: &str, value: f64, range: &RangeInclusive<f64>) -> Checked {
     let unit = unit_of(field);
     let (low, high) = (show(*range.start()), show(*range.end()));
     let space = if unit.is_empty() { "" } else { " " };
-    Err(problem(field, format!(" is {}; {low} to {high}{space}{unit}{}", show(value), hint(unit, value, range))))
+    Err(problem(
+        field,
+        format!(" is {}; it must be in [{low}, {high}]{space}{unit}{}", show(value), hint(unit, value, range)),
+    ))
 }
 
-/// A point of the cell: no part of it is farther than 5 m from the origin.
+/// Checks a point of the cell: its coordinates are within 5 m of the origin.
 fn point(field: &str, value: [f64; 3]) -> Checked {
-    const FARTHEST_M: f64 = 5.0;
-    let range = -FARTHEST_M..=FARTHEST_M;
+    const MAX_COORDINATE_M: f64 = 5.0;
+    let range = -MAX_COORDINATE_M..=MAX_COORDINATE_M;
     value.iter().enumerate().try_for_each(|(k, v)| number(&format!("{field}[{k}]"), *v, &range))
 }
 
-/// How far from 1 the length of what should be a unit may be; typed ones have four decimals or
-/// more.
+/// Tolerance of the length of unit vectors and quaternions. Typed ones have four decimals or more.
 const UNIT_TOLERANCE: f64 = 1e-4;
 
-/// A vector or quaternion of length 1.
+/// Checks that a vector or quaternion has length 1.
 fn unit(field: &str, value: &[f64], what: &str) -> Checked {
     let length = value.iter().map(|v| v * v).sum::<f64>().sqrt();
     if (length - 1.0).abs() <= UNIT_TOLERANCE {
@@ -84,44 +86,50 @@ fn unit(field: &str, value: &[f64], what: &str) -> Checked {
     } else {
         String::new()
     };
-    Err(problem(field, format!(" has length {}; {what}{right}", show(length))))
+    Err(problem(field, format!(" has length {}; it must be {what}{right}", show(length))))
 }
 
 fn quaternion(field: &str, value: [f64; 4]) -> Checked {
     unit(field, &value, "a unit quaternion, scalar first")
 }
 
-/// A name: lower-case letters, digits, `-` and `_`, 1 to 64 of them.
+/// Checks a name: 1 to 64 lower-case letters, digits, `-` and `_`.
 fn name(field: &str, value: &str) -> Checked {
     let legal = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-' || c == '_';
     if !value.is_empty() && value.len() <= 64 && value.chars().all(legal) {
         return Ok(());
     }
     let shown: String = value.chars().take(70).flat_map(char::escape_default).collect();
-    Err(problem(field, format!(" is '{shown}'; lower-case letters, digits, '-' and '_', 1 to 64 of them")))
+    Err(problem(field, format!(" is '{shown}'; it must be 1 to 64 lower-case letters, digits, '-' and '_'")))
 }
 
-/// Most entries of a list: more cameras, ports or instruments than a cell has room for.
-const MOST_ENTRIES: usize = 16;
+/// Maximum number of cameras, ports or instruments.
+const MAX_ENTRIES: usize = 16;
 
-/// The names of a list are names, each is used once, and there are not too many.
+/// Checks the names of a list: they are valid and unique, and there are not too many.
 fn names<'a>(list: &str, all: impl Iterator<Item = &'a str>) -> Checked {
     let mut seen: Vec<&str> = Vec::new();
     for (i, value) in all.enumerate() {
-        if i == MOST_ENTRIES {
-            return Err(problem(list, format!(" has more than {MOST_ENTRIES} entries; {MOST_ENTRIES} or fewer")));
+        if i == MAX_ENTRIES {
+            return Err(problem(
+                list,
+                format!(" has more than {MAX_ENTRIES} entries; it must have at most {MAX_ENTRIES}"),
+            ));
         }
         let field = format!("{list}[{i}].name");
         name(&field, value)?;
         if let Some(first) = seen.iter().position(|s| *s == value) {
-            return Err(problem(field, format!(" is '{value}', as that of {list}[{first}] is; names are unique")));
+            return Err(problem(
+                field,
+                format!(" is '{value}', which {list}[{first}] already has; names must be unique"),
+            ));
         }
         seen.push(value);
     }
     Ok(())
 }
 
-/// `value` is one of the `known`.
+/// Checks that `value` is one of `known`.
 fn one_of(field: &str, value: &str, what: &str, known: &[&str]) -> Checked {
     if known.contains(&value) {
         return Ok(());

@@ -1,4 +1,4 @@
-//! A task that the cell can do, with gates in their order.
+//! Checks of the task, its gates and the safety limits.
 
 use super::{Checked, numbers, problem};
 use crate::check::unit::show;
@@ -46,7 +46,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
     ];
     for (field, high, other, low) in ordered {
         if high <= low {
-            return Err(problem(field, format!(" is {}; above {other}, {}", show(high), show(low))));
+            return Err(problem(field, format!(" is {}; it must be greater than {other} ({})", show(high), show(low))));
         }
     }
     let needs: &[(InstrumentKind, &str)] = match task.name {
@@ -57,7 +57,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
     match needs.iter().find(|(kind, _)| scene.arm_with(*kind).is_none()) {
         Some((_, what)) => {
             let name = task.name.name();
-            Err(problem("task.name", format!(" is '{name}', but no arm has a {what}; an arm with a {what}")))
+            Err(problem("task.name", format!(" is '{name}', but no arm has a {what}; it needs an arm with a {what}")))
         }
         None => Ok(()),
     }

@@ -1,12 +1,12 @@
-//! Numbers with units in messages, and which other unit a number out of range was meant in.
+//! Numbers with units in messages, and suggestions for numbers in a wrong unit.
 
 use std::ops::RangeInclusive;
 
-/// Ending of a key, its unit, and the unit that is most often mistaken for it, with how many of the
-/// first it is.
+/// End of a key, its unit, and the unit that is most often used by mistake, with its size in the
+/// first.
 type Unit = (&'static str, &'static str, Option<(&'static str, f64)>);
 
-/// Endings of keys with their units, longer ones first.
+/// Ends of keys with their units, longer ones first.
 #[rustfmt::skip]
 const UNITS: [Unit; 10] = [
     ("_kg_m3", "kg/m3", Some(("g/cm3", 1e3))),
@@ -21,7 +21,7 @@ const UNITS: [Unit; 10] = [
     ("_s",     "s",     Some(("ms", 1e-3))),
 ];
 
-/// The unit that the field's key ends in; empty where it has none.
+/// The unit at the end of the field's key; empty if it has none.
 pub(super) fn unit_of(field: &str) -> &'static str {
     let key = field.rsplit('.').next().unwrap_or(field);
     let key = key.split('[').next().unwrap_or(key);
@@ -31,8 +31,8 @@ pub(super) fn unit_of(field: &str) -> &'static str {
     UNITS.iter().find(|(ending, ..)| key.ends_with(ending)).map_or("", |(_, unit, _)| unit)
 }
 
-/// "; 0.006 m is 6 mm" where the value would be in its range if it were in the unit that is most
-/// often mistaken for the right one.
+/// "; 0.006 m is 6 mm", if the value would be in its range in the unit that is most often used by
+/// mistake.
 pub(super) fn hint(unit: &str, value: f64, range: &RangeInclusive<f64>) -> String {
     let mistaken = UNITS.iter().find(|(_, u, _)| *u == unit).and_then(|(.., other)| *other);
     match mistaken {
@@ -43,7 +43,7 @@ pub(super) fn hint(unit: &str, value: f64, range: &RangeInclusive<f64>) -> Strin
     }
 }
 
-/// A number as people write it, six digits of it.
+/// A number for people, with six digits.
 pub(super) fn show(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
         return if value == 0.0 { "0".to_owned() } else { value.to_string() };

@@ -1,15 +1,20 @@
-//! What a whole cell costs: two arms, two instruments, all organs, moving, no cameras.
+//! Speed of a whole cell: two arms, two instruments, all organs in motion, no cameras.
 //!
-//! The left arm does the scripted grasp-lift while the right arm swings in its port. A second cell in which organs pass through each other gets the same actions, period beside period, so that the
-//! cost of contact between organs is the difference.
+//! The left arm performs the scripted grasp-lift; the right arm swings in its port. A second cell
+//! without contact between organs gets the same actions, alternating with the first. The difference
+//! is the cost of that contact.
 
 use super::machine::Machine;
-use super::timing::median;
-use crate::{Error, Result};
+use crate::Result;
+use crate::names::SceneChoice;
+use crate::statistics::median;
+use crate::study::{Job, Kind, Study, check_interrupted};
+use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use trocar_cell::{Action, Cell, ContactParts, Setpoint};
-use trocar_core::Progress;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
 use trocar_specimen::Specimen;
 use trocar_task::policy::{Script, Scripted};
@@ -17,52 +22,53 @@ use trocar_task::{Episode, Policy, SETTLE_S};
 use trocar_workflow::scene_specimen;
 use trocar_workflow::specimen_scene::{grasp_lift, task_organ};
 
-/// How the right arm swings: amplitude of its pivots [rad] and its frequency [Hz].
+/// Swing of the right arm: amplitude of the pivots (rad), frequency (Hz).
 const SWING: (f64, f64) = (0.1, 0.5);
 
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// Speed of the whole two-arm cell, and the cost of its parts.
+#[derive(Clone, Debug, Args)]
 pub struct CellBench {
-    /// Scene file or name.
-    pub scene: String,
+    /// The scene.
+    #[command(flatten)]
+    pub scene: SceneChoice,
     /// A specimen folder instead of the scene's specimen.
+    #[arg(long, value_name = "FOLDER")]
     pub specimen: Option<PathBuf>,
-    /// Folder for a scene's phantom.
-    pub phantoms: PathBuf,
-    /// Worker threads, 0 for all.
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
 }
 
-/// The benchmark's outcome. Times are means over control periods, in milliseconds of wall time.
+/// Figures of the benchmark. Times are means over control periods (ms of wall time).
 #[derive(Clone, Debug, Serialize)]
 pub struct CellBenchResult {
-    /// Simulated over wall time of the whole cell, from the settling on.
+    /// Simulated over wall time of the whole cell, after settling.
     pub real_time_factor: f64,
-    /// The same if organs passed through each other.
+    /// The same without contact between organs.
     pub real_time_factor_without_organ_contact: f64,
-    /// Controllers, ports and dynamics of the arms.
+    /// Controllers, ports and dynamics of the arms (ms).
     pub arms_ms: f64,
-    /// Contact of organs with each other: tissue with it less tissue without.
+    /// Contact between organs: tissue with it minus tissue without it (ms).
     pub contact_ms: f64,
-    /// Tissue without that: elasticity, supports, contact with the instruments, grasp.
+    /// Tissue without that contact: elasticity, supports, contact with instruments, grasp (ms).
     pub tissue_ms: f64,
-    /// All else: jaws, mouths, observations.
+    /// The rest: jaws, grasp detection, observations (ms).
     pub rest_ms: f64,
-    /// A control period, median.
+    /// Median of a control period (ms).
     pub median_ms: f64,
-    /// The slowest.
+    /// Slowest control period (ms).
     pub worst_ms: f64,
-    /// Length of a control period [ms].
+    /// Simulated length of a control period (ms).
     pub period_ms: f64,
-    /// Control periods that were timed.
+    /// Number of timed control periods.
     pub periods: usize,
-    /// The lift held.
+    /// Whether the grasper held the tissue at the end.
     pub attached: bool,
-    /// Organs.
+    /// Number of organs.
     pub organs: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
     /// Worker threads.
     pub threads: usize,
@@ -70,16 +76,18 @@ pub struct CellBenchResult {
     pub machine: Machine,
 }
 
-impl CellBench {
-    /// Runs it.
-    ///
-    /// # Errors
-    /// A scene or specimen that cannot be had, an interruption.
-    pub fn run(&self, progress: &dyn Progress) -> Result<CellBenchResult> {
-        let scene = Scene::read(&self.scene)?;
+impl Study for CellBench {
+    const NAME: &'static str = "cell";
+    const KIND: Kind = Kind::Bench;
+    const FOLDER: Option<&'static str> = None;
+    type Figures = CellBenchResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(CellBenchResult, Document)> {
+        let progress = job.progress;
+        let scene = Scene::read(&self.scene.scene)?;
         let specimen = match &self.specimen {
             Some(folder) => Specimen::read(folder)?,
-            None => scene_specimen(&scene, &self.phantoms, progress)?,
+            None => scene_specimen(&scene, &self.scene.phantoms, progress)?,
         };
         let machine = Machine::here();
         let mut lifting = scene.clone();
@@ -101,14 +109,12 @@ impl CellBench {
                 break;
             }
             for mut action in chunk {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
+                check_interrupted(progress)?;
                 if let Some(right) = &right {
                     swing(&mut action, right, episode.time());
                 }
                 let before = episode.cell().timing().all;
-                // Each first in every second period, so that what disturbs the machine disturbs both.
+                // The order alternates, so that disturbances of the machine affect both.
                 if times.len().is_multiple_of(2) {
                     episode.step(&action)?;
                     apart.step(&action)?;
@@ -129,7 +135,7 @@ impl CellBench {
         let period_ms = 1e3 * cell.period();
         let bodies = cell.world().model.bodies();
         let worst_ms = times.iter().copied().fold(0.0, f64::max);
-        Ok(CellBenchResult {
+        let result = CellBenchResult {
             real_time_factor: period_ms / all,
             real_time_factor_without_organ_contact: period_ms / ms(apart_now.all, apart_from.all),
             arms_ms: arms,
@@ -146,16 +152,49 @@ impl CellBench {
             tets: bodies.iter().map(|b| b.tets().len()).sum(),
             threads: if self.threads == 0 { machine.cores } else { self.threads },
             machine,
-        })
+        };
+        let document = document(&result);
+        Ok((result, document))
     }
 }
 
-/// The right arm's numbers of an action, which are the second five.
+/// Sets the two pivots of the right arm, which are entries 5 and 6 of an action.
 fn swing(action: &mut Action, at: &Setpoint, time: f64) {
     let phase = std::f64::consts::TAU * SWING.1 * time;
-    // It swings up from its start, away from the tissue and back.
+    // Upwards from the start, away from the tissue, and back.
     let turned = [at.0[0] + SWING.0 * phase.sin(), at.0[1] + 0.5 * SWING.0 * (1.0 - phase.cos())];
     if let Some(numbers) = action.numbers.get_mut(5..7) {
         numbers.copy_from_slice(&turned);
     }
+}
+
+fn document(r: &CellBenchResult) -> Document {
+    let head = [
+        "",
+        "times real time",
+        "arms (ms)",
+        "organ contact (ms)",
+        "tissue (ms)",
+        "rest (ms)",
+        "median (ms)",
+        "worst (ms)",
+    ];
+    let times = [r.arms_ms, r.contact_ms, r.tissue_ms, r.rest_ms, r.median_ms, r.worst_ms].map(|ms| fixed(ms, 2));
+    let rows = vec![
+        ["whole cell".to_owned(), fixed(r.real_time_factor, 2)].into_iter().chain(times).collect(),
+        vec!["without contact between organs".to_owned(), fixed(r.real_time_factor_without_organ_contact, 2)],
+    ];
+    let line = format!(
+        "control period {} ms; {} periods, {} organs, {} nodes, {} tets; the lift {}; {} threads on {}",
+        fixed(r.period_ms, 1),
+        r.periods,
+        r.organs,
+        count(r.nodes),
+        count(r.tets),
+        if r.attached { "held" } else { "did NOT hold" },
+        r.threads,
+        r.machine.described()
+    );
+    Document::new("Cell", "Speed of the two-arm cell")
+        .with(Section::new("Control periods", "").table(Table::new(head, rows)).lines([line]))
 }

@@ -1,12 +1,12 @@
-//! Embree through the Python package `embreex`, as a peer to measure beside: a separate process on one thread.
+//! Embree through the Python package `embreex`, for comparison: a separate process on one thread.
 
 use glam::Vec3;
 use std::path::Path;
 use std::process::Command;
 use trocar_geometry::TriMesh;
 
-/// Reads float32 vertices, int32 triangles, float32 origins and directions; prints the least seconds of the tries and writes
-/// float32 distances, in units of the directions.
+/// Reads float32 vertices, int32 triangles, float32 origins and directions. Prints the least time
+/// (s) and writes float32 distances, in units of the directions.
 const SCRIPT: &str = "
 import sys, time, numpy
 from embreex.rtcore_scene import EmbreeScene
@@ -26,27 +26,27 @@ numpy.asarray(distances, dtype=numpy.float32).tofile(folder + '/distances')
 print(least)
 ";
 
-/// Farther than this is Embree's way to say that nothing was hit.
+/// Embree reports a larger distance if nothing is hit.
 const NOTHING: f32 = 1e30;
 
-/// Where Embree is.
+/// Embree in a Python environment.
 pub(super) struct Embree<'a> {
-    /// The Python that has the package.
+    /// Python with the package.
     pub python: &'a Path,
-    /// Times that the rays are cast; the fastest counts.
+    /// Repetitions; the fastest counts.
     pub tries: usize,
 }
 
-/// What it says.
+/// Embree's result.
 pub(super) struct EmbreeRows {
-    /// Least time [s].
+    /// Least time (s).
     pub seconds: f64,
-    /// Distances in units of the directions; infinite where nothing was hit.
+    /// Distances in units of the directions; infinite for a miss.
     pub distances: Vec<f32>,
 }
 
 impl Embree<'_> {
-    /// First hits of rays given by origin and direction; an error is one line.
+    /// First hits of rays given by origin and direction. The error is one line.
     pub fn cast(&self, mesh: &TriMesh, rays: &[(Vec3, Vec3)]) -> Result<EmbreeRows, String> {
         let folder = tempfile::tempdir().map_err(|e| format!("no temporary folder: {e}"))?;
         let write = |name: &str, bytes: Vec<u8>| {
@@ -68,12 +68,12 @@ impl Embree<'_> {
             return Err(format!("{last}{hint}"));
         }
         let said = String::from_utf8_lossy(&output.stdout);
-        let seconds = said.trim().parse().map_err(|_| format!("Embree's time is '{}'", said.trim()))?;
+        let seconds = said.trim().parse().map_err(|_| format!("Embree printed no time but '{}'", said.trim()))?;
         let file = std::fs::read(folder.path().join("distances")).map_err(|e| format!("Embree's distances: {e}"))?;
         let far = |d: f32| if d < NOTHING { d } else { f32::INFINITY };
         let distances: Vec<f32> = file.as_chunks().0.iter().map(|b| far(f32::from_le_bytes(*b))).collect();
         if distances.len() != rays.len() {
-            return Err(format!("Embree answered {} of {} rays", distances.len(), rays.len()));
+            return Err(format!("Embree returned {} distances for {} rays", distances.len(), rays.len()));
         }
         Ok(EmbreeRows { seconds, distances })
     }

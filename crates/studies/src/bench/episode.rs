@@ -1,11 +1,12 @@
-//! What a whole episode costs: two arms, all organs, and pictures of two cameras once a control period, as policies see them.
+//! Speed of a whole episode: two arms, all organs, and pictures of two cameras per control period.
 //!
-//! The scripted controller does the scene's task; the same seed each time, so that all runs do the same work.
+//! The scripted controller performs the task of the scene. All runs use the same seed and do the
+//! same work.
 
 use super::machine::Machine;
-use super::timing::median;
 use crate::names::SceneChoice;
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::statistics::median;
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -19,16 +20,16 @@ use trocar_sensors::CameraRig;
 use trocar_task::{Episode, Policy, policy};
 use trocar_workflow::scene_specimen;
 
-/// Path-traced frames that are timed.
+/// Number of timed path-traced frames.
 const PATH_FRAMES: usize = 10;
 
-/// Least real-time factor that is asked of two cores (SPEC E6).
-const BAR: f64 = 0.5;
+/// Target of the real-time factor on two cores.
+const TARGET: f64 = 0.5;
 
-/// Largest side of a picture [px].
-const LARGEST: usize = 4096;
+/// Maximum side of a picture (px).
+const MAX_SIZE: usize = 4096;
 
-/// Speed of a whole scripted episode with arms, organs and two cameras, and what its parts cost.
+/// Speed of a whole scripted episode with arms, organs and two cameras, and the cost of its parts.
 #[derive(Clone, Debug, Args)]
 pub struct EpisodeBench {
     /// The scene.
@@ -37,79 +38,82 @@ pub struct EpisodeBench {
     /// Worker threads for tissue; all by default.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Times that the episode is run; the median counts.
+    /// Repetitions of the episode; the median counts.
     #[arg(long, default_value_t = 3)]
     pub runs: usize,
     /// Seed of the episode.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
-    /// A camera that looks once a control period; the endoscope and the depth camera by default. Several are named by several.
+    /// A camera that renders once per control period; repeat for several.
     #[arg(long = "camera", value_name = "NAME", default_values_t = ["endoscope".to_owned(), "d405".to_owned()])]
     pub cameras: Vec<String>,
-    /// Side of the square pictures [px].
+    /// Side of the square pictures (px).
     #[arg(long, default_value_t = 224)]
     pub size: usize,
-    /// Paths a pixel of the path-traced pictures of 1280 x 720; 0 leaves them out.
+    /// Paths per pixel of the path-traced pictures of 1280 x 720; 0 for none.
     #[arg(long, default_value_t = 64)]
     pub samples: u32,
 }
 
-/// The benchmark's outcome: medians over runs. Times are means over control periods, in milliseconds of wall time.
+/// Figures of the benchmark: medians over runs. Times are means over control periods (ms of wall
+/// time).
 #[derive(Clone, Debug, Serialize)]
 pub struct EpisodeBenchResult {
-    /// Simulated over wall time, from after the reset to the end, pictures included.
+    /// Simulated over wall time from the reset to the end, pictures included.
     pub real_time_factor: f64,
-    /// What is asked of it on two cores.
+    /// Target on two cores.
     pub bar: f64,
-    /// It is that or more.
+    /// Whether the target is met.
     pub met: bool,
-    /// Run by run.
+    /// Real-time factor of each run.
     pub run_factors: Vec<f64>,
-    /// Controllers, ports and dynamics of the arms.
+    /// Controllers, ports and dynamics of the arms (ms).
     pub arms_ms: f64,
-    /// Elasticity, supports, contact, grasp.
+    /// Elasticity, supports, contact, grasp (ms).
     pub tissue_ms: f64,
-    /// Bringing the stage to where the cell is, and drawing it through all cameras.
+    /// Update of the stage from the cell, and rendering through all cameras (ms).
     pub pictures_ms: f64,
-    /// All else: the policy, jaws and mouths, channels.
+    /// The rest: policy, jaws, grasp detection, channels (ms).
     pub rest_ms: f64,
-    /// Length of a control period [ms].
+    /// Simulated length of a control period (ms).
     pub period_ms: f64,
-    /// Control periods of the episode.
+    /// Number of control periods.
     pub periods: usize,
-    /// Their time [s].
+    /// Simulated time (s).
     pub simulated_s: f64,
     /// How the episode ended.
     pub end: String,
     /// All stages passed.
     pub passed: bool,
-    /// Hash of the first run's final state.
+    /// Hash of the final state of the first run.
     pub state_hash: String,
-    /// All runs ended in it.
+    /// Whether all runs end in the same state.
     pub repeatable: bool,
-    /// Organs.
+    /// Number of organs.
     pub organs: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// The cameras.
+    /// Names of the cameras.
     pub cameras: Vec<String>,
-    /// Side of their pictures [px].
+    /// Side of the pictures (px).
     pub size: usize,
     /// Worker threads for tissue.
     pub threads: usize,
-    /// What the pictures of `real_time_factor` are.
+    /// The kind of pictures behind `real_time_factor`.
     pub pictures: String,
-    /// Ten frames of 1280 x 720, path-traced, by the first camera: their mean [ms]; left out with 0 samples.
+    /// Mean time of ten path-traced frames of 1280 x 720 through the first camera (ms); none with 0
+    /// samples.
     pub path_720p_ms: Option<f64>,
-    /// Paths a pixel of them.
+    /// Paths per pixel of these frames.
     pub samples: u32,
-    /// Real-time factor of an episode with such a picture from every camera once a control period, extrapolated from these ten.
+    /// Real-time factor with such a picture from every camera per control period, extrapolated from
+    /// these frames.
     pub real_time_factor_path_720p: Option<f64>,
     /// The machine.
     pub machine: Machine,
 }
 
-/// One run, in seconds.
+/// Wall times of one run (s).
 #[derive(Clone, Copy, Debug, Default)]
 struct Took {
     arms: f64,
@@ -126,21 +130,21 @@ impl Study for EpisodeBench {
     type Figures = EpisodeBenchResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(EpisodeBenchResult, Document)> {
-        if self.runs == 0 || !(1..=LARGEST).contains(&self.size) {
+        if self.runs == 0 || !(1..=MAX_SIZE).contains(&self.size) {
             let given = format!("--runs {} --size {}", self.runs, self.size);
-            return Err(Error::Mismatch(format!("{given}: 1 or more runs and 1 to {LARGEST} px are wanted")));
+            return Err(Error::Mismatch(format!("{given}: needs at least 1 run and a size in [1, {MAX_SIZE}] px")));
         }
         let progress = job.progress;
         let scene = Scene::read(&self.scene.scene)?;
         let specimen = scene_specimen(&scene, &self.scene.phantoms, progress)?;
         let machine = Machine::here();
         let mut episode = Episode::new(&scene, &specimen, self.threads)?;
-        let mut sight = CameraRig::new(&scene, &specimen, episode.cell())?;
+        let mut rig = CameraRig::new(&scene, &specimen, episode.cell())?;
         let mut scripted = policy::named("scripted")?;
         let (mut runs, mut hashes) = (Vec::new(), Vec::new());
         progress.begin("episodes", self.runs as u64);
         for _ in 0..self.runs {
-            runs.push(self.once(&mut episode, &mut sight, scripted.as_mut(), progress)?);
+            runs.push(self.once(&mut episode, &mut rig, scripted.as_mut(), progress)?);
             hashes.push(episode.state_hash());
             progress.advance(1);
         }
@@ -154,7 +158,7 @@ impl Study for EpisodeBench {
         let run_factors: Vec<f64> = runs.iter().map(|t| episode.time() / t.all.max(1e-9)).collect();
         let real_time_factor = median(&mut run_factors.clone());
         let bodies = episode.cell().world().model.bodies();
-        let path_720p_ms = (self.samples > 0).then(|| self.path_traced(&episode, &mut sight, progress)).transpose()?;
+        let path_720p_ms = (self.samples > 0).then(|| self.path_traced(&episode, &mut rig, progress)).transpose()?;
         let rest_of_period = ms(|t| t.all - t.pictures);
         let with_paths = |frame: f64| period_ms / (rest_of_period + frame * self.cameras.len() as f64);
         let result = EpisodeBenchResult {
@@ -163,8 +167,8 @@ impl Study for EpisodeBench {
             path_720p_ms,
             samples: self.samples,
             real_time_factor,
-            bar: BAR,
-            met: real_time_factor >= BAR,
+            bar: TARGET,
+            met: real_time_factor >= TARGET,
             run_factors,
             arms_ms: ms(|t| t.arms),
             tissue_ms: ms(|t| t.tissue),
@@ -190,17 +194,18 @@ impl Study for EpisodeBench {
 }
 
 impl EpisodeBench {
-    /// Mean wall time of path-traced frames of 1280 x 720 through the first camera, where the episode ended [ms].
-    fn path_traced(&self, episode: &Episode, sight: &mut CameraRig, progress: &dyn Progress) -> Result<f64> {
+    /// Mean wall time of path-traced frames of 1280 x 720 through the first camera, at the end of
+    /// the episode (ms).
+    fn path_traced(&self, episode: &Episode, rig: &mut CameraRig, progress: &dyn Progress) -> Result<f64> {
         let Some(camera) = self.cameras.first() else {
-            return Err(Error::Mismatch("--camera: one or more are wanted".to_owned()));
+            return Err(Error::Mismatch("--camera: name at least one camera".to_owned()));
         };
         let settings = RenderSettings::path(self.samples);
         progress.begin("path-traced frames", PATH_FRAMES as u64);
         let clock = Instant::now();
         for _ in 0..PATH_FRAMES {
-            stop_if_asked(progress)?;
-            sight.render(episode.cell(), camera, [1280, 720], &settings)?;
+            check_interrupted(progress)?;
+            rig.render(episode.cell(), camera, [1280, 720], &settings)?;
             progress.advance(1);
         }
         progress.end();
@@ -210,7 +215,7 @@ impl EpisodeBench {
     fn once(
         &self,
         episode: &mut Episode,
-        sight: &mut CameraRig,
+        rig: &mut CameraRig,
         scripted: &mut dyn Policy,
         progress: &dyn Progress,
     ) -> Result<Took> {
@@ -220,16 +225,14 @@ impl EpisodeBench {
         let (clock, mut pictures) = (Instant::now(), Duration::ZERO);
         'episode: while episode.end().is_none() {
             for action in scripted.act(episode)? {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
+                check_interrupted(progress)?;
                 let ended = episode.step(&action)?.end.is_some();
-                let looking = Instant::now();
+                let before_pictures = Instant::now();
                 for camera in &self.cameras {
                     let size = [self.size; 2];
-                    sight.render(episode.cell(), camera, size, &RenderSettings::Preview { shadows: false })?;
+                    rig.render(episode.cell(), camera, size, &RenderSettings::Preview { shadows: false })?;
                 }
-                pictures += looking.elapsed();
+                pictures += before_pictures.elapsed();
                 if ended {
                     break 'episode;
                 }
@@ -247,12 +250,12 @@ impl EpisodeBench {
 
 fn document(r: &EpisodeBenchResult) -> Document {
     let head = [
-        "Pictures, once a control period",
+        "Pictures, once per control period",
         "times real time",
-        "arms [ms]",
-        "tissue [ms]",
-        "pictures [ms]",
-        "rest [ms]",
+        "arms (ms)",
+        "tissue (ms)",
+        "pictures (ms)",
+        "rest (ms)",
     ];
     let cameras = r.cameras.len();
     let row = |name: String, factor: f64, pictures: f64| {
@@ -261,13 +264,15 @@ fn document(r: &EpisodeBenchResult) -> Document {
     };
     let mut rows = vec![row(format!("{cameras} {}", r.pictures), r.real_time_factor, r.pictures_ms)];
     if let (Some(factor), Some(ms)) = (r.real_time_factor_path_720p, r.path_720p_ms) {
-        let name =
-            format!("{cameras} of 1280 x 720 pixels, {} paths a pixel (extrapolated from {PATH_FRAMES})", r.samples);
+        let name = format!(
+            "{cameras} of 1280 x 720 pixels, {} paths per pixel (extrapolated from {PATH_FRAMES} frames)",
+            r.samples
+        );
         rows.push(row(name, factor, ms * cameras as f64));
     }
     let factors = r.run_factors.iter().map(|f| fixed(*f, 2)).collect::<Vec<_>>().join(", ");
     let mut lines = vec![
-        format!("bar {}; runs {factors}; a control period lasts {} ms", r.bar, fixed(r.period_ms, 1)),
+        format!("target {}; runs {factors}; control period {} ms", r.bar, fixed(r.period_ms, 1)),
         format!(
             "{} s simulated, {}, {} periods, {} organs, {} nodes; {}; {} threads on {}",
             fixed(r.simulated_s, 1),
@@ -283,8 +288,8 @@ fn document(r: &EpisodeBenchResult) -> Document {
     if !r.repeatable {
         lines.push("the runs ended in DIFFERENT states".to_owned());
     }
-    let lead = "The scripted controller does the scene's task. The first row's pictures are previews for policies: small, and \
-                without shadows; the second row's are what the paper's figures look like.";
+    let lead = "The scripted controller performs the task of the scene. The pictures of the first row are previews \
+                for policies, small and without shadows; those of the second row are like the paper's figures.";
     Document::new("Episode", "Speed of a whole episode")
         .with(Section::new("Episode", lead).table(Table::new(head, rows)).lines(lines))
 }

@@ -1,101 +1,106 @@
-//! What contact costs, of organs with the gripper and with each other: the grasp-lift of a whole specimen with all contact, and without, frame beside frame.
+//! Cost of contact: the grasp-lift of a whole specimen with contact and without, frame by frame.
 //!
-//! Without contact there are two runs. In one nothing takes its place: jaws pass through tissue that stays at rest, and what is saved is contact and all motion that it causes. In the other every
-//! frame starts where the run with contact started it, and every node gets the force that contact did to it at the frame's end, so that tissue moves alike: what is saved is contact alone (finding it, its forces, and
-//! the iterations that its stiffness costs).
+//! Two runs have no contact. In the first nothing replaces it: the jaws pass through tissue at
+//! rest, so the difference is contact and all motion that it causes. In the second each frame
+//! starts from the state of the run with contact, and each node gets the force that contact had at
+//! the end of the frame. The tissue moves alike, so the difference is contact alone: detection,
+//! forces, and the iterations that its stiffness costs.
 
 use super::machine::Machine;
-use super::timing::median;
-use crate::experiment::design_name;
+use crate::names::{AppendixChoice, DesignName, design_name};
+use crate::statistics::median;
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
+use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 use trocar_cell::{Cell, ContactParts, FRAME, Timing};
 use trocar_core::Progress;
-use trocar_phantom::RecordOptions;
-use trocar_scene::GraspDesignName;
-use trocar_specimen::Specimen;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::table::{count, fixed, percent};
 use trocar_task::policy::Scripted;
 use trocar_task::{Episode, Policy, SETTLE_S};
+use trocar_workflow::Lift;
 use trocar_workflow::specimen_scene::{free_scene, task_organ};
-use trocar_workflow::{Lift, phantoms};
 
-/// Phases that are timed: those in which the jaws are near the tissue.
+/// The timed phases: those with the jaws near the tissue.
 const PHASES: [&str; 6] = ["enter", "close", "lift", "hold", "lower", "open"];
 
-/// Most repetitions.
+/// Maximum of `--repeats`.
 const MAX_REPEATS: usize = 1000;
 
-/// The benchmark's options.
-#[derive(Clone, Debug)]
+/// Cost of contact with the gripper in a grasp-lift of all organs.
+#[derive(Clone, Debug, Args)]
 pub struct GraspBench {
-    /// A specimen folder; phantom A, recorded and reconstructed, when `None`.
-    pub specimen: Option<PathBuf>,
-    /// How the phantom is filmed.
-    pub record: RecordOptions,
-    /// Grasp design.
-    pub design: GraspDesignName,
-    /// Force of the jaws [N].
+    /// The specimen.
+    #[command(flatten)]
+    pub specimen: AppendixChoice,
+    /// How the jaws hold.
+    #[arg(long, value_enum, default_value_t = DesignName::LivePose)]
+    pub design: DesignName,
+    /// Closing force of the jaws (N).
+    #[arg(long, default_value_t = trocar_cell::JAW_FORCE)]
     pub jaw_force: f64,
-    /// Times that the runs are repeated.
+    /// Repetitions of the runs with and without contact.
+    #[arg(long, default_value_t = 3)]
     pub repeats: usize,
-    /// Worker threads, 0 for all.
+    /// Worker threads; all by default.
+    #[arg(long, default_value_t = 0)]
     pub threads: usize,
 }
 
-/// One phase.
+/// Times of one phase.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraspPhaseTiming {
-    /// Its name; "all" for all of them.
+    /// Name of the phase; "all" for all phases.
     pub phase: &'static str,
-    /// Frames timed, of each run.
+    /// Timed frames of each run.
     pub frames: usize,
-    /// Median wall time of a frame with contact [ms].
+    /// Median wall time of a frame with contact (ms).
     pub with_contact_ms: f64,
-    /// The same without, under the forces that contact did [ms].
+    /// The same without contact, with its forces (ms).
     pub same_motion_ms: f64,
-    /// How far a node was from where contact had it after a frame under contact's forces, median over the frames [mm].
+    /// Largest distance of a node between the two after a frame, median over the frames (mm).
     pub same_motion_off_mm: f64,
-    /// The same without contact and its forces [ms].
+    /// The same without contact and without its forces (ms).
     pub without_contact_ms: f64,
-    /// Mean number of the solver's iterations in a frame with contact, of all organs and substeps.
+    /// Mean solver iterations per frame with contact, over all organs and substeps.
     pub with_contact_iterations: f64,
-    /// The same without, under the forces that contact did.
+    /// The same without contact, with its forces.
     pub same_motion_iterations: f64,
-    /// The same without contact and its forces.
+    /// The same without contact and without its forces.
     pub without_contact_iterations: f64,
-    /// The slowest frame with contact [ms].
+    /// Slowest frame with contact (ms).
     pub worst_ms: f64,
-    /// Share of the time with contact that contact costs: more than the same motion without, from the sums over the frames.
+    /// Share of contact in the time with contact: 1 minus the time of the same motion over it.
     pub own_share: f64,
-    /// Share of it that contact and all motion it causes cost: more than without contact and its forces.
+    /// Share of contact and the motion it causes: 1 minus the time without contact over it.
     pub contact_share: f64,
 }
 
-/// The benchmark's outcome.
+/// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct GraspBenchResult {
-    /// 1/60 s over the median wall time of a frame with contact, all phases in which the gripper is near.
+    /// 1/60 s over the median wall time of a frame with contact, in all timed phases.
     pub real_time_factor: f64,
-    /// The same without contact and its forces.
+    /// The same without contact and without its forces.
     pub real_time_factor_without_contact: f64,
-    /// Share of the time that contact costs: more than the same motion without.
+    /// Share of contact in the time with contact.
     pub own_share: f64,
-    /// Share of it that contact and all motion it causes cost.
+    /// Share of contact and the motion it causes.
     pub contact_share: f64,
-    /// Phase by phase, and all of them first.
+    /// All phases together, then each phase.
     pub phases: Vec<GraspPhaseTiming>,
-    /// The grasp design's name.
+    /// Name of the grasp design.
     pub design: &'static str,
-    /// It held, with contact.
+    /// Whether the lift with contact held.
     pub held: bool,
-    /// Organs.
+    /// Number of organs.
     pub organs: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
-    /// Times that they were run.
+    /// Repetitions.
     pub repeats: usize,
     /// Worker threads.
     pub threads: usize,
@@ -108,7 +113,7 @@ struct Frames {
     phase: &'static str,
     with: Frame,
     same_motion: Frame,
-    /// How far a node of the same motion was from where contact had it, at most (m).
+    /// Largest distance of a node between the same motion and the run with contact (m).
     off: f64,
     without: Frame,
 }
@@ -118,39 +123,37 @@ struct Frames {
 struct Frame {
     /// Wall time of the tissue (s).
     seconds: f64,
-    /// The solver's iterations.
+    /// Solver iterations.
     iterations: usize,
 }
 
 impl Frame {
-    /// The frames of a cell between two readings of its clock.
+    /// The difference between two readings of a cell's timing.
     fn between(before: Timing, after: Timing) -> Self {
         let seconds = (after.tissue - before.tissue).as_secs_f64();
         Self { seconds, iterations: after.iterations - before.iterations }
     }
 }
 
-impl GraspBench {
-    /// Does the runs; a phantom that has to be recorded and its specimen go to the folder `output`.
-    ///
-    /// # Errors
-    /// A specimen that cannot be had or simulated, an option out of range, an interruption.
-    pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<GraspBenchResult> {
+impl Study for GraspBench {
+    const NAME: &'static str = "grasp";
+    const KIND: Kind = Kind::Bench;
+    const FOLDER: Option<&'static str> =
+        Some("Folder of the phantom's recording and specimen. A finished recording in it is used again.");
+    const WRITES_OWN_FILES: bool = true;
+    type Figures = GraspBenchResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(GraspBenchResult, Document)> {
         if !(1..=MAX_REPEATS).contains(&self.repeats) {
-            return Err(Error::Mismatch(format!("{} repetitions; must be in [1, {MAX_REPEATS}]", self.repeats)));
+            return Err(Error::Mismatch(format!("--repeats {}: must be in [1, {MAX_REPEATS}]", self.repeats)));
         }
-        let (specimen, folder) = match &self.specimen {
-            Some(folder) => (Specimen::read(folder)?, folder.clone()),
-            None => {
-                let folder = output.join("phantom-a");
-                (phantoms::specimen("phantom-a", &self.record, &folder, progress)?, folder.join("specimen"))
-            }
-        };
+        let (progress, design) = (job.progress, self.design.into());
+        let (specimen, folder) = self.specimen.read(job.output(), progress)?;
         let machine = Machine::here();
-        let lift = Lift { design: Some(self.design), jaw_force: Some(self.jaw_force), ..Lift::default() };
+        let lift = Lift { design: Some(design), jaw_force: Some(self.jaw_force), ..Lift::default() };
         let organ = task_organ(&specimen, None)?;
         let mut scene = lift.arrange(free_scene(&specimen, &folder, organ, false)?)?;
-        // One tissue frame a control period, so that frames can be compared.
+        // One tissue frame per control period, so that frames can be compared.
         scene.rates.control_hz = 60;
         let (mut times, mut held) = (Vec::new(), false);
         let mut with = Episode::new(&scene, &specimen, self.threads)?;
@@ -162,7 +165,7 @@ impl GraspBench {
             with.reset(0)?;
             let mut policy = Scripted::following(lift.script);
             let periods = scene.task.episode_s / with.cell().period();
-            progress.begin("three runs side by side", periods.round() as u64);
+            progress.begin("three runs", periods.round() as u64);
             times.extend(together(&mut with, &mut policy, [&mut same, &mut without], progress)?);
             progress.end();
             held = with.summary().held;
@@ -170,13 +173,13 @@ impl GraspBench {
         let bodies = with.cell().world().model.bodies();
         let size = (bodies.iter().map(|b| b.len()).sum(), bodies.iter().map(|b| b.tets().len()).sum());
         let all = timing("all", &times);
-        Ok(GraspBenchResult {
+        let result = GraspBenchResult {
             real_time_factor: 1e3 * FRAME / all.with_contact_ms,
             real_time_factor_without_contact: 1e3 * FRAME / all.without_contact_ms,
             own_share: all.own_share,
             contact_share: all.contact_share,
             phases: std::iter::once(all).chain(PHASES.map(|phase| timing(phase, &times))).collect(),
-            design: design_name(self.design),
+            design: design_name(design),
             held,
             organs: specimen.organs.len(),
             nodes: size.0,
@@ -184,11 +187,14 @@ impl GraspBench {
             repeats: self.repeats,
             threads: if self.threads == 0 { machine.cores } else { self.threads },
             machine,
-        })
+        };
+        let document = document(&result);
+        Ok((result, document))
     }
 }
 
-/// Steps the runs frame by frame in changing order, so that what disturbs the machine disturbs all.
+/// Steps the runs frame by frame in alternating order, so that disturbances of the machine affect
+/// all.
 fn together(
     with: &mut Episode,
     policy: &mut Scripted,
@@ -203,9 +209,7 @@ fn together(
             return Ok(times);
         }
         for action in chunk {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            check_interrupted(progress)?;
             let clocks = (with.cell().timing(), without.timing());
             let before = with.cell().moment();
             if times.len().is_multiple_of(2) {
@@ -269,12 +273,60 @@ impl Run {
     }
 }
 
+fn document(r: &GraspBenchResult) -> Document {
+    let head = [
+        "Phase",
+        "Frames",
+        "Contact (ms)",
+        "Same motion (ms)",
+        "Distance (mm)",
+        "No contact (ms)",
+        "Iterations",
+        "Worst (ms)",
+        "Own share",
+        "Contact's share",
+    ];
+    let row = |p: &GraspPhaseTiming| {
+        let iterations = [p.with_contact_iterations, p.same_motion_iterations, p.without_contact_iterations];
+        vec![
+            p.phase.to_owned(),
+            p.frames.to_string(),
+            fixed(p.with_contact_ms, 2),
+            fixed(p.same_motion_ms, 2),
+            fixed(p.same_motion_off_mm, 4),
+            fixed(p.without_contact_ms, 2),
+            iterations.map(|n| fixed(n, 0)).join("/"),
+            fixed(p.worst_ms, 2),
+            percent(p.own_share, 1),
+            percent(p.contact_share, 1),
+        ]
+    };
+    let lines = [
+        "Same motion: each frame again without contact but with its forces. No contact: without contact and its forces."
+            .to_owned(),
+        format!(
+            "{}x real time with contact, {}x without; {} grasp, {}; {} organs, {} nodes, {} tets; {} threads on {}",
+            fixed(r.real_time_factor, 2),
+            fixed(r.real_time_factor_without_contact, 2),
+            r.design,
+            if r.held { "held" } else { "NOT held" },
+            r.organs,
+            count(r.nodes),
+            count(r.tets),
+            r.threads,
+            r.machine.described()
+        ),
+    ];
+    Document::new("Grasp", "Cost of contact with the gripper")
+        .with(Section::new("Phases", "").table(Table::new(head, r.phases.iter().map(row).collect())).lines(lines))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn the_share_is_of_the_time_with_contact() {
+    fn shares_are_of_the_time_with_contact() {
         let frame = |seconds| Frame { seconds, iterations: 8 };
         let frames = |phase, [with, same_motion, without]: [f64; 3]| Frames {
             phase,

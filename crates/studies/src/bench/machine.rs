@@ -1,13 +1,14 @@
-//! What figures of speed depend on besides the program.
+//! The machine on which speed is measured.
 
 use serde::Serialize;
 
-/// The machine and what of it is used.
+/// The machine.
 #[derive(Clone, Debug, Serialize)]
 pub struct Machine {
     /// Logical cores.
     pub cores: usize,
-    /// Average number of runnable tasks over the last minute at the beginning, where the system tells: more than the cores and the figures are too low.
+    /// Load average over the last minute at the start, if the system reports it. A load above the
+    /// number of cores makes the figures too low.
     pub load: Option<f64>,
 }
 
@@ -21,9 +22,9 @@ impl Machine {
         }
     }
 
-    /// In words: cores, and the load where the system tells.
+    /// A text: cores, and the load if known.
     pub fn described(&self) -> String {
-        let load = self.load.map_or(String::new(), |l| format!(", load {l:.1} at the beginning"));
+        let load = self.load.map_or(String::new(), |l| format!(", load {l:.1} at the start"));
         format!("{} cores{load}", self.cores)
     }
 }

@@ -1,43 +1,45 @@
-//! Many small models stepped at once, beside one model of the same total size.
+//! Many small models in parallel, beside one model of the same total size.
 
-use super::timing::median;
+use crate::scenes::{self, Organs, Run, Scene, material};
+use crate::statistics::median;
+use crate::study::check_interrupted;
 use crate::{Error, Result};
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_testing::scenes::{self, Organs, Run, Scene, material};
 use trocar_workflow::{SOLVERS, solver_named};
 
-/// Frames before the timed ones, and most timed ones.
+/// Warm-up frames, and maximum number of timed frames.
 const WARM_UP: usize = 3;
 const FRAMES: usize = 60;
 
-/// One schedule and number of threads. Frames of all ways are timed in turn, so that what disturbs the machine disturbs all.
+/// One schedule and number of threads. The variants are timed in turn, so that disturbances of the
+/// machine affect all.
 #[derive(Clone, Debug, Serialize)]
 pub struct ManyRow {
-    /// The schedule's name.
+    /// Name of the schedule.
     pub schedule: String,
     /// Worker threads.
     pub threads: usize,
-    /// Models stepped at once.
+    /// Number of models.
     pub models: usize,
-    /// Elements of them together.
+    /// Elements of all models.
     pub tets: usize,
-    /// A frame of the many models, each with a stepper of its own [ms].
+    /// A frame of the many models, each with its own stepper (ms).
     pub many_ms: f64,
-    /// A frame of one model with the same bodies [ms].
+    /// A frame of one model with the same bodies (ms).
     pub one_model_ms: f64,
-    /// A frame of one model of six organs [ms].
+    /// A frame of one model of six organs (ms).
     pub organs_ms: f64,
     /// Elements of the six organs.
     pub organs_tets: usize,
-    /// What the many lose: their time over that of one model with the same bodies, minus 1.
+    /// Time of the many over that of one model with the same bodies, minus 1.
     pub loss: f64,
-    /// Their time an element over that of the six organs, minus 1.
+    /// Their time per element over that of the six organs, minus 1.
     pub loss_against_organs: f64,
 }
 
-/// All schedules and numbers of threads.
+/// Measures all schedules and numbers of threads.
 pub(super) fn measure(
     count: usize,
     tets: usize,
@@ -61,9 +63,7 @@ pub(super) fn measure(
             let mut times: [Vec<f64>; 3] = Default::default();
             let whole = Instant::now();
             for frame in 0..WARM_UP + FRAMES {
-                if progress.interrupted() {
-                    return Err(Error::Interrupted);
-                }
+                check_interrupted(progress)?;
                 let took = [
                     timed(|| step_all(&mut many, threads))?,
                     timed(|| Ok(one.frame().map(|_| ())?))?,
@@ -97,19 +97,20 @@ pub(super) fn measure(
     Ok(rows)
 }
 
-/// Steps all by a frame, shared out among `threads` threads. Plain threads: those of a pool would begin with another model while they wait for one's own pool.
+/// Steps all models by a frame on `threads` plain threads. A thread pool would start another model
+/// while one waits for its own pool.
 fn step_all(runs: &mut [Run<'_>], threads: usize) -> Result<()> {
     let share = runs.len().div_ceil(threads.max(1)).max(1);
     std::thread::scope(|scope| {
         let step =
             |part: &mut [Run<'_>]| -> Result<()> { part.iter_mut().try_for_each(|run| Ok(run.frame().map(|_| ())?)) };
         let others: Vec<_> = runs.chunks_mut(share).map(|part| scope.spawn(move || step(part))).collect();
-        let lost = || Err(Error::Mismatch("a thread that steps models was lost".to_owned()));
+        let lost = || Err(Error::Mismatch("a worker thread panicked".to_owned()));
         others.into_iter().try_for_each(|thread| thread.join().unwrap_or_else(|_| lost()))
     })
 }
 
-/// Wall time [ms].
+/// Wall time of `work` (ms).
 fn timed(work: impl FnOnce() -> Result<()>) -> Result<f64> {
     let clock = Instant::now();
     work()?;

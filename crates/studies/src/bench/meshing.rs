@@ -1,36 +1,38 @@
-//! What meshing costs: the lattice mesher from ten thousand to a million elements, and side by side with TetGen and fTetWild.
+//! Cost of meshing: the lattice mesher from ten thousand to a million elements, and beside TetGen
+//! and fTetWild.
 
 use super::pytetwild::PytetwildMesher;
+use crate::Result;
 use crate::names::Units;
-use crate::study::{Job, Kind, Study, stop_if_asked};
-use crate::{Error, Result};
+use crate::scenes::ellipsoid;
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::time::Instant;
 use trocar_geometry::io::read_surface;
 use trocar_geometry::{LatticeMesher, Mesher, TetMesh, TetQuality, TetgenMesher, TriMesh, repair};
+use trocar_report::colors;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_report::{colors, page};
-use trocar_testing::scenes::ellipsoid;
 
-/// Half axes of the body that is meshed where no surface is named [m]: 815 cm3, the paper's liver.
+/// Half axes of the default body (m): an ellipsoid of 815 cm3, the volume of the paper's liver.
 const LIVER: [f64; 3] = [0.105, 0.064, 0.029];
 
 /// The lattice mesher from ten thousand to a million elements, and beside TetGen and fTetWild.
 #[derive(Clone, Debug, Args)]
 pub struct MeshingBench {
-    /// Closed surfaces (.stl, .ply, .obj); an ellipsoid of a liver's size by default. The first is the one meshed finer and finer.
+    /// Closed surfaces (.stl, .ply, .obj); by default an ellipsoid of the size of a liver. The
+    /// first is also meshed at all sizes.
     pub surfaces: Vec<PathBuf>,
     /// Unit of the surface files.
     #[arg(long, value_enum, default_value_t = Units::Mm)]
     pub units: Units,
-    /// Numbers of elements to aim at.
+    /// Target numbers of elements.
     #[arg(long, value_delimiter = ',', default_values_t = [10_000, 30_000, 100_000, 300_000, 1_000_000])]
     pub sizes: Vec<usize>,
-    /// Python that has the package pytetwild.
+    /// Python with the package pytetwild.
     #[arg(long, default_value = "python3")]
     pub python: PathBuf,
 }
@@ -38,46 +40,46 @@ pub struct MeshingBench {
 /// One mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshingRow {
-    /// The surface's name.
+    /// Name of the surface.
     pub surface: String,
-    /// `size` for the series over element counts, `peers` for the comparison.
+    /// `size` for the series over sizes, `peers` for the comparison of meshers.
     pub series: &'static str,
     /// The mesher and its settings.
     pub mesher: String,
-    /// Why there is no mesh; the figures are then 0.
+    /// Why meshing failed; then the figures are 0.
     pub failure: Option<String>,
     /// Nodes.
     pub nodes: usize,
     /// Tetrahedra.
     pub tets: usize,
-    /// Wall time from surface to mesh [s], the least of the runs.
+    /// Wall time from surface to mesh (s), the least of the runs.
     pub seconds: f64,
-    /// The same per element [ns].
+    /// The same per element (ns).
     pub ns_per_tet: f64,
-    /// Smallest dihedral angle [degrees].
+    /// Smallest dihedral angle (degrees).
     pub min_dihedral_deg: f64,
-    /// Median over elements of the smallest dihedral angle [degrees].
+    /// Median over elements of the smallest dihedral angle (degrees).
     pub median_dihedral_deg: f64,
-    /// Largest dihedral angle [degrees].
+    /// Largest dihedral angle (degrees).
     pub max_dihedral_deg: f64,
-    /// Elements with volume at or below 0.
+    /// Number of inverted elements.
     pub inverted: usize,
-    /// Median edge [mm].
+    /// Median edge (mm).
     pub median_edge_mm: f64,
-    /// Volume over that of the surface, minus 1.
+    /// Volume of the mesh over that of the surface, minus 1.
     pub volume_error: f64,
 }
 
-/// The benchmark's outcome.
+/// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshingResult {
-    /// Every mesh.
+    /// All meshes.
     pub rows: Vec<MeshingRow>,
-    /// Time per element at the largest size over that at the smallest: 1 when the cost is linear.
+    /// Time per element at the largest size over that at the smallest: 1 if the cost is linear.
     pub linearity: Option<f64>,
     /// Worker threads.
     pub threads: usize,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
@@ -92,7 +94,7 @@ impl Study for MeshingBench {
         let mut rows = Vec::new();
         let mut measure =
             |name: &str, series: &'static str, surface: &TriMesh, mesher: &dyn Mesher, runs: usize| -> Result<()> {
-                stop_if_asked(job.progress)?;
+                check_interrupted(job.progress)?;
                 rows.push(row(name, series, surface, mesher, runs));
                 job.progress.advance(1);
                 Ok(())
@@ -109,7 +111,7 @@ impl Study for MeshingBench {
             measure(name, "peers", surface, &PytetwildMesher { python: self.python.clone() }, 1)?;
         }
         job.progress.end();
-        stop_if_asked(job.progress)?;
+        check_interrupted(job.progress)?;
         let per_tet = |r: Option<&MeshingRow>| r.filter(|r| r.tets > 0).map(|r| r.ns_per_tet);
         let mut of_size: Vec<&MeshingRow> = rows.iter().filter(|r| r.series == "size").collect();
         of_size.sort_by_key(|r| r.tets);
@@ -121,7 +123,7 @@ impl Study for MeshingBench {
 }
 
 impl MeshingBench {
-    /// The surfaces by name, repaired if need be.
+    /// The surfaces with their names, repaired if necessary.
     fn surfaces(&self) -> Result<Vec<(String, TriMesh)>> {
         if self.surfaces.is_empty() {
             return Ok(vec![("ellipsoid of 815 cm3".into(), ellipsoid(LIVER.into(), 3e-3))]);
@@ -178,34 +180,25 @@ fn document(result: &MeshingResult) -> Result<Document> {
         points
     };
     let plot = |title: &'static str, y: &'static str, points: Vec<(f64, f64)>| {
-        let line = Line { points, color: colors::organ(0), filled: false };
-        let x = "tetrahedra [thousands]";
-        let plot = Plot {
-            title,
-            x,
-            y,
-            lines: vec![line],
-            bands: vec![],
-            show: vec![0.0],
-            limits: vec![],
-            log_x: false,
-            log_y: false,
-        };
-        Ok::<_, Error>(page::figure(&plot.svg()?, &format!("<b>{title}.</b>")))
+        let line = Line::new(points, colors::organ(0));
+        let x = "tetrahedra (thousands)";
+        let plot = Plot { title, x, y, lines: vec![line], show: vec![0.0], ..Plot::default() };
+        plot.figure(&format!("<b>{title}.</b>"))
     };
     let figures = [
-        plot("Time over size", "time [s]", points(&|r| r.seconds))?,
-        plot("Time per element", "time [\u{b5}s]", points(&|r| 1e-3 * r.ns_per_tet))?,
+        plot("Time over size", "time (s)", points(&|r| r.seconds))?,
+        plot("Time per element", "time (\u{b5}s)", points(&|r| 1e-3 * r.ns_per_tet))?,
     ];
     let linear = result.linearity.map_or(String::new(), |ratio| {
         format!(" Time per element at the largest size over that at the smallest: {}.", fixed(ratio, 2))
     });
-    let lead = format!("The lattice mesher on one surface, finer and finer, {} threads.{linear}", result.threads);
+    let lead = format!("The lattice mesher on one surface at increasing sizes, {} threads.{linear}", result.threads);
     let cost = Section::new("Cost", lead).figures(figures).table(rows(of("size")));
     let peers = Section::new(
-        "Side by side",
-        "One surface, one run each on the same machine. The lattice mesher at the default settings (2.2 mm, or about 50,000 \
-         elements), TetGen at the paper's, fTetWild at its own; the time of the last two holds the start of their process.",
+        "Comparison",
+        "One surface, one run each on the same machine. The lattice mesher at the default settings (2.2 mm, or about \
+         50,000 elements), TetGen with those of the paper, fTetWild with its own. The times of the last two include \
+         the start of their process.",
     )
     .table(rows(of("peers")));
     Ok(Document::new("Meshing", "From closed surfaces to tetrahedra").with(cost).with(peers))
@@ -217,13 +210,13 @@ fn rows<'a>(rows: impl Iterator<Item = &'a MeshingRow>) -> Table {
         "Mesher",
         "Nodes",
         "Tetrahedra",
-        "Time [s]",
-        "[ns/tet]",
+        "Time (s)",
+        "(ns/tet)",
         "Dihedral min.",
         "median",
         "max.",
         "Inverted",
-        "Edge [mm]",
+        "Edge (mm)",
         "Volume",
     ];
     let row = |r: &MeshingRow| match &r.failure {

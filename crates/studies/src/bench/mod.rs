@@ -1,10 +1,9 @@
-//! Measurements of speed and cost: one file each.
+//! Benchmarks: one file or folder each.
 
 mod cell;
 mod embree;
 mod episode;
 mod grasp;
-mod lifts;
 mod machine;
 mod many;
 mod meshing;
@@ -14,10 +13,10 @@ mod render;
 mod scaling;
 mod timing;
 
+pub use cell::CellBench;
 pub use episode::EpisodeBench;
-pub use lifts::{CellSpeed, GraspCost};
+pub use grasp::GraspBench;
 pub use meshing::MeshingBench;
 pub use organs::OrgansBench;
 pub use render::RenderBench;
 pub use scaling::ScalingBench;
-pub(crate) use timing::median;

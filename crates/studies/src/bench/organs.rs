@@ -1,9 +1,10 @@
-//! How fast and how exact organs are stepped: one schedule on one mesh, speed and error from the same scenes.
+//! Speed and error of stepping organs: one schedule on one mesh.
 
 use super::machine::Machine;
 use super::timing::Timing;
 use crate::names::{SolverName, kilopascals};
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
@@ -11,100 +12,104 @@ use std::path::PathBuf;
 use trocar_core::Progress;
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed, percent};
-use trocar_testing::scenes::{FRAME, OracleRun, Organs, Run, Scene, material, mean_error, rest_positions, rms_error};
 use trocar_tissue::Material;
 use trocar_workflow::solver_named;
 
-/// The frames of the tube at which errors are taken.
+/// Frames of the tube scene at which the error is measured.
 const TUBE_FRAMES: [usize; 3] = [15, 30, 60];
 
-/// Longest time to settle [s].
-const LONGEST: f64 = 3600.0;
+/// Maximum of `--settle` (s).
+const MAX_SETTLE: f64 = 3600.0;
 
-/// Speed and error of the stepping of six organs by one schedule.
+/// Speed and error of stepping six organs with one schedule.
 #[derive(Clone, Debug, Args)]
 pub struct OrgansBench {
-    /// Gmsh file (.msh, in metres, z up) with the organs, one a physical group or connected part; our own organs by default.
+    /// Gmsh file (.msh, in metres, z up) with the organs, one per physical group or connected part;
+    /// our own organs by default.
     #[arg(long, value_name = "FILE", conflicts_with = "tets")]
     pub mesh: Option<PathBuf>,
-    /// Elements of our own organs together, about.
+    /// Approximate number of elements of our own organs.
     #[arg(long, default_value_t = 44_000)]
     pub tets: usize,
-    /// What steps them.
+    /// The solver.
     #[arg(long, value_enum, default_value_t = SolverName::Fast)]
     pub schedule: SolverName,
     /// Worker threads; all by default.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
-    /// Young's modulus [kPa].
+    /// Young's modulus (kPa).
     #[arg(long = "young", default_value = "12", value_parser = kilopascals)]
     pub young_modulus: f64,
     /// Poisson's ratio.
     #[arg(long = "poisson", default_value_t = 0.45)]
     pub poisson_ratio: f64,
-    /// Damp the tissue as in the cell while it is timed and judged, too; the peers have no damping.
+    /// Damp the tissue as in the cell also in the timed scenes and the tube. The peers have no
+    /// damping.
     #[arg(long)]
     pub damped: bool,
-    /// Timed frames, after a quarter as many that are not.
+    /// Timed frames. A quarter as many warm-up frames come first.
     #[arg(long, default_value_t = 120)]
     pub frames: usize,
-    /// Simulated seconds for which the organs settle before their sag is measured.
+    /// Simulated time of settling before the sag is measured (s).
     #[arg(long, default_value_t = 3.0)]
     pub settle: f64,
 }
 
-/// The benchmark's outcome.
+/// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct OrgansResult {
-    /// 1/60 s over the median wall time of a frame while a patch of the appendix is dragged at 10 mm/s.
+    /// 1/60 s over the median wall time of a frame, with a patch of the appendix dragged at 10
+    /// mm/s.
     pub real_time_factor: f64,
     /// The same with a patch of every organ shaken.
     pub real_time_factor_moving: f64,
     /// The same while the organs sag from rest under gravity, as the peers are timed.
     pub real_time_factor_sag: f64,
-    /// Median wall time of a frame while the appendix is dragged [ms].
+    /// Median wall time of a frame with the appendix dragged (ms).
     pub frame_ms_median: f64,
-    /// Mean distance of the nodes at rest from their static equilibrium, over their mean displacement by gravity.
+    /// Mean distance of the settled nodes from the static equilibrium over their mean displacement
+    /// by gravity.
     pub static_sag_error: f64,
-    /// RMS distance from the oracle at the same substep over RMS displacement, worst of frames 15, 30 and 60 of the tube.
+    /// RMS distance from the oracle with the same substep over RMS displacement: the worst of
+    /// frames 15, 30 and 60 of the tube.
     pub step_error: f64,
     /// Worker threads.
     pub threads: usize,
     /// Instruction set of the kernels.
     pub isa: &'static str,
-    /// The schedule's name.
+    /// Name of the schedule.
     pub schedule: String,
-    /// Its substeps a frame.
+    /// Substeps per frame.
     pub substeps: usize,
-    /// Whether tissue was damped while it was timed and judged.
+    /// Whether the tissue was damped in the timed scenes and the tube.
     pub damped: bool,
-    /// Where the organs are from.
+    /// Source of the organs.
     pub mesh: String,
-    /// Organs.
+    /// Number of organs.
     pub organs: usize,
-    /// The organ taken for the appendix.
+    /// Name of the organ used as the appendix.
     pub appendix: String,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
-    /// The tube's errors at frames 15, 30 and 60.
+    /// Errors of the tube at frames 15, 30 and 60.
     pub step_errors: [f64; 3],
-    /// Mean displacement of the free nodes by gravity in the static equilibrium [um].
+    /// Mean displacement of the free nodes by gravity in the static equilibrium (um).
     pub static_sag_um: f64,
-    /// How long the organs had settled when their sag was measured [s].
+    /// Simulated time of settling (s).
     pub settled_s: f64,
-    /// Largest node speed then [m/s].
+    /// Largest node speed after settling (m/s).
     pub settled_speed_m_s: f64,
-    /// The dragged scene's frames.
+    /// Frames with the appendix dragged.
     pub drag: Timing,
-    /// The frames with every organ shaken.
+    /// Frames with every organ shaken.
     pub moving: Timing,
-    /// The frames of the sag from rest.
+    /// Frames of the sag from rest.
     pub sagging: Timing,
-    /// Most elements with volume at or below 0 in the tube.
+    /// Largest number of inverted elements in the tube.
     pub tube_inverted: usize,
-    /// Substeps in which the tube's grasp yielded.
+    /// Substeps in which the grasp of the tube yielded.
     pub tube_yielded_substeps: usize,
     /// The machine.
     pub machine: Machine,
@@ -117,9 +122,9 @@ impl Study for OrgansBench {
     type Figures = OrgansResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(OrgansResult, Document)> {
-        if self.frames == 0 || !(self.settle > 0.0 && self.settle <= LONGEST) {
+        if self.frames == 0 || !(self.settle > 0.0 && self.settle <= MAX_SETTLE) {
             return Err(Error::Mismatch(format!(
-                "{} timed frames and {} s to settle; 1 or more frames and up to {LONGEST} s make sense",
+                "--frames {} --settle {}: needs at least 1 frame and a time in (0, {MAX_SETTLE}] s",
                 self.frames, self.settle
             )));
         }
@@ -150,7 +155,7 @@ impl Study for OrgansBench {
         progress.begin("sag", frames as u64 + 1);
         let mut settled_speed_m_s = 0.0;
         for _ in 0..frames {
-            stop_if_asked(progress)?;
+            check_interrupted(progress)?;
             settled_speed_m_s = run.frame()?.max_speed;
             progress.advance(1);
         }
@@ -196,7 +201,7 @@ impl Study for OrgansBench {
     }
 }
 
-/// The tube stepped beside the oracle.
+/// The tube scene, stepped beside the oracle.
 struct Tube {
     errors: [f64; 3],
     inverted: usize,
@@ -223,7 +228,7 @@ impl Tube {
             tube.inverted = tube.inverted.max(report.inverted);
             tube.yielded += report.grasp_limited;
             for substep in 0..substeps {
-                stop_if_asked(progress)?;
+                check_interrupted(progress)?;
                 oracle.step(h, frame as f64 * FRAME + (substep + 1) as f64 * h)?;
                 progress.advance(1);
             }
@@ -238,7 +243,7 @@ impl Tube {
 
 fn document(r: &OrgansResult) -> Document {
     let head =
-        ["1/60 s frames", "median [ms]", "worst [ms]", "real time", "iterations", "inverted", "yielded", "fallbacks"];
+        ["1/60 s frames", "median (ms)", "worst (ms)", "real time", "iterations", "inverted", "yielded", "fallbacks"];
     let row = |name: String, t: &Timing| {
         vec![
             name,
@@ -270,19 +275,19 @@ fn document(r: &OrgansResult) -> Document {
             r.machine.described()
         ),
         format!(
-            "sag {} off the static solution (mean {} \u{b5}m) after {} s, when the fastest node moves at {:.1e} m/s",
+            "sag error {} of the static solution (mean {} \u{b5}m) after {} s; largest node speed {:.1e} m/s",
             percent(r.static_sag_error, 3),
             fixed(r.static_sag_um, 2),
             fixed(r.settled_s, 1),
             r.settled_speed_m_s
         ),
         format!(
-            "tube {} off the oracle at frames 15, 30, 60; {} inverted, grasp yielded in {} substeps",
+            "tube error {} against the oracle at frames 15, 30, 60; {} inverted, grasp yielded in {} substeps",
             r.step_errors.map(|e| percent(e, 3)).join(", "),
             r.tube_inverted,
             r.tube_yielded_substeps
         ),
     ];
-    Document::new("Organs", "Speed and error of the stepping")
+    Document::new("Organs", "Speed and error of stepping")
         .with(Section::new("Six organs", "").table(Table::new(head, rows)).lines(lines))
 }

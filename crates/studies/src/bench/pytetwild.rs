@@ -1,10 +1,10 @@
-//! fTetWild through the Python package `pytetwild`, as a peer to measure beside: a separate process.
+//! fTetWild through the Python package `pytetwild`, for comparison: a separate process.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_geometry::{Error, Mesher, Result, TetMesh, TriMesh};
 
-/// Reads float64 vertices and int32 triangles, writes float64 vertices and int32 tets.
+/// Reads float64 vertices and int32 triangles; writes float64 vertices and int32 tets.
 const SCRIPT: &str = "
 import sys, numpy, pytetwild
 folder = sys.argv[1]
@@ -15,9 +15,9 @@ numpy.asarray(vertices, dtype=numpy.float64).tofile(folder + '/nodes')
 numpy.asarray(tets, dtype=numpy.int32).tofile(folder + '/tets')
 ";
 
-/// fTetWild at its defaults.
+/// fTetWild with its default settings.
 pub(super) struct PytetwildMesher {
-    /// The Python that has the package.
+    /// Python with the package.
     pub(super) python: PathBuf,
 }
 
@@ -30,7 +30,7 @@ impl Mesher for PytetwildMesher {
         let triangles = surface.triangles.iter().flatten().flat_map(|v| v.to_le_bytes()).collect();
         write(&file("vertices"), vertices)?;
         write(&file("triangles"), triangles)?;
-        // A relative path is the user's, not the temporary folder's; a bare name is looked for in PATH.
+        // A relative path is relative to the user's folder; a bare name is searched in PATH.
         let python = match self.python.components().count() {
             1 => self.python.clone(),
             _ => std::path::absolute(&self.python).unwrap_or_else(|_| self.python.clone()),
@@ -56,10 +56,10 @@ impl Mesher for PytetwildMesher {
         let tets = read("tets")?;
         let indices: Vec<u32> = tets.as_chunks().0.iter().map(|b| u32::from_le_bytes(*b)).collect();
         if indices.iter().any(|v| *v as usize >= mesh.vertices.len()) {
-            return Err(wrong("pytetwild named a node that is not there".into()));
+            return Err(wrong("pytetwild returned an element with a missing node".into()));
         }
         mesh.tets = indices.as_chunks().0.to_vec();
-        // It winds them the other way round.
+        // fTetWild orders the nodes of an element the other way round.
         for t in 0..mesh.tets.len() {
             if mesh.tet_volume(t) < 0.0 {
                 mesh.tets[t].swap(2, 3);

@@ -1,8 +1,9 @@
-//! How stepping scales: with the number of elements, with threads, and with many small models beside one of the same size.
+//! Speed of stepping over the number of elements, over threads, and for many small models.
 
 use super::machine::Machine;
 use super::many::{self, ManyRow};
 use super::timing::Timing;
+use crate::scenes::{Organs, Run, Scene, material};
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
@@ -13,32 +14,32 @@ use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::plots::{Line, Plot};
 use trocar_report::table::{count, fixed, percent};
-use trocar_testing::scenes::{Organs, Run, Scene, material};
 use trocar_workflow::{SOLVERS, solver_named};
 
-/// Frames before the timed ones, and most timed ones.
+/// Warm-up frames, and maximum number of timed frames.
 const WARM_UP: usize = 3;
 const FRAMES: usize = 60;
 
-/// Frames that a measurement has at least, warm-up included.
-const LEAST_FRAMES: f64 = 6.0;
+/// Minimum number of frames of a measurement, warm-up included.
+const MIN_FRAMES: f64 = 6.0;
 
-/// Speed of the stepping from a thousand to a million elements, over threads, and of many small models at once.
+/// Speed of stepping from a thousand to a million elements, over threads, and of many small models.
 #[derive(Clone, Debug, Args)]
 pub struct ScalingBench {
-    /// Numbers of elements to aim at, ascending.
+    /// Target numbers of elements, ascending.
     #[arg(long, value_delimiter = ',', default_values_t = [1_000, 3_000, 10_000, 30_000, 100_000, 300_000, 1_000_000])]
     pub sizes: Vec<usize>,
     /// Numbers of worker threads.
     #[arg(long, value_delimiter = ',', default_values_t = [1, 2])]
     pub threads: Vec<usize>,
-    /// Seconds that one measurement may take; what is expected to take longer is left out.
+    /// Time limit of one measurement (s). Measurements that are expected to take longer are
+    /// skipped.
     #[arg(long, default_value_t = 20.0)]
     pub budget: f64,
-    /// Small models stepped at once; 0 for none.
+    /// Number of small models stepped in parallel; 0 for none.
     #[arg(long, default_value_t = 64)]
     pub many: usize,
-    /// Elements of each of them, about.
+    /// Approximate number of elements of each small model.
     #[arg(long, default_value_t = 700)]
     pub small: usize,
 }
@@ -46,32 +47,32 @@ pub struct ScalingBench {
 /// One size with one schedule and number of threads.
 #[derive(Clone, Debug, Serialize)]
 pub struct ScalingRow {
-    /// The schedule's name.
+    /// Name of the schedule.
     pub schedule: String,
-    /// Instruction set of its kernels; empty where nothing was measured.
+    /// Instruction set of the kernels; empty if nothing was measured.
     pub isa: &'static str,
     /// Worker threads.
     pub threads: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// The frames; none where there is a reason.
+    /// Times; none if the measurement was skipped.
     pub timing: Option<Timing>,
-    /// Why it was not measured.
+    /// Why the measurement was skipped.
     pub skipped: Option<String>,
 }
 
-/// The benchmark's outcome.
+/// Figures of the benchmark.
 #[derive(Clone, Debug, Serialize)]
 pub struct ScalingResult {
-    /// Every size, schedule and number of threads.
+    /// All sizes, schedules and numbers of threads.
     pub rows: Vec<ScalingRow>,
-    /// Many small models beside one.
+    /// Many small models beside one model.
     pub many: Vec<ManyRow>,
     /// The machine.
     pub machine: Machine,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
@@ -138,34 +139,36 @@ impl ScalingBench {
     }
 }
 
-/// What the fewest frames are expected to take [s], from the largest size measured so far, in proportion; not known, and so 0, for the first.
+/// Expected time of a minimal measurement (s): in proportion to the largest size measured so far; 0
+/// for the first size.
 fn expected_seconds(before: &[ScalingRow], schedule: &str, threads: usize, tets: usize) -> f64 {
     let same = before.iter().filter(|r| r.schedule == schedule && r.threads == threads);
     let largest = same.filter_map(|r| Some((r.tets, r.timing.as_ref()?.frame_ms_median))).max_by_key(|r| r.0);
-    largest.map_or(0.0, |(size, ms)| 1e-3 * ms * LEAST_FRAMES * tets as f64 / size.max(1) as f64)
+    largest.map_or(0.0, |(size, ms)| 1e-3 * ms * MIN_FRAMES * tets as f64 / size.max(1) as f64)
 }
 
 fn blank(schedule: &str, threads: usize, tets: usize, why: String) -> ScalingRow {
     ScalingRow { schedule: schedule.to_owned(), isa: "", threads, tets, nodes: 0, timing: None, skipped: Some(why) }
 }
 
-/// What many small models may lose.
-const LOSS: f64 = 0.1;
+/// Maximum loss of many small models.
+const MAX_LOSS: f64 = 0.1;
 
 fn document(result: &ScalingResult) -> Result<Document> {
     let m = &result.machine;
     let load = m.load.map_or(String::new(), |l| {
-        let busy = if l > 0.5 { "; the machine was not idle, so the figures are too low" } else { "" };
-        format!(", load {} at the beginning{busy}", fixed(l, 1))
+        let busy = if l > 0.5 { "; the machine was not idle: the figures are too low" } else { "" };
+        format!(", load {} at the start{busy}", fixed(l, 1))
     });
     let lead = format!(
-        "Our own six organs (fewer at the smallest sizes), finer and finer, the lowest 42% of each pinned and a patch of each shaken. Median of up to 60 frames of \
+        "Our own six organs (fewer at the smallest sizes), the lowest 42% of each pinned and a patch of each shaken. \
+         Median of up to 60 frames of \
          1/60 s; {} cores{load}. The dashed line is real time.",
         m.cores
     );
     let plots = [
         plot(result, "Real-time factor", "times real time", &|r, t| (r.tets as f64, t.real_time_factor))?,
-        plot(result, "Time per element", "\u{b5}s a frame", &|r, t| {
+        plot(result, "Time per element", "\u{b5}s per frame", &|r, t| {
             (r.tets as f64, 1e3 * t.frame_ms_median / r.tets as f64)
         })?,
     ];
@@ -174,7 +177,8 @@ fn document(result: &ScalingResult) -> Result<Document> {
     if !result.many.is_empty() {
         let section = Section::new(
             "Many small models",
-            "Each small model is an appendix with a stepper of its own; they are shared out among the threads. The same appendixes stand in one model beside them, and \
+            "Each small model is an appendix with its own stepper; the models are divided among the threads. For \
+             comparison: one model with the same appendixes, and \
              six organs of the same total size.",
         );
         document = document.with(section.cards(cards(result)).table(many_table(result)));
@@ -182,7 +186,7 @@ fn document(result: &ScalingResult) -> Result<Document> {
     Ok(document)
 }
 
-/// The schedules and threads, in the order of the rows.
+/// Schedules and numbers of threads in the order of the rows.
 fn settings(result: &ScalingResult) -> Vec<(&str, usize)> {
     let mut all: Vec<(&str, usize)> = Vec::new();
     for row in &result.rows {
@@ -203,14 +207,14 @@ fn plot(
     let line = |(k, (schedule, threads)): (usize, &(&str, usize))| {
         let rows = result.rows.iter().filter(|r| (r.schedule.as_str(), r.threads) == (schedule, *threads));
         let points = rows.filter_map(|r| r.timing.as_ref().map(|t| point(r, t))).collect();
-        Line { points, color: colors::organ(k), filled: false }
+        Line::new(points, colors::organ(k))
     };
     let lines = settings.iter().enumerate().map(line).collect();
     let limits = if title == "Real-time factor" { vec![1.0] } else { vec![] };
-    let plot = Plot { title, x: "elements", y, lines, bands: vec![], show: vec![], limits, log_x: true, log_y: true };
+    let plot = Plot { title, x: "elements", y, lines, limits, log_x: true, log_y: true, ..Plot::default() };
     let names: Vec<String> = settings.iter().map(|(s, t)| format!("{s}, {}", threads(*t))).collect();
     let legend = page::legend(names.iter().enumerate().map(|(k, name)| (name.as_str(), colors::organ(k))));
-    Ok(page::figure(&plot.svg()?, &format!("<b>{title}.</b>{legend}")))
+    Ok(plot.figure(&format!("<b>{title}.</b>{legend}"))?)
 }
 
 fn threads(n: usize) -> String {
@@ -224,9 +228,9 @@ fn sizes(result: &ScalingResult) -> Table {
         "Threads",
         "Elements",
         "Nodes",
-        "Frame [ms]",
+        "Frame (ms)",
         "Real time",
-        "Iterations a frame",
+        "Iterations per frame",
         "Inverted",
         "Yielded",
     ];
@@ -250,8 +254,9 @@ fn sizes(result: &ScalingResult) -> Table {
 
 fn cards(result: &ScalingResult) -> Vec<Card> {
     let card = |r: &ManyRow| {
-        let note = format!("{} models, {}, {}; at most {}", r.models, r.schedule, threads(r.threads), percent(LOSS, 0));
-        Card::new("Loss against one model", percent(r.loss, 1), note).met(r.loss <= LOSS)
+        let note =
+            format!("{} models, {}, {}; at most {}", r.models, r.schedule, threads(r.threads), percent(MAX_LOSS, 0));
+        Card::new("Loss against one model", percent(r.loss, 1), note).met(r.loss <= MAX_LOSS)
     };
     result.many.iter().map(card).collect()
 }
@@ -262,12 +267,12 @@ fn many_table(result: &ScalingResult) -> Table {
         "Threads",
         "Models",
         "Elements",
-        "Many [ms]",
-        "One model [ms]",
+        "Many (ms)",
+        "One model (ms)",
         "Loss",
-        "Six organs [ms]",
-        "their elements",
-        "Loss an element",
+        "Six organs (ms)",
+        "Elements of organs",
+        "Loss per element",
     ];
     let row = |r: &ManyRow| {
         vec![

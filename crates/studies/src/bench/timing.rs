@@ -1,46 +1,47 @@
-//! How long frames of a scene take.
+//! Wall times of frames of a scene.
 
-use crate::{Error, Result};
+use crate::Result;
+use crate::scenes::{FRAME, Run};
+use crate::statistics::median;
+use crate::study::check_interrupted;
 use serde::Serialize;
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_testing::scenes::{FRAME, Run};
 
-/// Timed frames.
+/// Wall times of frames.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Timing {
-    /// Median wall time of a frame [ms].
+    /// Median wall time of a frame (ms).
     pub frame_ms_median: f64,
-    /// The slowest frame [ms].
+    /// The slowest frame (ms).
     pub frame_ms_worst: f64,
-    /// A frame's 1/60 s over the median wall time.
+    /// 1/60 s over the median wall time of a frame.
     pub real_time_factor: f64,
-    /// Frames that were timed.
+    /// Number of timed frames.
     pub frames: usize,
-    /// Most elements with volume at or below 0 after any frame, warm-up included.
+    /// Largest number of inverted elements after any frame, warm-up included.
     pub inverted: usize,
     /// Substeps in which a grasp yielded.
     pub yielded_substeps: usize,
-    /// Iterations a frame, of all bodies and substeps.
+    /// Iterations per frame, over all bodies and substeps.
     pub iterations_per_frame: f64,
-    /// Substeps in which a body was given up to sweeps.
+    /// Substeps in which a body fell back to sweeps.
     pub fallbacks: usize,
 }
 
 impl Timing {
-    /// Steps `warm_up` frames and then times `frames`, fewer when `seconds` of wall time are over (at least 3).
+    /// Steps `warm_up` frames, then times `frames`; stops early after `seconds` of wall time (at
+    /// least 3 timed frames).
     ///
     /// # Errors
-    /// A scene that diverges, or an interruption.
+    /// A scene that diverges, an interruption.
     pub fn of(run: &mut Run<'_>, warm_up: usize, frames: usize, seconds: f64, progress: &dyn Progress) -> Result<Self> {
         let mut timing = Self::default();
         let mut times = Vec::with_capacity(frames);
         let mut iterations = 0;
         let whole = Instant::now();
         for frame in 0..warm_up + frames {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            check_interrupted(progress)?;
             let clock = Instant::now();
             let report = run.frame()?;
             let took = clock.elapsed().as_secs_f64();
@@ -64,15 +65,5 @@ impl Timing {
         timing.real_time_factor = FRAME / median;
         timing.iterations_per_frame = iterations as f64 / count;
         Ok(timing)
-    }
-}
-
-/// The median, and sorted values; not a number without values.
-pub(crate) fn median(values: &mut [f64]) -> f64 {
-    values.sort_by(f64::total_cmp);
-    match values.len() {
-        0 => f64::NAN,
-        n if n % 2 == 1 => values[n / 2],
-        n => 0.5 * (values[n / 2 - 1] + values[n / 2]),
     }
 }

@@ -1,9 +1,9 @@
-//! Random but legal actions in a scene's cell: whether anything breaks.
+//! Random valid actions in the cell of a scene: whether tissue or arms diverge.
 
-use super::trials::{Resumed, Trials, resumed};
+use crate::Result;
 use crate::names::SceneChoice;
-use crate::study::{Job, Kind, Study};
-use crate::{Error, Result};
+use crate::study::{Job, Kind, Study, check_interrupted};
+use crate::trials::{Outcomes, Resumed, resumed};
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use trocar_cell::Cell;
@@ -17,83 +17,86 @@ use trocar_task::policy::RandomActions;
 use trocar_task::{ArmChannels, End, Episode, Policy};
 use trocar_workflow::scene_specimen;
 
-/// RCM deviation below which nothing is said of it (mm). An episode would end at the scene's own limit.
-const ENDLESS_RCM_MM: f64 = 25.0;
+/// Threshold of the RCM deviation (mm). With that of the scene the episode would end early.
+const RCM_THRESHOLD_MM: f64 = 25.0;
 
-/// Random but legal actions in a scene's cell: whether tissue or arms break.
+/// Random valid actions in the cell of a scene: whether tissue or arms diverge.
 #[derive(Clone, Debug, Args)]
 pub struct RandomActionsExperiment {
     /// The scene.
     #[command(flatten)]
     pub scene: SceneChoice,
-    /// First seed; every fourth (3, 7, ...) moves the tips, the others ask for coordinates in the ports.
+    /// First seed. Every fourth seed (3, 7, ...) moves the tips; the others set coordinates in the
+    /// ports.
     #[arg(long, default_value_t = 0)]
     pub first_seed: u64,
     /// Number of seeds.
     #[arg(long, default_value_t = 20)]
     pub seeds: u64,
-    /// Actions a seed.
+    /// Actions per seed.
     #[arg(long, default_value_t = 500)]
     pub actions: usize,
-    /// Seeds that are run at once; as many as there are threads by default.
+    /// Seeds in parallel; all threads by default.
     #[arg(long, default_value_t = 0)]
     pub threads: usize,
 }
 
-/// One seed.
+/// Figures of one seed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RandomActionsRow {
     /// The seed.
     pub seed: u64,
-    /// Actions that were done.
+    /// Number of actions.
     pub actions: usize,
-    /// What ended the run before its time, if anything did.
+    /// Why the run ended early, if it did.
     pub diverged: Option<String>,
-    /// Most inverted elements in any frame.
+    /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// Largest length of an edge over that at rest, at the end of any action.
+    /// Largest length of an edge over that at rest, after any action.
     pub max_stretch: f64,
-    /// Least volume of an element over that at rest, in any frame.
+    /// Smallest volume of an element over that at rest, in any frame.
     pub min_volume_ratio: f64,
-    /// Joints found beyond their limits, added up over all actions.
+    /// Joints beyond their limits, summed over all actions.
     pub joint_limits_broken: usize,
-    /// Largest RCM deviation [mm].
+    /// Largest RCM deviation (mm).
     pub rcm_max_mm: f64,
-    /// Largest force on an instrument [N].
+    /// Largest force on an instrument (N).
     pub force_max_n: f64,
-    /// How often contact of an instrument with tissue was disabled.
+    /// How often contact between an instrument and tissue was disabled.
     pub disabled_contacts: usize,
-    /// How often contact of blades that hold tissue was disabled.
+    /// How often contact between holding blades and tissue was disabled.
     pub disabled_blades: usize,
-    /// How often an organ was relaxed outside of time.
+    /// How often an organ was relaxed.
     pub relaxed: usize,
-    /// Arms and periods in which the force guard shortened a command.
+    /// How often the force guard shortened a command, over all arms and periods.
     pub guarded: usize,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct RandomActionsResult {
-    /// The scene's name.
+    /// Name of the scene.
     pub scene: String,
-    /// Seed by seed.
+    /// Rows of the seeds.
     pub rows: Vec<RandomActionsRow>,
     /// Actions of all seeds.
     pub actions: usize,
-    /// Nothing diverged, no element was inverted, no joint left its limits.
+    /// Whether all runs were complete, without divergence, inverted elements or joints beyond their
+    /// limits.
     pub unbroken: bool,
-    /// What an earlier run had done.
+    /// Seeds of an earlier run.
     pub resumed: Resumed,
-    /// Wall time of everything [s].
+    /// Wall time (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
 impl Study for RandomActionsExperiment {
     const NAME: &'static str = "random-actions";
     const KIND: Kind = Kind::Experiment;
-    const FOLDER: Option<&'static str> = Some("Folder for trials and report; finished seeds in it are not run again.");
+    const FOLDER: Option<&'static str> =
+        Some("Output folder of trials and report. Finished seeds in it are used again.");
     type Figures = RandomActionsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RandomActionsResult, Document)> {
@@ -103,20 +106,19 @@ impl Study for RandomActionsExperiment {
         let places = specimen.organs.iter().flat_map(|o| &o.body.vertices);
         let sum: f64 = places.map(|p| p.x + 2.0 * p.y + 3.0 * p.z).sum();
         let settings = format!("{scene:?}\n{sum:?}\n{}", self.actions);
-        let trials = Trials::open(job.output(), "random-actions", &settings)?;
         let seeds: Vec<u64> = (0..self.seeds).map(|k| self.first_seed.saturating_add(k)).collect();
         let one = |seed: &u64, progress: &dyn Progress| run(&scene, &specimen, *seed, self.actions, progress);
-        let made =
-            trials.run("random actions", &seeds, |seed| format!("seed {seed}"), self.threads, job.progress, one)?;
+        let key = |seed: &u64| format!("seed {seed}");
+        let Outcomes { rows, resumed } = job.trials("random actions", &settings, &seeds, key, self.threads, one)?;
         let whole = |r: &RandomActionsRow| {
             r.diverged.is_none() && r.inverted_peak == 0 && r.joint_limits_broken == 0 && r.actions == self.actions
         };
         let result = RandomActionsResult {
             scene: scene.name.clone(),
-            actions: made.rows.iter().map(|r| r.actions).sum(),
-            unbroken: made.rows.iter().all(whole),
-            rows: made.rows,
-            resumed: made.resumed,
+            actions: rows.iter().map(|r| r.actions).sum(),
+            unbroken: rows.iter().all(whole),
+            rows,
+            resumed,
             seconds: job.seconds(),
             report: job.report(),
         };
@@ -125,14 +127,14 @@ impl Study for RandomActionsExperiment {
     }
 }
 
-/// The scene as it is asked to go on whatever happens: no task, no end but the last action.
+/// The scene without a task: the episode ends after the last action.
 fn endless(scene: &Scene, actions: usize) -> Scene {
     let mut scene = scene.clone();
     scene.task.name = TaskName::PortReach;
     scene.task.stop_when_passed = false;
     scene.task.episode_s = actions as f64 / f64::from(scene.rates.control_hz);
-    // What goes beyond the limit is counted; hardware would stop there.
-    (scene.safety.rcm_threshold_mm, scene.safety.rcm_abort_mm) = (ENDLESS_RCM_MM, 2.0 * ENDLESS_RCM_MM);
+    // Larger deviations are recorded; hardware would stop.
+    (scene.safety.rcm_threshold_mm, scene.safety.rcm_abort_mm) = (RCM_THRESHOLD_MM, 2.0 * RCM_THRESHOLD_MM);
     scene
 }
 
@@ -150,9 +152,7 @@ fn run(
     let mut row = RandomActionsRow { seed, max_stretch: 1.0, min_volume_ratio: 1.0, ..RandomActionsRow::default() };
     'episode: while row.actions < actions && episode.end().is_none() {
         for action in policy.act(&episode)? {
-            if progress.interrupted() {
-                return Err(Error::Interrupted);
-            }
+            check_interrupted(progress)?;
             let step = episode.step(&action)?;
             row.actions += 1;
             row.max_stretch = row.max_stretch.max(episode.max_stretch());
@@ -184,7 +184,7 @@ fn run(
     Ok(row)
 }
 
-/// Joints of any arm that are beyond their limits now.
+/// Number of joints beyond their limits.
 fn joint_limits_broken(cell: &Cell) -> Result<usize> {
     let mut broken = 0;
     for (side, _) in cell.arms() {
@@ -199,18 +199,19 @@ fn joint_limits_broken(cell: &Cell) -> Result<usize> {
 
 fn document(r: &RandomActionsResult) -> Document {
     let lead = format!(
-        "Random but legal actions in the cell of {}, from {} seeds. An instrument that pierces, hooks or crushes tissue lets go of it and passes through until it is out; an organ folded for good is put \
-         right. Both are counted.",
+        "Random valid actions in the cell of {}, from {} seeds. Contact of an instrument that pierces, hooks or \
+         crushes tissue is disabled until the instrument is outside; an organ that stays folded is \
+         relaxed. Both are counted.",
         page::escape(&r.scene),
         r.rows.len()
     );
     let good = r.rows.iter().filter(|row| row.diverged.is_none() && row.inverted_peak == 0).count();
     let broken: usize = r.rows.iter().map(|row| row.joint_limits_broken).sum();
     let cards = [
-        Card::new("Actions", count(r.actions), "done"),
-        Card::new("Seeds unbroken", format!("{good} of {}", r.rows.len()), "no divergence, no inverted element")
+        Card::new("Actions", count(r.actions), "of all seeds"),
+        Card::new("Seeds without failure", format!("{good} of {}", r.rows.len()), "no divergence, no inverted element")
             .met(good == r.rows.len()),
-        Card::new("Joint limits broken", count(broken), "over all actions").met(broken == 0),
+        Card::new("Joints beyond their limits", count(broken), "over all actions").met(broken == 0),
     ];
     let head = [
         "Seed",
@@ -218,11 +219,11 @@ fn document(r: &RandomActionsResult) -> Document {
         "Diverged",
         "Inverted",
         "Stretch",
-        "Least volume",
-        "RCM [mm]",
-        "Force [N]",
+        "Smallest volume",
+        "RCM (mm)",
+        "Force (N)",
         "Contacts disabled",
-        "Of blades",
+        "Contacts of blades disabled",
         "Relaxed",
         "Guarded",
     ];
@@ -246,8 +247,8 @@ fn document(r: &RandomActionsResult) -> Document {
             ]
         })
         .collect();
-    let seeds = Section::new("Seed by seed", "").table(Table::new(head, rows)).lines(resumed(&r.resumed, "seeds"));
-    Document::new("Random actions", "What breaks under random but legal actions")
+    let seeds = Section::new("Seeds", "").table(Table::new(head, rows)).lines(resumed(&r.resumed, "seeds"));
+    Document::new("Random actions", "Failures under random valid actions")
         .with(Section::new("Random actions", lead).cards(cards))
         .with(seeds)
 }

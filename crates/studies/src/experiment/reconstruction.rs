@@ -1,4 +1,5 @@
-//! Table I and Fig. 6(a): every phantom recorded, reconstructed with one set of settings, and measured against its truth.
+//! Table I and Fig. 6(a): all phantoms recorded, reconstructed with one set of settings, and
+//! compared with their truth.
 
 use crate::names::{BackName, MesherName, Recorded, SensorName, phantoms_or_all};
 use crate::study::{Job, Kind, Study};
@@ -23,7 +24,7 @@ use trocar_workflow::phantoms::recorded;
 use trocar_workflow::truth::DEPTH_UNIT;
 use trocar_workflow::{CompositeFigures, reconstruct_recording};
 
-/// Table I and Fig. 6(a): every phantom recorded, reconstructed and measured against its truth.
+/// Table I and Fig. 6(a): all phantoms recorded, reconstructed and compared with their truth.
 #[derive(Clone, Debug, Args)]
 pub struct ReconstructionExperiment {
     /// Phantoms; all by default.
@@ -32,55 +33,56 @@ pub struct ReconstructionExperiment {
     /// How they are recorded.
     #[command(flatten)]
     pub recorded: Recorded,
-    /// What kind of noise depth has.
+    /// The depth noise.
     #[arg(long, value_enum, default_value_t = SensorName::Plain)]
     pub sensor: SensorName,
-    /// How thick organs are taken to be behind their fronts.
+    /// The model of the unseen back of the organs.
     #[arg(long, value_enum, default_value_t = BackName::Rounded)]
     pub back: BackName,
-    /// What fills the surfaces with tetrahedra.
+    /// The mesher.
     #[arg(long, value_enum, default_value_t = MesherName::Lattice)]
     pub mesher: MesherName,
 }
 
-/// One organ: what is asked of it, and the paper's beside it.
+/// Figures of one organ, and those of the paper.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReconstructionRow {
-    /// Its phantom.
+    /// Name of the phantom.
     pub phantom: String,
-    /// Its name.
+    /// Name.
     pub organ: String,
     /// Nodes of the body.
     pub nodes: usize,
     /// Tetrahedra of the body.
     pub tets: usize,
-    /// The surface closes.
+    /// Whether the surface is closed.
     pub watertight: bool,
-    /// Elements with volume at or below 0.
+    /// Number of inverted elements.
     pub inverted: usize,
-    /// Smallest dihedral angle [degrees].
+    /// Smallest dihedral angle (degrees).
     pub min_dihedral_deg: f64,
-    /// Median over elements of the smallest dihedral angle [degrees].
+    /// Median over elements of the smallest dihedral angle (degrees).
     pub median_dihedral_deg: f64,
-    /// Median edge [mm].
+    /// Median edge (mm).
     pub median_edge_mm: f64,
-    /// SPEC R9: median absolute error of the surface through the recording camera against the composite's depth [mm].
+    /// Median absolute error of the surface, seen through the recording camera, against the depth
+    /// of the composite (mm).
     pub depth_error_median_mm: f64,
-    /// The same, signed, surface minus depth [mm].
+    /// The same, signed: surface minus depth (mm).
     pub signed_error_median_mm: f64,
-    /// Share of the organ's pixels that were compared.
+    /// Share of the pixels of the organ that are compared.
     pub covered: f64,
-    /// The surface against the true depth, without noise and quantisation: median absolute error [mm].
+    /// Median absolute error against the true depth, without noise and quantisation (mm).
     pub truth_error_median_mm: f64,
-    /// The same, signed [mm].
+    /// The same, signed (mm).
     pub truth_error_signed_mm: f64,
-    /// Volume of the body [cm3].
+    /// Volume of the body (cm3).
     pub volume_cm3: f64,
-    /// Volume over that between the true front and the back modelled behind it (paper eq. 1), minus 1.
+    /// Volume over that between the true front and the modelled back (paper eq. 1), minus 1.
     pub volume_error: f64,
-    /// Volume over the true organ's, minus 1: what the model of the unseen back is worth.
+    /// Volume over that of the true organ, minus 1: the error of the model of the back.
     pub volume_error_truth: f64,
-    /// Signed depth error of a surface made the paper's way, from a binary grid [mm].
+    /// Signed depth error of a surface from a binary grid, as in the paper (mm).
     pub binary_grid_signed_error_mm: Option<f64>,
     /// Nodes in the paper's Table I.
     pub paper_nodes: Option<usize>,
@@ -88,29 +90,29 @@ pub struct ReconstructionRow {
     pub paper_tets: Option<usize>,
 }
 
-/// One phantom's recording and composite.
+/// Recording and composite of one phantom.
 #[derive(Clone, Debug, Serialize)]
 pub struct PhantomFigures {
-    /// Its name.
+    /// Name.
     pub phantom: String,
-    /// The composite.
+    /// Figures of the composite.
     pub composite: CompositeFigures,
-    /// Wall time of the reconstruction, report included [s].
+    /// Wall time of the reconstruction with its report (s).
     pub seconds: f64,
-    /// Its report.
+    /// Path of the report of the reconstruction.
     pub report: String,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct ReconstructionResult {
-    /// Every organ of every phantom.
+    /// All organs of all phantoms.
     pub organs: Vec<ReconstructionRow>,
-    /// Every phantom.
+    /// All phantoms.
     pub phantoms: Vec<PhantomFigures>,
-    /// Wall time of everything [s].
+    /// Wall time (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
@@ -118,7 +120,7 @@ impl Study for ReconstructionExperiment {
     const NAME: &'static str = "reconstruction";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> =
-        Some("Folder for recordings, specimens and the report; finished recordings in it are used again.");
+        Some("Output folder of recordings, specimens and report. Finished recordings in it are used again.");
     type Figures = ReconstructionResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(ReconstructionResult, Document)> {
@@ -127,26 +129,27 @@ impl Study for ReconstructionExperiment {
         let settings = Settings { back: self.back.into(), mesher: self.mesher.into(), ..Settings::default() };
         let mut result =
             ReconstructionResult { organs: Vec::new(), phantoms: Vec::new(), seconds: 0.0, report: job.report() };
-        let mut pictures = Vec::new();
+        let mut reconstructions = Vec::new();
         for phantom in &phantoms_or_all(&self.phantoms) {
             let folder = job.output().join(phantom);
             let recording = folder.join("recording");
             recorded(phantom, &record, &recording, job.progress)?;
             let (made, reconstruction) =
                 reconstruct_recording(&recording, &settings, &folder.join("specimen"), job.progress)?;
-            let paper_way = Settings { surface: SurfaceRule::BinaryGrid, ..settings.clone() };
-            let paper_way = trocar_reconstruct::reconstruct(&Recording::open(&recording)?, &paper_way, job.progress)?;
-            result.organs.extend(rows(phantom, &recording, &reconstruction, &paper_way, settings.back)?);
+            let binary_grid = Settings { surface: SurfaceRule::BinaryGrid, ..settings.clone() };
+            let binary_grid =
+                trocar_reconstruct::reconstruct(&Recording::open(&recording)?, &binary_grid, job.progress)?;
+            result.organs.extend(rows(phantom, &recording, &reconstruction, &binary_grid, settings.back)?);
             result.phantoms.push(PhantomFigures {
                 phantom: phantom.clone(),
                 composite: CompositeFigures::of(&reconstruction, &recording)?,
                 seconds: made.seconds,
                 report: made.report,
             });
-            pictures.push(reconstruction);
+            reconstructions.push(reconstruction);
         }
         result.seconds = job.seconds();
-        let document = document(&result, &pictures)?;
+        let document = document(&result, &reconstructions)?;
         Ok((result, document))
     }
 }
@@ -155,7 +158,7 @@ fn rows(
     phantom: &str,
     recording: &Path,
     made: &Reconstruction,
-    paper_way: &Reconstruction,
+    binary_grid: &Reconstruction,
     back: BackRule,
 ) -> Result<Vec<ReconstructionRow>> {
     let truth = recording.join("truth");
@@ -174,7 +177,7 @@ fn rows(
         let true_volume = read_surface(&path, Unit::Metre).map_err(trocar_reconstruct::Error::from)?.volume();
         let volume = 1e-6 * facts.volume_cm3;
         let paper = table_i(phantom, &organ.name);
-        let signed_the_papers_way = paper_way.specimen.organs.get(i).and_then(|o| o.facts.depth_error_signed_mm);
+        let binary_grid_signed = binary_grid.specimen.organs.get(i).and_then(|o| o.facts.depth_error_signed_mm);
         Ok(ReconstructionRow {
             phantom: phantom.to_owned(),
             organ: organ.name.clone(),
@@ -193,7 +196,7 @@ fn rows(
             volume_cm3: facts.volume_cm3,
             volume_error: volume / modelled_volume(&front, mask, &camera, back) - 1.0,
             volume_error_truth: volume / true_volume - 1.0,
-            binary_grid_signed_error_mm: signed_the_papers_way,
+            binary_grid_signed_error_mm: binary_grid_signed,
             paper_nodes: paper.map(|p| p.nodes),
             paper_tets: paper.map(|p| p.tets),
         })
@@ -201,17 +204,18 @@ fn rows(
     made.specimen.organs.iter().enumerate().map(row).collect()
 }
 
-/// What is asked of each organ: depth error, signed error [mm], volume error, dihedral angle [degrees].
-const DEPTH_ERROR: f64 = 1.0;
-const SIGNED_ERROR: f64 = 0.3;
-const VOLUME_ERROR: f64 = 0.1;
-const DIHEDRAL: f64 = 10.0;
+/// Targets of each organ: depth error (mm), signed error (mm), volume error, smallest dihedral
+/// angle (degrees).
+const MAX_DEPTH_ERROR: f64 = 1.0;
+const MAX_SIGNED_ERROR: f64 = 0.3;
+const MAX_VOLUME_ERROR: f64 = 0.1;
+const MIN_DIHEDRAL: f64 = 10.0;
 
 fn document(result: &ReconstructionResult, made: &[Reconstruction]) -> Result<Document> {
     made.iter().try_for_each(check_sizes)?;
     let subtitle = format!("{} organs of {} phantoms, one set of settings", result.organs.len(), made.len());
     let document = Document::new("Reconstruction", subtitle).with(summary(result)).with(table_i_beside_paper(result));
-    Ok(document.with(errors(made)?).with(composites(result)).with(looks(made)?))
+    Ok(document.with(errors(made)?).with(composites(result)).with(pictures(made)?))
 }
 
 fn summary(result: &ReconstructionResult) -> Section {
@@ -225,21 +229,21 @@ fn summary(result: &ReconstructionResult) -> Section {
         (worst(&|r| r.depth_error_median_mm), worst(&|r| r.signed_error_median_mm), worst(&|r| r.volume_error));
     let cards = [
         Card::new("Watertight", format!("{tight} of {n}"), "organs; paper 13 of 13").met(tight == n),
-        Card::new("Inverted elements", count(inverted), "of all; paper 0").met(inverted == 0),
+        Card::new("Inverted elements", count(inverted), "paper 0").met(inverted == 0),
         Card::new("Smallest dihedral", format!("{}\u{b0}", fixed(dihedral, 1)), "of all elements; at least 10\u{b0}")
-            .met(dihedral >= DIHEDRAL),
-        Card::new("Depth error", format!("{} mm", fixed(depth, 2)), "the worst organ's median; paper 1.33 to 4.77 mm")
-            .met(depth <= DEPTH_ERROR),
+            .met(dihedral >= MIN_DIHEDRAL),
+        Card::new("Depth error", format!("{} mm", fixed(depth, 2)), "median of the worst organ; paper 1.33 to 4.77 mm")
+            .met(depth <= MAX_DEPTH_ERROR),
         Card::new(
             "Signed error",
             format!("{} mm", fixed(signed, 2)),
-            "the worst organ's median, either way; paper \u{2212}1.15 to \u{2212}4.88 mm",
+            "largest absolute median of an organ; paper \u{2212}1.15 to \u{2212}4.88 mm",
         )
-        .met(signed <= SIGNED_ERROR),
-        Card::new("Volume", percent(volume, 1), "off the true front with the modelled back, at worst")
-            .met(volume <= VOLUME_ERROR),
+        .met(signed <= MAX_SIGNED_ERROR),
+        Card::new("Volume", percent(volume, 1), "largest error against the true front with the modelled back")
+            .met(volume <= MAX_VOLUME_ERROR),
     ];
-    Section::new("Together", "").cards(cards)
+    Section::new("Summary", "").cards(cards)
 }
 
 fn table_i_beside_paper(result: &ReconstructionResult) -> Section {
@@ -250,19 +254,19 @@ fn table_i_beside_paper(result: &ReconstructionResult) -> Section {
         "(paper)",
         "Tetrahedra",
         "(paper)",
-        "Min. dihedral [\u{b0}]",
-        "Median dihedral [\u{b0}]",
-        "Median edge [mm]",
+        "Min. dihedral (\u{b0})",
+        "Median dihedral (\u{b0})",
+        "Median edge (mm)",
         "Watertight",
         "Inverted",
-        "Depth error [mm]",
-        "signed [mm]",
-        "binary grid, signed [mm]",
-        "against truth [mm]",
+        "Depth error (mm)",
+        "signed (mm)",
+        "binary grid, signed (mm)",
+        "against truth (mm)",
         "Covered",
-        "Volume [cm\u{b3}]",
-        "off the model",
-        "off the truth",
+        "Volume (cm\u{b3})",
+        "error, model",
+        "error, truth",
     ];
     let paper = |n: Option<usize>| n.map_or(String::new(), count);
     let row = |r: &ReconstructionRow| {
@@ -290,14 +294,14 @@ fn table_i_beside_paper(result: &ReconstructionResult) -> Section {
     };
     Section::new(
         "Table I",
-        "The depth error is the paper's measure: the surface through the recording camera against the depth it was made \
-         from. <i>Off the model</i>: the volume against that between the true front and the back that the paper's closure \
-         puts behind it. <i>Off the truth</i>: against the organ itself, whose back no camera saw.",
+        "The depth error is the paper's measure: the surface, seen through the recording camera, against the input \
+         depth. <i>Error, model</i>: the volume against that between the true front and the modelled back of the \
+         paper's closure. <i>Error, truth</i>: against the true organ, whose back is unseen.",
     )
     .table(Table::new(head, result.organs.iter().map(row).collect()))
 }
 
-/// Fig. 6(a): where the surfaces lie before or behind the depth.
+/// Fig. 6(a): signed depth error of the surfaces.
 fn errors(made: &[Reconstruction]) -> Result<Section> {
     let mut shown = Vec::new();
     for r in made {
@@ -308,8 +312,8 @@ fn errors(made: &[Reconstruction]) -> Result<Section> {
         let img = figures::img(&picture, "signed depth error of all organs")?;
         shown.push(page::figure(&img, &format!("<b>{}.</b>", page::escape(&r.specimen.name))));
     }
-    let bar = page::scale_bar(&colors::DIVERGING, "\u{2212}5", "surface minus measured depth [mm]", "+5");
-    let lead = "Blue: the surface lies nearer to the camera than measured; red: behind.";
+    let bar = page::scale_bar(&colors::DIVERGING, "\u{2212}5", "surface minus measured depth (mm)", "+5");
+    let lead = "Blue: the surface is nearer to the camera than the measured depth; red: farther.";
     let section = Section::new("Depth error (Fig. 6a)", lead);
     Ok(shown.into_iter().fold(section, |s, f| s.figure(Columns::Three, f)).html(bar))
 }
@@ -346,18 +350,18 @@ fn composites(result: &ReconstructionResult) -> Section {
             ]
         })
         .collect();
-    let lead = "What the window's frames say of the scene behind the instruments, and how far that is from the truth.";
+    let lead = "The scene behind the instruments, from the frames of the window, and its error against the truth.";
     Section::new("Composites", lead).table(Table::new(head, rows))
 }
 
-/// Photograph and reconstruction, side by side.
-fn looks(made: &[Reconstruction]) -> Result<Section> {
+/// Input picture and reconstruction side by side.
+fn pictures(made: &[Reconstruction]) -> Result<Section> {
     let mut shown = Vec::new();
     for r in made {
         let Some(camera) = &r.specimen.camera else { continue };
         let name = page::escape(&r.specimen.name);
         let input = figures::img(&r.input, "input frame")?;
-        shown.push(page::figure(&input, &format!("<b>{name}.</b> The window's centre frame as recorded.")));
+        shown.push(page::figure(&input, &format!("<b>{name}.</b> The centre frame of the window.")));
         let scene =
             PhongScene::new(trocar_workflow::pages::organ_views::surfaces(&r.specimen), None, colors::VIEW_GROUND)
                 .with_ambient_occlusion(24, 0.012);

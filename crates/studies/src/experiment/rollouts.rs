@@ -1,23 +1,26 @@
-//! The paper's rollouts made anew (Fig. 6(d, e)): 140 episodes of six controllers, as a campaign that goes on where it was left.
+//! The paper's rollouts (Fig. 6(d, e)): 140 episodes of six controllers, as a campaign that
+//! resumes.
 
 use crate::names::SceneChoice;
 use crate::study::{Job, Kind, Study};
 use crate::{Error, Result};
 use clap::Args;
 use serde::Serialize;
-use trocar_campaign::{Campaign, CampaignResult, Kept, Plan, PolicyRow, PolicySpec, lift_and_rcm, lifts, median};
+use trocar_campaign::{
+    Campaign, CampaignResult, EpisodeRecord, Manifest, PolicyRow, PolicySpec, lift_and_rcm, lifts, median,
+};
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::page::{self, Card};
 use trocar_report::table::{count, fixed};
 use trocar_task::policy::POLICIES;
 
-/// The page that stands beside the campaign's own.
+/// The page of the study, beside the page of the campaign.
 const PAGE: &str = "rollouts.html";
 
-/// Beyond this RCM deviation the paper's hardware stops [mm].
+/// RCM deviation at which the paper's hardware stops (mm).
 const ABORT_MM: f64 = 5.0;
 
-/// The paper's threshold for RCM deviations [mm].
+/// The paper's threshold of the RCM deviation (mm).
 const THRESHOLD_MM: f64 = 3.0;
 
 /// Fig. 6(d, e): 140 rollouts of six controllers; resumable, safe to interrupt at any time.
@@ -26,33 +29,35 @@ pub struct RolloutsExperiment {
     /// The scene.
     #[command(flatten)]
     pub scene: SceneChoice,
-    /// Rollouts of all six controllers together; the first controllers have one more if it does not divide.
+    /// Rollouts of all six controllers together. If they cannot be divided by six, the first
+    /// controllers run one more.
     #[arg(long, default_value_t = 140)]
     pub rollouts: usize,
-    /// Seed of each controller's first rollout; the next have the next.
+    /// Seed of the first rollout of each controller; each further rollout has the next seed.
     #[arg(long, visible_alias = "first-seed", default_value_t = 0)]
     pub seed: u64,
-    /// Rollouts at once; as many as the machine has cores by default. The result does not depend on it.
+    /// Rollouts in parallel; as many as the machine has cores by default. The result does not
+    /// depend on it.
     #[arg(long, default_value_t = 0)]
     pub jobs: usize,
 }
 
-/// What the paper says of its 140 rollouts.
+/// The paper's figures of its 140 rollouts.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PaperRollouts {
     /// Rollouts.
     pub rollouts: usize,
-    /// Of these, those that attached the appendix.
+    /// Rollouts that attached the appendix.
     pub attached: usize,
     /// Of these, those that held it to the end.
     pub held_to_end: usize,
-    /// Median lift of the attached [mm].
+    /// Median lift of the attached rollouts (mm).
     pub lift_median_mm: f64,
-    /// Median of their peak RCM deviations [mm].
+    /// Median of the peak RCM deviations of the attached rollouts (mm).
     pub rcm_peak_median_mm: f64,
-    /// Attached rollouts whose RCM deviation stayed within 3 mm.
+    /// Attached rollouts with RCM deviations of at most 3 mm.
     pub rcm_within_3_mm: usize,
-    /// And within 5 mm.
+    /// Attached rollouts with RCM deviations of at most 5 mm.
     pub rcm_within_5_mm: usize,
 }
 
@@ -67,44 +72,46 @@ const PAPER: PaperRollouts = PaperRollouts {
     rcm_within_5_mm: 84,
 };
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct RolloutsResult {
     /// The scene.
     pub scene: String,
-    /// Rollouts that are kept.
+    /// Finished rollouts.
     pub rollouts: usize,
-    /// Those that attached the task's organ.
+    /// Rollouts that attached the organ of the task.
     pub attached: usize,
     /// Of these, those that held it to the end.
     pub held_to_end: usize,
-    /// Rollouts whose tissue or arms were lost.
+    /// Rollouts whose tissue or arms diverged.
     pub diverged: usize,
     /// Rollouts that passed all stages.
     pub passed: usize,
-    /// Median over the attached of the greatest lift [mm]; None without any.
+    /// Median over the attached rollouts of the largest lift (mm); none without any.
     pub lift_median_mm: Option<f64>,
-    /// Median over the attached of the largest RCM deviation of any arm in any physics step [mm], as the paper's is of peaks.
+    /// Median over the attached rollouts of the largest RCM deviation of any arm in any physics
+    /// step (mm). The paper's figure is also one of peaks.
     pub rcm_peak_median_mm: Option<f64>,
-    /// Median over the attached of the grasping arm's median RCM deviation under load [mm].
+    /// Median over the attached rollouts of the grasping arm's median RCM deviation under load
+    /// (mm).
     pub rcm_loaded_median_mm: Option<f64>,
-    /// Attached rollouts in which no arm's RCM deviation was beyond 3 mm in any physics step.
+    /// Attached rollouts with RCM deviations of at most 3 mm, of any arm in any physics step.
     pub rcm_within_3_mm: usize,
-    /// And beyond 5 mm.
+    /// The same with at most 5 mm.
     pub rcm_within_5_mm: usize,
-    /// Most inverted elements in any frame.
+    /// Largest number of inverted elements in any frame.
     pub inverted_peak: usize,
-    /// Suspensions of physics in all rollouts: contacts disabled, contacts of blades disabled, organs relaxed.
+    /// Suspensions in all rollouts: contacts disabled, contacts of blades disabled, organs relaxed.
     pub suspensions: [usize; 3],
-    /// Controller by controller.
+    /// Rows of the controllers.
     pub by_policy: Vec<PolicyRow>,
-    /// What the paper says.
+    /// The paper's figures.
     pub paper: PaperRollouts,
-    /// One hash over all final states.
+    /// Hash of all final states.
     pub hash: String,
-    /// The campaign's page, with the failures.
+    /// Path of the campaign's page, with the failures.
     pub campaign: String,
-    /// The page beside the paper.
+    /// Path of the page of the study.
     pub report: String,
 }
 
@@ -112,12 +119,12 @@ impl Study for RolloutsExperiment {
     const NAME: &'static str = "rollouts";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> = Some("Campaign folder: a new one, or one of an earlier run to resume.");
-    const KEEPS_OWN_FILES: bool = true;
+    const WRITES_OWN_FILES: bool = true;
     type Figures = RolloutsResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RolloutsResult, Document)> {
         if self.rollouts == 0 {
-            return Err(Error::Mismatch("--rollouts 0: 1 or more are to be run; the paper has 140".to_owned()));
+            return Err(Error::Mismatch("--rollouts 0: must be at least 1; the paper has 140".to_owned()));
         }
         let campaign = Campaign {
             scene: self.scene.scene.clone(),
@@ -128,11 +135,11 @@ impl Study for RolloutsExperiment {
             retry_failed: false,
             phantoms: self.scene.phantoms.clone(),
         };
-        let (store, plan) = campaign.keep(job.output(), Some(self.rollouts), job.progress)?;
-        let (made, kept) = (store.finish(&plan)?, store.kept(&plan)?);
+        let (store, manifest) = campaign.run_episodes(job.output(), Some(self.rollouts), job.progress)?;
+        let (made, records) = (store.write_results(&manifest)?, store.records(&manifest)?);
         let page = job.output().join(PAGE);
-        let result = RolloutsResult::of(made, &kept, page.display().to_string());
-        let document = document(&plan, &result, &kept)?;
+        let result = RolloutsResult::of(made, &records, page.display().to_string());
+        let document = document(&manifest, &result, &records)?;
         store.write(PAGE, document.page().as_bytes())?;
         let text = serde_json::to_vec_pretty(&result).map_err(|e| Error::Format(e.to_string()))?;
         store.write("rollouts.json", &text)?;
@@ -141,26 +148,26 @@ impl Study for RolloutsExperiment {
 }
 
 impl RolloutsResult {
-    fn of(made: CampaignResult, kept: &[Kept], report: String) -> Self {
-        let attached: Vec<&Kept> = kept.iter().filter(|k| k.summary.attached).collect();
+    fn of(made: CampaignResult, records: &[EpisodeRecord], report: String) -> Self {
+        let attached: Vec<&EpisodeRecord> = records.iter().filter(|k| k.summary.attached).collect();
         let within = |mm: f64| attached.iter().filter(|k| k.summary.rcm_peak_mm <= mm).count();
         Self {
             scene: made.scene,
-            rollouts: kept.len(),
+            rollouts: records.len(),
             attached: attached.len(),
             held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
-            diverged: kept.iter().filter(|k| k.summary.diverged).count(),
+            diverged: records.iter().filter(|k| k.summary.diverged).count(),
             passed: made.passed,
             lift_median_mm: median(attached.iter().map(|k| k.summary.lift_mm).collect()),
             rcm_peak_median_mm: median(attached.iter().map(|k| k.summary.rcm_peak_mm).collect()),
             rcm_loaded_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
             rcm_within_3_mm: within(THRESHOLD_MM),
             rcm_within_5_mm: within(ABORT_MM),
-            inverted_peak: kept.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
+            inverted_peak: records.iter().map(|k| k.summary.inverted_peak).max().unwrap_or(0),
             suspensions: [
-                kept.iter().map(|k| k.summary.disabled_contacts).sum(),
-                kept.iter().map(|k| k.summary.disabled_blades).sum(),
-                kept.iter().map(|k| k.summary.relaxed).sum(),
+                records.iter().map(|k| k.summary.disabled_contacts).sum(),
+                records.iter().map(|k| k.summary.disabled_blades).sum(),
+                records.iter().map(|k| k.summary.relaxed).sum(),
             ],
             by_policy: made.policies,
             paper: PAPER,
@@ -171,30 +178,31 @@ impl RolloutsResult {
     }
 }
 
-fn document(plan: &Plan, r: &RolloutsResult, kept: &[Kept]) -> Result<Document> {
+fn document(manifest: &Manifest, r: &RolloutsResult, records: &[EpisodeRecord]) -> Result<Document> {
     let lead = format!(
-        "{} rollouts of {} by {} controllers, seeds from {}. The paper\u{2019}s 140 are of its own six; counts compare by their shares of what attached.",
+        "{} rollouts of {} by {} controllers, seeds from {}. The paper\u{2019}s 140 are by six other controllers: \
+         compare shares of the attached rollouts.",
         r.rollouts,
         page::escape(&r.scene),
-        plan.policies.len(),
-        plan.seed
+        manifest.policies.len(),
+        manifest.seed
     );
     let cards = [
         Card::new("Held to the end", format!("{} of {}", r.held_to_end, r.attached), "of the attached; paper 83 of 84")
             .met(r.held_to_end == r.attached),
         Card::new("Diverged", count(r.diverged), "of all rollouts").met(r.diverged == 0),
-        Card::new("Inverted elements", count(r.inverted_peak), "at worst, in any frame").met(r.inverted_peak == 0),
+        Card::new("Inverted elements", count(r.inverted_peak), "largest number in any frame").met(r.inverted_peak == 0),
         Card::new("Passed", format!("{} of {}", r.passed, r.rollouts), "all stages"),
         Card::new(
             "Suspensions",
             r.suspensions.map(|n| n.to_string()).join("/"),
-            "of physics: contacts disabled / contacts of blades disabled / organs relaxed",
+            "contacts disabled / contacts of blades disabled / organs relaxed",
         )
         .met(r.suspensions == [0; 3]),
     ];
     let outcome = Section::new("Outcome", lead).cards(cards).table(beside_paper(r));
-    let spread = Section::new("Lift and RCM deviation", "Every rollout that attached the organ.")
-        .figures([lift_and_rcm(plan, kept)?, lifts(plan, kept)?]);
+    let spread = Section::new("Lift and RCM deviation", "All rollouts that attached the organ.")
+        .figures([lift_and_rcm(manifest, records)?, lifts(manifest, records)?]);
     let by_controller = Section::new("Controllers", "").table(controllers(&r.by_policy));
     let subtitle = "Lift and RCM deviation of six controllers, beside the paper's Fig. 6(d, e)";
     Ok(Document::new("Rollouts", subtitle).with(outcome).with(spread).with(by_controller))
@@ -211,9 +219,9 @@ fn beside_paper(r: &RolloutsResult) -> Table {
     let rows = vec![
         row("Attached", of(r.attached, r.rollouts), of(p.attached, p.rollouts)),
         row("Held to the end", of(r.held_to_end, r.attached), of(p.held_to_end, p.attached)),
-        row("Lift, median [mm]", or_dash(r.lift_median_mm, 1), fixed(p.lift_median_mm, 1)),
-        row("Peak RCM deviation, median [mm]", or_dash(r.rcm_peak_median_mm, 3), fixed(p.rcm_peak_median_mm, 2)),
-        row("RCM deviation under load, median of medians [mm]", or_dash(r.rcm_loaded_median_mm, 4), or_dash(None, 0)),
+        row("Lift, median (mm)", or_dash(r.lift_median_mm, 1), fixed(p.lift_median_mm, 1)),
+        row("Peak RCM deviation, median (mm)", or_dash(r.rcm_peak_median_mm, 3), fixed(p.rcm_peak_median_mm, 2)),
+        row("RCM deviation under load, median of medians (mm)", or_dash(r.rcm_loaded_median_mm, 4), or_dash(None, 0)),
         row("RCM within 3 mm", of(r.rcm_within_3_mm, r.attached), of(p.rcm_within_3_mm, p.attached)),
         row("RCM within 5 mm", of(r.rcm_within_5_mm, r.attached), of(p.rcm_within_5_mm, p.attached)),
     ];
@@ -227,9 +235,9 @@ fn controllers(rows: &[PolicyRow]) -> Table {
         "passed",
         "attached",
         "held",
-        "lift mm",
-        "RCM mm, loaded median",
-        "RCM mm, max",
+        "lift (mm)",
+        "RCM, loaded median (mm)",
+        "RCM, max. (mm)",
         "diverged",
     ];
     let row = |p: &PolicyRow| {

@@ -1,8 +1,8 @@
-//! Fig. 6(c): phantoms A, B and C released into the cell; how fast they still move after a second.
+//! Fig. 6(c): phantoms A, B and C released in the cell, and their speed after one second.
 
+use crate::Result;
 use crate::names::{Recorded, SolverName, phantoms_or_all};
-use crate::study::{Job, Kind, Study};
-use crate::{Error, Result};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
 use serde::Serialize;
 use trocar_cell::{FRAME, World};
@@ -15,25 +15,25 @@ use trocar_report::table::{count, fixed, percent};
 use trocar_workflow::phantoms;
 use trocar_workflow::solver_named;
 
-/// Speed under which every specimen must be ... [m/s]
-const SETTLED: f64 = 0.01;
-/// ... after this long [s].
+/// Target: every specimen is below this speed (m/s)
+const SETTLED_SPEED: f64 = 0.01;
+/// after this time (s).
 const AFTER: f64 = 1.0;
 
-/// How long is simulated [s].
+/// Simulated time (s).
 const SECONDS: f64 = 1.5;
 
-/// What the paper says (section VII-C): phantom, speed after a second [m/s], share of the nodes that are fixed.
+/// The paper's figures (section VII-C): phantom, speed after a second (m/s), share of fixed nodes.
 const PAPER: [(&str, f64, f64); 3] =
     [("phantom-a", 0.007, 0.416), ("phantom-b", 0.136, 0.211), ("phantom-c", 0.029, 0.066)];
 
 /// Fig. 6(c): how fast phantoms A, B and C come to rest in the cell.
 #[derive(Clone, Debug, Args)]
-pub struct Settling {
+pub struct SettlingExperiment {
     /// Phantoms; all by default.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
-    /// What steps them.
+    /// The solver.
     #[arg(long, value_enum, default_value_t = SolverName::Fast)]
     pub schedule: SolverName,
     /// Worker threads; all by default.
@@ -44,68 +44,68 @@ pub struct Settling {
     pub recorded: Recorded,
 }
 
-/// One organ after a second.
+/// Figures of one organ.
 #[derive(Clone, Debug, Serialize)]
 pub struct SettlingOrgan {
-    /// Its name.
+    /// Name.
     pub organ: String,
-    /// Share of its nodes that are pinned.
+    /// Share of pinned nodes.
     pub pinned: f64,
-    /// Its greatest node speed in any frame [m/s].
+    /// Largest node speed in any frame (m/s).
     pub peak_speed_m_s: f64,
-    /// Its greatest node speed after a second [m/s].
+    /// Largest node speed after a second (m/s).
     pub speed_m_s: f64,
 }
 
-/// One phantom.
+/// Figures of one phantom.
 #[derive(Clone, Debug, Serialize)]
 pub struct SettlingRow {
-    /// Its name.
+    /// Name.
     pub phantom: String,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: usize,
-    /// Elements.
+    /// Number of elements.
     pub tets: usize,
-    /// Share of the nodes that are pinned.
+    /// Share of pinned nodes.
     pub pinned: f64,
-    /// The paper's share.
+    /// Share of pinned nodes in the paper.
     pub paper_pinned: Option<f64>,
-    /// Greatest node speed in any frame [m/s].
+    /// Largest node speed in any frame (m/s).
     pub peak_speed_m_s: f64,
-    /// Greatest node speed after a second [m/s].
+    /// Largest node speed after a second (m/s).
     pub speed_m_s: f64,
-    /// The paper's [m/s].
+    /// The same in the paper (m/s).
     pub paper_speed_m_s: Option<f64>,
-    /// Below 0.01 m/s after a second, and from then on.
+    /// Whether the speed is below 0.01 m/s from one second on.
     pub settled: bool,
-    /// When it came below 0.01 m/s for good [s].
+    /// Time after which the speed stays below 0.01 m/s (s).
     pub settled_after_s: Option<f64>,
-    /// What ended it, if anything did.
+    /// Why it ended early, if it did.
     pub event: Option<String>,
-    /// Its organs.
+    /// Organs.
     pub organs: Vec<SettlingOrgan>,
-    /// Time [s] and greatest node speed [m/s], frame by frame.
+    /// Time (s) and largest node speed (m/s) of each frame.
     pub speeds: Vec<(f64, f64)>,
 }
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct SettlingResult {
-    /// Every phantom.
+    /// All phantoms.
     pub phantoms: Vec<SettlingRow>,
-    /// The schedule's name.
+    /// Name of the schedule.
     pub schedule: String,
-    /// Wall time of everything [s].
+    /// Wall time (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }
 
-impl Study for Settling {
+impl Study for SettlingExperiment {
     const NAME: &'static str = "settling";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> =
-        Some("Folder for recordings, specimens and report; finished recordings in it are used again.");
+        Some("Output folder of recordings, specimens and report. Finished recordings in it are used again.");
     type Figures = SettlingResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(SettlingResult, Document)> {
@@ -147,9 +147,7 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
     let (mut speeds, mut event) = (Vec::with_capacity(frames), None);
     progress.begin(phantom, frames as u64);
     for frame in 1..=frames {
-        if progress.interrupted() {
-            return Err(Error::Interrupted);
-        }
+        check_interrupted(progress)?;
         let report = world.step(&[]);
         progress.advance(1);
         speeds.push((frame as f64 * FRAME, report.max_speed));
@@ -167,7 +165,7 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
         }
     }
     progress.end();
-    let fast = speeds.iter().rposition(|s| s.1 >= SETTLED);
+    let fast = speeds.iter().rposition(|s| s.1 >= SETTLED_SPEED);
     let settled_after_s = match fast {
         _ if event.is_some() => None,
         None => Some(0.0),
@@ -195,37 +193,32 @@ fn released(phantom: &str, mut world: World, progress: &dyn Progress) -> Result<
 
 fn document(result: &SettlingResult) -> Result<Document> {
     let lead = format!(
-        "Each phantom recorded, reconstructed and released into the cell in its recorded shape (schedule {}). The greatest speed of any node at the end of each frame; the dashed \
-         line is {SETTLED} m/s, below which each must be after a second.",
+        "Each phantom is recorded, reconstructed and released in the cell in its recorded shape (schedule {}). \
+         The plot shows the largest node speed at the end of each frame. The dashed \
+         line is {SETTLED_SPEED} m/s, the target after a second.",
         page::escape(&result.schedule)
     );
-    let line = |(k, speeds): (usize, &Vec<(f64, f64)>)| Line {
-        points: speeds.clone(),
-        color: colors::organ(k),
-        filled: false,
-    };
+    let line = |(k, speeds): (usize, &Vec<(f64, f64)>)| Line::new(speeds.clone(), colors::organ(k));
     let plot = Plot {
-        title: "Greatest node speed",
-        x: "time since release [s]",
-        y: "speed [m/s]",
+        title: "Largest node speed",
+        x: "time since release (s)",
+        y: "speed (m/s)",
         lines: result.phantoms.iter().map(|p| &p.speeds).enumerate().map(line).collect(),
-        bands: vec![],
-        show: vec![],
-        limits: vec![SETTLED],
-        log_x: false,
+        limits: vec![SETTLED_SPEED],
         log_y: true,
+        ..Plot::default()
     };
     let legend = page::legend(result.phantoms.iter().enumerate().map(|(k, p)| (p.phantom.as_str(), colors::organ(k))));
     let settled = result.phantoms.iter().filter(|p| p.settled).count();
     let card = Card::new(
         "Settled within a second",
         format!("{settled} of {}", result.phantoms.len()),
-        "below 0.01 m/s; the paper: one of three",
+        "below 0.01 m/s; paper one of three",
     );
     let section = Section::new("Settling", lead)
         .cards([card.met(settled == result.phantoms.len())])
-        .plot(&plot, &format!("<b>Fig. 6(c) anew.</b>{legend}"))?;
-    Ok(Document::new("Settling", "Phantoms released into the cell")
+        .plot(&plot, &format!("<b>Fig. 6(c).</b>{legend}"))?;
+    Ok(Document::new("Settling", "Phantoms released in the cell")
         .with(section)
         .with(beside_paper(result))
         .with(organs(result)))
@@ -238,8 +231,8 @@ fn beside_paper(result: &SettlingResult) -> Section {
         "Tetrahedra",
         "Pinned",
         "(paper)",
-        "Peak [m/s]",
-        "After 1 s [m/s]",
+        "Peak (m/s)",
+        "After 1 s (m/s)",
         "(paper)",
         "Settled after",
         "Event",
@@ -266,7 +259,7 @@ fn beside_paper(result: &SettlingResult) -> Section {
 }
 
 fn organs(result: &SettlingResult) -> Section {
-    let head = ["Organ", "Phantom", "Pinned", "Peak [m/s]", "After 1 s [m/s]"];
+    let head = ["Organ", "Phantom", "Pinned", "Peak (m/s)", "After 1 s (m/s)"];
     let rows: Vec<Vec<String>> = result
         .phantoms
         .iter()
@@ -276,5 +269,5 @@ fn organs(result: &SettlingResult) -> Section {
             name.into_iter().chain([fixed(o.peak_speed_m_s, 3), fixed(o.speed_m_s, 4)]).collect()
         })
         .collect();
-    Section::new("Organ by organ", "").table(Table::new(head, rows).on_page_only())
+    Section::new("Organs", "").table(Table::new(head, rows).on_page_only())
 }

@@ -11,7 +11,7 @@ use trocar_specimen::Specimen;
 
 /// Views of the organs and their table.
 pub(super) fn section(s: &Specimen, beside_paper: bool) -> Result<String> {
-    // The bodies too: a lattice may stand out a little beyond its surface.
+    // Bodies are included, because a lattice may extend beyond its surface.
     let points: Vec<DVec3> =
         s.organs.iter().flat_map(|o| o.surface.vertices.iter().chain(&o.body.vertices).copied()).collect();
     let d = Directions::of(s);
@@ -21,12 +21,12 @@ pub(super) fn section(s: &Specimen, beside_paper: bool) -> Result<String> {
     let rest = organ_views::rest(s);
     let picture = |view: &View, instances, alt: &str| figures::img(&view.picture(instances, 2), alt);
     let names = s.organs.iter().enumerate().map(|(i, o)| (o.name.as_str(), colors::organ(i)));
-    let wires = format!("<b>Tetrahedra.</b> Outer faces of the bodies that are simulated.{}", page::legend(names));
+    let wires = format!("<b>Tetrahedra.</b> Outer faces of the simulated bodies.{}", page::legend(names));
     let cut = "<b>Cut-away.</b> Each organ opened by an upright plane through its middle; cut elements are lighter.";
     let figures = [
         page::figure(
             &picture(&oblique, organ_views::surfaces(s), "organ surfaces, oblique view")?,
-            "<b>Surfaces.</b> Closed, coloured, seen obliquely from the front.",
+            "<b>Surfaces</b> obliquely from the front.",
         ),
         page::figure(
             &picture(&low, organ_views::surfaces(s), "organ surfaces, low view")?,
@@ -39,8 +39,8 @@ pub(super) fn section(s: &Specimen, beside_paper: bool) -> Result<String> {
         ),
     ];
     let lead = if beside_paper {
-        "Each organ is a watertight surface around a body of tetrahedra; under the figures, where the names agree, \
-         the paper\u{2019}s Table I."
+        "Each organ is a watertight surface around a body of tetrahedra. Small figures: the paper\u{2019}s Table I, for \
+         organs of the same name."
     } else {
         "Each organ is a watertight surface around a body of tetrahedra."
     };

@@ -1,4 +1,4 @@
-//! The page of an episode: how it ended and why, its stages, figures, pictures, and channels over time.
+//! The page of an episode: its end and reason, stages, figures, pictures, and channels over time.
 
 use super::over_time::{self, TimePlot};
 use crate::Result;
@@ -9,12 +9,13 @@ use trocar_report::table::{self, fixed};
 use trocar_scene::TaskName;
 use trocar_task::{ArmChannels, ArmSummary, Channels, Recording, Summary};
 
-/// The channels of one arm in a row, and one value of a row.
+/// Selects the channels of one arm.
 type ArmOf = fn(&Channels) -> &ArmChannels;
+/// A value of one row.
 type Value = Box<dyn Fn(&Channels) -> f64>;
 
-/// The page of the episode `recording` with its `pictures`; `real_time_factor` is simulated over wall
-/// time.
+/// The page of the episode `recording` with its `pictures`. `real_time_factor` is simulated time
+/// over wall time.
 ///
 /// # Errors
 /// A plot or picture that cannot be drawn.
@@ -32,7 +33,7 @@ pub(crate) fn episode(recording: &Recording, pictures: &Pictures, real_time_fact
     Ok(page::page(&title, &subtitle, &body))
 }
 
-/// How the episode ended, why, and which physics was suspended: HTML.
+/// The end of the episode, its reason, and suspensions of physics, as HTML.
 fn lead(s: &Summary) -> String {
     let end = s.end.as_ref().map_or("no end".to_owned(), ToString::to_string);
     let why = s.why.clone().filter(|why| *why != end);
@@ -49,7 +50,6 @@ fn lead(s: &Summary) -> String {
 fn cards(recording: &Recording, real_time_factor: f64) -> String {
     let s = &recording.summary;
     let mm = |v: f64| format!("{} mm", fixed(v, 2));
-    let peak = |of: fn(&ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
     let mut cards = vec![
         Card::new("Passed", if s.passed { "yes" } else { "no" }, format!("score {}", fixed(s.score, 2))).met(s.passed),
         Card::new("Stages", format!("{} of {}", s.stage, s.progress.stages.len()), format!("next: {}", s.next)),
@@ -60,7 +60,7 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
         ),
     ];
     if recording.info.task != TaskName::PortReach {
-        let at = s.grasp_at.map_or("nothing grasped".to_owned(), |at| {
+        let at = s.grasp_at.map_or("no grasp".to_owned(), |at| {
             let organ = &s.details.organ;
             format!("{} grasp of the {organ} at s = {}", s.details.design, fixed(at, 2))
         });
@@ -73,14 +73,13 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
     let threshold = recording.info.rcm_threshold_mm;
     let within = Card::new("RCM deviation", mm(s.rcm_peak_mm), format!("at most; the threshold is {threshold} mm"));
     cards.push(within.met(s.rcm_within));
-    let contact =
-        format!("contact on an instrument; pull of held tissue {} N", fixed(peak(|a| a.peak_constraint_n), 2));
-    cards.push(Card::new("Peak force", format!("{} N", fixed(peak(|a| a.peak_contact_n), 2)), contact));
-    cards.push(Card::new("Inverted elements", s.inverted_peak.to_string(), "at worst").met(s.inverted_peak == 0));
-    let suspended = s.suspensions();
-    let count = (s.disabled_contacts + s.disabled_blades + s.relaxed).to_string();
-    let note = suspended.clone().unwrap_or_else(|| "of physics by safety rules".to_owned());
-    cards.push(Card::new("Suspensions", count, note).met(suspended.is_none()));
+    let contact = format!(
+        "contact on an instrument; pull of held tissue {} N",
+        fixed(over_time::peak(s, |a| a.peak_constraint_n), 2)
+    );
+    cards.push(Card::new("Peak force", format!("{} N", fixed(over_time::peak(s, |a| a.peak_contact_n), 2)), contact));
+    cards.push(over_time::inverted_card(s));
+    cards.push(over_time::suspensions_card(s));
     page::cards(&cards)
 }
 
@@ -90,23 +89,23 @@ fn stages(s: &Summary) -> String {
         vec![p.stage.name().to_owned(), if p.passed { "yes" } else { "no" }.to_owned(), time, fixed(100.0 * p.share, 0)]
     };
     let rows: Vec<Vec<String>> = s.progress.stages.iter().map(row).collect();
-    let lead = "Stages pass in their order; a stage that did not pass shows how near it came.";
-    page::section("Stages", lead, &table::plain(&["Stage", "Passed", "Time [s]", "Share [%]"], &rows))
+    let lead = "Stages pass in order. Share: progress towards passing the stage.";
+    page::section("Stages", lead, &table::plain(&["Stage", "Passed", "Time (s)", "Share (%)"], &rows))
 }
 
 fn arms(recording: &Recording) -> String {
     let head = [
         "Arm",
-        "Under load [s]",
-        "RCM under load, median [mm]",
-        "95% [mm]",
-        "Largest [mm]",
-        "Whole episode [mm]",
-        "Lag [ms]",
-        "Contact [N]",
-        "Pull [N]",
-        "Jaw [N]",
-        "Tilt [\u{b0}]",
+        "Under load (s)",
+        "RCM under load, median (mm)",
+        "95% (mm)",
+        "Largest (mm)",
+        "Whole episode (mm)",
+        "Lag (ms)",
+        "Contact (N)",
+        "Constraint (N)",
+        "Jaw (N)",
+        "Tilt (\u{b0})",
         "Periods without contact",
         "Commands shortened",
     ];
@@ -129,11 +128,11 @@ fn arms(recording: &Recording) -> String {
         ]
     };
     let rows: Vec<Vec<String>> = recording.summary.arms.iter().map(row).collect();
-    let lead = "Forces are peaks. A dash means that the arm was never under load, or never without.";
+    let lead = "Forces are peaks. A dash: the arm was never under load, or never without load.";
     page::section("Arms", lead, &table::plain(&head, &rows))
 }
 
-/// Spans between the times at which stages passed, named by the stage that was next.
+/// A band per stage, until the time at which it passed.
 fn bands(s: &Summary) -> Vec<Band> {
     let mut from = 0.0;
     let mut bands = Vec::new();
@@ -182,44 +181,46 @@ fn plots(recording: &Recording) -> Result<String> {
     };
     let (title, caption) = match recording.info.task {
         TaskName::PortReach => ("Distance to the targets", "largest distance of a blade tip from its target."),
-        _ => ("Lift", "rise since the jaws took hold, and how far tissue moved in them; zero while they hold nothing."),
+        _ => {
+            ("Lift", "rise of jaws and tissue since the grasp, and slip of the tissue in the jaws; 0 without a grasp.")
+        }
     };
     let near = recording.summary.rcm_peak_mm > 0.5 * recording.info.rcm_threshold_mm;
     let limits = if near { vec![recording.info.rcm_threshold_mm] } else { vec![] };
     let all = [
-        TimePlot { title, y: "[mm]", curves: &task, caption, limits: vec![] }
+        TimePlot { title, y: "distance (mm)", curves: &task, caption, limits: vec![] }
             .figure(channels, bands(&recording.summary))?,
-        both("Jaw", "opening [1]", |a| a.jaw, "0 closed, 1 wide open.", vec![])?,
-        both("Contact force", "force [N]", ArmChannels::contact_n, "of tissue on the instrument.", vec![])?,
+        both("Jaw", "opening (1)", |a| a.jaw, "0: closed, 1: wide open.", vec![])?,
+        both("Contact force", "force (N)", ArmChannels::contact_n, "force of tissue on the instrument.", vec![])?,
         both(
             "Constraint force",
-            "force [N]",
+            "force (N)",
             ArmChannels::constraint_n,
             "pull of the tissue that the jaws hold.",
             vec![],
         )?,
         both(
             "RCM deviation",
-            "deviation [mm]",
+            "deviation (mm)",
             |a| a.rcm_peak_mm,
-            "from the port\u{2019}s centre to the shaft\u{2019}s axis, largest of a period; dashed the threshold, where it is near.",
+            "distance of the port\u{2019}s centre from the shaft\u{2019}s axis, largest of the period; dashed: the threshold, if near.",
             limits,
         )?,
         both(
-            "Behind the command",
-            "[mm]",
+            "Tracking error",
+            "distance (mm)",
             |a| a.tracking_mm,
-            "distance of the tip from what was commanded at that time.",
+            "distance of the tip from its command at the same time.",
             vec![],
         )?,
         TimePlot {
             title: "Smallest volume ratio",
-            y: "volume ratio [1]",
+            y: "volume ratio (1)",
             curves: &[("tissue", &|c| c.task.min_volume, 4)],
             caption: "volume of the most compressed element over its volume at rest; at 0 an element is inverted.",
             limits: vec![],
         }
         .figure(channels, bands(&recording.summary))?,
     ];
-    Ok(page::section("Over time", "Shaded: the stage that was next.", &page::grid(Columns::Two, &all)))
+    Ok(page::section("Over time", "Shaded: the next stage.", &page::grid(Columns::Two, &all)))
 }

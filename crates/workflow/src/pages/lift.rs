@@ -1,8 +1,8 @@
-//! The page of a lift: figures of merit, what the cameras saw, and what arms and tissue did over time.
+//! The page of a lift: outcome, camera pictures, and channels of arms and tissue over time.
 
+use super::cut;
 use super::over_time::{self, Curve, TimePlot};
-use super::severed;
-use crate::lifted::Lifted;
+use crate::lift_result::FinishedLift;
 use crate::{Result, counted};
 use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::Band;
@@ -10,12 +10,13 @@ use trocar_report::table::fixed;
 use trocar_scene::Side;
 use trocar_task::{ArmChannels, Channels};
 
-/// RCM deviation of the paper's rollouts, median (mm), and its threshold (mm).
+/// Median RCM deviation of the paper's rollouts (mm).
 const PAPER_RCM_MM: f64 = 0.12;
+/// The paper's threshold of the RCM deviation (mm).
 const THRESHOLD_MM: f64 = 3.0;
 
-/// The sections that come first, and those with details.
-pub(super) fn sections(lifted: &Lifted) -> Result<(String, String)> {
+/// The sections of the outcome, and those of the details.
+pub(super) fn sections(lifted: &FinishedLift) -> Result<(String, String)> {
     let s = &lifted.recording.summary;
     let mut lead = "The jaws close on the organ, lift it and hold it.".to_owned();
     if let Some(why) = &s.why {
@@ -30,7 +31,7 @@ pub(super) fn sections(lifted: &Lifted) -> Result<(String, String)> {
     let title = if s.diverged { "The lift (diverged)" } else { "The lift" };
     let mut first = page::section(title, &lead, &cards(lifted)) + &over_time::pictures(&lifted.pictures)?;
     if let Some(cut) = &s.details.sever {
-        first += &severed::section(cut);
+        first += &cut::section(cut);
     }
     let plots = page::grid(Columns::Two, &plots(lifted)?);
     let details = page::section("Over time", "Shaded: the phases of the script.", &plots)
@@ -39,42 +40,35 @@ pub(super) fn sections(lifted: &Lifted) -> Result<(String, String)> {
     Ok((first, details))
 }
 
-fn cards(lifted: &Lifted) -> String {
+fn cards(lifted: &FinishedLift) -> String {
     let (r, s) = (&lifted.result, &lifted.recording.summary);
     let (d, mm) = (&s.details, |v: f64| format!("{} mm", fixed(v, 2)));
-    let peak = |of: fn(&trocar_task::ArmSummary) -> f64| s.arms.iter().map(of).fold(0.0, f64::max);
-    let grasp = s.grasp_at.map_or("nothing grasped".to_owned(), |at| {
+    let grasp = s.grasp_at.map_or("no grasp".to_owned(), |at| {
         format!("{} grasp of {} of the {} at s = {}", d.design, counted(d.held_nodes, "node"), d.organ, fixed(at, 2))
     });
     let mut cards = vec![Card::new("Held", if s.held { "yes" } else { "no" }, grasp).met(s.held)];
-    // Without a grasp there is nothing to measure.
     if let (Some(slip), Some(follow)) = (s.slip_mm, s.follow_ratio) {
         cards.extend([
             Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * follow, 0)))
                 .met(follow >= 0.8),
             Card::new("Slip", mm(slip), "less than 3 mm counts as held").met(slip < 3.0),
-            Card::new("Snap", mm(d.snap_mm), "what the grasp prescribes when the jaws take hold"),
-            Card::new("Activation step", mm(d.activation_step_mm), "what moves in its first frame"),
+            Card::new("Snap", mm(d.snap_mm), "largest displacement that the grasp prescribes at its start"),
+            Card::new("Activation step", mm(d.activation_step_mm), "largest motion of a node in its first frame"),
             Card::new(
                 "Jaws",
                 format!("{} N", fixed(d.closing_force_n, 2)),
-                format!("of {} N; closed on {} mm", fixed(d.jaw_force_n, 2), fixed(d.gap_mm, 1)),
+                format!("of {} N; gap {} mm", fixed(d.jaw_force_n, 2), fixed(d.gap_mm, 1)),
             ),
         ]);
     }
     cards.extend([
         Card::new(
             "Peak force",
-            format!("{} N", fixed(peak(|a| a.peak_constraint_n), 2)),
-            format!("constraint; contact {} N", fixed(peak(|a| a.peak_contact_n), 2)),
+            format!("{} N", fixed(over_time::peak(s, |a| a.peak_constraint_n), 2)),
+            format!("constraint; contact {} N", fixed(over_time::peak(s, |a| a.peak_contact_n), 2)),
         ),
-        Card::new("Inverted elements", s.inverted_peak.to_string(), "at worst").met(s.inverted_peak == 0),
-        Card::new(
-            "Suspensions",
-            (s.disabled_contacts + s.disabled_blades + s.relaxed).to_string(),
-            s.suspensions().unwrap_or_else(|| "of physics by safety rules".to_owned()),
-        )
-        .met(s.suspensions().is_none()),
+        over_time::inverted_card(s),
+        over_time::suspensions_card(s),
         Card::new("Speed", format!("{}\u{d7}", fixed(r.real_time_factor, 2)), "of real time, arms and tissue"),
     ]);
     if s.arms.iter().any(|a| a.rcm_peak_mm > 0.0) {
@@ -87,7 +81,7 @@ fn cards(lifted: &Lifted) -> String {
     page::cards(&cards)
 }
 
-fn bands(lifted: &Lifted) -> Vec<Band> {
+fn bands(lifted: &FinishedLift) -> Vec<Band> {
     let mut bands: Vec<Band> = Vec::new();
     for (row, phase) in lifted.recording.channels.iter().zip(&lifted.phases) {
         match bands.last_mut().filter(|b| b.name == *phase) {
@@ -102,7 +96,7 @@ fn bands(lifted: &Lifted) -> Vec<Band> {
 }
 
 fn plot(
-    lifted: &Lifted,
+    lifted: &FinishedLift,
     (title, y): (&str, &str),
     curves: &[Curve<'_>],
     caption: &str,
@@ -111,7 +105,7 @@ fn plot(
     TimePlot { title, y, curves, caption, limits }.figure(&lifted.recording.channels, bands(lifted))
 }
 
-fn plots(lifted: &Lifted) -> Result<Vec<String>> {
+fn plots(lifted: &FinishedLift) -> Result<Vec<String>> {
     let grasper = lifted.recording.events.iter().find_map(|(_, e)| match e {
         trocar_cell::CellEvent::Attached { arm, .. } => Some(*arm),
         _ => None,
@@ -121,43 +115,43 @@ fn plots(lifted: &Lifted) -> Result<Vec<String>> {
     let mut all = vec![
         plot(
             lifted,
-            ("Lift", "[mm]"),
+            ("Lift", "height (mm)"),
             &[
                 ("jaws", &|c| c.task.jaw_lift_mm, 1),
                 ("tissue", &|c| c.task.lift_mm, 4),
                 ("slip", &|c| c.task.slip_mm, 2),
             ],
-            "rise since the jaws took hold, and how far tissue moved in them.",
+            "rise of jaws and tissue since the grasp, and slip of the tissue in the jaws.",
             vec![],
         )?,
         plot(
             lifted,
-            ("Force", "force [N]"),
+            ("Force", "force (N)"),
             &[
                 ("contact", &|c| arm(c).contact_n(), 1),
                 ("constraint", &|c| arm(c).constraint_n(), 2),
                 ("on the jaws", &|c| arm(c).jaw_force_n, 4),
             ],
-            "what tissue does to the instrument, by kind; contact cancels where both blades press.",
+            "force of tissue on the instrument, by kind; contact forces on the two blades cancel.",
             vec![],
         )?,
         plot(
             lifted,
-            ("Jaw", "opening [1]"),
+            ("Jaw", "opening (1)"),
             &[("opening", &|c| arm(c).jaw, 1)],
-            "0 closed, 1 wide open. Jaws close with a force, not to an angle.",
+            "0: closed, 1: wide open. Jaws close with a force, not to an angle.",
             vec![],
         )?,
         plot(
             lifted,
-            ("Largest node speed", "speed [m/s]"),
+            ("Largest node speed", "speed (m/s)"),
             &[("tissue", &|c| c.task.max_speed_m_s, 4)],
-            "over all organs; dashed: settled, 0.01 m/s.",
+            "of all organs; dashed: limit of settled tissue, 0.01 m/s.",
             vec![0.01],
         )?,
         plot(
             lifted,
-            ("Smallest volume ratio", "volume ratio [1]"),
+            ("Smallest volume ratio", "volume ratio (1)"),
             &[("tissue", &|c| c.task.min_volume, 4)],
             "volume of the most compressed element over its volume at rest; at 0 an element is inverted.",
             vec![],
@@ -166,16 +160,19 @@ fn plots(lifted: &Lifted) -> Result<Vec<String>> {
     if lifted.recording.summary.arms.iter().any(|a| a.rcm_peak_mm > 0.0) {
         all.push(plot(
             lifted,
-            ("RCM deviation", "deviation [mm]"),
-            &[("largest of the period", &|c| arm(c).rcm_peak_mm, 2), ("at its end", &|c| arm(c).rcm_mm, 1)],
-            "from the port\u{2019}s centre to the shaft\u{2019}s axis; dashed the paper\u{2019}s median.",
+            ("RCM deviation", "deviation (mm)"),
+            &[
+                ("largest of the period", &|c| arm(c).rcm_peak_mm, 2),
+                ("at the end of the period", &|c| arm(c).rcm_mm, 1),
+            ],
+            "distance of the port\u{2019}s centre from the shaft\u{2019}s axis; dashed: the paper\u{2019}s median.",
             vec![PAPER_RCM_MM],
         )?);
         all.push(plot(
             lifted,
-            ("Behind the command", "[mm]"),
+            ("Tracking error", "distance (mm)"),
             &[("tip", &|c| arm(c).tracking_mm, 1)],
-            "distance from what was commanded at that time: the reference\u{2019}s lag and the tracking error.",
+            "distance of the tip from its command at the same time, which includes the lag of the reference.",
             vec![],
         )?);
     }

@@ -1,19 +1,19 @@
 //! The pages of specimens and runs.
 //!
-//! [`reconstruction`] shows how a recording became organs, [`surface`] what became of a ready surface, and the page of a lift how
-//! the organs behaved when they were lifted.
+//! [`reconstruction`] is the page of a specimen from a recording, [`surface`] that of a specimen
+//! from a surface file. Lifts and episodes have pages, too.
 
 mod bodies;
+mod cut;
 mod episode;
+mod images;
 mod lift;
 mod organ_table;
 pub mod organ_views;
 mod over_time;
-mod seen;
-mod severed;
 mod truth;
 
-use crate::lifted::Lifted;
+use crate::lift_result::FinishedLift;
 use crate::{Result, counted};
 use std::path::Path;
 use trocar_geometry::RepairReport;
@@ -22,17 +22,18 @@ use trocar_report::{page, table};
 use trocar_specimen::Specimen;
 
 pub(crate) use episode::episode;
-pub use seen::check_sizes;
+pub use images::check_sizes;
 
-/// The page of a specimen reconstructed from a recording. `truth_dir` is the phantom's `truth` folder or the recording that
-/// holds it; with `color.png` or `depth.png` (0.1 mm a unit) in it, the composite is compared with them.
+/// The page of a specimen reconstructed from a recording. `truth_dir` is the phantom's folder
+/// `truth` or the recording that holds it. Its `color.png` and `depth.png` (unit 0.1 mm), if
+/// present, are compared with the composite.
 ///
 /// # Errors
-/// Images of differing sizes, an unreadable truth file, a picture that cannot be encoded.
+/// Images of different sizes, an unreadable truth file, a picture that cannot be encoded.
 pub fn reconstruction(r: &Reconstruction, truth_dir: Option<&Path>) -> Result<String> {
     let truth = match truth_dir {
         Some(dir) => {
-            seen::check_sizes(r)?;
+            images::check_sizes(r)?;
             truth::section(r, dir)?
         }
         None => String::new(),
@@ -41,21 +42,21 @@ pub fn reconstruction(r: &Reconstruction, truth_dir: Option<&Path>) -> Result<St
     Ok(page::page(&r.specimen.name, &made_from(&r.specimen, "Reconstruction"), &body))
 }
 
-/// The sections of the reconstruction's page without its frame, to put before those of a run.
+/// The sections of the reconstruction, for a page that shows a run as well.
 ///
 /// # Errors
-/// Images of differing sizes, a picture that cannot be encoded.
+/// Images of different sizes, a picture that cannot be encoded.
 pub fn reconstruction_sections(r: &Reconstruction) -> Result<String> {
-    seen::check_sizes(r)?;
+    images::check_sizes(r)?;
     let specimen = &r.specimen;
-    Ok(seen::overview(r)
-        + &seen::images(r)?
+    Ok(images::overview(r)
+        + &images::images(r)?
         + &bodies::section(specimen, true)?
-        + &seen::depth_errors(r)?
+        + &images::depth_errors(r)?
         + &notes(&r.notes))
 }
 
-/// The page of a specimen made from a ready surface.
+/// The page of a specimen made from a surface file.
 ///
 /// # Errors
 /// A picture that cannot be encoded.
@@ -67,34 +68,30 @@ pub fn surface(s: &Specimen, repair: &RepairReport) -> Result<String> {
         found(repair.merged_vertices, "coincident vertices merged"),
         found(repair.degenerate_triangles, "degenerate triangles removed"),
         found(repair.open_edges, "edges with other than two triangles before the repair"),
-        did(repair.flipped, "The triangles faced inward and were turned."),
+        did(repair.flipped, "The triangles faced inward and were flipped."),
         did(
             repair.rebuilt,
-            "The surface was not watertight; it was rebuilt from its winding number and its largest piece kept.",
+            "The surface was not watertight. It was rebuilt from its winding number; only its largest piece was used.",
         ),
-        did(!repair.rebuilt, "The surface is used as it came: it encloses a volume."),
+        did(!repair.rebuilt, "The surface encloses a volume and is used unchanged."),
     ]
     .into_iter()
     .flatten()
     .collect();
     let body = bodies::section(s, false)?
-        + &page::section(
-            "The surface as found",
-            "What was wrong with the file's surface, and what was done.",
-            &page::list(&lines),
-        )
+        + &page::section("Surface file", "Defects of the surface and their repair.", &page::list(&lines))
         + &provenance(s);
     Ok(page::page(&s.name, &made_from(s, "Organ"), &body))
 }
 
-/// The page of a lift; `before` are sections to put first, such as [`reconstruction_sections`].
+/// The page of a lift. `before` are sections to insert after the outcome, such as
+/// [`reconstruction_sections`].
 ///
 /// # Errors
 /// A picture or plot that cannot be made.
-pub(crate) fn lift(s: &Specimen, lifted: &Lifted, before: Option<&str>) -> Result<String> {
+pub(crate) fn lift(s: &Specimen, lifted: &FinishedLift, before: Option<&str>) -> Result<String> {
     let (outcome, details) = lift::sections(lifted)?;
     let body = match before {
-        // The outcome first: it is what the reader came for.
         Some(before) => outcome + before + &details,
         None => outcome + &bodies::section(s, s.camera.is_some())? + &details,
     };
@@ -116,7 +113,7 @@ fn notes(notes: &[String]) -> String {
     if notes.is_empty() {
         return String::new();
     }
-    page::section("Notes", "What the reconstruction met on the way.", &page::list(notes))
+    page::section("Notes", "Remarks of the reconstruction.", &page::list(notes))
 }
 
 fn provenance(s: &Specimen) -> String {

@@ -6,16 +6,16 @@ use trocar_report::table::{count, fixed, percent};
 use trocar_report::{colors, page};
 use trocar_specimen::{Organ, Specimen};
 
-/// A row an organ. `beside_paper` puts the paper's figures under those of organs of the same name.
+/// One row per organ. `beside_paper` adds the paper's figures for organs of the same name.
 pub fn organs(specimen: &Specimen, beside_paper: bool) -> String {
     let seen = specimen.organs.iter().any(|o| o.facts.depth_error_median_mm.is_some());
     let mut out = String::from(
-        "<div class=\"wide\"><table><thead><tr><th>Organ</th><th>Nodes</th><th>Tetra\u{ad}hedra</th><th>E<br>[kPa]</th>\
-         <th>Min. dihedral<br>[\u{b0}]</th><th>Median dihedral<br>[\u{b0}]</th><th>Median edge<br>[mm]</th>\
-         <th>Volume<br>[cm\u{b3}]</th><th>Water\u{ad}tight</th><th>In\u{ad}verted</th>",
+        "<div class=\"wide\"><table><thead><tr><th>Organ</th><th>Nodes</th><th>Tetra\u{ad}hedra</th><th>E<br>(kPa)</th>\
+         <th>Min. dihedral<br>(\u{b0})</th><th>Median dihedral<br>(\u{b0})</th><th>Median edge<br>(mm)</th>\
+         <th>Volume<br>(cm\u{b3})</th><th>Water\u{ad}tight</th><th>In\u{ad}verted</th>",
     );
     if seen {
-        out.push_str("<th>Depth error<br>[mm]</th><th>signed<br>[mm]</th><th>Covered</th>");
+        out.push_str("<th>Depth error<br>(mm)</th><th>signed<br>(mm)</th><th>Covered</th>");
     }
     out.push_str("</tr></thead><tbody>\n");
     for (i, organ) in specimen.organs.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! What views of a specimen show: whole organs, their elements, cut-aways; and from where.
+//! The contents of views of a specimen (organs, elements, cut-aways), and their directions.
 
 use glam::DVec3;
 use trocar_geometry::TetMesh;
@@ -7,19 +7,19 @@ use trocar_report::colors;
 use trocar_report::views::shell;
 use trocar_specimen::Specimen;
 
-/// Directions of a specimen that views are made of.
+/// Directions for views of a specimen.
 #[derive(Clone, Copy, Debug)]
 pub struct Directions {
     /// Against gravity.
     pub up: DVec3,
-    /// Horizontal, towards who stands at the lower edge of the recorded image.
+    /// Horizontal, towards a person at the lower edge of the recorded image.
     pub front: DVec3,
     /// Horizontal, to that person's right.
     pub right: DVec3,
 }
 
 impl Directions {
-    /// Of `specimen`.
+    /// The directions of `specimen`.
     pub fn of(specimen: &Specimen) -> Self {
         let up = specimen.up.normalize_or(DVec3::Z);
         // The recording frame is the camera's: y runs down the image. A ready surface has z up and
@@ -55,9 +55,8 @@ pub fn label(index: usize) -> u16 {
     u16::try_from(index + 1).unwrap_or(u16::MAX)
 }
 
-/// The tetrahedra of every organ as wires in its colour; `cut` removes the half of each organ on
-/// the side of that direction, along the plane through the middle of its nodes. Cut faces are
-/// lighter.
+/// The tetrahedra of every organ as wires in its colour. `cut` is a direction: the half of each
+/// organ on that side of the middle of its nodes is removed. Cut faces are lighter.
 pub fn wires(specimen: &Specimen, nodes: &[Vec<DVec3>], cut: Option<DVec3>) -> Vec<Instance> {
     let instance = |(i, (organ, nodes)): (usize, (&trocar_specimen::Organ, &Vec<DVec3>))| {
         let color = colors::organ(i);

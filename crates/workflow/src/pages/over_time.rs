@@ -1,14 +1,14 @@
-//! What every episode's page shows: pictures, plots over time, events, all figures.
+//! Sections of lifts and episodes: pictures, plots over time, events, and all figures.
 
 use crate::Result;
 use crate::recorder::Pictures;
 use serde::Serialize;
 use trocar_cell::CellEvent;
-use trocar_report::page::{self, Columns};
+use trocar_report::page::{self, Card, Columns};
 use trocar_report::plots::{Band, Line, Plot};
 use trocar_report::table::{self, fixed};
 use trocar_report::{colors, figures};
-use trocar_task::Channels;
+use trocar_task::{ArmSummary, Channels, Summary};
 
 /// A curve: its name, its value in a row, and the number of its colour.
 pub(super) type Curve<'a> = (&'a str, &'a dyn Fn(&Channels) -> f64, usize);
@@ -25,7 +25,7 @@ pub(super) struct TimePlot<'a> {
 }
 
 impl TimePlot<'_> {
-    /// The plot of `channels`, before `bands`.
+    /// The plot of `channels` over `bands`.
     ///
     /// # Errors
     /// A plot that cannot be drawn.
@@ -37,7 +37,7 @@ impl TimePlot<'_> {
         };
         let plot = Plot {
             title: self.title,
-            x: "time [s]",
+            x: "time (s)",
             y: self.y,
             lines: self.curves.iter().map(line).collect(),
             bands,
@@ -51,13 +51,30 @@ impl TimePlot<'_> {
     }
 }
 
-/// The section of pictures; nothing without any.
+/// The maximum of `of` over the arms.
+pub(super) fn peak(s: &Summary, of: fn(&ArmSummary) -> f64) -> f64 {
+    s.arms.iter().map(of).fold(0.0, f64::max)
+}
+
+/// The card with the number of inverted elements.
+pub(super) fn inverted_card(s: &Summary) -> Card {
+    Card::new("Inverted elements", s.inverted_peak.to_string(), "maximum of any frame").met(s.inverted_peak == 0)
+}
+
+/// The card with the suspensions of physics.
+pub(super) fn suspensions_card(s: &Summary) -> Card {
+    let count = s.disabled_contacts + s.disabled_blades + s.relaxed;
+    let note = s.suspensions().unwrap_or_else(|| "of physics by safety rules".to_owned());
+    Card::new("Suspensions", count.to_string(), note).met(count == 0)
+}
+
+/// The section of pictures; empty without pictures.
 ///
 /// # Errors
 /// A picture that cannot be encoded.
 pub(super) fn pictures(pictures: &Pictures) -> Result<String> {
     let mut all = Vec::new();
-    if let Some((bytes, size)) = &pictures.film {
+    if let Some((bytes, size)) = &pictures.video {
         let img = figures::img_of_bytes("webp", bytes, size[0], size[1], "the lift through a camera of the scene");
         all.push(page::figure(&img, "<b>The lift</b> in real time."));
     }
@@ -67,27 +84,48 @@ pub(super) fn pictures(pictures: &Pictures) -> Result<String> {
     if all.is_empty() {
         return Ok(String::new());
     }
-    let lead = "Direct light; instruments and organs are where the simulation has them.";
-    Ok(page::section("What the cameras saw", lead, &page::grid(Columns::Two, &all)))
+    let lead = "Pictures with direct light of the simulated instruments and organs.";
+    Ok(page::section("Camera pictures", lead, &page::grid(Columns::Two, &all)))
 }
 
 /// The section of events.
 pub(super) fn events(events: &[(f64, CellEvent)]) -> String {
     let rows: Vec<Vec<String>> = events.iter().map(|(time, event)| vec![fixed(*time, 2), event.to_string()]).collect();
-    let body = if rows.is_empty() { String::new() } else { table::plain(&["Time [s]", "Event"], &rows) };
-    let lead = if rows.is_empty() { "The jaws took hold of nothing and cut nothing." } else { "" };
-    page::section("What happened", lead, &body)
+    if rows.is_empty() {
+        return page::section("Events", "None: no grasp and no cut.", "");
+    }
+    page::section("Events", "", &table::plain(&["Time (s)", "Event"], &rows))
 }
 
-/// The section of every number, word and flag of `result` by its key. What was not measured has a dash.
+/// Keys of figures that only a grasp has.
+const GRASP_FIGURES: [&str; 9] = [
+    "held_nodes",
+    "gap_mm",
+    "closing_force_n",
+    "snap_mm",
+    "snap_mean_mm",
+    "activation_step_mm",
+    "displaced_mm",
+    "lift_mm",
+    "slipped",
+];
+
+/// The section of all numbers, texts and flags of `result` by key. Figures that were not measured
+/// have a dash, as those of a grasp if there was none.
 pub(super) fn all_figures(result: &impl Serialize) -> String {
     let Ok(serde_json::Value::Object(all)) = serde_json::to_value(result) else { return String::new() };
+    let grasped = all.get("grasp_at").is_some_and(|at| !at.is_null());
     let simple = all.into_iter().filter(|(_, v)| !v.is_array() && !v.is_object());
-    let text = |v: serde_json::Value| match v {
+    let text = |key: &str, v: serde_json::Value| match v {
+        _ if !grasped && GRASP_FIGURES.contains(&key) => "\u{2013}".to_owned(),
         serde_json::Value::Null => "\u{2013}".to_owned(),
         serde_json::Value::String(text) => text,
         other => other.to_string(),
     };
-    let rows: Vec<Vec<String>> = simple.map(|(key, value)| vec![key, text(value)]).collect();
-    page::section("All figures of the run", "", &table::plain(&["Figure", "Value"], &rows))
+    let row = |(key, value): (String, serde_json::Value)| {
+        let text = text(&key, value);
+        vec![key, text]
+    };
+    let rows: Vec<Vec<String>> = simple.map(row).collect();
+    page::section("All figures", "", &table::plain(&["Figure", "Value"], &rows))
 }

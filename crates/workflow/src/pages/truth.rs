@@ -1,4 +1,4 @@
-//! The composite against the instrument-free truth of a phantom.
+//! The section that compares the composite with the truth of a phantom.
 
 use crate::Result;
 use crate::truth::{Part, Truth};
@@ -9,7 +9,7 @@ use trocar_report::overlays;
 use trocar_report::page::{self, Columns};
 use trocar_report::{colors::DIVERGING, figures, table};
 
-/// The section; empty when `dir` (the folder of the truth, or the recording with it as `truth/`)
+/// The section; empty if `dir` (the folder of the truth, or the recording with it as `truth/`)
 /// has neither `color.png` nor `depth.png`.
 ///
 /// # Errors
@@ -38,8 +38,8 @@ pub(super) fn section(r: &Reconstruction, dir: &Path) -> Result<String> {
     ];
     Ok(page::section(
         "Composite against the truth",
-        "The phantom is known exactly, so what the composite recovered, also under the instruments, can be checked. \
-         Colour differences are of 255 levels.",
+        "The exact view of the phantom without instruments is known, so the composite can be checked, also under the \
+         instruments. Colour differences are of 255 levels.",
         &(page::grid(Columns::Two, &figures) + &table::plain(&head, &rows)),
     ))
 }
@@ -53,7 +53,7 @@ fn error_map(r: &Reconstruction, truth: &DepthImage) -> Result<String> {
     overlays::error(&mut picture, &error, &compared);
     overlays::outline(&mut picture, &r.instruments, trocar_report::colors::INSTRUMENT);
     let img = figures::img(&picture, "depth error of the composite")?;
-    let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "composite minus true depth [mm]", "+5");
+    let bar = page::scale_bar(&DIVERGING, "\u{2212}5", "composite minus true depth (mm)", "+5");
     let caption = "<b>Depth error of the composite.</b> Outlined: the instruments of the centre frame.";
     Ok(page::figure(&img, &format!("{caption}{bar}")))
 }

@@ -1,58 +1,59 @@
-//! What `trocar render` tells of a picture.
+//! The figures that `trocar render` prints.
 
-use super::colors::label_color;
+use crate::picture_colors::label_color;
 use serde::Serialize;
 use trocar_sensors::CameraRig;
 
-/// A picture that was made.
+/// The figures of a picture or video.
 #[derive(Clone, Debug, Serialize)]
 pub struct Rendered {
     /// The camera.
     pub camera: String,
-    /// Width of the picture [px].
+    /// Width (px).
     pub width: usize,
-    /// Height of the picture [px].
+    /// Height (px).
     pub height: usize,
-    /// Simulated time of the picture, of a moving one of its last frame [s].
+    /// Simulated time of the picture, or of the last frame of a video (s).
     pub time_s: f64,
-    /// Frames.
+    /// Number of frames.
     pub frames: usize,
-    /// Paths a pixel; 0 for direct light alone.
+    /// Paths per pixel; 0 for direct light only.
     pub samples: u32,
-    /// Triangles on the stage.
+    /// Number of triangles of the scene.
     pub triangles: usize,
-    /// Wall time of the pictures [s].
+    /// Wall time of rendering (s).
     pub render_s: f64,
-    /// What was seen: name and label, colour in the picture of labels, share of the picture.
-    pub seen: Vec<Seen>,
-    /// Files.
+    /// The visible objects.
+    pub seen: Vec<VisibleObject>,
+    /// The written files.
     pub files: Vec<String>,
-    /// Where the episode that was done again is not the recorded one, as one of another version of the program may be.
+    /// The first difference of the replay from the recorded episode, as after a change of the
+    /// program.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub differs: Option<String>,
 }
 
-/// Something in a picture.
+/// An object in a picture.
 #[derive(Clone, Debug, Serialize)]
-pub struct Seen {
+pub struct VisibleObject {
     /// Its name.
     pub name: String,
     /// Its label.
     pub label: u16,
     /// Its sRGB colour in the picture of labels.
     pub color: [u8; 3],
-    /// Share of the pixels.
+    /// Its share of the pixels.
     pub share: f64,
 }
 
-/// What is in a picture of `labels`, with its shares.
-pub(super) fn seen(sight: &CameraRig, labels: &[u16]) -> Vec<Seen> {
+/// The objects in a picture of `labels`.
+pub(super) fn visible_objects(rig: &CameraRig, labels: &[u16]) -> Vec<VisibleObject> {
     let count = |label: u16| labels.iter().filter(|l| **l == label).count() as f64 / labels.len().max(1) as f64;
-    let row = |(label, name): &(u16, String)| Seen {
+    let row = |(label, name): &(u16, String)| VisibleObject {
         name: name.clone(),
         label: *label,
         color: label_color(*label),
         share: count(*label),
     };
-    sight.labels().iter().map(row).filter(|s| s.share > 0.0).collect()
+    rig.labels().iter().map(row).filter(|s| s.share > 0.0).collect()
 }

@@ -1,4 +1,4 @@
-//! The scripted grasp-lift of a scene, a control period at a time: for pictures.
+//! The scripted grasp-lift of a scene, one control period at a time, for pictures.
 
 use crate::Result;
 use crate::specimen_scene::{grasp_lift, task_organ};
@@ -16,8 +16,8 @@ pub struct ScriptedLift {
 }
 
 impl ScriptedLift {
-    /// In the cell of `scene` around `specimen`: the organ of the scene's task, grasped in the middle and
-    /// lifted 15 mm, as the scene's grasp design holds.
+    /// The grasp-lift in the cell of `scene` with `specimen`. The organ of the scene's task is
+    /// grasped in the middle with the scene's grasp design and lifted by 15 mm.
     ///
     /// # Errors
     /// A scene that cannot be built, a specimen without organs.
@@ -32,12 +32,12 @@ impl ScriptedLift {
         Ok(Self { episode, policy, chunk: std::collections::VecDeque::new() })
     }
 
-    /// The cell as it is now.
+    /// The cell in its present state.
     pub fn cell(&self) -> &Cell {
         self.episode.cell()
     }
 
-    /// Does one control period; false when the lift is over.
+    /// Advances one control period. Returns false at the end.
     ///
     /// # Errors
     /// A place that cannot be grasped.

@@ -1,4 +1,4 @@
-//! Rays a second, beside Embree's.
+//! Rays per second, beside Embree.
 
 use crate::bench::embree::{Embree, EmbreeRows};
 use crate::{Error, Result};
@@ -12,31 +12,31 @@ use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_render::{Appearance, Stage};
 
-/// Times that rays are cast; the fastest counts, for the machine may be shared.
+/// Repetitions. The fastest counts, because the machine may be shared.
 const TRIES: usize = 5;
 
 /// First hits of one kind of ray on one thread.
 #[derive(Clone, Debug, Serialize)]
 pub struct RayRow {
-    /// `camera` (neighbours alike) or `scattered` (to all sides from where camera rays hit).
+    /// `camera` (coherent) or `scattered` (in all directions from where camera rays hit).
     pub kind: &'static str,
     /// Rays.
     pub rays: usize,
-    /// Ours a second.
+    /// Our rays per second.
     pub rays_per_second: f64,
-    /// Embree's a second.
+    /// Embree's rays per second.
     pub embree_rays_per_second: Option<f64>,
-    /// Ours over Embree's.
+    /// Our speed over Embree's.
     pub ratio: Option<f64>,
-    /// Rays that only one of the two has hitting, away from edges of the picture.
+    /// Rays that hit for only one of the two, without those at edges of the picture.
     pub differing: Option<usize>,
-    /// Rays looked at for that: all but those at edges.
+    /// Compared rays: all but those at edges.
     pub compared: Option<usize>,
-    /// Largest difference of hits there [m].
+    /// Largest distance between the two hits (m).
     pub largest_difference_m: Option<f64>,
 }
 
-/// Both kinds of rays of a square image of `side` pixels, by us and by Embree.
+/// Casts both kinds of rays of a square image of `side` pixels, with our code and with Embree.
 pub(super) fn measure(
     mesh: &TriMesh,
     view: &Pose,
@@ -55,7 +55,8 @@ pub(super) fn measure(
         .enumerate()
         .map(|(i, (o, d))| {
             let t = stage.cast(*o, *d).map_or(0.1, |m| m.t);
-            // A millimetre back, to where a golden spiral over the sphere points, far from its neighbour's.
+            // From a millimetre before the hit, in a direction of a golden spiral over the sphere,
+            // far from that of its neighbour.
             let turn = i as f32 * 2.399_963_2;
             let z = 1.0 - 2.0 * ((i * 7_919) % 10_007) as f32 / 10_007.0;
             let r = (1.0 - z * z).max(0.0).sqrt();
@@ -99,7 +100,7 @@ impl RayRow {
         let per_second = rays.len() as f64 / theirs.seconds;
         self.embree_rays_per_second = Some(per_second);
         self.ratio = Some(self.rays_per_second / per_second);
-        // An edge of the picture: a neighbour misses, or is nearer or farther by more than a twentieth.
+        // An edge: a neighbour misses, or its distance differs by more than a twentieth.
         let inner = |i: usize| {
             let (u, v) = (i % width, i / width);
             if u == 0 || v == 0 || u + 1 == width || v + 1 == width {

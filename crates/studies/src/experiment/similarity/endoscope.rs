@@ -1,8 +1,8 @@
-//! The endoscope's camera.
+//! The camera of the endoscope.
 
 use trocar_camera::{Camera, Endoscope};
 
-/// The thirty-degree endoscope's camera with pictures of another width [px].
+/// The camera of the thirty-degree endoscope, scaled to pictures of `width` (px).
 pub(super) fn endoscope_camera(width: usize) -> Camera {
     let camera = Endoscope::thirty_degrees().camera;
     let k = width as f64 / camera.width as f64;

@@ -1,7 +1,7 @@
-//! Filling of what an image does not know from what is around: coarser and coarser means, then back (pull and push: Gortler and others 1996,
-//! "The Lumigraph", section 3.4).
+//! Fills unknown pixels from their surroundings by means at coarser and coarser scales (pull-push:
+//! S. J. Gortler and others, "The Lumigraph", 1996, section 3.4).
 
-/// Values and whether they are known, row by row.
+/// An image with known and unknown pixels, row by row.
 #[derive(Clone)]
 pub(super) struct Sparse<const N: usize> {
     pub width: usize,
@@ -10,7 +10,7 @@ pub(super) struct Sparse<const N: usize> {
     pub known: Vec<bool>,
 }
 
-/// Every pixel's value; all 0 where nothing at all is known.
+/// The values of all pixels; 0 if no pixel is known.
 pub(super) fn fill<const N: usize>(image: &Sparse<N>) -> Vec<[f64; N]> {
     let (w, h) = (image.width, image.height);
     if image.known.iter().all(|k| *k) || w.max(h) <= 1 {
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hole_in_a_slope_is_closed_between_its_rims() {
+    fn a_hole_in_a_slope_is_filled_from_its_rim() {
         let (width, height) = (61, 47);
         let value = |i: usize| [(i % width) as f64, 5.0];
         let hole = |i: usize| (20..40).contains(&(i % width)) && (10..30).contains(&(i / width));
@@ -71,7 +71,7 @@ mod tests {
         let filled = fill(&image);
         for i in 0..filled.len() {
             let [x, c] = filled[i];
-            assert!((c - 5.0).abs() < 1e-9, "a constant stays");
+            assert!((c - 5.0).abs() < 1e-9, "a constant is kept");
             assert!(if hole(i) { (x - value(i)[0]).abs() < 8.0 } else { x == value(i)[0] }, "{i}: {x}");
         }
         let nothing = Sparse { width: 3, height: 2, values: vec![[0.0]; 6], known: vec![false; 6] };

@@ -1,63 +1,72 @@
-//! One picture of a reconstruction beside the real one, in figures.
+//! Comparison of a rendered reconstruction with the real picture.
 
 use crate::Result;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::path::Path;
 use trocar_camera::metrics::{ImageMetrics, compare, iou, mean_colour, union};
 use trocar_camera::{ColorImage, Mask};
+use trocar_recording::{Recording, RgbdFrame};
 
-/// One specimen: its silhouettes, and its picture beside a real frame, within the organs.
+/// Figures of one specimen: silhouettes, and the picture within the organs, against a real frame.
 #[derive(Clone, Debug, Serialize)]
 pub struct SimilarityRow {
-    /// Its name.
+    /// Name.
     pub specimen: String,
-    /// Mean over the organs of the silhouettes' intersection over union.
+    /// Mean intersection over union of the silhouettes of the organs.
     pub iou: f64,
     /// The same of all organs together.
     pub union_iou: f64,
-    /// The same organ by organ.
+    /// The same of each organ.
     pub organ_iou: BTreeMap<String, f64>,
-    /// The rendered picture beside the recording's first frame.
+    /// The rendered picture against the first frame of the recording.
     #[serde(flatten)]
     pub rendered: ImageMetrics,
-    /// The recording's second frame beside its first; `None` where it has but one.
+    /// The second frame of the recording against the first; none with a single frame.
     pub second_frame: Option<ImageMetrics>,
-    /// The first frame's mean colour beside it.
+    /// The mean colour of the first frame against that frame.
     pub mean_colour: ImageMetrics,
-    /// The rendered picture beside the composite, whose colours it has.
+    /// The rendered picture against the composite, the source of its colours.
     pub composite: Option<ImageMetrics>,
-    /// Where the masks come from, and in what light the picture was rendered.
+    /// Source of the masks, and light of the rendered picture.
     pub note: String,
 }
 
-/// What was compared, for the page.
+/// The compared pictures, for the page.
 pub(crate) struct SimilarityPictures {
     pub real: ColorImage,
     pub rendered: ColorImage,
-    /// Pixels that were compared.
+    /// Compared pixels.
     pub compared: Mask,
-    /// The organs in the real picture, and in the rendered one.
+    /// The organs in the real and in the rendered picture.
     pub silhouettes: [Mask; 2],
-    /// The rendered one in another light: what it is, and the picture.
+    /// The rendered picture in another light, with a description.
     pub other: Option<(&'static str, ColorImage)>,
 }
 
-/// What there is to be compared.
+/// Inputs of a comparison.
 pub(super) struct Sides<'a> {
     pub specimen: String,
     pub note: String,
-    /// The organs' names, their true masks, and their masks in the rendered picture.
+    /// Names of the organs, true masks, and masks in the rendered picture.
     pub organs: Vec<(String, Mask, Mask)>,
     pub real: &'a ColorImage,
     pub rendered: &'a ColorImage,
-    /// What covers the organs in the real picture.
+    /// Pixels of the real picture covered by instruments.
     pub covered: &'a Mask,
-    /// The second frame, and what covers it.
+    /// The second frame, and its covered pixels.
     pub second: Option<(&'a ColorImage, &'a Mask)>,
     pub composite: Option<&'a ColorImage>,
 }
 
-/// The figures, and the pixels that were compared.
+/// The first frame of the recording in `folder`, and the second if there is one.
+pub(super) fn first_frames(folder: &Path) -> Result<(RgbdFrame, Option<RgbdFrame>)> {
+    let recording = Recording::open(&folder.join("recording"))?;
+    let second = (recording.len() > 1).then(|| recording.frame(1)).transpose()?;
+    Ok((recording.frame(0)?, second))
+}
+
+/// Returns the figures and the compared pictures.
 pub(super) fn measure(sides: &Sides<'_>) -> Result<(SimilarityRow, SimilarityPictures)> {
     let mut organ_iou = BTreeMap::new();
     for (name, real, rendered) in &sides.organs {
@@ -92,7 +101,7 @@ pub(super) fn measure(sides: &Sides<'_>) -> Result<(SimilarityRow, SimilarityPic
     Ok((row, pictures))
 }
 
-/// A mask and two pixels around it: an instrument's rim is blended with what is behind.
+/// The mask grown by two pixels: the rim of an instrument is blended with its background.
 fn grown(mask: &Mask) -> Mask {
     let mut out = mask.clone();
     for _ in 0..2 {
@@ -104,7 +113,7 @@ fn grown(mask: &Mask) -> Mask {
     out
 }
 
-/// The pixels of an organ in labels, where it is 1 + `index`.
+/// The pixels with the label of organ `index`, which is `index` + 1.
 pub(super) fn labelled(labels: &[u16], index: usize, width: usize, height: usize) -> Mask {
     Mask { width, height, set: labels.iter().map(|l| usize::from(*l) == index + 1).collect() }
 }
@@ -116,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn organs_are_measured_apart_and_instruments_left_out() {
+    fn organs_are_compared_separately_without_instruments() {
         let (width, height) = (40, 30);
         let columns = |from: usize, to: usize| Mask {
             width,
@@ -125,7 +134,7 @@ mod tests {
         };
         let mut real = ColorImage::new(width, height, [90, 60, 50]);
         let rendered = real.clone();
-        // An instrument, and something beside the organs.
+        // An instrument, and an object beside the organs.
         for (i, p) in real.pixels.iter_mut().enumerate() {
             if (5..8).contains(&(i % width)) || i % width > 30 {
                 *p = [255; 3];

@@ -1,5 +1,6 @@
-//! Table IV's silhouettes and pictures (paper section VII-E): reconstructions rendered through the recovered recording camera beside the
-//! recordings, and through the endoscope beside an oblique view.
+//! Silhouettes and pictures of Table IV (paper section VII-E): reconstructions rendered through the
+//! recovered recording camera against the recordings, and through the endoscope against an oblique
+//! view.
 
 mod endoscope;
 mod fill;
@@ -16,33 +17,33 @@ pub use result::SimilarityResult;
 
 use crate::Result;
 use crate::names::{Recorded, phantoms_or_all};
-use crate::study::{Job, Kind, Study, stop_if_asked};
+use crate::study::{Job, Kind, Study, check_interrupted};
 use clap::Args;
-use measure::{Sides, SimilarityPictures, labelled, measure};
+use measure::{Sides, SimilarityPictures, first_frames, labelled, measure};
 use result::PAPER;
 use scenery::{Illumination, Scenery};
 use std::path::{Path, PathBuf};
 use through_endoscope::{from_the_side, through_endoscope};
 use trocar_core::Progress;
 use trocar_reconstruct::{Reconstruction, Settings};
-use trocar_recording::Recording;
 use trocar_report::document::Document;
 use trocar_workflow::phantoms::recorded;
 use trocar_workflow::reconstruct_recording;
 
-/// Silhouettes, SSIM and PSNR of rendered reconstructions beside what was filmed, and oblique views through the endoscope.
+/// Silhouettes, SSIM and PSNR of rendered reconstructions against the recordings, and oblique views
+/// through the endoscope.
 #[derive(Clone, Debug, Args)]
 pub struct SimilarityExperiment {
-    /// Phantoms; all by default. The first is filmed from the side too.
+    /// Phantoms; all by default. The first is also recorded from the side.
     #[arg(long = "phantom")]
     pub phantoms: Vec<String>,
     /// How they are recorded.
     #[command(flatten)]
     pub recorded: Recorded,
-    /// Folder with the real recordings; what it lacks is left out.
+    /// Folder of real recordings; missing ones are skipped.
     #[arg(long, value_name = "FOLDER", default_value = "../shared/data")]
     pub data: PathBuf,
-    /// Paths a pixel.
+    /// Paths per pixel.
     #[arg(long, default_value_t = 16)]
     pub samples: u32,
 }
@@ -51,7 +52,7 @@ impl Study for SimilarityExperiment {
     const NAME: &'static str = "similarity";
     const KIND: Kind = Kind::Experiment;
     const FOLDER: Option<&'static str> =
-        Some("Folder for recordings, specimens, pictures and the report; finished recordings in it are used again.");
+        Some("Output folder of recordings, specimens, pictures and report. Finished recordings in it are used again.");
     type Figures = SimilarityResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(SimilarityResult, Document)> {
@@ -102,7 +103,8 @@ impl Study for SimilarityExperiment {
 }
 
 impl SimilarityExperiment {
-    /// A reconstruction through its recording camera beside the recording's first frame.
+    /// Compares a reconstruction, rendered through its recording camera, with the first frame of
+    /// the recording.
     fn beside_recording(
         &self,
         name: &str,
@@ -112,9 +114,8 @@ impl SimilarityExperiment {
         note: &str,
         progress: &dyn Progress,
     ) -> Result<(SimilarityRow, SimilarityPictures)> {
-        stop_if_asked(progress)?;
-        let recording = Recording::open(&folder.join("recording"))?;
-        let (first, second) = (recording.frame(0)?, (recording.len() > 1).then(|| recording.frame(1)).transpose()?);
+        check_interrupted(progress)?;
+        let (first, second) = first_frames(folder)?;
         let scenery = Scenery::new(made, light)?;
         let camera = scenery.camera;
         let labels = scenery.labels(&camera)?;

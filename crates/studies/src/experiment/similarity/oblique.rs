@@ -1,11 +1,11 @@
-//! A phantom filmed through the endoscope from the side: its true surfaces and what was around them, ray traced wet in the endoscope's light, with
-//! a stereo camera's depth noise.
+//! A phantom recorded through the endoscope from the side: its true, wet surfaces and its
+//! surroundings, ray traced in the endoscope's light, with the depth noise of a stereo camera.
 
 use super::endoscope::endoscope_camera;
 use super::measure::labelled;
 use super::scenery::{BESIDE_LENS, surroundings};
 use crate::Result;
-use crate::study::stop_if_asked;
+use crate::study::check_interrupted;
 use glam::DVec3;
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage, DepthNoise, Mask};
@@ -15,18 +15,19 @@ use trocar_recording::{InstrumentRule, OrganInfo, Recording, RecordingInfo, Reco
 use trocar_render::{Appearance, Film, Light, Noise, RayGenerator, RenderSettings, Stage, render};
 use trocar_workflow::truth::DEPTH_UNIT;
 
-/// Width of the pictures [px].
+/// Width of the pictures (px).
 const WIDTH: usize = 848;
-/// Frames.
+/// Number of frames.
 const FRAMES: u32 = 3;
-/// Towards the endoscope from the organs' middle, in the recording frame (up is -z): 40 degrees above the horizon.
+/// Direction from the centre of the organs to the endoscope in the recording frame (up is -z): 40
+/// degrees above the horizon.
 const TOWARDS: DVec3 = DVec3::new(0.12, 0.76, -0.64);
-/// Distance from the organs' middle to the lens [m].
+/// Distance from the centre of the organs to the lens (m).
 const DISTANCE: f64 = 0.12;
-/// An organ that shows fewer pixels is not reconstructed.
-const FEWEST_PIXELS: usize = 600;
+/// Minimum number of visible pixels of a reconstructed organ.
+const MIN_PIXELS: usize = 600;
 
-/// Films the phantom whose recording, truth included, is in `from` into the recording `to`.
+/// Records the phantom with the recording `from`, which includes the truth, into the folder `to`.
 pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progress) -> Result<()> {
     let filmed = Recording::open(from)?;
     let (camera, truth) = (filmed.camera(), from.join("truth"));
@@ -52,7 +53,7 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
     let mut writer: Option<RecordingWriter> = None;
     progress.begin("oblique frames", u64::from(FRAMES));
     for frame in 0..FRAMES {
-        if let Err(e) = stop_if_asked(progress) {
+        if let Err(e) = check_interrupted(progress) {
             progress.end();
             return Err(e);
         }
@@ -63,7 +64,7 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
         if writer.is_none() {
             let masks: Vec<Mask> =
                 (0..masks.len()).map(|k| labelled(&picture.labels, k, scope.width, scope.height)).collect();
-            let shown = |(_, mask): &(&OrganInfo, &Mask)| mask.count() >= FEWEST_PIXELS;
+            let shown = |(_, mask): &(&OrganInfo, &Mask)| mask.count() >= MIN_PIXELS;
             let organs: Vec<(&OrganInfo, &Mask)> = filmed.info.organs.iter().zip(&masks).filter(shown).collect();
             let started = RecordingWriter::create(to, &described(&filmed.info, &organs, &scope, &pose))?;
             for (organ, mask) in organs {
@@ -71,9 +72,9 @@ pub(super) fn record(from: &Path, to: &Path, samples: u32, progress: &dyn Progre
             }
             writer = Some(started);
         }
-        let told = DepthNoise::d405().apply(&picture.depth, Some(&picture.color), &scope, 11, u64::from(frame))?;
+        let noisy = DepthNoise::d405().apply(&picture.depth, Some(&picture.color), &scope, 11, u64::from(frame))?;
         if let Some(writer) = &writer {
-            writer.frame(frame as usize, &picture.color, &told, None)?;
+            writer.frame(frame as usize, &picture.color, &noisy, None)?;
         }
         progress.advance(1);
     }

@@ -1,4 +1,4 @@
-//! The page: reconstructions beside the real pictures, in pictures and figures.
+//! The page: reconstructions beside the real pictures.
 
 use super::measure::{SimilarityPictures, SimilarityRow};
 use super::result::SimilarityResult;
@@ -12,11 +12,11 @@ use trocar_report::overlays;
 use trocar_report::page::{self, Card};
 use trocar_report::table::fixed;
 
-/// What is asked of a phantom's silhouettes.
-const BAR: f64 = 0.95;
-/// Difference of 8-bit colour values that is drawn brightest.
-const SPAN: f64 = 80.0;
-/// Pixels of silhouettes that only the real and only the rendered picture has, and both.
+/// Target of the silhouettes of phantoms.
+const MIN_IOU: f64 = 0.95;
+/// Colour difference drawn brightest (of 255).
+const MAX_DIFFERENCE: f64 = 80.0;
+/// Colours of silhouette pixels: only real, only rendered, both.
 const ONLY_REAL: [u8; 3] = [70, 165, 225];
 const ONLY_RENDERED: [u8; 3] = [214, 64, 52];
 const BOTH: [u8; 3] = [0, 158, 115];
@@ -26,22 +26,23 @@ pub(super) fn document(
     shown: &[SimilarityPictures],
     oblique: &[SimilarityPictures],
 ) -> Result<Document> {
-    let document = Document::new("Similarity", "Reconstructions rendered beside what was filmed");
-    let mut out = document.with(Section::new("Together", "").cards(cards(r))).with(table(r));
+    let document = Document::new("Similarity", "Rendered reconstructions beside the recordings");
+    let mut out = document.with(Section::new("Summary", "").cards(cards(r))).with(table(r));
     for (row, pictures) in r.rows.iter().zip(shown) {
         let lead = format!("Through the recovered recording camera. {}.", page::escape(&capital(&row.note)));
         out = out.with(views(pictures, Section::new(&row.specimen, lead))?.html(organs(row)));
     }
     for (row, pictures) in r.oblique.iter().zip(oblique) {
         let lead = format!(
-            "An oblique view through the thirty-degree endoscope (86.2 x 54.6 degrees), its lens where the recording camera stood, beside the real frame as that lens shows it. {}.",
+            "An oblique view through the thirty-degree endoscope (86.2 x 54.6 degrees) at the place of the recording \
+             camera, beside the real frame seen through that lens. {}.",
             page::escape(&capital(&row.note))
         );
         let title = format!("Oblique view: {}", row.specimen);
         out = out.with(views(pictures, Section::new(title, lead))?.html(organs(row)));
     }
     if !r.skipped.is_empty() {
-        out = out.with(Section::new("Left out", "").lines(r.skipped.iter().cloned()));
+        out = out.with(Section::new("Skipped", "").lines(r.skipped.iter().cloned()));
     }
     Ok(out)
 }
@@ -62,9 +63,9 @@ fn cards(r: &SimilarityResult) -> [Card; 4] {
         Card::new(
             "Silhouettes",
             fixed(least(&r.rows), 3),
-            format!("the worst specimen's IoU; at least {BAR}; paper {}", p.iou),
+            format!("IoU of the worst specimen; at least {MIN_IOU}; paper {}", p.iou),
         )
-        .met(least(&r.rows) >= BAR),
+        .met(least(&r.rows) >= MIN_IOU),
         Card::new(
             "SSIM / PSNR",
             pair([mean(&|l| l.ssim), mean(&|l| l.psnr_db)]),
@@ -78,14 +79,14 @@ fn cards(r: &SimilarityResult) -> [Card; 4] {
         Card::new(
             "Oblique views",
             fixed(least(&r.oblique), 3),
-            "the worst IoU through the endoscope; phantom and mug, not in vivo",
+            "worst IoU through the endoscope; phantom and mug, not in vivo",
         ),
     ]
 }
 
 fn table(r: &SimilarityResult) -> Section {
     let head =
-        ["Specimen", "What beside the first frame", "IoU", "SSIM", "PSNR [dB]", "matched SSIM", "matched PSNR [dB]"];
+        ["Specimen", "Compared with the first frame", "IoU", "SSIM", "PSNR (dB)", "matched SSIM", "matched PSNR (dB)"];
     let cells = |l: &ImageMetrics| [l.ssim, l.psnr_db, l.ssim_matched, l.psnr_matched_db];
     let row = |name: &str, what: &str, iou: Option<f64>, [a, b, c, d]: [f64; 4]| {
         let iou = iou.map_or(String::new(), |v| fixed(v, 3));
@@ -105,7 +106,8 @@ fn table(r: &SimilarityResult) -> Section {
     rows.push(row("paper", "rendered", Some(p.iou), both(p.rendered, p.matched)));
     rows.push(row("", "second frame", None, both(none, p.second_frame)));
     rows.push(row("", "mean colour", None, both(none, p.mean_colour)));
-    let lead = "Within the organs\u{2019} masks, less what instruments cover. SSIM is Wang and others\u{2019} (2004), 8-bit sRGB, the mean over the channels; matching scales each channel by least squares.";
+    let lead = "Within the masks of the organs, without instruments. SSIM after Wang and others (2004), 8-bit sRGB, \
+                mean over the channels. Matching scales each channel by least squares.";
     Section::new("Beside the paper", lead).table(Table::new(head, rows))
 }
 
@@ -126,7 +128,7 @@ fn views(p: &SimilarityPictures, section: Section) -> Result<Section> {
     let bar = page::scale_bar(&SEQUENTIAL, "0", "mean difference of the channels, of 255", "80");
     let legend = page::legend([("both", BOTH), ("real only", ONLY_REAL), ("rendered only", ONLY_RENDERED)]);
     let mut all = vec![
-        figure(&p.real, "the real picture", "<b>Real.</b> The recording\u{2019}s first frame.")?,
+        figure(&p.real, "the real picture", "<b>Real.</b> The first frame of the recording.")?,
         figure(&p.rendered, "the rendered picture", "<b>Rendered.</b> Organs and surroundings, path traced.")?,
         figure(&difference(p), "their difference", &format!("<b>Difference.</b>{bar}"))?,
         figure(&silhouettes(p), "their silhouettes", &format!("<b>Silhouettes.</b>{legend}"))?,
@@ -142,7 +144,7 @@ fn difference(p: &SimilarityPictures) -> ColorImage {
     for i in (0..out.pixels.len()).filter(|i| p.compared.set[*i]) {
         let (a, b) = (p.real.pixels[i], p.rendered.pixels[i]);
         let mean = (0..3).map(|c| f64::from(a[c].abs_diff(b[c]))).sum::<f64>() / 3.0;
-        out.pixels[i] = colors::map(&SEQUENTIAL, mean / SPAN);
+        out.pixels[i] = colors::map(&SEQUENTIAL, mean / MAX_DIFFERENCE);
     }
     out
 }

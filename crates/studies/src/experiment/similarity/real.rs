@@ -1,17 +1,17 @@
-//! Real recordings beside the repository, made into folders that the reconstruction reads.
+//! Real recordings beside the repository, converted into recording folders.
 
 use crate::{Error, Result};
 use std::path::Path;
 use trocar_camera::{ColorImage, DepthImage};
 use trocar_recording::{RecordingInfo, RecordingWriter};
 
-/// The mug of pyk4a's tests: a colour and a depth frame of an Azure Kinect, seen from the side.
+/// The mug from the tests of pyk4a: a colour and a depth frame of an Azure Kinect, from the side.
 pub(super) const MUG: &str = "k4a_mug";
 
-/// What is known of it.
+/// Its description.
 const DESCRIPTION: &str = include_str!("../../../../../examples/recordings/k4a_mug_color.toml");
 
-/// Makes the mug's recording of the frames in `data`; false where they are not there.
+/// Writes the recording of the mug from the frames in `data`; returns false if they are missing.
 pub(super) fn prepare_mug(data: &Path, recording: &Path) -> Result<bool> {
     let [color, depth] = ["color.png", "depth.png"].map(|name| data.join(MUG).join(name));
     if !color.is_file() || !depth.is_file() {

@@ -1,14 +1,14 @@
-//! The outcome in figures, and the paper's beside it.
+//! The figures of the study and of the paper.
 
 use super::measure::SimilarityRow;
 use serde::Serialize;
 
-/// The paper's figures (its table of real-to-sim similarity).
+/// The paper's figures (table of real-to-sim similarity).
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct PaperSimilarity {
     /// Mean silhouette IoU.
     pub iou: f64,
-    /// SSIM and PSNR [dB] of its path-traced view.
+    /// SSIM and PSNR (dB) of the path-traced view.
     pub rendered: [f64; 2],
     /// The same after matching the exposure.
     pub matched: [f64; 2],
@@ -18,7 +18,7 @@ pub struct PaperSimilarity {
     pub mean_colour: [f64; 2],
 }
 
-/// What the paper measured on its rabbit.
+/// The paper's figures on its rabbit.
 pub(super) const PAPER: PaperSimilarity = PaperSimilarity {
     iou: 0.80,
     rendered: [0.43, 14.7],
@@ -27,19 +27,19 @@ pub(super) const PAPER: PaperSimilarity = PaperSimilarity {
     mean_colour: [0.66, 19.0],
 };
 
-/// The experiment's outcome.
+/// Figures of the study.
 #[derive(Clone, Debug, Serialize)]
 pub struct SimilarityResult {
-    /// Every specimen through its recording camera.
+    /// All specimens, through their recording cameras.
     pub rows: Vec<SimilarityRow>,
-    /// Oblique views through the endoscope, of phantoms and of a coffee mug: none is in vivo.
+    /// Oblique views through the endoscope, of a phantom and of a mug; none is in vivo.
     pub oblique: Vec<SimilarityRow>,
-    /// What was left out, and why.
+    /// Skipped recordings, and why.
     pub skipped: Vec<String>,
     /// The paper's figures.
     pub paper: PaperSimilarity,
-    /// Wall time of everything [s].
+    /// Wall time (s).
     pub seconds: f64,
-    /// The report's path.
+    /// Path of the report.
     pub report: String,
 }

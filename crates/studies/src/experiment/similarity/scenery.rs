@@ -1,4 +1,5 @@
-//! What a recording showed, put on stage: its organs and what is around them, coloured by the photograph less the light it was taken in.
+//! The scene of a recording as a stage: organs and surroundings, with albedos estimated from the
+//! photograph and its light.
 
 use super::fill::{Sparse, fill};
 use crate::{Error, Result};
@@ -11,37 +12,42 @@ use trocar_geometry::TriMesh;
 use trocar_reconstruct::Reconstruction;
 use trocar_render::{Appearance, Film, Light, Picture, RayGenerator, RenderSettings, Stage, render, srgb};
 
-/// Triangles of the organs at most, once they are split finely enough for the photograph.
-const MOST_TRIANGLES: usize = 3_000_000;
-/// Columns and rows of pixels from vertex to vertex of what is around.
+/// Maximum number of triangles of the organs after subdivision.
+const MAX_TRIANGLES: usize = 3_000_000;
+/// Pixels between vertices of the surroundings.
 const STEP: usize = 2;
-/// What is unknown under the organs lies so far behind its surroundings [m], so that it does not show through an organ's rim.
-const SUNK: f64 = 3e-3;
-/// Colours are taken from the photograph where the organ is seen within this of its own front [m].
-const OWN_FRONT: f64 = 2e-3;
-/// Surfaces steeper than this (cosine) are taken to get as much light as at it: what is left of a grazing photograph says little of a colour.
-const STEEPEST: f64 = 0.2;
-/// How far an endoscope's light is from its lens [m].
+/// Depth of the unknown surface under the organs below the surroundings (m), so that it does not
+/// show through the rim of an organ.
+const DEPTH_UNDER_ORGANS: f64 = 3e-3;
+/// A vertex gets the colour of the photograph if it is within this distance of the visible front
+/// (m).
+const FRONT_DISTANCE: f64 = 2e-3;
+/// Minimum cosine of the angle of incidence: at grazing angles the photograph says little about the
+/// albedo.
+const MIN_COSINE: f64 = 0.2;
+/// Distance of the endoscope's light from its lens (m).
 pub(super) const BESIDE_LENS: f64 = 0.006;
-/// The brightest colour but for one in 200 becomes this albedo.
+/// Albedo of the 99.5th percentile of brightness.
 const BRIGHTEST: f64 = 0.9;
 
-/// The light a recording was taken in, as far as it matters.
+/// The light of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Illumination {
-    /// A lamp beside the lens, so far towards the picture's top [m]: light falls off with the square of the distance.
+    /// A lamp beside the lens, at this distance towards the top of the picture (m); its light falls
+    /// off with the squared distance.
     Lamp { beside: f64 },
-    /// From everywhere, as in a room.
+    /// Uniform, as in a room.
     Room,
 }
 
-/// Organs and surroundings in the recording frame, their colours albedos.
+/// Organs and surroundings in the recording frame; their colours are albedos.
 pub(super) struct Scenery {
     organs: Vec<TriMesh>,
     around: TriMesh,
     pub camera: Camera,
     illumination: Illumination,
-    /// The lamp's radiant intensity that makes the photograph of the albedos: radiance times square metres.
+    /// Radiant intensity of the lamp that reproduces the photograph from the albedos: radiance
+    /// times square metres.
     power: f64,
 }
 
@@ -54,8 +60,8 @@ impl Scenery {
         let seen = silhouettes(&coarse, &camera)?;
         let photo = &made.background;
         let total: usize = coarse.iter().map(|m| m.triangles.len()).sum();
-        // Two splits make a triangle of 1.5 mm one of a pixel at 0.17 m.
-        let splits = if 16 * total <= MOST_TRIANGLES { 2 } else { usize::from(4 * total <= MOST_TRIANGLES) };
+        // Two subdivisions reduce a triangle of 1.5 mm to a pixel at 0.17 m.
+        let splits = if 16 * total <= MAX_TRIANGLES { 2 } else { usize::from(4 * total <= MAX_TRIANGLES) };
         let mut organs = coarse;
         for (k, mesh) in organs.iter_mut().enumerate() {
             (0..splits).for_each(|_| split(mesh));
@@ -67,7 +73,7 @@ impl Scenery {
             Illumination::Lamp { beside } => {
                 let lamp = DVec3::new(0.0, -beside, 0.0);
                 let meshes = || organs.iter().chain([&around]);
-                let light: Vec<Vec<[f64; 3]>> = meshes().map(|m| unlit(m, lamp)).collect();
+                let light: Vec<Vec<[f64; 3]>> = meshes().map(|m| albedos(m, lamp)).collect();
                 let mut all: Vec<f64> = light.iter().flatten().map(|c| c[0].max(c[1]).max(c[2])).collect();
                 all.sort_unstable_by(f64::total_cmp);
                 let bright = all.get(all.len().saturating_sub(1) * 199 / 200).copied().unwrap_or(1.0).max(1e-12);
@@ -75,19 +81,19 @@ impl Scenery {
                 for (mesh, light) in organs.iter_mut().chain([&mut around]).zip(&light) {
                     mesh.colors = light.iter().map(|c| srgb::from_linear(c.map(|v| (v * scale) as f32))).collect();
                 }
-                // A matte albedo a shows radiance a / pi * power * cos / distance^2.
+                // A matte albedo a has radiance a / pi * power * cos / distance^2.
                 PI / scale
             }
         };
         Ok(Self { organs, around, camera, illumination, power })
     }
 
-    /// Labels through `camera` at the recording camera's place, organs alone: 1 + the organ's index.
+    /// Labels of the organs through `camera` at the recording camera's pose: index + 1.
     pub fn labels(&self, camera: &Camera) -> Result<Vec<u16>> {
         Ok(silhouettes(&self.organs, camera)?.labels)
     }
 
-    /// Everything through `camera` at the recording camera's place, in the light of the recording.
+    /// The scene through `camera` at the recording camera's pose, in the light of the recording.
     pub fn picture(&self, camera: &Camera, samples: u32) -> Result<ColorImage> {
         let mut stage = self.stage(false)?;
         match self.illumination {
@@ -104,7 +110,8 @@ impl Scenery {
         Ok(render(&mut stage, &RayGenerator::new(*camera), &Pose::IDENTITY, &settings, &Film::default()).color)
     }
 
-    /// Everything through `camera` at `pose`, wet, in the light of an endoscope that makes a white surface `white_at` [m] before it white.
+    /// The wet scene through `camera` at `pose`, in the light of an endoscope. A white surface at
+    /// distance `white_at` (m) is rendered white.
     pub fn through_endoscope(&self, camera: &Camera, pose: &Pose, white_at: f64, samples: u32) -> Result<ColorImage> {
         let mut stage = self.stage(true)?;
         stage.lights.push(Light::endoscope(pose, BESIDE_LENS, white_at));
@@ -123,7 +130,7 @@ impl Scenery {
     }
 }
 
-/// The organs alone through the camera, unlit.
+/// The organs through the camera, without light.
 fn silhouettes(organs: &[TriMesh], camera: &Camera) -> Result<Picture> {
     let mut stage = Stage::new();
     for (k, mesh) in organs.iter().enumerate() {
@@ -133,7 +140,7 @@ fn silhouettes(organs: &[TriMesh], camera: &Camera) -> Result<Picture> {
     Ok(render(&mut stage, &RayGenerator::new(*camera), &Pose::IDENTITY, &settings, &Film::default()))
 }
 
-/// Halves every edge.
+/// Subdivides all triangles: halves every edge.
 fn split(mesh: &mut TriMesh) {
     let mut middle: BTreeMap<(u32, u32), u32> = BTreeMap::new();
     let colored = mesh.colors.len() == mesh.vertices.len();
@@ -155,7 +162,8 @@ fn split(mesh: &mut TriMesh) {
     mesh.triangles = triangles;
 }
 
-/// Colours every vertex that the camera sees with the photograph between its pixels; others keep their colours.
+/// Colours the vertices that the camera sees from the photograph by bilinear interpolation; others
+/// keep their colours.
 fn project(mesh: &mut TriMesh, label: u16, photo: &ColorImage, seen: &Picture, camera: &Camera) {
     let (w, h) = (photo.width, photo.height);
     mesh.colors.resize(mesh.vertices.len(), [150, 60, 55]);
@@ -165,14 +173,15 @@ fn project(mesh: &mut TriMesh, label: u16, photo: &ColorImage, seen: &Picture, c
             continue;
         }
         let nearest = q.y.round() as usize * w + q.x.round() as usize;
-        if seen.labels[nearest] != label || (f64::from(seen.depth.depth[nearest]) - p.z).abs() > OWN_FRONT {
+        if seen.labels[nearest] != label || (f64::from(seen.depth.depth[nearest]) - p.z).abs() > FRONT_DISTANCE {
             continue;
         }
         let (x, y) = (q.x as usize, q.y as usize);
         let (a, b) = (q.x - x as f64, q.y - y as f64);
         let at = |i: usize, j: usize| j.min(h - 1) * w + i.min(w - 1);
         let corners = [at(x, y), at(x + 1, y), at(x, y + 1), at(x + 1, y + 1)];
-        // Black is what the composite does not know; beside the organ is another's colour.
+        // Black pixels of the composite are unknown; neighbouring pixels may belong to other
+        // organs.
         if corners.iter().any(|i| photo.pixels[*i] == [0; 3] || seen.labels[*i] != label) {
             let here = photo.pixels[nearest];
             if here != [0; 3] {
@@ -187,9 +196,9 @@ fn project(mesh: &mut TriMesh, label: u16, photo: &ColorImage, seen: &Picture, c
     }
 }
 
-/// The colours as they would be in even light, but for a common factor: the photograph's light over what a lamp of power 1 at `lamp`
-/// makes of a matte white surface.
-fn unlit(mesh: &TriMesh, lamp: DVec3) -> Vec<[f64; 3]> {
+/// Albedos up to a common factor: the light of the photograph over that of a matte white surface
+/// lit by a lamp of power 1 at `lamp`.
+fn albedos(mesh: &TriMesh, lamp: DVec3) -> Vec<[f64; 3]> {
     let mut normals = vec![DVec3::ZERO; mesh.vertices.len()];
     for t in 0..mesh.triangles.len() {
         let area = mesh.area_vector(t);
@@ -197,14 +206,14 @@ fn unlit(mesh: &TriMesh, lamp: DVec3) -> Vec<[f64; 3]> {
     }
     let color = |i: usize| {
         let to_lamp = lamp - mesh.vertices[i];
-        let cos = normals[i].normalize_or_zero().dot(to_lamp.normalize_or_zero()).abs().max(STEEPEST);
+        let cos = normals[i].normalize_or_zero().dot(to_lamp.normalize_or_zero()).abs().max(MIN_COSINE);
         srgb::to_linear(mesh.colors[i]).map(|l| f64::from(l) * to_lamp.length_squared() / cos)
     };
     (0..mesh.vertices.len()).map(color).collect()
 }
 
-/// What is around the organs as a height field over the image: the composite's depth and colour, smoothed a little, and filled under the
-/// organs and where nothing was measured.
+/// The surroundings of the organs as a height field over the image: depth and colour of the
+/// composite, smoothed, and filled under the organs and at unknown pixels.
 pub(super) fn surroundings<'a>(
     photo: &ColorImage,
     depth: &DepthImage,
@@ -219,7 +228,7 @@ pub(super) fn surroundings<'a>(
     let filled = fill(&Sparse {
         width: w,
         height: h,
-        // Even pictures of depth are flat in 1/z.
+        // A plane is linear in 1/z.
         values: depth.depth.iter().map(|z| [1.0 / f64::from(*z).max(1e-3)]).collect(),
         known: (0..w * h).map(|i| !covered[i] && depth.depth[i] > 0.0).collect(),
     });
@@ -230,9 +239,9 @@ pub(super) fn surroundings<'a>(
             for u in 1..w - 1 {
                 let i = v * w + u;
                 let near = [from[i - 1], from[i + 1], from[i - w], from[i + w]];
-                // Steps of more than 2% are edges.
-                let kin = near.iter().filter(|n| (**n - from[i]).abs() < 0.02 * from[i]);
-                let (sum, count) = kin.fold((from[i], 1.0), |(s, c), n| (s + n, c + 1.0));
+                // Differences of more than 2% are edges.
+                let neighbours = near.iter().filter(|n| (**n - from[i]).abs() < 0.02 * from[i]);
+                let (sum, count) = neighbours.fold((from[i], 1.0), |(s, c), n| (s + n, c + 1.0));
                 nearness[i] = sum / count;
             }
         }
@@ -248,7 +257,7 @@ pub(super) fn surroundings<'a>(
     for i in 0..columns * rows {
         let (u, v) = (i % columns * STEP, i / columns * STEP);
         let at = v * w + u;
-        let z = 1.0 / nearness[at].max(1e-3) + if covered[at] { SUNK } else { 0.0 };
+        let z = 1.0 / nearness[at].max(1e-3) + if covered[at] { DEPTH_UNDER_ORGANS } else { 0.0 };
         mesh.vertices.push(camera.ray(u as f64, v as f64) * z);
         mesh.colors.push(color[at].map(|c| c.round() as u8));
     }

@@ -1,22 +1,24 @@
-//! An oblique view through the endoscope's model beside the real frame (paper section VIII, the in-vivo extension).
+//! An oblique view through the endoscope's model beside the real frame (paper section VIII, in-vivo
+//! extension).
 
 use super::endoscope::endoscope_camera;
-use super::measure::{Sides, SimilarityPictures, SimilarityRow, labelled, measure};
+use super::measure::{Sides, SimilarityPictures, SimilarityRow, first_frames, labelled, measure};
 use super::oblique;
 use super::scenery::{BESIDE_LENS, Illumination, Scenery};
 use crate::Result;
-use crate::study::stop_if_asked;
+use crate::study::check_interrupted;
 use std::path::Path;
 use trocar_camera::{CameraModel, ColorImage, Mask, UndistortionMap};
 use trocar_core::{Pose, Progress};
 use trocar_reconstruct::{Reconstruction, Settings};
-use trocar_recording::Recording;
 use trocar_workflow::reconstruct_recording;
 
-/// Where the endoscope's light would make a white surface white [m], in pictures of scenes that it did not light.
+/// Distance at which the endoscope's light renders a white surface white (m), for scenes recorded
+/// in other light.
 const WHITE_AT: f64 = 0.35;
 
-/// A phantom filmed through the endoscope from the side, reconstructed, and rendered through it again.
+/// A phantom recorded through the endoscope from the side, reconstructed, and rendered through the
+/// endoscope.
 pub(super) fn from_the_side(
     samples: u32,
     phantom: &str,
@@ -34,8 +36,8 @@ pub(super) fn from_the_side(
     through_endoscope(samples, &name, &folder, &made, light, note, progress)
 }
 
-/// A reconstruction through the thirty-degree endoscope, whose lens stands where the recording camera stood, beside the recording's first
-/// frame as the endoscope's lens would have shown it.
+/// Compares a reconstruction, rendered through the thirty-degree endoscope at the pose of the
+/// recording camera, with the first frame of the recording seen through the endoscope's lens.
 pub(super) fn through_endoscope(
     samples: u32,
     name: &str,
@@ -45,10 +47,8 @@ pub(super) fn through_endoscope(
     note: &str,
     progress: &dyn Progress,
 ) -> Result<(SimilarityRow, SimilarityPictures)> {
-    stop_if_asked(progress)?;
-    let recording = Recording::open(&folder.join("recording"))?;
-    let first = recording.frame(0)?;
-    let second = (recording.len() > 1).then(|| recording.frame(1)).transpose()?;
+    check_interrupted(progress)?;
+    let (first, second) = first_frames(folder)?;
     let scenery = Scenery::new(made, light)?;
     let scope = endoscope_camera(scenery.camera.width);
     let map = CameraModel::from(scenery.camera).undistortion_map(&scope);
@@ -82,11 +82,11 @@ pub(super) fn through_endoscope(
     Ok((row, pictures))
 }
 
-/// A mask through the map, the nearest pixel each.
+/// The mask, remapped to the nearest pixels.
 fn masked(map: &UndistortionMap, mask: &Mask) -> Mask {
     let at = |p: &glam::DVec2| {
         let (x, y) = (p.x.round(), p.y.round());
-        // Written so that NaN is outside.
+        // NaN is outside.
         let inside = x >= 0.0 && y >= 0.0 && x < mask.width as f64 && y < mask.height as f64;
         inside && mask.set[y as usize * mask.width + x as usize]
     };

@@ -1,0 +1,47 @@
+//! One episode by any policy of a campaign: a built-in controller, a server, or a Python callable.
+
+use crate::manifest;
+use crate::policy_server::{POLL_INTERVAL, start_servers};
+use crate::policy_spec::PolicySpec;
+use crate::remote::RemotePolicy;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use trocar_core::Progress;
+use trocar_workflow::{EpisodeOutput, EpisodeRun, Error, Result};
+
+/// Runs the episode `run` into the folder `output`. Its policy is anything that
+/// [`PolicySpec::parse`] accepts. A Python policy is loaded before anything is built.
+///
+/// # Errors
+/// As [`EpisodeRun::run`]; a policy that is unknown or cannot be loaded. `output` then stays
+/// unchanged.
+pub fn run_episode(run: &EpisodeRun, output: &Path, progress: &dyn Progress) -> Result<EpisodeOutput> {
+    let spec = PolicySpec::parse(&run.policy)?;
+    manifest::check(std::slice::from_ref(&spec), 1, run.seed, None)?;
+    if !spec.is_remote() {
+        return EpisodeRun { policy: spec.source, ..run.clone() }.run(output, progress);
+    }
+    run.check(output)?;
+    let mut servers = start_servers(&[&spec], progress)?;
+    let (stop, done) = (Arc::new(AtomicBool::new(false)), AtomicBool::new(false));
+    let made = std::thread::scope(|scope| {
+        // The policy waits for replies without checking for interruption, so this thread checks.
+        scope.spawn(|| {
+            while !done.load(Ordering::Relaxed) && !progress.interrupted() {
+                std::thread::sleep(POLL_INTERVAL);
+            }
+            stop.store(true, Ordering::Relaxed);
+        });
+        let made = run.run_policy(output, progress, |specimen, episode| {
+            let server = servers.remove(&spec.name);
+            Ok(Box::new(RemotePolicy::new(&spec, specimen, episode, Arc::clone(&stop), None, server)?))
+        });
+        done.store(true, Ordering::Relaxed);
+        made
+    });
+    match made {
+        Err(_) if progress.interrupted() => Err(Error::Interrupted),
+        made => made,
+    }
+}

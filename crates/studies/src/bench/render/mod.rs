@@ -1,0 +1,371 @@
+//! Cost of pictures: a preview for policies with deforming organs, a path-traced frame, and rays
+//! per second beside Embree.
+
+mod rays;
+
+pub use rays::RayRow;
+
+use super::machine::Machine;
+use crate::Result;
+use crate::scenes::{LaparoscopicScene, endoscope_view};
+use crate::statistics::median;
+use crate::study::{Job, Kind, Study, check_interrupted};
+use clap::Args;
+use serde::Serialize;
+use std::path::PathBuf;
+use std::time::Instant;
+use trocar_camera::{Camera, Endoscope};
+use trocar_cell::Cell;
+use trocar_core::{Pose, Progress};
+use trocar_render::{Appearance, BodyId, Film, Light, RayGenerator, RenderSettings, ShapeId, Stage, render};
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::table::{count, fixed};
+use trocar_scene::Scene;
+use trocar_sensors::CameraRig;
+use trocar_workflow::ScriptedLift;
+use trocar_workflow::scene_specimen;
+
+/// Index of the organ that deforms.
+const MOVING: usize = 1;
+/// Timed frames. A tenth as many warm-up frames come first.
+const FRAMES: usize = 60;
+
+/// Cost of pictures: a preview for policies, a path-traced frame, rays beside Embree.
+#[derive(Clone, Debug, Args)]
+pub struct RenderBench {
+    /// Approximate number of triangles of the organs; a fifth of them deform.
+    #[arg(long, default_value_t = 100_000)]
+    pub triangles: usize,
+    /// Paths per pixel of the large picture; 0 for none.
+    #[arg(long, default_value_t = 64)]
+    pub samples: u32,
+    /// Side of the square image of rays cast beside Embree.
+    #[arg(long, default_value_t = 1024)]
+    pub rays: usize,
+    /// Python with the package embreex.
+    #[arg(long, default_value = "python3")]
+    pub python: PathBuf,
+    /// Output file of the large picture (PNG).
+    #[arg(long, value_name = "FILE")]
+    pub picture: Option<PathBuf>,
+    /// Scene file or built-in scene whose cameras are measured; "none" for none.
+    #[arg(long, default_value = "cell-a")]
+    pub scene: String,
+    /// Folder of phantoms. A phantom is made once and used again (default: $TROCAR_PHANTOMS, else
+    /// trocar/phantoms in the user's cache)
+    #[arg(long, value_name = "FOLDER", default_value_os_t = trocar_phantom::phantoms_folder(), hide_default_value = true)]
+    pub phantoms: PathBuf,
+}
+
+/// Figures of the benchmark.
+#[derive(Clone, Debug, Serialize)]
+pub struct RenderBenchResult {
+    /// The cameras of the scene; none without a scene.
+    pub cell: Option<CellRow>,
+    /// Median time of a frame of 224 x 224 with colour, depth, labels and hard shadows, after all
+    /// organs deformed and all arms moved: of the first camera of the scene, without a scene of the
+    /// loops of bowel (ms).
+    pub preview_224_ms: f64,
+    /// The same without shadows (ms).
+    pub preview_224_unshadowed_ms: f64,
+    /// Fastest frame with shadows (ms): the speed of an undisturbed machine.
+    pub preview_224_best_ms: f64,
+    /// Median time of updating the stage from the cell; without a scene, of refitting the loops of
+    /// bowel (ms).
+    pub refit_ms: f64,
+    /// Triangles of the loops of bowel.
+    pub triangles: usize,
+    /// Triangles of them refitted in each frame.
+    pub refitted_triangles: usize,
+    /// Median time of a frame of 224 x 224 of the loops of bowel with hard shadows (ms).
+    pub loops_224_ms: f64,
+    /// The same without shadows (ms).
+    pub loops_224_unshadowed_ms: f64,
+    /// Building all trees of the loops of bowel (ms).
+    pub build_ms: f64,
+    /// One frame of 1280 x 720 with `samples` paths per pixel (ms); none with 0 samples.
+    pub path_720p_ms: Option<f64>,
+    /// Paths per pixel of that frame.
+    pub samples: u32,
+    /// Rays on one thread, by kind.
+    pub rays: Vec<RayRow>,
+    /// Why Embree was not measured.
+    pub embree_failure: Option<String>,
+    /// Worker threads for pictures.
+    pub threads: usize,
+    /// The machine.
+    pub machine: Machine,
+}
+
+/// The cameras of a cell.
+#[derive(Clone, Debug, Serialize)]
+pub struct CellRow {
+    /// Name of the scene.
+    pub scene: String,
+    /// Triangles on the stage.
+    pub triangles: usize,
+    /// Building the stage: organs, arms, instruments, all trees (ms).
+    pub begin_ms: f64,
+    /// Median time of updating the stage from the cell (ms).
+    pub follow_ms: f64,
+    /// The cameras, with pictures of 224 x 224.
+    pub cameras: Vec<CameraRow>,
+}
+
+/// One camera of a cell.
+#[derive(Clone, Debug, Serialize)]
+pub struct CameraRow {
+    /// Name of the camera.
+    pub camera: String,
+    /// Median time of a frame with shadows, the update of the stage included (ms).
+    pub ms: f64,
+    /// Fastest frame with shadows (ms).
+    pub best_ms: f64,
+    /// Median time of a frame without shadows (ms).
+    pub unshadowed_ms: f64,
+}
+
+/// The loops of bowel on a stage.
+struct Set {
+    scene: LaparoscopicScene,
+    stage: Stage,
+    moving: ShapeId,
+    instruments: [BodyId; 2],
+    view: Pose,
+}
+
+impl Set {
+    fn new(triangles: usize) -> Result<Self> {
+        let scene = LaparoscopicScene::new(triangles / 5);
+        let view = endoscope_view();
+        let mut stage = Stage::new();
+        let mut shapes = Vec::new();
+        for (i, organ) in scene.organs.iter().enumerate() {
+            shapes.push(stage.add_mesh(organ, i as u16 + 1, &Appearance::tissue([200, 110, 100]))?.0);
+        }
+        let instrument = stage.add_shape(&scene.instrument)?;
+        let mut place = |right: bool, label| {
+            stage.add_body(instrument, &scene.instrument_pose(right, 0.0), label, &Appearance::steel())
+        };
+        let instruments = [place(false, 101)?, place(true, 102)?];
+        stage.lights.push(Light::endoscope(&view, 0.006, 0.11));
+        stage.environment = [0.02; 3];
+        Ok(Self { moving: shapes[MOVING], scene, stage, instruments, view })
+    }
+
+    /// Median and least time of a frame (ms).
+    fn preview(&mut self, shadows: bool) -> Result<(f64, f64)> {
+        let Endoscope { camera, .. } = Endoscope::thirty_degrees();
+        // The square centre of the endoscope's picture.
+        let scale = 224.0 / camera.height as f64;
+        let policy = Camera {
+            width: 224,
+            height: 224,
+            fx: camera.fx * scale,
+            fy: camera.fy * scale,
+            cx: 111.5,
+            cy: 111.5,
+            ..camera
+        };
+        let eye = RayGenerator::new(policy);
+        let film = Film::endoscope();
+        let mut times = Vec::with_capacity(FRAMES);
+        for frame in 0..FRAMES + FRAMES / 10 {
+            let t = frame as f64 / 30.0;
+            let positions = self.scene.moved(MOVING, t);
+            let poses = [false, true].map(|right| self.scene.instrument_pose(right, t));
+            let clock = Instant::now();
+            self.stage.deform(self.moving, &positions)?;
+            for (body, pose) in self.instruments.iter().zip(&poses) {
+                self.stage.place(*body, pose)?;
+            }
+            let picture = render(&mut self.stage, &eye, &self.view, &RenderSettings::Preview { shadows }, &film);
+            let took = 1e3 * clock.elapsed().as_secs_f64();
+            std::hint::black_box(picture);
+            if frame >= FRAMES / 10 {
+                times.push(took);
+            }
+        }
+        Ok((median(&mut times), times[0]))
+    }
+
+    fn refit(&mut self) -> Result<f64> {
+        let mut times = Vec::with_capacity(FRAMES);
+        for frame in 0..FRAMES {
+            let positions = self.scene.moved(MOVING, frame as f64 / 30.0);
+            let clock = Instant::now();
+            self.stage.deform(self.moving, &positions)?;
+            times.push(1e3 * clock.elapsed().as_secs_f64());
+        }
+        Ok(median(&mut times))
+    }
+}
+
+impl Study for RenderBench {
+    const NAME: &'static str = "render";
+    const KIND: Kind = Kind::Bench;
+    const FOLDER: Option<&'static str> = None;
+    type Figures = RenderBenchResult;
+
+    fn run(&self, job: &Job<'_>) -> Result<(RenderBenchResult, Document)> {
+        let machine = Machine::here();
+        let progress = job.progress;
+        progress.begin("measurements", 5);
+        let step = || {
+            progress.advance(1);
+            check_interrupted(progress)
+        };
+        let cell = (self.scene != "none").then(|| self.cell(&self.scene, progress)).transpose()?;
+        let clock = Instant::now();
+        let mut set = Set::new(self.triangles)?;
+        let build_ms = 1e3 * clock.elapsed().as_secs_f64();
+        let (loops_224_ms, loops_best_ms) = set.preview(true)?;
+        let (loops_224_unshadowed_ms, _) = set.preview(false)?;
+        step()?;
+        let loops_refit_ms = set.refit()?;
+        step()?;
+        let whole = rays::merged(&set.scene.organs);
+        let (mut rays, embree_failure) = rays::measure(&whole, &set.view, self.rays, &self.python)?;
+        rays.shrink_to_fit();
+        step()?;
+        let path_720p_ms = if self.samples > 0 { Some(self.path(&mut set)?) } else { None };
+        step()?;
+        progress.end();
+        let first = cell.as_ref().and_then(|c| c.cameras.first());
+        let result = RenderBenchResult {
+            preview_224_ms: first.map_or(loops_224_ms, |c| c.ms),
+            preview_224_unshadowed_ms: first.map_or(loops_224_unshadowed_ms, |c| c.unshadowed_ms),
+            preview_224_best_ms: first.map_or(loops_best_ms, |c| c.best_ms),
+            refit_ms: cell.as_ref().map_or(loops_refit_ms, |c| c.follow_ms),
+            cell,
+            loops_224_ms,
+            loops_224_unshadowed_ms,
+            triangles: set.stage.triangles(),
+            refitted_triangles: set.scene.organs[MOVING].triangles.len(),
+            build_ms,
+            path_720p_ms,
+            samples: self.samples,
+            rays,
+            embree_failure,
+            threads: rayon::current_num_threads(),
+            machine,
+        };
+        let document = document(&result);
+        Ok((result, document))
+    }
+}
+
+impl RenderBench {
+    /// Times the cameras of the cell during the grasp-lift, after each control period, which is not
+    /// timed.
+    fn cell(&self, name: &str, progress: &dyn Progress) -> Result<CellRow> {
+        let scene = Scene::read(name)?;
+        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
+        let mut script = ScriptedLift::new(&scene, &specimen, 0)?;
+        let clock = Instant::now();
+        let mut rig = CameraRig::new(&scene, &specimen, script.cell())?;
+        let begin_ms = 1e3 * clock.elapsed().as_secs_f64();
+        let names: Vec<String> = scene.cameras.iter().map(|c| c.name.clone()).collect();
+        let mut shadowed = vec![Vec::new(); names.len()];
+        let mut plain = shadowed.clone();
+        let mut follow = Vec::new();
+        for frame in 0..FRAMES + FRAMES / 10 {
+            let mut step =
+                |timed: &mut dyn FnMut(&mut CameraRig, &Cell) -> Result<()>, times: &mut Vec<f64>| -> Result<()> {
+                    check_interrupted(progress)?;
+                    script.advance()?;
+                    let clock = Instant::now();
+                    timed(&mut rig, script.cell())?;
+                    if frame >= FRAMES / 10 {
+                        times.push(1e3 * clock.elapsed().as_secs_f64());
+                    }
+                    Ok(())
+                };
+            // One camera and one kind per period: everything has moved before each picture.
+            let k = frame % names.len().max(1);
+            let see = |shadows: bool| {
+                let camera = &names[k];
+                move |rig: &mut CameraRig, cell: &Cell| -> Result<()> {
+                    std::hint::black_box(rig.render(cell, camera, [224; 2], &RenderSettings::Preview { shadows })?);
+                    Ok(())
+                }
+            };
+            if !names.is_empty() {
+                step(&mut see(true), &mut shadowed[k])?;
+                step(&mut see(false), &mut plain[k])?;
+            }
+            step(&mut |rig, cell| Ok(rig.update(cell)?), &mut follow)?;
+        }
+        let rows = names.into_iter().zip(shadowed.iter_mut().zip(&mut plain));
+        let cameras = rows
+            .map(|(camera, (shadowed, plain))| {
+                let ms = median(shadowed);
+                let best_ms = shadowed.first().copied().unwrap_or(ms);
+                CameraRow { camera, ms, best_ms, unshadowed_ms: median(plain) }
+            })
+            .collect();
+        let (scene, triangles, follow_ms) = (scene.name, rig.triangles(), median(&mut follow));
+        Ok(CellRow { scene, triangles, begin_ms, follow_ms, cameras })
+    }
+
+    fn path(&self, set: &mut Set) -> Result<f64> {
+        let eye = RayGenerator::new(Endoscope::thirty_degrees().camera);
+        let clock = Instant::now();
+        let picture = render(&mut set.stage, &eye, &set.view, &RenderSettings::path(self.samples), &Film::endoscope());
+        let took = 1e3 * clock.elapsed().as_secs_f64();
+        if let Some(path) = &self.picture {
+            picture.color.write_png(path)?;
+        }
+        Ok(took)
+    }
+}
+
+fn document(r: &RenderBenchResult) -> Document {
+    let mut lines = Vec::new();
+    let mut rows = Vec::new();
+    let picture =
+        |name: String, shadowed: String, best: String, plain: f64| vec![name, shadowed, best, fixed(plain, 1)];
+    if let Some(cell) = &r.cell {
+        lines.push(format!(
+            "{}: {} triangles, built in {} ms; updated from the cell in {} ms",
+            cell.scene,
+            count(cell.triangles),
+            fixed(cell.begin_ms, 0),
+            fixed(cell.follow_ms, 2)
+        ));
+        for c in &cell.cameras {
+            rows.push(picture(c.camera.clone(), fixed(c.ms, 1), fixed(c.best_ms, 1), c.unshadowed_ms));
+        }
+    }
+    rows.push(picture("loops of bowel".to_owned(), fixed(r.loops_224_ms, 1), String::new(), r.loops_224_unshadowed_ms));
+    lines.push(format!(
+        "loops of bowel: {} triangles, {} of them refitted each frame; all trees built in {} ms; {} threads on {}",
+        count(r.triangles),
+        count(r.refitted_triangles),
+        fixed(r.build_ms, 0),
+        r.threads,
+        r.machine.described()
+    ));
+    if let Some(ms) = r.path_720p_ms {
+        lines.push(format!("1280 x 720 pixels with {} paths each: {} s", r.samples, fixed(1e-3 * ms, 1)));
+    }
+    lines.extend(r.embree_failure.as_ref().map(|why| format!("Embree: {why}")));
+    let dash = || "\u{2013}".to_owned();
+    let million = |x: Option<f64>| x.map_or_else(dash, |x| fixed(1e-6 * x, 2));
+    let rays = r.rays.iter().map(|row| {
+        vec![
+            row.kind.to_owned(),
+            count(row.rays),
+            million(Some(row.rays_per_second)),
+            million(row.embree_rays_per_second),
+            row.ratio.map_or_else(dash, |x| fixed(x, 2)),
+            row.differing.map_or_else(dash, count),
+            row.largest_difference_m.map_or_else(dash, |x| fixed(1e6 * x, 2)),
+        ]
+    });
+    let head = ["Rays", "count", "ours (M/s)", "Embree (M/s)", "ratio", "differ", "largest difference (\u{b5}m)"];
+    let pictures = ["224 x 224 pixels", "with shadows (ms)", "best (ms)", "without shadows (ms)"];
+    Document::new("Render", "Cost of pictures")
+        .with(Section::new("Previews", "").table(Table::new(pictures, rows)).lines(lines))
+        .with(Section::new("Rays on one thread", "").table(Table::new(head, rays.collect())))
+}

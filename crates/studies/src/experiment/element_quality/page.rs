@@ -1,0 +1,141 @@
+//! The page of the element-quality study.
+
+use super::result::{ElementQualityResult, ElementQualityRow};
+use crate::Result;
+use crate::experiment::appendix::{Condition, remarks, suspensions};
+use crate::trials::resumed;
+use trocar_report::colors;
+use trocar_report::document::{Document, Section, Table};
+use trocar_report::page::{self, Card};
+use trocar_report::plots::{Line, Plot};
+use trocar_report::table::{count, fixed};
+
+pub(super) fn document(r: &ElementQualityResult) -> Result<Document> {
+    // Groups of cases: condition, and whether the jaw force is proportional to the modulus.
+    let mut groups: Vec<(Condition, bool)> = r.rows.iter().map(|row| (row.condition, row.scaled)).collect();
+    groups.dedup();
+    let mut document = Document::new("Element quality", "Lifts of the appendix against its pins");
+    for group in groups {
+        document = document.with(section(r, group)?);
+    }
+    let appendix = format!(
+        "Appendix: {} nodes, {} elements; jaw force {} N.",
+        count(r.nodes),
+        count(r.tets),
+        fixed(r.jaw_force_n, 2)
+    );
+    let lines = std::iter::once(appendix).chain(resumed(&r.resumed, "cases"));
+    Ok(document.with(Section::new("Settings", "").lines(lines)))
+}
+
+fn section(r: &ElementQualityResult, (condition, scaled): (Condition, bool)) -> Result<Section> {
+    let rows: Vec<&ElementQualityRow> =
+        r.rows.iter().filter(|row| (row.condition, row.scaled) == (condition, scaled)).collect();
+    let force = if scaled { "N at 12 kPa and in proportion at other moduli" } else { "N at all moduli" };
+    let lead = format!(
+        "{}. The appendix is grasped in its middle and lifted, at five moduli. The jaw force is {} {force}. The far \
+         end is pinned; in half of the cases also the lowest 42% of the nodes. Paper: 170 to 180 of 8,072 elements \
+         inverted at 15 mm; at 30 mm three of three runs diverged at 3 and 6 kPa, one of three at 12 and 24 kPa, \
+         none at 48 kPa.",
+        condition.described(),
+        fixed(r.jaw_force_n, 2),
+    );
+    let inverted = rows.iter().map(|row| row.inverted_peak).max().unwrap_or(0);
+    let diverged = rows.iter().filter(|row| row.diverged).count();
+    let held = rows.iter().filter(|row| row.held).count();
+    let smallest = rows.iter().map(|row| row.min_volume_ratio).fold(f64::INFINITY, f64::min);
+    let sum = |k: usize| rows.iter().map(|row| row.suspensions[k]).sum();
+    let cards = [
+        Card::new("Inverted", count(inverted), "largest number in any frame of any case").met(inverted == 0),
+        Card::new("Diverged", format!("{diverged} of {}", rows.len()), "cases").met(diverged == 0),
+        Card::new("Held", format!("{held} of {}", rows.len()), "cases"),
+        Card::new("Smallest volume", fixed(smallest, 3), "of an element over its volume at rest"),
+        Card::new(
+            "Suspensions",
+            suspensions([sum(0), sum(1), sum(2)]),
+            "contacts disabled / contacts of blades disabled / organs relaxed",
+        ),
+    ];
+    let mut pins: Vec<&str> = rows.iter().map(|row| row.pins.as_str()).collect();
+    pins.sort_unstable();
+    pins.dedup();
+    let figures = pins.iter().map(|pins| volumes(&rows, pins)).collect::<Result<Vec<_>>>()?;
+    let scaled = if scaled { ", jaw force proportional to the modulus" } else { "" };
+    let title = format!("Fig. 7(f) {}{scaled}", condition.title());
+    Ok(Section::new(title, lead).cards(cards).figures(figures).table(table(&rows)))
+}
+
+/// Smallest volume ratio over modulus, one line per design and lift.
+fn volumes(rows: &[&ElementQualityRow], pins: &str) -> Result<String> {
+    let mut series: Vec<(String, Line)> = Vec::new();
+    for row in rows.iter().filter(|row| row.pins == pins) {
+        let name = format!("{}, {} mm", row.design, fixed(row.lift_mm, 0));
+        let point = (row.modulus_kpa, row.min_volume_ratio);
+        match series.iter_mut().find(|s| s.0 == name) {
+            Some((_, line)) => line.points.push(point),
+            None => series.push((name, Line::new(vec![point], colors::organ(series.len())))),
+        }
+    }
+    let legend = page::legend(series.iter().map(|(name, line)| (name.as_str(), line.color)));
+    let title = format!("smallest volume ratio, {pins}");
+    let plot = Plot {
+        title: &title,
+        x: "Young's modulus (kPa)",
+        y: "volume ratio (1)",
+        lines: series.into_iter().map(|s| s.1).collect(),
+        show: vec![0.0],
+        limits: vec![0.0],
+        log_x: true,
+        ..Plot::default()
+    };
+    let pins = page::escape(pins);
+    let caption = format!(
+        "<b>Smallest volume of an element</b> over its volume at rest, {pins} pinned; at 0 it is inverted.{legend}"
+    );
+    Ok(plot.figure(&caption)?)
+}
+
+fn table(rows: &[&ElementQualityRow]) -> Table {
+    let head = [
+        "Design",
+        "Condition",
+        "Pins",
+        "Lift (mm)",
+        "E (kPa)",
+        "Jaws (N)",
+        "Inverted",
+        "Diverged",
+        "Smallest volume",
+        "Yielded substeps",
+        "Follow ratio",
+        "Slip (mm)",
+        "Activation step (mm)",
+        "Pull (N)",
+        "Held",
+        "Suspensions",
+        "Remarks",
+    ];
+    let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
+    let row = |row: &&ElementQualityRow| {
+        vec![
+            row.design.clone(),
+            row.condition.name().to_owned(),
+            row.pins.clone(),
+            fixed(row.lift_mm, 0),
+            fixed(row.modulus_kpa, 0),
+            fixed(row.jaw_force_n, 2),
+            count(row.inverted_peak),
+            yes(row.diverged),
+            fixed(row.min_volume_ratio, 3),
+            count(row.yielded_substeps),
+            fixed(row.follow_ratio, 3),
+            fixed(row.slip_mm, 2),
+            fixed(row.activation_step_mm, 2),
+            fixed(row.peak_constraint_n, 2),
+            yes(row.held),
+            suspensions(row.suspensions),
+            remarks(row.divergence.as_ref(), row.why.as_ref(), (row.slipped, row.torn), None),
+        ]
+    };
+    Table::new(head, rows.iter().map(row).collect())
+}

@@ -1,0 +1,22 @@
+//! Scenes for benchmarks, experiments and tests.
+//!
+//! [`Organs`] are read from a mesh file or procedural. A [`Scene`] is a model of them with patches
+//! of nodes that move along a path: [`Scene::sag`], [`Scene::drag`], [`Scene::shake`],
+//! [`Scene::moving`], [`Scene::tube`], [`Scene::fall`]. [`Run`] steps it by a solver, [`OracleRun`]
+//! by the oracle.
+
+mod error;
+mod error_norms;
+mod laparoscopic;
+mod organs;
+mod run;
+mod scene;
+mod shapes;
+
+pub use error::{Error, Result};
+pub use error_norms::{mean_error, rms_error};
+pub use laparoscopic::{LaparoscopicScene, view as endoscope_view};
+pub use organs::{Organ, Organs};
+pub use run::{OracleRun, Run, grasps, rest_positions, tools};
+pub use scene::{FRAME, Motion, Patch, SCENES, Scene, material};
+pub use shapes::ellipsoid;

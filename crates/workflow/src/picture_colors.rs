@@ -1,0 +1,69 @@
+//! Conversions of pictures: averages, and colours of labels and depth.
+
+use trocar_camera::ColorImage;
+
+/// The picture reduced by the factor `finer`, by averaging.
+pub(crate) fn averaged(image: &ColorImage, finer: usize) -> ColorImage {
+    if finer <= 1 {
+        return image.clone();
+    }
+    let (width, height) = (image.width / finer, image.height / finer);
+    let count = (finer * finer) as u32;
+    let pixel = |i: usize| {
+        let (x, y) = (i % width * finer, i / width * finer);
+        let block = (0..finer * finer).map(|k| image.pixels[(y + k / finer) * image.width + x + k % finer]);
+        let sum = block.fold([0_u32; 3], |s, p| [0, 1, 2].map(|c| s[c] + u32::from(p[c])));
+        sum.map(|s| ((s + count / 2) / count) as u8)
+    };
+    ColorImage { width, height, pixels: (0..width * height).map(pixel).collect() }
+}
+
+/// A colour per label. Hues are steps of the golden angle, so that neighbours differ most.
+pub(crate) fn label_color(label: u16) -> [u8; 3] {
+    if label == 0 {
+        return [0; 3];
+    }
+    let hue = (f64::from(label) * 0.618_033_988_75).fract() * 6.0;
+    let light = if label.is_multiple_of(2) { 0.95 } else { 0.72 };
+    let x = 1.0 - (hue % 2.0 - 1.0).abs();
+    let rgb = match hue as u32 {
+        0 => [1.0, x, 0.0],
+        1 => [x, 1.0, 0.0],
+        2 => [0.0, 1.0, x],
+        3 => [0.0, x, 1.0],
+        4 => [x, 0.0, 1.0],
+        _ => [1.0, 0.0, x],
+    };
+    rgb.map(|c| (255.0 * light * (0.18 + 0.82 * c)) as u8)
+}
+
+/// Depth in colours from near (bright) to far; black without depth.
+pub(crate) fn shown(depth: &trocar_camera::DepthImage) -> ColorImage {
+    // Depth is rounded to millimetres, so that a flat area has one rank.
+    let whole = |d: f32| (d * 1e3).round() * 1e-3;
+    let mut valid: Vec<f32> = depth.depth.iter().copied().filter(|d| *d > 0.0).map(whole).collect();
+    valid.sort_by(f32::total_cmp);
+    let at = |share: f64| valid.get((share * valid.len().saturating_sub(1) as f64) as usize).copied().unwrap_or(1.0);
+    let (near, far) = (at(0.01), at(0.97));
+    // Samples of the colour map Viridis.
+    let stops: [[f64; 3]; 6] = [
+        [253.0, 231.0, 37.0],
+        [122.0, 209.0, 81.0],
+        [34.0, 168.0, 132.0],
+        [42.0, 120.0, 142.0],
+        [65.0, 68.0, 135.0],
+        [68.0, 1.0, 84.0],
+    ];
+    let color = |d: &f32| {
+        if *d <= 0.0 {
+            return [0; 3];
+        }
+        // Half by depth and half by rank, so that a flat object on a table is not all one colour.
+        let rank = valid.partition_point(|v| *v < whole(*d)) as f64 / valid.len().max(1) as f64;
+        let share = f64::from((d - near) / (far - near).max(1e-6));
+        let x = 5.0 * (0.5 * share.clamp(0.0, 1.0) + 0.5 * rank).min(0.9999);
+        let (i, t) = (x as usize, x.fract());
+        [0, 1, 2].map(|k| (stops[i][k] + t * (stops[i + 1][k] - stops[i][k])) as u8)
+    };
+    ColorImage { width: depth.width, height: depth.height, pixels: depth.depth.iter().map(color).collect() }
+}
