@@ -37,6 +37,7 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         policies: policies.iter().map(|p| PolicySpec::parse(p).unwrap()).collect(),
         episodes,
         seed: 0,
+        variation: None,
         jobs: 1,
         retry_failed: false,
         phantoms: folder.join("phantoms"),
@@ -245,6 +246,7 @@ fn one_episode_of_a_server_has_the_same_files_as_any_other_and_a_page() {
         scene: scene(dir.path()).display().to_string(),
         policy: format!("mine={}", server.url()),
         seed: 3,
+        variation: None,
         threads: 1,
         phantoms: dir.path().join("phantoms"),
     };
@@ -279,6 +281,7 @@ fn an_episode_without_its_policy_leaves_nothing() {
             scene: scene.clone(),
             policy: policy.to_owned(),
             seed: 0,
+            variation: None,
             threads: 1,
             phantoms: dir.path().into(),
         };

@@ -15,6 +15,7 @@ impl Scene {
         scene.specimen = drawn.specimen.clone();
         scene.place_specimen(drawn, specimen);
         scene.vary_tissue(drawn, specimen);
+        scene.vary_pictures(drawn);
         scene.vary_tools(drawn);
         scene.vary_starts(drawn);
         scene.vary_cameras(drawn);
@@ -59,6 +60,9 @@ impl Scene {
         tissue.tear_force_n = drawn.one(Factor::TearForce).unwrap_or(tissue.tear_force_n);
         let error = &mut self.gravity_error;
         error.joint_friction_nm = drawn.one(Factor::JointFriction).unwrap_or(error.joint_friction_nm);
+    }
+
+    fn vary_pictures(&mut self, drawn: &Drawn) {
         let imaging = &mut self.imaging;
         imaging.lamp *= drawn.one(Factor::LampScale).unwrap_or(1.0);
         imaging.exposure *= drawn.one(Factor::ExposureScale).unwrap_or(1.0);
@@ -103,7 +107,8 @@ impl Scene {
             start.azimuth_deg += added(Factor::Azimuth);
             start.insertion_mm += added(Factor::Insertion);
             start.roll_deg += added(Factor::Roll);
-            let aside = |axis| drawn.values.iter().find(|v| v.factor == Factor::Insertion && v.part == name && v.axis == axis);
+            let aside =
+                |axis| drawn.values.iter().find(|v| v.factor == Factor::Insertion && v.part == name && v.axis == axis);
             if let Some(position) = &mut start.position_m {
                 for (k, coordinate) in position.iter_mut().enumerate() {
                     *coordinate += aside(1 + k).map_or(0.0, |v| 1e-3 * v.value);
@@ -176,12 +181,12 @@ impl PinRule {
         match self {
             Self::None {} => Self::None {},
             Self::Band { share } => Self::Band { share: scaled(share) },
-            Self::End { end, length, band_length, band_share } => Self::End {
-                end,
-                length: scaled(length),
-                band_length: scaled(band_length),
-                band_share: scaled(band_share),
-            },
+            Self::End { end, length, band_length, band_share } => {
+                let length = scaled(length);
+                // The band is next to the end, within the organ.
+                let band_length = scaled(band_length).min(1.0 - length);
+                Self::End { end, length, band_length, band_share: scaled(band_share) }
+            }
         }
     }
 }

@@ -1,14 +1,15 @@
 //! What a factor's value is drawn from.
 
 use crate::EpisodeRandom;
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 
 /// Beyond so many standard deviations nothing is drawn.
 const MAX_DEVIATIONS: f64 = 3.0;
 
 /// A distribution of one number.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distribution {
     /// Evenly to either side of 0, by at most this.
@@ -81,6 +82,43 @@ impl Distribution {
     pub fn varies(&self) -> bool {
         let [low, high] = self.range();
         low < high
+    }
+}
+
+impl JsonSchema for Distribution {
+    fn schema_name() -> Cow<'static, str> {
+        "Distribution".into()
+    }
+
+    fn json_schema(_: &mut SchemaGenerator) -> Schema {
+        let number = || serde_json::json!({ "type": "number" });
+        let list = |said: &str, fewest: u32, most: Option<u32>| {
+            let mut list = serde_json::json!({
+                "description": said, "type": "array", "items": number(), "minItems": fewest
+            });
+            if let Some(most) = most {
+                list["maxItems"] = most.into();
+            }
+            list
+        };
+        json_schema!({
+            "description": "A distribution of one number; one of the keys.",
+            "type": "object",
+            "minProperties": 1,
+            "maxProperties": 1,
+            "additionalProperties": false,
+            "properties": {
+                "within": {
+                    "description": "Evenly to either side of 0, by at most this.", "type": "number", "minimum": 0
+                },
+                "uniform": list("Evenly between two numbers.", 2, Some(2)),
+                "log_uniform": list("Evenly in the logarithm, between two numbers above 0.", 2, Some(2)),
+                "normal": list(
+                    "Mean and standard deviation of a normal distribution, cut off at three deviations.", 2, Some(2)
+                ),
+                "choice": list("One of these, each as likely.", 1, None),
+            }
+        })
     }
 }
 

@@ -1,9 +1,11 @@
 //! Drawing: the values of one episode by its seed.
 
 use super::{Factor, Per, Specimens, VariationSet};
-use crate::{EpisodeRandom, Scene, SpecimenSource, Tool};
+use crate::{EpisodeRandom, Error, Lens, Result, Scene, SpecimenSource, Tool};
+use serde::de::{Error as _, MapAccess, Visitor};
 use serde::ser::SerializeMap;
-use serde::{Serialize, Serializer};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use std::fmt;
 
 /// One drawn number.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,22 +29,49 @@ impl DrawnValue {
     }
 
     fn axis_name(&self) -> &'static str {
-        // An arm without a port has three coordinates instead of an insertion.
-        let axes = if self.factor == Factor::Insertion && self.axis > 0 { &["", "x", "y", "z"][..] } else { self.factor.axes() };
-        axes.get(self.axis).copied().unwrap_or_default()
+        axes(self.factor).get(self.axis).copied().unwrap_or_default()
+    }
+
+    /// The number `value` of that name in tables; `None` of a name that no number has.
+    pub fn named(name: &str, value: f64) -> Option<Self> {
+        let steps: Vec<&str> = name.split('.').collect();
+        let (at, factor) = steps.iter().enumerate().find_map(|(at, step)| Some((at, Factor::named(step)?)))?;
+        let (part, axis) = (steps[..at].join("."), steps[at + 1..].join("."));
+        let axis = axes(factor).iter().position(|name| *name == axis)?;
+        Some(Self { factor, part, axis, value })
     }
 }
 
-/// What was drawn for an episode.
+/// The names of a factor's numbers. An arm without a port has three coordinates instead of an
+/// insertion.
+fn axes(factor: Factor) -> &'static [&'static str] {
+    if factor == Factor::Insertion { &["", "x", "y", "z"] } else { factor.axes() }
+}
+
+/// What was drawn for an episode. In files it is a table of numbers by their names, and `specimen`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawn {
     /// The specimen.
     pub specimen: SpecimenSource,
-    /// The numbers, in the order of the factors.
+    /// The numbers, in the order of the factors, then by part and axis.
     pub values: Vec<DrawnValue>,
 }
 
 impl Drawn {
+    fn new(specimen: SpecimenSource, mut values: Vec<DrawnValue>) -> Self {
+        let order = |v: &DrawnValue| (v.factor, v.part.clone(), v.axis);
+        values.sort_by_cached_key(order);
+        Self { specimen, values }
+    }
+
+    /// As TOML, for files that it is read back from to the bit.
+    ///
+    /// # Errors
+    /// A value that has no place in TOML.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string(self).map_err(|e| Error::Write(e.to_string()))
+    }
+
     /// The number of a factor of the whole cell.
     pub(super) fn one(&self, factor: Factor) -> Option<f64> {
         self.values.iter().find(|v| v.factor == factor).map(|v| v.value)
@@ -60,13 +89,41 @@ impl Drawn {
 }
 
 impl Serialize for Drawn {
-    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         let mut map = serializer.serialize_map(Some(1 + self.values.len()))?;
-        map.serialize_entry("specimen", &self.specimen.label())?;
+        map.serialize_entry(super::SPECIMEN, &self.specimen.label())?;
         for value in &self.values {
             map.serialize_entry(&value.name(), &value.value)?;
         }
         map.end()
+    }
+}
+
+impl<'de> Deserialize<'de> for Drawn {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> std::result::Result<Self, D::Error> {
+        struct Numbers;
+        impl<'de> Visitor<'de> for Numbers {
+            type Value = Drawn;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str("a table of drawn numbers by name")
+            }
+
+            fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> std::result::Result<Drawn, A::Error> {
+                let (mut specimen, mut values) = (None, Vec::new());
+                while let Some(name) = map.next_key::<String>()? {
+                    if name == super::SPECIMEN {
+                        specimen = Some(SpecimenSource::labelled(&map.next_value::<String>()?));
+                        continue;
+                    }
+                    let value = DrawnValue::named(&name, map.next_value()?);
+                    values.push(value.ok_or_else(|| A::Error::custom(format!("'{name}' is no drawn number")))?);
+                }
+                let specimen = specimen.ok_or_else(|| A::Error::missing_field(super::SPECIMEN))?;
+                Ok(Drawn::new(specimen, values))
+            }
+        }
+        deserializer.deserialize_map(Numbers)
     }
 }
 
@@ -95,7 +152,7 @@ impl Scene {
                     }
                 }
                 None => {
-                    for part in self.parts(factor.per()) {
+                    for part in self.parts(factor) {
                         let (purpose, first) = purpose(factor, part);
                         let random = EpisodeRandom::new(seed, &purpose);
                         (0..factor.axes().len()).for_each(|k| draw(&random, part, k, first + k as u64));
@@ -103,16 +160,21 @@ impl Scene {
                 }
             }
         }
-        Drawn { specimen: self.draw_specimen(seed), values }
+        Drawn::new(self.draw_specimen(seed), values)
     }
 
-    /// The names of the parts that a factor is drawn for.
-    fn parts(&self, per: Per) -> Vec<&str> {
-        match per {
+    /// The names of the parts that a factor is drawn for. An arm without a base has none to shift,
+    /// and the lens of a recording is that of its camera.
+    fn parts(&self, factor: Factor) -> Vec<&str> {
+        let has_base = |tool: &&Tool<'_>| factor != Factor::BaseShift || tool.arm.base.is_some();
+        match factor.per() {
             Per::Cell => vec![""],
-            Per::Arm => self.tools().iter().map(|tool: &Tool<'_>| tool.arm.name.name()).collect(),
+            Per::Arm => self.tools().iter().filter(has_base).map(|tool| tool.arm.name.name()).collect(),
             Per::Port => self.ports.iter().map(|port| port.name.as_str()).collect(),
-            Per::Camera => self.cameras.iter().map(|camera| camera.name.as_str()).collect(),
+            Per::Camera => {
+                let own_lens = |lens: &Lens| factor != Factor::FocalScale || !matches!(lens, Lens::Recording {});
+                self.cameras.iter().filter(|c| own_lens(&c.lens)).map(|c| c.name.as_str()).collect()
+            }
         }
     }
 

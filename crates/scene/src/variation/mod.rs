@@ -20,7 +20,7 @@ use std::collections::BTreeMap;
 use std::fmt;
 
 /// Sets of factors by name.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum VariationSet {
     /// Nothing but what the scene itself names.
@@ -91,6 +91,7 @@ pub struct Variation {
 }
 
 const SET: &str = "set";
+const SPECIMEN: &str = "specimen";
 const SPECIMENS: &str = "specimens";
 
 impl Variation {
@@ -102,9 +103,26 @@ impl Variation {
         all
     }
 
-    /// Whether an episode's specimen, or where it lies, depends on the seed.
+    /// The starts of the instruments alone, as in the paper's cell.
+    pub fn starts() -> Self {
+        Self { factors: sets::starts(), ..Self::default() }
+    }
+
+    /// The largest number that is drawn for a factor; 0 where it is not drawn or never positive.
+    pub(crate) fn most(&self, factor: Factor) -> f64 {
+        self.all_factors().get(&factor).map_or(0.0, |d| d.range()[1].max(0.0))
+    }
+
+    /// The largest distance from 0 that is drawn for a factor; 0 where it is not drawn.
+    pub(crate) fn reach(&self, factor: Factor) -> f64 {
+        self.all_factors().get(&factor).map_or(0.0, |d| d.range()[0].abs().max(d.range()[1].abs()))
+    }
+
+    /// Whether episodes depend on their seed.
     pub fn varies(&self) -> bool {
-        self.specimens.is_some() || self.all_factors().values().any(Distribution::varies)
+        self.specimens.is_some()
+            || self.set >= VariationSet::Standard
+            || self.all_factors().values().any(Distribution::varies)
     }
 }
 
@@ -163,8 +181,12 @@ impl JsonSchema for Variation {
     fn json_schema(generator: &mut SchemaGenerator) -> Schema {
         let distribution = generator.subschema_for::<Distribution>();
         let mut properties = serde_json::Map::new();
-        properties.insert(SET.to_owned(), generator.subschema_for::<VariationSet>().into());
-        properties.insert(SPECIMENS.to_owned(), generator.subschema_for::<Specimens>().into());
+        let set = generator.subschema_for::<VariationSet>();
+        let said = "Set of factors: none, easy, standard or hard.";
+        properties.insert(SET.to_owned(), serde_json::json!({ "description": said, "allOf": [set] }));
+        let specimens = generator.subschema_for::<Specimens>();
+        let said = "The specimens that an episode's one is drawn from.";
+        properties.insert(SPECIMENS.to_owned(), serde_json::json!({ "description": said, "allOf": [specimens] }));
         for factor in Factor::ALL {
             let one = serde_json::json!({ "description": factor.about(), "allOf": [distribution] });
             properties.insert(factor.name().to_owned(), one);

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 pub(super) fn factors(set: VariationSet) -> BTreeMap<Factor, Distribution> {
     match set {
         VariationSet::None => BTreeMap::new(),
-        VariationSet::Easy => BTreeMap::from([
+        VariationSet::Easy => with_starts([
             (Factor::SpecimenShift, Within(3.0)),
             (Factor::SpecimenTurn, Within(8.0)),
             (Factor::Modulus, LogUniform([8.0, 18.0])),
@@ -49,8 +49,22 @@ pub(super) fn factors(set: VariationSet) -> BTreeMap<Factor, Distribution> {
     }
 }
 
-fn standard() -> BTreeMap<Factor, Distribution> {
+/// The starts of the instruments, as far as in the paper's cell.
+pub(super) fn starts() -> BTreeMap<Factor, Distribution> {
     BTreeMap::from([
+        (Factor::Tilt, Within(1.0)),
+        (Factor::Azimuth, Within(5.0)),
+        (Factor::Insertion, Within(5.0)),
+        (Factor::Roll, Within(10.0)),
+    ])
+}
+
+fn with_starts<const N: usize>(more: [(Factor, Distribution); N]) -> BTreeMap<Factor, Distribution> {
+    starts().into_iter().chain(more).collect()
+}
+
+fn standard() -> BTreeMap<Factor, Distribution> {
+    with_starts([
         (Factor::SpecimenShift, Within(8.0)),
         (Factor::SpecimenTurn, Within(20.0)),
         (Factor::Modulus, LogUniform([3.0, 48.0])),
@@ -60,4 +74,20 @@ fn standard() -> BTreeMap<Factor, Distribution> {
         (Factor::LampScale, Uniform([0.7, 1.3])),
         (Factor::ExposureScale, Uniform([0.7, 1.3])),
     ])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sets_stay_within_the_ranges_of_their_factors() {
+        for set in VariationSet::ALL {
+            for (factor, distribution) in factors(set) {
+                assert!(distribution.mistake().is_none());
+                let range = factor.range();
+                assert!(distribution.range().iter().all(|v| range.contains(v)), "{}: {}", set.name(), factor.name());
+            }
+        }
+    }
 }
