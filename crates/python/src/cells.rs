@@ -1,15 +1,17 @@
 //! `Cells`: episodes of one scene, side by side in one process.
 
-use crate::error::{forked, task, wrong};
+use crate::error::{evaluate, forked, task, wrong};
 use crate::frames::Rows;
 use crate::pictures::Eyes;
 use crate::prepare;
+use crate::progress::Signals;
 use numpy::{PyArray1, PyArray3, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
 use trocar_cell::{Action, ActionSpace};
 use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
+use trocar_workflow::{SpecimenCache, drawn_specimens};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it
 /// goes on), time (s).
@@ -27,6 +29,7 @@ pub struct State(EpisodeState);
 pub struct Cells {
     pub(crate) episodes: Vec<Episode>,
     pub(crate) eyes: Eyes,
+    specimens: SpecimenCache,
     bounds: Bounds,
     pub(crate) pool: rayon::ThreadPool,
     task_name: &'static str,
@@ -126,7 +129,7 @@ impl Cells {
             let prompt = trocar_task::prompt(&scene);
             let eyes = Eyes::new(count, sensor_noise);
             let (task_name, process) = (scene.task.name.name(), std::process::id());
-            Ok(Self { episodes, eyes, bounds, pool, task_name, prompt, steps, process })
+            Ok(Self { episodes, eyes, specimens, bounds, pool, task_name, prompt, steps, process })
         })
     }
 
@@ -246,6 +249,10 @@ impl Cells {
             let place = usize::try_from(*k).ok().and_then(|k| wanted.get_mut(k));
             *place.ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))? = Some(*seed);
         }
+        // Made here and not in the pool: whoever makes one uses the pool itself and locks its folder.
+        let drawn = drawn_specimens(self.episodes[0].scene(), wanted.iter().copied().flatten());
+        let specimens = &self.specimens;
+        py.detach(|| specimens.make_all(&drawn, &Signals::new())).map_err(|e| evaluate(&e))?;
         let begin = |(place, seed): (&mut Place<'_>, &Option<u64>)| match seed {
             Some(seed) => place.episode.reset(*seed).map(|_| place.write(0.0)),
             None => Ok(()),

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::sync::Arc;
 use trocar_cell::{Action, ActionSpace};
-use trocar_scene::{ArmModel, Drawn, Scene, Source};
+use trocar_scene::{ArmModel, Drawn, Scene, Source, Variation};
 use trocar_specimen::{Specimen, parse_toml};
 use xxhash_rust::xxh3::xxh3_64;
 
@@ -30,7 +30,7 @@ const NUMBERS: usize = 5;
 pub struct Header {
     /// Version of the program.
     pub program: String,
-    /// The scene as TOML, every value in it, with the specimen that was drawn.
+    /// The scene as TOML, every value in it, with the specimen that was drawn and nothing that varies.
     pub scene: String,
     /// What was drawn for the episode, as TOML: a replay draws nothing.
     #[serde(default)]
@@ -106,14 +106,19 @@ pub fn scene_hash(scene: &Scene, specimen: u64) -> Result<u64> {
     Ok(scene.hash(&contents)?)
 }
 
+/// The scene as an episode file keeps it: with the specimen of that episode, and without what
+/// varies between episodes. What was drawn is applied to it.
+fn recorded(scene: &Scene, drawn: &Drawn) -> Scene {
+    Scene { specimen: drawn.specimen.clone(), variation: Variation::default(), ..scene.clone() }
+}
+
 impl Header {
     /// Of an episode that stands at its start.
     ///
     /// # Errors
     /// As [`scene_hash`].
     pub fn of(episode: &Episode, policy: &str) -> Result<Self> {
-        let mut scene = episode.scene().clone();
-        scene.specimen = episode.drawn().specimen.clone();
+        let scene = recorded(episode.scene(), episode.drawn());
         let folder = std::path::absolute(&scene.folder).unwrap_or_else(|_| scene.folder.clone());
         Ok(Self {
             program: env!("CARGO_PKG_VERSION").to_owned(),
@@ -247,7 +252,7 @@ impl EpisodeFile {
     /// `None` where they are the same.
     ///
     /// # Errors
-    /// A model file that cannot be read.
+    /// A model file that cannot be read, a damaged header.
     pub fn other(&self, scene: &Scene, specimen: &Specimen) -> Result<Option<String>> {
         let header = &self.header;
         let found = specimen_hash(specimen);
@@ -255,7 +260,7 @@ impl EpisodeFile {
             let said = format!("the specimen is another one: {}, not {}", hex(found), header.specimen_hash);
             return Ok(Some(said));
         }
-        let found = hex(scene_hash(scene, found)?);
+        let found = hex(scene_hash(&recorded(scene, &self.drawn()?), found)?);
         Ok((found != header.scene_hash)
             .then(|| format!("the scene or an arm's model is another one: {found}, not {}", header.scene_hash)))
     }

@@ -51,8 +51,10 @@ impl SpecimenCache {
     /// # Errors
     /// As [`read`](Self::read); an interruption.
     pub fn make_all(&self, sources: &[SpecimenSource], progress: &dyn Progress) -> Result<()> {
-        if let [one] = sources {
-            return self.read(one, progress).map(drop);
+        match sources {
+            [] => return Ok(()),
+            [one] => return self.read(one, progress).map(drop),
+            _ => {}
         }
         progress.begin("specimens", sources.len() as u64);
         for source in sources {
