@@ -111,6 +111,14 @@ def test_two_processes_give_the_same_numbers(one):
     assert int(printed.stdout) == one.unwrapped.state_hash
 
 
+def test_a_reset_tells_what_was_drawn(one):
+    drawn = one.reset(seed=3)[1]["drawn"]
+    assert drawn["specimen"] == "phantom-a:1" and abs(drawn["left.tilt_deg"]) <= 1.0
+    assert "drawn" not in one.step(one.action_space.low)[4]
+    assert one.reset(seed=3)[1]["drawn"] == drawn
+    assert one.reset(seed=4)[1]["drawn"] != drawn
+
+
 def test_a_restored_state_has_its_seed_and_draws_the_same_seeds(one):
     one.reset(seed=3)
     saved = one.save_state()

@@ -13,10 +13,9 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
-use trocar_core::Progress;
-use trocar_scene::Scene;
-use trocar_specimen::Specimen;
-use trocar_workflow::{Error, Result, refuse_overlap, scene_specimen};
+use trocar_core::{Progress, Silent};
+use trocar_scene::{Scene, SpecimenSource, VariationSet};
+use trocar_workflow::{Error, Result, SpecimenCache, drawn_specimens, read_varied, refuse_overlap};
 
 /// Maximum number of parallel episodes per core. Each has its own cell in memory.
 const JOBS_PER_CORE: usize = 8;
@@ -36,6 +35,8 @@ pub struct Campaign {
     /// Seed of the first episode; the following episodes have the following seeds. All policies
     /// have the same seeds.
     pub seed: u64,
+    /// The set of factors that vary between episodes, instead of the scene's.
+    pub variation: Option<VariationSet>,
     /// Number of parallel episodes; 0 for one per core. Results do not depend on it.
     pub jobs: usize,
     /// Runs episodes again whose policy failed.
@@ -68,7 +69,7 @@ impl Campaign {
         max_episodes: Option<usize>,
         progress: &dyn Progress,
     ) -> Result<(Store, Manifest)> {
-        let scene = Scene::read(&self.scene)?;
+        let scene = read_varied(&self.scene, self.variation)?;
         refuse_overlap(Path::new(&self.scene), output)?;
         // Making a specimen takes minutes, so everything that does not need it is checked first.
         manifest::check(&self.policies, self.episodes, self.seed, max_episodes)?;
@@ -83,14 +84,21 @@ impl Campaign {
         let missing = |p: &&PolicySpec| self.retry_failed || !store::has_episodes(output, &p.name, self.episodes);
         let policies: Vec<&PolicySpec> = self.policies.iter().filter(missing).collect();
         let servers = start_servers(&policies, progress)?;
-        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
-        let mut manifest = Manifest::new(&scene, &specimen, &self.policies, self.episodes, self.seed)?;
+        let specimens = SpecimenCache::new(&scene, &self.phantoms);
+        let named = manifest::named_specimen(&scene);
+        // The check above excludes an overflow.
+        let seeds = (0..self.episodes as u64).map(|k| self.seed.saturating_add(k));
+        let others = drawn_specimens(&scene, seeds).into_iter().filter(|s| *s != named);
+        let needed: Vec<SpecimenSource> = std::iter::once(named.clone()).chain(others).collect();
+        specimens.make_all(&needed, progress)?;
+        let named = specimens.read(&named, &Silent)?;
+        let mut manifest = Manifest::new(&scene, &named, &self.policies, self.episodes, self.seed)?;
         manifest.max_episodes = max_episodes;
         let store = Store::open(output, &manifest)?;
         let workers = if self.jobs == 0 { cores } else { self.jobs };
         let done = self
-            .run_missing(&scene, &specimen, &manifest, &store, workers, servers, progress)
-            .and_then(|()| store.write_videos(&manifest, &scene, &specimen, progress));
+            .run_missing(&scene, &specimens, &manifest, &store, workers, servers, progress)
+            .and_then(|()| store.write_videos(&manifest, &scene, &specimens, progress));
         match done {
             Ok(()) => Ok((store, manifest)),
             Err(Error::Interrupted) => {
@@ -107,7 +115,7 @@ impl Campaign {
     fn run_missing(
         &self,
         scene: &Scene,
-        specimen: &Specimen,
+        specimens: &SpecimenCache,
         manifest: &Manifest,
         store: &Store,
         workers: usize,
@@ -122,7 +130,7 @@ impl Campaign {
         let first_error: Mutex<Option<Error>> = Mutex::new(None);
         let servers = Mutex::new(servers);
         let work = |first: bool| -> Result<()> {
-            let mut worker = Worker::new(scene, specimen)?.with_stop_flag(Arc::clone(&stop));
+            let mut worker = Worker::new(scene, specimens)?.with_stop_flag(Arc::clone(&stop));
             if first {
                 let servers = servers.lock().map(|mut s| std::mem::take(&mut *s)).unwrap_or_default();
                 worker = worker.with_servers(servers);
@@ -185,10 +193,10 @@ impl Store {
         &self,
         manifest: &Manifest,
         scene: &Scene,
-        specimen: &Specimen,
+        specimens: &SpecimenCache,
         progress: &dyn Progress,
     ) -> Result<()> {
-        videos::write(self, manifest, &self.records(manifest)?, scene, specimen, progress)
+        videos::write(self, manifest, &self.records(manifest)?, scene, specimens, progress)
     }
 
     /// Writes table, report and `result.json` of the stored episodes.

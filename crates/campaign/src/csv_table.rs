@@ -48,8 +48,15 @@ fn why(k: &EpisodeRecord) -> String {
     s.why.clone().or_else(|| s.end.as_ref().map(ToString::to_string)).unwrap_or_default()
 }
 
+/// What was drawn for an episode: names with their values.
+fn drawn(k: &EpisodeRecord) -> Vec<(String, String)> {
+    let Some(drawn) = &k.summary.drawn else { return Vec::new() };
+    let specimen = ("specimen".to_owned(), drawn.specimen.label());
+    std::iter::once(specimen).chain(drawn.values.iter().map(|v| (v.name(), v.value.to_string()))).collect()
+}
+
 /// The table of `records`. Its last columns are the times at which the stages of the task passed
-/// (s), empty if they did not.
+/// (s), empty if they did not, and what was drawn for the episode.
 ///
 /// # Errors
 /// A table that cannot be written as CSV.
@@ -57,11 +64,16 @@ pub(super) fn csv_table(records: &[EpisodeRecord]) -> Result<String> {
     let format = |e: csv::Error| Error::Format(e.to_string());
     let stages = records.first().map_or(&[][..], |k| &k.summary.progress.stages);
     let times = stages.iter().map(|s| format!("{}_time_s", s.stage.name()));
+    let drawn = records.first().map(|k| drawn(k)).unwrap_or_default();
+    let names = drawn.iter().map(|(name, _)| format!("drawn.{name}"));
     let mut table = csv::Writer::from_writer(Vec::new());
-    table.write_record(COLUMNS.iter().map(|(name, _)| (*name).to_owned()).chain(times)).map_err(format)?;
+    table.write_record(COLUMNS.iter().map(|(name, _)| (*name).to_owned()).chain(times).chain(names)).map_err(format)?;
     for k in records {
         let times = (0..stages.len()).map(|n| or_empty(k.summary.progress.stages.get(n).and_then(|p| p.time_s)));
-        table.write_record(COLUMNS.iter().map(|(_, text)| text(k)).chain(times)).map_err(format)?;
+        let own = self::drawn(k);
+        let value = |name: &String| own.iter().find(|(n, _)| n == name).map(|(_, v)| v.clone()).unwrap_or_default();
+        let values = drawn.iter().map(|(name, _)| value(name));
+        table.write_record(COLUMNS.iter().map(|(_, text)| text(k)).chain(times).chain(values)).map_err(format)?;
     }
     let bytes = table.into_inner().map_err(|e| Error::Format(e.to_string()))?;
     String::from_utf8(bytes).map_err(|e| Error::Format(e.to_string()))

@@ -33,9 +33,9 @@ pub fn run_episode(run: &EpisodeRun, output: &Path, progress: &dyn Progress) -> 
             }
             stop.store(true, Ordering::Relaxed);
         });
-        let made = run.run_policy(output, progress, |specimen, episode| {
+        let made = run.run_policy(output, progress, |episode| {
             let server = servers.remove(&spec.name);
-            Ok(Box::new(RemotePolicy::new(&spec, specimen, episode, Arc::clone(&stop), None, server)?))
+            Ok(Box::new(RemotePolicy::new(&spec, episode, Arc::clone(&stop), None, server)?))
         });
         done.store(true, Ordering::Relaxed);
         made

@@ -23,7 +23,7 @@ mod worker;
 
 pub use campaign::Campaign;
 pub use episode::run_episode;
-pub use manifest::{Job, Manifest};
+pub use manifest::{Job, Manifest, named_specimen};
 pub use plots::{lift_and_rcm, lifts};
 pub use policy_spec::PolicySpec;
 pub use store::{EpisodeFiles, EpisodeRecord, Store};

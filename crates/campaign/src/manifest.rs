@@ -3,7 +3,7 @@
 use crate::policy_spec::PolicySpec;
 use crate::remote;
 use serde::{Deserialize, Serialize};
-use trocar_scene::Scene;
+use trocar_scene::{Scene, SpecimenSource};
 use trocar_specimen::Specimen;
 use trocar_task::{scene_hash, specimen_hash};
 use trocar_workflow::{Error, Result};
@@ -25,6 +25,12 @@ pub struct Job {
 /// Version of this program and hash of the sources that an episode depends on.
 pub(super) fn program() -> String {
     format!("{} {}", env!("CARGO_PKG_VERSION"), trocar_workflow::EPISODE_SOURCE_HASH)
+}
+
+/// The specimen by whose hash a campaign of `scene` is known: the first one that episodes draw
+/// from. Each episode file knows its own.
+pub fn named_specimen(scene: &Scene) -> SpecimenSource {
+    scene.specimens().into_iter().next().unwrap_or_else(|| scene.specimen.clone())
 }
 
 /// Checks the options of a campaign, without its specimen. `max_episodes` is the value of
@@ -78,7 +84,8 @@ pub struct Manifest {
     pub task: String,
     /// Hash of the scene and the models of its arms, hexadecimal.
     pub scene_hash: String,
-    /// Hash of the simulated parts of the specimen, hexadecimal.
+    /// Hash of the simulated parts of the specimen, hexadecimal; of the first one where several are
+    /// drawn from.
     pub specimen_hash: String,
     /// RCM threshold of the scene (mm).
     pub rcm_threshold_mm: f64,

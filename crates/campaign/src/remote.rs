@@ -17,9 +17,7 @@ use std::time::Duration;
 use trocar_cell::{Action, ActionSpace};
 use trocar_remote::{Array, Client, Endpoint, Observation, Value};
 use trocar_render::RenderSettings;
-use trocar_scene::Frame;
 use trocar_sensors::CameraRig;
-use trocar_specimen::Specimen;
 use trocar_task::policy::CHUNK;
 use trocar_task::{Bounds, Episode, Policy};
 use trocar_workflow::{Error, Result};
@@ -42,9 +40,7 @@ pub(super) struct RemotePolicy {
     server: Option<PolicyServer>,
     client: Option<Client>,
     bounds: Bounds,
-    specimen: Specimen,
-    /// The cameras, with the placement of the specimen for which they were made.
-    rig: Option<(Frame, CameraRig)>,
+    rig: Option<CameraRig>,
     stop: Arc<AtomicBool>,
     cameras: Vec<(String, [usize; 2])>,
     prompt: String,
@@ -65,7 +61,6 @@ impl RemotePolicy {
     /// A Python policy that cannot be loaded.
     pub fn new(
         spec: &PolicySpec,
-        specimen: &Specimen,
         episode: &Episode,
         stop: Arc<AtomicBool>,
         python: Option<&str>,
@@ -87,7 +82,6 @@ impl RemotePolicy {
             server: None,
             client: None,
             bounds,
-            specimen: specimen.clone(),
             rig: None,
             stop,
             cameras,
@@ -155,11 +149,11 @@ impl RemotePolicy {
         let array = Array::from_f32(&[state.len()], &state).map_err(said)?;
         seen.insert("observation/state".to_owned(), Value::Array(array));
         let scene = episode.arranged_scene();
-        if self.rig.as_ref().is_none_or(|(placed, _)| *placed != scene.placement) {
-            let rig = CameraRig::new(&scene, &self.specimen, episode.cell()).map_err(|e| e.to_string())?;
-            self.rig = Some((scene.placement, rig));
+        if self.rig.as_ref().is_none_or(|rig| !rig.is_of(scene)) {
+            let rig = CameraRig::new(scene, episode.specimen(), episode.cell()).map_err(|e| e.to_string())?;
+            self.rig = Some(rig);
         }
-        let Some((_, rig)) = &mut self.rig else { return Err("there are no cameras".to_owned()) };
+        let Some(rig) = &mut self.rig else { return Err("there are no cameras".to_owned()) };
         for (camera, size) in &self.cameras {
             let picture = rig
                 .render(episode.cell(), camera, *size, &RenderSettings::Preview { shadows: false })

@@ -7,11 +7,10 @@ use std::path::PathBuf;
 use trocar_core::Progress;
 use trocar_render::RenderSettings;
 use trocar_scene::Scene;
-use trocar_specimen::Specimen;
 use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
 use trocar_workflow::episode_replay::EpisodeReplay;
 use trocar_workflow::video::webp;
-use trocar_workflow::{Error, Result};
+use trocar_workflow::{Error, Result, SpecimenCache};
 
 /// Maximum numbers of failures and of successes with a video. The policies take turns.
 const MAX_FAILURES: usize = 4;
@@ -62,7 +61,7 @@ pub(super) fn write(
     manifest: &Manifest,
     records: &[EpisodeRecord],
     scene: &Scene,
-    specimen: &Specimen,
+    specimens: &SpecimenCache,
     progress: &dyn Progress,
 ) -> Result<()> {
     let failed = failures(manifest, records).into_iter().take(MAX_FAILURES);
@@ -71,7 +70,7 @@ pub(super) fn write(
     if chosen.is_empty() || !scene.cameras.iter().any(|c| c.name == "endoscope") {
         return Ok(());
     }
-    let mut episode = Episode::new(scene, specimen, 0)?;
+    let mut episode = Episode::with_specimens(scene, Box::new(specimens.clone()), 0)?;
     progress.begin("pictures", chosen.len() as u64);
     for record in chosen {
         let path = store.episode(&record.name, record.index).join(EPISODE_FILE);
@@ -81,7 +80,7 @@ pub(super) fn write(
             return Err(store.damaged(&record.name, record.index, &why));
         }
         let mut replay = EpisodeReplay::begin(&mut episode, &file)?;
-        let mut rig = replay.camera_rig(specimen)?;
+        let mut rig = replay.camera_rig()?;
         let every = file.steps.len().div_ceil(MAX_FRAMES).max(1);
         let mut frames = Vec::new();
         let mut add_frame = |replay: &EpisodeReplay<'_>, time_ms: i32| -> Result<()> {

@@ -10,13 +10,11 @@ use std::collections::btree_map::Entry;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use trocar_scene::Scene;
-use trocar_specimen::Specimen;
 use trocar_task::{Episode, Policy, policy, run};
-use trocar_workflow::{Error, Result};
+use trocar_workflow::{Error, Result, SpecimenCache};
 
 /// A cell with policies, which runs one job at a time.
 pub struct Worker {
-    specimen: Specimen,
     episode: Episode,
     /// By name.
     policies: BTreeMap<String, Box<dyn Policy + Send>>,
@@ -28,20 +26,13 @@ pub struct Worker {
 }
 
 impl Worker {
-    /// Builds the cell of `scene` around `specimen`, stepped by one thread.
+    /// Builds the cell of `scene`, whose episodes have `specimens`, stepped by one thread.
     ///
     /// # Errors
     /// A scene that cannot be built.
-    pub fn new(scene: &Scene, specimen: &Specimen) -> Result<Self> {
-        let episode = Episode::new(scene, specimen, 1)?;
-        Ok(Self {
-            specimen: specimen.clone(),
-            episode,
-            policies: BTreeMap::new(),
-            stop: Arc::default(),
-            python: None,
-            servers: BTreeMap::new(),
-        })
+    pub fn new(scene: &Scene, specimens: &SpecimenCache) -> Result<Self> {
+        let episode = Episode::with_specimens(scene, Box::new(specimens.clone()), 1)?;
+        Ok(Self { episode, policies: BTreeMap::new(), stop: Arc::default(), python: None, servers: BTreeMap::new() })
     }
 
     /// Stops running work when `flag` becomes true.
@@ -81,7 +72,7 @@ impl Worker {
             Entry::Vacant(place) => place.insert(if spec.is_remote() {
                 let stop = Arc::clone(&self.stop);
                 let server = self.servers.remove(&spec.name);
-                Box::new(RemotePolicy::new(spec, &self.specimen, &self.episode, stop, self.python.as_deref(), server)?)
+                Box::new(RemotePolicy::new(spec, &self.episode, stop, self.python.as_deref(), server)?)
             } else {
                 policy::named(&spec.source)?
             }),

@@ -13,7 +13,7 @@ use tempfile::TempDir;
 use trocar_campaign::{Campaign, EpisodeFiles, Job, Manifest, PolicySpec, Store, run_episode};
 use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
-use trocar_scene::{SpecimenSource, TaskName};
+use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, Specimens, TaskName};
 use trocar_task::EpisodeFile;
 use trocar_workflow::EpisodeRun;
 
@@ -37,6 +37,7 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
         policies: policies.iter().map(|p| PolicySpec::parse(p).unwrap()).collect(),
         episodes,
         seed: 0,
+        variation: None,
         jobs: 1,
         retry_failed: false,
         phantoms: folder.join("phantoms"),
@@ -245,6 +246,7 @@ fn one_episode_of_a_server_has_the_same_files_as_any_other_and_a_page() {
         scene: scene(dir.path()).display().to_string(),
         policy: format!("mine={}", server.url()),
         seed: 3,
+        variation: None,
         threads: 1,
         phantoms: dir.path().join("phantoms"),
     };
@@ -279,6 +281,7 @@ fn an_episode_without_its_policy_leaves_nothing() {
             scene: scene.clone(),
             policy: policy.to_owned(),
             seed: 0,
+            variation: None,
             threads: 1,
             phantoms: dir.path().into(),
         };
@@ -354,4 +357,38 @@ fn a_roboarena_server_is_told_of_every_episode_by_its_name() {
     sessions.sort_unstable();
     sessions.dedup();
     assert!(sessions.len() == 4 && !sessions.contains(&""), "{asked:?}");
+}
+
+#[test]
+fn episodes_have_the_specimens_that_are_drawn_for_them() {
+    let dir = TempDir::new().unwrap();
+    let file = scene(dir.path());
+    common::two_tubes(common::ONE_END, 3.4e-3).write(&dir.path().join("other")).unwrap();
+    let mut varied = Scene::read(&file.display().to_string()).unwrap();
+    let paths = vec!["tube".to_owned(), "other".to_owned()];
+    varied.variation.specimens = Some(Specimens { paths, phantoms: Vec::new(), seeds: [1, 1] });
+    varied.variation.factors.insert(Factor::Modulus, Distribution::LogUniform([6.0, 24.0]));
+    std::fs::write(&file, varied.to_toml().unwrap()).unwrap();
+    let run = |name: &str, jobs: usize| {
+        let campaign = Campaign { jobs, ..campaign(dir.path(), &["random"], 6) };
+        campaign.run(&dir.path().join(name), &Silent).unwrap().hash
+    };
+    assert_eq!(run("one", 1), run("two", 2));
+    let text = std::fs::read_to_string(dir.path().join("two/table.csv")).unwrap();
+    let mut lines = text.lines().map(|line| line.split(',').map(str::to_owned).collect::<Vec<_>>());
+    let head = lines.next().unwrap();
+    let at = |name: &str| head.iter().position(|h| h == name).unwrap();
+    let (specimen, modulus, tilt) = (at("drawn.specimen"), at("drawn.modulus_kpa"), at("drawn.left.tilt_deg"));
+    for (seed, row) in lines.enumerate() {
+        let drawn = varied.draw(seed as u64);
+        assert_eq!(row[specimen], drawn.specimen.label());
+        for (column, name) in [(modulus, "modulus_kpa"), (tilt, "left.tilt_deg")] {
+            let value = drawn.values.iter().find(|v| v.name() == name).unwrap().value;
+            assert_eq!(row[column].parse::<f64>().unwrap(), value);
+        }
+    }
+    let seen: std::collections::BTreeSet<String> = (0..6).map(|seed| varied.draw(seed).specimen.label()).collect();
+    assert_eq!(seen.len(), 2);
+    // Videos are replays: each has its own specimen.
+    assert!(std::fs::read_dir(dir.path().join("two/pictures")).unwrap().count() > 2);
 }

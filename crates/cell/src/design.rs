@@ -27,9 +27,14 @@ pub enum GraspDesign {
 /// jaws.
 const SPRING: f64 = 20.0;
 
-/// Pull at which tissue tears out of the jaws (N): a wall of 1 mm (two layers of 0.5) over the 5 mm
-/// of the blades at a strength of 1 MPa.
-const TEAR_FORCE: f64 = 5.0;
+/// What a compliant grasp is held by and what it bears.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct JawForces {
+    /// Force with which the jaws close (N).
+    pub closing: f64,
+    /// Pull at which tissue tears out of them (N).
+    pub tearing: f64,
+}
 
 impl GraspDesign {
     /// All of them, in the paper's order.
@@ -45,8 +50,8 @@ impl GraspDesign {
         }
     }
 
-    /// The grasp of `nodes` of organ `organ` by jaws of force `jaw_force` (N) whose gripper,
-    /// `tools` of the step, is at `pose`; none for friction, which needs none.
+    /// The grasp of `nodes` of organ `organ` by jaws whose gripper, `tools` of the step, is at `pose`;
+    /// none for friction, which needs none.
     pub fn grasp(
         self,
         world: &World,
@@ -54,7 +59,7 @@ impl GraspDesign {
         nodes: &[u32],
         tools: Tools,
         pose: &Pose,
-        jaw_force: f64,
+        forces: JawForces,
     ) -> Option<Grasp> {
         let (model, state) = (&world.model, &world.state);
         let live = || Grasp::capture(model, state, organ, nodes, tools.gripper, pose);
@@ -71,9 +76,9 @@ impl GraspDesign {
             Self::Compliant => Some(live().compliant(Compliance {
                 stiffness: SPRING * body.material().young_modulus * body.median_edge(),
                 closing: DVec3::Y,
-                jaw_force,
+                jaw_force: forces.closing,
                 friction: FRICTION,
-                tear_force: TEAR_FORCE,
+                tear_force: forces.tearing,
                 blades: Some(tools.blades),
             })),
         }

@@ -26,7 +26,7 @@ pub use cell::{
 };
 pub use clusters::{Cluster, clusters};
 pub use cutter::{CUT_CLOSED, CUT_OPENED, Scissors};
-pub use design::GraspDesign;
+pub use design::{GraspDesign, JawForces};
 pub use error::{Error, Result};
 pub use gripper::{Gripper, MAX_ANGLE};
 pub use jaw::{JAW_FORCE, Jaw};

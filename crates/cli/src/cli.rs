@@ -4,17 +4,20 @@ mod episode;
 mod evaluate;
 mod render;
 mod scene;
+mod specimens;
 mod study;
 
 pub use episode::*;
 pub use evaluate::*;
 pub use render::*;
 pub use scene::*;
+pub use specimens::*;
 pub use study::*;
 pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, SolverName, Units};
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use trocar_scene::VariationSet;
 
 /// Trocar makes deformable organs from recordings of a surgical field, and scores robot policies on
 /// them.
@@ -41,6 +44,8 @@ pub enum Command {
     /// Make a recording with known ground truth: a procedural anatomy filmed by a simulated depth
     /// camera.
     Record(Record),
+    /// Make specimens of a phantom ahead, each another anatomy, for scenes that draw from them.
+    Specimens(Specimens),
     /// Describe a recording: frames, cameras, depth, organs, and what is missing.
     Inspect(Inspect),
     /// Make masks of a recording: organs by SAM 2.1 from points, instruments by the appearance of
@@ -70,6 +75,12 @@ pub enum Command {
     Experiment(Experiment),
     /// Measure speed.
     Bench(Bench),
+}
+
+/// The set of factors of that name.
+fn variation_set(name: &str) -> Result<VariationSet, String> {
+    let known = VariationSet::ALL.map(VariationSet::name).join(", ");
+    VariationSet::named(name).ok_or_else(|| format!("the sets are {known}"))
 }
 
 /// Arguments of `demo`.

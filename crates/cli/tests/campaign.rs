@@ -14,8 +14,8 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, SystemTime};
 use tempfile::TempDir;
 use trocar_remote::{Array, Call, Loopback, LoopbackOptions, Map, Value};
+use trocar_scene::EpisodeRandom;
 use trocar_scene::{SpecimenSource, TaskName};
-use trocar_task::Random;
 
 /// A coarse tube on disk, and a scene of it in which arms reach for `seconds`, without cameras.
 fn scene(folder: &Path, seconds: f64) -> PathBuf {
@@ -100,7 +100,7 @@ fn a_campaign_that_is_killed_loses_nothing_and_repeats_nothing() {
     let unbroken = json(&evaluate(&scene, &whole, &more).output().unwrap());
     // The start takes much of the time, so most kills hit running episodes and some hit the start.
     let each = clock.elapsed().mul_f64(2.5 / kills as f64);
-    let random = Random::new(7, "kills");
+    let random = EpisodeRandom::new(7, "kills");
     let (mut seen, mut under_way): (BTreeMap<PathBuf, SystemTime>, usize) = (BTreeMap::new(), 0);
     for kill in 0..kills {
         let mut child = evaluate(&scene, &broken, &more).stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();

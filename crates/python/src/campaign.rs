@@ -15,13 +15,13 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use trocar_campaign::{EpisodeFiles, Error, Job, Manifest, PolicySpec, Store};
 use trocar_core::Progress;
 use trocar_scene::Scene;
-use trocar_specimen::Specimen;
+use trocar_workflow::SpecimenCache;
 
 /// A campaign's manifest and its folder, which is locked against other processes.
 #[pyclass(frozen, module = "trocar._native")]
 pub struct Campaign {
     scene: Scene,
-    specimen: Specimen,
+    specimens: SpecimenCache,
     manifest: Manifest,
     store: Mutex<Store>,
 }
@@ -63,10 +63,10 @@ impl Campaign {
                 }
             }
             let scene = prepare::scene(scene, None, None)?;
-            let specimen = prepare::specimen(&scene, &phantoms)?;
-            let manifest = Manifest::new(&scene, &specimen, &specs, episodes, seed).map_err(|e| evaluate(&e))?;
+            let (specimens, named) = prepare::named_specimens(&scene, &phantoms)?;
+            let manifest = Manifest::new(&scene, &named, &specs, episodes, seed).map_err(|e| evaluate(&e))?;
             let store = Mutex::new(Store::open(&output, &manifest).map_err(|e| evaluate(&e))?);
-            Ok(Self { scene, specimen, manifest, store })
+            Ok(Self { scene, specimens, manifest, store })
         })
     }
 
@@ -101,7 +101,7 @@ impl Campaign {
             let store = self.store()?;
             if films {
                 store
-                    .write_videos(&self.manifest, &self.scene, &self.specimen, &Signals::new())
+                    .write_videos(&self.manifest, &self.scene, &self.specimens, &Signals::new())
                     .map_err(|e| evaluate(&e))?;
             }
             let result = store.write_results(&self.manifest).map_err(|e| evaluate(&e))?;
@@ -165,15 +165,15 @@ impl Worker {
         let manifest: Manifest = serde_json::from_str(plan).map_err(|e| wrong(format!("plan: {e}")))?;
         py.detach(|| {
             let scene = prepare::scene(scene, None, None)?;
-            let specimen = prepare::specimen(&scene, &phantoms)?;
-            let own = Manifest::new(&scene, &specimen, &manifest.policies, manifest.episodes, manifest.seed).map_err(|e| evaluate(&e))?;
+            let (specimens, named) = prepare::named_specimens(&scene, &phantoms)?;
+            let own = Manifest::new(&scene, &named, &manifest.policies, manifest.episodes, manifest.seed).map_err(|e| evaluate(&e))?;
             if own != manifest {
                 return Err(wrong(
                     "this worker has another scene, specimen or program than the campaign; give all machines the same files",
                 ));
             }
             check_stop(&stop)?;
-            let worker = trocar_campaign::Worker::new(&scene, &specimen).map_err(|e| evaluate(&e))?;
+            let worker = trocar_campaign::Worker::new(&scene, &specimens).map_err(|e| evaluate(&e))?;
             let worker = Mutex::new(worker.with_stop_flag(Arc::clone(&stop)).with_python(python));
             Ok(Self { worker, stop })
         })

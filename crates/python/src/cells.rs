@@ -1,15 +1,17 @@
 //! `Cells`: episodes of one scene, side by side in one process.
 
-use crate::error::{forked, task, wrong};
+use crate::error::{evaluate, forked, task, wrong};
 use crate::frames::Rows;
 use crate::pictures::Eyes;
 use crate::prepare;
+use crate::progress::Signals;
 use numpy::{PyArray1, PyArray3, PyArrayDyn, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
 use trocar_cell::{Action, ActionSpace};
 use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
+use trocar_workflow::{SpecimenCache, drawn_specimens};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it
 /// goes on), time (s).
@@ -27,6 +29,7 @@ pub struct State(EpisodeState);
 pub struct Cells {
     pub(crate) episodes: Vec<Episode>,
     pub(crate) eyes: Eyes,
+    specimens: SpecimenCache,
     bounds: Bounds,
     pub(crate) pool: rayon::ThreadPool,
     task_name: &'static str,
@@ -116,17 +119,17 @@ impl Cells {
         };
         let scene = prepare::scene(scene, task, episode_s)?;
         py.detach(|| {
-            let specimen = prepare::specimen(&scene, &phantoms)?;
+            let specimens = prepare::specimens(&scene, &phantoms)?;
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(wrong)?;
             // One cell uses all threads; of many, each has its own.
             let each = if count == 1 { threads } else { 1 };
-            let episodes = built(&pool, count, || Episode::new(&scene, &specimen, each))?;
+            let episodes = built(&pool, count, || Episode::with_specimens(&scene, Box::new(specimens.clone()), each))?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let prompt = trocar_task::prompt(&scene);
-            let eyes = Eyes::new(specimen, count, sensor_noise);
+            let eyes = Eyes::new(count, sensor_noise);
             let (task_name, process) = (scene.task.name.name(), std::process::id());
-            Ok(Self { episodes, eyes, bounds, pool, task_name, prompt, steps, process })
+            Ok(Self { episodes, eyes, specimens, bounds, pool, task_name, prompt, steps, process })
         })
     }
 
@@ -246,9 +249,10 @@ impl Cells {
             let place = usize::try_from(*k).ok().and_then(|k| wanted.get_mut(k));
             *place.ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))? = Some(*seed);
         }
-        for k in (0..count).filter(|k| wanted[*k].is_some()) {
-            self.eyes.moved(k, self.episodes[k].scene());
-        }
+        // Made here and not in the pool: whoever makes one uses the pool itself and locks its folder.
+        let drawn = drawn_specimens(self.episodes[0].scene(), wanted.iter().copied().flatten());
+        let specimens = &self.specimens;
+        py.detach(|| specimens.make_all(&drawn, &Signals::new())).map_err(|e| evaluate(&e))?;
         let begin = |(place, seed): (&mut Place<'_>, &Option<u64>)| match seed {
             Some(seed) => place.episode.reset(*seed).map(|_| place.write(0.0)),
             None => Ok(()),
@@ -295,6 +299,11 @@ impl Cells {
         serde_json::to_string(self.at(k)?.events()).map_err(wrong)
     }
 
+    /// What was drawn for the episode in cell `k`: a JSON object.
+    fn drawn(&self, k: usize) -> PyResult<String> {
+        serde_json::to_string(self.at(k)?.drawn()).map_err(wrong)
+    }
+
     /// The episode in cell `k` in figures: a JSON object.
     fn summary(&self, k: usize) -> PyResult<String> {
         serde_json::to_string(&self.at(k)?.summary()).map_err(wrong)
@@ -314,7 +323,6 @@ impl Cells {
     /// refused before anything changes.
     fn restore(&mut self, py: Python<'_>, k: usize, saved: &State, arrays: Arrays<'_>) -> PyResult<()> {
         self.at(k)?;
-        self.eyes.moved(k, self.episodes[k].scene());
         let which: Vec<Option<&State>> = (0..self.episodes.len()).map(|j| (j == k).then_some(saved)).collect();
         let put = |(place, saved): (&mut Place<'_>, &Option<&State>)| match saved {
             Some(saved) => place.episode.restore(&saved.0).map(|()| place.write(0.0)),

@@ -8,9 +8,7 @@ use numpy::{PyArray3, PyArrayDyn, PyArrayMethods, PyReadonlyArray1};
 use pyo3::prelude::*;
 use rayon::prelude::*;
 use trocar_render::RenderSettings;
-use trocar_scene::Scene;
 use trocar_sensors::{CameraRig, DepthNoise, SensorNoise};
-use trocar_specimen::Specimen;
 use trocar_task::Episode;
 
 /// Shot and read noise of the colours, with `sensor_noise`.
@@ -22,7 +20,6 @@ const SETTINGS: RenderSettings = RenderSettings::Preview { shadows: false };
 /// The sights of the cells; each is made when its cell is first looked at.
 pub struct Eyes {
     sights: Vec<Option<CameraRig>>,
-    specimen: Specimen,
     noise: bool,
 }
 
@@ -35,25 +32,16 @@ struct Look<'a> {
 }
 
 impl Eyes {
-    pub fn new(specimen: Specimen, count: usize, noise: bool) -> Self {
-        Self { sights: (0..count).map(|_| None).collect(), specimen, noise }
-    }
-
-    /// The specimen of cell `k` may be elsewhere now: where a scene varies that, the field under it
-    /// is made anew.
-    pub fn moved(&mut self, k: usize, scene: &Scene) {
-        let v = &scene.task.variation;
-        if v.specimen_shift_mm != 0.0 || v.specimen_turn_deg != 0.0 {
-            self.sights[k] = None;
-        }
+    pub fn new(count: usize, noise: bool) -> Self {
+        Self { sights: (0..count).map(|_| None).collect(), noise }
     }
 }
 
-/// The sight of `episode`, made if it is not there, with the noise of its seed.
+/// The sight of `episode` with the noise of its seed, made if it is not there or is that of an
+/// episode for which something else was drawn.
 fn awake<'a>(
     sight: &'a mut Option<CameraRig>,
     episode: &Episode,
-    specimen: &Specimen,
     noise: bool,
 ) -> trocar_sensors::Result<&'a mut CameraRig> {
     let sensor = if noise {
@@ -64,9 +52,10 @@ fn awake<'a>(
     } else {
         SensorNoise::default()
     };
-    let made = match sight.take() {
+    let scene = episode.arranged_scene();
+    let made = match sight.take().filter(|made| made.is_of(scene)) {
         Some(made) => made,
-        None => CameraRig::new(&episode.arranged_scene(), specimen, episode.cell())?,
+        None => CameraRig::new(scene, episode.specimen(), episode.cell())?,
     };
     let sight = sight.insert(made);
     sight.noise = sensor;
@@ -112,7 +101,7 @@ impl Eyes {
         let mut depth = rows(depth, "depth", count, size, 1)?;
         let mut colors = by_cell(&mut color, count)?;
         let mut depths = by_cell(&mut depth, count)?;
-        let (specimen, noise) = (&self.specimen, self.noise);
+        let noise = self.noise;
         let mut looks: Vec<Look<'_>> = self
             .sights
             .iter_mut()
@@ -123,7 +112,7 @@ impl Eyes {
             .map(|(((sight, episode), (color, depth)), _)| Look { sight, episode, color, depth })
             .collect();
         let see = |look: &mut Look<'_>| -> trocar_sensors::Result<()> {
-            let sight = awake(look.sight, look.episode, specimen, noise)?;
+            let sight = awake(look.sight, look.episode, noise)?;
             for (k, (camera, (height, width))) in cameras.iter().zip(size).enumerate() {
                 let picture = sight.render(look.episode.cell(), camera, [*width, *height], &SETTINGS)?;
                 if let Some(to) = look.color.get_mut(k) {
@@ -150,10 +139,10 @@ impl Eyes {
         height: usize,
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let (specimen, noise, sight) = (&self.specimen, self.noise, &mut self.sights[k]);
+        let (noise, sight) = (self.noise, &mut self.sights[k]);
         let pixels = py.detach(|| {
             pool.install(|| {
-                let sight = awake(sight, episode, specimen, noise)?;
+                let sight = awake(sight, episode, noise)?;
                 let picture = sight.render(episode.cell(), camera, [width, height], &SETTINGS)?;
                 Ok(picture.color.pixels.as_flattened().to_vec())
             })

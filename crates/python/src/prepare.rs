@@ -5,9 +5,10 @@ use crate::error::{evaluate, wrong};
 use crate::progress::Signals;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use trocar_scene::{BUILTINS, Scene, TaskName};
 use trocar_specimen::Specimen;
-use trocar_workflow::scene_specimen;
+use trocar_workflow::SpecimenCache;
 
 /// Names of the built-in scenes.
 #[pyfunction]
@@ -40,8 +41,18 @@ pub fn phantoms_folder() -> PathBuf {
     trocar_phantom::phantoms_folder()
 }
 
-/// The specimen of `scene`; a phantom's is made in the folder `phantoms` the first time, which
-/// takes seconds.
-pub fn specimen(scene: &Scene, phantoms: &Path) -> PyResult<Specimen> {
-    scene_specimen(scene, phantoms, &Signals::new()).map_err(|e| evaluate(&e))
+/// The specimens of the episodes of `scene`. The first one is made now in the folder `phantoms`,
+/// which takes seconds the first time; others when an episode has them.
+pub fn specimens(scene: &Scene, phantoms: &Path) -> PyResult<SpecimenCache> {
+    let specimens = SpecimenCache::new(scene, phantoms);
+    specimens.read(&scene.draw(0).specimen, &Signals::new()).map_err(|e| evaluate(&e))?;
+    Ok(specimens)
+}
+
+/// The same, and the specimen by which a campaign of `scene` is known.
+pub fn named_specimens(scene: &Scene, phantoms: &Path) -> PyResult<(SpecimenCache, Arc<Specimen>)> {
+    let specimens = SpecimenCache::new(scene, phantoms);
+    let named = trocar_campaign::named_specimen(scene);
+    let named = specimens.read(&named, &Signals::new()).map_err(|e| evaluate(&e))?;
+    Ok((specimens, named))
 }

@@ -1,6 +1,7 @@
 //! The organs of a scene: where they come from, what is said otherwise than in the specimen, and
 //! how their tissue is stepped.
 
+use crate::Phantom;
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
 use trocar_specimen::{End, Material, MaterialModel, Pins};
@@ -41,6 +42,27 @@ impl SpecimenSource {
     /// A phantom.
     pub fn phantom(name: &str, seed: u32) -> Self {
         Self { path: None, phantom: Some(name.to_owned()), seed }
+    }
+
+    /// A specimen folder.
+    pub fn folder(path: &str) -> Self {
+        Self { path: Some(path.to_owned()), phantom: None, seed: first_seed() }
+    }
+
+    /// What it is called in results: a folder's path, or a phantom with its seed, as
+    /// `phantom-a:1`.
+    pub fn label(&self) -> String {
+        match self.source() {
+            Some(Source::Folder(path)) => path.to_owned(),
+            Some(Source::Phantom(name, seed)) => format!("{name}:{seed}"),
+            None => String::new(),
+        }
+    }
+
+    /// What [`label`](Self::label) calls so.
+    pub fn labelled(label: &str) -> Self {
+        let parts = label.rsplit_once(':').and_then(|(name, seed)| Some((Phantom::named(name)?, seed.parse().ok()?)));
+        parts.map_or_else(|| Self::folder(label), |(phantom, seed)| Self::phantom(phantom.name, seed))
     }
 
     /// What it names; the folder where both are given, `None` where neither is. A checked scene has
@@ -184,6 +206,8 @@ pub struct Tissue {
     pub tip_rest_offset_mm: f64,
     /// Coulomb friction of tissue on tissue and of instruments on tissue.
     pub friction: f64,
+    /// Pull at which tissue tears out of a compliant grasp (N).
+    pub tear_force_n: f64,
     /// Pairs without contact: two organs, or an organ and `field`, the ground under the organs.
     pub filtered_pairs: Vec<[String; 2]>,
     /// The ground under the organs.
@@ -198,6 +222,8 @@ impl Default for Tissue {
             contact_offset_mm: 1.5,
             tip_rest_offset_mm: 1.5,
             friction: 0.6,
+            // A wall of 1 mm (two layers of 0.5) over the 5 mm of the blades, at a strength of 1 MPa.
+            tear_force_n: 5.0,
             filtered_pairs: Vec::new(),
             support: Support::default(),
         }

@@ -35,6 +35,12 @@ impl Default for Frame {
 }
 
 impl Frame {
+    /// That of `pose`.
+    pub fn of(pose: &Pose) -> Self {
+        let q = pose.rotation;
+        Self { position_m: pose.translation.to_array(), rotation_wxyz: [q.w, q.x, q.y, q.z] }
+    }
+
     /// As a pose; the quaternion is normalised (checked scenes have it within 1e-4 of a unit).
     pub fn pose(&self) -> Pose {
         let [w, x, y, z] = self.rotation_wxyz;

@@ -16,13 +16,16 @@ mod camera;
 mod cell;
 mod check;
 mod error;
+mod imaging;
 mod phantoms;
 mod port;
+mod random;
 mod read;
 mod scene;
 mod schema;
 mod start;
 mod task;
+mod variation;
 
 pub use anatomy::{
     FIELD, MaterialOverride, OrganOverride, PinEnd, PinRule, ScheduleName, Source, SpecimenSource, Support,
@@ -32,8 +35,11 @@ pub use builtin::{BUILTINS, Builtin};
 pub use camera::{CellCamera, Lens, View};
 pub use cell::{Arm, ArmModel, Controller, Drive, FRANKA_FR3, Frame, GravityError, Instrument, InstrumentKind, Side};
 pub use error::{Error, Result};
+pub use imaging::Imaging;
 pub use phantoms::{PHANTOMS, Phantom};
 pub use port::Port;
+pub use random::EpisodeRandom;
 pub use scene::{Rates, Scene, Tool};
 pub use start::Start;
-pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task, TaskName, Variation};
+pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task, TaskName};
+pub use variation::{Distribution, Drawn, DrawnValue, Factor, Per, Specimens, Variation, VariationSet};

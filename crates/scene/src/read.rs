@@ -1,7 +1,7 @@
 //! Reading scenes: files and built-in ones, checked whole.
 
 use crate::check::{Problem, check};
-use crate::{Builtin, Error, Phantom, Result, Scene, Source};
+use crate::{Builtin, Error, Phantom, Result, Scene, Source, SpecimenSource};
 use std::io::Read;
 use std::path::Path;
 use trocar_specimen::{Specimen, line_of, nearest, parse_toml};
@@ -59,15 +59,14 @@ impl Scene {
     /// As [`read`](Self::read).
     pub fn parse(text: &str, file: &str, folder: &Path) -> Result<Self> {
         let invalid = |reason| Error::Invalid { file: file.to_owned(), reason };
-        let mut scene: Self = parse_toml(text).map_err(invalid)?;
+        let mut scene: Self = parse_toml(text).map_err(|reason| invalid(moved(reason)))?;
         scene.folder = folder.to_owned();
         let placed = |problem: Problem| {
             let line = line_of(text, &problem.field).map_or_else(String::new, |n| format!("line {n}: "));
             invalid(format!("{line}{}{}", problem.field, problem.reason))
         };
         check(&scene).map_err(placed)?;
-        let organs = scene.organ_names()?;
-        crate::check::check_organs(&scene, &organs).map_err(placed)?;
+        scene.check_all_organs()?.map_err(placed)?;
         Ok(scene)
     }
 
@@ -82,7 +81,27 @@ impl Scene {
             reason: format!("{}{}", p.field, p.reason),
         };
         check(self).map_err(invalid)?;
-        crate::check::check_organs(self, &self.organ_names()?).map_err(invalid)
+        self.check_all_organs()?.map_err(invalid)
+    }
+
+    /// Checks what is said of organs for every specimen that episodes may have.
+    fn check_all_organs(&self) -> Result<std::result::Result<(), Problem>> {
+        let drawn = self.variation.specimens.iter();
+        let paths = drawn.clone().flat_map(|s| s.paths.iter().map(|p| SpecimenSource::folder(p)));
+        let phantoms = drawn.flat_map(|s| s.phantoms.iter().map(|p| SpecimenSource::phantom(p, s.seeds[0])));
+        for (k, source) in std::iter::once(self.specimen.clone()).chain(paths).chain(phantoms).enumerate() {
+            if let Err(problem) = crate::check::check_organs(self, &self.organ_names_of(&source)?) {
+                let Problem { field, reason } = problem;
+                return Ok(Err(match k {
+                    0 => Problem { field, reason },
+                    _ => Problem {
+                        field: "variation.specimens".to_owned(),
+                        reason: format!(" has {}, with which {field}{reason}", source.label()),
+                    },
+                }));
+            }
+        }
+        Ok(Ok(()))
     }
 
     /// The names of the specimen's organs.
@@ -90,7 +109,11 @@ impl Scene {
     /// # Errors
     /// When the specimen's folder is unusable.
     pub fn organ_names(&self) -> Result<Vec<String>> {
-        match self.specimen.source() {
+        self.organ_names_of(&self.specimen)
+    }
+
+    fn organ_names_of(&self, source: &SpecimenSource) -> Result<Vec<String>> {
+        match source.source() {
             Some(Source::Folder(path)) => Ok(Specimen::organ_names(&self.resolve(path))?),
             Some(Source::Phantom(name, _)) => {
                 let organs = Phantom::named(name).map_or(&[][..], |p| p.organs);
@@ -98,6 +121,21 @@ impl Scene {
             }
             None => Ok(Vec::new()),
         }
+    }
+}
+
+/// What to write instead of a key of earlier scenes.
+fn moved(reason: String) -> String {
+    const EARLIER: &str = "task.variation: unknown field";
+    match reason.find(EARLIER) {
+        Some(at) => {
+            let line = &reason[..at];
+            format!(
+                "{line}task.variation is no longer a key; write [variation] with a distribution for each factor, \
+                 such as tilt_deg = {{ within = 1.0 }}"
+            )
+        }
+        None => reason,
     }
 }
 

@@ -1,8 +1,8 @@
 //! The scene: everything that a cell is built from.
 
 use crate::{
-    Arm, CellCamera, Error, Frame, GravityError, Instrument, InstrumentKind, OrganOverride, Port, Result, Safety, Side,
-    Source, SpecimenSource, Start, Task, Tissue,
+    Arm, CellCamera, Error, Frame, GravityError, Imaging, Instrument, InstrumentKind, OrganOverride, Port, Result,
+    Safety, Side, Source, SpecimenSource, Start, Task, Tissue, Variation,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -50,12 +50,18 @@ pub struct Scene {
     /// The cameras; the paper's three if left out.
     #[serde(default = "CellCamera::paper", rename = "camera")]
     pub cameras: Vec<CellCamera>,
+    /// Factors on what pictures are made with.
+    #[serde(default)]
+    pub imaging: Imaging,
     /// The task of an episode.
     #[serde(default)]
     pub task: Task,
     /// Safety limits.
     #[serde(default)]
     pub safety: Safety,
+    /// How episodes differ by their seed; not at all if left out.
+    #[serde(default)]
+    pub variation: Variation,
     /// The folder that paths in the scene start from; not in the file.
     #[serde(skip)]
     pub folder: PathBuf,
@@ -132,8 +138,10 @@ impl Scene {
             instruments: instruments(),
             gravity_error: GravityError::default(),
             cameras: CellCamera::paper(),
+            imaging: Imaging::default(),
             task: Task::default(),
             safety: Safety::default(),
+            variation: Variation::default(),
             folder: PathBuf::new(),
         }
     }

@@ -66,8 +66,6 @@ pub struct Task {
     pub stop_when_passed: bool,
     /// When stages count as done.
     pub gates: Gates,
-    /// How episodes differ by their seed.
-    pub variation: Variation,
 }
 
 impl Default for Task {
@@ -81,7 +79,6 @@ impl Default for Task {
             sever: false,
             stop_when_passed: true,
             gates: Gates::default(),
-            variation: Variation::default(),
         }
     }
 }
@@ -128,38 +125,6 @@ impl Default for Gates {
             positioning_mm: 10.0,
             cut_open: 0.50,
             cut_closed: 0.15,
-        }
-    }
-}
-
-/// How episodes differ by their seed: each figure is the most that a value goes to either side, all
-/// values equally likely. All 0 for the same start every time.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Variation {
-    /// Tilt of the instruments (degrees).
-    pub tilt_deg: f64,
-    /// Azimuth of the instruments (degrees).
-    pub azimuth_deg: f64,
-    /// Insertion of the instruments (mm).
-    pub insertion_mm: f64,
-    /// Roll of the instruments (degrees).
-    pub roll_deg: f64,
-    /// Shift of the specimen along the cell's x and along its y (mm).
-    pub specimen_shift_mm: f64,
-    /// Turn of the specimen about the vertical (degrees).
-    pub specimen_turn_deg: f64,
-}
-
-impl Default for Variation {
-    fn default() -> Self {
-        Self {
-            tilt_deg: 1.0,
-            azimuth_deg: 5.0,
-            insertion_mm: 5.0,
-            roll_deg: 10.0,
-            specimen_shift_mm: 0.0,
-            specimen_turn_deg: 0.0,
         }
     }
 }

@@ -42,7 +42,7 @@ fn form() {
         Case(
             "[safety]",
             "[safty§]",
-            "safty: unknown field `safty`, expected one of `name`, `description`, `specimen`, `placement`, `organ`, `tissue`, `rates`, `arm`, `port`, `instrument`, `gravity_error`, `camera`, `task`, `safety`; did you mean `safety`?",
+            "safty: unknown field `safty`, expected one of `name`, `description`, `specimen`, `placement`, `organ`, `tissue`, `rates`, `arm`, `port`, `instrument`, `gravity_error`, `camera`, `imaging`, `task`, `safety`, `variation`; did you mean `safety`?",
         ),
         Case(
             "hole_diameter_mm = 6.0",
@@ -70,6 +70,63 @@ fn form() {
             "name = \"left\"\nmodel",
             "name = \"middle\"§\nmodel",
             "arm[0].name: unknown variant `middle`, expected `left` or `right`",
+        ),
+    ]);
+}
+
+#[test]
+fn variation() {
+    check(&[
+        Case(
+            "set = \"none\"",
+            "set = \"heavy\"§",
+            "variation.set: unknown variant `heavy`, expected one of `none`, `easy`, `standard`, `hard`",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "tilt_deg = { about = 1.0 }§",
+            "variation.tilt_deg: unknown variant `about`, expected one of `within`, `uniform`, `log_uniform`, `normal`, `choice`",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "tilt_deg = { within = -1.0 }§",
+            "variation.tilt_deg has a negative `within`; it goes to either side",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "friction = { uniform = [0.2, 2.5] }§",
+            "variation.friction gives 0.2 to 2.5; it must stay in [0, 2]",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "specimens = { phantoms = [\"phantom-d\"] }§",
+            "variation.specimens.phantoms[0] is 'phantom-d'; the phantoms are: phantom-a, phantom-b, phantom-c; did you mean 'phantom-a'?",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "specimens = { phantoms = [\"phantom-a\"], seeds = [3, 2] }§",
+            "variation.specimens.seeds is [3, 2]; the first seed must not be greater than the last",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "specimens = { phantoms = [\"phantom-a\"], seeds = [1, 2000] }§",
+            "variation.specimens.seeds is [1, 2000]; there must be at most 1000 seeds",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "specimens = { phantoms = [\"phantom-c\"] }§",
+            "variation.specimens has phantom-c:1, with which organ.appendix names 'appendix'; the specimen's organs are: liver, gallbladder",
+        ),
+        Case(
+            "tilt_deg = { within = 1.0 }",
+            "specimens = { seeds = [1, 2] }§",
+            "variation.specimens has neither paths nor phantoms; it must have one or more",
+        ),
+        Case("lamp = 1.0 ", "lamp = 11.0§ ", "imaging.lamp is 11; it must be in [0, 10]"),
+        Case(
+            "[safety]",
+            "[task.variation]§\ntilt_deg = 1.0\n[safety]",
+            "task.variation is no longer a key; write [variation] with a distribution for each factor, such as tilt_deg = { within = 1.0 }",
         ),
     ]);
 }

@@ -2,13 +2,15 @@
 #![allow(clippy::unwrap_used, reason = "tests")]
 
 use trocar_phantom::RecordOptions;
-use trocar_scene::{BUILTINS, PHANTOMS, Scene, SpecimenSource};
+use trocar_scene::{BUILTINS, PHANTOMS, Scene, SpecimenSource, Variation};
 
 #[test]
 fn cell_a_writes_out_the_defaults() {
     let cell = Scene::builtin("cell-a").unwrap();
     let plain = Scene::new("cell-a", SpecimenSource::phantom("phantom-a", 1));
-    let said = Scene { organs: cell.organs.clone(), description: cell.description.clone(), ..plain };
+    assert_eq!(cell.variation, Variation::starts());
+    let (organs, description, variation) = (cell.organs.clone(), cell.description.clone(), cell.variation.clone());
+    let said = Scene { organs, description, variation, ..plain };
     assert_eq!(cell, said, "a default differs from what cell-a says of it");
     assert_eq!(cell.organs.len(), 6);
 }

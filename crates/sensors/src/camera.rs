@@ -5,7 +5,7 @@ use glam::DVec3;
 use trocar_camera::Camera;
 use trocar_core::Pose;
 use trocar_render::{Film, Light, RayGenerator, Stage};
-use trocar_scene::{CellCamera, Scene};
+use trocar_scene::{CellCamera, Imaging, Scene};
 
 /// Name of the overview camera that every rig has: both arms above the specimen, seen from the
 /// other side of the table. A scene camera of the same name replaces it.
@@ -89,7 +89,19 @@ impl RigCamera {
         if all.iter().all(|v| v.name != OUTSIDE) {
             all.push(Self::outside(scene, room));
         }
+        all.iter_mut().for_each(|camera| camera.adjust(&scene.imaging));
         Ok(all)
+    }
+
+    /// Scales light and exposure as the scene says. Factors of 1 keep every bit.
+    fn adjust(&mut self, imaging: &Imaging) {
+        let lamp = imaging.lamp as f32;
+        for light in &mut self.lights {
+            let (Light::Spot { intensity: strength, .. } | Light::Panel { radiance: strength, .. }) = light;
+            *strength = strength.map(|v| v * lamp);
+        }
+        self.environment = self.environment.map(|v| v * lamp);
+        self.film.exposure *= imaging.exposure as f32;
     }
 
     /// Turns the camera into an endoscope with its own light and a circular image.

@@ -12,7 +12,7 @@ use trocar_cell::Cell;
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_render::{Appearance, BodyId, ShapeId, Stage, SurfaceKind};
-use trocar_scene::{InstrumentKind, Scene};
+use trocar_scene::{Imaging, InstrumentKind, Scene};
 use trocar_specimen::Specimen;
 
 /// First labels of instruments, arms, and other objects. Labels of organs start at 1.
@@ -31,6 +31,7 @@ pub(crate) struct CellStage {
     organs: Vec<OrganOnStage>,
     arms: Vec<Arm>,
     section: Option<(DVec3, DVec3)>,
+    imaging: Imaging,
 }
 
 /// An organ on the stage.
@@ -82,6 +83,7 @@ impl CellStage {
             organs: Vec::new(),
             arms: Vec::new(),
             section: None,
+            imaging: scene.map(|s| s.imaging).unwrap_or_default(),
         };
         for (k, organ) in placed.organs.iter().enumerate() {
             let label = 1 + k as u16;
@@ -280,7 +282,8 @@ impl CellStage {
             if let Some((point, normal)) = self.section.filter(|_| in_one) {
                 mesh = section(&organ.recorded, &organ.skin, &organ.nodes, point, normal);
             }
-            let (shape, _) = self.stage.add_mesh(&mesh, organ.label, &wet(0.3))?;
+            tint(&mut mesh, self.imaging.tint);
+            let (shape, _) = self.stage.add_mesh(&mesh, organ.label, &glossed(wet(0.3), self.imaging.gloss))?;
             organ.shape = Some(shape);
             organ.drawn_nodes.clone_from(&organ.nodes);
         }
@@ -311,5 +314,29 @@ fn wet(roughness: f32) -> Appearance {
             Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..tissue }
         }
         _ => tissue,
+    }
+}
+
+/// Scales the colour channels of a surface. Factors of 1 keep every bit.
+fn tint(mesh: &mut TriMesh, factors: [f64; 3]) {
+    for color in &mut mesh.colors {
+        for (channel, factor) in color.iter_mut().zip(factors) {
+            *channel = (f64::from(*channel) * factor).round().clamp(0.0, 255.0) as u8;
+        }
+    }
+}
+
+/// The appearance with its highlights scaled by `gloss`: the coat's refractive index for which the
+/// reflectance at normal incidence, ((n - 1) / (n + 1))^2, is scaled so. A factor of 1 keeps every
+/// bit.
+fn glossed(appearance: Appearance, gloss: f64) -> Appearance {
+    match appearance.surface {
+        SurfaceKind::Coated { roughness, ior, scattering_length } if gloss != 1.0 => {
+            let n = f64::from(ior);
+            let root = ((n - 1.0) / (n + 1.0) * gloss.sqrt()).min(0.5);
+            let ior = ((1.0 + root) / (1.0 - root)) as f32;
+            Appearance { surface: SurfaceKind::Coated { roughness, ior, scattering_length }, ..appearance }
+        }
+        _ => appearance,
     }
 }

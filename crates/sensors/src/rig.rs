@@ -8,7 +8,7 @@ use trocar_camera::{Camera, DepthNoise};
 use trocar_cell::{Cell, Placed};
 use trocar_core::Pose;
 use trocar_render::{Noise, Picture, RenderSettings, render_into};
-use trocar_scene::Scene;
+use trocar_scene::{Scene, Start, Task};
 use trocar_specimen::Specimen;
 
 /// Width of a depth camera's native picture (px). Its disparities have this resolution for pictures
@@ -48,6 +48,8 @@ pub struct CameraRig {
     cameras: Vec<RigCamera>,
     visible: CellStage,
     picture: Picture,
+    /// See [`drawn_part`]; `None` for a specimen alone.
+    scene: Option<Box<Scene>>,
     /// Noise of the sensors.
     pub noise: SensorNoise,
 }
@@ -72,7 +74,14 @@ impl CameraRig {
         }
         visible.invalidate();
         visible.update(cell)?;
-        Ok(Self::with(visible, cameras))
+        let scene = Some(Box::new(drawn_part(scene)));
+        Ok(Self { scene, ..Self::with(visible, cameras) })
+    }
+
+    /// Whether [`new`](Self::new) would give the same cameras for `scene`. Where an episode begins
+    /// does not matter.
+    pub fn is_of(&self, scene: &Scene) -> bool {
+        self.scene.as_ref().is_some_and(|own| **own == drawn_part(scene))
     }
 
     /// Builds the cameras of a specimen in its recorded pose: `recording` if the specimen has a
@@ -107,7 +116,7 @@ impl CameraRig {
     }
 
     fn with(visible: CellStage, cameras: Vec<RigCamera>) -> Self {
-        Self { cameras, visible, picture: Picture::default(), noise: SensorNoise::default() }
+        Self { cameras, visible, picture: Picture::default(), scene: None, noise: SensorNoise::default() }
     }
 
     /// Updates the stage to the current state of the cell. [`Self::render`] does this itself.
@@ -204,17 +213,22 @@ impl CameraRig {
         }
         let at = self.index(camera)?;
         let sensor = self.noise;
+        let louder = self.scene.as_ref().map_or(1.0, |s| s.imaging.noise);
         let Self { cameras, visible: CellStage { stage, .. }, picture, .. } = self;
         let own = &mut cameras[at];
         stage.lights.clone_from(&own.lights);
         stage.environment = own.environment;
         let mut film = own.film;
-        film.noise = sensor.color.map(|[shot, read]| Noise { shot, read, seed: sensor.seed, frame });
+        film.noise = sensor.color.map(|[shot, read]| {
+            let [shot, read] = [shot, read].map(|v| v * louder as f32);
+            Noise { shot, read, seed: sensor.seed, frame }
+        });
         // The stereo pair itself is neither cropped nor scaled.
         let focal = own.model.fx * NATIVE_DEPTH_WIDTH / own.model.width.max(1) as f64;
         let (pose, depth) = (own.pose, own.depth);
         render_into(picture, stage, own.rays(size), &pose, settings, &film);
         if let Some(noise) = sensor.depth.filter(|_| depth) {
+            let noise = DepthNoise { disparity_sigma: noise.disparity_sigma * louder, ..noise };
             let camera = own.sized(size);
             let seeds = [u64::from(sensor.seed), u64::from(frame)];
             noise.apply_resampled(&mut picture.depth, Some(&picture.color), &camera, focal, seeds)?;
@@ -226,6 +240,14 @@ impl CameraRig {
     pub fn triangles(&self) -> usize {
         self.visible.stage.triangles()
     }
+}
+
+/// The part of a scene that pictures are made of: all but the arms' starts and the task.
+fn drawn_part(scene: &Scene) -> Scene {
+    let mut part = scene.clone();
+    part.arms.iter_mut().for_each(|arm| arm.start = Start { position_m: arm.start.position_m, ..Start::default() });
+    part.task = Task::default();
+    part
 }
 
 /// Centre of the organs.

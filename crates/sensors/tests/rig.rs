@@ -189,3 +189,33 @@ fn specimen_renders_alone_and_errors_name_the_cause() {
     let seen = rig.render_still("outside", [120, 80], &RenderSettings::preview()).unwrap();
     assert!(share(seen, 1) > 0.01, "{}", share(seen, 1));
 }
+
+#[test]
+fn imaging_changes_pictures_as_it_says() {
+    let (plain, specimen) = (scene(), specimen());
+    let cell = Cell::new(&plain, &specimen, 1).unwrap();
+    let see = |change: &dyn Fn(&mut trocar_scene::Imaging)| {
+        let mut scene = plain.clone();
+        change(&mut scene.imaging);
+        let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
+        assert!(rig.is_of(&scene) && (scene == plain || !rig.is_of(&plain)));
+        rig.noise = SensorNoise { color: Some([0.02, 0.004]), depth: Some(DepthNoise::default()), seed: 7 };
+        let organ = label(&rig, "appendix");
+        let picture = rig.render(&cell, "d405", [96, 64], &RenderSettings::preview()).unwrap().clone();
+        let on = |all: bool, channel: usize| -> f64 {
+            let pixels = picture.color.pixels.iter().zip(&picture.labels).filter(|(_, l)| all || **l == organ);
+            let values: Vec<f64> = pixels.map(|(p, _)| f64::from(p[channel])).collect();
+            values.iter().sum::<f64>() / values.len() as f64
+        };
+        (on(true, 0), [0, 1, 2].map(|channel| on(false, channel)), picture)
+    };
+    let (bright, organ, same) = see(&|_| {});
+    let (_, _, louder) = see(&|i| i.noise = 3.0);
+    assert!(louder.color != same.color && louder.depth.depth != same.depth.depth && louder.labels == same.labels);
+    assert!(see(&|i| i.lamp = 0.5).0 < 0.9 * bright);
+    assert!(see(&|i| i.exposure = 0.5).0 < 0.9 * bright);
+    assert_ne!(see(&|i| i.gloss = 3.0).2.color, same.color);
+    let (_, tinted, picture) = see(&|i| i.tint = [1.0, 0.6, 1.0]);
+    assert!(tinted[1] < 0.9 * organ[1] && (tinted[0] - organ[0]).abs() < 2.0, "{tinted:?} {organ:?}");
+    assert_eq!(picture.labels, same.labels);
+}

@@ -3,12 +3,13 @@
 
 use crate::facts::Facts;
 use crate::measure::Subject;
-use crate::random::Random;
 use crate::stages::Tracker;
-use crate::start::{Arrangement, starts, targets};
+use crate::start::{starts, targets};
+use crate::supply::{OneSpecimen, SpecimenSupply};
 use crate::{Channels, End, Error, Observation, Progress, Result, Summary, specimen_hash};
+use std::sync::Arc;
 use trocar_cell::{Action, Cell, CellEvent, CellState, Settling};
-use trocar_scene::{Scene, TaskName};
+use trocar_scene::{Drawn, EpisodeRandom, Imaging, Scene, TaskName};
 use trocar_specimen::Specimen;
 use xxhash_rust::xxh3::Xxh3;
 
@@ -36,7 +37,7 @@ pub struct EpisodeState {
     /// See [`key`].
     key: u64,
     cell: CellState,
-    arrangement: Arrangement,
+    drawn: Drawn,
     now: Now,
 }
 
@@ -51,19 +52,28 @@ struct Now {
     end: Option<End>,
 }
 
+/// What a cell was built from, and its tissue when it had settled.
+struct Built {
+    /// See [`foundation`].
+    scene: Scene,
+    specimen: Arc<Specimen>,
+    specimen_hash: u64,
+    settled: CellState,
+    settling: Settling,
+}
+
 /// An episode of a scene's task.
 pub struct Episode {
     scene: Scene,
-    specimen: Specimen,
-    specimen_hash: u64,
+    supply: Box<dyn SpecimenSupply>,
     /// See [`key`].
     key: u64,
     threads: usize,
+    built: Built,
     cell: Cell,
-    /// Where the specimen is in `cell`, and the tissue there when it has settled.
-    arrangement: Arrangement,
-    settled: CellState,
-    settling: Settling,
+    /// What was drawn for this episode, and the scene with it.
+    drawn: Drawn,
+    arranged: Scene,
     now: Now,
 }
 
@@ -73,33 +83,52 @@ impl Episode {
     /// once; the episode stands at the start of seed 0.
     ///
     /// # Errors
-    /// A scene without the task's organ or instruments, or one that cannot be built.
+    /// A scene without the task's organ or instruments, one that cannot be built, or one whose
+    /// episodes have different specimens: see [`with_specimens`](Self::with_specimens).
     pub fn new(scene: &Scene, specimen: &Specimen, threads: usize) -> Result<Self> {
-        let arrangement = Arrangement::default();
-        let (cell, settled, settling) = build(scene, specimen, threads, &arrangement)?;
+        let count = scene.specimens().len();
+        if count > 1 {
+            let name = &scene.name;
+            let why = format!("scene '{name}': its episodes draw from {count} specimens, but one was given");
+            return Err(Error::Option(why));
+        }
+        Self::with_specimens(scene, Box::new(OneSpecimen(Arc::new(specimen.clone()))), threads)
+    }
+
+    /// The same with the specimens of `supply`: each episode has the one that is drawn for it.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new); a specimen that `supply` does not have.
+    pub fn with_specimens(scene: &Scene, supply: Box<dyn SpecimenSupply>, threads: usize) -> Result<Self> {
+        Self::begun(scene, supply, threads, 0, scene.draw(0))
+    }
+
+    /// The same, at the start of the episode of `seed` with `drawn`.
+    ///
+    /// # Errors
+    /// As [`with_specimens`](Self::with_specimens).
+    pub fn begun(
+        scene: &Scene,
+        mut supply: Box<dyn SpecimenSupply>,
+        threads: usize,
+        seed: u64,
+        drawn: Drawn,
+    ) -> Result<Self> {
+        let specimen = supply.get(&drawn.specimen)?;
+        let arranged = scene.with_drawn(&drawn, &specimen);
+        let key = key(scene, specimen_hash(&specimen))?;
+        let (cell, built) = Built::new(foundation(scene, &arranged), specimen, threads)?;
         let now = Now {
-            seed: 0,
+            seed,
             subject: Subject::new(&cell, &scene.task.organ, &scene.task.gates, Vec::new()),
             tracker: Tracker::new(scene.task.name, &scene.task.gates),
             rows: Vec::new(),
             events: Vec::new(),
             end: None,
         };
-        let specimen_hash = specimen_hash(specimen);
-        let mut made = Self {
-            scene: scene.clone(),
-            specimen_hash,
-            key: key(scene, specimen_hash)?,
-            specimen: specimen.clone(),
-            threads,
-            cell,
-            arrangement,
-            settled,
-            settling,
-            now,
-        };
+        let mut made = Self { scene: scene.clone(), supply, key, threads, built, cell, drawn, arranged, now };
         made.check()?;
-        made.reset(0)?;
+        made.reset_with(seed, made.drawn.clone())?;
         Ok(made)
     }
 
@@ -122,20 +151,25 @@ impl Episode {
         Ok(())
     }
 
-    /// Begins the episode of `seed`: the arms' starts, and where the scene says so the specimen's
-    /// place, are those of the seed. The same seed gives the same bits, whatever was before. Takes
-    /// milliseconds; a specimen that moves is built and settled anew, which takes seconds.
+    /// Begins the episode of `seed`, with what the scene's variation draws for it. The same seed
+    /// gives the same bits, whatever was before. Takes milliseconds where only starts and cameras
+    /// are drawn. A cell that differs otherwise is built and settled anew, which takes seconds.
     ///
     /// # Errors
-    /// A start that an arm does not reach; a specimen that cannot be built there.
+    /// A start that an arm does not reach; a cell that cannot be built so; a specimen that is not
+    /// there.
     pub fn reset(&mut self, seed: u64) -> Result<Observation> {
-        let arrangement = Arrangement::of(&self.scene, seed);
-        if arrangement != self.arrangement {
-            (self.cell, self.settled, self.settling) = build(&self.scene, &self.specimen, self.threads, &arrangement)?;
-            self.arrangement = arrangement;
-        }
-        let starts = starts(&self.scene, &self.cell, seed);
-        self.cell.restart(&self.settled, &starts)?;
+        self.reset_with(seed, self.scene.draw(seed))
+    }
+
+    /// Begins the episode of `seed` with `drawn` instead of what would be drawn for it.
+    ///
+    /// # Errors
+    /// As [`reset`](Self::reset).
+    pub fn reset_with(&mut self, seed: u64, drawn: Drawn) -> Result<Observation> {
+        self.arrange(drawn)?;
+        let starts = starts(&self.arranged, &self.cell);
+        self.cell.restart(&self.built.settled, &starts)?;
         let task = &self.scene.task;
         let targets = match task.name {
             TaskName::PortReach => targets(&self.cell, seed)?,
@@ -150,6 +184,22 @@ impl Episode {
             end: None,
         };
         Ok(self.observe())
+    }
+
+    /// Makes the cell that of `drawn`. The episode stays as it was on an error.
+    fn arrange(&mut self, drawn: Drawn) -> Result<()> {
+        let specimen = if drawn.specimen == self.drawn.specimen {
+            Arc::clone(&self.built.specimen)
+        } else {
+            self.supply.get(&drawn.specimen)?
+        };
+        let arranged = self.scene.with_drawn(&drawn, &specimen);
+        let scene = foundation(&self.scene, &arranged);
+        if scene != self.built.scene {
+            (self.cell, self.built) = Built::new(scene, specimen, self.threads)?;
+        }
+        (self.drawn, self.arranged) = (drawn, arranged);
+        Ok(())
     }
 
     /// Does one control period.
@@ -251,19 +301,29 @@ impl Episode {
         self.now.seed
     }
 
-    /// The scene.
+    /// The scene as it was given.
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
 
-    /// The scene with the specimen where this episode has it: what pictures are made of.
-    pub fn arranged_scene(&self) -> Scene {
-        self.arrangement.scene(&self.scene, &self.specimen)
+    /// The scene with what was drawn for this episode: what pictures are made of.
+    pub fn arranged_scene(&self) -> &Scene {
+        &self.arranged
+    }
+
+    /// What was drawn for this episode.
+    pub fn drawn(&self) -> &Drawn {
+        &self.drawn
+    }
+
+    /// The specimen of this episode, as it was recorded.
+    pub fn specimen(&self) -> &Specimen {
+        &self.built.specimen
     }
 
     /// Hash of the specimen; see [`specimen_hash`].
     pub fn specimen_hash(&self) -> u64 {
-        self.specimen_hash
+        self.built.specimen_hash
     }
 
     /// The cell: privileged, for scripts and pictures.
@@ -293,8 +353,8 @@ impl Episode {
     }
 
     /// Random numbers of this episode for `purpose`.
-    pub fn random(&self, purpose: &str) -> Random {
-        Random::new(self.now.seed, purpose)
+    pub fn random(&self, purpose: &str) -> EpisodeRandom {
+        EpisodeRandom::new(self.now.seed, purpose)
     }
 
     /// The episode in figures so far.
@@ -303,18 +363,19 @@ impl Episode {
         let safety = self.scene.safety.rcm_threshold_mm;
         let mut summary = Summary::of(&self.now.rows, self.progress(), self.end(), &arms, safety);
         summary.add_facts(&self.facts());
+        summary.drawn = Some(self.drawn.clone());
         summary
     }
 
     fn facts(&self) -> Facts<'_> {
-        let grasper = self.now.subject.grasper.and_then(|k| self.scene.tools().get(k).map(|t| t.instrument));
+        let grasper = self.now.subject.grasper.and_then(|k| self.arranged.tools().get(k).map(|t| t.instrument));
         let bodies = self.bodies();
         Facts {
             task: &self.scene.task,
             grasper: self.now.subject.grasper.map(|k| self.cell.arms()[k].0),
             jaw_force_n: grasper.map_or(0.0, |i| i.jaw_force_n),
-            settling: self.settling,
-            inverted_rest: self.specimen.organs.iter().map(|o| o.body.inverted()).sum(),
+            settling: self.built.settling,
+            inverted_rest: self.specimen().organs.iter().map(|o| o.body.inverted()).sum(),
             pin_drift_mm: 1e3 * self.cell.pin_drift(),
             organ_weight_n: self.cell.weight(&bodies),
             events: &self.now.events,
@@ -340,7 +401,7 @@ impl Episode {
             task: self.scene.task.name,
             key: self.key,
             cell: self.cell.save(),
-            arrangement: self.arrangement,
+            drawn: self.drawn.clone(),
             now: self.now.clone(),
         }
     }
@@ -358,11 +419,7 @@ impl Episode {
         if state.key != self.key {
             return Err(Error::Option("state: is of another scene or specimen than this episode".to_owned()));
         }
-        if state.arrangement != self.arrangement {
-            (self.cell, self.settled, self.settling) =
-                build(&self.scene, &self.specimen, self.threads, &state.arrangement)?;
-            self.arrangement = state.arrangement;
-        }
+        self.arrange(state.drawn.clone())?;
         self.cell.restore(&state.cell)?;
         self.now = state.now.clone();
         Ok(())
@@ -382,19 +439,34 @@ impl Episode {
     }
 }
 
-/// What a state is known by to belong to an episode: the scene and the specimen. How long an
-/// episode may be does not matter.
+/// What a state is known by to belong to an episode: the scene and, where it has only one, the
+/// specimen. How long an episode may be does not matter.
 fn key(scene: &Scene, specimen: u64) -> Result<u64> {
     let mut scene = scene.clone();
     scene.task.episode_s = 0.0;
+    let specimen = if scene.specimens().len() > 1 { 0 } else { specimen };
     Ok(scene.hash(&[specimen])?)
 }
 
-/// The cell with the specimen as arranged, its state once the organs have settled, and how they
-/// did.
-fn build(scene: &Scene, specimen: &Specimen, threads: usize, at: &Arrangement) -> Result<(Cell, CellState, Settling)> {
-    let mut cell = Cell::new(&at.scene(scene, specimen), specimen, threads)?;
-    let settling = cell.settle(SETTLE_S)?;
-    let settled = cell.save();
-    Ok((cell, settled, settling))
+/// The part of the `arranged` scene that the cell of an episode is built from. The starts are those
+/// of `scene` as it is written, because the limits of an arm depend on the start that it is built
+/// with; a reset puts the arms elsewhere. Cameras and light are no part of the cell.
+fn foundation(scene: &Scene, arranged: &Scene) -> Scene {
+    let mut part = arranged.clone();
+    for (arm, own) in part.arms.iter_mut().zip(&scene.arms) {
+        arm.start = own.start;
+    }
+    (part.cameras, part.imaging) = (Vec::new(), Imaging::default());
+    part
+}
+
+impl Built {
+    /// The cell of `scene` around `specimen`, settled.
+    fn new(scene: Scene, specimen: Arc<Specimen>, threads: usize) -> Result<(Cell, Self)> {
+        let mut cell = Cell::new(&scene, &specimen, threads)?;
+        let settling = cell.settle(SETTLE_S)?;
+        let settled = cell.save();
+        let specimen_hash = specimen_hash(&specimen);
+        Ok((cell, Self { scene, specimen, specimen_hash, settled, settling }))
+    }
 }

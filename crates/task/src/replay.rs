@@ -1,20 +1,22 @@
 //! Episode files: what was done, so that anyone can do it again and compare every step.
 //!
-//! One line of JSON (scene text and hash, specimen hash, seed, program), then for every step the
+//! One line of JSON (scene text and hash, what was drawn, specimen hash, seed, program), then for every step the
 //! action's numbers and the state's hash after it as little-endian binary, then xxh3 of all before
 //! it.
 
 use crate::storage::write_whole;
-use crate::{End, Episode, Error, Result, specimen_hash};
+use crate::{End, Episode, Error, OneSpecimen, Result, specimen_hash};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+use std::sync::Arc;
 use trocar_cell::{Action, ActionSpace};
-use trocar_scene::{ArmModel, Scene, Source};
+use trocar_scene::{ArmModel, Drawn, Scene, Source, Variation};
 use trocar_specimen::{Specimen, parse_toml};
 use xxhash_rust::xxh3::xxh3_64;
 
 const FORMAT: &str = "trocar-episode";
-const VERSION: u32 = 1;
+/// Version 1 did not have what was drawn.
+const VERSION: u32 = 2;
 
 /// Largest file (bytes): a million steps.
 const MOST_BYTES: u64 = 100 << 20;
@@ -28,8 +30,11 @@ const NUMBERS: usize = 5;
 pub struct Header {
     /// Version of the program.
     pub program: String,
-    /// The scene as TOML, every value in it.
+    /// The scene as TOML, every value in it, with the specimen that was drawn and nothing that varies.
     pub scene: String,
+    /// What was drawn for the episode, as TOML: a replay draws nothing.
+    #[serde(default)]
+    pub drawn: String,
     /// The folder that paths in the scene start from.
     pub folder: String,
     /// See [`scene_hash`]; hexadecimal, as all hashes here.
@@ -101,19 +106,26 @@ pub fn scene_hash(scene: &Scene, specimen: u64) -> Result<u64> {
     Ok(scene.hash(&contents)?)
 }
 
+/// The scene as an episode file keeps it: with the specimen of that episode, and without what
+/// varies between episodes. What was drawn is applied to it.
+fn recorded(scene: &Scene, drawn: &Drawn) -> Scene {
+    Scene { specimen: drawn.specimen.clone(), variation: Variation::default(), ..scene.clone() }
+}
+
 impl Header {
     /// Of an episode that stands at its start.
     ///
     /// # Errors
     /// As [`scene_hash`].
     pub fn of(episode: &Episode, policy: &str) -> Result<Self> {
-        let scene = episode.scene();
+        let scene = recorded(episode.scene(), episode.drawn());
         let folder = std::path::absolute(&scene.folder).unwrap_or_else(|_| scene.folder.clone());
         Ok(Self {
             program: env!("CARGO_PKG_VERSION").to_owned(),
             scene: scene.to_toml()?,
+            drawn: episode.drawn().to_toml()?,
             folder: folder.display().to_string(),
-            scene_hash: hex(scene_hash(scene, episode.specimen_hash())?),
+            scene_hash: hex(scene_hash(&scene, episode.specimen_hash())?),
             specimen_hash: hex(episode.specimen_hash()),
             seed: episode.seed(),
             policy: policy.to_owned(),
@@ -228,11 +240,19 @@ impl EpisodeFile {
         Ok(scene)
     }
 
+    /// What was drawn for the episode.
+    ///
+    /// # Errors
+    /// A table that cannot be read.
+    pub fn drawn(&self) -> Result<Drawn> {
+        parse_toml(&self.header.drawn).map_err(|e| Error::Option(format!("what was drawn for the episode: {e}")))
+    }
+
     /// Whether specimen, scene or an arm's model are others than the recorded ones, in a sentence;
     /// `None` where they are the same.
     ///
     /// # Errors
-    /// A model file that cannot be read.
+    /// A model file that cannot be read, a damaged header.
     pub fn other(&self, scene: &Scene, specimen: &Specimen) -> Result<Option<String>> {
         let header = &self.header;
         let found = specimen_hash(specimen);
@@ -240,9 +260,18 @@ impl EpisodeFile {
             let said = format!("the specimen is another one: {}, not {}", hex(found), header.specimen_hash);
             return Ok(Some(said));
         }
-        let found = hex(scene_hash(scene, found)?);
+        let found = hex(scene_hash(&recorded(scene, &self.drawn()?), found)?);
         Ok((found != header.scene_hash)
             .then(|| format!("the scene or an arm's model is another one: {found}, not {}", header.scene_hash)))
+    }
+
+    /// The episode at its start, with `scene` of [`scene`](Self::scene).
+    ///
+    /// # Errors
+    /// An episode that cannot be built.
+    pub fn begin(&self, scene: &Scene, specimen: &Specimen, threads: usize) -> Result<Episode> {
+        let supply = Box::new(OneSpecimen(Arc::new(specimen.clone())));
+        Episode::begun(scene, supply, threads, self.header.seed, self.drawn()?)
     }
 
     /// Does the episode again with `specimen` and compares every step. What differs is a verdict,
@@ -269,8 +298,7 @@ impl EpisodeFile {
         if let Some(said) = self.other(scene, specimen)? {
             return Ok(differs(None, said));
         }
-        let mut episode = Episode::new(scene, specimen, threads)?;
-        episode.reset(header.seed)?;
+        let mut episode = self.begin(scene, specimen, threads)?;
         let start = hex(episode.state_hash());
         if start != header.start_hash {
             return Ok(differs(Some(0), format!("the start is another one: {start}, not {}", header.start_hash)));

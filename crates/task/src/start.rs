@@ -1,70 +1,14 @@
-//! Where an episode begins, by its seed: the scene's starts and placement, varied as its task says.
+//! Where an episode begins: the starts of its arms, and the targets of port-reach by its seed.
 
 use crate::Result;
-use crate::random::Random;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use trocar_cell::{Cell, Setpoint, Workspace};
-use trocar_core::Pose;
 use trocar_robot::instrument::Coordinates;
-use trocar_scene::{Frame, Scene, Start, Tool};
-use trocar_specimen::Specimen;
+use trocar_scene::{EpisodeRandom, Scene, Tool};
 
-/// How far a specimen lies from where the scene has it.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Arrangement {
-    /// Along the cell's x and y (m).
-    shift: [f64; 2],
-    /// About the vertical through the middle of the specimen (rad).
-    turn: f64,
-}
-
-impl Arrangement {
-    /// That of `seed`.
-    pub fn of(scene: &Scene, seed: u64) -> Self {
-        let (v, random) = (&scene.task.variation, Random::new(seed, "specimen"));
-        let shift = [0, 1].map(|k| 1e-3 * random.aside(k, v.specimen_shift_mm));
-        Self { shift, turn: random.aside(2, v.specimen_turn_deg).to_radians() }
-    }
-
-    /// The scene with the specimen so arranged.
-    pub fn scene(&self, scene: &Scene, specimen: &Specimen) -> Scene {
-        let mut moved = scene.clone();
-        if *self == Self::default() {
-            return moved;
-        }
-        let placement = scene.placement.pose();
-        let points = || specimen.organs.iter().flat_map(|o| &o.body.vertices);
-        let middle = placement.transform(points().sum::<DVec3>() / points().count().max(1) as f64);
-        let rotation = DQuat::from_rotation_z(self.turn);
-        let shift = DVec3::new(self.shift[0], self.shift[1], 0.0);
-        let at = Pose {
-            rotation: (rotation * placement.rotation).normalize(),
-            translation: middle + rotation * (placement.translation - middle) + shift,
-        };
-        let q = at.rotation;
-        moved.placement = Frame { position_m: at.translation.to_array(), rotation_wxyz: [q.w, q.x, q.y, q.z] };
-        moved
-    }
-}
-
-/// The arms' starts of `seed`, as near as the arms' limits let them.
-pub(crate) fn starts(scene: &Scene, cell: &Cell, seed: u64) -> Vec<Setpoint> {
-    let (v, random) = (&scene.task.variation, Random::new(seed, "start"));
-    let one = |(k, tool): (usize, &Tool<'_>)| {
-        let at = &tool.arm.start;
-        // An arm's numbers do not depend on how many arms there are.
-        let first = 8 * tool.arm.name as u64;
-        let aside = |n: u64| 1e-3 * random.aside(first + n, v.insertion_mm);
-        let start = Start {
-            tilt_deg: (at.tilt_deg + random.aside(first, v.tilt_deg)).max(0.0),
-            azimuth_deg: at.azimuth_deg + random.aside(first + 1, v.azimuth_deg),
-            insertion_mm: at.insertion_mm + random.aside(first + 2, v.insertion_mm),
-            roll_deg: at.roll_deg + random.aside(first + 3, v.roll_deg),
-            jaw: at.jaw,
-            position_m: at.position_m.map(|[x, y, z]| [x + aside(4), y + aside(5), z + aside(6)]),
-        };
-        cell.start_setpoint(k, &start, tool.port)
-    };
+/// The arms' starts in `scene`, as near as the arms' limits let them.
+pub(crate) fn starts(scene: &Scene, cell: &Cell) -> Vec<Setpoint> {
+    let one = |(k, tool): (usize, &Tool<'_>)| cell.start_setpoint(k, &tool.arm.start, tool.port);
     scene.tools().iter().enumerate().map(one).collect()
 }
 
@@ -77,7 +21,7 @@ const TARGET_RANGE: f64 = 0.03;
 
 /// Three targets an arm for port-reach, where its blade tips can be, above the tissue (m).
 pub(crate) fn targets(cell: &Cell, seed: u64) -> Result<Vec<[DVec3; 3]>> {
-    let random = Random::new(seed, "targets");
+    let random = EpisodeRandom::new(seed, "targets");
     let mut all = Vec::new();
     for (side, _) in cell.arms() {
         let (name, space) = (side.name(), cell.workspace(side.name())?);

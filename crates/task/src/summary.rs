@@ -7,6 +7,7 @@ use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
 use crate::why::why;
 use crate::{Channels, End, Progress, Stage};
 use serde::{Deserialize, Serialize};
+use trocar_scene::Drawn;
 
 /// An arm is loaded while its jaws hold tissue, or tissue does this much to its instrument (N).
 pub const LOADED_N: f64 = 0.05;
@@ -128,6 +129,9 @@ pub struct Summary {
     /// What jaw force would bear the organ, where a grasp that presses slipped.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub advice: Option<String>,
+    /// What was drawn for the episode.
+    #[serde(default)]
+    pub drawn: Option<Drawn>,
     /// Figures that channels do not have.
     #[serde(default, flatten)]
     pub details: Details,
@@ -176,6 +180,7 @@ impl Summary {
             arms,
             why: None,
             advice: None,
+            drawn: None,
             details: Details::default(),
         }
     }

@@ -9,7 +9,7 @@ mod common;
 use common::{ONE_END, resection, two_tubes};
 use std::path::Path;
 use trocar_cell::{Action, CellEvent, Setpoint};
-use trocar_scene::{Scene, TaskName};
+use trocar_scene::{Distribution, Factor, Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::{
     Channels, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, Stage, policy, read_channels, run,
@@ -71,9 +71,9 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
     let verdict = tampered.verify(&scene, &specimen, 1, &mut || true).unwrap();
     assert_eq!((verdict.same, verdict.first_difference), (false, Some(50)), "{verdict:?}");
     assert!(file.verify(&scene, &specimen, 1, &mut || false).is_err(), "stopped, which is no verdict");
-    // Another seed at the start, another specimen before that.
+    // Another draw at the start, another specimen before that.
     let mut other = file.clone();
-    other.header.seed += 1;
+    other.header.drawn = scene.draw(4).to_toml().unwrap();
     assert_eq!(other.verify(&scene, &specimen, 1, &mut || true).unwrap().first_difference, Some(0));
     let mut soft = specimen.clone();
     soft.organs[0].material.young_modulus_pa *= 1.001;
@@ -164,7 +164,8 @@ fn a_reset_gives_the_same_bits_whatever_was_before() {
 fn specimens_are_shifted_and_turned_by_the_seed() {
     let specimen = two_tubes(ONE_END, 4e-3);
     let mut scene = resection();
-    (scene.task.variation.specimen_shift_mm, scene.task.variation.specimen_turn_deg) = (4.0, 20.0);
+    scene.variation.factors.insert(Factor::SpecimenShift, Distribution::Within(4.0));
+    scene.variation.factors.insert(Factor::SpecimenTurn, Distribution::Within(20.0));
     let middle = |e: &Episode| e.cell().world().axes[0].point_at(0.5);
     let mut episode = Episode::new(&scene, &specimen, 1).unwrap();
     episode.reset(1).unwrap();

@@ -2,7 +2,6 @@
 
 use crate::Result;
 use trocar_sensors::CameraRig;
-use trocar_specimen::Specimen;
 use trocar_task::{Episode, EpisodeFile};
 
 /// The replay of an episode. It continues after a difference from the recorded states, as long as
@@ -15,23 +14,25 @@ pub struct EpisodeReplay<'a> {
 }
 
 impl<'a> EpisodeReplay<'a> {
-    /// Resets `episode`, which has the file's scene, to the start of the recorded episode.
+    /// Resets `episode`, which has the file's scene, to the start of the recorded episode with what
+    /// was drawn for it.
     ///
     /// # Errors
     /// A reset that fails.
     pub fn begin(episode: &'a mut Episode, file: &'a EpisodeFile) -> Result<Self> {
-        episode.reset(file.header.seed)?;
+        episode.reset_with(file.header.seed, file.drawn()?)?;
         let same = format!("{:016x}", episode.state_hash()) == file.header.start_hash;
         let difference = (!same).then(|| "the start is another one".to_owned());
         Ok(Self { episode, file, next: 0, difference })
     }
 
-    /// The cameras of the episode, with the specimen where the seed places it.
+    /// The cameras of the episode, with what was drawn for it.
     ///
     /// # Errors
     /// A camera without a lens.
-    pub fn camera_rig(&self, specimen: &Specimen) -> Result<CameraRig> {
-        Ok(CameraRig::new(&self.episode.arranged_scene(), specimen, self.episode.cell())?)
+    pub fn camera_rig(&self) -> Result<CameraRig> {
+        let episode = &self.episode;
+        Ok(CameraRig::new(episode.arranged_scene(), episode.specimen(), episode.cell())?)
     }
 
     /// Executes the next step. Returns false at the end, or if the step cannot be executed.

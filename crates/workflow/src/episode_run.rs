@@ -4,12 +4,13 @@ use crate::pages;
 use crate::phantoms::scene_specimen;
 use crate::reconstruct::{REPORT, refuse_overlap};
 use crate::recorder::Recorder;
+use crate::specimen_cache::{SpecimenCache, drawn_specimens};
 use crate::{Error, Result};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use trocar_core::Progress;
-use trocar_scene::Scene;
+use trocar_scene::{Scene, VariationSet};
 use trocar_sensors::CameraRig;
 use trocar_specimen::{Specimen, StagedFolder};
 use trocar_task::{
@@ -27,6 +28,8 @@ pub struct EpisodeRun {
     pub policy: String,
     /// The episode's seed.
     pub seed: u64,
+    /// The set of factors that vary, instead of the scene's.
+    pub variation: Option<VariationSet>,
     /// Worker threads, 0 for all.
     pub threads: usize,
     /// Folder of made phantoms. The scene's phantom is made there once and reused.
@@ -57,7 +60,7 @@ impl EpisodeRun {
     /// One line that names the file, field or option; `output` then stays unchanged.
     pub fn run(&self, output: &Path, progress: &dyn Progress) -> Result<EpisodeOutput> {
         let chosen = policy::named(&self.policy)?;
-        self.run_policy(output, progress, |_, _| Ok(chosen))
+        self.run_policy(output, progress, |_| Ok(chosen))
     }
 
     /// Checks the scene and the folder `output`, before anything is built.
@@ -65,7 +68,7 @@ impl EpisodeRun {
     /// # Errors
     /// A scene that cannot be read; a folder with other contents.
     pub fn check(&self, output: &Path) -> Result<Scene> {
-        let scene = Scene::read(&self.scene)?;
+        let scene = read_varied(&self.scene, self.variation)?;
         refuse_overlap(Path::new(&self.scene), output)?;
         // The staged folder is removed when it is dropped.
         StagedFolder::create(output, RESULT_FILE)?;
@@ -80,16 +83,17 @@ impl EpisodeRun {
         &self,
         output: &Path,
         progress: &dyn Progress,
-        make: impl FnOnce(&Specimen, &Episode) -> Result<Box<dyn Policy + Send>>,
+        make: impl FnOnce(&Episode) -> Result<Box<dyn Policy + Send>>,
     ) -> Result<EpisodeOutput> {
         let scene = self.check(output)?;
         let staged = StagedFolder::create(output, RESULT_FILE)?;
-        let specimen = scene_specimen(&scene, &self.phantoms, progress)?;
-        let mut episode = Episode::new(&scene, &specimen, self.threads)?;
-        let mut chosen = make(&specimen, &episode)?;
-        // The seed may move the specimen, and the page must show it there.
-        episode.reset(self.seed)?;
-        let rig = CameraRig::new(&episode.arranged_scene(), &specimen, episode.cell())?;
+        let specimens = SpecimenCache::new(&scene, &self.phantoms);
+        specimens.make_all(&drawn_specimens(&scene, std::iter::once(self.seed)), progress)?;
+        let drawn = scene.draw(self.seed);
+        let episode = Episode::begun(&scene, Box::new(specimens), self.threads, self.seed, drawn);
+        let mut episode = episode?;
+        let mut chosen = make(&episode)?;
+        let rig = CameraRig::new(episode.arranged_scene(), episode.specimen(), episode.cell())?;
         let mut recorder = Recorder::new(rig).stills_only();
         let periods = scene.task.episode_s / episode.cell().period();
         progress.begin("episode", periods.round() as u64);
@@ -114,6 +118,19 @@ impl EpisodeRun {
         let (folder, report) = (output.display().to_string(), output.join(REPORT).display().to_string());
         Ok(EpisodeOutput { result: recording.result(), wall_s, real_time_factor, folder, report })
     }
+}
+
+/// The scene at `path` or of that name, with the set `variation` instead of its own.
+///
+/// # Errors
+/// A scene that cannot be read, or that the set does not suit.
+pub fn read_varied(path: &str, variation: Option<VariationSet>) -> Result<Scene> {
+    let mut scene = Scene::read(path)?;
+    if let Some(set) = variation {
+        scene.variation.set = set;
+        scene.validate()?;
+    }
+    Ok(scene)
 }
 
 /// The file `name` in the folder `path`, or `path` itself if it is no folder.

@@ -17,13 +17,14 @@ mod recorder;
 mod rendering;
 mod segment;
 mod solvers;
+mod specimen_cache;
 pub mod specimen_scene;
 pub mod truth;
 pub mod video;
 
 pub use counted::counted;
 pub use demo::{Demo, DemoResult};
-pub use episode_run::{EpisodeOutput, EpisodeRun, read_episode, replay, sweep_files};
+pub use episode_run::{EpisodeOutput, EpisodeRun, read_episode, read_varied, replay, sweep_files};
 pub use error::{Error, Result};
 pub use inspect::{Inspection, inspect};
 pub use lift::Lift;
@@ -35,6 +36,7 @@ pub use reconstruct::{
 pub use rendering::{Rendered, Rendering, ScriptedLift, VisibleObject};
 pub use segment::{Segment, Segmented, WeightFile, weight_files};
 pub use solvers::{SOLVERS, solver_named};
+pub use specimen_cache::{SpecimenCache, drawn_specimens};
 pub use trocar_task::{Header as EpisodeHeader, SweepRow};
 pub use truth::TruthFigures;
 

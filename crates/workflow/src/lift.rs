@@ -106,6 +106,7 @@ impl Lift {
         let own = specimen.organs.iter().any(|o| o.name == read.task.organ).then(|| read.task.organ.clone());
         let organ = task_organ(&specimen, self.organ.as_deref().or(own.as_deref()))?.to_owned();
         let task = grasp_lift(&organ);
+        read.variation = trocar_scene::Variation::default();
         read.task = trocar_scene::Task { grasp: read.task.grasp, sever: read.task.sever, ..task };
         let lifted = self.lift(read, &specimen, output, progress)?;
         write(staged, &specimen, &lifted, None, progress)?;

@@ -9,7 +9,7 @@ use trocar_core::Progress;
 use trocar_phantom::RecordOptions;
 use trocar_reconstruct::Settings;
 use trocar_recording::Recording;
-use trocar_scene::{Scene, Source};
+use trocar_scene::{Scene, Source, SpecimenSource};
 use trocar_specimen::Specimen;
 
 /// Frames of a phantom's recording: the composite's window.
@@ -70,12 +70,26 @@ pub fn specimen(phantom: &str, options: &RecordOptions, folder: &Path, progress:
 /// # Errors
 /// A specimen that cannot be read or made.
 pub fn scene_specimen(scene: &Scene, phantoms: &Path, progress: &dyn Progress) -> Result<Specimen> {
-    match scene.specimen.source() {
-        Some(Source::Folder(path)) => Ok(Specimen::read(&scene.resolve(path))?),
+    source_specimen(&scene.specimen, &scene.folder, phantoms, progress)
+}
+
+/// The specimen that `source` names: from its folder, whose path starts from `folder`, or of its
+/// phantom, which is made once in the folder `phantoms` and kept.
+///
+/// # Errors
+/// As [`scene_specimen`].
+pub fn source_specimen(
+    source: &SpecimenSource,
+    folder: &Path,
+    phantoms: &Path,
+    progress: &dyn Progress,
+) -> Result<Specimen> {
+    match source.source() {
+        Some(Source::Folder(path)) => Ok(Specimen::read(&folder.join(path))?),
         Some(Source::Phantom(name, seed)) => {
             let options = RecordOptions { frames: FRAMES, seed: u64::from(seed), ..RecordOptions::default() };
             specimen(name, &options, &phantoms.join(format!("{name}-{seed}")), progress)
         }
-        None => Err(Error::Mismatch(format!("scene '{}' names neither a specimen folder nor a phantom", scene.name))),
+        None => Err(Error::Mismatch("the scene names neither a specimen folder nor a phantom".to_owned())),
     }
 }

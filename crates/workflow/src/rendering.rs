@@ -23,7 +23,7 @@ use trocar_render::{Picture, RenderSettings};
 use trocar_scene::Scene;
 use trocar_sensors::{CameraRig, DepthNoise, OUTSIDE, PICTURE_SIDES, SensorNoise};
 use trocar_specimen::Specimen;
-use trocar_task::{EPISODE_FILE, Episode, EpisodeFile};
+use trocar_task::{EPISODE_FILE, EpisodeFile};
 
 /// Unit of depth in files of depth (m).
 const DEPTH_STEP: f64 = 1e-4;
@@ -145,9 +145,9 @@ impl Rendering {
             let right = "name the folder of the recorded specimen by --specimen";
             return Err(Error::Mismatch(format!("{}: {other}; {right}", file.display())));
         }
-        let mut episode = Episode::new(&scene, &specimen, self.threads)?;
+        let mut episode = recorded.begin(&scene, &specimen, self.threads)?;
         let mut replay = EpisodeReplay::begin(&mut episode, &recorded)?;
-        let rig = replay.camera_rig(&specimen)?;
+        let rig = replay.camera_rig()?;
         self.render(&mut replay, rig, (self.at, video), output, progress)
     }
 

@@ -65,7 +65,7 @@ pub fn free_scene(specimen: &Specimen, folder: &Path, organ: &str, sever: bool) 
     let start = [MIDDLE[0], MIDDLE[1], top + START_ABOVE];
     let mut scene = Scene::new("specimen", source(folder));
     scene.description = format!("{} alone, with instruments that move freely", specimen.name);
-    scene.placement = frame(&placement);
+    scene.placement = Frame::of(&placement);
     scene.ports = Vec::new();
     scene.arms = vec![Arm::free(Side::Left, "grasper", start)];
     scene.instruments = vec![Instrument::of(InstrumentKind::Grasper)];
@@ -93,6 +93,7 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
     let mut scene = Scene::new(name, source(folder));
     scene.description = format!("The paper's two-arm cell around {}", specimen.name);
     organ.clone_into(&mut scene.task.organ);
+    scene.variation = Variation::starts();
     if specimen.camera.is_none() {
         scene.cameras.retain(|c| !matches!(c.lens, Lens::Recording {}));
     }
@@ -102,7 +103,7 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
         // Small turns come first, so that the smallest of equal ones is used.
         let turn = if k % 2 == 0 { k / 2 } else { -(k + 1) / 2 };
         let turn = std::f64::consts::TAU * f64::from(turn) / f64::from(TURNS);
-        scene.placement = rounded(frame(&placed(specimen, organ, turn)?));
+        scene.placement = rounded(Frame::of(&placed(specimen, organ, turn)?));
         let reach = tool_reach(&scene, specimen)?;
         if best.as_ref().is_none_or(|(_, b)| missed(&reach) < missed(b) - 0.1) {
             best = Some((scene.clone(), reach));
@@ -114,24 +115,14 @@ pub fn cell_scene(specimen: &Specimen, folder: &Path, organ: &str, name: &str) -
     best.ok_or_else(|| Error::Mismatch("the specimen cannot be placed".to_owned()))
 }
 
-/// A grasp-lift of `organ` at any place along it, until its policy has finished. All episodes have
-/// the same start.
+/// A grasp-lift of `organ` at any place along it, until its policy has finished.
 pub fn grasp_lift(organ: &str) -> Task {
-    let still = Variation {
-        tilt_deg: 0.0,
-        azimuth_deg: 0.0,
-        insertion_mm: 0.0,
-        roll_deg: 0.0,
-        specimen_shift_mm: 0.0,
-        specimen_turn_deg: 0.0,
-    };
     Task {
         name: TaskName::GraspLift,
         organ: organ.to_owned(),
         episode_s: 60.0,
         stop_when_passed: false,
         gates: Gates { grasp_from: 0.0, grasp_to: 1.0, lift_s: 0.0, ..Gates::default() },
-        variation: still,
         ..Task::default()
     }
 }
@@ -153,11 +144,6 @@ fn placed(specimen: &Specimen, organ: &str, turn: f64) -> Result<Pose> {
     Ok(Pose { rotation, translation })
 }
 
-pub(crate) fn frame(pose: &Pose) -> Frame {
-    let q = pose.rotation;
-    Frame { position_m: pose.translation.to_array(), rotation_wxyz: [q.w, q.x, q.y, q.z] }
-}
-
 /// The frame with nine decimals, for people to read and edit.
 fn rounded(frame: Frame) -> Frame {
     // Adding zero makes a negative zero positive.
@@ -167,7 +153,7 @@ fn rounded(frame: Frame) -> Frame {
 
 pub(crate) fn source(folder: &Path) -> SpecimenSource {
     let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-    SpecimenSource { path: Some(folder.display().to_string()), phantom: None, seed: 1 }
+    SpecimenSource::folder(&folder.display().to_string())
 }
 
 /// Two cameras: one close to the organ from the front, and one that sees the whole specimen.

@@ -277,7 +277,10 @@ class Cells:
         return success
 
     def info(self, k: int) -> dict[str, Any]:
-        """The `info` of cell `k`. Once its episode has ended, its end and summary too."""
+        """The `info` of cell `k`, with what was drawn at the start of its episode.
+
+        Once its episode has ended, its end and summary too.
+        """
         figures = self.figures[k]
         info: dict[str, Any] = {
             "is_success": bool(self.success[k]),
@@ -286,6 +289,8 @@ class Cells:
             "time_s": float(figures[TIME]),
             "seed": int(self.seeds[k]),
         }
+        if figures[TIME] == 0.0:
+            info["drawn"] = json.loads(self.native.drawn(k))
         if self.privileged:
             info["channels"] = self.channels[k].copy()
         if figures[END] >= 0:

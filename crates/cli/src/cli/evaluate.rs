@@ -2,6 +2,7 @@
 
 use clap::Args;
 use std::path::PathBuf;
+use trocar_scene::VariationSet;
 
 /// Arguments of `evaluate`.
 #[derive(Debug, Args)]
@@ -20,6 +21,10 @@ pub struct Evaluate {
     /// have the same seeds.
     #[arg(long, default_value_t = 0)]
     pub seed: u64,
+    /// What varies between episodes, instead of the scene's set: none, easy, standard or hard.
+    /// Factors that the scene itself names vary as it says.
+    #[arg(long, value_name = "SET", value_parser = super::variation_set)]
+    pub variation: Option<VariationSet>,
     /// Episodes at once, up to eight per core; by default one per core. The result does not depend
     /// on it.
     #[arg(long, default_value_t = 0)]

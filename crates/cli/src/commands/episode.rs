@@ -16,6 +16,7 @@ pub fn run(arguments: &cli::Episode, json: bool, progress: &dyn Progress) -> Res
         scene: arguments.scene.clone(),
         policy: arguments.policy.clone(),
         seed: arguments.seed,
+        variation: arguments.variation,
         threads: arguments.threads,
         phantoms: arguments.phantoms.clone(),
     };

@@ -14,6 +14,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
         policies,
         episodes: arguments.episodes,
         seed: arguments.seed,
+        variation: arguments.variation,
         jobs: arguments.jobs,
         retry_failed: arguments.retry_failed,
         phantoms: arguments.phantoms.clone(),

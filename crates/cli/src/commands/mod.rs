@@ -10,6 +10,7 @@ mod render;
 mod scene;
 mod segment;
 mod simulate;
+mod specimens;
 mod study;
 
 use crate::cli::{Cli, Command};
@@ -32,6 +33,7 @@ pub fn run(cli: &Cli, progress: &dyn Progress) -> Result<()> {
         Command::Reconstruct(arguments) => reconstruct::run(arguments, cli.json, progress)?,
         Command::Experiment(arguments) => study::run(&arguments.study.0, Kind::Experiment, cli.json, progress)?,
         Command::Scene(arguments) => scene::run(arguments, cli.json)?,
+        Command::Specimens(arguments) => specimens::run(arguments, cli.json, progress)?,
         Command::Segment(arguments) => segment::run(arguments, cli.json, progress)?,
         Command::Simulate(arguments) => simulate::run(arguments, cli.json, progress)?,
     }

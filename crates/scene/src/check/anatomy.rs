@@ -26,6 +26,7 @@ pub(super) fn check(scene: &Scene) -> Checked {
             ("contact_offset_mm", t.contact_offset_mm, 0.01..=20.0),
             ("tip_rest_offset_mm", t.tip_rest_offset_mm, 0.0..=20.0),
             ("friction", t.friction, 0.0..=5.0),
+            ("tear_force_n", t.tear_force_n, 0.1..=100.0),
             ("support.friction", t.support.friction, 0.0..=5.0),
         ],
     )

@@ -3,7 +3,7 @@
 use super::unit::{hint, show};
 use super::{Checked, join, name, names, number, numbers, one_of, point, problem, quaternion, unit};
 use crate::cell::SIMPLE;
-use crate::{Arm, ArmModel, Drive, Frame, Instrument, Port, Scene, Start};
+use crate::{Arm, ArmModel, Drive, Factor, Frame, Instrument, Port, Scene, Start};
 use glam::DVec3;
 
 /// Height of the FR3's shoulder above its base (m).
@@ -142,7 +142,7 @@ fn arm(at: &str, one: &Arm, scene: &Scene) -> Checked {
     one_of(&join(at, "instrument"), &one.instrument, "the instruments are", &held)?;
     let Some(instrument) = scene.instrument(&one.instrument) else { return Ok(()) };
     match one.port.as_deref().and_then(|port| scene.port(port)) {
-        Some(port) => fits(at, one, port, instrument, scene.task.variation.tilt_deg),
+        Some(port) => fits(at, one, port, instrument, scene.variation.most(Factor::Tilt)),
         None => free(at, one),
     }
 }
@@ -283,12 +283,21 @@ fn start(at: &str, start: &Start, limit_deg: f64, varies_deg: f64, instrument: &
 }
 
 /// Checks that no two arms share a place, a port or an instrument, and that holes do not overlap.
+///
+/// Where ports or bases are drawn, the least distance that they may have counts.
 fn apart(scene: &Scene) -> Checked {
+    // Both may move along x and y, towards each other.
+    let moved_mm = |factor| 2.0 * std::f64::consts::SQRT_2 * scene.variation.reach(factor);
+    let drawn = |mm: f64| {
+        if mm > 0.0 { format!(", and the variation takes up to {} mm of it", show(mm)) } else { String::new() }
+    };
+    let ports_mm = moved_mm(Factor::PortShift);
     for (i, port) in scene.ports.iter().enumerate() {
         for (k, other) in scene.ports[..i].iter().enumerate() {
             let far = 1e3 * DVec3::from(port.centre_m).distance(other.centre_m.into());
-            if far < 0.5 * (port.hole_diameter_mm + other.hole_diameter_mm) {
-                let reason = format!(" is {} mm from that of port[{k}]; holes must not overlap", show(far));
+            if far - ports_mm < 0.5 * (port.hole_diameter_mm + other.hole_diameter_mm) {
+                let (far, drawn) = (show(far), drawn(ports_mm));
+                let reason = format!(" is {far} mm from that of port[{k}]{drawn}; holes must not overlap");
                 return Err(problem(format!("port[{i}].centre_m"), reason));
             }
         }
@@ -296,8 +305,10 @@ fn apart(scene: &Scene) -> Checked {
     let [one, other] = scene.arms.as_slice() else { return Ok(()) };
     if let (Some(one), Some(other)) = (&one.base, &other.base) {
         let far = DVec3::from(one.position_m).distance(other.position_m.into());
-        if far < BASE_WIDTH {
-            let reason = format!(" is {} m from that of arm[0]; it must be at least {BASE_WIDTH} m", show(far));
+        let bases_mm = moved_mm(Factor::BaseShift);
+        if far - 1e-3 * bases_mm < BASE_WIDTH {
+            let (far, drawn) = (show(far), drawn(bases_mm));
+            let reason = format!(" is {far} m from that of arm[0]{drawn}; it must be at least {BASE_WIDTH} m");
             return Err(problem("arm[1].base.position_m", reason));
         }
     }

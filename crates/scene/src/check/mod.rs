@@ -6,6 +6,7 @@ mod camera;
 mod cell;
 mod task;
 mod unit;
+mod variation;
 
 use crate::Scene;
 use std::ops::RangeInclusive;
@@ -32,7 +33,8 @@ pub(crate) fn check(scene: &Scene) -> Checked {
     anatomy::check(scene)?;
     cell::check(scene)?;
     camera::check(scene)?;
-    task::check(scene)
+    task::check(scene)?;
+    variation::check(scene)
 }
 
 /// A mistake in the field `at`.

@@ -5,7 +5,7 @@ use crate::check::unit::show;
 use crate::{InstrumentKind, Scene, TaskName};
 
 pub(super) fn check(scene: &Scene) -> Checked {
-    let (task, gates, varies) = (&scene.task, &scene.task.gates, &scene.task.variation);
+    let (task, gates) = (&scene.task, &scene.task.gates);
     numbers("task", &[("episode_s", task.episode_s, 0.1..=3600.0)])?;
     numbers(
         "task.gates",
@@ -17,17 +17,6 @@ pub(super) fn check(scene: &Scene) -> Checked {
             ("positioning_mm", gates.positioning_mm, 0.1..=100.0),
             ("cut_open", gates.cut_open, 0.0..=1.0),
             ("cut_closed", gates.cut_closed, 0.0..=1.0),
-        ],
-    )?;
-    numbers(
-        "task.variation",
-        &[
-            ("tilt_deg", varies.tilt_deg, 0.0..=30.0),
-            ("azimuth_deg", varies.azimuth_deg, 0.0..=180.0),
-            ("insertion_mm", varies.insertion_mm, 0.0..=100.0),
-            ("roll_deg", varies.roll_deg, 0.0..=180.0),
-            ("specimen_shift_mm", varies.specimen_shift_mm, 0.0..=50.0),
-            ("specimen_turn_deg", varies.specimen_turn_deg, 0.0..=180.0),
         ],
     )?;
     let safety = &scene.safety;

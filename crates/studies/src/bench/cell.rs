@@ -92,6 +92,7 @@ impl Study for CellBench {
         let machine = Machine::here();
         let mut lifting = scene.clone();
         let organ = task_organ(&specimen, Some(&scene.task.organ))?;
+        lifting.variation = trocar_scene::Variation::default();
         lifting.task = trocar_scene::Task { grasp: scene.task.grasp, ..grasp_lift(organ) };
         let mut episode = Episode::new(&lifting, &specimen, self.threads)?;
         let parts = ContactParts { organs: false, ..ContactParts::default() };

@@ -6,7 +6,7 @@ use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use trocar_core::Progress;
-use trocar_scene::{GraspDesignName, OrganOverride, PinEnd, PinRule, Scene, SpecimenSource};
+use trocar_scene::{GraspDesignName, OrganOverride, PinEnd, PinRule, Scene, SpecimenSource, Variation};
 use trocar_specimen::{End, Pins, Specimen};
 use trocar_task::policy::{Script, Scripted};
 use trocar_task::{Episode, Recording, run};
@@ -117,6 +117,7 @@ impl Whole {
         let folder = std::path::absolute(&self.folder).unwrap_or_else(|_| self.folder.clone());
         scene.specimen = SpecimenSource { path: Some(folder.display().to_string()), phantom: None, seed: 1 };
         scene.task = grasp_lift(ORGAN);
+        scene.variation = Variation::default();
         Ok(scene)
     }
 

@@ -131,6 +131,7 @@ impl Study for RolloutsExperiment {
             policies: POLICIES.iter().map(|name| PolicySpec::parse(name)).collect::<std::result::Result<_, _>>()?,
             episodes: self.rollouts.div_ceil(POLICIES.len()),
             seed: self.seed,
+            variation: None,
             jobs: self.jobs,
             retry_failed: false,
             phantoms: self.scene.phantoms.clone(),

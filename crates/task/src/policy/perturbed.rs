@@ -1,10 +1,10 @@
 //! A good policy made worse: by noise, by delay, by a constant offset.
 
 use super::{CHUNK, Policy};
-use crate::random::Random;
 use crate::{Episode, Result};
 use std::collections::VecDeque;
 use trocar_cell::{Action, ActionSpace, Setpoint, Workspace};
+use trocar_scene::EpisodeRandom;
 
 /// Standard deviation of the noise on pivots (rad): about 3 mm at the tip. On roll ten times as
 /// much.
@@ -43,14 +43,14 @@ fn changed(episode: &Episode, action: Action, mut change: impl FnMut(usize, &Wor
 #[derive(Clone, Debug)]
 pub struct Noise<P> {
     inner: P,
-    random: Random,
+    random: EpisodeRandom,
     count: u64,
 }
 
 impl<P: Policy> Noise<P> {
     /// Of `inner`.
     pub fn new(inner: P) -> Self {
-        Self { inner, random: Random::new(0, "noise"), count: 0 }
+        Self { inner, random: EpisodeRandom::new(0, "noise"), count: 0 }
     }
 }
 
@@ -64,7 +64,7 @@ impl<P: Policy> Policy for Noise<P> {
     }
 
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()> {
-        (self.random, self.count) = (Random::new(seed, "noise"), 0);
+        (self.random, self.count) = (EpisodeRandom::new(seed, "noise"), 0);
         self.inner.begin(episode, seed)
     }
 
@@ -156,7 +156,7 @@ impl<P: Policy> Policy for Offset<P> {
     }
 
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()> {
-        let random = Random::new(seed, "offset");
+        let random = EpisodeRandom::new(seed, "offset");
         self.by = [0_u64, 1].map(|k| {
             let way = glam::DVec3::from([0, 1, 2].map(|n| random.normal(4 * k + n)));
             let way = 1e-3 * OFFSET_MM * way.normalize_or(glam::DVec3::X);

@@ -1,9 +1,9 @@
 //! Random legal actions, for tests that nothing breaks.
 
 use super::{CHUNK, Policy};
-use crate::random::Random;
 use crate::{Episode, Result};
 use trocar_cell::{Action, ActionSpace, ROLL_SPEED, Setpoint, TIP_SPEED, Workspace};
+use trocar_scene::EpisodeRandom;
 
 /// Half of the targets lie at this insertion (m) or deeper, where the tissue is.
 const DEEP: f64 = 0.09;
@@ -15,7 +15,7 @@ const MAX_KEPT: f64 = 20.0;
 /// steps of the tips of any size, each kept for 1 to 20 periods. The same seed does the same.
 #[derive(Clone, Debug)]
 pub struct RandomActions {
-    random: Random,
+    random: EpisodeRandom,
     count: u64,
     space: ActionSpace,
     action: Action,
@@ -26,7 +26,7 @@ pub struct RandomActions {
 impl Default for RandomActions {
     fn default() -> Self {
         let action = Action { space: ActionSpace::Pivots, numbers: Vec::new() };
-        Self { random: Random::new(0, "random-actions"), count: 0, space: ActionSpace::Pivots, action, left: 0 }
+        Self { random: EpisodeRandom::new(0, "random-actions"), count: 0, space: ActionSpace::Pivots, action, left: 0 }
     }
 }
 
@@ -86,7 +86,7 @@ impl Policy for RandomActions {
     /// Every fourth seed (3, 7, ...) moves the tips, the others ask for absolute targets.
     fn begin(&mut self, _episode: &Episode, seed: u64) -> Result<()> {
         let space = if seed % 4 == 3 { ActionSpace::Tip } else { ActionSpace::Pivots };
-        *self = Self { random: Random::new(seed, "random-actions"), space, ..Self::default() };
+        *self = Self { random: EpisodeRandom::new(seed, "random-actions"), space, ..Self::default() };
         Ok(())
     }
 

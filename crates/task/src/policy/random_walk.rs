@@ -2,10 +2,10 @@
 
 use super::aim::eased;
 use super::{CHUNK, Policy};
-use crate::random::Random;
 use crate::{Episode, Result};
 use trocar_cell::{Action, Setpoint, Workspace};
 use trocar_robot::instrument::Coordinates;
+use trocar_scene::EpisodeRandom;
 
 /// Time from one random place to the next (s).
 const HOP_S: f64 = 2.0;
@@ -14,7 +14,7 @@ const HOP_S: f64 = 2.0;
 /// deep, where the tissue is.
 #[derive(Clone, Debug)]
 pub struct RandomWalk {
-    random: Random,
+    random: EpisodeRandom,
     count: u64,
     hop: u64,
     from: Vec<Setpoint>,
@@ -23,7 +23,7 @@ pub struct RandomWalk {
 
 impl Default for RandomWalk {
     fn default() -> Self {
-        Self { random: Random::new(0, "random"), count: 0, hop: 0, from: Vec::new(), to: Vec::new() }
+        Self { random: EpisodeRandom::new(0, "random"), count: 0, hop: 0, from: Vec::new(), to: Vec::new() }
     }
 }
 
@@ -60,7 +60,7 @@ impl Policy for RandomWalk {
     }
 
     fn begin(&mut self, episode: &Episode, seed: u64) -> Result<()> {
-        *self = Self { random: Random::new(seed, "random"), ..Self::default() };
+        *self = Self { random: EpisodeRandom::new(seed, "random"), ..Self::default() };
         self.to = episode.cell().observe().iter().map(|arm| arm.commanded).collect();
         Ok(())
     }

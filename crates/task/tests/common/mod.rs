@@ -5,7 +5,7 @@
 #[path = "../../../cell/tests/common/mod.rs"]
 mod tube;
 
-use trocar_scene::Scene;
+use trocar_scene::{Scene, Variation};
 pub use tube::*;
 
 /// A resection of the tube: pinned at its base, no start varied but by the scene's variation.
@@ -13,5 +13,6 @@ pub fn resection() -> Scene {
     let mut scene = scene();
     scene.task.organ = "tube".to_owned();
     scene.task.episode_s = 20.0;
+    scene.variation = Variation::starts();
     scene
 }

@@ -25,6 +25,7 @@ impl ScriptedLift {
         let mut scene = scene.clone();
         let own = specimen.organs.iter().any(|o| o.name == scene.task.organ).then(|| scene.task.organ.clone());
         let organ = task_organ(specimen, own.as_deref())?;
+        scene.variation = trocar_scene::Variation::default();
         scene.task = trocar_scene::Task { grasp: scene.task.grasp, ..grasp_lift(organ) };
         let episode = Episode::new(&scene, specimen, threads)?;
         let mut policy = Scripted::following(Script::default());

@@ -6,7 +6,7 @@ use crate::cell::report::CellEvent;
 use crate::grasp_candidate::{GraspCandidate, Snap};
 use crate::hold::{Hold, Moved};
 use crate::target::reach_into;
-use crate::{GraspDesign, Gripper, JawRegion, TissueInJaws, World};
+use crate::{GraspDesign, Gripper, JawForces, JawRegion, TissueInJaws, World};
 use glam::DVec3;
 use trocar_tissue::Piece;
 
@@ -51,7 +51,8 @@ impl ArmUnit {
         let pose = state.gripper.pose;
         let closing_force_n = opening_force(&state.gripper, Tools::of(0), &state.forces);
         let displaced_mm = 1e3 * candidate.displaced(world, organ);
-        let grasp = state.design.grasp(world, organ, &candidate.nodes, model.tools, &pose, state.jaw.budget);
+        let forces = JawForces { closing: state.jaw.budget, tearing: model.tear_force };
+        let grasp = state.design.grasp(world, organ, &candidate.nodes, model.tools, &pose, forces);
         let snap = grasp.as_ref().map(|g| Snap::of(world, g, &pose)).unwrap_or_default();
         let hold = Hold::new(world, organ, candidate.nodes, &pose);
         state.held = Some(Held { organ, s: candidate.s, hold, opening });

@@ -28,6 +28,8 @@ pub(super) struct ArmModel {
     pub force_limit: f64,
     /// RCM deviations that are reported (m): the scene's threshold, and where hardware stops.
     pub rcm_limits: [f64; 2],
+    /// Pull at which tissue tears out of a compliant grasp (N).
+    pub tear_force: f64,
     /// Length of a control period (s).
     pub period: f64,
     /// How the jaws hold after the first grasp.

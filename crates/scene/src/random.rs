@@ -5,11 +5,11 @@ use xxhash_rust::xxh3::xxh3_64_with_seed;
 
 /// Numbers of one purpose in one episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Random {
+pub struct EpisodeRandom {
     key: u64,
 }
 
-impl Random {
+impl EpisodeRandom {
     /// Those of an episode's `seed` for `purpose`, a name.
     pub fn new(seed: u64, purpose: &str) -> Self {
         Self { key: xxh3_64_with_seed(purpose.as_bytes(), seed) }
@@ -47,10 +47,10 @@ mod tests {
 
     #[test]
     fn keys_decide_and_the_distributions_are_right() {
-        let (a, b) = (Random::new(7, "start"), Random::new(7, "noise"));
-        assert_eq!(a.bits(3), Random::new(7, "start").bits(3));
+        let (a, b) = (EpisodeRandom::new(7, "start"), EpisodeRandom::new(7, "noise"));
+        assert_eq!(a.bits(3), EpisodeRandom::new(7, "start").bits(3));
         assert_ne!(a.bits(3), b.bits(3));
-        assert_ne!(a.bits(3), Random::new(8, "start").bits(3));
+        assert_ne!(a.bits(3), EpisodeRandom::new(8, "start").bits(3));
         let n = 20_000;
         let mean = (0..n).map(|k| a.unit(k)).sum::<f64>() / n as f64;
         assert!((mean - 0.5).abs() < 0.01, "{mean}");

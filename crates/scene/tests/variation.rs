@@ -1,0 +1,123 @@
+//! What is drawn: by the seed alone, one factor without the others, and applied as it says.
+#![allow(clippy::unwrap_used, reason = "tests")]
+
+use std::collections::BTreeSet;
+use trocar_scene::{Distribution, Drawn, Factor, Scene, SpecimenSource, Specimens, Variation, VariationSet};
+use trocar_specimen::Specimen;
+
+fn cell_a(set: VariationSet) -> Scene {
+    let mut scene = Scene::builtin("cell-a").unwrap();
+    scene.variation.set = set;
+    scene.validate().unwrap();
+    scene
+}
+
+fn nothing() -> Specimen {
+    let organs = Vec::new();
+    Specimen {
+        name: "none".to_owned(),
+        up: glam::DVec3::Z,
+        placement: trocar_core::Pose::IDENTITY,
+        camera: None,
+        background: None,
+        provenance: trocar_specimen::Provenance::default(),
+        organs,
+    }
+}
+
+#[test]
+fn the_starts_of_cell_a_are_those_of_earlier_versions() {
+    let scene = cell_a(VariationSet::None);
+    let drawn = scene.draw(0);
+    assert_eq!(drawn.specimen, scene.specimen);
+    assert_eq!(drawn.values.len(), 8);
+    let random = trocar_scene::EpisodeRandom::new(0, "start");
+    let arranged = scene.with_drawn(&drawn, &nothing());
+    for (side, (arm, own)) in arranged.arms.iter().zip(&scene.arms).enumerate() {
+        let first = 8 * side as u64;
+        assert_eq!(arm.start.tilt_deg, (own.start.tilt_deg + random.aside(first, 1.0)).max(0.0));
+        assert_eq!(arm.start.azimuth_deg, own.start.azimuth_deg + random.aside(first + 1, 5.0));
+        assert_eq!(arm.start.insertion_mm, own.start.insertion_mm + random.aside(first + 2, 5.0));
+        assert_eq!(arm.start.roll_deg, own.start.roll_deg + random.aside(first + 3, 10.0));
+    }
+    // Nothing else differs.
+    let mut same = arranged;
+    (same.arms, same.variation) = (scene.arms.clone(), scene.variation.clone());
+    assert_eq!(same, scene);
+}
+
+#[test]
+fn draws_depend_on_the_seed_and_not_on_each_other() {
+    let scene = cell_a(VariationSet::Hard);
+    assert_eq!(scene.draw(3), scene.draw(3));
+    assert_ne!(scene.draw(3), scene.draw(4));
+    let names: BTreeSet<String> = scene.draw(3).values.iter().map(|v| v.name()).collect();
+    assert_eq!(names.len(), scene.draw(3).values.len(), "names are unique");
+    for name in ["modulus_kpa", "left.tilt_deg", "d405.camera_shift_mm.x", "right.port_shift_mm.y", "tint_scale.red"] {
+        assert!(names.contains(name), "{name} is not among {names:?}");
+    }
+    // Without a factor, all others are the same.
+    for factor in scene.variation.all_factors().into_keys() {
+        let mut without = scene.clone();
+        without.variation.set = VariationSet::None;
+        without.variation.factors = scene.variation.all_factors();
+        without.variation.factors.remove(&factor);
+        let expected: Vec<_> = scene.draw(3).values.into_iter().filter(|v| v.factor != factor).collect();
+        assert_eq!(without.draw(3).values, expected, "{}", factor.name());
+    }
+    // Without a camera or an arm, those of the others are the same.
+    let mut fewer = scene.clone();
+    fewer.cameras.remove(0);
+    fewer.arms.remove(0);
+    let few = fewer.draw(3).values;
+    assert!(few.iter().all(|v| scene.draw(3).values.contains(v)));
+}
+
+#[test]
+fn what_is_drawn_comes_back_from_its_table() {
+    let mut scene = cell_a(VariationSet::Hard);
+    scene.arms[0].port = None;
+    let drawn = scene.draw(7);
+    let again: Drawn = trocar_specimen::parse_toml(&drawn.to_toml().unwrap()).unwrap();
+    assert_eq!(again, drawn);
+    let json = serde_json::to_string(&drawn).unwrap();
+    assert_eq!(serde_json::from_str::<Drawn>(&json).unwrap(), drawn);
+    for source in [SpecimenSource::phantom("phantom-b", 9), SpecimenSource::folder("../a:b/c")] {
+        assert_eq!(SpecimenSource::labelled(&source.label()), source);
+    }
+    assert!(serde_json::from_str::<Drawn>(r#"{"specimen": "phantom-a:1", "modulus_mpa": 1.0}"#).is_err());
+}
+
+#[test]
+fn specimens_are_drawn_evenly() {
+    let mut scene = cell_a(VariationSet::Standard);
+    assert_eq!(scene.specimens().len(), 8);
+    let seen: BTreeSet<String> = (0..200).map(|seed| scene.draw(seed).specimen.label()).collect();
+    assert_eq!(seen.len(), 8, "{seen:?}");
+    scene.variation.specimens =
+        Some(Specimens { paths: Vec::new(), phantoms: vec!["phantom-a".into(), "phantom-c".into()], seeds: [4, 6] });
+    let seen: BTreeSet<String> = (0..200).map(|seed| scene.draw(seed).specimen.label()).collect();
+    assert_eq!(seen.len(), 6, "{seen:?}");
+    assert!(seen.contains("phantom-c:5"));
+    assert_eq!(cell_a(VariationSet::Easy).specimens(), [SpecimenSource::phantom("phantom-a", 1)]);
+}
+
+#[test]
+fn every_factor_changes_what_it_names() {
+    let mut scene = cell_a(VariationSet::None);
+    scene.variation = Variation::default();
+    let mut specimen = nothing();
+    specimen.organs.clear();
+    for factor in Factor::ALL {
+        let range = factor.range();
+        let value = 0.4 * range.start() + 0.6 * range.end();
+        let mut varied = scene.clone();
+        varied.variation.factors.insert(*factor, Distribution::Choice(vec![value]));
+        let drawn = varied.draw(0);
+        assert!(!drawn.values.is_empty() && drawn.values.iter().all(|v| v.value == value), "{}", factor.name());
+        let arranged = varied.with_drawn(&drawn, &specimen);
+        // These change organs of the specimen, of which there are none here.
+        let of_organs = [Factor::Modulus, Factor::Poisson, Factor::Density, Factor::PinScale];
+        assert_eq!(arranged != scene, !of_organs.contains(factor), "{}", factor.name());
+    }
+}

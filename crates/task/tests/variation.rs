@@ -1,0 +1,114 @@
+//! Episodes that differ by their seed: the same bits whatever was before, and replays that draw
+//! nothing.
+#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
+
+mod common;
+
+use common::{ONE_END, resection, two_tubes};
+use std::sync::Arc;
+use trocar_cell::{Action, Setpoint};
+use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, VariationSet};
+use trocar_specimen::Specimen;
+use trocar_task::{Episode, EpisodeFile, Result, SpecimenSupply, policy, run};
+
+/// Another tube for each seed of an anatomy.
+struct Tubes;
+
+impl SpecimenSupply for Tubes {
+    fn get(&mut self, source: &SpecimenSource) -> Result<Arc<Specimen>> {
+        let mut specimen = two_tubes(ONE_END, 4e-3);
+        let by = 1e-3 * f64::from(source.seed);
+        for organ in &mut specimen.organs {
+            organ.body.vertices.iter_mut().chain(&mut organ.surface.vertices).for_each(|p| p.x += by);
+            organ.base.x += by;
+        }
+        Ok(Arc::new(specimen))
+    }
+}
+
+fn scene(set: VariationSet) -> Scene {
+    let mut scene = resection();
+    scene.task.episode_s = 0.5;
+    scene.variation.set = set;
+    scene
+}
+
+fn steps(episode: &mut Episode, seed: u64) -> Vec<u64> {
+    episode.reset(seed).unwrap();
+    let mut hashes = vec![episode.state_hash()];
+    for _ in 0..3 {
+        let at: Vec<Setpoint> = episode.cell().observe().iter().map(|a| a.commanded).collect();
+        episode.step(&Action::targets(&at)).unwrap();
+        hashes.push(episode.state_hash());
+    }
+    hashes
+}
+
+#[test]
+fn a_seed_gives_the_same_bits_whatever_was_before() {
+    for set in [VariationSet::Standard, VariationSet::Hard] {
+        let scene = scene(set);
+        let mut episode = Episode::with_specimens(&scene, Box::new(Tubes), 1).unwrap();
+        let (one, first) = (steps(&mut episode, 1), episode.drawn().clone());
+        let saved = episode.save();
+        let two = steps(&mut episode, 2);
+        assert_ne!(one[0], two[0]);
+        assert_ne!(first, *episode.drawn());
+        assert_eq!(steps(&mut episode, 1), one);
+        let mut other = Episode::with_specimens(&scene, Box::new(Tubes), 2).unwrap();
+        assert_eq!(steps(&mut other, 1), one);
+        // A saved state goes on in an episode that has another cell now.
+        steps(&mut other, 2);
+        other.restore(&saved).unwrap();
+        assert_eq!((other.state_hash(), other.drawn()), (one[3], &first));
+        assert_eq!(other.summary().drawn.as_ref(), Some(&first));
+    }
+}
+
+#[test]
+fn starts_do_not_depend_on_what_else_is_drawn() {
+    let plain = scene(VariationSet::None);
+    let specimen = two_tubes(ONE_END, 4e-3);
+    let mut episode = Episode::new(&plain, &specimen, 1).unwrap();
+    episode.reset(5).unwrap();
+    let start = episode.cell().observe()[0].commanded;
+    let mut softer = plain;
+    softer.variation.factors.insert(Factor::Modulus, Distribution::Uniform([6.0, 12.0]));
+    softer.variation.factors.insert(Factor::CameraShift, Distribution::Within(5.0));
+    let mut episode = Episode::new(&softer, &specimen, 1).unwrap();
+    episode.reset(5).unwrap();
+    assert_eq!(episode.cell().observe()[0].commanded, start);
+    assert_ne!(episode.arranged_scene().cameras, softer.cameras);
+    let modulus = episode.arranged_scene().organs["tube"].material.young_modulus_pa.unwrap();
+    assert!((6e3..12e3).contains(&modulus) && episode.specimen().organs[0].material.young_modulus_pa != modulus);
+}
+
+#[test]
+fn a_replay_draws_nothing() {
+    let scene = scene(VariationSet::Standard);
+    let mut episode = Episode::with_specimens(&scene, Box::new(Tubes), 1).unwrap();
+    let mut chosen = policy::named("random").unwrap();
+    let recording = run(&mut episode, chosen.as_mut(), 3, &mut |_| true).unwrap();
+    assert_eq!(recording.summary.drawn, Some(scene.draw(3)));
+    let folder = tempfile::tempdir().unwrap();
+    recording.write_into(folder.path()).unwrap();
+    let path = folder.path().join("episode.trocar");
+    let file = EpisodeFile::read(&path).unwrap();
+    assert_eq!(file.drawn().unwrap(), scene.draw(3));
+    let written: Scene = trocar_specimen::parse_toml(&file.header.scene).unwrap();
+    assert_eq!((&written.specimen, written.variation.varies()), (&scene.draw(3).specimen, false));
+    let specimen = Tubes.get(&written.specimen).unwrap();
+    let verdict = file.verify(&written, &specimen, 2, &mut || true).unwrap();
+    assert!(verdict.same, "{verdict:?}");
+    // Whatever would be drawn from the scene.
+    assert!(file.verify(&self::scene(VariationSet::Easy), &specimen, 1, &mut || true).unwrap().same);
+    // One specimen is not enough for a scene that draws from several.
+    let said = Episode::new(&scene, &specimen, 1).err().unwrap().to_string();
+    assert!(said.contains("draw from 8 specimens"), "{said}");
+    // Files of earlier versions are refused in a line.
+    let bytes = std::fs::read(&path).unwrap();
+    let end = bytes.iter().position(|b| *b == b'\n').unwrap();
+    let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":2", "\"version\":1");
+    let said = EpisodeFile::parse(&[header.as_bytes(), &bytes[end..]].concat()).unwrap_err();
+    assert!(said.contains("version 1; trocar-episode version 2 is read"), "{said}");
+}
