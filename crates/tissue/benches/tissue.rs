@@ -4,7 +4,6 @@
 #![allow(clippy::unwrap_used, reason = "a benchmark stops at the first error")]
 
 #[path = "../tests/common/mod.rs"]
-#[allow(dead_code, reason = "shared with the tests, which use more of it")]
 mod common;
 
 use common::{FRAME, GRAVITY, appendix, nodes, tissue};

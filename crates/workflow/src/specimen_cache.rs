@@ -13,6 +13,9 @@ use trocar_task::SpecimenSupply;
 /// Number of specimens that are kept in memory.
 const KEPT: usize = 16;
 
+/// A specimen and what names it.
+type Entry = (SpecimenSource, Arc<Specimen>);
+
 /// The specimens of the episodes of a scene. Clones share what is in memory.
 #[derive(Clone)]
 pub struct SpecimenCache {
@@ -20,7 +23,7 @@ pub struct SpecimenCache {
     folder: PathBuf,
     phantoms: PathBuf,
     /// Used ones first.
-    kept: Arc<Mutex<VecDeque<(SpecimenSource, Arc<Specimen>)>>>,
+    kept: Arc<Mutex<VecDeque<Entry>>>,
 }
 
 impl SpecimenCache {
