@@ -64,7 +64,7 @@ pub(super) fn csv_table(records: &[EpisodeRecord]) -> Result<String> {
     let format = |e: csv::Error| Error::Format(e.to_string());
     let stages = records.first().map_or(&[][..], |k| &k.summary.progress.stages);
     let times = stages.iter().map(|s| format!("{}_time_s", s.stage.name()));
-    let drawn = records.first().map(|k| drawn(k)).unwrap_or_default();
+    let drawn = records.first().map(drawn).unwrap_or_default();
     let names = drawn.iter().map(|(name, _)| format!("drawn.{name}"));
     let mut table = csv::Writer::from_writer(Vec::new());
     table.write_record(COLUMNS.iter().map(|(name, _)| (*name).to_owned()).chain(times).chain(names)).map_err(format)?;

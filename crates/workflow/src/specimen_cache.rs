@@ -13,6 +13,8 @@ use trocar_task::SpecimenSupply;
 /// Number of specimens that are kept in memory.
 const KEPT: usize = 16;
 
+type Kept = (SpecimenSource, Arc<Specimen>);
+
 /// The specimens of the episodes of a scene. Clones share what is in memory.
 #[derive(Clone)]
 pub struct SpecimenCache {
@@ -20,7 +22,7 @@ pub struct SpecimenCache {
     folder: PathBuf,
     phantoms: PathBuf,
     /// Used ones first.
-    kept: Arc<Mutex<VecDeque<(SpecimenSource, Arc<Specimen>)>>>,
+    kept: Arc<Mutex<VecDeque<Kept>>>,
 }
 
 impl SpecimenCache {
