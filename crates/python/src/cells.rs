@@ -249,7 +249,8 @@ impl Cells {
             let place = usize::try_from(*k).ok().and_then(|k| wanted.get_mut(k));
             *place.ok_or_else(|| wrong(format!("cell {k} is not there; there are {count}")))? = Some(*seed);
         }
-        // Made here and not in the pool: whoever makes one uses the pool itself and locks its folder.
+        // Made here and not in the pool: whoever makes one uses the pool itself and locks its
+        // folder.
         let drawn = drawn_specimens(self.episodes[0].scene(), wanted.iter().copied().flatten());
         let specimens = &self.specimens;
         py.detach(|| specimens.make_all(&drawn, &Signals::new())).map_err(|e| evaluate(&e))?;

@@ -222,7 +222,8 @@ impl Default for Tissue {
             contact_offset_mm: 1.5,
             tip_rest_offset_mm: 1.5,
             friction: 0.6,
-            // A wall of 1 mm (two layers of 0.5) over the 5 mm of the blades, at a strength of 1 MPa.
+            // A wall of 1 mm (two layers of 0.5) over the 5 mm of the blades, at a strength of 1
+            // MPa.
             tear_force_n: 5.0,
             filtered_pairs: Vec::new(),
             support: Support::default(),

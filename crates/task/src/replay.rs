@@ -1,8 +1,8 @@
 //! Episode files: what was done, so that anyone can do it again and compare every step.
 //!
-//! One line of JSON (scene text and hash, what was drawn, specimen hash, seed, program), then for every step the
-//! action's numbers and the state's hash after it as little-endian binary, then xxh3 of all before
-//! it.
+//! One line of JSON (scene text and hash, what was drawn, specimen hash, seed, program), then for
+//! every step the action's numbers and the state's hash after it as little-endian binary, then xxh3
+//! of all before it.
 
 use crate::storage::write_whole;
 use crate::{End, Episode, Error, OneSpecimen, Result, specimen_hash};
@@ -30,7 +30,8 @@ const NUMBERS: usize = 5;
 pub struct Header {
     /// Version of the program.
     pub program: String,
-    /// The scene as TOML, every value in it, with the specimen that was drawn and nothing that varies.
+    /// The scene as TOML, every value in it, with the specimen that was drawn and nothing that
+    /// varies.
     pub scene: String,
     /// What was drawn for the episode, as TOML: a replay draws nothing.
     #[serde(default)]

@@ -13,8 +13,7 @@ use trocar_task::SpecimenSupply;
 /// Number of specimens that are kept in memory.
 const KEPT: usize = 16;
 
-/// A specimen and what names it.
-type Entry = (SpecimenSource, Arc<Specimen>);
+type Kept = (SpecimenSource, Arc<Specimen>);
 
 /// The specimens of the episodes of a scene. Clones share what is in memory.
 #[derive(Clone)]
@@ -23,7 +22,7 @@ pub struct SpecimenCache {
     folder: PathBuf,
     phantoms: PathBuf,
     /// Used ones first.
-    kept: Arc<Mutex<VecDeque<Entry>>>,
+    kept: Arc<Mutex<VecDeque<Kept>>>,
 }
 
 impl SpecimenCache {
