@@ -209,6 +209,7 @@ td i{display:inline-block;width:.72em;height:.72em;border-radius:2px;margin-righ
 tr.sum td{border-bottom:0;border-top:1.5px solid var(--ink)}
 td.bad{color:var(--bad);font-weight:640}
 .plain th,.plain td{text-align:left;white-space:normal}
+.plain td.long{min-width:16rem}
 .plain td+td{font-variant-numeric:tabular-nums}
 ul{margin:0 0 14px;padding-left:1.2em}
 dl{display:grid;grid-template-columns:max-content 1fr;gap:4px 18px;margin:0;font-size:.9rem}

@@ -34,10 +34,15 @@ pub fn percent(share: f64, decimals: usize) -> String {
     format!("{}\u{202f}%", fixed(100.0 * share, decimals))
 }
 
+/// A cell with more characters than this is a sentence. Its column gets room to be read in a table
+/// of many columns.
+const MAX_SHORT_CELL: usize = 40;
+
 /// An HTML table of plain texts.
 pub fn plain(head: &[&str], rows: &[Vec<String>]) -> String {
     let cells = |tag: &str, texts: &mut dyn Iterator<Item = &str>| {
-        texts.map(|t| format!("<{tag}>{}</{tag}>", page::escape(t))).collect::<String>()
+        let class = |t: &str| if t.chars().count() > MAX_SHORT_CELL { " class=\"long\"" } else { "" };
+        texts.map(|t| format!("<{tag}{}>{}</{tag}>", class(t), page::escape(t))).collect::<String>()
     };
     let mut out = format!(
         "<div class=\"wide\"><table class=\"plain\"><thead><tr>{}</tr></thead><tbody>\n",
@@ -53,6 +58,13 @@ pub fn plain(head: &[&str], rows: &[Vec<String>]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn sentences_get_room() {
+        let why = "empty jaws: they closed on nothing at 3.0 s, 1 mm from the appendix".to_owned();
+        let html = plain(&["Held", "Remarks"], &[vec!["no".to_owned(), why]]);
+        assert!(html.contains("<td>no</td><td class=\"long\">empty jaws"), "{html}");
+    }
 
     #[test]
     fn numbers_are_typeset() {
