@@ -225,7 +225,7 @@ impl Cells {
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
         self.at(k)?;
-        self.eyes.photograph(py, (&self.episodes[k], &self.pool), k, camera, height, width)
+        self.eyes.photograph(py, (&self.episodes, &self.pool), k, camera, height, width)
     }
 
     /// Least and greatest numbers of an action.

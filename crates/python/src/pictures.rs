@@ -17,7 +17,8 @@ const COLOR_NOISE: [f32; 2] = [0.015, 0.003];
 /// Pictures are made by direct light without shadows, which is what policies of campaigns see too.
 const SETTINGS: RenderSettings = RenderSettings::Preview { shadows: false };
 
-/// The sights of the cells; each is made when its cell is first looked at.
+/// The sights of the cells; each is made when its cell is first looked at, and shares with those of
+/// the same scene.
 pub struct Eyes {
     sights: Vec<Option<CameraRig>>,
     noise: bool,
@@ -25,7 +26,7 @@ pub struct Eyes {
 
 /// A cell that is looked at, with the pieces of the arrays that are its own.
 struct Look<'a> {
-    sight: &'a mut Option<CameraRig>,
+    sight: &'a mut CameraRig,
     episode: &'a Episode,
     color: Vec<&'a mut [u8]>,
     depth: Vec<&'a mut [f32]>,
@@ -37,29 +38,15 @@ impl Eyes {
     }
 }
 
-/// The sight of `episode` with the noise of its seed, made if it is not there or is that of an
-/// episode for which something else was drawn.
-fn awake<'a>(
-    sight: &'a mut Option<CameraRig>,
-    episode: &Episode,
-    noise: bool,
-) -> trocar_sensors::Result<&'a mut CameraRig> {
-    let sensor = if noise {
-        let seed = episode.seed();
-        // Both halves of the seed count.
-        let seed = (seed ^ (seed >> 32)) as u32;
-        SensorNoise { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
-    } else {
-        SensorNoise::default()
-    };
-    let scene = episode.arranged_scene();
-    let made = match sight.take().filter(|made| made.is_of(scene)) {
-        Some(made) => made,
-        None => CameraRig::new(scene, episode.specimen(), episode.cell())?,
-    };
-    let sight = sight.insert(made);
-    sight.noise = sensor;
-    Ok(sight)
+/// The noise of an episode's cameras.
+fn sensor_noise(episode: &Episode, noise: bool) -> SensorNoise {
+    if !noise {
+        return SensorNoise::default();
+    }
+    let seed = episode.seed();
+    // Both halves of the seed count.
+    let seed = (seed ^ (seed >> 32)) as u32;
+    SensorNoise { color: Some(COLOR_NOISE), depth: Some(DepthNoise::default()), seed }
 }
 
 /// A camera as Python is told of it: name, height and width (px) of what policies see, whether it
@@ -77,6 +64,39 @@ pub fn cameras(scene: &str) -> PyResult<Vec<Described>> {
 }
 
 impl Eyes {
+    /// Makes the sights of the `wanted` episodes that are not there or are of an episode for which
+    /// something else was drawn. Episodes for which the same was drawn share what does not move.
+    fn wake(&mut self, episodes: &[Episode], wanted: &[usize]) -> trocar_sensors::Result<()> {
+        let scene = |k: usize| episodes[k].arranged_scene();
+        let is_ready = |sight: &Option<CameraRig>, k: usize| sight.as_ref().is_some_and(|rig| rig.is_of(scene(k)));
+        let missing: Vec<usize> = wanted.iter().copied().filter(|k| !is_ready(&self.sights[*k], *k)).collect();
+        for k in missing.iter().copied() {
+            self.sights[k] = self.sights.iter().find(|sight| is_ready(sight, k)).cloned().flatten();
+        }
+        let open: Vec<usize> = missing.iter().copied().filter(|k| !is_ready(&self.sights[*k], *k)).collect();
+        let leader = |k: usize| open.iter().copied().find(|j| CameraRig::shows_same(scene(*j), scene(k))).unwrap_or(k);
+        let made: Vec<(usize, trocar_sensors::Result<CameraRig>)> = open
+            .par_iter()
+            .filter(|k| leader(**k) == **k)
+            .map(|k| (*k, CameraRig::new(scene(*k), episodes[*k].specimen(), episodes[*k].cell())))
+            .collect();
+        for (k, rig) in made {
+            self.sights[k] = Some(rig?);
+        }
+        for k in open.iter().copied() {
+            let from = leader(k);
+            if from != k {
+                self.sights[k] = self.sights[from].clone();
+            }
+        }
+        for k in wanted {
+            if let Some(sight) = &mut self.sights[*k] {
+                sight.noise = sensor_noise(&episodes[*k], self.noise);
+            }
+        }
+        Ok(())
+    }
+
     /// See `Cells.see`.
     pub fn look(
         &mut self,
@@ -101,7 +121,8 @@ impl Eyes {
         let mut depth = rows(depth, "depth", count, size, 1)?;
         let mut colors = by_cell(&mut color, count)?;
         let mut depths = by_cell(&mut depth, count)?;
-        let noise = self.noise;
+        let wanted: Vec<usize> = (0..count).filter(|k| active[*k]).collect();
+        py.detach(|| pool.install(|| self.wake(episodes, &wanted))).map_err(wrong)?;
         let mut looks: Vec<Look<'_>> = self
             .sights
             .iter_mut()
@@ -109,12 +130,13 @@ impl Eyes {
             .zip(colors.drain(..).zip(depths.drain(..)))
             .zip(active)
             .filter(|(_, active)| **active)
-            .map(|(((sight, episode), (color, depth)), _)| Look { sight, episode, color, depth })
+            .filter_map(|(((sight, episode), (color, depth)), _)| {
+                Some(Look { sight: sight.as_mut()?, episode, color, depth })
+            })
             .collect();
         let see = |look: &mut Look<'_>| -> trocar_sensors::Result<()> {
-            let sight = awake(look.sight, look.episode, noise)?;
             for (k, (camera, (height, width))) in cameras.iter().zip(size).enumerate() {
-                let picture = sight.render(look.episode.cell(), camera, [*width, *height], &SETTINGS)?;
+                let picture = look.sight.render(look.episode.cell(), camera, [*width, *height], &SETTINGS)?;
                 if let Some(to) = look.color.get_mut(k) {
                     to.copy_from_slice(picture.color.pixels.as_flattened());
                 }
@@ -133,17 +155,17 @@ impl Eyes {
     pub fn photograph<'py>(
         &mut self,
         py: Python<'py>,
-        (episode, pool): (&Episode, &rayon::ThreadPool),
+        (episodes, pool): (&[Episode], &rayon::ThreadPool),
         k: usize,
         camera: &str,
         height: usize,
         width: usize,
     ) -> PyResult<Bound<'py, PyArray3<u8>>> {
-        let (noise, sight) = (self.noise, &mut self.sights[k]);
         let pixels = py.detach(|| {
             pool.install(|| {
-                let sight = awake(sight, episode, noise)?;
-                let picture = sight.render(episode.cell(), camera, [width, height], &SETTINGS)?;
+                self.wake(episodes, &[k])?;
+                let Some(sight) = &mut self.sights[k] else { return Ok(Vec::new()) };
+                let picture = sight.render(episodes[k].cell(), camera, [width, height], &SETTINGS)?;
                 Ok(picture.color.pixels.as_flattened().to_vec())
             })
         });

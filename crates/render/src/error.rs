@@ -29,4 +29,7 @@ pub enum Error {
     /// The mesh has more triangles than a search tree can index.
     #[error("the mesh has {0} triangles; must be at most 2^27")]
     TooLarge(usize),
+    /// The bodies have more triangles than a picture can tell apart.
+    #[error("the bodies of the stage have {0} triangles; must be less than 2^32")]
+    TooMany(usize),
 }

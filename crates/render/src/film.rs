@@ -44,12 +44,12 @@ impl Film {
         Self { exposure: 1.0, vignette: 0.45, shoulder: 0.7, noise: None }
     }
 
-    /// The sRGB colour of a pixel with linear radiance `light`.
-    pub(crate) fn develop(&self, rays: &RayGenerator, pixel: usize, light: [f32; 3]) -> [u8; 3] {
-        let gain = self.exposure * (1.0 - self.vignette * rays.eccentricity_squared(pixel)).max(0.0);
+    /// The sRGB colour of pixel (`u`, `v`) with linear radiance `light`.
+    pub(crate) fn develop(&self, rays: &RayGenerator, [u, v]: [usize; 2], light: [f32; 3]) -> [u8; 3] {
+        let gain = self.exposure * (1.0 - self.vignette * rays.eccentricity_squared(u, v)).max(0.0);
         let mut values = light.map(|l| l * gain);
         if let Some(noise) = self.noise {
-            let [a, b, c, d] = numbers([pixel as u32, noise.frame, 0x6e6f_6973, noise.seed]);
+            let [a, b, c, d] = numbers([(v * rays.width() + u) as u32, noise.frame, 0x6e6f_6973, noise.seed]);
             let ([x, y], [z, _]) = (normal(a, b), normal(c, d));
             for (value, n) in values.iter_mut().zip([x, y, z]) {
                 let variance = noise.read * noise.read + noise.shot * noise.shot * value.max(0.0);

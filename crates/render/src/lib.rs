@@ -1,8 +1,9 @@
-//! Ray-traced camera images of triangle meshes.
+//! Camera images of triangle meshes, rasterised or ray traced.
 //!
 //! [`render`] renders a [`Stage`] (shapes that deform, bodies with poses, lights) through a
 //! [`RayGenerator`] (any camera model). One pass gives colour, metric depth, labels and normals,
-//! either with direct light only ([`RenderSettings::Preview`]) or by path tracing
+//! either with direct light only ([`RenderSettings::Preview`], rasterised; its reference
+//! [`RenderSettings::Traced`] casts a ray per pixel) or by path tracing
 //! ([`RenderSettings::Path`]). [`phong::PhongScene`] is a second, simpler renderer for phantoms and
 //! the figures of reports: one light, wireframes, double precision.
 //!
@@ -35,6 +36,8 @@
 //! ```
 
 mod bvh;
+mod deferred;
+mod direct;
 mod error;
 mod film;
 mod light;
@@ -43,8 +46,8 @@ mod microfacet;
 mod path;
 pub mod phong;
 mod picture;
-mod preview;
 pub mod random;
+mod raster;
 mod rays;
 mod shading_frame;
 pub mod srgb;

@@ -1,6 +1,8 @@
 //! Light sources. Radiance is linear and relative: a sensor with exposure 1 shows radiance 1 as
 //! white.
 
+mod lanes;
+
 use crate::bvh::Ray;
 use glam::{DVec3, Vec3A};
 use trocar_core::Pose;

@@ -1,6 +1,10 @@
 //! Surface reflectance: matte, coated (wet tissue, plastic sheet) and metal. All models conserve
 //! energy.
 
+mod lanes;
+
+pub(crate) use lanes::{WRAP_LENGTH, only};
+
 use crate::microfacet::{AlbedoTable, GgxLobe, fresnel};
 use glam::Vec3A;
 use std::f32::consts::PI;
@@ -96,7 +100,7 @@ pub(crate) struct Material {
 enum Kind {
     Matte,
     Coated { lobe: GgxLobe, head_on: f32, table: AlbedoTable, base_mean: f32 },
-    Metal { lobe: GgxLobe, table: AlbedoTable },
+    Metal { lobe: GgxLobe, table: AlbedoTable, mean: f32 },
 }
 
 /// The two lobes of a material between two directions. `gloss` and `base` are outgoing radiance per
@@ -118,7 +122,9 @@ impl Material {
             SurfaceKind::Matte => Self { kind: Kind::Matte, scattering_length: Vec3A::ZERO },
             SurfaceKind::Metal { roughness } => {
                 let lobe = width(roughness);
-                Self { kind: Kind::Metal { lobe, table: AlbedoTable::new(&lobe) }, scattering_length: Vec3A::ZERO }
+                let table = AlbedoTable::new(&lobe);
+                let mean = table.mean(1.0);
+                Self { kind: Kind::Metal { lobe, table, mean }, scattering_length: Vec3A::ZERO }
             }
             SurfaceKind::Coated { roughness, ior, scattering_length } => {
                 let lobe = width(roughness);
@@ -172,17 +178,16 @@ impl Material {
                 let through = (1.0 - table.albedo(*head_on, out)) * (1.0 - table.albedo(*head_on, come));
                 lobes.base = albedo * (come / PI * through / base_mean.max(1e-4));
             }
-            Kind::Metal { lobe, table } => {
+            Kind::Metal { lobe, table, mean } => {
                 let (value, density, facing) = lobe.evaluate(to_eye, to_light);
                 let tint = albedo + (Vec3A::ONE - albedo) * fresnel(0.0, facing);
                 lobes.gloss = tint * value;
                 lobes.gloss_density = density;
                 // Multiple scattering between facets (Kulla and Conty, "Revisiting Physically Based
                 // Shading", 2017).
-                let mean = table.mean(1.0);
                 let lost = (1.0 - table.albedo(1.0, out)) * (1.0 - table.albedo(1.0, come)) / (1.0 - mean).max(1e-4);
                 let average = albedo + (Vec3A::ONE - albedo) / 21.0;
-                let again = average * average * mean / (Vec3A::ONE - average * (1.0 - mean));
+                let again = average * average * *mean / (Vec3A::ONE - average * (1.0 - mean));
                 lobes.base = again * (lost * come / PI);
             }
         }

@@ -28,6 +28,10 @@ impl GgxLobe {
         Self { width }
     }
 
+    pub fn width(&self) -> f32 {
+        self.width
+    }
+
     /// Returns the reflection without the Fresnel factor times the cosine of `to_light`, the
     /// density of [`Self::reflect`], and the cosine between either direction and the facet (Heitz
     /// 2014, "Understanding the Masking-Shadowing Function").

@@ -1,18 +1,17 @@
 //! Rendering: colour, depth, labels and normals of a stage in one pass.
 
 use crate::bvh::Stacks;
+use crate::deferred::{self, Shading};
+use crate::direct::{self, ShadowBuffers, VisiblePoint};
 use crate::film::Film;
 use crate::path::{Key, LENS, radiance};
-use crate::preview::{self, ShadowBuffers, VisiblePoint};
-use crate::rays::RayGenerator;
+use crate::raster::{BAND, View};
+use crate::rays::{RayGenerator, TILE};
 use crate::stage::{BundleCandidates, Stage, rotation_of};
-use glam::{Mat3A, Vec3A};
+use glam::Vec3A;
 use rayon::prelude::*;
 use trocar_camera::{ColorImage, DepthImage};
 use trocar_core::Pose;
-
-/// Side of a tile (px). A picture is rendered tile by tile.
-const TILE: usize = 8;
 
 /// Limit on the radiance of one path. Rare paths that meet a light in a mirror by chance give white
 /// dots in a picture of a hundred paths per pixel (firefly clamping). The light that is lost is
@@ -22,9 +21,14 @@ const MAX_PATH_RADIANCE: f32 = 24.0;
 /// How light is computed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RenderSettings {
-    /// Direct light at pixel centres: for policies and live views.
+    /// Direct light at pixel centres, rasterised: for policies and live views.
     Preview {
-        /// Casts hard shadows with a second ray per light.
+        /// Casts hard shadows with a ray per light.
+        shadows: bool,
+    },
+    /// The same light on what a ray per pixel hits: the reference for `Preview`.
+    Traced {
+        /// Casts hard shadows with a ray per light.
         shadows: bool,
     },
     /// Path tracing: for publication pictures.
@@ -53,12 +57,13 @@ pub struct Picture {
     pub light: Vec<[f32; 3]>,
 }
 
-#[derive(Clone, Copy, Default)]
-struct Pixel {
-    light: [f32; 3],
-    normal: [f32; 3],
-    depth: f32,
-    label: u16,
+/// Rows of a picture.
+pub(crate) struct Rows<'a> {
+    pub color: &'a mut [[u8; 3]],
+    pub depth: &'a mut [f32],
+    pub labels: &'a mut [u16],
+    pub normals: &'a mut [[f32; 3]],
+    pub light: &'a mut [[f32; 3]],
 }
 
 impl RenderSettings {
@@ -113,7 +118,8 @@ pub fn render(stage: &mut Stage, rays: &RayGenerator, pose: &Pose, settings: &Re
     picture
 }
 
-/// Like [`render`], but reuses `picture`. No memory is allocated for it if the size stays the same.
+/// Like [`render`], but reuses `picture`, and the memory that the stage keeps for previews. Little
+/// memory is allocated if the size stays the same.
 pub fn render_into(
     picture: &mut Picture,
     stage: &mut Stage,
@@ -122,55 +128,77 @@ pub fn render_into(
     settings: &RenderSettings,
     film: &Film,
 ) {
-    stage.update_acceleration();
-    let (width, height) = (rays.width(), rays.height());
-    picture.resize(width, height);
-    let shot =
-        Shot { stage, camera_rays: rays, rotation: rotation_of(pose), origin: pose.translation.as_vec3a(), settings };
-    let band = (width * TILE).max(1);
-    let rows = (
-        picture.color.pixels.par_chunks_mut(band),
-        picture.depth.depth.par_chunks_mut(band),
-        picture.labels.par_chunks_mut(band),
-        picture.normals.par_chunks_mut(band),
-        picture.light.par_chunks_mut(band),
-    );
-    rows.into_par_iter().enumerate().for_each_init(
-        TileBuffers::new,
-        |buffers, (k, (color, depth, label, normal, light))| {
-            let first = k * band;
-            buffers.pixels.clear();
-            buffers.pixels.resize(color.len(), Pixel::default());
-            for left in (0..width).step_by(TILE) {
-                shot.tile(first, left..width.min(left + TILE), buffers);
+    picture.resize(rays.width(), rays.height());
+    stage.update_lamps();
+    let view = View { rays, rotation: rotation_of(pose), origin: pose.translation.as_vec3a() };
+    let RenderSettings::Preview { shadows } = *settings else {
+        stage.update_acceleration();
+        let shot = Shot { stage, view, settings };
+        picture.bands(rays.width() * TILE).for_each_init(TileBuffers::new, |buffers, (k, mut rows)| {
+            for left in (0..rays.width()).step_by(TILE) {
+                shot.tile(k * TILE, left, &mut rows, buffers);
             }
-            for (i, pixel) in buffers.pixels.iter().enumerate() {
-                color[i] = film.develop(rays, first + i, pixel.light);
-                (depth[i], label[i], normal[i], light[i]) = (pixel.depth, pixel.label, pixel.normal, pixel.light);
+            rows.develop(film, rays, k * TILE);
+        });
+        return;
+    };
+    let mut visibility = std::mem::take(&mut stage.visibility);
+    visibility.draw(stage, &view);
+    let shadows = shadows && Shading { stage, view: &view, visibility: &visibility, shadows }.may_cast();
+    if shadows {
+        stage.update_acceleration();
+    }
+    let shading = Shading { stage, view: &view, visibility: &visibility, shadows };
+    picture.bands(rays.width() * BAND).for_each_init(deferred::Buffers::new, |buffers, (k, mut rows)| {
+        shading.shade(k * BAND, &mut rows, buffers);
+        rows.develop(film, rays, k * BAND);
+    });
+    stage.visibility = visibility;
+}
+
+impl Picture {
+    /// Parts of `pixels` pixels, numbered.
+    fn bands(&mut self, pixels: usize) -> impl IndexedParallelIterator<Item = (usize, Rows<'_>)> {
+        let pixels = pixels.max(1);
+        let parts = (
+            self.color.pixels.par_chunks_mut(pixels),
+            self.depth.depth.par_chunks_mut(pixels),
+            self.labels.par_chunks_mut(pixels),
+            self.normals.par_chunks_mut(pixels),
+            self.light.par_chunks_mut(pixels),
+        );
+        let rows = |(color, depth, labels, normals, light)| Rows { color, depth, labels, normals, light };
+        parts.into_par_iter().map(rows).enumerate()
+    }
+}
+
+impl Rows<'_> {
+    /// Turns light into colour. `first` is the first of these rows.
+    fn develop(&mut self, film: &Film, rays: &RayGenerator, first: usize) {
+        let width = rays.width();
+        for (row, (color, light)) in self.color.chunks_mut(width).zip(self.light.chunks(width)).enumerate() {
+            for (u, (color, light)) in color.iter_mut().zip(light).enumerate() {
+                *color = film.develop(rays, [u, first + row], *light);
             }
-        },
-    );
+        }
+    }
 }
 
 struct Shot<'a> {
     stage: &'a Stage,
-    camera_rays: &'a RayGenerator,
-    rotation: Mat3A,
-    origin: Vec3A,
+    view: View<'a>,
     settings: &'a RenderSettings,
 }
 
 /// Buffers that a thread reuses from tile to tile.
 struct TileBuffers {
     stacks: Stacks,
-    /// Pixels of the current band of rows.
-    pixels: Vec<Pixel>,
     /// For each pixel of the tile with a ray: its index in the band, and its ray in the camera
     /// frame.
     rays: Vec<(usize, Vec3A)>,
     directions: Vec<Vec3A>,
     candidates: BundleCandidates,
-    /// Preview only: the visible surface points, and their pixels in the band.
+    /// Direct light only: the visible surface points, and their pixels in the band.
     visible: Vec<VisiblePoint>,
     pixel_indices: Vec<usize>,
     shadow_buffers: ShadowBuffers,
@@ -178,71 +206,71 @@ struct TileBuffers {
 
 impl TileBuffers {
     fn new() -> Self {
-        let (pixels, rays, directions) = (Vec::new(), Vec::new(), Vec::new());
-        let (candidates, shadow_buffers) = (BundleCandidates::default(), ShadowBuffers::default());
         Self {
             stacks: Stacks::new(),
-            pixels,
-            rays,
-            directions,
-            candidates,
+            rays: Vec::new(),
+            directions: Vec::new(),
+            candidates: BundleCandidates::default(),
             visible: Vec::new(),
             pixel_indices: Vec::new(),
-            shadow_buffers,
+            shadow_buffers: ShadowBuffers::default(),
         }
     }
 }
 
 impl Shot<'_> {
-    /// Renders the pixels in `columns` of a band of rows. `first` is the index of the band's first
-    /// pixel.
-    fn tile(&self, first: usize, columns: std::ops::Range<usize>, buffers: &mut TileBuffers) {
-        let width = self.camera_rays.width();
-        let TileBuffers { stacks, pixels: band, rays, directions, candidates, visible, pixel_indices, shadow_buffers } =
-            buffers;
+    /// Renders the pixels of a tile whose first row is `first` and whose first column is `left`.
+    fn tile(&self, first: usize, left: usize, rows: &mut Rows<'_>, buffers: &mut TileBuffers) {
+        let Self { stage, view, settings } = self;
+        let width = view.rays.width();
+        let TileBuffers { stacks, rays, directions, candidates, visible, pixel_indices, shadow_buffers } = buffers;
         rays.clear();
-        for row in 0..band.len() / width {
-            let pixels = columns.clone().map(|u| row * width + u);
-            rays.extend(pixels.filter_map(|i| self.camera_rays.centre(first + i).map(|ray| (i, ray))));
-        }
-        directions.clear();
-        directions.extend(rays.iter().map(|(_, ray)| self.rotation * *ray));
-        self.stage.collect_bundle(self.origin, directions, candidates);
-        visible.clear();
-        pixel_indices.clear();
-        let to_camera = self.rotation.transpose();
-        for ((i, ray), direction) in rays.iter().zip(directions.iter()) {
-            let pixel = &mut band[*i];
-            pixel.light = self.stage.environment;
-            if let Some(hit) = self.stage.first_of_bundle(candidates, self.origin, *direction, stacks) {
-                let surface = self.stage.surface(&hit, *direction);
-                pixel.depth = (hit.t * ray.z).max(0.0);
-                pixel.label = self.stage.label(&hit);
-                pixel.normal = (to_camera * surface.smooth).to_array();
-                pixel_indices.push(*i);
-                visible.push(VisiblePoint::new(self.stage, hit, surface, *direction));
+        for row in 0..rows.depth.len() / width {
+            for u in left..width.min(left + TILE) {
+                let i = row * width + u;
+                (rows.depth[i], rows.labels[i]) = (0.0, 0);
+                (rows.normals[i], rows.light[i]) = ([0.0; 3], [0.0; 3]);
+                rays.extend(view.rays.centre(first * width + i).map(|ray| (i, ray)));
             }
         }
-        match *self.settings {
-            RenderSettings::Preview { shadows } => {
-                preview::light(self.stage, self.origin, visible, shadows, shadow_buffers, stacks);
+        directions.clear();
+        directions.extend(rays.iter().map(|(_, ray)| view.rotation * *ray));
+        stage.collect_bundle(view.origin, directions, candidates);
+        visible.clear();
+        pixel_indices.clear();
+        let to_camera = view.rotation.transpose();
+        for ((i, ray), direction) in rays.iter().zip(directions.iter()) {
+            rows.light[*i] = stage.environment;
+            if let Some(hit) = stage.first_of_bundle(candidates, view.origin, *direction, stacks) {
+                let surface = stage.surface(&hit, *direction);
+                rows.depth[*i] = (hit.t * ray.z).max(0.0);
+                rows.labels[*i] = stage.label(&hit);
+                rows.normals[*i] = (to_camera * surface.smooth).to_array();
+                pixel_indices.push(*i);
+                visible.push(VisiblePoint::new(stage, hit, surface, *direction));
+            }
+        }
+        match **settings {
+            RenderSettings::Preview { shadows } | RenderSettings::Traced { shadows } => {
+                direct::light(stage, view.origin, visible, shadows, shadow_buffers, stacks);
                 for (i, visible) in pixel_indices.iter().zip(visible.iter()) {
-                    band[*i].light = visible.light.to_array();
+                    rows.light[*i] = visible.light.to_array();
                 }
             }
             RenderSettings::Path { samples, bounces, seed } => {
                 for (i, _) in rays.iter() {
-                    let key = |sample| Key { seed, pixel: (first + i) as u32, sample };
+                    let pixel = first * width + i;
+                    let key = |sample| Key { seed, pixel: pixel as u32, sample };
                     let mut sum = Vec3A::ZERO;
                     for sample in 0..samples.max(1) {
                         let key = key(sample);
                         let [a, b, ..] = key.draw(0, LENS);
-                        if let Some(ray) = self.camera_rays.at(first + i, a, b) {
-                            let light = radiance(self.stage, self.origin, self.rotation * ray, bounces, key, stacks);
+                        if let Some(ray) = view.rays.at(pixel, a, b) {
+                            let light = radiance(stage, view.origin, view.rotation * ray, bounces, key, stacks);
                             sum += light * (MAX_PATH_RADIANCE / light.max_element().max(MAX_PATH_RADIANCE));
                         }
                     }
-                    band[*i].light = (sum / samples.max(1) as f32).to_array();
+                    rows.light[*i] = (sum / samples.max(1) as f32).to_array();
                 }
             }
         }

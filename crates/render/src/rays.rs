@@ -1,21 +1,41 @@
 //! Precomputed rays of a camera's pixels. The lens model costs nothing at render time.
 
+use crate::raster::{LANES, Projection};
 use glam::Vec3A;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 use trocar_camera::CameraModel;
+
+/// Side of a tile of pixels.
+pub(crate) const TILE: usize = 8;
 
 /// The rays of all pixels of a camera.
 #[derive(Clone, Debug)]
 pub struct RayGenerator {
     width: usize,
     height: usize,
-    /// Rays through pixel centres; NaN where nothing is visible. Rays of a pinhole have z = 1, rays
-    /// of a fisheye have length 1.
-    centres: Vec<[f32; 3]>,
-    /// Rays through pixel corners: one row and one column more than there are pixels.
-    corners: Vec<[f32; 3]>,
+    model: CameraModel,
+    /// Rays through pixel centres, by axis, in rows of `stride`; NaN where nothing is visible and
+    /// beyond the picture. Rays of a pinhole have z = 1, rays of a fisheye have length 1.
+    centres: [Vec<f32>; 3],
+    stride: usize,
+    /// Rays through pixel corners: one row and one column more than there are pixels. Only paths
+    /// need them.
+    corners: OnceLock<Vec<[f32; 3]>>,
     /// Radius of the circular image (px).
     circle: Option<f32>,
+    projection: Projection,
+    tiles: TileBounds,
+}
+
+/// Least and greatest components of the rays of each tile.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct TileBounds {
+    /// Tiles of a row, rounded up to whole registers.
+    pub stride: usize,
+    /// By axis; NaN for tiles without a ray.
+    pub low: [Vec<f32>; 3],
+    pub high: [Vec<f32>; 3],
 }
 
 impl RayGenerator {
@@ -23,24 +43,30 @@ impl RayGenerator {
     pub fn new(model: impl Into<CameraModel>) -> Self {
         let model = model.into();
         let (width, height) = (model.camera().width, model.camera().height);
-        let flat = matches!(model, CameraModel::Pinhole(_));
-        let ray = |u: f64, v: f64| {
-            let ray = model.unproject(u, v).map(|d| if flat { d / d.z } else { d });
-            ray.map_or([f32::NAN; 3], |d| d.as_vec3().to_array())
-        };
-        let grid = |columns: usize, rows: usize, shift: f64| -> Vec<[f32; 3]> {
-            (0..columns * rows)
-                .into_par_iter()
-                .map(|i| ray((i % columns) as f64 - shift, (i / columns) as f64 - shift))
-                .collect()
-        };
-        Self {
+        // Registers that start in the picture end in the row.
+        let stride = width.next_multiple_of(LANES) + LANES;
+        let mut centres = [0, 1, 2].map(|_| vec![f32::NAN; stride * height]);
+        let [x, y, z] = &mut centres;
+        let rows = x.par_chunks_mut(stride).zip(y.par_chunks_mut(stride)).zip(z.par_chunks_mut(stride));
+        rows.enumerate().for_each(|(v, ((x, y), z))| {
+            for u in 0..width {
+                [x[u], y[u], z[u]] = ray(&model, u as f64, v as f64);
+            }
+        });
+        let mut rays = Self {
             width,
             height,
-            centres: grid(width, height, 0.0),
-            corners: grid(width + 1, height + 1, 0.5),
+            model,
+            centres,
+            stride,
+            corners: OnceLock::new(),
             circle: None,
-        }
+            projection: Projection::default(),
+            tiles: TileBounds::default(),
+        };
+        rays.projection = Projection::new(&rays.model, &rays);
+        rays.tiles = TileBounds::of(&rays);
+        rays
     }
 
     /// Restricts the visible image to a circle around its centre, as an endoscope shows it.
@@ -49,11 +75,13 @@ impl RayGenerator {
     pub fn with_circular_image(mut self, diameter: f32) -> Self {
         let radius = 0.5 * diameter * self.height as f32;
         self.circle = Some(radius);
-        for i in 0..self.centres.len() {
-            if self.centre_distance_squared(i) > radius * radius {
-                self.centres[i] = [f32::NAN; 3];
+        for pixel in 0..self.width * self.height {
+            if self.centre_distance_squared(pixel) > radius * radius {
+                let at = pixel / self.width * self.stride + pixel % self.width;
+                self.centres.iter_mut().for_each(|axis| axis[at] = f32::NAN);
             }
         }
+        self.tiles = TileBounds::of(&self);
         self
     }
 
@@ -67,17 +95,48 @@ impl RayGenerator {
         self.height
     }
 
+    /// Numbers of a row of [`Self::axes`].
+    pub(crate) fn stride(&self) -> usize {
+        self.stride
+    }
+
+    /// Rays through pixel centres by axis, in rows of [`Self::stride`]; NaN where nothing is
+    /// visible and beyond the picture.
+    pub(crate) fn axes(&self) -> &[Vec<f32>; 3] {
+        &self.centres
+    }
+
+    pub(crate) fn projection(&self) -> &Projection {
+        &self.projection
+    }
+
+    pub(crate) fn tiles(&self) -> &TileBounds {
+        &self.tiles
+    }
+
+    /// Ray through the centre of pixel (`u`, `v`); NaN where nothing is visible.
+    pub(crate) fn through(&self, u: usize, v: usize) -> Vec3A {
+        let at = v * self.stride + u;
+        let [x, y, z] = &self.centres;
+        Vec3A::new(x[at], y[at], z[at])
+    }
+
     /// Ray through the centre of a pixel; `None` where nothing is visible.
     pub(crate) fn centre(&self, pixel: usize) -> Option<Vec3A> {
-        let ray = Vec3A::from(self.centres[pixel]);
+        let ray = self.through(pixel % self.width, pixel / self.width);
         ray.is_finite().then_some(ray)
     }
 
     /// Ray through position (`a`, `b`) in a pixel, with (0, 0) at its upper left corner; `None`
     /// where nothing is visible.
     pub(crate) fn at(&self, pixel: usize, a: f32, b: f32) -> Option<Vec3A> {
+        let corners = self.corners.get_or_init(|| {
+            let (columns, rows) = (self.width + 1, self.height + 1);
+            let corner = |i: usize| ray(&self.model, (i % columns) as f64 - 0.5, (i / columns) as f64 - 0.5);
+            (0..columns * rows).into_par_iter().map(corner).collect()
+        });
         let at = pixel / self.width * (self.width + 1) + pixel % self.width;
-        let corner = |i: usize| Vec3A::from(self.corners[i]);
+        let corner = |i: usize| Vec3A::from(corners[i]);
         let above = corner(at).lerp(corner(at + 1), a);
         let below = corner(at + self.width + 1).lerp(corner(at + self.width + 2), a);
         let ray = above.lerp(below, b);
@@ -86,15 +145,48 @@ impl RayGenerator {
 
     /// Squared distance of a pixel from the image centre, 1 at the rim of the circular image or at
     /// the corner of a rectangular one.
-    pub(crate) fn eccentricity_squared(&self, pixel: usize) -> f32 {
+    pub(crate) fn eccentricity_squared(&self, u: usize, v: usize) -> f32 {
         let (width, height) = (self.width as f32, self.height as f32);
         let rim = self.circle.map_or(0.25 * (width * width + height * height), |radius| radius * radius);
-        self.centre_distance_squared(pixel) / rim.max(1e-12)
+        self.distance_squared(u, v) / rim.max(1e-12)
     }
 
     fn centre_distance_squared(&self, pixel: usize) -> f32 {
-        let x = (pixel % self.width) as f32 - 0.5 * (self.width as f32 - 1.0);
-        let y = (pixel / self.width) as f32 - 0.5 * (self.height as f32 - 1.0);
+        self.distance_squared(pixel % self.width, pixel / self.width)
+    }
+
+    fn distance_squared(&self, u: usize, v: usize) -> f32 {
+        let x = u as f32 - 0.5 * (self.width as f32 - 1.0);
+        let y = v as f32 - 0.5 * (self.height as f32 - 1.0);
         x * x + y * y
+    }
+}
+
+/// Ray through an image point; NaN where nothing is visible.
+fn ray(model: &CameraModel, u: f64, v: f64) -> [f32; 3] {
+    let flat = matches!(model, CameraModel::Pinhole(_));
+    let ray = model.unproject(u, v).map(|d| if flat { d / d.z } else { d });
+    ray.map_or([f32::NAN; 3], |d| d.as_vec3().to_array())
+}
+
+impl TileBounds {
+    fn of(rays: &RayGenerator) -> Self {
+        let (columns, rows) = (rays.width.div_ceil(TILE), rays.height.div_ceil(TILE));
+        let stride = columns.next_multiple_of(LANES);
+        let empty = || [0, 1, 2].map(|_| vec![f32::NAN; stride * rows]);
+        let mut tiles = Self { stride, low: empty(), high: empty() };
+        for v in 0..rays.height {
+            for u in 0..rays.width {
+                let ray = rays.through(u, v);
+                if ray.is_finite() {
+                    let at = v / TILE * stride + u / TILE;
+                    for k in 0..3 {
+                        tiles.low[k][at] = tiles.low[k][at].min(ray[k]);
+                        tiles.high[k][at] = tiles.high[k][at].max(ray[k]);
+                    }
+                }
+            }
+        }
+        tiles
     }
 }

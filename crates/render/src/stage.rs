@@ -4,6 +4,6 @@ mod model;
 mod queries;
 
 pub use model::{BodyId, ShapeId, Stage};
-pub(crate) use model::{StageHit, Surface, rotation_of};
+pub(crate) use model::{BodyView, StageHit, Surface, rotation_of};
 pub(crate) use queries::BundleCandidates;
 pub use queries::RayHit;

@@ -2,6 +2,7 @@
 
 use crate::{Error, Result};
 use glam::DVec3;
+use std::sync::Arc;
 use trocar_camera::Camera;
 use trocar_core::Pose;
 use trocar_render::{Film, Light, RayGenerator, Stage};
@@ -34,7 +35,7 @@ pub(crate) struct RigCamera {
     pub film: Film,
     pub model: Camera,
     round: bool,
-    rays: Vec<([usize; 2], RayGenerator)>,
+    rays: Vec<([usize; 2], Arc<RayGenerator>)>,
 }
 
 /// The lighting of the room.
@@ -160,7 +161,8 @@ impl RigCamera {
                 if self.rays.len() >= CACHED_SIZES {
                     self.rays.remove(0);
                 }
-                self.rays.push((size, if self.round { rays.with_circular_image(IMAGE_CIRCLE) } else { rays }));
+                let rays = if self.round { rays.with_circular_image(IMAGE_CIRCLE) } else { rays };
+                self.rays.push((size, Arc::new(rays)));
                 self.rays.len() - 1
             }
         };

@@ -8,6 +8,7 @@ use crate::section::section;
 use crate::{Error, Result, arm, furniture};
 use glam::DVec3;
 use std::path::PathBuf;
+use std::sync::Arc;
 use trocar_cell::Cell;
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
@@ -20,7 +21,8 @@ const INSTRUMENTS: u16 = 101;
 const ARMS: u16 = 111;
 const OTHERS: u16 = 201;
 
-/// Everything that cameras of a cell can see.
+/// Everything that cameras of a cell can see. A copy shares what does not move.
+#[derive(Clone)]
 pub(crate) struct CellStage {
     /// The current stage.
     pub stage: Stage,
@@ -35,10 +37,11 @@ pub(crate) struct CellStage {
 }
 
 /// An organ on the stage.
+#[derive(Clone)]
 struct OrganOnStage {
-    recorded: OrganSkin,
+    recorded: Arc<OrganSkin>,
     label: u16,
-    surface: BoundSurface,
+    surface: Arc<BoundSurface>,
     shape: Option<ShapeId>,
     /// Bodies of the cell that are pieces of this organ, and their elements.
     bodies: Vec<usize>,
@@ -50,6 +53,7 @@ struct OrganOnStage {
 }
 
 /// An arm on the stage.
+#[derive(Clone)]
 struct Arm {
     name: &'static str,
     /// Description file of its shapes, and the shapes of base and links.
@@ -62,7 +66,7 @@ struct Arm {
 }
 
 /// Everything that determines the shapes of a described arm, except the number of its links.
-#[derive(PartialEq)]
+#[derive(Clone, PartialEq)]
 struct ShapeSource {
     file: PathBuf,
     flange: Option<String>,
@@ -93,9 +97,9 @@ impl CellStage {
             let nodes = recorded.body.vertices.clone();
             let bodies = Vec::new();
             all.organs.push(OrganOnStage {
-                recorded,
+                recorded: Arc::new(recorded),
                 label,
-                surface,
+                surface: Arc::new(surface),
                 shape: None,
                 bodies,
                 tets: Vec::new(),
@@ -245,8 +249,9 @@ impl CellStage {
                 } else {
                     organ.recorded.surface_of_pieces(&pieces)
                 };
-                organ.surface =
+                let surface =
                     surface.ok_or_else(|| Error::Mismatch(format!("organ '{name}' has different elements")))?;
+                organ.surface = Arc::new(surface);
             }
             organ.nodes.clear();
             for b in &organ.bodies {
@@ -271,7 +276,7 @@ impl CellStage {
         }
     }
 
-    /// Rebuilds the stage: copies the static part and adds the organs.
+    /// Rebuilds the stage: the static part, which is shared, and the organs.
     pub fn rebuild(&mut self) -> Result<()> {
         self.stage = self.base.clone();
         for organ in &mut self.organs {

@@ -1,6 +1,6 @@
 //! Pictures from the cameras of a simulated cell.
 //!
-//! A [`CameraRig`] combines the cameras of a scene, a running cell and the ray tracer of
+//! A [`CameraRig`] combines the cameras of a scene, a running cell and the renderer of
 //! `trocar-render`. It shows the organs with their surfaces (in pieces after a cut), the field
 //! below them, instruments with moving jaws, arms, ports and the room. [`CameraRig::render`]
 //! returns colour, metric depth, labels and normals. The result depends on the state of the cell

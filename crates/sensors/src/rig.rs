@@ -44,6 +44,10 @@ pub struct SensorNoise {
 /// # Ok(())
 /// # }
 /// ```
+///
+/// A copy shows another cell of the same scene as well. Both share everything but the organs that
+/// have moved.
+#[derive(Clone)]
 pub struct CameraRig {
     cameras: Vec<RigCamera>,
     visible: CellStage,
@@ -76,6 +80,11 @@ impl CameraRig {
         visible.update(cell)?;
         let scene = Some(Box::new(drawn_part(scene)));
         Ok(Self { scene, ..Self::with(visible, cameras) })
+    }
+
+    /// Whether [`new`](Self::new) gives the same cameras for both scenes.
+    pub fn shows_same(one: &Scene, other: &Scene) -> bool {
+        drawn_part(one) == drawn_part(other)
     }
 
     /// Whether [`new`](Self::new) would give the same cameras for `scene`. Where an episode begins

@@ -219,3 +219,51 @@ fn imaging_changes_pictures_as_it_says() {
     assert!(tinted[1] < 0.9 * organ[1] && (tinted[0] - organ[0]).abs() < 2.0, "{tinted:?} {organ:?}");
     assert_eq!(picture.labels, same.labels);
 }
+
+#[test]
+fn previews_equal_traced_pictures() {
+    let (scene, specimen) = (scene(), specimen());
+    let mut cell = Cell::new(&scene, &specimen, 1).unwrap();
+    let mut rig = CameraRig::new(&scene, &specimen, &cell).unwrap();
+    let action: Vec<_> = cell.observe().iter().map(|a| trocar_cell_coordinates(a, 0.004)).collect();
+    for _ in 0..3 {
+        for _ in 0..5 {
+            cell.step(&Action::targets(&action)).unwrap();
+        }
+        for camera in ["endoscope", "d405", "recording", "outside"] {
+            let mut see = |settings| rig.render(&cell, camera, [224, 160], &settings).unwrap().clone();
+            let raster = see(RenderSettings::Preview { shadows: false });
+            let traced = see(RenderSettings::Traced { shadows: false });
+            let bytes = |p: &Picture| p.color.pixels.as_flattened().to_vec();
+            let apart = bytes(&raster).into_iter().zip(bytes(&traced)).map(|(a, b)| f64::from(a.abs_diff(b)));
+            let color = apart.sum::<f64>() / (3 * 224 * 160) as f64;
+            assert!(color < 0.2, "{camera}: colours differ by {color} of 255");
+            let pixels = raster.labels.len();
+            let other = (0..pixels).filter(|i| raster.labels[*i] != traced.labels[*i]).count();
+            assert!(other < pixels / 1000, "{camera}: {other} labels differ");
+            let pairs = raster.depth.depth.iter().zip(&traced.depth.depth);
+            let off = pairs.filter(|(a, b)| (*a - *b).abs() > 1e-4).count();
+            assert!(off < pixels / 1000, "{camera}: {off} depths differ");
+        }
+    }
+}
+
+#[test]
+fn copies_of_a_rig_show_their_own_cells() {
+    let (scene, specimen) = (scene(), specimen());
+    let still = Cell::new(&scene, &specimen, 1).unwrap();
+    let mut moved = Cell::new(&scene, &specimen, 1).unwrap();
+    let mut rig = CameraRig::new(&scene, &specimen, &still).unwrap();
+    let mut copy = rig.clone();
+    let action: Vec<_> = moved.observe().iter().map(|a| trocar_cell_coordinates(a, 0.004)).collect();
+    for _ in 0..10 {
+        moved.step(&Action::targets(&action)).unwrap();
+    }
+    let see = |rig: &mut CameraRig, cell: &Cell| {
+        rig.render(cell, "d405", [96, 64], &RenderSettings::preview()).unwrap().clone()
+    };
+    let (first, other) = (see(&mut rig, &still), see(&mut copy, &moved));
+    assert_ne!(first.labels, other.labels);
+    assert_eq!(see(&mut rig, &still), first);
+    assert_eq!(see(&mut CameraRig::new(&scene, &specimen, &moved).unwrap(), &moved), other);
+}

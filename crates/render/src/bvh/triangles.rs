@@ -64,6 +64,11 @@ impl TriangleTree {
         });
     }
 
+    /// All triangles, neighbours after each other.
+    pub fn order(&self) -> impl Iterator<Item = u32> + '_ {
+        self.blocks.iter().flat_map(|b| b.triangle).filter(|t| *t != NO_CHILD)
+    }
+
     /// The box of all triangles.
     pub fn bounds(&self) -> Bounds {
         self.boxes.nodes.first().map_or(Bounds::EMPTY, bounds_of_node)

@@ -3,9 +3,11 @@
 use crate::bvh::{Bounds, BoxTree, Ray, TriangleTree};
 use crate::light::{Lamp, Light};
 use crate::material::{Appearance, Material};
+use crate::raster::{Clusters, Vec8, View, Visibility};
 use crate::{Error, Result, srgb};
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd};
 use glam::{DVec3, Mat3A, Quat, Vec3A};
+use std::sync::Arc;
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 
@@ -27,9 +29,9 @@ pub struct BodyId(pub(super) usize);
 
 /// Shapes, bodies and lights, rendered through any number of cameras (see [`crate::render`]).
 ///
-/// A *shape* is a surface with its search tree; [`Stage::deform`] refits the tree. A *body* is a
-/// shape at a pose with an appearance and a label; several bodies can share a shape. Positions are
-/// in metres in one world frame.
+/// A *shape* is a surface; [`Stage::deform`] moves its vertices. A *body* is a shape at a pose with
+/// an appearance and a label; several bodies can share a shape. Positions are in metres in one
+/// world frame. A copy of a stage shares its shapes with the original until they deform.
 #[derive(Clone, Debug)]
 pub struct Stage {
     pub(super) shapes: Vec<Shape>,
@@ -39,7 +41,9 @@ pub struct Stage {
     pub(super) entries: Vec<(u32, u32)>,
     lamps: Vec<Lamp>,
     stale: bool,
-    pub(super) level: Level,
+    pub(crate) level: Level,
+    /// Memory for pictures.
+    pub(crate) visibility: Visibility,
     /// Lights, in the world frame.
     pub lights: Vec<Light>,
     /// Linear radiance of the uniform environment.
@@ -48,21 +52,26 @@ pub struct Stage {
 
 #[derive(Clone, Debug)]
 pub(super) struct Shape {
-    pub(super) tree: TriangleTree,
-    positions: Vec<Vec3A>,
-    triangles: Vec<[u32; 3]>,
-    normals: Vec<Vec3A>,
+    pub(super) tree: Arc<TriangleTree>,
+    /// Whether the vertices have moved since the tree was fitted.
+    tree_stale: bool,
+    clusters: Clusters,
+    positions: Arc<Vec<Vec3A>>,
+    triangles: Arc<Vec<[u32; 3]>>,
+    normals: Arc<Vec<Vec3A>>,
     /// Linear colour per vertex; empty if the mesh has none.
-    colors: Vec<Vec3A>,
+    colors: Arc<Vec<Vec3A>>,
 }
 
 #[derive(Clone, Debug)]
 pub(super) struct Body {
     pub(super) shape: usize,
     label: u16,
-    material: Material,
+    /// Number of its first triangle among those of all bodies.
+    first_triangle: u32,
+    material: Arc<Material>,
     /// Material for paths that have bounced before.
-    path_material: Material,
+    path_material: Arc<Material>,
     /// Linear colour, used if the shape has none.
     color: Vec3A,
     /// Whether the pose is the identity.
@@ -71,6 +80,18 @@ pub(super) struct Body {
     /// Inverse rotation.
     pub(super) inverse_rotation: Mat3A,
     pub(super) translation: Vec3A,
+}
+
+/// A body as a camera sees it.
+pub(crate) struct BodyView<'a> {
+    pub clusters: &'a Clusters,
+    /// Number of its first triangle among those of all bodies.
+    pub first_triangle: u32,
+    /// From the shape to the camera.
+    rotation: Mat3A,
+    translation: Vec3A,
+    /// The eye, in the shape's frame.
+    eye: Vec3A,
 }
 
 /// First intersection of a ray with the stage.
@@ -113,6 +134,7 @@ impl Stage {
             lamps: Vec::new(),
             stale: true,
             level: Level::new(),
+            visibility: Visibility::default(),
             lights: Vec::new(),
             environment: [0.0; 3],
         }
@@ -132,13 +154,22 @@ impl Stage {
         let colored = mesh.colors.len() == mesh.vertices.len();
         let colors =
             if colored { mesh.colors.iter().map(|c| srgb::to_linear(*c).into()).collect() } else { Vec::new() };
-        let mut shape = Shape { tree, positions, triangles: mesh.triangles.clone(), normals: Vec::new(), colors };
+        let mut shape = Shape {
+            clusters: Clusters::new(mesh, &positions, tree.order()),
+            tree: Arc::new(tree),
+            tree_stale: false,
+            positions: Arc::new(positions),
+            triangles: Arc::new(mesh.triangles.clone()),
+            normals: Arc::default(),
+            colors: Arc::new(colors),
+        };
         shape.update_normals();
         self.shapes.push(shape);
         Ok(ShapeId(self.shapes.len() - 1))
     }
 
-    /// Moves the vertices of a shape to `positions` (m). The search tree is refitted, not rebuilt.
+    /// Moves the vertices of a shape to `positions` (m). The next picture that casts rays refits the
+    /// search tree; it is not rebuilt.
     ///
     /// # Errors
     /// The shape is unknown, or the number of positions differs from its number of vertices.
@@ -150,10 +181,11 @@ impl Stage {
             let (has, given) = (found.positions.len(), positions.len());
             return Err(Error::Vertices { shape: shape.0, has, given });
         }
-        for (to, from) in found.positions.iter_mut().zip(positions) {
+        for (to, from) in Arc::make_mut(&mut found.positions).iter_mut().zip(positions) {
             *to = from.as_vec3a();
         }
-        found.tree.refit(&found.positions, &found.triangles);
+        found.clusters.follow(&found.positions);
+        found.tree_stale = true;
         found.update_normals();
         self.stale = true;
         Ok(())
@@ -163,16 +195,22 @@ impl Stage {
     /// in label images; 0 means no body.
     ///
     /// # Errors
-    /// The shape is unknown.
+    /// The shape is unknown, or the bodies have 2^32 triangles or more.
     pub fn add_body(&mut self, shape: ShapeId, pose: &Pose, label: u16, appearance: &Appearance) -> Result<BodyId> {
         if shape.0 >= self.shapes.len() {
             return Err(Error::Unknown { what: "shape", index: shape.0, count: self.shapes.len() });
         }
+        let first_triangle = self.triangles();
+        let total = first_triangle + self.shapes[shape.0].triangles.len();
+        if total >= u32::MAX as usize {
+            return Err(Error::TooMany(total));
+        }
         self.bodies.push(Body {
             shape: shape.0,
             label,
-            path_material: Material::new(&appearance.surface.for_paths()),
-            material: Material::new(&appearance.surface),
+            first_triangle: first_triangle as u32,
+            path_material: Arc::new(Material::new(&appearance.surface.for_paths())),
+            material: Arc::new(Material::new(&appearance.surface)),
             color: srgb::to_linear(appearance.color).into(),
             is_identity: true,
             rotation: Mat3A::IDENTITY,
@@ -214,13 +252,22 @@ impl Stage {
         self.bodies.iter().map(|b| self.shapes[b.shape].triangles.len()).sum()
     }
 
-    /// Updates the lamps and the tree over bodies. Large bodies enter the tree with many of their
+    /// Updates the lamps.
+    pub(crate) fn update_lamps(&mut self) {
+        self.lamps.clear();
+        self.lamps.extend(self.lights.iter().map(Lamp::new));
+    }
+
+    /// Updates the trees over triangles and the tree over bodies. Large bodies enter the tree with many of their
     /// nodes, so that a ray need not descend into every body whose box it crosses (Benthin and
     /// others 2017, "Improved Two-Level BVHs using Partial Re-Braiding").
     pub(crate) fn update_acceleration(&mut self) {
-        self.lamps = self.lights.iter().map(Lamp::new).collect();
         if !self.stale {
             return;
+        }
+        for shape in self.shapes.iter_mut().filter(|s| s.tree_stale) {
+            Arc::make_mut(&mut shape.tree).refit(&shape.positions, &shape.triangles);
+            shape.tree_stale = false;
         }
         self.entries.clear();
         let mut bounds = Vec::new();
@@ -246,6 +293,40 @@ impl Stage {
         self.bodies[hit.body as usize].label
     }
 
+    /// The body that triangle `number` belongs to. `guess` is tried first.
+    #[inline]
+    pub(crate) fn body_of(&self, number: u32, guess: usize) -> usize {
+        let body = &self.bodies[guess];
+        let inside = number.checked_sub(body.first_triangle);
+        if inside.is_some_and(|n| (n as usize) < self.shapes[body.shape].triangles.len()) {
+            return guess;
+        }
+        self.bodies.partition_point(|b| b.first_triangle <= number).saturating_sub(1)
+    }
+
+    #[inline]
+    pub(crate) fn label_of(&self, body: usize) -> u16 {
+        self.bodies[body].label
+    }
+
+    #[inline]
+    pub(crate) fn material_of(&self, body: usize) -> &Material {
+        &self.bodies[body].material
+    }
+
+    /// All bodies as a camera sees them.
+    pub(crate) fn bodies_seen_from(&self, view: &View<'_>) -> impl Iterator<Item = BodyView<'_>> {
+        let to_camera = view.rotation.transpose();
+        let origin = view.origin;
+        self.bodies.iter().map(move |body| BodyView {
+            clusters: &self.shapes[body.shape].clusters,
+            first_triangle: body.first_triangle,
+            rotation: to_camera * body.rotation,
+            translation: to_camera * (body.translation - origin),
+            eye: body.inverse_rotation * (origin - body.translation),
+        })
+    }
+
     #[inline]
     pub(crate) fn material(&self, hit: &StageHit) -> &Material {
         &self.bodies[hit.body as usize].material
@@ -263,7 +344,38 @@ impl Stage {
         let body = &self.bodies[hit.body as usize];
         let shape = &self.shapes[body.shape];
         let corners = shape.triangles[hit.triangle as usize].map(|v| v as usize);
-        let (u, v) = (hit.u, hit.v);
+        self.surface_at(body, shape, corners, [hit.u, hit.v], direction)
+    }
+
+    /// The surface point of triangle `number` (among those of all bodies) of a body at parameter
+    /// `t` of a ray that meets the triangle.
+    #[inline]
+    pub(crate) fn surface_along(&self, body: usize, number: u32, origin: Vec3A, direction: Vec3A, t: f32) -> Surface {
+        let body = &self.bodies[body];
+        let shape = &self.shapes[body.shape];
+        let corners = shape.triangles[(number - body.first_triangle) as usize].map(|v| v as usize);
+        let mut p = origin + t * direction;
+        if !body.is_identity {
+            p = body.inverse_rotation * (p - body.translation);
+        }
+        let [a, b, c] = corners.map(|i| shape.positions[i]);
+        let (x, y, p) = (b - a, c - a, p - a);
+        let normal = x.cross(y);
+        let share = 1.0 / normal.length_squared().max(f32::MIN_POSITIVE);
+        let place = [p.cross(y).dot(normal) * share, x.cross(p).dot(normal) * share];
+        self.surface_at(body, shape, corners, place, direction)
+    }
+
+    /// The surface point at barycentric coordinates of the second and third corner.
+    #[inline(always)]
+    fn surface_at(
+        &self,
+        body: &Body,
+        shape: &Shape,
+        corners: [usize; 3],
+        [u, v]: [f32; 2],
+        direction: Vec3A,
+    ) -> Surface {
         let mixed = |of: &[Vec3A]| {
             let [a, b, c] = corners.map(|i| of[i]);
             a + u * (b - a) + v * (c - a)
@@ -288,6 +400,26 @@ impl Stage {
         let smooth = smooth.try_normalize().filter(|n| n.dot(direction) < 0.0).unwrap_or(flat);
         let albedo = if shape.colors.is_empty() { body.color } else { mixed(&shape.colors) };
         Surface { position, flat, smooth, albedo }
+    }
+}
+
+impl BodyView<'_> {
+    /// Points of the shape in the camera frame.
+    #[inline(always)]
+    pub fn to_camera<S: Simd>(&self, _: S, [x, y, z]: Vec8<S>) -> Vec8<S> {
+        let Mat3A { x_axis: a, y_axis: b, z_axis: c } = self.rotation;
+        let t = self.translation;
+        [
+            ((x * a.x + y * b.x) + z * c.x) + t.x,
+            ((x * a.y + y * b.y) + z * c.y) + t.y,
+            ((x * a.z + y * b.z) + z * c.z) + t.z,
+        ]
+    }
+
+    /// Whether the eye may be inside the shape.
+    pub fn holds_eye(&self) -> bool {
+        let Bounds { low, high } = self.clusters.bounds();
+        !(self.eye.cmplt(low).any() || self.eye.cmpgt(high).any())
     }
 }
 
@@ -323,20 +455,21 @@ impl Body {
 impl Shape {
     /// Computes area-weighted vertex normals.
     fn update_normals(&mut self) {
-        self.normals.clear();
-        self.normals.resize(self.positions.len(), Vec3A::ZERO);
-        for triangle in &self.triangles {
+        let normals = Arc::make_mut(&mut self.normals);
+        normals.clear();
+        normals.resize(self.positions.len(), Vec3A::ZERO);
+        for triangle in self.triangles.iter() {
             let [a, b, c] = triangle.map(|v| v as usize);
             if let (Some(p), Some(q), Some(r)) = (self.positions.get(a), self.positions.get(b), self.positions.get(c)) {
                 let normal = (*q - *p).cross(*r - *p);
                 if normal.is_finite() {
                     for v in [a, b, c] {
-                        self.normals[v] += normal;
+                        normals[v] += normal;
                     }
                 }
             }
         }
-        for normal in &mut self.normals {
+        for normal in normals {
             *normal = normal.normalize_or_zero();
         }
     }

@@ -26,6 +26,9 @@ const PATH_FRAMES: usize = 10;
 /// Target of the real-time factor on two cores.
 const TARGET: f64 = 0.5;
 
+/// Every such control period, the pictures are also traced.
+const TRACED_EVERY: usize = 10;
+
 /// Maximum side of a picture (px).
 const MAX_SIZE: usize = 4096;
 
@@ -75,6 +78,13 @@ pub struct EpisodeBenchResult {
     pub pictures_ms: f64,
     /// The rest: policy, jaws, grasp detection, channels (ms).
     pub rest_ms: f64,
+    /// Share of a control period that pictures take: `pictures_ms` over `period_ms`.
+    pub picture_share: f64,
+    /// The same pictures again with a ray per pixel, after every tenth period and outside of all
+    /// other times (ms). The stage is up to date then.
+    pub traced_pictures_ms: f64,
+    /// `traced_pictures_ms` over `pictures_ms`.
+    pub picture_ratio: f64,
     /// Simulated length of a control period (ms).
     pub period_ms: f64,
     /// Number of control periods.
@@ -119,6 +129,7 @@ struct Took {
     arms: f64,
     tissue: f64,
     pictures: f64,
+    traced: f64,
     all: f64,
 }
 
@@ -126,7 +137,7 @@ impl Study for EpisodeBench {
     const NAME: &'static str = "episode";
     const KIND: Kind = Kind::Bench;
     const FOLDER: Option<&'static str> = None;
-    const SCHEMA: u32 = 2;
+    const SCHEMA: u32 = 3;
     type Figures = EpisodeBenchResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(EpisodeBenchResult, Document)> {
@@ -159,6 +170,8 @@ impl Study for EpisodeBench {
         let real_time_factor = median(&mut run_factors.clone());
         let bodies = episode.cell().world().model.bodies();
         let path_720p_ms = (self.samples > 0).then(|| self.path_traced(&episode, &mut rig, progress)).transpose()?;
+        let pictures_ms = ms(|t| t.pictures);
+        let traced_pictures_ms = ms(|t| t.traced);
         let rest_of_period = ms(|t| t.all - t.pictures);
         let with_paths = |frame: f64| period_ms / (rest_of_period + frame * self.cameras.len() as f64);
         let result = EpisodeBenchResult {
@@ -172,7 +185,10 @@ impl Study for EpisodeBench {
             run_factors,
             arms_ms: ms(|t| t.arms),
             tissue_ms: ms(|t| t.tissue),
-            pictures_ms: ms(|t| t.pictures),
+            pictures_ms,
+            picture_share: pictures_ms / period_ms,
+            traced_pictures_ms,
+            picture_ratio: traced_pictures_ms / pictures_ms.max(1e-9),
             rest_ms: ms(|t| t.all - t.arms - t.tissue - t.pictures),
             period_ms,
             periods,
@@ -222,7 +238,8 @@ impl EpisodeBench {
         episode.reset(self.seed)?;
         scripted.begin(episode, self.seed)?;
         let before = episode.cell().timing();
-        let (clock, mut pictures) = (Instant::now(), Duration::ZERO);
+        let (clock, mut pictures, mut traced) = (Instant::now(), Duration::ZERO, Duration::ZERO);
+        let (mut periods, mut traced_periods) = (0_usize, 0_usize);
         'episode: while episode.end().is_none() {
             for action in scripted.act(episode)? {
                 check_interrupted(progress)?;
@@ -233,16 +250,28 @@ impl EpisodeBench {
                     rig.render(episode.cell(), camera, size, &RenderSettings::Preview { shadows: false })?;
                 }
                 pictures += before_pictures.elapsed();
+                if periods.is_multiple_of(TRACED_EVERY) {
+                    let before_traced = Instant::now();
+                    for camera in &self.cameras {
+                        let size = [self.size; 2];
+                        rig.render(episode.cell(), camera, size, &RenderSettings::Traced { shadows: false })?;
+                    }
+                    traced += before_traced.elapsed();
+                    traced_periods += 1;
+                }
+                periods += 1;
                 if ended {
                     break 'episode;
                 }
             }
         }
-        let (all, now) = (clock.elapsed(), episode.cell().timing());
+        let (all, now) = (clock.elapsed() - traced, episode.cell().timing());
         Ok(Took {
             arms: (now.arms - before.arms).as_secs_f64(),
             tissue: (now.tissue - before.tissue).as_secs_f64(),
             pictures: pictures.as_secs_f64(),
+            // As if they had been made in every period.
+            traced: traced.as_secs_f64() * periods as f64 / traced_periods.max(1) as f64,
             all: all.as_secs_f64(),
         })
     }
@@ -285,6 +314,12 @@ fn document(r: &EpisodeBenchResult) -> Document {
             r.machine.described()
         ),
     ];
+    lines.push(format!(
+        "pictures take {}% of a control period; with a ray per pixel {} ms, {} times as long",
+        fixed(100.0 * r.picture_share, 1),
+        fixed(r.traced_pictures_ms, 2),
+        fixed(r.picture_ratio, 1)
+    ));
     if !r.repeatable {
         lines.push("the runs ended in DIFFERENT states".to_owned());
     }

@@ -17,7 +17,9 @@ use std::time::Instant;
 use trocar_camera::{Camera, Endoscope};
 use trocar_cell::Cell;
 use trocar_core::{Pose, Progress};
-use trocar_render::{Appearance, BodyId, Film, Light, RayGenerator, RenderSettings, ShapeId, Stage, render};
+use trocar_render::{
+    Appearance, BodyId, Film, Light, Picture, RayGenerator, RenderSettings, ShapeId, Stage, render, render_into,
+};
 use trocar_report::document::{Document, Section, Table};
 use trocar_report::table::{count, fixed};
 use trocar_scene::Scene;
@@ -62,14 +64,20 @@ pub struct RenderBench {
 pub struct RenderBenchResult {
     /// The cameras of the scene; none without a scene.
     pub cell: Option<CellRow>,
-    /// Median time of a frame of 224 x 224 with colour, depth, labels and hard shadows, after all
-    /// organs deformed and all arms moved: of the first camera of the scene, without a scene of the
-    /// loops of bowel (ms).
+    /// Median time of a frame of 224 x 224 with colour, depth, labels and normals, without shadows,
+    /// as policies see it, after all organs deformed and all arms moved: of the first camera of the
+    /// scene, without a scene of the loops of bowel (ms).
     pub preview_224_ms: f64,
-    /// The same without shadows (ms).
-    pub preview_224_unshadowed_ms: f64,
-    /// Fastest frame with shadows (ms): the speed of an undisturbed machine.
+    /// The same with a ray per pixel, measured in turn with it (ms).
+    pub traced_preview_224_ms: f64,
+    /// `traced_preview_224_ms` over `preview_224_ms`.
+    pub preview_ratio: f64,
+    /// Target of the ratio.
+    pub preview_bar: f64,
+    /// Fastest frame (ms): the speed of an undisturbed machine.
     pub preview_224_best_ms: f64,
+    /// The median with hard shadows (ms).
+    pub preview_224_shadowed_ms: f64,
     /// Median time of updating the stage from the cell; without a scene, of refitting the loops of
     /// bowel (ms).
     pub refit_ms: f64,
@@ -77,10 +85,10 @@ pub struct RenderBenchResult {
     pub triangles: usize,
     /// Triangles of them refitted in each frame.
     pub refitted_triangles: usize,
-    /// Median time of a frame of 224 x 224 of the loops of bowel with hard shadows (ms).
+    /// Median time of a frame of 224 x 224 of the loops of bowel, without shadows (ms).
     pub loops_224_ms: f64,
-    /// The same without shadows (ms).
-    pub loops_224_unshadowed_ms: f64,
+    /// The same with a ray per pixel (ms).
+    pub traced_loops_224_ms: f64,
     /// Building all trees of the loops of bowel (ms).
     pub build_ms: f64,
     /// One frame of 1280 x 720 with `samples` paths per pixel (ms); none with 0 samples.
@@ -117,13 +125,28 @@ pub struct CellRow {
 pub struct CameraRow {
     /// Name of the camera.
     pub camera: String,
-    /// Median time of a frame with shadows, the update of the stage included (ms).
+    /// Median time of a frame without shadows, the update of the stage included (ms).
     pub ms: f64,
-    /// Fastest frame with shadows (ms).
+    /// Fastest such frame (ms).
     pub best_ms: f64,
-    /// Median time of a frame without shadows (ms).
-    pub unshadowed_ms: f64,
+    /// Median time of such a frame with a ray per pixel (ms).
+    pub traced_ms: f64,
+    /// Median time of a frame with hard shadows (ms).
+    pub shadowed_ms: f64,
+    /// Median time of a frame with hard shadows and a ray per pixel (ms).
+    pub traced_shadowed_ms: f64,
 }
+
+/// The kinds of frames, in the order of the columns of [`CameraRow`].
+const KINDS: [RenderSettings; 4] = [
+    RenderSettings::Preview { shadows: false },
+    RenderSettings::Traced { shadows: false },
+    RenderSettings::Preview { shadows: true },
+    RenderSettings::Traced { shadows: true },
+];
+
+/// Target of the time of a traced preview over that of a rasterised one.
+const BAR: f64 = 5.0;
 
 /// The loops of bowel on a stage.
 struct Set {
@@ -132,6 +155,7 @@ struct Set {
     moving: ShapeId,
     instruments: [BodyId; 2],
     view: Pose,
+    picture: Picture,
 }
 
 impl Set {
@@ -150,11 +174,12 @@ impl Set {
         let instruments = [place(false, 101)?, place(true, 102)?];
         stage.lights.push(Light::endoscope(&view, 0.006, 0.11));
         stage.environment = [0.02; 3];
-        Ok(Self { moving: shapes[MOVING], scene, stage, instruments, view })
+        Ok(Self { moving: shapes[MOVING], scene, stage, instruments, view, picture: Picture::default() })
     }
 
-    /// Median and least time of a frame (ms).
-    fn preview(&mut self, shadows: bool) -> Result<(f64, f64)> {
+    /// Times of frames in turn, rasterised and traced (ms): the median of each, and the least of the
+    /// first.
+    fn preview(&mut self) -> Result<([f64; 2], f64)> {
         let Endoscope { camera, .. } = Endoscope::thirty_degrees();
         // The square centre of the endoscope's picture.
         let scale = 224.0 / camera.height as f64;
@@ -169,24 +194,27 @@ impl Set {
         };
         let eye = RayGenerator::new(policy);
         let film = Film::endoscope();
-        let mut times = Vec::with_capacity(FRAMES);
+        let mut times = [Vec::with_capacity(FRAMES), Vec::with_capacity(FRAMES)];
         for frame in 0..FRAMES + FRAMES / 10 {
-            let t = frame as f64 / 30.0;
-            let positions = self.scene.moved(MOVING, t);
-            let poses = [false, true].map(|right| self.scene.instrument_pose(right, t));
-            let clock = Instant::now();
-            self.stage.deform(self.moving, &positions)?;
-            for (body, pose) in self.instruments.iter().zip(&poses) {
-                self.stage.place(*body, pose)?;
-            }
-            let picture = render(&mut self.stage, &eye, &self.view, &RenderSettings::Preview { shadows }, &film);
-            let took = 1e3 * clock.elapsed().as_secs_f64();
-            std::hint::black_box(picture);
-            if frame >= FRAMES / 10 {
-                times.push(took);
+            for (kind, times) in times.iter_mut().enumerate() {
+                let t = (2 * frame + kind) as f64 / 30.0;
+                let positions = self.scene.moved(MOVING, t);
+                let poses = [false, true].map(|right| self.scene.instrument_pose(right, t));
+                let clock = Instant::now();
+                self.stage.deform(self.moving, &positions)?;
+                for (body, pose) in self.instruments.iter().zip(&poses) {
+                    self.stage.place(*body, pose)?;
+                }
+                render_into(&mut self.picture, &mut self.stage, &eye, &self.view, &KINDS[kind], &film);
+                let took = 1e3 * clock.elapsed().as_secs_f64();
+                std::hint::black_box(&self.picture);
+                if frame >= FRAMES / 10 {
+                    times.push(took);
+                }
             }
         }
-        Ok((median(&mut times), times[0]))
+        let [raster, traced] = &mut times;
+        Ok(([median(raster), median(traced)], raster[0]))
     }
 
     fn refit(&mut self) -> Result<f64> {
@@ -205,6 +233,7 @@ impl Study for RenderBench {
     const NAME: &'static str = "render";
     const KIND: Kind = Kind::Bench;
     const FOLDER: Option<&'static str> = None;
+    const SCHEMA: u32 = 2;
     type Figures = RenderBenchResult;
 
     fn run(&self, job: &Job<'_>) -> Result<(RenderBenchResult, Document)> {
@@ -219,8 +248,7 @@ impl Study for RenderBench {
         let clock = Instant::now();
         let mut set = Set::new(self.triangles)?;
         let build_ms = 1e3 * clock.elapsed().as_secs_f64();
-        let (loops_224_ms, loops_best_ms) = set.preview(true)?;
-        let (loops_224_unshadowed_ms, _) = set.preview(false)?;
+        let ([loops_224_ms, traced_loops_224_ms], loops_best_ms) = set.preview()?;
         step()?;
         let loops_refit_ms = set.refit()?;
         step()?;
@@ -232,14 +260,19 @@ impl Study for RenderBench {
         step()?;
         progress.end();
         let first = cell.as_ref().and_then(|c| c.cameras.first());
+        let preview_224_ms = first.map_or(loops_224_ms, |c| c.ms);
+        let traced_preview_224_ms = first.map_or(traced_loops_224_ms, |c| c.traced_ms);
         let result = RenderBenchResult {
-            preview_224_ms: first.map_or(loops_224_ms, |c| c.ms),
-            preview_224_unshadowed_ms: first.map_or(loops_224_unshadowed_ms, |c| c.unshadowed_ms),
+            preview_224_ms,
+            traced_preview_224_ms,
+            preview_ratio: traced_preview_224_ms / preview_224_ms,
+            preview_bar: BAR,
+            preview_224_shadowed_ms: first.map_or(loops_224_ms, |c| c.shadowed_ms),
             preview_224_best_ms: first.map_or(loops_best_ms, |c| c.best_ms),
             refit_ms: cell.as_ref().map_or(loops_refit_ms, |c| c.follow_ms),
             cell,
             loops_224_ms,
-            loops_224_unshadowed_ms,
+            traced_loops_224_ms,
             triangles: set.stage.triangles(),
             refitted_triangles: set.scene.organs[MOVING].triangles.len(),
             build_ms,
@@ -266,8 +299,8 @@ impl RenderBench {
         let mut rig = CameraRig::new(&scene, &specimen, script.cell())?;
         let begin_ms = 1e3 * clock.elapsed().as_secs_f64();
         let names: Vec<String> = scene.cameras.iter().map(|c| c.name.clone()).collect();
-        let mut shadowed = vec![Vec::new(); names.len()];
-        let mut plain = shadowed.clone();
+        // By camera and kind.
+        let mut times = vec![[const { Vec::new() }; KINDS.len()]; names.len()];
         let mut follow = Vec::new();
         for frame in 0..FRAMES + FRAMES / 10 {
             let mut step =
@@ -283,25 +316,30 @@ impl RenderBench {
                 };
             // One camera and one kind per period: everything has moved before each picture.
             let k = frame % names.len().max(1);
-            let see = |shadows: bool| {
-                let camera = &names[k];
-                move |rig: &mut CameraRig, cell: &Cell| -> Result<()> {
-                    std::hint::black_box(rig.render(cell, camera, [224; 2], &RenderSettings::Preview { shadows })?);
-                    Ok(())
+            if let (Some(camera), Some(times)) = (names.get(k), times.get_mut(k)) {
+                for (kind, times) in KINDS.iter().zip(times) {
+                    let mut see = |rig: &mut CameraRig, cell: &Cell| -> Result<()> {
+                        std::hint::black_box(rig.render(cell, camera, [224; 2], kind)?);
+                        Ok(())
+                    };
+                    step(&mut see, times)?;
                 }
-            };
-            if !names.is_empty() {
-                step(&mut see(true), &mut shadowed[k])?;
-                step(&mut see(false), &mut plain[k])?;
             }
             step(&mut |rig, cell| Ok(rig.update(cell)?), &mut follow)?;
         }
-        let rows = names.into_iter().zip(shadowed.iter_mut().zip(&mut plain));
-        let cameras = rows
-            .map(|(camera, (shadowed, plain))| {
-                let ms = median(shadowed);
-                let best_ms = shadowed.first().copied().unwrap_or(ms);
-                CameraRow { camera, ms, best_ms, unshadowed_ms: median(plain) }
+        let cameras = names
+            .into_iter()
+            .zip(&mut times)
+            .map(|(camera, [raster, traced, shadowed, traced_shadowed])| {
+                let ms = median(raster);
+                CameraRow {
+                    camera,
+                    ms,
+                    best_ms: raster.first().copied().unwrap_or(ms),
+                    traced_ms: median(traced),
+                    shadowed_ms: median(shadowed),
+                    traced_shadowed_ms: median(traced_shadowed),
+                }
             })
             .collect();
         let (scene, triangles, follow_ms) = (scene.name, rig.triangles(), median(&mut follow));
@@ -323,8 +361,6 @@ impl RenderBench {
 fn document(r: &RenderBenchResult) -> Document {
     let mut lines = Vec::new();
     let mut rows = Vec::new();
-    let picture =
-        |name: String, shadowed: String, best: String, plain: f64| vec![name, shadowed, best, fixed(plain, 1)];
     if let Some(cell) = &r.cell {
         lines.push(format!(
             "{}: {} triangles, built in {} ms; updated from the cell in {} ms",
@@ -334,10 +370,14 @@ fn document(r: &RenderBenchResult) -> Document {
             fixed(cell.follow_ms, 2)
         ));
         for c in &cell.cameras {
-            rows.push(picture(c.camera.clone(), fixed(c.ms, 1), fixed(c.best_ms, 1), c.unshadowed_ms));
+            let ms = [c.ms, c.best_ms, c.traced_ms].map(|ms| fixed(ms, 2));
+            let shadowed = [fixed(c.traced_ms / c.ms, 1), fixed(c.shadowed_ms, 2), fixed(c.traced_shadowed_ms, 2)];
+            rows.push([c.camera.clone()].into_iter().chain(ms).chain(shadowed).collect::<Vec<_>>());
         }
     }
-    rows.push(picture("loops of bowel".to_owned(), fixed(r.loops_224_ms, 1), String::new(), r.loops_224_unshadowed_ms));
+    let ratio = fixed(r.traced_loops_224_ms / r.loops_224_ms, 1);
+    let loops = ["loops of bowel".to_owned(), fixed(r.loops_224_ms, 2), String::new(), fixed(r.traced_loops_224_ms, 2)];
+    rows.push(loops.into_iter().chain([ratio, String::new(), String::new()]).collect());
     lines.push(format!(
         "loops of bowel: {} triangles, {} of them refitted each frame; all trees built in {} ms; {} threads on {}",
         count(r.triangles),
@@ -364,7 +404,8 @@ fn document(r: &RenderBenchResult) -> Document {
         ]
     });
     let head = ["Rays", "count", "ours (M/s)", "Embree (M/s)", "ratio", "differ", "largest difference (\u{b5}m)"];
-    let pictures = ["224 x 224 pixels", "with shadows (ms)", "best (ms)", "without shadows (ms)"];
+    let pictures =
+        ["224 x 224 pixels", "preview (ms)", "best (ms)", "traced (ms)", "ratio", "with shadows (ms)", "traced (ms)"];
     Document::new("Render", "Cost of pictures")
         .with(Section::new("Previews", "").table(Table::new(pictures, rows)).lines(lines))
         .with(Section::new("Rays on one thread", "").table(Table::new(head, rays.collect())))

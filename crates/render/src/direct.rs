@@ -1,7 +1,8 @@
-//! Direct light without bounces, for policies and live views: tens of pictures per second.
+//! Direct light without bounces on what rays hit: the reference for rasterised previews.
 
 use crate::bvh::Stacks;
 use crate::light::Lamp;
+use crate::material::WRAP_LENGTH;
 use crate::shading_frame::{ShadingFrame, offset};
 use crate::stage::{BundleCandidates, Stage, StageHit, Surface};
 use glam::Vec3A;
@@ -9,7 +10,7 @@ use glam::Vec3A;
 /// A light casts no shadow if its distance to the eye is less than this share of its distance to
 /// the surface. What such a light does not reach is hidden from the eye too, except for a rim at
 /// edges as thin as that share of the depth behind them.
-const BESIDE_EYE_SHARE: f32 = 0.1;
+pub(crate) const BESIDE_EYE_SHARE: f32 = 0.1;
 
 /// A visible surface point and the light it sends to the eye.
 pub(crate) struct VisiblePoint {
@@ -107,8 +108,4 @@ pub(crate) fn light(
 
 /// Share of the distance from a lamp in which an occluder counts. It is below 1 by the rounding
 /// error.
-const SHADOW_RAY_END: f32 = 1.0 - 5e-7;
-
-/// Scattering length at which light reaches half way round (m): the radius of curvature of typical
-/// tissue.
-const WRAP_LENGTH: f32 = 6e-3;
+pub(crate) const SHADOW_RAY_END: f32 = 1.0 - 5e-7;

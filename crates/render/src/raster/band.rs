@@ -1,0 +1,290 @@
+//! A band of rows of the picture: the clusters that it may show, and their triangles.
+
+use super::clusters::{Cluster, Clusters};
+use super::triangle::{Eight, One};
+use super::visibility::View;
+use super::{LANES, splat};
+use crate::rays::TILE;
+use crate::stage::{BodyView, Stage};
+use fearless_simd::{Simd, SimdBase, SimdFloat, SimdMask, f32x8};
+use glam::Vec3A;
+
+/// Images of triangles that are longer than this (px) are sought in tiles of pixels first.
+const SMALL: f32 = 16.0;
+
+/// Places for the vertices of a cluster, a power of two.
+const PLACES: usize = 128;
+
+/// A band of rows.
+pub(super) struct Band<'a> {
+    view: &'a View<'a>,
+    first_row: usize,
+    rows: usize,
+    /// Rays of the band, by axis.
+    rays: [&'a [f32]; 3],
+    depth: &'a mut [f32],
+    triangle: &'a mut [u32],
+    /// Inward normals of planes through the eye between which all rays of the band lie; zero where
+    /// there is no such plane.
+    planes: [Vec3A; 4],
+}
+
+/// Vertices of a cluster in the camera frame, and their image points, by axis.
+struct Corners {
+    place: [[f32; PLACES]; 3],
+    image: [[f32; PLACES]; 2],
+}
+
+impl<'a> Band<'a> {
+    /// The band that starts at `first_row`.
+    pub fn new(view: &'a View<'a>, first_row: usize, depth: &'a mut [f32], triangle: &'a mut [u32]) -> Self {
+        let stride = view.rays.stride();
+        let [x, y, z] = view.rays.axes();
+        let held = first_row * stride..first_row * stride + depth.len();
+        let rays = [&x[held.clone()], &y[held.clone()], &z[held]];
+        let rows = depth.len() / stride;
+        let planes = planes(view, first_row / TILE..(first_row + rows).div_ceil(TILE));
+        Self { view, first_row, rows, rays, depth, triangle, planes }
+    }
+
+    /// Draws all bodies.
+    #[inline(always)]
+    pub fn draw<S: Simd>(&mut self, simd: S, stage: &Stage) {
+        let mut corners = Corners { place: [[0.0; PLACES]; 3], image: [[0.0; PLACES]; 2] };
+        for body in stage.bodies_seen_from(self.view) {
+            let clusters = body.clusters;
+            let culled = clusters.fixed.closed && !body.holds_eye();
+            let spheres = &*clusters.spheres;
+            for first in (0..spheres[0].len()).step_by(LANES) {
+                let mut lanes = self.seen(simd, &body, spheres, first);
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize;
+                    lanes &= lanes - 1;
+                    let cluster = clusters.fixed.clusters[first + lane];
+                    self.move_corners(simd, &body, clusters, cluster, &mut corners);
+                    self.triangles(simd, &body, clusters, cluster, &corners, culled);
+                }
+            }
+        }
+    }
+
+    /// Which of eight clusters may be in the band.
+    #[inline(always)]
+    fn seen<S: Simd>(&self, simd: S, body: &BodyView<'_>, spheres: &[Vec<f32>; 4], first: usize) -> u64 {
+        let centre = body.to_camera(
+            simd,
+            [
+                f32x8::from_slice(simd, &spheres[0][first..first + LANES]),
+                f32x8::from_slice(simd, &spheres[1][first..first + LANES]),
+                f32x8::from_slice(simd, &spheres[2][first..first + LANES]),
+            ],
+        );
+        let radius = f32x8::from_slice(simd, &spheres[3][first..first + LANES]);
+        // The margin covers rounding.
+        let reach = radius * 1.0001 + 1e-6;
+        let zero = splat(simd, 0.0);
+        let mut seen = reach.simd_ge(zero);
+        for plane in &self.planes {
+            let height = (centre[0] * plane.x + centre[1] * plane.y) + centre[2] * plane.z;
+            seen = seen & (height + reach).simd_ge(zero);
+        }
+        seen.to_bitmask()
+    }
+
+    /// Moves the vertices of a cluster into the camera frame and projects them.
+    #[inline(always)]
+    fn move_corners<S: Simd>(
+        &self,
+        simd: S,
+        body: &BodyView<'_>,
+        clusters: &Clusters,
+        cluster: Cluster,
+        corners: &mut Corners,
+    ) {
+        let projection = self.view.rays.projection();
+        let [x, y, z] = &*clusters.vertices;
+        for k in (0..cluster.vertices as usize).step_by(LANES) {
+            let from = cluster.first_vertex as usize + k;
+            let p = [
+                f32x8::from_slice(simd, &x[from..from + LANES]),
+                f32x8::from_slice(simd, &y[from..from + LANES]),
+                f32x8::from_slice(simd, &z[from..from + LANES]),
+            ];
+            let p = body.to_camera(simd, p);
+            let image = projection.project(simd, p);
+            for axis in 0..3 {
+                p[axis].store_slice(&mut corners.place[axis][k..k + LANES]);
+            }
+            for axis in 0..2 {
+                image[axis].store_slice(&mut corners.image[axis][k..k + LANES]);
+            }
+        }
+    }
+
+    /// Draws the triangles of a cluster.
+    #[inline(always)]
+    fn triangles<S: Simd>(
+        &mut self,
+        simd: S,
+        body: &BodyView<'_>,
+        clusters: &Clusters,
+        cluster: Cluster,
+        corners: &Corners,
+        culled: bool,
+    ) {
+        let projection = self.view.rays.projection();
+        let is_straight = projection.bend == 0.0;
+        let last_column = splat(simd, self.view.rays.width() as f32 - 1.0);
+        let (top, bottom) = (self.first_row as f32, (self.first_row + self.rows) as f32 - 1.0);
+        let fixed = &*clusters.fixed;
+        let mut eight = Eight::default();
+        for k in (0..cluster.triangles as usize).step_by(LANES) {
+            let first = cluster.first_triangle as usize + k;
+            let of = [
+                &fixed.corners[0][first..first + LANES],
+                &fixed.corners[1][first..first + LANES],
+                &fixed.corners[2][first..first + LANES],
+            ];
+            let [ua, ub, uc] = gather(simd, &corners.image[0], &of);
+            let [va, vb, vc] = gather(simd, &corners.image[1], &of);
+            let sum = ((ua + ub) + uc) + ((va + vb) + vc);
+            let known = sum.simd_eq(sum);
+            let (low_u, high_u) = (ua.min(ub).min(uc), ua.max(ub).max(uc));
+            let (low_v, high_v) = (va.min(vb).min(vc), va.max(vb).max(vc));
+            let (wide, tall) = (high_u - low_u, high_v - low_v);
+            let slack = (wide * wide + tall * tall) * projection.bend + projection.margin;
+            let low_u = (low_u - slack).ceil().max(splat(simd, 0.0));
+            let high_u = (high_u + slack).floor().min(last_column);
+            let low_v = (low_v - slack).ceil().max(splat(simd, top));
+            let high_v = (high_v + slack).floor().min(splat(simd, bottom));
+            let small = splat(simd, SMALL);
+            let large = wide.simd_gt(small) | tall.simd_gt(small);
+            let boxed = known & low_u.simd_le(high_u) & low_v.simd_le(high_v);
+            let used = (1_u64 << LANES.min(cluster.triangles as usize - k)) - 1;
+            // Lines that are bent much may be anywhere.
+            let loose = if is_straight { !known.to_bitmask() } else { !known.to_bitmask() | large.to_bitmask() };
+            let mut lanes = (boxed.to_bitmask() | loose) & used;
+            if lanes == 0 {
+                continue;
+            }
+            let [xa, xb, xc] = gather(simd, &corners.place[0], &of);
+            let [ya, yb, yc] = gather(simd, &corners.place[1], &of);
+            let [za, zb, zc] = gather(simd, &corners.place[2], &of);
+            let p = [[xa, ya, za], [xb, yb, zb], [xc, yc, zc]];
+            lanes &= eight.prepare(simd, &p, culled, projection.is_flat());
+            if lanes == 0 {
+                continue;
+            }
+            let tiled = large.to_bitmask() | loose;
+            let (low_u, high_u): ([f32; LANES], [f32; LANES]) = (low_u.into(), high_u.into());
+            let (low_v, high_v): ([f32; LANES], [f32; LANES]) = (low_v.into(), high_v.into());
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize & (LANES - 1);
+                lanes &= lanes - 1;
+                let one = eight.one(simd, lane, body.first_triangle + fixed.triangle[first + lane]);
+                if loose >> lane & 1 == 1 {
+                    self.tiles(simd, &one, [0, self.view.rays.width() - 1], [0, self.rows - 1]);
+                    continue;
+                }
+                let columns = [low_u[lane] as usize, high_u[lane] as usize];
+                let rows = [low_v[lane] as usize - self.first_row, high_v[lane] as usize - self.first_row];
+                if tiled >> lane & 1 == 1 {
+                    self.tiles(simd, &one, columns, rows);
+                } else {
+                    self.pixels(simd, &one, columns, rows);
+                }
+            }
+        }
+    }
+
+    /// Tests the pixels of a box, given by first and last column and row of the band.
+    #[inline(always)]
+    fn pixels<S: Simd>(&mut self, simd: S, one: &One<S>, columns: [usize; 2], rows: [usize; 2]) {
+        let stride = self.view.rays.stride();
+        for row in rows[0]..=rows[1] {
+            let mut u = columns[0];
+            while u <= columns[1] {
+                one.test(simd, &self.rays, row * stride + u, self.depth, self.triangle);
+                u += LANES;
+            }
+        }
+    }
+
+    /// Tests the pixels of those tiles in a box that may show the triangle.
+    #[inline(always)]
+    fn tiles<S: Simd>(&mut self, simd: S, one: &One<S>, columns: [usize; 2], rows: [usize; 2]) {
+        let stride = self.view.rays.stride();
+        let tiles = self.view.rays.tiles();
+        for row in rows[0] / TILE..=rows[1] / TILE {
+            let start = (self.first_row / TILE + row) * tiles.stride;
+            let mut first = columns[0] / TILE & !(LANES - 1);
+            while first <= columns[1] / TILE {
+                let at = start + first..start + first + LANES;
+                let zero = splat(simd, 0.0);
+                let (mut low, mut high) = ([zero; 3], [zero; 3]);
+                for axis in 0..3 {
+                    low[axis] = f32x8::from_slice(simd, &tiles.low[axis][at.clone()]);
+                    high[axis] = f32x8::from_slice(simd, &tiles.high[axis][at.clone()]);
+                }
+                let mut met = one.may_meet(simd, &low, &high);
+                while met != 0 {
+                    let column = first + met.trailing_zeros() as usize;
+                    met &= met - 1;
+                    if column < columns[0] / TILE || column > columns[1] / TILE {
+                        continue;
+                    }
+                    let mut v = (row * TILE).max(rows[0]);
+                    while v <= rows[1].min(row * TILE + TILE - 1) {
+                        one.test(simd, &self.rays, v * stride + column * TILE, self.depth, self.triangle);
+                        v += 1;
+                    }
+                }
+                first += LANES;
+            }
+        }
+    }
+}
+
+/// Numbers of eight triangles' corners, by corner.
+#[inline(always)]
+fn gather<S: Simd>(simd: S, from: &[f32; PLACES], of: &[&[u8]; 3]) -> [f32x8<S>; 3] {
+    let mut held = [[0.0; LANES]; 3];
+    for k in 0..3 {
+        for lane in 0..LANES {
+            held[k][lane] = from[of[k][lane] as usize & (PLACES - 1)];
+        }
+    }
+    [f32x8::from_slice(simd, &held[0]), f32x8::from_slice(simd, &held[1]), f32x8::from_slice(simd, &held[2])]
+}
+
+/// Inward normals of the planes through the eye that bound the rays of rows of tiles; zero if some
+/// ray is not clearly ahead.
+fn planes(view: &View<'_>, rows: std::ops::Range<usize>) -> [Vec3A; 4] {
+    let tiles = view.rays.tiles();
+    let (mut low, mut high) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+    for at in rows.start * tiles.stride..rows.end * tiles.stride {
+        let (near, far) = (tiles.low[2][at], tiles.high[2][at]);
+        if near.is_nan() {
+            continue;
+        }
+        if near < 0.05 {
+            return [Vec3A::ZERO; 4];
+        }
+        for k in 0..2 {
+            let (least, most) = (tiles.low[k][at], tiles.high[k][at]);
+            low[k] = low[k].min(least / near).min(least / far);
+            high[k] = high[k].max(most / near).max(most / far);
+        }
+    }
+    if low[0] > high[0] {
+        // No ray at all: an empty cone.
+        return [Vec3A::X, -Vec3A::X, Vec3A::Y, Vec3A::NEG_Z];
+    }
+    [
+        Vec3A::new(1.0, 0.0, -low[0]),
+        Vec3A::new(-1.0, 0.0, high[0]),
+        Vec3A::new(0.0, 1.0, -low[1]),
+        Vec3A::new(0.0, -1.0, high[1]),
+    ]
+    .map(Vec3A::normalize)
+}

@@ -1,0 +1,145 @@
+//! A triangle seen from the eye: the test of eight pixels.
+
+use super::{Vec8, splat};
+use fearless_simd::{Select, Simd, SimdBase, SimdMask, f32x8, u32x8};
+
+/// Eight triangles as seen from the eye, in the camera frame.
+///
+/// The planes through the eye and the edges face inward, and the plane of the triangle faces away
+/// from the eye.
+#[derive(Default)]
+pub(super) struct Eight {
+    pub edges: [[[f32; 8]; 3]; 3],
+    pub plane: [[f32; 8]; 3],
+    /// Distance of the plane from the eye, times the length of its normal.
+    pub offset: [f32; 8],
+    /// Least and greatest depth of the corners.
+    pub near: [f32; 8],
+    pub far: [f32; 8],
+}
+
+/// One triangle in all lanes.
+#[derive(Clone, Copy)]
+pub(super) struct One<S: Simd> {
+    edges: [Vec8<S>; 3],
+    plane: Vec8<S>,
+    offset: f32x8<S>,
+    near: f32x8<S>,
+    far: f32x8<S>,
+    number: u32x8<S>,
+}
+
+impl Eight {
+    /// Prepares triangles of corners `p` (by corner and axis). Returns the lanes that can be seen:
+    /// with `culled`, only triangles that face the eye. Depths of pixels stay between those of the
+    /// corners if `flat`.
+    #[inline(always)]
+    pub fn prepare<S: Simd>(&mut self, simd: S, p: &[Vec8<S>; 3], culled: bool, flat: bool) -> u64 {
+        let zero = splat(simd, 0.0);
+        let [a, b, c] = *p;
+        let plane = cross(minus(b, a), minus(c, a));
+        let offset = dot(a, plane);
+        let front = offset.simd_lt(zero);
+        let seen = if culled { front } else { front | offset.simd_gt(zero) };
+        let lanes = seen.to_bitmask();
+        if lanes == 0 {
+            return 0;
+        }
+        let sign = front.select(splat(simd, -1.0), splat(simd, 1.0));
+        let edges = [cross(b, c), cross(c, a), cross(a, b)];
+        for k in 0..3 {
+            for axis in 0..3 {
+                (edges[k][axis] * sign).store_slice(&mut self.edges[k][axis]);
+            }
+            (plane[k] * sign).store_slice(&mut self.plane[k]);
+        }
+        (offset * sign).store_slice(&mut self.offset);
+        if flat {
+            a[2].min(b[2]).min(c[2]).store_slice(&mut self.near);
+            a[2].max(b[2]).max(c[2]).store_slice(&mut self.far);
+        } else {
+            self.near = [0.0; 8];
+            self.far = [f32::MAX; 8];
+        }
+        lanes
+    }
+
+    #[inline(always)]
+    pub fn one<S: Simd>(&self, simd: S, lane: usize, number: u32) -> One<S> {
+        let zero = splat(simd, 0.0);
+        let (mut edges, mut plane) = ([[zero; 3]; 3], [zero; 3]);
+        for k in 0..3 {
+            for axis in 0..3 {
+                edges[k][axis] = splat(simd, self.edges[k][axis][lane]);
+            }
+            plane[k] = splat(simd, self.plane[k][lane]);
+        }
+        One {
+            edges,
+            plane,
+            offset: splat(simd, self.offset[lane]),
+            near: splat(simd, self.near[lane]),
+            far: splat(simd, self.far[lane]),
+            number: u32x8::splat(simd, number),
+        }
+    }
+}
+
+impl<S: Simd> One<S> {
+    /// Tests the rays of eight pixels, and keeps the triangle where it is the nearest.
+    #[inline(always)]
+    pub fn test(&self, simd: S, rays: &[&[f32]; 3], at: usize, depth: &mut [f32], triangle: &mut [u32]) {
+        let ray = [
+            f32x8::from_slice(simd, &rays[0][at..at + 8]),
+            f32x8::from_slice(simd, &rays[1][at..at + 8]),
+            f32x8::from_slice(simd, &rays[2][at..at + 8]),
+        ];
+        let zero = splat(simd, 0.0);
+        let (e, f, g) = (dot(ray, self.edges[0]), dot(ray, self.edges[1]), dot(ray, self.edges[2]));
+        let inside = e.simd_ge(zero) & f.simd_ge(zero) & g.simd_ge(zero);
+        if !inside.any_true() {
+            return;
+        }
+        let t = (self.offset / dot(ray, self.plane)).max(self.near).min(self.far);
+        let before = f32x8::from_slice(simd, &depth[at..at + 8]);
+        let nearest = inside & t.simd_lt(before) & t.simd_gt(zero);
+        nearest.select(t, before).store_slice(&mut depth[at..at + 8]);
+        let held = u32x8::from_slice(simd, &triangle[at..at + 8]);
+        nearest.select(self.number, held).store_slice(&mut triangle[at..at + 8]);
+    }
+
+    /// For eight tiles of pixels, between `low` and `high` (by axis), whether any of their rays may
+    /// meet the triangle.
+    #[inline(always)]
+    pub fn may_meet(&self, simd: S, low: &Vec8<S>, high: &Vec8<S>) -> u64 {
+        let mut met = f32x8::splat(simd, 0.0).simd_ge(splat(simd, 0.0));
+        for plane in [&self.edges[0], &self.edges[1], &self.edges[2], &self.plane] {
+            let mut most = splat(simd, 0.0);
+            let mut size = splat(simd, 0.0);
+            for axis in 0..3 {
+                let (a, b) = (plane[axis] * low[axis], plane[axis] * high[axis]);
+                most = most + a.simd_gt(b).select(a, b);
+                size = size + a.abs() + b.abs();
+            }
+            met = met & (most + size * 1e-6).simd_ge(splat(simd, 0.0));
+        }
+        met.to_bitmask()
+    }
+}
+
+#[inline(always)]
+pub(crate) fn minus<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+pub(crate) fn dot<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> f32x8<S> {
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+/// The cross product. Exchanging the arguments changes its sign and no other bit, so that an edge
+/// is the same for both of its triangles.
+#[inline(always)]
+pub(crate) fn cross<S: Simd>(a: Vec8<S>, b: Vec8<S>) -> Vec8<S> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

@@ -1,0 +1,249 @@
+//! Rasterised previews against the ray tracer, through every lens.
+
+#![allow(clippy::unwrap_used, reason = "test helpers may panic")]
+
+mod common;
+
+use common::{quad, sphere};
+use glam::{DQuat, DVec3};
+use trocar_camera::{Camera, CameraModel, Distortion, Endoscope, Fisheye};
+use trocar_core::Pose;
+use trocar_geometry::TriMesh;
+use trocar_render::{Appearance, Film, Light, Picture, RayGenerator, RenderSettings, Stage, SurfaceKind, render};
+
+/// Two pictures of the same stage.
+struct Pair {
+    raster: Picture,
+    traced: Picture,
+}
+
+/// How much two pictures differ.
+#[derive(Debug)]
+struct Difference {
+    /// Mean over all pixels and channels, of 255.
+    color: f64,
+    /// Largest, away from edges (m).
+    depth: f32,
+    /// Largest angle between normals, away from edges (rad).
+    normal: f64,
+    /// Share of other labels away from edges.
+    labels: f64,
+    /// Share of other labels everywhere.
+    all_labels: f64,
+    /// Pixels that show a body away from edges.
+    inner: usize,
+}
+
+impl Pair {
+    fn new(stage: &mut Stage, rays: &RayGenerator, pose: &Pose, shadows: bool, film: &Film) -> Self {
+        let raster = render(stage, rays, pose, &RenderSettings::Preview { shadows }, film);
+        let traced = render(stage, rays, pose, &RenderSettings::Traced { shadows }, film);
+        Self { raster, traced }
+    }
+
+    fn difference(&self) -> Difference {
+        let Self { raster, traced } = self;
+        let (width, height) = (traced.color.width, traced.color.height);
+        let bytes = |p: &Picture| p.color.pixels.as_flattened().to_vec();
+        let apart = bytes(raster).into_iter().zip(bytes(traced)).map(|(a, b)| f64::from(a.abs_diff(b))).sum::<f64>();
+        let mut found = Difference {
+            color: apart / (3 * width * height) as f64,
+            depth: 0.0,
+            normal: 0.0,
+            labels: 0.0,
+            all_labels: 0.0,
+            inner: 0,
+        };
+        let differs = |i: usize| usize::from(raster.labels[i] != traced.labels[i]);
+        let mut other = 0;
+        for v in 1..height - 1 {
+            for u in 1..width - 1 {
+                let i = v * width + u;
+                let (z, label) = (traced.depth.depth[i], traced.labels[i]);
+                // An edge: a neighbour has another label, or a depth that differs by a twentieth.
+                let around =
+                    [i - width - 1, i - width, i - width + 1, i - 1, i + 1, i + width - 1, i + width, i + width + 1];
+                let is_edge =
+                    |j: &usize| traced.labels[*j] != label || (traced.depth.depth[*j] - z).abs() > 0.05 * z.abs();
+                if around.iter().any(|j| is_edge(j)) {
+                    continue;
+                }
+                found.inner += usize::from(label != 0);
+                other += differs(i);
+                if raster.labels[i] == label && label != 0 {
+                    found.depth = found.depth.max((raster.depth.depth[i] - z).abs());
+                    let [a, b] = [raster, traced].map(|p| DVec3::from(p.normals[i].map(f64::from)));
+                    found.normal = found.normal.max(a.angle_between(b));
+                }
+            }
+        }
+        found.labels = other as f64 / found.inner.max(1) as f64;
+        found.all_labels = (0..width * height).map(differs).sum::<usize>() as f64 / (width * height) as f64;
+        found
+    }
+}
+
+fn lenses() -> Vec<(&'static str, CameraModel)> {
+    let camera = Camera::centred(203, 150, 1.2);
+    let barrel = Distortion([-0.28, 0.09, 1.2e-3, -1.1e-4, -0.012, 0.0, 0.0, 0.0]);
+    let rational = Distortion([0.5479, -0.0210, -7.21e-5, 2.06e-5, -0.00265, 0.8897, 0.0861, -0.0139]);
+    let policy = |camera: Camera| {
+        let scale = 224.0 / camera.height as f64;
+        let (fx, fy) = (camera.fx * scale, camera.fy * scale);
+        Camera { width: 224, height: 224, fx, fy, cx: 111.5, cy: 111.5, ..camera }
+    };
+    let wide = Camera { fx: 75.0, fy: 75.0, ..camera };
+    vec![
+        ("pinhole", camera.into()),
+        ("endoscope", policy(Endoscope::thirty_degrees().camera).into()),
+        ("d405", policy(Camera::d405()).into()),
+        ("barrel", Camera { distortion: barrel, ..camera }.into()),
+        ("rational", Camera { distortion: rational, ..policy(Camera::d405()) }.into()),
+        ("fisheye", CameraModel::Fisheye(camera, Fisheye([-0.02, 0.003, 0.0, 0.0]))),
+        ("fisheye of 190 degrees", CameraModel::Fisheye(wide, Fisheye([-0.01, 0.001, 0.0, 0.0]))),
+    ]
+}
+
+/// Bowls, balls, rods and a floor around the origin: large triangles beside small ones, open and
+/// closed shapes, every kind of surface.
+fn stage() -> Stage {
+    let mut stage = Stage::new();
+    let coat = |scattering_length| SurfaceKind::Coated { roughness: 0.35, ior: 1.4, scattering_length };
+    let looks = [
+        Appearance::tissue([190, 90, 80]),
+        Appearance::steel(),
+        Appearance { color: [90, 160, 120], surface: coat([0.0; 3]) },
+        Appearance::matte([220, 200, 120]),
+    ];
+    let bumpy = |rings: u32| {
+        let mut mesh = sphere(DVec3::ZERO, 0.03, rings);
+        for p in &mut mesh.vertices {
+            *p *= 1.0 + 0.1 * (90.0 * p.x).sin() * (70.0 * p.y).cos();
+        }
+        mesh
+    };
+    let fine = stage.add_shape(&bumpy(120)).unwrap();
+    let coarse = stage.add_shape(&bumpy(14)).unwrap();
+    let mut bowl = bumpy(40);
+    bowl.triangles.retain(|t| t.iter().all(|v| bowl.vertices[*v as usize].z > -0.005));
+    let bowl = stage.add_shape(&bowl).unwrap();
+    let rod =
+        TriMesh { vertices: bumpy(20).vertices.iter().map(|p| *p * DVec3::new(0.1, 0.1, 4.0)).collect(), ..bumpy(20) };
+    let rod = stage.add_shape(&rod).unwrap();
+    for i in 0..24_u16 {
+        let turn = DQuat::from_rotation_y(2.4 * f64::from(i)) * DQuat::from_rotation_x(1.1 * f64::from(i));
+        let pose = Pose { rotation: turn, translation: turn * DVec3::new(0.02, 0.0, 0.09 + 0.006 * f64::from(i)) };
+        let shape = [fine, coarse, bowl, rod][usize::from(i) % 4];
+        stage.add_body(shape, &pose, i + 1, &looks[usize::from(i / 4) % 4]).unwrap();
+    }
+    let floor = quad(DVec3::new(-2.0, -2.0, 0.33), 4.0 * DVec3::X, 4.0 * DVec3::Y);
+    stage.add_mesh(&floor, 90, &looks[3]).unwrap();
+    stage.environment = [0.06, 0.05, 0.05];
+    stage
+}
+
+fn poses() -> Vec<Pose> {
+    let askew = DQuat::from_rotation_x(0.4) * DQuat::from_rotation_z(0.3);
+    vec![
+        Pose::IDENTITY,
+        Pose { rotation: askew, translation: DVec3::new(0.01, -0.02, 0.005) },
+        Pose::look_at(DVec3::new(0.3, 0.1, -0.1), DVec3::ZERO, DVec3::Z),
+        Pose::look_at(DVec3::new(-0.05, 0.28, 0.05), DVec3::new(0.0, 0.0, 0.1), DVec3::Z),
+    ]
+}
+
+#[test]
+fn raster_equals_traced_through_every_lens() {
+    let mut stage = stage();
+    for (name, model) in lenses() {
+        for (k, pose) in poses().iter().enumerate() {
+            stage.lights = vec![
+                Light::endoscope(pose, 0.0025, 0.12),
+                Light::Panel {
+                    corner: DVec3::new(-0.5, -0.5, -0.9),
+                    along: DVec3::X,
+                    across: DVec3::Y,
+                    radiance: [0.8, 0.9, 1.0],
+                },
+            ];
+            for rays in [RayGenerator::new(model), RayGenerator::new(model).with_circular_image(0.8)] {
+                let pair = Pair::new(&mut stage, &rays, pose, false, &Film::endoscope());
+                let found = pair.difference();
+                let at = format!("{name}, pose {k}: {found:?}");
+                assert!(found.color < 0.2, "{at}");
+                assert!(found.depth < 1e-5 && found.normal < 0.02, "{at}");
+                assert!(found.labels == 0.0 && found.all_labels < 5e-4, "{at}");
+                assert!(found.inner > 1500, "{at}");
+            }
+        }
+    }
+}
+
+#[test]
+fn shadows_equal_traced_shadows() {
+    let mut stage = stage();
+    stage.lights = vec![Light::Panel {
+        corner: DVec3::new(-0.5, 0.1, -0.9),
+        along: DVec3::X,
+        across: DVec3::Y,
+        radiance: [6.0; 3],
+    }];
+    let rays = RayGenerator::new(Camera::centred(203, 150, 1.2));
+    for pose in poses() {
+        let with = Pair::new(&mut stage, &rays, &pose, true, &Film::default());
+        let without = Pair::new(&mut stage, &rays, &pose, false, &Film::default());
+        assert!(with.difference().color < 0.3, "{:?}", with.difference());
+        let shadow = Pair { raster: with.raster, traced: without.raster };
+        assert!(shadow.difference().color > 1.0, "there are shadows: {:?}", shadow.difference());
+    }
+}
+
+#[test]
+fn deformed_bodies_are_where_rays_meet_them() {
+    let mut stage = Stage::new();
+    let rest = sphere(DVec3::new(0.0, 0.0, 0.2), 0.06, 60);
+    let (shape, _) = stage.add_mesh(&rest, 1, &Appearance::tissue([180, 80, 70])).unwrap();
+    stage.lights = vec![Light::endoscope(&Pose::IDENTITY, 0.0025, 0.12)];
+    let rays = RayGenerator::new(Camera::centred(160, 120, 1.2));
+    for frame in 0..4 {
+        let t = f64::from(frame);
+        let bent: Vec<DVec3> =
+            rest.vertices.iter().map(|p| *p + DVec3::new(0.03 * (40.0 * p.y + t).sin(), 0.01 * t, 0.0)).collect();
+        stage.deform(shape, &bent).unwrap();
+        let copy = stage.clone();
+        let found = Pair::new(&mut stage, &rays, &Pose::IDENTITY, false, &Film::default()).difference();
+        assert!(found.color < 0.1 && found.depth < 1e-5 && found.labels == 0.0, "{found:?}");
+        // A copy shares shapes until one of the two deforms.
+        let mut copy = copy;
+        let before = render(&mut copy, &rays, &Pose::IDENTITY, &RenderSettings::preview(), &Film::default());
+        stage.deform(shape, &rest.vertices).unwrap();
+        let after = render(&mut copy, &rays, &Pose::IDENTITY, &RenderSettings::preview(), &Film::default());
+        assert!(before == after);
+    }
+}
+
+#[test]
+fn eye_inside_of_a_closed_body_sees_its_inside() {
+    let mut stage = Stage::new();
+    stage.add_mesh(&sphere(DVec3::ZERO, 0.1, 30), 1, &Appearance::matte([200; 3])).unwrap();
+    stage.lights = vec![Light::endoscope(&Pose::IDENTITY, 0.0025, 0.12)];
+    for (name, model) in lenses() {
+        let rays = RayGenerator::new(model);
+        let found = Pair::new(&mut stage, &rays, &Pose::IDENTITY, false, &Film::default());
+        assert!(found.raster.labels.iter().all(|l| *l == 1), "{name}");
+        assert!(found.difference().depth < 1e-5, "{name}: {:?}", found.difference());
+    }
+}
+
+#[test]
+fn raster_does_not_depend_on_thread_count() {
+    let picture = |threads: usize| {
+        let mut stage = stage();
+        stage.lights = vec![Light::endoscope(&Pose::IDENTITY, 0.03, 0.12)];
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let rays = RayGenerator::new(Camera::centred(301, 207, 1.2));
+        pool.install(|| render(&mut stage, &rays, &Pose::IDENTITY, &RenderSettings::preview(), &Film::endoscope()))
+    };
+    let one = picture(1);
+    assert!(one == picture(2) && one == picture(5));
+}
