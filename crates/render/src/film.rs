@@ -2,7 +2,7 @@
 
 use crate::random::{normal, numbers};
 use crate::rays::RayGenerator;
-use crate::srgb;
+use crate::srgb::Encoder;
 
 /// Response of the image sensor and its electronics.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,22 +44,28 @@ impl Film {
         Self { exposure: 1.0, vignette: 0.45, shoulder: 0.7, noise: None }
     }
 
-    /// The sRGB colour of pixel (`u`, `v`) with linear radiance `light`.
-    pub(crate) fn develop(&self, rays: &RayGenerator, [u, v]: [usize; 2], light: [f32; 3]) -> [u8; 3] {
-        let gain = self.exposure * (1.0 - self.vignette * rays.eccentricity_squared(u, v)).max(0.0);
-        let mut values = light.map(|l| l * gain);
-        if let Some(noise) = self.noise {
-            let [a, b, c, d] = numbers([(v * rays.width() + u) as u32, noise.frame, 0x6e6f_6973, noise.seed]);
-            let ([x, y], [z, _]) = (normal(a, b), normal(c, d));
-            for (value, n) in values.iter_mut().zip([x, y, z]) {
-                let variance = noise.read * noise.read + noise.shot * noise.shot * value.max(0.0);
-                *value += n * variance.sqrt();
+    /// The sRGB colours of row `v` of a picture with linear radiance `light`.
+    pub(crate) fn develop(&self, rays: &RayGenerator, v: usize, light: &[[f32; 3]], colors: &mut [[u8; 3]]) {
+        let encoder = Encoder::new();
+        let knee = self.shoulder.clamp(0.0, 1.0);
+        for (u, (color, light)) in colors.iter_mut().zip(light).enumerate() {
+            let gain = self.exposure * (1.0 - self.vignette * rays.eccentricity_squared(u, v)).max(0.0);
+            let mut values = [light[0] * gain, light[1] * gain, light[2] * gain];
+            if let Some(noise) = self.noise {
+                let [a, b, c, d] = numbers([(v * rays.width() + u) as u32, noise.frame, 0x6e6f_6973, noise.seed]);
+                let ([x, y], [z, _]) = (normal(a, b), normal(c, d));
+                for (value, n) in values.iter_mut().zip([x, y, z]) {
+                    let variance = noise.read * noise.read + noise.shot * noise.shot * value.max(0.0);
+                    *value += n * variance.sqrt();
+                }
+            }
+            for k in 0..3 {
+                let above = values[k] - knee;
+                let bent = above > 0.0 && knee < 1.0;
+                let rest = 1.0 - knee;
+                let value = if bent { knee + rest * (1.0 - (-above / rest).exp()) } else { values[k] };
+                color[k] = encoder.encode(value);
             }
         }
-        let knee = self.shoulder.clamp(0.0, 1.0);
-        srgb::from_linear(values.map(|v| {
-            let above = v - knee;
-            if above <= 0.0 || knee >= 1.0 { v } else { knee + (1.0 - knee) * (1.0 - (-above / (1.0 - knee)).exp()) }
-        }))
     }
 }

@@ -177,9 +177,7 @@ impl Rows<'_> {
     fn develop(&mut self, film: &Film, rays: &RayGenerator, first: usize) {
         let width = rays.width();
         for (row, (color, light)) in self.color.chunks_mut(width).zip(self.light.chunks(width)).enumerate() {
-            for (u, (color, light)) in color.iter_mut().zip(light).enumerate() {
-                *color = film.develop(rays, [u, first + row], *light);
-            }
+            film.develop(rays, first + row, light, color);
         }
     }
 }

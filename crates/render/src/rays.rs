@@ -115,6 +115,7 @@ impl RayGenerator {
     }
 
     /// Ray through the centre of pixel (`u`, `v`); NaN where nothing is visible.
+    #[inline]
     pub(crate) fn through(&self, u: usize, v: usize) -> Vec3A {
         let at = v * self.stride + u;
         let [x, y, z] = &self.centres;
@@ -122,6 +123,7 @@ impl RayGenerator {
     }
 
     /// Ray through the centre of a pixel; `None` where nothing is visible.
+    #[inline]
     pub(crate) fn centre(&self, pixel: usize) -> Option<Vec3A> {
         let ray = self.through(pixel % self.width, pixel / self.width);
         ray.is_finite().then_some(ray)
@@ -145,6 +147,7 @@ impl RayGenerator {
 
     /// Squared distance of a pixel from the image centre, 1 at the rim of the circular image or at
     /// the corner of a rectangular one.
+    #[inline]
     pub(crate) fn eccentricity_squared(&self, u: usize, v: usize) -> f32 {
         let (width, height) = (self.width as f32, self.height as f32);
         let rim = self.circle.map_or(0.25 * (width * width + height * height), |radius| radius * radius);
@@ -155,6 +158,7 @@ impl RayGenerator {
         self.distance_squared(pixel % self.width, pixel / self.width)
     }
 
+    #[inline]
     fn distance_squared(&self, u: usize, v: usize) -> f32 {
         let x = u as f32 - 0.5 * (self.width as f32 - 1.0);
         let y = v as f32 - 0.5 * (self.height as f32 - 1.0);

@@ -17,9 +17,12 @@ pub fn to_linear(color: [u8; 3]) -> [f32; 3] {
 /// Number of entries of the start table.
 const STEPS: usize = 4096;
 
-/// Least linear light that maps to each 8-bit value.
-static LEAST_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
+/// Least linear light that maps to each 8-bit value; the last is beyond all light.
+static LEAST_LIGHT: LazyLock<[f32; 257]> = LazyLock::new(|| {
     std::array::from_fn(|value| {
+        if value > 255 {
+            return f32::INFINITY;
+        }
         // The bit patterns of floats in [0, 1] are ordered like their values.
         let (mut low, mut high) = (0, 1.0_f32.to_bits());
         while low < high {
@@ -37,19 +40,33 @@ static LEAST_LIGHT: LazyLock<[f32; 256]> = LazyLock::new(|| {
 /// 8-bit value at the start of each table step.
 static START: LazyLock<Vec<u8>> = LazyLock::new(|| (0..=STEPS).map(|i| encode(i as f32 / STEPS as f32)).collect());
 
-/// The 8-bit sRGB colour nearest to linear light. Values outside [0, 1] are clipped. Table lookup
-/// avoids the slow power function.
+/// The 8-bit sRGB colour nearest to linear light. Values outside [0, 1] are clipped.
 pub fn from_linear(light: [f32; 3]) -> [u8; 3] {
-    let (start, least) = (&*START, &*LEAST_LIGHT);
-    light.map(|l| {
+    let encoder = Encoder::new();
+    light.map(|l| encoder.encode(l))
+}
+
+/// Tables that avoid the slow power function.
+#[derive(Clone, Copy)]
+pub(crate) struct Encoder {
+    start: &'static [u8],
+    least: &'static [f32; 257],
+}
+
+impl Encoder {
+    pub fn new() -> Self {
+        Self { start: &START, least: &LEAST_LIGHT }
+    }
+
+    /// The 8-bit value of linear light, see [`from_linear`].
+    #[inline(always)]
+    pub fn encode(&self, l: f32) -> u8 {
         // NaN maps to black.
         let l = if l > 0.0 { l.min(1.0) } else { 0.0 };
-        let mut value = start[(l * STEPS as f32) as usize];
-        while value < 255 && l >= least[usize::from(value) + 1] {
-            value += 1;
-        }
-        value
-    })
+        let value = self.start[(l * STEPS as f32) as usize];
+        // A step of the table is shorter than the least distance between two values.
+        value + u8::from(l >= self.least[usize::from(value) + 1])
+    }
 }
 
 fn encode(l: f32) -> u8 {

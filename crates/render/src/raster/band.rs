@@ -12,6 +12,10 @@ use glam::Vec3A;
 /// Images of triangles that are longer than this (px) are sought in tiles of pixels first.
 const SMALL: f32 = 16.0;
 
+/// Triangles whose boxes have at most so many pixels are tested eight at a time, the others by
+/// eight pixels at a time. A power of two.
+const TINY: usize = 4;
+
 /// Places for the vertices of a cluster, a power of two.
 const PLACES: usize = 128;
 
@@ -137,7 +141,6 @@ impl<'a> Band<'a> {
         let last_column = splat(simd, self.view.rays.width() as f32 - 1.0);
         let (top, bottom) = (self.first_row as f32, (self.first_row + self.rows) as f32 - 1.0);
         let fixed = &*clusters.fixed;
-        let mut eight = Eight::default();
         for k in (0..cluster.triangles as usize).step_by(LANES) {
             let first = cluster.first_triangle as usize + k;
             let of = [
@@ -171,13 +174,27 @@ impl<'a> Band<'a> {
             let [ya, yb, yc] = gather(simd, &corners.place[1], &of);
             let [za, zb, zc] = gather(simd, &corners.place[2], &of);
             let p = [[xa, ya, za], [xb, yb, zb], [xc, yc, zc]];
-            lanes &= eight.prepare(simd, &p, culled, projection.is_flat());
+            let (eight, facing) = Eight::new(simd, &p, culled, projection.is_flat());
+            lanes &= facing;
             if lanes == 0 {
                 continue;
             }
+            let one = splat(simd, 1.0);
+            let (columns, rows) = (high_u - low_u + one, high_v - low_v + one);
+            let few = (columns * rows).simd_le(splat(simd, TINY as f32)).to_bitmask();
             let tiled = large.to_bitmask() | loose;
             let (low_u, high_u): ([f32; LANES], [f32; LANES]) = (low_u.into(), high_u.into());
             let (low_v, high_v): ([f32; LANES], [f32; LANES]) = (low_v.into(), high_v.into());
+            let tiny = few & lanes & !loose;
+            if tiny != 0 {
+                let numbers = (body.first_triangle, &fixed.triangle[first..first + LANES]);
+                self.tiny(simd, &eight, tiny, [&low_u, &high_u, &low_v, &high_v], numbers);
+                lanes &= !tiny;
+                if lanes == 0 {
+                    continue;
+                }
+            }
+            let eight = eight.store();
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize & (LANES - 1);
                 lanes &= lanes - 1;
@@ -192,6 +209,61 @@ impl<'a> Band<'a> {
                     self.tiles(simd, &one, columns, rows);
                 } else {
                     self.pixels(simd, &one, columns, rows);
+                }
+            }
+        }
+    }
+
+    /// Tests triangles in lanes `lanes` whose boxes (first and last column, first and last row) have
+    /// at most [`TINY`] pixels: one pixel of each at a time.
+    #[inline(always)]
+    fn tiny<S: Simd>(
+        &mut self,
+        simd: S,
+        eight: &Eight<S>,
+        lanes: u64,
+        [low_u, high_u, low_v, high_v]: [&[f32; LANES]; 4],
+        (first, numbers): (u32, &[u32]),
+    ) {
+        let stride = self.view.rays.stride();
+        // A place without a ray, for lanes that are done.
+        let none = stride - 1;
+        let mut places = [[none; LANES]; TINY];
+        let mut most = 0;
+        let mut left = lanes;
+        while left != 0 {
+            let lane = left.trailing_zeros() as usize & (LANES - 1);
+            left &= left - 1;
+            let (u, v) = (low_u[lane] as usize, low_v[lane] as usize - self.first_row);
+            let columns = (high_u[lane] as usize - u).min(TINY - 1) + 1;
+            let rows = (high_v[lane] as usize - self.first_row - v).min(TINY - 1) + 1;
+            let mut at = 0;
+            for row in v..v + rows {
+                for column in u..u + columns {
+                    places[at & (TINY - 1)][lane] = row * stride + column;
+                    at += 1;
+                }
+            }
+            most = most.max(at.min(TINY));
+        }
+        for places in &places[..most] {
+            let mut ray = [[0.0; LANES]; 3];
+            for axis in 0..3 {
+                for lane in 0..LANES {
+                    ray[axis][lane] = self.rays[axis][places[lane]];
+                }
+            }
+            let ray =
+                [f32x8::from_slice(simd, &ray[0]), f32x8::from_slice(simd, &ray[1]), f32x8::from_slice(simd, &ray[2])];
+            let (met, t) = eight.test(simd, &ray);
+            let mut met = met & lanes;
+            while met != 0 {
+                let lane = met.trailing_zeros() as usize & (LANES - 1);
+                met &= met - 1;
+                let at = places[lane];
+                if t[lane] < self.depth[at] {
+                    self.depth[at] = t[lane];
+                    self.triangle[at] = first + numbers[lane];
                 }
             }
         }

@@ -343,8 +343,9 @@ impl Stage {
     pub(crate) fn surface(&self, hit: &StageHit, direction: Vec3A) -> Surface {
         let body = &self.bodies[hit.body as usize];
         let shape = &self.shapes[body.shape];
-        let corners = shape.triangles[hit.triangle as usize].map(|v| v as usize);
-        self.surface_at(body, shape, corners, [hit.u, hit.v], direction)
+        let corners = shape.corners(hit.triangle);
+        let places = Corners::of(&shape.positions, corners);
+        self.surface_at(body, shape, corners, places, [hit.u, hit.v], direction)
     }
 
     /// The surface point of triangle `number` (among those of all bodies) of a body at parameter
@@ -353,17 +354,17 @@ impl Stage {
     pub(crate) fn surface_along(&self, body: usize, number: u32, origin: Vec3A, direction: Vec3A, t: f32) -> Surface {
         let body = &self.bodies[body];
         let shape = &self.shapes[body.shape];
-        let corners = shape.triangles[(number - body.first_triangle) as usize].map(|v| v as usize);
+        let corners = shape.corners(number - body.first_triangle);
         let mut p = origin + t * direction;
         if !body.is_identity {
             p = body.inverse_rotation * (p - body.translation);
         }
-        let [a, b, c] = corners.map(|i| shape.positions[i]);
-        let (x, y, p) = (b - a, c - a, p - a);
+        let places = Corners::of(&shape.positions, corners);
+        let (x, y, p) = (places.1 - places.0, places.2 - places.0, p - places.0);
         let normal = x.cross(y);
         let share = 1.0 / normal.length_squared().max(f32::MIN_POSITIVE);
-        let place = [p.cross(y).dot(normal) * share, x.cross(p).dot(normal) * share];
-        self.surface_at(body, shape, corners, place, direction)
+        let at = [p.cross(y).dot(normal) * share, x.cross(p).dot(normal) * share];
+        self.surface_at(body, shape, corners, places, at, direction)
     }
 
     /// The surface point at barycentric coordinates of the second and third corner.
@@ -373,17 +374,13 @@ impl Stage {
         body: &Body,
         shape: &Shape,
         corners: [usize; 3],
-        [u, v]: [f32; 2],
+        places: Corners,
+        at: [f32; 2],
         direction: Vec3A,
     ) -> Surface {
-        let mixed = |of: &[Vec3A]| {
-            let [a, b, c] = corners.map(|i| of[i]);
-            a + u * (b - a) + v * (c - a)
-        };
-        let [a, b, c] = corners.map(|i| shape.positions[i]);
-        let mut position = a + u * (b - a) + v * (c - a);
-        let mut flat = (b - a).cross(c - a);
-        let mut smooth = mixed(&shape.normals);
+        let mut position = places.mixed(at);
+        let mut flat = (places.1 - places.0).cross(places.2 - places.0);
+        let mut smooth = Corners::of(&shape.normals, corners).mixed(at);
         if !body.is_identity {
             position = body.rotation * position + body.translation;
             flat = body.rotation * flat;
@@ -398,8 +395,25 @@ impl Stage {
         }
         // An interpolated normal can face away from the eye; the triangle's normal replaces it.
         let smooth = smooth.try_normalize().filter(|n| n.dot(direction) < 0.0).unwrap_or(flat);
-        let albedo = if shape.colors.is_empty() { body.color } else { mixed(&shape.colors) };
+        let albedo = if shape.colors.is_empty() { body.color } else { Corners::of(&shape.colors, corners).mixed(at) };
         Surface { position, flat, smooth, albedo }
+    }
+}
+
+/// A vector at each corner of a triangle.
+#[derive(Clone, Copy)]
+struct Corners(Vec3A, Vec3A, Vec3A);
+
+impl Corners {
+    #[inline(always)]
+    fn of(all: &[Vec3A], corners: [usize; 3]) -> Self {
+        Self(all[corners[0]], all[corners[1]], all[corners[2]])
+    }
+
+    #[inline(always)]
+    fn mixed(&self, [u, v]: [f32; 2]) -> Vec3A {
+        let Self(a, b, c) = *self;
+        a + u * (b - a) + v * (c - a)
     }
 }
 
@@ -453,6 +467,12 @@ impl Body {
 }
 
 impl Shape {
+    #[inline(always)]
+    fn corners(&self, triangle: u32) -> [usize; 3] {
+        let [a, b, c] = self.triangles[triangle as usize];
+        [a as usize, b as usize, c as usize]
+    }
+
     /// Computes area-weighted vertex normals.
     fn update_normals(&mut self) {
         let normals = Arc::make_mut(&mut self.normals);
