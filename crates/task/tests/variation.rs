@@ -110,5 +110,5 @@ fn a_replay_draws_nothing() {
     let end = bytes.iter().position(|b| *b == b'\n').unwrap();
     let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":2", "\"version\":1");
     let said = EpisodeFile::parse(&[header.as_bytes(), &bytes[end..]].concat()).unwrap_err();
-    assert!(said.contains("version 1; trocar-episode version 2 is read"), "{said}");
+    assert!(said.contains("version 1; trocar-episode version 3 is read"), "{said}");
 }

@@ -1,5 +1,5 @@
 //! Reads and commands of one arm, in the words of the Collaborative Robotics Toolkit (CRTK).
-//! Commands are taken at once and carried out by [`Cell::advance`] or the next [`Cell::step`].
+//! Commands are taken at once and carried out by the next [`Cell::step`].
 
 use super::Cell;
 use super::arm::{ArmUnit, Wanted};

@@ -207,13 +207,11 @@ impl IdealState {
 }
 
 impl DriveState {
-    /// Feeds every bit to a hash.
-    pub fn hash_into(&self, hash: &mut xxhash_rust::xxh3::Xxh3) {
+    /// Every number of it.
+    pub fn numbers(&self) -> Vec<f64> {
         match self {
-            // A printed number is the shortest text that reads back as the same bits. The names of
-            // fields in the text are part of the hash: see `Debug` of the controller's memory.
-            Self::Dynamic(state) => hash.update(format!("{state:?}").as_bytes()),
-            Self::Ideal(state) => state.numbers().iter().for_each(|n| hash.update(&n.to_bits().to_le_bytes())),
+            Self::Dynamic(state) => state.numbers().collect(),
+            Self::Ideal(state) => state.numbers(),
         }
     }
 }

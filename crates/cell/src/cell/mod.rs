@@ -43,9 +43,8 @@ pub use state::CellState;
 pub use workspace::{FreeSpace, PortSpace, Reached, Workspace};
 
 use crate::{Error, Result, World};
-use arm::{ArmUnit, Wanted};
+use arm::ArmUnit;
 use rules::Edges;
-use setpoint::NUMBERS;
 use std::time::Duration;
 use trocar_scene::{SafetyRules, Scene};
 use trocar_specimen::Specimen;
@@ -147,28 +146,6 @@ impl Cell {
             rules: scene.safety.rules,
             timing: Timing::default(),
         })
-    }
-
-    /// Does one control period.
-    ///
-    /// # Errors
-    /// An action that cannot be done is refused with the number's place and name, and nothing has
-    /// changed. After an arm whose numbers are not finite any more a state has to be restored.
-    pub fn step(&mut self, action: &Action) -> Result<CellReport> {
-        let needed = NUMBERS * self.arms.len();
-        if action.numbers.len() != needed {
-            return Err(Error::Action {
-                index: action.numbers.len().min(needed),
-                name: "length".to_owned(),
-                reason: format!("is {}; {needed} numbers, {NUMBERS} an arm", action.numbers.len()),
-            });
-        }
-        let wanted = self.arms.iter().enumerate().map(|(k, arm)| action.wanted(&arm.model, &arm.state, NUMBERS * k));
-        let wanted: Vec<Wanted> = wanted.collect::<Result<_>>()?;
-        for (arm, wanted) in self.arms.iter_mut().zip(wanted) {
-            arm.state.wanted = wanted;
-        }
-        self.advance()
     }
 
     /// The gap between the two instruments now (m): negative where they are inside each other, for

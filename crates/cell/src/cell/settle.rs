@@ -34,17 +34,17 @@ impl Cell {
     /// Lets the organs settle for `seconds`, and damps what still moves then.
     ///
     /// # Errors
-    /// As [`Cell::advance`].
+    /// As [`Cell::step`].
     pub fn settle(&mut self, seconds: f64) -> Result<Settling> {
         let mut speed = 0.0;
         for _ in 0..(seconds / self.period()).round() as usize {
-            speed = self.advance()?.tissue.max_speed;
+            speed = self.step(None)?.tissue.max_speed;
         }
         let settled = speed < SETTLED_SPEED;
         let mut settling = Settling { settled_speed_m_s: speed, settled, calmed_s: 0.0, resting_speed_m_s: speed };
         let (mut slow_s, mut energy) = (0.0, self.world.state.kinetic_energy(&self.world.model));
         while !settled && slow_s < SLOW_S && settling.calmed_s < MAX_DAMPING_S {
-            settling.resting_speed_m_s = self.advance()?.tissue.max_speed;
+            settling.resting_speed_m_s = self.step(None)?.tissue.max_speed;
             settling.calmed_s += self.period();
             let now = self.world.state.kinetic_energy(&self.world.model);
             (slow_s, energy) = if settling.resting_speed_m_s < SETTLED_SPEED {

@@ -32,8 +32,7 @@ impl CellState {
         waits.iter().for_each(|w| hash.update(&w.to_le_bytes()));
         hash.update(&[u8::from(*touch)]);
         for (arm, drive) in arms {
-            drive.hash_into(&mut hash);
-            for number in arm.numbers() {
+            for number in drive.numbers().into_iter().chain(arm.numbers()) {
                 hash.update(&number.to_bits().to_le_bytes());
             }
         }

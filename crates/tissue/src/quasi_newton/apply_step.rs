@@ -79,12 +79,12 @@ impl QuasiNewtonSolver {
         }
         let Iterate { x, targets, .. } = &mut self.iterate;
         x[..free].copy_from_slice(&targets[..free]);
-        if !self.evaluate(h) {
+        if !self.elements.evaluate(self.level, &self.layout, &self.iterate, h) {
             self.elements.accept();
             return InitialGuess::Ahead;
         }
         self.restore();
-        self.evaluate(h);
+        self.elements.evaluate(self.level, &self.layout, &self.iterate, h);
         InitialGuess::Behind
     }
 
@@ -122,7 +122,7 @@ impl QuasiNewtonSolver {
         } else {
             let Iterate { x, base, .. } = &mut self.iterate;
             x[..free].copy_from_slice(&base[..free]);
-            self.evaluate(h);
+            self.elements.evaluate(self.level, &self.layout, &self.iterate, h);
         }
         let Iterate { x, targets, .. } = &self.iterate;
         let arrived = |i: usize| (0..3).all(|c| (x[i][c] - targets[i][c]).abs() <= ARRIVED);
@@ -139,7 +139,8 @@ impl QuasiNewtonSolver {
     pub fn apply_step(&mut self, share: f32, h: f32) -> bool {
         for _ in 0..=MAX_RETREATS {
             for round in 0..=MAX_HALVINGS + MAX_DROPS {
-                let Self { level, layout, iterate: Iterate { x, base, direction, .. }, .. } = self;
+                let Self { level, layout, elements, iterate, .. } = self;
+                let Iterate { x, base, direction, .. } = &mut *iterate;
                 dispatch!(*level, _simd => {
                     let ways = base.iter().zip(direction.iter());
                     for (x, (from, by)) in x[..layout.free].iter_mut().zip(ways) {
@@ -148,7 +149,7 @@ impl QuasiNewtonSolver {
                         }
                     }
                 });
-                if !self.evaluate(h) {
+                if !elements.evaluate(*level, layout, iterate, h) {
                     return true;
                 }
                 let mut squeezed = 0;

@@ -1,7 +1,7 @@
 //! The quasi-Newton solver of one body: its parts by purpose, and the potential of one body.
 
 use super::elements::Elements;
-use super::history::{History, Memory};
+use super::history::Memory;
 use super::iterate::{InitialGuess, Iterate, add, max_coordinate, position};
 use super::layout::Layout;
 use super::rigid_modes::RigidModes;
@@ -120,11 +120,6 @@ impl QuasiNewtonSolver {
         }
     }
 
-    /// What bodies of an island share.
-    pub fn new_history(&self) -> History {
-        History::new(self.settings.memory)
-    }
-
     /// Begins a frame.
     pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         self.iterate.load(&self.layout, state);
@@ -217,17 +212,9 @@ impl QuasiNewtonSolver {
         });
     }
 
-    /// Evaluates the elements where the nodes are: forces and volume ratios. Returns whether an
-    /// element has lost too much of its accepted volume.
-    pub fn evaluate(&mut self, h: f32) -> bool {
-        self.rest.evaluated = false;
-        let Self { level, elements, layout, iterate: Iterate { x, start, .. }, .. } = self;
-        dispatch!(*level, simd => elements.evaluate(simd, layout, x, start, h))
-    }
-
     /// Turns the system with the tissue where the nodes are.
     pub fn update_warp(&mut self) {
-        if self.rest.evaluated && std::mem::replace(&mut self.rest.warped, true) {
+        if self.elements.in_place && std::mem::replace(&mut self.rest.warped, true) {
             return;
         }
         self.system.update_warp(self.level, &self.layout, &self.iterate.x);

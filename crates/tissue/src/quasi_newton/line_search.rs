@@ -27,7 +27,7 @@ impl IslandSystem<'_> {
 
     /// Goes along the direction: all of it where the slope does not rise too much by it, else as
     /// far as it takes for the slope to become small.
-    pub fn search(&mut self) -> Found {
+    pub(super) fn search(&mut self) -> Found {
         let mut slope = self.slope();
         if slope.is_nan() || slope >= 0.0 {
             // The history misleads: the preconditioner alone always points downhill.

@@ -10,15 +10,15 @@ impl QuasiNewtonSolver {
     /// has not moved since it was last evaluated in place is not evaluated again.
     pub fn evaluate_in_place(&mut self, h: f32) {
         let Iterate { x, start, .. } = &self.iterate;
-        if self.rest.evaluated && *x == self.rest.x && *start == self.rest.start {
+        if self.elements.in_place && *x == self.rest.x && *start == self.rest.start {
             return;
         }
-        self.evaluate(h);
-        self.elements.accept();
-        let Self { rest, iterate, .. } = self;
+        let Self { level, elements, layout, iterate, rest, .. } = self;
+        elements.evaluate(*level, layout, iterate, h);
+        elements.accept();
         rest.x.copy_from_slice(&iterate.x);
         rest.start.copy_from_slice(&iterate.start);
-        (rest.evaluated, rest.warped) = (true, false);
+        (elements.in_place, rest.warped) = (true, false);
     }
 
     /// Whether no node goes farther than `way` (m) by itself in a substep of `h` (s), and no tool

@@ -21,8 +21,6 @@ pub(super) struct RestCache {
     /// Positions, and beginning of the substep, of the last evaluation in place.
     pub x: Vec<Row>,
     pub start: Vec<Row>,
-    /// Whether nothing else was evaluated since.
-    pub evaluated: bool,
     /// Whether the warp is that of there.
     pub warped: bool,
     /// Positions and gradient for which the correction was last computed.
@@ -40,7 +38,6 @@ impl RestCache {
         Self {
             x: all(),
             start: all(),
-            evaluated: false,
             warped: false,
             correction_x: rows(),
             correction_gradient: rows(),

@@ -13,7 +13,7 @@ use trocar_tissue::ToolForce;
 
 /// What an arm is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::cell) enum Wanted {
+pub(crate) enum Wanted {
     /// Absolute targets, and what is left of the orientation that was asked for.
     Setpoint(Setpoint, DVec3),
     /// Joints, which the drive knows, and the jaw's opening.
@@ -22,7 +22,7 @@ pub(in crate::cell) enum Wanted {
 
 /// Tissue that the jaws hold.
 #[derive(Clone, Debug)]
-pub(in crate::cell) struct Held {
+pub(crate) struct Held {
     pub organ: usize,
     /// Organ coordinate of what is held.
     pub s: f64,
@@ -33,7 +33,7 @@ pub(in crate::cell) struct Held {
 
 /// What changes of an arm besides its drive's state: plain data.
 #[derive(Clone, Debug)]
-pub(in crate::cell) struct ArmState {
+pub(crate) struct ArmState {
     pub wanted: Wanted,
     /// What was commanded last.
     pub commanded: Setpoint,

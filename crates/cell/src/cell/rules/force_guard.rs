@@ -33,7 +33,7 @@ const RETREAT: f64 = 1e-3;
 
 /// The force guard of one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(in crate::cell) struct ForceGuard {
+pub(crate) struct ForceGuard {
     /// Force gained a way gone against it (N/m).
     stiffness: f64,
     /// Force (N) and tip (m) a period ago.

@@ -10,7 +10,7 @@
 //! [`MIN_VOLUME_SHARE`]: super::strain::MIN_VOLUME_SHARE
 //! [`MAX_LATCHED_STRETCH`]: super::strain::MAX_LATCHED_STRETCH
 
-use super::Scope;
+use super::scope::Scope;
 use super::strain::{MAX_LATCHED_STRETCH, MAX_WAIT_FRAMES};
 
 /// An instrument farther than this from where tissue is strained most has nothing to do with it

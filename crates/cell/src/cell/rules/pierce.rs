@@ -6,7 +6,7 @@
 //! inside an organ, deeper than the part is thick, contact of the instrument is disabled. What the
 //! jaws hold may bulge round them and does not count.
 
-use super::Scope;
+use super::scope::Scope;
 
 pub(super) fn apply(scope: &mut Scope<'_>) {
     for k in 0..scope.arms.len() {

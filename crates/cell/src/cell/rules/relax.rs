@@ -5,7 +5,7 @@
 //! instrument at it, or that stays strained for [`MAX_WAIT_FRAMES`], is relaxed by
 //! [`trocar_tissue::State::relax`] without regard to time and forces.
 
-use super::Scope;
+use super::scope::Scope;
 use super::strain::MAX_WAIT_FRAMES;
 use crate::cell::report::CellEvent;
 

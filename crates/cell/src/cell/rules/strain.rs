@@ -30,7 +30,7 @@ pub(super) const MAX_WAIT_FRAMES: u32 = 15;
 
 /// How far an organ is from its rest shape at worst.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::cell) struct Strain {
+pub(crate) struct Strain {
     /// Length of the most stretched edge over that at rest; 1 where none is stretched.
     pub stretch: f64,
     /// Least volume of an element over that at rest; 1 where that was not asked for.
@@ -75,7 +75,7 @@ fn most_crushed(world: &World, body: usize, now: &[DVec3]) -> (f64, DVec3) {
 }
 
 /// The edges of all bodies with their squared rest lengths.
-pub(in crate::cell) struct Edges {
+pub(crate) struct Edges {
     bodies: Vec<Vec<([u32; 2], f64)>>,
     /// The world's count of cuts for which they are right.
     cuts: usize,

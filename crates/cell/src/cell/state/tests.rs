@@ -96,7 +96,7 @@ fn hash_and_restore_carry_every_field() {
     others.push(("waits", changed(&|s| s.waits.push(3))));
     others.push(("touch", changed(&|s| s.touch ^= true)));
     others.push(("periods", changed(&|s| s.periods += 1)));
-    cell.advance().unwrap();
+    cell.step(None).unwrap();
     others.push(("world and drive", cell.save()));
     for (field, other) in &others {
         let hash = other.hash();

@@ -1,4 +1,4 @@
-//! Stage 3: tissue is stepped by a frame, with the tools on their way to where the arms are now.
+//! Stage 3: a frame of tissue, with the tools on their way to where the arms are now.
 
 use crate::blades::{Tools, opening_force};
 use crate::cell::Cell;
@@ -8,27 +8,37 @@ use crate::{FRAME, GraspDesign, Gripper};
 use glam::DVec3;
 use std::time::Instant;
 use trocar_core::Pose;
-use trocar_tissue::{StepReport, ToolMotion};
+use trocar_tissue::{State, StepReport, ToolMotion};
 
 /// Height at which tissue feels no instrument (m).
 const OUT_OF_CONTACT_HEIGHT: f64 = 100.0;
 
+/// The beginning of a frame of tissue.
+pub(super) struct FrameStart {
+    /// The tissue, where the frame is the first of a grasp.
+    state: Option<State>,
+    clock: Instant,
+}
+
 impl Cell {
-    pub(super) fn step_tissue(&mut self, log: &mut PeriodLog) -> StepReport {
+    /// Sets the motions of the tools for a frame of tissue.
+    pub(super) fn begin_tissue_frame(&mut self) -> FrameStart {
         self.motions.clear();
         for arm in &mut self.arms {
             self.motions.extend(arm.motions(FRAME));
         }
-        let before = self.arms.iter().any(|arm| arm.is_newly_attached(&self.world)).then(|| self.world.state.clone());
-        let clock = Instant::now();
-        let report = self.world.step(&self.motions);
-        self.timing.tissue += clock.elapsed();
+        let newly_attached = self.arms.iter().any(|arm| arm.is_newly_attached(&self.world));
+        FrameStart { state: newly_attached.then(|| self.world.state.clone()), clock: Instant::now() }
+    }
+
+    /// Records the frame that began at `start`.
+    pub(super) fn end_tissue_frame(&mut self, start: FrameStart, report: &StepReport, log: &mut PeriodLog) {
+        self.timing.tissue += start.clock.elapsed();
         self.timing.iterations += report.iterations;
-        log.tissue.add(&report);
-        if let Some(before) = before {
+        log.tissue.add(report);
+        if let Some(before) = start.state {
             log.activation_step = log.activation_step.max(self.world.largest_motion_since(&before));
         }
-        report
     }
 }
 

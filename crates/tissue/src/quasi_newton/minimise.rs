@@ -1,4 +1,4 @@
-//! One substep of an island: start, search direction after direction, take the velocities.
+//! The minimisation of a substep: start, search direction after direction, take the velocities.
 
 use super::apply_step::ConstraintMotion;
 use super::body_system::QuasiNewtonSolver;
@@ -23,11 +23,11 @@ struct Tolerance {
 }
 
 impl IslandSystem<'_> {
-    /// Minimises one substep, which ends when `share` of the frame is over.
+    /// Minimises the potential of a substep, which ends when `share` of the frame is over.
     ///
     /// False if it was given up. Nothing has changed then but scratch memory, and that bodies at
     /// rest have no velocity.
-    pub fn substep(&mut self, share: f64) -> bool {
+    pub fn minimise(&mut self, share: f64) -> bool {
         let alone = self.pairs.is_empty();
         self.start(share);
         let moved = self.all().any(|body| body.progress.guess != InitialGuess::Still);
