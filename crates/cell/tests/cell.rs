@@ -3,15 +3,13 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
-mod common;
-
-use common::{ONE_END, meshed, scene, two_tubes};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellReport, Setpoint};
 use trocar_core::Pose;
 use trocar_robot::wrench::ForceKind;
 use trocar_scene::{Arm, Drive, GraspDesignName, Scene, Side};
 use trocar_specimen::{Pins, Specimen};
+use trocar_testing::tube::{ONE_END, meshed, scene, two_tubes};
 
 const ARMS: [&str; 2] = ["left", "right"];
 

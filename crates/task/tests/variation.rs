@@ -2,14 +2,12 @@
 //! nothing.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{ONE_END, resection, two_tubes};
 use std::sync::Arc;
 use trocar_cell::{Action, Setpoint};
 use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, VariationSet};
 use trocar_specimen::Specimen;
 use trocar_task::{Episode, EpisodeFile, Result, SpecimenSupply, policy, run};
+use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
 /// Another tube for each seed of an anatomy.
 struct Tubes;

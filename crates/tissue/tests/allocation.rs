@@ -1,13 +1,11 @@
 //! Stepping allocates nothing.
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::DVec3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_core::Pose;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Compliance, Grasp, Load, Material, ModelBuilder, Shape, SolverSettings,
     State, Stepper, ToolMotion,

@@ -1,8 +1,8 @@
 //! Organs come to rest before an episode begins.
 //!
-//! They settle under gravity for a time. A large soft organ swings for many seconds; the swing is
-//! then taken out by kinetic damping (Cundall 1976): everything is stopped whenever the kinetic
-//! energy has passed a peak, until nothing moves fast for a while by itself.
+//! They settle under gravity for a time. A large soft organ swings for many seconds; then kinetic
+//! damping (Cundall 1976) stops it: all velocities are set to zero whenever the kinetic energy has
+//! passed a peak, until nothing moves fast for a while.
 
 use super::Cell;
 use crate::Result;
@@ -14,7 +14,7 @@ const SETTLED_SPEED: f64 = 0.01;
 /// Longest kinetic damping (s).
 const MAX_DAMPING_S: f64 = 5.0;
 
-/// Damping ends after the organs have been slow, undisturbed, for this long (s).
+/// Damping ends after the organs have been slow for this long without it (s).
 const SLOW_S: f64 = 0.2;
 
 /// How organs came to rest.
@@ -22,7 +22,7 @@ const SLOW_S: f64 = 0.2;
 pub struct Settling {
     /// Largest node speed after the settling time, before any damping (m/s).
     pub settled_speed_m_s: f64,
-    /// They settled by themselves: that speed is below 0.01 m/s.
+    /// They settled without damping: that speed is below 0.01 m/s.
     pub settled: bool,
     /// How long kinetic damping took (s).
     pub calmed_s: f64,
@@ -31,7 +31,7 @@ pub struct Settling {
 }
 
 impl Cell {
-    /// Lets the organs settle for `seconds`, and damps what still moves then.
+    /// Lets the organs settle for `seconds`, then damps the remaining motion.
     ///
     /// # Errors
     /// As [`Cell::step`].
@@ -48,7 +48,7 @@ impl Cell {
             settling.calmed_s += self.period();
             let now = self.world.state.kinetic_energy(&self.world.model);
             (slow_s, energy) = if settling.resting_speed_m_s < SETTLED_SPEED {
-                // Slow: left alone, to show that it stays so.
+                // Slow: not damped any more, to verify that it stays slow.
                 (slow_s + self.period(), now)
             } else if now < energy {
                 self.world.state.stop();

@@ -20,7 +20,7 @@ impl Cell {
         Ok(())
     }
 
-    /// Takes over what an action asks of the arms; nothing of one that is refused.
+    /// Takes over the requests of an action; an action with an error changes nothing.
     fn request(&mut self, action: &Action) -> Result<()> {
         let needed = NUMBERS * self.arms.len();
         if action.numbers.len() != needed {

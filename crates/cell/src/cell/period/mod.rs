@@ -1,9 +1,9 @@
 //! The stages of a control period, one module each.
 //!
-//! Tissue is stepped 60 times a second, arms 480 times. In a tissue frame the arms go first, under
-//! the load that tissue had on them at the end of the last frame, extrapolated with the tip. Then
-//! tissue is stepped with tools that go from where the tips were at the beginning of the frame to
-//! where they are now.
+//! Tissue is stepped 60 times a second, arms 480 times. In a tissue frame the arms move first,
+//! under the tissue's load at the end of the last frame, extrapolated with the tip. Then tissue is
+//! stepped with tools that move from the tips' places at the beginning of the frame to their places
+//! now.
 
 mod command;
 mod exchange_forces;
@@ -18,12 +18,12 @@ use crate::{Result, World};
 use std::time::Instant;
 
 impl Cell {
-    /// Steps the cell by one control period. Without an action (None) the arms go on towards what
-    /// they were last asked for.
+    /// Steps the cell by one control period. Without an action (`None`) the arms continue towards
+    /// their last request.
     ///
     /// # Errors
-    /// An action that cannot be done is refused with the number's place and name; nothing has
-    /// changed then. If the numbers of an arm are no longer finite, a state has to be restored.
+    /// An action with an error is refused with the number's index and name; nothing has changed
+    /// then. If the numbers of an arm are no longer finite, a state has to be restored.
     pub fn step<'a>(&mut self, action: impl Into<Option<&'a Action>>) -> Result<CellReport> {
         let clock = Instant::now();
         let mut log = PeriodLog::default();

@@ -1,4 +1,4 @@
-//! Stage 3: a frame of tissue, with the tools on their way to where the arms are now.
+//! Stage 3: a frame of tissue, in which the tools move to the arms' present places.
 
 use crate::blades::{Tools, opening_force};
 use crate::cell::Cell;
@@ -10,12 +10,12 @@ use std::time::Instant;
 use trocar_core::Pose;
 use trocar_tissue::{State, StepReport, ToolMotion};
 
-/// Height at which tissue feels no instrument (m).
+/// Height of instruments without contact (m).
 const OUT_OF_CONTACT_HEIGHT: f64 = 100.0;
 
 /// The beginning of a frame of tissue.
 pub(super) struct FrameStart {
-    /// The tissue, where the frame is the first of a grasp.
+    /// The tissue's state, if the frame is the first of a grasp.
     state: Option<State>,
     clock: Instant,
 }
@@ -48,7 +48,7 @@ impl ArmUnit {
         let (model, state) = (&self.model, &mut self.state);
         let angle = state.gripper.jaw_angle;
         let target = state.wanted.jaw() * model.blades.max_angle;
-        // What is latched locks the jaws; friction must go on pressing.
+        // A latched grasp locks the jaws; friction must continue to press.
         let locked = state.held.is_some() && state.design != GraspDesign::Friction;
         let next_angle = if locked {
             angle
@@ -62,7 +62,7 @@ impl ArmUnit {
         let mut motions = state.gripper.motions_to(&next);
         state.jaw_rate = (next_angle - angle) / (model.blades.max_angle * dt);
         state.gripper = next;
-        // At rest, far from everything.
+        // At rest, far from tissue.
         let away = Pose { translation: OUT_OF_CONTACT_HEIGHT * DVec3::Z, ..Pose::IDENTITY };
         let away = ToolMotion { from: away, to: away };
         if state.contact_disabled {

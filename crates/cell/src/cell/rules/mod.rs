@@ -1,5 +1,5 @@
-//! Safety rules: where the cell departs from plain physics, so that no command breaks tissue or
-//! solver. Each rule is a file of its own, says so as an event, and is counted.
+//! Safety rules: the cell departs from plain physics so that no command breaks tissue or solver.
+//! Each rule has its own file, reports an event, and is counted.
 //!
 //! | rule | when | what it does |
 //! |---|---|---|
@@ -9,11 +9,11 @@
 //! | [`reconnect`] | the instrument is out, and tissue has come back | enables contact again |
 //! | [`relax`] | an organ stays folded with no instrument at it | relaxes it outside of time |
 //!
-//! A scene turns rules off in `[safety.rules]`. [`reconnect`] undoes what the rules did, and needs no
-//! switch.
+//! A scene turns rules off in `[safety.rules]`. [`reconnect`] undoes the effects of the other rules
+//! and has no switch.
 //!
-//! Contact of jaws that hold by a latch is disabled in two steps: first of the blades, which keep
-//! their hold, then of the whole instrument, which lets go.
+//! Contact of latched jaws is disabled in two steps: first that of the blades, which keep their
+//! grasp, then that of the whole instrument, which releases it.
 
 mod enforce;
 mod force_guard;

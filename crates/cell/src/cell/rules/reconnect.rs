@@ -1,5 +1,5 @@
-//! Rule: an instrument whose contact is disabled is felt again once it is out of all organs and no
-//! organ is strained any more.
+//! Rule: contact of an instrument is enabled again when it is out of all organs and no organ is
+//! strained.
 
 use super::scope::Scope;
 

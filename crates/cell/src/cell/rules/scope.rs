@@ -6,20 +6,20 @@ use crate::cell::arm::ArmUnit;
 use crate::cell::report::{CellEvent, PeriodLog};
 use trocar_robot::wrench::ForceKind;
 
-/// What rules look at and change after a tissue frame.
+/// The parts that rules read and change after a frame of tissue.
 pub(super) struct Scope<'a> {
     pub world: &'a mut World,
     pub arms: &'a mut [ArmUnit],
     /// By body.
     pub strains: &'a [Strain],
-    /// By body, frames for which it has been strained with no instrument at it.
+    /// By body: frames for which it has been strained without an instrument at it.
     pub waits: &'a mut [u32],
     pub log: &'a mut PeriodLog,
 }
 
 impl Scope<'_> {
-    /// Disables contact of arm `k` because of `organ`: of its blades alone where a latch holds, and
-    /// of the whole instrument otherwise, which then lets go.
+    /// Disables contact of arm `k` because of `organ`: that of its blades if they are latched, else
+    /// that of the whole instrument, which then releases its grasp.
     pub fn disable_contact(&mut self, k: usize, organ: usize) {
         let arm = &mut self.arms[k];
         let (side, name) = (arm.model.side, self.world.model.bodies()[organ].name().to_owned());

@@ -7,10 +7,7 @@ use crate::GraspDesign;
 use crate::cell::arm::{ArmState, Held, Wanted};
 use crate::hold::Hold;
 use glam::DVec3;
-use tube::{ONE_END, specimen};
-
-#[path = "../../../tests/common/mod.rs"]
-mod tube;
+use trocar_testing::tube::{self, ONE_END, specimen};
 
 fn cell() -> Cell {
     let mut scene = tube::scene();
