@@ -6,7 +6,7 @@ use crate::frame::Frame;
 use glam::DVec3;
 use std::cmp::Reverse;
 
-/// An island: how many of the slots are its bodies, and what it owns.
+/// An island: its number of slots, and the data that its bodies share.
 pub(crate) struct Island<S: Solver> {
     /// Bodies of the island; they are adjacent in the list of slots.
     bodies: usize,

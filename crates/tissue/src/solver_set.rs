@@ -28,11 +28,11 @@ pub(crate) trait SolverSet: Send + Sync {
     /// one, and measures their bodies.
     fn solve_islands(&mut self, state: &mut State, frame: &Frame<'_>, pool: Option<&rayon::ThreadPool>);
 
-    /// Sums up the frame. If a position is not finite, all bodies are put back to where the frame
-    /// began.
+    /// Sums up the frame. If a position is not finite, all bodies return to the beginning of the
+    /// frame.
     fn end_frame(&mut self, state: &mut State) -> StepReport;
 
-    /// Calls `visit` for every body with what it did to the tools in the last frame.
+    /// Calls `visit` for every body with its forces on the tools in the last frame.
     fn for_bodies(&self, visit: &mut dyn FnMut(usize, &Reaction, Option<&ContactSet>));
 
     /// Calls `visit(body, vertex, force)` for every contact force (N) of tools and other bodies on
@@ -139,7 +139,7 @@ impl<S: Solver> SolverSet for BodySolvers<S> {
         let report = self.slots.iter().fold(StepReport::default(), |all, slot| all.with(&slot.report));
         let broken = matches!(report.divergence, Some(Divergence::NonFinite { .. }));
         for slot in &mut self.slots {
-            // The whole state is of one instant: if a body is lost, all are put back.
+            // All bodies of a state belong to one instant: if one is lost, all are restored.
             if broken {
                 slot.state.copy_from(&slot.before);
             }

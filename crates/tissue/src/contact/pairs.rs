@@ -232,7 +232,7 @@ impl Pairs {
         self.list.iter().filter(of).any(|pair| pair.contact.push(pair.offset(x)).is_some())
     }
 
-    /// Ends a substep with the states as they are: stretches follow what slips.
+    /// Ends a substep with the present states: stretches follow slipping contacts.
     pub fn end_substep(&mut self, island: &(impl Members + ?Sized)) {
         let x = |m: usize, vertex: u32| island.x(m, vertex);
         for pair in &self.list {
@@ -273,8 +273,8 @@ impl Pairs {
         self.roles.sort_unstable();
     }
 
-    /// Contacts of a body with the others, by vertex: each as it is for one vertex while the other
-    /// three of its pair stay where they are.
+    /// Contacts of a body with the others, by vertex: each for one vertex while the other three of
+    /// its pair are fixed.
     pub fn contacts_of(&mut self, island: &(impl Members + ?Sized), member: usize) -> &[Contact] {
         let x = |m: usize, vertex: u32| island.x(m, vertex);
         self.pressed.clear();

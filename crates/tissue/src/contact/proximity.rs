@@ -67,7 +67,7 @@ pub(crate) struct Near {
     pub free: f32,
 }
 
-/// Scratch memory, and what is known of the rest shapes.
+/// Scratch memory, and distances at rest.
 #[derive(Clone, Debug)]
 pub(crate) struct Proximity {
     limits: Limits,
@@ -81,7 +81,7 @@ pub(crate) struct Proximity {
     /// Where the bodies were when they were last examined, and how often they had moved by then.
     seen: Vec<Vec<Vec3A>>,
     versions: Vec<u64>,
-    /// Of each ordered pair, what was found.
+    /// The result for each ordered pair.
     known: Vec<Known>,
 }
 
@@ -209,7 +209,7 @@ impl Proximity {
         let Limits { offset, depth, .. } = self.limits;
         // Folds are not sought deep inside, where the tissue's own surface is.
         let depth = if a == b { depth.min(reach) } else { depth };
-        // Tissue that belongs together does so however fast it is.
+        // Neighbouring tissue stays neighbouring at any speed.
         let close = CLOSE * offset;
         let least = self.free[a * n + b].iter().copied().fold(0.0, f32::min);
         let search = reach.max(depth - least);

@@ -19,7 +19,7 @@ use crate::frame::Frame;
 use crate::settings::Descent;
 pub(crate) use body_descent::BodyDescent;
 
-/// The sweeps of a body with what it touches.
+/// The sweeps of a body with its contacts.
 pub(crate) struct TouchingDescent {
     descent: BodyDescent,
     contacts: ContactSet,
@@ -83,7 +83,7 @@ impl Sweeps for TouchingDescent {
 
 /// A solver that can sweep.
 pub(crate) trait Sweeps: Solver {
-    /// The sweeps of the body and what it touches.
+    /// The sweeps of the body and its contacts.
     fn sweeps(&mut self) -> (&mut BodyDescent, &mut ContactSet);
 }
 

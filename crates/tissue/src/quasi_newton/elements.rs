@@ -19,7 +19,7 @@ pub(super) struct Elements {
     pub trial: Vec<[f32; LANES]>,
     /// Each element's part of the dashpots along its edges (N s/m); empty without viscosity.
     dashpots: Vec<[[f32; LANES]; 6]>,
-    /// Whether the last evaluation was of a body that stays where it is.
+    /// Whether the last evaluation was of a body at rest, by `evaluate_in_place`.
     pub in_place: bool,
 }
 
@@ -123,7 +123,7 @@ impl Elements {
     }
 }
 
-/// By how much a volume ratio is below what it must be after `before`; 0 where it is not. NaN
+/// Shortfall of a volume ratio below its minimum after the ratio `before`; 0 if there is none. NaN
 /// counts as too low.
 #[inline(always)]
 fn lack<S: Simd>(simd: S, ratio: f32x16<S>, before: f32x16<S>) -> f32x16<S> {
