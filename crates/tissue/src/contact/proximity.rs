@@ -153,19 +153,8 @@ impl Proximity {
     /// Whether `reaches` holds for the middle and half the diagonal of the box around some
     /// triangles of a body and of all boxes around that.
     pub fn meets(&self, body: &Body, index: usize, reaches: &dyn Fn(Vec3A, f32) -> bool) -> bool {
-        let (nodes, boxes) = (&body.surface.tree.nodes, &self.boxes[index]);
-        let mut at = 0;
-        while let Some(node) = nodes.get(at as usize) {
-            let Aabb { low, high } = boxes[at as usize];
-            if !reaches(0.5 * (low + high), 0.5 * (high - low).length()) {
-                at = node.end;
-            } else if node.is_leaf() {
-                return true;
-            } else {
-                at += 1;
-            }
-        }
-        false
+        let meets = |b: &Aabb| reaches(0.5 * (b.low + b.high), 0.5 * (b.high - b.low).length());
+        body.surface.tree.any(&self.boxes[index], meets)
     }
 
     /// Writes into `found` every vertex whose distance from another body that it may touch is
@@ -229,7 +218,7 @@ impl Proximity {
                 return;
             }
             let place = from.boxes[leaf as usize].moved(shift, search);
-            if !to.body.surface.tree.reaches(to.boxes, &place) {
+            if !to.body.surface.tree.any(to.boxes, |b| b.meets(&place)) {
                 return;
             }
             let around = rest_boxes.get(leaf as usize).map(|b| b.moved(Vec3A::ZERO, FOLDED * close));
