@@ -95,26 +95,14 @@ impl World {
     /// # Errors
     /// A mesh, a material or pins of an organ that cannot be simulated.
     pub fn new(specimen: &Specimen, schedule: SolverSettings, threads: usize) -> Result<Self> {
-        Self::with_tools(specimen, Vec::new(), schedule, threads)
+        Self::surrounded(specimen, &Surroundings::default(), Vec::new(), schedule, threads)
     }
 
-    /// The same with tools that have `colliders`, such as [`crate::blades::colliders`].
+    /// The same with other `surroundings`, and tools with `colliders`, such as
+    /// [`crate::blades::colliders`].
     ///
     /// # Errors
-    /// As [`World::new`], and invalid colliders.
-    pub fn with_tools(
-        specimen: &Specimen,
-        colliders: Vec<Collider>,
-        schedule: SolverSettings,
-        threads: usize,
-    ) -> Result<Self> {
-        Self::surrounded(specimen, &Surroundings::default(), colliders, schedule, threads)
-    }
-
-    /// The same with other `surroundings`.
-    ///
-    /// # Errors
-    /// As [`World::with_tools`], and filtered pairs of organs that do not exist.
+    /// As [`World::new`], invalid colliders, and filtered pairs of organs that do not exist.
     pub fn surrounded(
         specimen: &Specimen,
         surroundings: &Surroundings,

@@ -13,19 +13,12 @@ use trocar_core::Wrench;
 use trocar_robot::manipulator::JointReadings;
 
 impl Cell {
-    fn index_of(&self, arm: &str) -> Result<usize> {
-        self.arms.iter().position(|s| s.model.side.name() == arm).ok_or_else(|| Error::UnknownArm {
-            name: arm.chars().take(60).collect(),
-            known: self.arms.iter().map(|s| s.model.side.name()).collect::<Vec<_>>().join(", "),
-        })
-    }
-
     pub(super) fn arm(&self, arm: &str) -> Result<&ArmUnit> {
-        Ok(&self.arms[self.index_of(arm)?])
+        Ok(&self.arms[self.arm_index(arm)?])
     }
 
     fn arm_mut(&mut self, arm: &str) -> Result<&mut ArmUnit> {
-        let k = self.index_of(arm)?;
+        let k = self.arm_index(arm)?;
         Ok(&mut self.arms[k])
     }
 
@@ -34,7 +27,10 @@ impl Cell {
     /// # Errors
     /// An arm that the cell does not have.
     pub fn arm_index(&self, arm: &str) -> Result<usize> {
-        self.index_of(arm)
+        self.arms.iter().position(|s| s.model.side.name() == arm).ok_or_else(|| Error::UnknownArm {
+            name: arm.chars().take(60).collect(),
+            known: self.arms.iter().map(|s| s.model.side.name()).collect::<Vec<_>>().join(", "),
+        })
     }
 
     /// Measured joints.
