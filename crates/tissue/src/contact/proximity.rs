@@ -28,8 +28,7 @@ const FACING: f32 = 0.2;
 /// The limits of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Limits {
-    /// Gap at which surfaces begin to press (m). Where they were nearer at rest, it is the gap at
-    /// rest.
+    /// Gap at which surfaces begin to press (m), or the gap at rest if that is smaller.
     pub offset: f32,
     /// Vertices deeper inside than this (m), or than this from where they were at rest if they were
     /// inside then, are left out.
@@ -62,8 +61,8 @@ pub(crate) struct Near {
     pub normal: Vec3,
     /// Signed distance along `normal` (m); negative inside.
     pub distance: f32,
-    /// Distance at which nothing presses (m): [`Limits::offset`], or the signed distance at rest
-    /// where that is less. There is force where `distance` is below it.
+    /// Distance without force (m): [`Limits::offset`], or the signed distance at rest if that is
+    /// less. There is force where `distance` is below it.
     pub free: f32,
 }
 
@@ -78,14 +77,14 @@ pub(crate) struct Proximity {
     /// Rest positions by internal number and boxes around them, of bodies that are searched for
     /// folds.
     rest: Vec<(Vec<Vec3A>, Vec<Aabb>)>,
-    /// Where the bodies were when they were last examined, and how often they had moved by then.
+    /// Positions of the bodies at the last search, and their numbers of motions by then.
     seen: Vec<Vec<Vec3A>>,
     versions: Vec<u64>,
     /// The result for each ordered pair.
     known: Vec<Known>,
 }
 
-/// What was found of a pair, and within which reach.
+/// The result for a pair, and its reach.
 #[derive(Clone, Debug, Default)]
 struct Known {
     reach: f32,
@@ -196,7 +195,7 @@ impl Proximity {
     fn find_pair(&mut self, model: &Model, state: &[BodyState], [a, b]: [usize; 2], reach: f32, found: &mut Vec<Near>) {
         let n = model.bodies.len();
         let Limits { offset, depth, .. } = self.limits;
-        // Folds are not sought deep inside, where the tissue's own surface is.
+        // Folds are not searched for deep inside, where the tissue's own surface is.
         let depth = if a == b { depth.min(reach) } else { depth };
         // Neighbouring tissue stays neighbouring at any speed.
         let close = CLOSE * offset;
