@@ -3,9 +3,6 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-#[path = "../../task/tests/common/mod.rs"]
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Barrier, Mutex};
@@ -15,13 +12,14 @@ use trocar_core::{Silent, StopAfter};
 use trocar_remote::{Array, Call, Dialect, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, Specimens, TaskName};
 use trocar_task::EpisodeFile;
+use trocar_testing::tube;
 use trocar_workflow::EpisodeRun;
 
 /// A coarse tube on disk, and a scene of it in which arms reach for half a second before the
 /// endoscope.
 fn scene(folder: &Path) -> PathBuf {
-    common::two_tubes(common::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
-    let mut scene = common::resection();
+    tube::two_tubes(tube::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
+    let mut scene = tube::resection();
     scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
     scene.task.name = TaskName::PortReach;
     scene.task.episode_s = 0.5;
@@ -48,7 +46,7 @@ fn campaign(folder: &Path, policies: &[&str], episodes: usize) -> Campaign {
 fn episodes_of_names_with_dots_are_done_again_side_by_side() {
     let dir = TempDir::new().unwrap();
     let scene = trocar_scene::Scene::read(&scene(dir.path()).display().to_string()).unwrap();
-    let specimen = common::two_tubes(common::ONE_END, 4e-3);
+    let specimen = tube::two_tubes(tube::ONE_END, 4e-3);
     let policies = ["v1.0=random", "v1.1=random"].map(|p| PolicySpec::parse(p).unwrap());
     let manifest = Manifest::new(&scene, &specimen, &policies, 40, 0).unwrap();
     let store = Store::open(&dir.path().join("campaign"), &manifest).unwrap();
@@ -363,7 +361,7 @@ fn a_roboarena_server_is_told_of_every_episode_by_its_name() {
 fn episodes_have_the_specimens_that_are_drawn_for_them() {
     let dir = TempDir::new().unwrap();
     let file = scene(dir.path());
-    common::two_tubes(common::ONE_END, 3.4e-3).write(&dir.path().join("other")).unwrap();
+    tube::two_tubes(tube::ONE_END, 3.4e-3).write(&dir.path().join("other")).unwrap();
     let mut varied = Scene::read(&file.display().to_string()).unwrap();
     let paths = vec!["tube".to_owned(), "other".to_owned()];
     varied.variation.specimens = Some(Specimens { paths, phantoms: Vec::new(), seeds: [1, 1] });

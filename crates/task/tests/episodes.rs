@@ -4,9 +4,6 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
-mod common;
-
-use common::{ONE_END, resection, two_tubes};
 use std::path::Path;
 use trocar_cell::{Action, CellEvent, Setpoint};
 use trocar_scene::{Distribution, Factor, Scene, TaskName};
@@ -15,6 +12,7 @@ use trocar_task::{
     Channels, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, Stage, policy, read_channels, run,
     sweep,
 };
+use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
 fn specimen() -> Specimen {
     two_tubes(ONE_END, 3e-3)

@@ -3,16 +3,13 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-#[path = "../../cell/tests/common/mod.rs"]
-mod tube;
-
 use trocar_scene::GraspDesignName;
 use trocar_specimen::Pins;
 use trocar_task::policy::{AfterHold, CutAt, Script, Scripted};
 use trocar_task::{Episode, Recording, Severed, Summary, run};
+use trocar_testing::tube::{ONE_END, specimen};
 use trocar_workflow::specimen_scene::free_scene;
 use trocar_workflow::{Lift, Result};
-use tube::{ONE_END, specimen};
 
 fn lift(lift: &Lift, pins: Pins) -> Result<Recording> {
     lift.script.check()?;
