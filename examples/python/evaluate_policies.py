@@ -45,7 +45,13 @@ def main() -> None:
         scene = Path(folder) / "scene.toml"
         scene.write_text(text.replace("episode_s = 40.0", f"episode_s = {options.seconds}"))
         output = options.output or Path(folder) / "campaign"
-        result = campaign.run(str(scene), ["scripted", "random"], output, episodes=options.episodes, variation=options.variation)
+        result = campaign.run(
+            str(scene),
+            ["scripted", "random"],
+            output,
+            episodes=options.episodes,
+            variation=options.variation,
+        )
         print(f"{'policy':<12} {'passed':>7} {'95% interval':>13} {'score':>6}")
         for row in result["policies"]:
             low, high = row["interval"]["low"], row["interval"]["high"]

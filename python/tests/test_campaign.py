@@ -62,7 +62,7 @@ def test_threads_keep_every_episode_and_resume(short_scene, local):
         campaign.run(str(short_scene), POLICIES, folder / "local", **(OPTIONS | {"seed": 6}))
     with pytest.raises(ValueError, match="another split"):
         campaign.run(str(short_scene), POLICIES, folder / "local", **OPTIONS, split="unseen")
-    with pytest.raises(ValueError, match="--by modulous: .*did you mean 'modulus'"):
+    with pytest.raises(ValueError, match=r"--by modulous: .*did you mean 'modulus'"):
         campaign.run(str(short_scene), POLICIES, folder / "new", **OPTIONS, by=["modulous"])
 
 
@@ -110,8 +110,11 @@ class Other:
     def here(self):
         pass
 
-other = Other.remote() ray.get(other.here.remote()) result = campaign.run(sys.argv[1], ["random"],
-sys.argv[2], episodes=3, workers=2, ray_address="local", variation="none") print("episodes", result["episodes"])
+other = Other.remote()
+ray.get(other.here.remote())
+result = campaign.run(sys.argv[1], ["random"], sys.argv[2], episodes=3, workers=2,
+                      ray_address="local", variation="none")
+print("episodes", result["episodes"])
 """
 
 

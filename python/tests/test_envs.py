@@ -199,7 +199,9 @@ def test_training_does_not_reach_unseen_episodes(tmp_path):
     path.write_text(path.read_text() + "\n".join(["", *lines, ""]))
     seen = trocar.TrocarEnv(str(path), variation="easy")
     assert all(seen.reset()[1]["seed"] < 10**6 for _ in range(3))
-    with pytest.raises(ValueError, match=r"seed: is 1000000; seeds of split seen are in \[0, 999999"):
+    with pytest.raises(
+        ValueError, match=r"seed: is 1000000; seeds of split seen are in \[0, 999999"
+    ):
         seen.reset(seed=10**6)
     unseen = trocar.TrocarEnv(str(path), variation="easy", split="unseen")
     assert unseen.reset()[1]["seed"] >= 10**6

@@ -100,7 +100,9 @@ def test_the_factory_makes_environments_with_their_task(example):
 
 
 def test_success_is_read_from_one_cell_and_from_many(example):
-    alone = make_env(example.TrocarConfig(variation="none", cameras=[], episode_s=20.0), n_envs=1)["trocar"][0]
+    alone = make_env(example.TrocarConfig(variation="none", cameras=[], episode_s=20.0), n_envs=1)[
+        "trocar"
+    ][0]
     many = trocar.TrocarVectorEnv(
         2,
         task="grasp-lift",

@@ -223,7 +223,9 @@ def main(arguments: list[str] | None = None) -> int:
                     f"first: {row['policy_error']}; --retry-failed runs them again"
                 )
         if (distinct := result["distinct_outcomes"]) < result["episodes"]:
-            print(f"warning: only {distinct} of {result['episodes']} episodes differ from each other")
+            print(
+                f"warning: only {distinct} of {result['episodes']} episodes differ from each other"
+            )
         print(f"states {result['hash']}\nreport {result['report']}")
     return 0
 

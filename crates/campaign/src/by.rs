@@ -109,7 +109,8 @@ impl By {
         let known = members.is_some() || [SPLIT, SPECIMEN].contains(&name) || Factor::named(name).is_some();
         if !known && !is_number() {
             let groups = GROUPS.iter().map(|(group, _)| *group);
-            let names = || [SPLIT, SPECIMEN, ALL].into_iter().chain(groups.clone()).chain(Factor::NAMES.iter().copied());
+            let names =
+                || [SPLIT, SPECIMEN, ALL].into_iter().chain(groups.clone()).chain(Factor::NAMES.iter().copied());
             let hint = nearest(name, names()).map_or_else(String::new, |n| format!("; did you mean '{n}'?"));
             let listed: Vec<&str> = names().collect();
             let listed = listed.join(", ");
@@ -129,7 +130,8 @@ impl By {
         if found.is_empty() {
             let what = if wanted.len() > 1 { format!("{name} ({})", wanted.join(", ")) } else { name.to_owned() };
             let varied: Vec<&str> = all.iter().map(|by| by.name.as_str()).collect();
-            let varied = if varied.is_empty() { "nothing varies".to_owned() } else { format!("{} vary", varied.join(", ")) };
+            let varied =
+                if varied.is_empty() { "nothing varies".to_owned() } else { format!("{} vary", varied.join(", ")) };
             let why = format!("--by {what}: it does not vary here; {varied}; see --variation and --split");
             return Err(Error::Mismatch(why));
         }
@@ -232,7 +234,10 @@ mod tests {
         let none = names(&[], VariationSet::None, Split::Both).unwrap();
         assert_eq!(none, "split tilt_deg azimuth_deg insertion_mm roll_deg");
         let said = standard(&["modulous"]).unwrap_err();
-        assert!(said.starts_with("--by modulous: it is unknown") && said.ends_with("did you mean 'modulus'?"), "{said}");
+        assert!(
+            said.starts_with("--by modulous: it is unknown") && said.ends_with("did you mean 'modulus'?"),
+            "{said}"
+        );
         let said = standard(&["port_tilt_deg"]).unwrap_err();
         assert!(said.starts_with("--by port_tilt_deg: it does not vary here; specimen, "), "{said}");
         let said = standard(&["split"]).unwrap_err();

@@ -54,9 +54,10 @@ impl Curve {
     /// same seeds.
     pub(crate) fn of(by: &By, policies: &[&str], records: &[EpisodeRecord]) -> Self {
         let valued: Vec<(&EpisodeRecord, Value)> = records.iter().filter_map(|k| Some((k, by.value(k)?))).collect();
-        let single = records.iter().find_map(|k| k.summary.drawn.as_ref()).is_some_and(|drawn| {
-            drawn.values.iter().filter(|v| v.factor.name() == by.name).count() == 1
-        });
+        let single = records
+            .iter()
+            .find_map(|k| k.summary.drawn.as_ref())
+            .is_some_and(|drawn| drawn.values.iter().filter(|v| v.factor.name() == by.name).count() == 1);
         let rows = |of: &dyn Fn(&Value) -> bool| -> Vec<&EpisodeRecord> {
             valued.iter().filter(|(_, value)| of(value)).map(|(k, _)| *k).collect()
         };

@@ -48,8 +48,6 @@ pub(super) fn words(distribution: &Distribution) -> String {
         Distribution::Uniform([low, high]) => format!("{low} to {high}"),
         Distribution::LogUniform([low, high]) => format!("{low} to {high}, evenly in the logarithm"),
         Distribution::Normal([mean, deviation]) => format!("normal, mean {mean}, deviation {deviation}"),
-        Distribution::Choice(values) => {
-            values.iter().map(ToString::to_string).collect::<Vec<_>>().join(", ")
-        }
+        Distribution::Choice(values) => values.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "),
     }
 }

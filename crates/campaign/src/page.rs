@@ -57,7 +57,8 @@ fn body(manifest: &Manifest, r: &CampaignResult, records: &[EpisodeRecord], stor
         r.policies.iter().map(|p| page::escape(&p.policy)).collect::<Vec<_>>().join(", "),
         if r.policies.len() > 1 { "All policies have the same seeds. " } else { "" }
     );
-    let warning = repeats(r.distinct_outcomes, r.episodes).map_or_else(String::new, |why| page::warning(&sentence(&why)));
+    let warning =
+        repeats(r.distinct_outcomes, r.episodes).map_or_else(String::new, |why| page::warning(&sentence(&why)));
     let overview = page::section("Outcome", &lead, &(warning + &cards(manifest, r)));
     let varied = variation_page::varied(manifest, r, records);
     let curves = variation_page::curves(r)?;

@@ -226,7 +226,8 @@ impl CampaignResult {
         let stages: Vec<&'static str> = records
             .first()
             .map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
-        let policies: Vec<PolicyRow> = manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
+        let policies: Vec<PolicyRow> =
+            manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
         let names: Vec<&str> = manifest.policies.iter().map(|p| p.name.as_str()).collect();
         let mut comparisons = Vec::new();
         for (k, a) in manifest.policies.iter().enumerate() {

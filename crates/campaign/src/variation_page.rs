@@ -60,7 +60,8 @@ pub(super) fn varied(manifest: &Manifest, r: &CampaignResult, records: &[Episode
         Split::Both => "Seen and unseen episodes take turns.".to_owned(),
     };
     let names = ["factor", "what it is", "distribution", "drawn"];
-    let lead = format!("{set}, drawn by the seed of each episode ({}). {split}", counted(r.variation.episodes.len(), "seed"));
+    let lead =
+        format!("{set}, drawn by the seed of each episode ({}). {split}", counted(r.variation.episodes.len(), "seed"));
     page::section("Variation", &lead, &table::plain(&names, &rows))
 }
 
@@ -92,12 +93,13 @@ fn weakest(r: &CampaignResult) -> String {
     let cell = |curve: &Curve, policy: usize| {
         let shares = curve.bins.iter().filter_map(|bin| Some((bin, bin.policies.get(policy)?)));
         // The first of equals.
-        let least = shares.filter(|(_, s)| s.episodes > 0).reduce(|least, next| {
-            if next.1.interval.share < least.1.interval.share { next } else { least }
-        });
+        let least = shares
+            .filter(|(_, s)| s.episodes > 0)
+            .reduce(|least, next| if next.1.interval.share < least.1.interval.share { next } else { least });
         least.map_or("\u{2013}".to_owned(), |(bin, s)| format!("{}: {}/{}", bin.value, s.passed, s.episodes))
     };
-    let head: Vec<&str> = ["least success at"].into_iter().chain(r.policies.iter().map(|p| p.policy.as_str())).collect();
+    let head: Vec<&str> =
+        ["least success at"].into_iter().chain(r.policies.iter().map(|p| p.policy.as_str())).collect();
     let row = |curve: &Curve| {
         std::iter::once(curve.label.clone()).chain((0..r.policies.len()).map(|k| cell(curve, k))).collect::<Vec<_>>()
     };

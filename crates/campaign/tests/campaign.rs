@@ -389,7 +389,8 @@ fn episodes_have_the_specimens_that_are_drawn_for_them() {
             assert_eq!(row[column].parse::<f64>().unwrap(), value);
         }
     }
-    let seen: std::collections::BTreeSet<String> = (0..6).map(|k| varied.draw(Split::Both.seed(k)).specimen.label()).collect();
+    let seen: std::collections::BTreeSet<String> =
+        (0..6).map(|k| varied.draw(Split::Both.seed(k)).specimen.label()).collect();
     assert_eq!(seen.len(), 2, "the seen specimen and the unseen one");
     // Videos are replays: each has its own specimen.
     assert!(std::fs::read_dir(dir.path().join("two/pictures")).unwrap().count() > 2);
@@ -400,7 +401,8 @@ fn a_campaign_varies_unless_it_is_told_otherwise_and_shows_success_by_what_varie
     let dir = TempDir::new().unwrap();
     scene(dir.path());
     let folder = dir.path().join("campaign");
-    let varied = || Campaign { split: Split::Both, variation: None, ..campaign(dir.path(), &["random", "scripted"], 8) };
+    let varied =
+        || Campaign { split: Split::Both, variation: None, ..campaign(dir.path(), &["random", "scripted"], 8) };
     // It stops on the way and goes on with the same bits.
     let stopped = varied().run(&folder, &StopAfter::new(5)).unwrap_err().to_string();
     assert!(stopped.contains("continues"), "{stopped}");
@@ -424,7 +426,9 @@ fn a_campaign_varies_unless_it_is_told_otherwise_and_shows_success_by_what_varie
     let [low, middle, high] = modulus.bins[0].numbers.unwrap();
     assert!(3.0 <= low && low <= middle && middle <= high && high < modulus.bins[1].numbers.unwrap()[0]);
     let page = std::fs::read_to_string(folder.join("report.html")).unwrap();
-    for said in ["The set standard varies", "Success by split", "<details><summary>16 episodes", "1000003", "modulus (kPa)"] {
+    for said in
+        ["The set standard varies", "Success by split", "<details><summary>16 episodes", "1000003", "modulus (kPa)"]
+    {
         assert!(page.contains(said), "{said}");
     }
     // Only what is asked for.

@@ -3,8 +3,8 @@
 use crate::bench::{CellBench, EpisodeBench, GraspBench, MeshingBench, OrgansBench, RenderBench, ScalingBench};
 use crate::experiment::{
     ControllerGridExperiment, ConvergenceExperiment, ElementQualityExperiment, GraspDesignsExperiment,
-    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment, RobustnessExperiment, RolloutsExperiment,
-    SettlingExperiment, SimilarityExperiment, WrenchExperiment,
+    IntegratorsExperiment, PortBudgetExperiment, RandomActionsExperiment, ReconstructionExperiment,
+    RobustnessExperiment, RolloutsExperiment, SettlingExperiment, SimilarityExperiment, WrenchExperiment,
 };
 use crate::study::{Entry, Of};
 

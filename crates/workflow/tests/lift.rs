@@ -83,7 +83,10 @@ fn displacement_since_rest_is_the_snap_of_a_rest_pose_grasp_alone() {
     let (rest, live) = (grasp(GraspDesignName::RestPose), grasp(GraspDesignName::LivePose));
     assert!((rest.snap_mean_mm.unwrap() - rest.displaced_mm.unwrap()).abs() < 0.01, "equation (5): {rest:?}");
     assert_eq!((live.snap_mm, live.snap_mean_mm), (Some(0.0), Some(0.0)));
-    assert!((rest.displaced_mm.unwrap() - live.displaced_mm.unwrap()).abs() < 1e-9, "the same state before the second grasp");
+    assert!(
+        (rest.displaced_mm.unwrap() - live.displaced_mm.unwrap()).abs() < 1e-9,
+        "the same state before the second grasp"
+    );
     assert!(rest.activation_step_mm > live.activation_step_mm, "{rest:?} {live:?}");
 }
 

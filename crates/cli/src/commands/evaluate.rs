@@ -26,9 +26,7 @@ pub fn run(arguments: &cli::Evaluate, json: bool, progress: &dyn Progress) -> Re
     if let Some(why) = repeats(result.distinct_outcomes, result.episodes) {
         eprintln!("warning: {why}");
     }
-    output::print(json, &result, |r| {
-        if arguments.by.is_empty() { text(r, "") } else { text(r, &curves(r)) }
-    });
+    output::print(json, &result, |r| if arguments.by.is_empty() { text(r, "") } else { text(r, &curves(r)) });
     Ok(())
 }
 

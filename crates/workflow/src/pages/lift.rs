@@ -46,7 +46,13 @@ fn cards(lifted: &FinishedLift) -> String {
     // What was not measured is shown as a dash.
     let of_grasp = |v: Option<f64>| v.unwrap_or(f64::NAN);
     let grasp = s.grasp_at.map_or("no grasp".to_owned(), |at| {
-        format!("{} grasp of {} of the {} at s = {}", d.design, counted(d.held_nodes.unwrap_or(0), "node"), d.organ, fixed(at, 2))
+        format!(
+            "{} grasp of {} of the {} at s = {}",
+            d.design,
+            counted(d.held_nodes.unwrap_or(0), "node"),
+            d.organ,
+            fixed(at, 2)
+        )
     });
     let mut cards = vec![Card::new("Held", if s.held { "yes" } else { "no" }, grasp).met(s.held)];
     if let (Some(slip), Some(follow)) = (s.slip_mm, s.follow_ratio) {
@@ -55,7 +61,11 @@ fn cards(lifted: &FinishedLift) -> String {
                 .met(follow >= 0.8),
             Card::new("Slip", mm(slip), "less than 3 mm counts as held").met(slip < 3.0),
             Card::new("Snap", mm(of_grasp(d.snap_mm)), "largest displacement that the grasp prescribes at its start"),
-            Card::new("Activation step", mm(of_grasp(d.activation_step_mm)), "largest motion of a node in its first frame"),
+            Card::new(
+                "Activation step",
+                mm(of_grasp(d.activation_step_mm)),
+                "largest motion of a node in its first frame",
+            ),
             Card::new(
                 "Jaws",
                 format!("{} N", fixed(of_grasp(d.closing_force_n), 2)),

@@ -34,7 +34,11 @@ fn outcome(r: &RobustnessResult) -> Section {
     let inverted = r.rows.iter().flat_map(|row| &row.policies).map(|p| p.inverted_peak).max().unwrap_or(0);
     let suspended = [0, 1, 2].map(|k| sum(&|p| p.suspensions[k]));
     let cards = [
-        Card::new("Passed", format!("{} of {}", sum(&|p| p.passed), sum(&|p| p.episodes)), "episodes of all conditions"),
+        Card::new(
+            "Passed",
+            format!("{} of {}", sum(&|p| p.passed), sum(&|p| p.episodes)),
+            "episodes of all conditions",
+        ),
         Card::new("Inverted elements", count(inverted), "largest number in any frame").met(inverted == 0),
         Card::new("Diverged", count(sum(&|p| p.diverged)), "episodes").met(sum(&|p| p.diverged) == 0),
         Card::new("Could not begin", count(sum(&|p| p.refused)), "episodes, such as with a start out of reach"),
