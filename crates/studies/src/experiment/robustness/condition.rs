@@ -69,7 +69,7 @@ pub(super) fn conditions(scene: &Scene, own: &RobustnessExperiment) -> Result<Ve
         if by.name == SPECIMEN {
             for source in ranges.specimens() {
                 let mut scene = scene.clone();
-                scene.specimen = source.clone();
+                (scene.specimen, scene.variation.specimens) = (source.clone(), None);
                 all.push(made(SPECIMEN, source.label(), scene));
             }
             continue;
