@@ -32,7 +32,7 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
     println!("{s:?}");
     assert!(s.passed && s.end == Some(End::Passed) && s.stage == 5, "{s:?}");
     assert!(s.held_to_end && !s.diverged && s.inverted_peak == 0 && s.rcm_within, "{s:?}");
-    assert!((0.30..=0.70).contains(&s.grasp_at.unwrap()) && s.lift_mm >= 8.0 && s.lift_mm < 13.0);
+    assert!((0.30..=0.70).contains(&s.grasp_at.unwrap()) && s.lift_mm.is_some_and(|mm| (8.0..13.0).contains(&mm)));
     assert!(s.passed_at(Stage::Cut).unwrap() <= s.duration_s);
     assert!(recording.events.iter().any(|(_, e)| matches!(e, CellEvent::Cut { pieces: 1, .. })));
 
