@@ -34,7 +34,6 @@ pub use images::{ColorImage, DepthImage, Mask, pixel_neighbours};
 pub use lens::{CameraModel, UndistortionMap};
 pub use model::Camera;
 pub use raster::draw_triangle;
-pub use trocar_core::Pose;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

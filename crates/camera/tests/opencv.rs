@@ -4,23 +4,13 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
 use glam::DVec3;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use trocar_camera::{Camera, CameraModel, Distortion, Fisheye};
+use trocar_testing::python_with;
 
 /// Tolerance (px).
 const TOLERANCE: f64 = 1e-4;
-
-/// The Python interpreter with OpenCV; prints a message if there is none.
-fn python() -> Option<PathBuf> {
-    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
-    let imports = Command::new(&python).args(["-c", "import cv2"]).output();
-    if imports.is_ok_and(|o| o.status.success()) {
-        return Some(python);
-    }
-    println!("skipped: no OpenCV in target/tools; `cargo xtask tools` fetches it");
-    None
-}
 
 fn camera(distortion: [f64; 8]) -> Camera {
     let distortion = Distortion(distortion);
@@ -51,7 +41,7 @@ fn read(path: &Path) -> Vec<[f64; 2]> {
 
 #[test]
 fn every_model_agrees_with_opencv() {
-    let Some(python) = python() else { return };
+    let Some(python) = python_with("cv2", "OpenCV") else { return };
     for (name, model) in models() {
         let folder = tempfile::tempdir().unwrap();
         let file = |name: &str| folder.path().join(name);

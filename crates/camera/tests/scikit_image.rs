@@ -2,27 +2,16 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helper functions of tests")]
 
-use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_camera::Mask;
 use trocar_camera::metrics::{psnr_db, ssim};
 use trocar_core::Random;
+use trocar_testing::python_with;
 
 const WIDTH: usize = 120;
 const HEIGHT: usize = 80;
 /// Half the window. Nearer to the border the two differ in the treatment of pixels beyond it.
 const REACH: usize = 5;
-
-/// The Python interpreter with scikit-image; prints a message if there is none.
-fn python() -> Option<PathBuf> {
-    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
-    let imports = Command::new(&python).args(["-c", "import skimage.metrics"]).output();
-    if imports.is_ok_and(|o| o.status.success()) {
-        return Some(python);
-    }
-    println!("skipped: no scikit-image in target/tools; `cargo xtask tools` fetches it");
-    None
-}
 
 /// A picture of blobs, and the same picture with noise and another exposure.
 fn pictures(strength: f64) -> [Vec<[f64; 3]>; 2] {
@@ -40,7 +29,7 @@ fn pictures(strength: f64) -> [Vec<[f64; 3]>; 2] {
 
 #[test]
 fn ssim_and_psnr_agree_with_scikit_image() {
-    let Some(python) = python() else { return };
+    let Some(python) = python_with("skimage.metrics", "scikit-image") else { return };
     for strength in [3.0, 40.0, 200.0] {
         let folder = tempfile::tempdir().unwrap();
         let [a, b] = pictures(strength);

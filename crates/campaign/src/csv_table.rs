@@ -20,7 +20,7 @@ const COLUMNS: [Column; 25] = [
     ("attached", |k| k.summary.attached.to_string()),
     ("grasp_at", |k| or_empty(k.summary.grasp_at)),
     ("held_to_end", |k| k.summary.held_to_end.to_string()),
-    ("lift_mm", |k| k.summary.lift_mm.to_string()),
+    ("lift_mm", |k| or_empty(k.summary.lift_mm)),
     ("slip_mm", |k| or_empty(k.summary.slip_mm)),
     ("rcm_peak_mm", |k| k.summary.rcm_peak_mm.to_string()),
     ("rcm_loaded_median_mm", |k| or_empty(k.loaded_rcm_mm())),

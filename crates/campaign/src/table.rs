@@ -1,7 +1,11 @@
 //! The figures of a campaign: episodes of each policy that passed each stage, with intervals, and
 //! comparisons of policies on the same seeds.
 
+use crate::by::By;
+use crate::curves::Curve;
+use crate::drawn_result::VariationResult;
 use crate::manifest::Manifest;
+use crate::outcomes::distinct_outcomes;
 use crate::store::EpisodeRecord;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -95,6 +99,8 @@ pub struct PolicyRow {
     pub policy: String,
     /// Stored episodes.
     pub episodes: usize,
+    /// Episodes that differ from each other in any figure by more than can be measured.
+    pub distinct_outcomes: usize,
     /// Episodes that passed all stages.
     pub passed: usize,
     /// Their share.
@@ -160,6 +166,17 @@ pub struct Comparison {
     pub score_difference: f64,
 }
 
+/// Suspensions of physics in all episodes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Suspensions {
+    /// Number of times that contact of an instrument was disabled.
+    pub disabled_contacts: usize,
+    /// Number of times that contact of blades that hold tissue was disabled.
+    pub disabled_blades: usize,
+    /// Number of times that an organ was relaxed outside of time.
+    pub relaxed: usize,
+}
+
 /// The figures of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CampaignResult {
@@ -167,7 +184,7 @@ pub struct CampaignResult {
     pub scene: String,
     /// The task.
     pub task: String,
-    /// Seed of the first episode.
+    /// Number of the first episode in its split. Of seen episodes it is the seed.
     pub seed: u64,
     /// Stored episodes.
     pub episodes: usize,
@@ -175,6 +192,15 @@ pub struct CampaignResult {
     pub planned: usize,
     /// Episodes of all policies that passed.
     pub passed: usize,
+    /// Sum over the policies of the episodes that differ from each other in any figure by more than
+    /// can be measured: 0.01 mm, 0.001 N or one control period.
+    pub distinct_outcomes: usize,
+    /// Suspensions of physics.
+    pub suspensions: Suspensions,
+    /// What varied, and what was drawn.
+    pub variation: VariationResult,
+    /// Success over what varied.
+    pub by: Vec<Curve>,
     /// The policies in order.
     pub policies: Vec<PolicyRow>,
     /// The pairs of policies.
@@ -194,13 +220,15 @@ impl PolicyRow {
 
 impl CampaignResult {
     /// The figures of the stored episodes `records`.
-    pub(super) fn of(manifest: &Manifest, records: &[EpisodeRecord], folder: &Path) -> Self {
+    pub(super) fn of(manifest: &Manifest, by: &[By], records: &[EpisodeRecord], folder: &Path) -> Self {
         let of = |name: &str| records.iter().filter(|k| k.name == name).collect::<Vec<_>>();
         // A policy without episodes has the stages of the others.
         let stages: Vec<&'static str> = records
             .first()
             .map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
-        let policies = manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
+        let policies: Vec<PolicyRow> =
+            manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
+        let names: Vec<&str> = manifest.policies.iter().map(|p| p.name.as_str()).collect();
         let mut comparisons = Vec::new();
         for (k, a) in manifest.policies.iter().enumerate() {
             for b in &manifest.policies[k + 1..] {
@@ -219,6 +247,14 @@ impl CampaignResult {
             episodes: records.len(),
             planned: manifest.count(),
             passed: records.iter().filter(|k| k.summary.passed).count(),
+            distinct_outcomes: policies.iter().map(|p| p.distinct_outcomes).sum(),
+            suspensions: Suspensions {
+                disabled_contacts: policies.iter().map(|p| p.disabled_contacts).sum(),
+                disabled_blades: policies.iter().map(|p| p.disabled_blades).sum(),
+                relaxed: policies.iter().map(|p| p.relaxed).sum(),
+            },
+            variation: VariationResult::of(manifest, records),
+            by: by.iter().map(|by| Curve::of(by, &names, records)).collect(),
             policies,
             comparisons,
             hash: format!("{:016x}", hash.digest()),
@@ -246,6 +282,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&'static str], manifest:
     PolicyRow {
         policy: name.to_owned(),
         episodes: all,
+        distinct_outcomes: distinct_outcomes(records, manifest.control_period_s),
         passed,
         interval: Interval::wilson(passed, all),
         stages: stages.collect(),
@@ -253,7 +290,7 @@ fn row(name: &str, records: &[&EpisodeRecord], names: &[&'static str], manifest:
         ends,
         attached: attached.len(),
         held_to_end: attached.iter().filter(|k| k.summary.held_to_end).count(),
-        lift_median_mm: median(attached.iter().map(|k| k.summary.lift_mm).collect()),
+        lift_median_mm: median(attached.iter().filter_map(|k| k.summary.lift_mm).collect()),
         rcm_median_mm: median(attached.iter().filter_map(|k| k.loaded_rcm_mm()).collect()),
         rcm_max_mm: records.iter().map(|k| k.summary.rcm_peak_mm).max_by(f64::total_cmp),
         rcm_within: attached.iter().filter(|k| k.summary.rcm_peak_mm <= manifest.rcm_threshold_mm).count(),

@@ -1,26 +1,27 @@
-//! The gripper as tissue feels it: colliders of its blades and shaft.
+//! The colliders of a gripper's blades and shaft, which touch tissue.
 //!
-//! Three tools stand for one gripper: its own frame, which carries the shaft and whatever is held,
-//! and a frame for each blade ([`Gripper::blade`]). A blade is three thin capsules along it. With
-//! their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5 mm wide, 3.2 mm
-//! thick, and an inner face that is flat to 0.07 mm. A cutter's blade is a single capsule.
+//! A gripper is three tools of the tissue's step: its own frame, which carries the shaft and the
+//! held tissue, and a frame for each blade ([`Gripper::blade`]). A blade is three thin capsules
+//! along it. With their rest offset of 1.5 mm (paper section IV-C) they fill the visible blade: 5
+//! mm wide, 3.2 mm thick, and an inner face that is flat to 0.07 mm. A cutter's blade is a single
+//! capsule.
 
 use crate::Gripper;
 use crate::gripper::{BLADE_TIP, BLADE_WIDTH, JAW_REGION_BEGIN, MAX_ANGLE, SHAFT_LENGTH, SHAFT_RADIUS};
 use glam::DVec3;
 use trocar_tissue::{Collider, Shape, ToolForce};
 
-/// The places, among the tools of a step, of the three that stand for one gripper.
+/// The indices of a gripper's three tools among the tools of a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tools {
-    /// Its own frame.
+    /// The gripper's own frame.
     pub gripper: usize,
     /// The blade that opens towards +y, and the one towards -y.
     pub blades: [usize; 2],
 }
 
 impl Tools {
-    /// Those of gripper number `k`, three a gripper in the order of [`Gripper::motions_to`].
+    /// The tools of gripper `k`: three for each gripper, in the order of [`Gripper::motions_to`].
     pub const fn of(k: usize) -> Self {
         Self { gripper: 3 * k, blades: [3 * k + 1, 3 * k + 2] }
     }
@@ -30,13 +31,13 @@ impl Tools {
         [(self.blades[0], 1.0), (self.blades[1], -1.0)]
     }
 
-    /// The forces on the three of them; zero where `forces` has none.
+    /// The forces on the three tools; zero where `forces` has none.
     pub fn forces(self, forces: &[ToolForce]) -> [ToolForce; 3] {
         [self.gripper, self.blades[0], self.blades[1]].map(|t| forces.get(t).copied().unwrap_or_default())
     }
 }
 
-/// Size and surface of an instrument's end.
+/// Size and surface of an instrument's blades.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Blades {
     /// Length beyond the pivot (m).
@@ -70,13 +71,14 @@ impl Default for Blades {
     }
 }
 
-/// Distance at which tissue rests on an instrument's tip (m) (SPEC C1).
+/// Distance at which tissue rests on an instrument's tip (m).
 pub const REST_OFFSET: f64 = 0.0015;
 
-/// Coulomb friction of the instrument on tissue (SPEC C1).
+/// Coulomb friction of the instrument on tissue (paper section IV-C).
 pub const FRICTION: f64 = 0.6;
 
-/// Radius of a blade's ridges (m): nearly none; the rest offset makes the blade's thickness.
+/// Radius of a blade's ridges (m): nearly zero, because the rest offset makes the blade's
+/// thickness.
 const RIDGE: f64 = 0.0001;
 
 /// The colliders of one gripper of the paper's size whose frames are tools 0 to 2.
@@ -91,7 +93,7 @@ impl Blades {
         let mut all = Vec::with_capacity(7);
         for (tool, side) in tools.sides() {
             for ridge in 0..self.ridges {
-                // -1, 0 and 1 of three; 0 of one.
+                // -1, 0 and 1 for three ridges; 0 for one.
                 let share = ridge as f64 - 0.5 * (self.ridges as f64 - 1.0);
                 let aside = share * (0.5 * BLADE_WIDTH - inset).max(0.0);
                 let (begin, end) = (JAW_REGION_BEGIN + inset, self.length - inset);
@@ -106,7 +108,7 @@ impl Blades {
                 });
             }
         }
-        // The shaft ends so that it does not fill the mouth.
+        // The shaft ends before the region between the jaws.
         let ends =
             [DVec3::new(-self.shaft_length, 0.0, 0.0), DVec3::new(JAW_REGION_BEGIN - self.shaft_radius, 0.0, 0.0)];
         let shape = Shape::Capsule { ends, radius: self.shaft_radius };
@@ -116,9 +118,9 @@ impl Blades {
     }
 }
 
-/// How hard tissue pushes the blades of `gripper` apart (N): the mean over the two of the force
-/// outwards across the blade, which is what one rod that drives both feels of either. `forces` are
-/// those of the step's tools, of which `tools` are the gripper's; 0 where there are none.
+/// Force with which tissue pushes the blades of `gripper` apart (N): the mean over both blades of
+/// the outward force, as one rod that drives both would measure it. `forces` are those of all tools
+/// of the step, `tools` the indices of the gripper's; 0 without forces.
 pub fn opening_force(gripper: &Gripper, tools: Tools, forces: &[ToolForce]) -> f64 {
     let of = |(tool, side): (usize, f64)| {
         let outwards = gripper.blade(side).rotation * (side * DVec3::Y);

@@ -1,7 +1,7 @@
 //! Where a grasp may form: disjoint clusters of about 1 cm along an organ's axis (paper section
 //! IV-C).
 //!
-//! A cluster's index is a position on the organ, so that "where was it grasped" is a number.
+//! A cluster's index is its position along the organ.
 
 use crate::World;
 use glam::DVec3;
@@ -10,21 +10,20 @@ use trocar_tissue::Body;
 /// Length of a cluster along the axis (m).
 const CLUSTER_LENGTH: f64 = 0.010;
 
-/// A cluster at least this many median edges long, so that a coarsely meshed large organ has nodes
-/// in every cluster.
+/// A cluster is at least this many median edges long, so that every cluster of a coarsely meshed
+/// large organ has nodes.
 const CLUSTER_EDGES: f64 = 1.5;
 
 /// Nodes nearer to pinned tissue than this (m), or than this many median edges, are in no cluster
-/// while others are: a rigid cluster tied to pinned tissue by less would stretch what is between
-/// them beyond what tissue bears.
+/// if others are: a rigid cluster nearer to pinned tissue would overstretch the tissue between.
 const CLEARANCE: f64 = 0.005;
 const CLEARANCE_EDGES: f64 = 1.5;
 
 const CLEARANCE_HALVINGS: u32 = 3;
-/// Fewest nodes the jaws take hold of, where there are as many.
+/// Minimum number of nodes of a grasp, if the organ has as many.
 pub(crate) const MIN_HELD_NODES: usize = 8;
 
-/// As many clear nodes are enough for a cluster.
+/// So many nodes far from pins are enough for a cluster.
 const MIN_CLEAR_NODES: usize = 12;
 
 /// Nodes that are grasped together.
@@ -41,9 +40,8 @@ pub struct Cluster {
 /// The clusters of the free part of organ `organ`, from base to tip; parts without free nodes have
 /// none.
 ///
-/// Nodes that share an element with a pinned one belong to no cluster: an element all of whose
-/// nodes are prescribed could not give way, and a rigid cluster tied directly to pinned tissue
-/// would invert it.
+/// Nodes that share an element with a pinned one belong to no cluster: an element with all nodes
+/// prescribed cannot deform, and a rigid cluster next to pinned tissue would invert it.
 pub fn clusters(world: &World, organ: usize) -> Vec<Cluster> {
     let (axis, body) = (&world.axes[organ], &world.model.bodies()[organ]);
     let length = CLUSTER_LENGTH.max(CLUSTER_EDGES * body.median_edge());
@@ -73,8 +71,8 @@ fn not_beside_pins(body: &Body) -> impl Iterator<Item = u32> + use<> {
     (0..free.len() as u32).filter(move |i| free[*i as usize])
 }
 
-/// Leaves out the cluster's nodes within `clearance` (m) of pinned tissue at rest, or within half
-/// of that, and so on, as long as too few are left.
+/// Removes the cluster's nodes within `clearance` (m) of pinned tissue at rest. If too few are
+/// left, the clearance is halved, and so on.
 fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
     let rest = body.rest_positions();
     let pinned: Vec<DVec3> = (0..rest.len()).filter(|i| body.pinned()[*i]).map(|i| rest[i]).collect();
@@ -95,8 +93,8 @@ fn keep_clear(cluster: &mut Cluster, body: &Body, clearance: f64) {
 }
 
 impl Cluster {
-    /// The part of the cluster that jaws coming from above can hold: its nodes within `reach` (m)
-    /// of its highest region. Slender organs are held whole; of a liver, jaws pinch the top.
+    /// The part of the cluster that jaws from above can grasp: its nodes within `reach` (m) of its
+    /// highest region. Jaws hold the whole cross-section of a slender organ and the top of a liver.
     pub fn within_reach(&self, world: &World, organ: usize, reach: f64) -> Self {
         let position = |i: u32| world.state.position(&world.model, organ, i as usize);
         let centroid = self.centroid(world, organ);

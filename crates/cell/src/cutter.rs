@@ -1,27 +1,28 @@
-//! Scissors: what blades that close through tissue part.
+//! Scissors: when closing blades cut, and what they cut.
 //!
-//! A cutter has the gripper's blades. Its cut is in the plane in which they swing, over their
-//! length and as wide as they were open. A tube across the blades is cut through where the mouth
-//! holds all of it, and in part otherwise. Its edges have no width: they push no tissue.
+//! A cutter's blades move like the gripper's. The cut lies in the plane between the blades, over
+//! their length and as wide as they were open. A tube across the blades is cut through if its whole
+//! cross-section is between them, else in part. The cutting edges have no width: they push no
+//! tissue.
 
 use crate::gripper::{BLADE_TIP, JAW_REGION_BEGIN};
 use crate::{Gripper, Result, World};
 use glam::DVec3;
 use trocar_tissue::{Cut, Piece, sever};
 
-/// Blades that were open wider than this (rad) are ready to cut (SPEC E1) ...
+/// Blades that were open wider than this (rad) are ready to cut ...
 pub const CUT_OPENED: f64 = 0.50;
 
 /// ... and cut when they close to less than this (rad).
 pub const CUT_CLOSED: f64 = 0.15;
 
-/// Watches the blades of a cutter: a cut is made by blades that were open and close.
+/// Watches the blades of a cutter: open blades that close make a cut.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scissors {
-    /// Blades wider than the first angle are ready to cut, and do when they close to less than the
-    /// second (rad).
+    /// Blades open by more than the first angle are ready to cut; they cut when they close below
+    /// the second (rad).
     angles: [f64; 2],
-    /// Widest angle (rad) since the last cut, if that is wide enough for the next.
+    /// Widest angle (rad) since the last cut, if it is wide enough for another.
     opened: Option<f64>,
 }
 
@@ -38,7 +39,7 @@ impl Scissors {
         Self { angles: [opened, closed], opened: None }
     }
 
-    /// How wide they are or were (rad), if they are ready to cut.
+    /// Widest angle of the blades (rad), if they are ready to cut.
     pub fn opened(&self) -> Option<f64> {
         self.opened
     }
@@ -49,15 +50,14 @@ impl Scissors {
         angles.into_iter().chain([opened.unwrap_or(-1.0)])
     }
 
-    /// Forgets that they were open: nothing was between them for a while.
+    /// Forgets the open angle: nothing was between the blades.
     pub fn rest(&mut self) {
         self.opened = None;
     }
 
-    /// The cutter is at `gripper` now. When its blades have closed, after they were open, the
-    /// gripper there with the blades as wide as they were: what lies between those is cut
-    /// ([`Gripper::cut`]). None otherwise; blades that close again without having opened cut
-    /// nothing.
+    /// Takes over where the cutter is now. If its open blades have just closed, returns the gripper
+    /// there with the blades as wide as they were: the tissue between them is cut
+    /// ([`Gripper::cut`]). `None` otherwise; blades that close again without opening cut nothing.
     pub fn follow(&mut self, gripper: &Gripper) -> Option<Gripper> {
         let angle = gripper.jaw_angle;
         if angle < self.angles[1] {
@@ -71,7 +71,7 @@ impl Scissors {
 }
 
 impl Gripper {
-    /// What its blades cut of body `body` when they close from where they are now.
+    /// The cut of body `body` when the blades close from here.
     pub fn cut(&self, body: usize) -> Cut {
         self.cut_along(body, BLADE_TIP)
     }
@@ -91,11 +91,12 @@ impl Gripper {
 }
 
 impl World {
-    /// Cuts a body; it keeps its index, and what it lost comes behind all others. The pieces, or
-    /// none where nothing was cut. Nothing of it can be undone but by a clone of model and state.
+    /// Cuts a body. The first piece keeps the body's index; the other pieces become the last
+    /// bodies. Returns the pieces, or none if nothing was cut. Only a copy of model and state
+    /// undoes it.
     ///
     /// # Errors
-    /// A cut that cannot be, or pieces that cannot be stepped.
+    /// An invalid cut, or pieces that cannot be stepped.
     pub fn sever(&mut self, cut: &Cut) -> Result<Vec<Piece>> {
         let severed = sever(&self.model, &self.state, cut)?;
         if severed.faces == 0 {

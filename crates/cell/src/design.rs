@@ -1,4 +1,4 @@
-//! The ways in which jaws can hold tissue, by name (SPEC C4, C7; paper section IV-C and Table II).
+//! The ways in which jaws can hold tissue, by name (paper section IV-C and Table II).
 
 use crate::World;
 use crate::blades::{FRICTION, Tools};
@@ -9,30 +9,29 @@ use trocar_tissue::{Compliance, Grasp};
 /// How jaws hold what is between them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum GraspDesign {
-    /// By the friction of the two blades alone.
+    /// Friction of the two blades alone.
     Friction,
-    /// Nodes tied to the jaws where they were in the undeformed organ: whatever the organ has moved
-    /// since becomes a jump (paper, equation 5).
+    /// Nodes tied to the jaws at their places in the undeformed organ: the organ's motion since
+    /// then becomes a jump (paper, equation 5).
     RestPose,
-    /// Nodes tied to the jaws where they are when these close (paper, equation 4).
+    /// Nodes tied to the jaws at their places when the jaws close (paper, equation 4).
     LivePose,
-    /// As live-pose, on springs that hold no more than the friction of the jaws' force does, and
-    /// tear.
+    /// As live-pose, by springs whose force is limited to the friction of the jaws, and that tear.
     #[default]
     Compliant,
 }
 
-/// Stiffness of a compliant grasp's spring over Young's modulus times the median edge, which is
-/// about what the tissue around a node resists with: far above it, so that held tissue follows the
+/// Stiffness of a compliant grasp's spring over Young's modulus times the median edge, about the
+/// stiffness of the tissue around a node. It is far above one, so that held tissue follows the
 /// jaws.
 const SPRING: f64 = 20.0;
 
-/// What a compliant grasp is held by and what it bears.
+/// Forces of a compliant grasp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JawForces {
     /// Force with which the jaws close (N).
     pub closing: f64,
-    /// Pull at which tissue tears out of them (N).
+    /// Pull at which tissue tears out of the jaws (N).
     pub tearing: f64,
 }
 
@@ -50,8 +49,7 @@ impl GraspDesign {
         }
     }
 
-    /// The grasp of `nodes` of organ `organ` by jaws whose gripper, `tools` of the step, is at `pose`;
-    /// none for friction, which needs none.
+    /// The grasp of `nodes` of organ `organ` by the gripper `tools` at `pose`; `None` for friction.
     pub fn grasp(
         self,
         world: &World,
@@ -67,7 +65,7 @@ impl GraspDesign {
         match self {
             Self::Friction => None,
             Self::RestPose => {
-                // Offsets as authored in the undeformed organ with the gripper where it closes: the
+                // Offsets from the undeformed organ to the gripper where it closes: the
                 // displacement since rest becomes the snap.
                 let rest: Vec<DVec3> = nodes.iter().map(|i| body.rest_positions()[*i as usize]).collect();
                 Some(Grasp::prescribe(model, organ, nodes, &rest, tools.gripper, pose))

@@ -1,38 +1,38 @@
-//! What can go wrong while a task is set up or run.
+//! Errors of the cell.
 
 /// Result of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// A task that cannot be run.
+/// An error of the cell.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The specimen has no organ of that name.
     #[error("no organ '{name}' in the specimen; it has {known}")]
     UnknownOrgan {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The known names.
         known: String,
     },
-    /// An option is out of range, or nothing can be grasped there.
+    /// An option is out of range, or no tissue can be grasped there.
     #[error("{0}")]
     Option(String),
-    /// A number of an action cannot be done. The cell is as it was.
+    /// A number of an action is refused. The cell is unchanged.
     #[error("action[{index}], {name}, {reason}")]
     Action {
         /// Its place in the action.
         index: usize,
         /// Its name.
         name: String,
-        /// What is wrong with it, what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
     /// The cell has no arm of that name.
     #[error("no arm '{name}' in the cell; it has {known}")]
     UnknownArm {
-        /// The name asked for.
+        /// The requested name.
         name: String,
-        /// The names there are.
+        /// The known names.
         known: String,
     },
     /// A field of the scene cannot be built.
@@ -42,7 +42,7 @@ pub enum Error {
         scene: String,
         /// The field.
         field: String,
-        /// What is wrong with it, what would be right.
+        /// What is wrong, and what would be right.
         reason: String,
     },
     /// An arm, an instrument or a port is unusable.

@@ -1,4 +1,4 @@
-//! What jaws take hold of at the instant they have closed, whoever moves them.
+//! The tissue that jaws grasp at the instant when they have closed.
 
 use crate::jaw_region::attached;
 use crate::{GraspDesign, JawRegion, TissueInJaws, World};
@@ -9,14 +9,14 @@ use trocar_tissue::Grasp;
 pub(crate) struct GraspCandidate {
     /// Organ coordinate of the attached cluster.
     pub s: f64,
-    /// The nodes that are followed, and held by designs that hold nodes.
+    /// The nodes that are measured, and held by designs that hold nodes.
     pub nodes: Vec<u32>,
 }
 
 impl GraspCandidate {
-    /// What is held of the `tissue` of organ `organ` in the `mouth`: the attached cluster (SPEC
-    /// C3), or for friction the tissue between the blades. None where no cluster is near. `reach`
-    /// is how far jaws hold from the middle of what they pinch (m).
+    /// The grasped part of the `tissue` of organ `organ` in the region `mouth`: the attached
+    /// cluster, or for friction the tissue between the blades. `None` if no cluster is near.
+    /// `reach` is the largest distance of held nodes from the middle of the pinched tissue (m).
     pub fn on(
         world: &World,
         organ: usize,
@@ -43,7 +43,7 @@ impl GraspCandidate {
     }
 }
 
-/// How far a grasp's nodes were from where it first prescribes them (SPEC, snap).
+/// The snap of a grasp: distances of its nodes from where it first prescribes them.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Snap {
     /// The largest distance (m).
@@ -55,7 +55,7 @@ pub(crate) struct Snap {
 }
 
 impl Snap {
-    /// Of `grasp`, made just now with its tool at `pose`.
+    /// The snap of a new `grasp` with its tool at `pose`.
     pub fn of(world: &World, grasp: &Grasp, pose: &Pose) -> Self {
         let place = |i: u32| world.state.position(&world.model, grasp.body, i as usize);
         let snaps: Vec<f64> = grasp.prescribed(pose).map(|(i, x)| x.distance(place(i))).collect();

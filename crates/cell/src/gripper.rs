@@ -1,28 +1,27 @@
 //! A free-moving two-jaw gripper.
 //!
 //! Frame: origin at the jaw pivot, x along the closed blades towards their tips, y across the
-//! closing plane (the blades open towards +y and -y), z completes. The mouth (SPEC C3) is a wedge 2
-//! to 21 mm beyond the pivot, 5 mm wide along z, with half-gap r sin(theta/2).
+//! closing plane (the blades open towards +y and -y), z completes. The region between the jaws is a
+//! wedge 2 to 21 mm beyond the pivot, 5 mm wide along z, with half-gap r sin(theta/2).
 
 use glam::{DMat3, DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TriMesh;
 use trocar_tissue::ToolMotion;
 
-/// Widest angle between the blades (rad) (SPEC: theta_max 60 degrees).
+/// Widest angle between the blades (rad): 60 degrees (paper section IV-C).
 pub const MAX_ANGLE: f64 = std::f64::consts::FRAC_PI_3;
 
-/// Distance from the pivot at which tissue is taken (m): the middle of the mouth.
+/// Distance from the pivot at which tissue is grasped (m): the middle of the region between the
+/// jaws.
 pub(crate) const GRIP_DISTANCE: f64 = 0.0115;
 
-/// The mouth begins this far beyond the pivot (m).
+/// Distance from the pivot to the beginning of that region (m).
 pub(crate) const JAW_REGION_BEGIN: f64 = 0.002;
-/// The blades and the mouth end there (m).
+/// Distance from the pivot to its end, the blades' tips (m).
 pub(crate) const BLADE_TIP: f64 = 0.021;
 pub(crate) const BLADE_WIDTH: f64 = 0.005;
 pub(crate) const BLADE_THICKNESS: f64 = 0.0032;
-/// Width of a cutter's blade (m).
-const CUTTER_WIDTH: f64 = 0.0012;
 pub(crate) const SHAFT_RADIUS: f64 = 0.0025;
 pub(crate) const SHAFT_LENGTH: f64 = 0.12;
 
@@ -36,8 +35,8 @@ pub struct Gripper {
 }
 
 impl Gripper {
-    /// A gripper that comes from `up`, closes across `along` (the tube's direction) and holds
-    /// `point` in mid-mouth.
+    /// A gripper above `point` whose blades close across `along` (the tube's direction), with
+    /// `point` in the middle of the region between the jaws.
     pub fn over(point: DVec3, up: DVec3, along: DVec3, jaw_angle: f64) -> Self {
         let x = -up;
         let z = (along - along.dot(up) * up).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
@@ -52,8 +51,8 @@ impl Gripper {
         Pose { rotation: self.pose.rotation * swing, translation: self.pose.translation }
     }
 
-    /// How the gripper and its two blades move in a frame at whose end they are as in `next`: the
-    /// motions of tools 0, 1 (the blade towards +y) and 2.
+    /// The motions in a frame at whose end the gripper is `next`: tool 0 is the gripper, 1 the
+    /// blade towards +y, 2 the other.
     pub fn motions_to(&self, next: &Self) -> [ToolMotion; 3] {
         let blade = |side| ToolMotion { from: self.blade(side), to: next.blade(side) };
         [ToolMotion { from: self.pose, to: next.pose }, blade(1.0), blade(-1.0)]
@@ -64,24 +63,8 @@ impl Gripper {
         r * (0.5 * self.jaw_angle).sin()
     }
 
-    /// The angle at which the blades touch tissue that reaches `half_width` (m) to either side in
-    /// mid-mouth.
-    pub fn angle_for(half_width: f64) -> f64 {
-        (2.0 * (half_width / GRIP_DISTANCE).clamp(0.0, 1.0).asin()).min(MAX_ANGLE)
-    }
-
     /// Surface of the shaft and the two blades in the world (m), for pictures.
     pub fn surface(&self) -> TriMesh {
-        self.surface_of(BLADE_WIDTH, BLADE_THICKNESS, 0.0)
-    }
-
-    /// The same of a cutter: two thin blades that pass each other.
-    pub fn cutter_surface(&self) -> TriMesh {
-        self.surface_of(CUTTER_WIDTH, BLADE_THICKNESS, 0.5 * CUTTER_WIDTH)
-    }
-
-    /// Blades of a width and thickness (m), each shifted by `aside` (m) along z, and the shaft.
-    fn surface_of(&self, width: f64, thickness: f64, aside: f64) -> TriMesh {
         let mut mesh = TriMesh::default();
         for side in [1.0, -1.0] {
             let swing = DQuat::from_rotation_z(side * 0.5 * self.jaw_angle);
@@ -89,12 +72,12 @@ impl Gripper {
             // towards the tip.
             let section = |x: f64, thickness: f64, width: f64| {
                 [(0.0, -1.0), (1.0, -1.0), (1.0, 1.0), (0.0, 1.0)]
-                    .map(|(t, w)| swing * DVec3::new(x, side * t * thickness, 0.5 * w * width + side * aside))
+                    .map(|(t, w)| swing * DVec3::new(x, side * t * thickness, 0.5 * w * width))
             };
             let rings = [
-                section(-0.002, thickness, width),
-                section(0.6 * BLADE_TIP, thickness, width),
-                section(BLADE_TIP, 0.7 * thickness, 0.7 * width),
+                section(-0.002, BLADE_THICKNESS, BLADE_WIDTH),
+                section(0.6 * BLADE_TIP, BLADE_THICKNESS, BLADE_WIDTH),
+                section(BLADE_TIP, 0.7 * BLADE_THICKNESS, 0.7 * BLADE_WIDTH),
             ];
             loft(&mut mesh, &rings, side < 0.0);
         }
@@ -168,8 +151,7 @@ mod tests {
 
     #[test]
     fn the_half_gap_follows_the_papers_wedge() {
-        let gripper = Gripper::over(DVec3::ZERO, DVec3::Z, DVec3::X, Gripper::angle_for(0.004));
+        let gripper = Gripper::over(DVec3::ZERO, DVec3::Z, DVec3::X, 2.0 * (0.004 / GRIP_DISTANCE).asin());
         assert!((gripper.half_gap(GRIP_DISTANCE) - 0.004).abs() < 1e-12);
-        assert!((Gripper::angle_for(1.0) - MAX_ANGLE).abs() < 1e-12);
     }
 }

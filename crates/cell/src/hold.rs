@@ -1,4 +1,4 @@
-//! How tissue in the jaws has moved since they closed on it: lift and slip (SPEC, Definitions).
+//! Motion of grasped tissue since the jaws closed: lift and slip (see the glossary).
 
 use crate::World;
 use glam::DVec3;
@@ -15,7 +15,7 @@ pub(crate) struct Hold {
     jaw: DVec3,
 }
 
-/// What has become of it (m).
+/// Its motion since then (m).
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Moved {
     pub jaw_lift: f64,
@@ -24,15 +24,16 @@ pub(crate) struct Moved {
 }
 
 impl Hold {
-    /// `nodes` of organ `organ` are in the jaws of a gripper at `pose` now.
+    /// A hold on `nodes` of organ `organ` by a gripper that is at `pose` now.
     pub fn new(world: &World, organ: usize, nodes: Vec<u32>, pose: &Pose) -> Self {
         let centroid = world.state.centroid(&world.model, organ, &nodes);
         let centroid_in_jaw = pose.inverse().transform(centroid);
         Self { organ, nodes, centroid, centroid_in_jaw, jaw: pose.translation }
     }
 
-    /// The organ has been cut into `pieces` of bodies in `world`: goes on with the piece that has
-    /// the most of the nodes. `pose` is the gripper's now, `was` their centroid before the cut (m).
+    /// Follows a cut of the organ into `pieces`, bodies of `world`: the hold continues on the piece
+    /// with most of its nodes. `pose` is the gripper's now; `was` is the nodes' centroid before the
+    /// cut (m).
     pub fn follow(&mut self, world: &World, pieces: &[Piece], pose: &Pose, was: DVec3) {
         let mut held = self.nodes.clone();
         held.sort_unstable();
@@ -49,14 +50,13 @@ impl Hold {
         }
         let Some((organ, nodes)) = most.filter(|(_, nodes)| !nodes.is_empty()) else { return };
         (self.organ, self.nodes) = (organ, nodes);
-        // Nodes that were left to other pieces do not count as motion.
+        // Nodes of other pieces do not count as motion.
         let shift = self.now(world) - was;
         self.centroid += shift;
         self.centroid_in_jaw += pose.rotation.inverse() * shift;
     }
 
-    /// Whether nothing has moved since the jaws closed, so that the next frame is the grasp's
-    /// first.
+    /// Whether no frame has passed since the jaws closed.
     pub fn is_new(&self, world: &World) -> bool {
         self.now(world) == self.centroid
     }
@@ -78,7 +78,7 @@ impl Hold {
         (self.organ, &self.nodes)
     }
 
-    /// How far all has moved by the time that the gripper is at `pose`.
+    /// The motion since the jaws closed, with the gripper at `pose` now.
     pub fn moved(&self, world: &World, pose: &Pose) -> Moved {
         let centroid = self.now(world);
         Moved {

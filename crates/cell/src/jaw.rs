@@ -1,20 +1,20 @@
-//! The jaw's drive: it closes until tissue presses with the force it may use, and keeps that force.
+//! The jaw's drive: it closes until tissue pushes back with the force budget, and holds that force.
 //!
-//! A drive that is told an angle crushes what is soft and lets go of what is softer. This one is
-//! told a force. It closes at a limited speed that falls as the force nears the budget, and opens
-//! when it is above. At 60 commands a second against contact, which is stiff, a fixed gain would be
-//! unstable or slow; so every step is at most half of what the stiffness seen so far (a secant
-//! through the last two frames) says would meet the budget.
+//! A drive that is commanded by angle crushes soft tissue or loses it. This one is commanded by
+//! force. It closes at a limited speed that falls as the force nears the budget, and opens when it
+//! is above. At 60 commands a second against contact, which is stiff, a fixed gain would be
+//! unstable or slow; so every step is at most half of the step that would meet the budget by the
+//! stiffness seen so far (a secant through the last two frames).
 
 use crate::FRAME;
 use crate::gripper::MAX_ANGLE;
 
-/// Force of the jaws (N) unless the user says otherwise: it squeezes the appendix, 9 mm of 12 kPa,
-/// to about 3 mm, and two blades with friction 0.6 then bear 0.6 N, of which a lift of 15 mm needs
-/// 0.2 to 0.4. See `docs/measurements/grasp.md`.
+/// Default force of the jaws (N). It squeezes the appendix (9 mm, 12 kPa) to about 3 mm; two blades
+/// with friction 0.6 then hold 0.6 N, and a lift of 15 mm needs 0.2 to 0.4 N. See
+/// `docs/measurements/grasp.md`.
 pub const JAW_FORCE: f64 = 0.5;
 
-/// Time that the jaws take from wide open to closed on nothing (s).
+/// Time from wide open to closed, without tissue (s).
 const CLOSING_TIME: f64 = 0.3;
 
 /// Share of the way to the budget that one step goes.
@@ -23,15 +23,14 @@ const GAIN: f64 = 0.5;
 /// Within this share of the budget the jaw stands still, so that held tissue comes to rest.
 const DEADBAND: f64 = 0.02;
 
-/// What is left of the stiffest secant from one frame to the next: tissue that was stiff a moment
-/// ago is approached with care.
+/// Decay of the stiffest secant from one frame to the next, so that the jaw stays slow for a while
+/// after it met stiff tissue.
 const FORGETTING: f64 = 0.8;
 
-/// Least motion that gives a secant (rad); with less, the tissue's creep would be taken for its
-/// stiffness.
+/// Minimum motion for a secant (rad); below it, creep would be mistaken for stiffness.
 const LEAST_MOTION: f64 = 1e-4;
 
-/// A jaw that is driven by force.
+/// A force-controlled jaw.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Jaw {
     /// Force with which it presses (N).
@@ -40,7 +39,7 @@ pub struct Jaw {
     max_angle: f64,
     /// Fastest motion (rad a frame).
     fastest: f64,
-    /// Opening force gained per angle closed (N/rad).
+    /// Stiffness seen so far: opening force per closing angle (N/rad).
     stiffness: f64,
     /// Angle (rad) and opening force (N) a frame ago.
     last: Option<(f64, f64)>,
@@ -97,8 +96,8 @@ impl Jaw {
 mod tests {
     use super::*;
 
-    /// Closes on something that pushes back by `spring` (angle, change of angle in the last frame)
-    /// and returns the angle and forces of 90 frames.
+    /// Closes on a spring with the force `spring(angle, change of angle in the last frame)`;
+    /// returns the final angle and the forces of 90 frames.
     fn close_on(spring: impl Fn(f64, f64) -> f64, budget: f64) -> (f64, Vec<f64>) {
         let mut jaw = Jaw::new(budget);
         let (mut angle, mut force) = (MAX_ANGLE, 0.0);
@@ -115,7 +114,7 @@ mod tests {
 
     #[test]
     fn it_keeps_the_budget_on_soft_and_on_stiff_things() {
-        // Newtons a radian: tissue gives 1 to 10, steel 100,000.
+        // Newtons per radian: tissue 1 to 10, steel 100,000.
         for stiffness in [1.0, 5.0, 50.0, 1e3, 1e5] {
             for budget in [0.2, 1.0, 5.0] {
                 let (angle, forces) = close_on(|a, _| stiffness * (0.7 - a).max(0.0), budget);
@@ -129,7 +128,7 @@ mod tests {
 
     #[test]
     fn it_does_not_overshoot_tissue_that_stiffens() {
-        // An exponential spring, as squeezed tissue is, that creeps: a force goes with the speed,
+        // An exponential spring that creeps, like squeezed tissue: its force depends on the speed,
         // too.
         let creeping = |a: f64, turn: f64| 0.02 * ((8.0 * (0.8 - a).max(0.0)).exp() - 1.0) - 3.0 * turn;
         let (_, forces) = close_on(|a, turn| if a < 0.8 { creeping(a, turn) } else { 0.0 }, 1.0);

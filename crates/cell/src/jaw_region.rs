@@ -10,16 +10,14 @@ use crate::{Cluster, Gripper, World, clusters};
 use glam::DVec3;
 use trocar_core::Pose;
 
-/// Blades whose inner faces are no farther apart than this (m), where tissue is, hold nothing but
-/// each other's skin (the contact offset of SPEC C1).
+/// Blades whose inner faces are no farther apart than this (m) at the tissue touch only each other
+/// (the contact offset).
 pub const CONTACT_SKIN: f64 = 0.0015;
 
-/// A cluster farther than this (m) from the middle of the tissue between the blades is not what
-/// they hold.
+/// A cluster farther than this (m) from the middle of the tissue between the blades is not grasped.
 const ATTACH_WITHIN: f64 = 0.012;
 
-/// Share of the way from an element's middle to its corners at which it is looked at, besides its
-/// middle.
+/// An element is sampled at its centroid, and at this share of the way from there to each corner.
 const TOWARDS_CORNER: f64 = 0.5;
 
 /// The wedge between the blades at one instant.
@@ -43,17 +41,17 @@ pub struct TissueInJaws {
 }
 
 impl JawRegion {
-    /// The mouth of a gripper with the paper's blades.
+    /// The region of a gripper with the paper's blades.
     pub fn of(gripper: &Gripper) -> Self {
         Self::sized(gripper, BLADE_TIP)
     }
 
-    /// The mouth of a gripper whose blades are `length` (m) long.
+    /// The region of a gripper whose blades are `length` (m) long.
     pub fn sized(gripper: &Gripper, length: f64) -> Self {
         Self { gripper: *gripper, to_gripper: gripper.pose.inverse(), length }
     }
 
-    /// Whether a point (m, world) is in the wedge; on its faces counts as in.
+    /// Whether a point (m, world) is in the wedge or on its faces.
     pub fn contains(&self, p: DVec3) -> bool {
         self.holds(self.to_gripper.transform(p), 0.0)
     }
@@ -65,11 +63,11 @@ impl JawRegion {
         along && q.z.abs() <= 0.5 * BLADE_WIDTH && q.y.abs() <= self.gripper.half_gap(r) + beyond
     }
 
-    /// The part of a body of elements `tets` with nodes at `positions` (m, world) that is grasped
-    /// when the jaws close on it now; `None` when that is none.
+    /// The part of a body, with elements `tets` and nodes at `positions` (m, world), that the jaws
+    /// grasp when they close now; `None` without such a part.
     ///
-    /// Elements are looked at in five points, their middle and half way from there to each corner,
-    /// each for a fifth of the volume: nodes alone are too far apart, and those that touch a blade
+    /// Elements are sampled at five points, the centroid and half way from there to each corner,
+    /// each with a fifth of the volume: nodes alone are too far apart, and nodes that touch a blade
     /// may lie on either side of its face.
     pub fn tissue(&self, tets: &[[u32; 4]], positions: &[DVec3]) -> Option<TissueInJaws> {
         let (mut sides, mut sum, mut volume) = ([0.0; 2], DVec3::ZERO, 0.0);
@@ -78,8 +76,8 @@ impl JawRegion {
             let [a, b, c, d] = corners;
             let share = (b - a).cross(c - a).dot(d - a).abs() / 30.0;
             let middle = 0.25 * (a + b + c + d);
-            // Most elements are far away; no point that is looked at is farther from the middle
-            // than half of the way to a corner.
+            // Most elements are far away; no sample is farther from the centroid than half of the
+            // way to a corner.
             let reach = corners.map(|c| c.distance_squared(middle)).into_iter().fold(0.0, f64::max).sqrt();
             if middle.distance(self.gripper.pose.translation) > self.length + BLADE_WIDTH + reach {
                 continue;
@@ -114,7 +112,8 @@ impl JawRegion {
         all.reduce(|best, next| if next.1.volume > best.1.volume { next } else { best })
     }
 
-    /// Whether any node of organ `organ` is so near that some of it may be between the blades.
+    /// Whether any node of organ `organ` is near enough for a part of the organ to be between the
+    /// blades.
     fn is_near(&self, world: &World, organ: usize) -> bool {
         let body = &world.model.bodies()[organ];
         // Coarse inner elements are a few times as large as the median.
@@ -136,7 +135,8 @@ impl JawRegion {
 }
 
 /// The cluster of organ `organ` that is attached when jaws close on tissue around `centroid` (m):
-/// the nearest, within 12 mm. Of thick organs, clusters are what jaws can reach (`reach` (m), see
+/// the nearest, within 12 mm. Clusters of thick organs are limited to the jaws' reach (`reach` (m),
+/// see
 /// [`Cluster::within_reach`]).
 pub fn attached(world: &World, organ: usize, centroid: DVec3, reach: f64) -> Option<Cluster> {
     let mut all: Vec<Cluster> = clusters(world, organ).iter().map(|c| c.within_reach(world, organ, reach)).collect();

@@ -1,8 +1,8 @@
-//! Specimen and instruments in one stepped world: the cell.
+//! The cell: specimen and instruments, stepped together.
 //!
-//! A [`World`] is a specimen made ready to be stepped. A [`Cell`] is the whole of a scene file in
-//! the cell frame: it takes actions and reports observations. Its arms are driven by their dynamics
-//! through ports, in which tissue feels and loads them, or go where they are commanded.
+//! A [`World`] is a specimen's tissue with its stepper. A [`Cell`] is everything in a scene file,
+//! in the cell frame: it takes actions and reports observations. Its arms are driven by their
+//! dynamics through ports, where tissue loads them, or are ideal and go where they are commanded.
 
 pub mod blades;
 mod cell;

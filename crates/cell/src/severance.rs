@@ -1,4 +1,4 @@
-//! A cut that parts an organ, in figures.
+//! Figures of a cut that severs an organ.
 
 use crate::{Gripper, JawRegion, World};
 use glam::DVec3;
@@ -9,21 +9,20 @@ use trocar_tissue::Piece;
 /// Corners of the face opposite each corner of an element, counter-clockwise seen from outside.
 const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]];
 
-/// A cut in figures, at the instant it is made.
+/// Figures of a cut, at the instant of the cut.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Severance {
     /// `severed`, `cut in part` or `no tissue`.
     pub outcome: String,
     /// The same in a sentence.
     pub said: String,
-    /// Organ coordinate of the cut: the mean over the nodes that fell apart; 0 where nothing was
-    /// cut.
+    /// Organ coordinate of the cut: the mean over the separated nodes; 0 if nothing was cut.
     pub at: f64,
-    /// The least of these organ coordinates: elements' faces are no plane.
+    /// The smallest of these organ coordinates: the elements' faces are not a plane.
     pub at_least: f64,
     /// The greatest of them.
     pub at_most: f64,
-    /// How wide the blades were open (rad).
+    /// Angle between the open blades (rad).
     pub opened_rad: f64,
     /// The angle at which they cut (rad).
     pub closed_rad: f64,
@@ -33,10 +32,9 @@ pub struct Severance {
     pub faces: usize,
     /// Their area, of one side (mm2).
     pub area_mm2: f64,
-    /// Nodes that are new, as copies of those on the cut.
+    /// New nodes: copies of those on the cut.
     pub copies: usize,
-    /// The pieces: the one that stays the organ, then those that came loose. Empty where nothing
-    /// was cut.
+    /// The pieces: the one that remains the organ, then the loose ones. Empty if nothing was cut.
     pub pieces: Vec<SeveredPiece>,
     /// Volume of the organ just before the cut (mm3).
     pub volume_before_mm3: f64,
@@ -50,7 +48,7 @@ pub struct Severance {
     pub inverted_after: usize,
 }
 
-/// A piece of the organ in figures.
+/// Figures of a piece of the organ.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SeveredPiece {
     /// Its body's name.
@@ -95,12 +93,12 @@ struct CutMesh {
     parents: Vec<u32>,
     /// For each node, its piece.
     piece: Vec<usize>,
-    /// Faces that the cut laid bare, of both sides.
+    /// Faces that the cut exposed, on both sides.
     faces: Vec<[u32; 3]>,
 }
 
 impl Severance {
-    /// Organ `organ` before the blades of `open` part it.
+    /// Organ `organ` before the open blades of `open` cut it.
     pub(crate) fn before(world: &World, organ: usize, open: &Gripper) -> BeforeCut {
         let tets = world.model.bodies()[organ].tets().to_vec();
         BeforeCut {
@@ -162,7 +160,7 @@ impl BeforeCut {
         let mut copies = vec![0; s.len()];
         cut.parents.iter().for_each(|i| copies[*i as usize] += 1);
         let mut split: Vec<f64> = (0..copies.len()).filter(|i| copies[*i] > 1).map(|i| s[i]).collect();
-        // A lone face that opens inside leaves its nodes whole.
+        // A single face that opens inside duplicates no node.
         if split.is_empty() {
             split = cut.faces.iter().flatten().map(|i| s[cut.parents[*i as usize] as usize]).collect();
         }

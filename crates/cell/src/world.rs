@@ -1,4 +1,4 @@
-//! A specimen made ready to be stepped.
+//! The organs of a specimen as a tissue model with its state and stepper.
 
 use crate::{Error, Result};
 use glam::DVec3;
@@ -19,26 +19,26 @@ pub(crate) const GRAVITY: f64 = 9.80665;
 const SUPPORT_FRICTION: f64 = 0.6;
 
 /// Shear viscosity of tissue over its Young's modulus (s). Sheared tissue creeps with three times
-/// as long a time constant, 18 ms. The paper damps its elements without saying how much; this lets
-/// the organs of all phantoms come to rest within a second and stays far below the second that a
-/// lift takes.
+/// as long a time constant, 18 ms. The paper damps its elements but does not state the coefficient.
+/// With this value the organs of all phantoms come to rest within a second, and the time constant
+/// stays far below the second that a lift takes.
 pub const VISCOSITY_TIME: f64 = 0.006;
 
-/// Cell of the supports over the organ's median edge: as fine as the nodes that lie on it.
+/// Cell size of the supports over the organ's median edge: as fine as the nodes that lie on them.
 const SUPPORT_CELL: f64 = 0.5;
 
-/// The organs of a specimen as bodies that gravity pulls and planes support.
+/// The organs of a specimen as bodies under gravity, on their supports.
 pub struct World {
-    /// What is constant.
+    /// The constant part.
     pub model: Model,
-    /// What moves.
+    /// The part that changes.
     pub state: State,
     /// Axis and organ coordinates of each organ, in the specimen's order.
     pub axes: Vec<OrganAxis>,
     /// Unit vector against gravity.
     pub up: DVec3,
     pub(crate) stepper: Stepper,
-    /// How often something was severed: each time the model became another.
+    /// Number of cuts so far; each replaces the model.
     pub(crate) cuts: usize,
 }
 
@@ -47,16 +47,16 @@ pub struct World {
 pub struct Surroundings {
     /// How organs touch each other; None if they pass through each other.
     pub body_contact: Option<BodyContact>,
-    /// Pairs of organs that do not touch, by their places in the specimen.
+    /// Pairs of organs without contact, by their indices in the specimen.
     pub filtered: Vec<[usize; 2]>,
     /// Friction of the bed that organs lie on, with their imprints; None for no bed.
     pub bed_friction: Option<f64>,
-    /// Organs that feel no bed.
+    /// Organs without a bed, by their indices.
     pub floating: Vec<usize>,
 }
 
 impl Default for Surroundings {
-    /// Organs that touch each other, on a bed with their imprints (SPEC C1).
+    /// Organs that touch each other, on a bed with their imprints.
     fn default() -> Self {
         Self {
             body_contact: Some(BodyContact::default()),
@@ -93,28 +93,16 @@ impl World {
     /// lies on, with its imprint.
     ///
     /// # Errors
-    /// When a mesh, a material or the pins of an organ cannot be simulated.
+    /// A mesh, a material or pins of an organ that cannot be simulated.
     pub fn new(specimen: &Specimen, schedule: SolverSettings, threads: usize) -> Result<Self> {
-        Self::with_tools(specimen, Vec::new(), schedule, threads)
+        Self::surrounded(specimen, &Surroundings::default(), Vec::new(), schedule, threads)
     }
 
-    /// The same with tools that have `colliders`, such as [`crate::blades::colliders`].
+    /// The same with other `surroundings`, and tools with `colliders`, such as
+    /// [`crate::blades::colliders`].
     ///
     /// # Errors
-    /// As [`World::new`], and colliders that cannot be.
-    pub fn with_tools(
-        specimen: &Specimen,
-        colliders: Vec<Collider>,
-        schedule: SolverSettings,
-        threads: usize,
-    ) -> Result<Self> {
-        Self::surrounded(specimen, &Surroundings::default(), colliders, schedule, threads)
-    }
-
-    /// The same with other `surroundings`.
-    ///
-    /// # Errors
-    /// As [`World::with_tools`], and filtered pairs of organs that are not there.
+    /// As [`World::new`], invalid colliders, and filtered pairs of organs that do not exist.
     pub fn surrounded(
         specimen: &Specimen,
         surroundings: &Surroundings,
@@ -152,28 +140,28 @@ impl World {
         Ok(Self { model, state, axes, up, stepper, cuts: 0 })
     }
 
-    /// What tissue did to each tool in the last frame, in the order of the motions that were given;
-    /// shorter where nothing is felt.
+    /// Forces of tissue on each tool in the last frame, in the order of the given motions. The list
+    /// is shorter if the last tools touch nothing.
     pub fn forces(&self) -> &[ToolForce] {
         self.stepper.forces()
     }
 
-    /// What happened to grasps in the last frame.
+    /// Events of grasps in the last frame.
     pub fn events(&self) -> &[Event] {
         self.stepper.events()
     }
 
-    /// All that changes.
+    /// A copy of everything that changes.
     pub(crate) fn save(&self) -> WorldState {
         // The upward direction never changes, and the stepper follows the model.
         let Self { model, state, axes, up: _, stepper: _, cuts } = self;
         WorldState { model: model.clone(), state: state.clone(), axes: axes.clone(), cuts: *cuts }
     }
 
-    /// Puts back what [`World::save`] gave. What comes after is the same to the bit.
+    /// Restores what [`World::save`] returned. The steps after it are the same to the bit.
     ///
     /// # Errors
-    /// Threads that the system does not give.
+    /// Threads that the system refuses.
     pub(crate) fn restore(&mut self, saved: &WorldState) -> Result<()> {
         let sizes = |model: &Model| model.bodies().iter().map(|b| b.len()).collect::<Vec<_>>();
         if self.cuts == 0 && saved.cuts == 0 && sizes(&self.model) != sizes(&saved.model) {
@@ -208,13 +196,13 @@ impl World {
         self.stepper.step_with_loads(&self.model, &mut self.state, tools, loads)
     }
 
-    /// What tools and other organs did to nodes at the end of the last frame.
+    /// Forces of tools and other organs on nodes at the end of the last frame.
     pub fn contact_loads(&self) -> Vec<Load> {
         self.stepper.contact_loads(&self.model, &self.state)
     }
 }
 
-/// The bed the organ lay on when it was recorded, and its imprint in it.
+/// The bed on which the organ was recorded, with its imprint.
 fn support_under(organ: &Organ, up: DVec3, friction: f64) -> Result<Support> {
     let cell = SUPPORT_CELL * TetQuality::of(&organ.body).median_edge;
     Ok(SupportField::under(&organ.body, up, cell, friction)?.into())

@@ -3,15 +3,13 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
-mod common;
-
-use common::{ONE_END, meshed, scene, two_tubes};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Action, ActionSpace, Cell, CellEvent, CellReport, Setpoint};
 use trocar_core::Pose;
 use trocar_robot::wrench::ForceKind;
 use trocar_scene::{Arm, Drive, GraspDesignName, Scene, Side};
 use trocar_specimen::{Pins, Specimen};
+use trocar_testing::tube::{ONE_END, meshed, scene, two_tubes};
 
 const ARMS: [&str; 2] = ["left", "right"];
 
@@ -22,7 +20,7 @@ fn cell(specimen: &Specimen) -> Cell {
 #[test]
 fn illegal_actions_are_refused_by_name_and_change_nothing() {
     let mut cell = cell(&meshed(ONE_END, 4e-3));
-    cell.advance().unwrap();
+    cell.step(None).unwrap();
     let before = cell.hash();
     let good = Action::targets(&ARMS.map(|arm| cell.setpoint(arm).unwrap()));
     let mut said = |change: &dyn Fn(&mut Vec<f64>)| {
@@ -156,7 +154,7 @@ fn every_kind_of_arm_lifts_the_tube_by_actions() {
             assert_eq!(cell.link_poses("left").unwrap().is_empty(), name != "dynamic");
             // Jaws that open let go.
             cell.servo_jaw("left", 1.0).unwrap();
-            let events: Vec<CellEvent> = (0..6).flat_map(|_| cell.advance().unwrap().events).collect();
+            let events: Vec<CellEvent> = (0..6).flat_map(|_| cell.step(None).unwrap().events).collect();
             assert!(events.iter().any(|e| matches!(e, CellEvent::Released { .. })), "{events:?}");
             assert!(!cell.observe()[0].attached && cell.world().state.grasps.is_empty());
         }
@@ -221,7 +219,7 @@ fn go(cell: &mut Cell, arm: &str, pose: &Pose, periods: usize) -> Vec<CellReport
             let rotation = start.rotation.slerp(pose.rotation, share);
             let translation = start.translation.lerp(pose.translation, share);
             cell.servo_cp(arm, &Pose { rotation, translation }).unwrap();
-            cell.advance().unwrap()
+            cell.step(None).unwrap()
         })
         .collect()
 }
@@ -312,7 +310,7 @@ fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
         cell.servo_jaw("right", 0.0).unwrap();
         let mut events = Vec::new();
         for _ in 0..45 {
-            let report = cell.advance().unwrap();
+            let report = cell.step(None).unwrap();
             assert!(report.tissue.divergence.is_none() && report.tissue.inverted == 0, "{:?}", report.tissue);
             events.extend(report.events);
         }
@@ -336,10 +334,10 @@ fn the_cutter_cuts_what_it_closes_on_and_parts_it_where_the_scene_says_so() {
         }
         // A state with a cut is restored, and one from before it.
         let saved = cell.save();
-        cell.advance().unwrap();
+        cell.step(None).unwrap();
         let hash = cell.hash();
         cell.restore(&saved).unwrap();
-        cell.advance().unwrap();
+        cell.step(None).unwrap();
         assert_eq!(cell.hash(), hash);
     }
 }
@@ -351,7 +349,7 @@ fn joints_can_be_commanded_and_orientations_that_cannot_be_met_are_told() {
     q[6] += 0.1;
     cell.servo_jp("right", &q).unwrap();
     for _ in 0..45 {
-        cell.advance().unwrap();
+        cell.step(None).unwrap();
     }
     let now = cell.measured_js("right").unwrap().position;
     assert!((now[6] - q[6]).abs() < 5e-3, "{} of {}", now[6], q[6]);
@@ -359,7 +357,7 @@ fn joints_can_be_commanded_and_orientations_that_cannot_be_met_are_told() {
     tip.rotation = DQuat::from_rotation_y(0.2) * tip.rotation;
     let solution = cell.servo_cp("left", &tip).unwrap();
     assert!((solution.rejected_rotation.length() - 0.2).abs() < 0.02, "{}", solution.rejected_rotation);
-    let report = cell.advance().unwrap();
+    let report = cell.step(None).unwrap();
     assert_eq!(report.arms[0].rejected_rotation, solution.rejected_rotation);
 }
 

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-mod common;
-
-use common::{HALF_LENGTH, ONE_END, specimen};
 use glam::DVec3;
 use trocar_cell::{Gripper, MAX_ANGLE, World};
+use trocar_testing::tube::{HALF_LENGTH, ONE_END, specimen};
 use trocar_tissue::{Compliance, Grasp, SolverSettings, ToolMotion};
 
 /// Volume of all bodies as they are now (m3).

@@ -1,11 +1,9 @@
 //! What is taken to be in the mouth: the 15 placements of a synthetic tube (SPEC C3), and those
 //! where nothing is.
 
-mod common;
-
-use common::{HALF_LENGTH, ONE_END, RADIUS, specimen};
 use glam::DVec3;
 use trocar_cell::{CONTACT_SKIN, Gripper, JawRegion, MAX_ANGLE, World, attached, clusters};
+use trocar_testing::tube::{HALF_LENGTH, ONE_END, RADIUS, specimen};
 use trocar_tissue::SolverSettings;
 
 const REACH: f64 = 0.009;

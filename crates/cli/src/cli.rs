@@ -17,7 +17,7 @@ pub use trocar_studies::names::{BackName, DesignName, MesherName, SensorName, So
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use trocar_scene::VariationSet;
+use trocar_scene::{Split, VariationSet};
 
 /// Trocar makes deformable organs from recordings of a surgical field, and scores robot policies on
 /// them.
@@ -81,6 +81,12 @@ pub enum Command {
 fn variation_set(name: &str) -> Result<VariationSet, String> {
     let known = VariationSet::ALL.map(VariationSet::name).join(", ");
     VariationSet::named(name).ok_or_else(|| format!("the sets are {known}"))
+}
+
+/// The split of that name, for the command line.
+fn split(name: &str) -> Result<Split, String> {
+    let known = Split::ALL.map(Split::name).join(", ");
+    Split::named(name).ok_or_else(|| format!("the splits are {known}"))
 }
 
 /// Arguments of `demo`.

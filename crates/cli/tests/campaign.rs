@@ -5,9 +5,6 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-#[path = "../../task/tests/common/mod.rs"]
-mod common;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -16,14 +13,15 @@ use tempfile::TempDir;
 use trocar_remote::{Array, Call, Loopback, LoopbackOptions, Map, Value};
 use trocar_scene::EpisodeRandom;
 use trocar_scene::{SpecimenSource, TaskName};
+use trocar_testing::tube;
 
 /// A coarse tube on disk, and a scene of it in which arms reach for `seconds`, without cameras.
 fn scene(folder: &Path, seconds: f64) -> PathBuf {
     let specimen = folder.join("tube");
     if !specimen.exists() {
-        common::two_tubes(common::ONE_END, 4e-3).write(&specimen).unwrap();
+        tube::two_tubes(tube::ONE_END, 4e-3).write(&specimen).unwrap();
     }
-    let mut scene = common::resection();
+    let mut scene = tube::resection();
     scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
     scene.task.name = TaskName::PortReach;
     scene.task.episode_s = seconds;
@@ -148,6 +146,10 @@ fn other_folders_scenes_and_seeds_are_refused_in_one_line() {
     assert_eq!(std::fs::read_dir(&foreign).unwrap().count(), 1, "it was written to");
     refused(&long, &folder, &[], "another scene");
     refused(&short, &folder, &["--seed", "1"], "another seed");
+    refused(&short, &folder, &["--split", "unseen"], "another split");
+    refused(&short, &folder, &["--variation", "none"], "another variation");
+    refused(&short, &folder, &["--by", "frction"], "did you mean 'friction'?");
+    refused(&short, &folder, &["--split", "test"], "the splits are seen, unseen, both");
     refused(&short, &folder, &["--policy", "genius"], "genius");
     // An invalid address is an error and no failed episode.
     for (address, why) in [("a=ws://", "host"), ("ws://h:0", "port"), ("ws://user:word@h", "TROCAR_POLICY_KEY")] {

@@ -2,13 +2,11 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "what tests share may panic and tell what is skipped")]
 
-#[path = "../../task/tests/common/mod.rs"]
-mod common;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 use trocar_camera::ColorImage;
 use trocar_scene::{SpecimenSource, TaskName};
+use trocar_testing::tube;
 
 const SMALL: [&str; 4] = ["--size", "96x54", "--camera", "endoscope"];
 
@@ -23,8 +21,8 @@ fn said(output: &Output) -> serde_json::Value {
 
 /// An episode of half a second, in the folder `run`, whose specimen is the folder `tube`.
 fn episode(folder: &Path) -> PathBuf {
-    common::two_tubes(common::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
-    let mut scene = common::resection();
+    tube::two_tubes(tube::ONE_END, 4e-3).write(&folder.join("tube")).unwrap();
+    let mut scene = tube::resection();
     scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
     scene.task.name = TaskName::PortReach;
     scene.task.episode_s = 0.5;
@@ -91,7 +89,7 @@ fn an_episode_is_filmed_and_what_is_wrong_is_told() {
     let found = said(&render(&run, &at("found.png"), &["--specimen", &at("moved")]));
     assert_eq!(found["time_s"], end["time_s"]);
     assert_eq!(read("found.png"), read("end.png"));
-    common::two_tubes(common::ONE_END, 5e-3).write(&dir.path().join("other")).unwrap();
+    tube::two_tubes(tube::ONE_END, 5e-3).write(&dir.path().join("other")).unwrap();
     refused(&run, "no.png", &["--specimen", &at("other")], &["the specimen is another one", "--specimen"]);
     // A damaged file.
     let mut bytes = std::fs::read(&file).unwrap();

@@ -4,13 +4,11 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-#[path = "../../task/tests/common/mod.rs"]
-mod common;
-
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use tempfile::TempDir;
 use trocar_scene::{SpecimenSource, TaskName};
+use trocar_testing::tube;
 
 /// Runs the program in `folder`, without a terminal and without the user's settings.
 fn trocar(folder: &Path, arguments: &[&str]) -> Output {
@@ -57,7 +55,7 @@ fn the_help_of_every_command() {
 fn inputs() -> TempDir {
     let here = TempDir::new().unwrap();
     let at = |name: &str| here.path().join(name);
-    common::two_tubes(common::ONE_END, 4e-3).write(&at("tube")).unwrap();
+    tube::two_tubes(tube::ONE_END, 4e-3).write(&at("tube")).unwrap();
     std::fs::write(at("reach.toml"), reach(0.5)).unwrap();
     let scene = |more: &str| format!("name = 'mine'\n[specimen]\nphantom = 'phantom-a'\n{more}");
     std::fs::write(at("unit.toml"), scene("[safety]\nrcm_abort_mm = 0.005\n")).unwrap();
@@ -74,7 +72,7 @@ fn inputs() -> TempDir {
 
 /// A scene of the specimen `tube` in which arms reach for `seconds` before the endoscope.
 fn reach(seconds: f64) -> String {
-    let mut scene = common::resection();
+    let mut scene = tube::resection();
     scene.specimen = SpecimenSource { path: Some("tube".to_owned()), phantom: None, seed: 1 };
     scene.task.name = TaskName::PortReach;
     scene.task.episode_s = seconds;

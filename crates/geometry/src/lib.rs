@@ -54,7 +54,6 @@ pub use skin::Skin;
 pub use smooth::taubin;
 pub use tet_mesh::{CutAway, TetMesh};
 pub use tri_mesh::TriMesh;
-pub use trocar_core::Pose;
 
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]

@@ -73,19 +73,6 @@ impl TriMesh {
         0.5 * (b - a).cross(c - a)
     }
 
-    /// Unit normal of each vertex, weighted by triangle area. Zero for a vertex without area around
-    /// it.
-    pub fn vertex_normals(&self) -> Vec<DVec3> {
-        let mut normals = vec![DVec3::ZERO; self.vertices.len()];
-        for (t, triangle) in self.triangles.iter().enumerate() {
-            let n = self.area_vector(t);
-            for &v in triangle {
-                normals[v as usize] += n;
-            }
-        }
-        normals.into_iter().map(DVec3::normalize_or_zero).collect()
-    }
-
     /// Smallest and largest coordinates (m); `None` without vertices.
     pub fn bounds(&self) -> Option<(DVec3, DVec3)> {
         bounds(&self.vertices)
@@ -226,9 +213,6 @@ mod tests {
         assert!((mesh.area() - 24.0).abs() < 1e-12);
         assert_eq!((mesh.edge_count(), mesh.open_edges()), (18, 0));
         assert_eq!(mesh.bounds(), Some((DVec3::splat(9.0), DVec3::splat(11.0))));
-        for (v, n) in mesh.vertices.iter().zip(mesh.vertex_normals()) {
-            assert!(n.dot(*v - DVec3::splat(10.0)) > 0.0);
-        }
         mesh.flip();
         assert!(mesh.is_watertight());
         assert!((mesh.volume() + 8.0).abs() < 1e-12);

@@ -94,7 +94,7 @@ impl Cells {
     /// `count` episodes of `scene` on `threads` threads (0: as many as the machine has; results do
     /// not depend on them).
     #[new]
-    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false))]
+    #[pyo3(signature = (scene, count, *, phantoms, threads=0, task=None, actions="pivots", episode_s=None, sensor_noise=false, variation=None, split="seen"))]
     fn new(
         py: Python<'_>,
         scene: &str,
@@ -105,6 +105,8 @@ impl Cells {
         actions: &str,
         episode_s: Option<f64>,
         sensor_noise: bool,
+        variation: Option<&str>,
+        split: &str,
     ) -> PyResult<Self> {
         if count == 0 || count > 4096 {
             return Err(wrong(format!("num_envs: is {count}; 1 to 4096 cells")));
@@ -117,13 +119,16 @@ impl Cells {
                 return Err(wrong(format!("actions: '{other}' is unknown; {known} are known")));
             }
         };
-        let scene = prepare::scene(scene, task, episode_s)?;
+        let scene = prepare::scene(scene, variation, task, episode_s)?;
+        let split = prepare::split(split)?;
         py.detach(|| {
-            let specimens = prepare::specimens(&scene, &phantoms)?;
+            let specimens = prepare::specimens(&scene, split, &phantoms)?;
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().map_err(wrong)?;
             // One cell uses all threads; of many, each has its own.
             let each = if count == 1 { threads } else { 1 };
-            let episodes = built(&pool, count, || Episode::with_specimens(&scene, Box::new(specimens.clone()), each))?;
+            let seed = split.seed(0);
+            let begun = || Episode::begun(&scene, Box::new(specimens.clone()), each, seed, scene.draw(seed));
+            let episodes = built(&pool, count, begun)?;
             let bounds = Bounds::new(episodes[0].cell(), space).map_err(|e| crate::error::task(&e))?;
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let prompt = trocar_task::prompt(&scene);

@@ -1,16 +1,13 @@
 //! A missing or unusable organ mask is one clear error, found before any work.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[path = "../../recording/tests/common/mod.rs"]
-mod common;
-
-use common::{info, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_camera::Mask;
 use trocar_core::Silent;
 use trocar_reconstruct::{Settings, reconstruct};
 use trocar_recording::{Recording, RecordingInfo};
+use trocar_testing::sphere::{info, write};
 
 fn recording(info: &RecordingInfo) -> (tempfile::TempDir, PathBuf) {
     let root = tempfile::tempdir().unwrap();

@@ -1,10 +1,6 @@
 //! Reconstructs recordings with known truth.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-#[path = "../../recording/tests/common/mod.rs"]
-mod common;
-
-use common::{CENTRE, RADIUS, info, write, write_moving};
 use glam::DVec3;
 use std::path::Path;
 use trocar_core::{Silent, StopAfter};
@@ -12,6 +8,7 @@ use trocar_geometry::io::Unit;
 use trocar_reconstruct::{Settings, from_surface, reconstruct};
 use trocar_recording::Recording;
 use trocar_specimen::Specimen;
+use trocar_testing::sphere::{self, CENTRE, RADIUS, info, write, write_moving};
 
 #[test]
 fn a_sphere_comes_back_from_behind_the_instrument() {
@@ -22,7 +19,7 @@ fn a_sphere_comes_back_from_behind_the_instrument() {
     let made = reconstruct(&recording, &Settings::default(), &Silent).unwrap();
 
     // The composite has no trace of the bar, which covered an eighth of the image.
-    let (color, depth, mask) = common::scene(&recording.camera());
+    let (color, depth, mask) = sphere::scene(&recording.camera());
     assert_eq!(made.background, color);
     assert_eq!(made.frames_used, 12, "stride 2");
     assert_eq!(made.coverage, 1.0);

@@ -2,11 +2,9 @@
 //! their size needs.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{info, write};
 use std::fs;
 use trocar_recording::Recording;
+use trocar_testing::sphere::{info, write};
 use trocar_testing::{Allowance, PEAK, Peak, fuzz_reader};
 
 #[global_allocator]

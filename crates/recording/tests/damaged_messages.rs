@@ -8,7 +8,7 @@
 
 mod common;
 
-use common::messages::{ALL, decode_all, fixture, log, read_all};
+use common::{ALL, decode_all, fixture, log, read_all};
 use std::io::Cursor;
 use std::path::Path;
 use trocar_recording::messages::{Topic, find_rgbd_topics, open_reader};

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::messages::*;
+use common::*;
 use std::io::Cursor;
 use std::path::Path;
 use trocar_recording::messages::{MessageLog, open_reader, realsense};

@@ -4,7 +4,7 @@
 
 mod common;
 
-use common::messages::*;
+use common::*;
 use trocar_camera::{Camera, Distortion};
 use trocar_recording::messages::{
     Encoding, MessageLog, decode_calibration, decode_float, decode_image, decode_transforms, find_rgbd_topics,
@@ -45,17 +45,17 @@ fn realsense_bags() {
         let found = realsense::find(log.topics()).unwrap();
         let guessed = find_rgbd_topics(&*log, None, None).unwrap();
         assert_eq!((guessed.color, guessed.depth, guessed.depth_units), (found.color, found.depth, found.depth_units));
-        assert_eq!(log.topics()[found.color].name, realsense::image_topic(1, "Color_0"));
-        assert_eq!(log.topics()[found.depth_info.unwrap()].name, realsense::info_topic(0, "Depth_0"));
-        assert_eq!(log.topics()[found.color_transform.unwrap()].name, realsense::transform_topic(1, "Color_0"));
+        assert_eq!(log.topics()[found.color].name, "/device_0/sensor_1/Color_0/image/data");
+        assert_eq!(log.topics()[found.depth_info.unwrap()].name, "/device_0/sensor_0/Depth_0/info/camera_info");
+        assert_eq!(log.topics()[found.color_transform.unwrap()].name, "/device_0/sensor_1/Color_0/tf/0");
         check_streams(&*log, found.color, found.depth);
         assert_eq!(images(&*log, found.depth)[2].depth_unit, unit);
 
         let t = found.depth_units.unwrap();
-        let expected = realsense::depth_units_topic(0);
+        let expected = "/device_0/sensor_0/option/Depth Units/value";
         assert_eq!(
             log.topics()[t].name,
-            if name.contains("bz2") { expected.replace("Depth ", "Depth_") } else { expected }
+            if name.contains("bz2") { expected.replace("Depth ", "Depth_") } else { expected.to_owned() }
         );
         assert_eq!(decode_float(&log.topics()[t], &first(&*log, t)).unwrap(), 0.0001);
         assert_eq!(log.times(t), [1]);

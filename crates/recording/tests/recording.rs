@@ -1,13 +1,11 @@
 //! Recordings are read as written, and every wrong input is one clear error.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-mod common;
-
-use common::{info, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use trocar_camera::{ColorImage, DepthImage, Mask};
 use trocar_recording::{Recording, RecordingWriter};
+use trocar_testing::sphere::{self, info, write};
 
 /// A new recording of three frames for a test to damage.
 fn recording() -> (tempfile::TempDir, PathBuf) {
@@ -42,7 +40,7 @@ fn is_read_as_written() {
     assert_eq!(recording.info, info());
     assert_eq!(recording.len(), 3);
     let frame = recording.frame(1).unwrap();
-    let (color, depth, mask) = common::scene(&recording.camera());
+    let (color, depth, mask) = sphere::scene(&recording.camera());
     let i = 60 * 160 + 80;
     assert_eq!(frame.color.pixels[i], color.pixels[i]);
     assert!((frame.depth.depth[i] - depth.depth[i]).abs() <= 0.5001e-3);
@@ -278,7 +276,7 @@ fn an_unfinished_recording_leaves_nothing() {
     write(&dir, &info(), 1);
     let before = fs::read(dir.join("frames.csv")).unwrap();
     let writer = RecordingWriter::create(&dir, &info()).unwrap();
-    let (color, depth, _) = common::scene(&info().camera.unwrap());
+    let (color, depth, _) = sphere::scene(&info().camera.unwrap());
     writer.frame(5, &color, &depth, None).unwrap();
     assert!(writer.frame(5, &color, &depth, None).is_err(), "a frame is written once");
     drop(writer);

@@ -12,6 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use trocar_core::Pose;
 use trocar_robot::chain::{ArmState, Drive, JointKind, JointLimits, Joints, SerialArm};
+use trocar_testing::python_with;
 
 const STATES: usize = 1000;
 
@@ -23,17 +24,6 @@ fn menagerie() -> Option<PathBuf> {
         return None;
     }
     Some(path.to_owned())
-}
-
-/// The interpreter with MuJoCo; prints why there is none.
-fn python() -> Option<PathBuf> {
-    let python = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/tools/bin/python");
-    let imports = Command::new(&python).args(["-c", "import mujoco"]).output();
-    if imports.is_ok_and(|o| o.status.success()) {
-        return Some(python);
-    }
-    println!("skipped: no MuJoCo in target/tools; `cargo xtask tools` fetches it");
-    None
 }
 
 fn run(python: &Path, model: &Path, names: [&str; 2], table: &str, mode: &[&str]) -> Vec<Vec<f64>> {
@@ -154,7 +144,7 @@ fn as_mjcf(arm: &SerialArm) -> String {
 
 #[test]
 fn the_arm_read_from_mjcf_equals_mujocos() {
-    let (Some(model), Some(python)) = (menagerie(), python()) else { return };
+    let (Some(model), Some(python)) = (menagerie(), python_with("mujoco", "MuJoCo")) else { return };
     let arm = SerialArm::from_mjcf(&model, "attachment_site").unwrap();
     assert_eq!(arm.dof(), 7);
     let worst = compare(&arm, &python, &model, ["fr3_link7", "attachment_site"]);
@@ -165,7 +155,7 @@ fn the_arm_read_from_mjcf_equals_mujocos() {
 /// MuJoCo exactly, and the Menagerie's file up to rounding.
 #[test]
 fn the_built_in_fr3_equals_mujocos() {
-    let Some(python) = python() else { return };
+    let Some(python) = python_with("mujoco", "MuJoCo") else { return };
     let payload = common::rod(0.5, 0.2);
     let base = Pose { rotation: glam::DQuat::from_rotation_y(0.3), translation: DVec3::new(-0.45, 0.1, 0.2) };
     let arm = SerialArm::franka_fr3().unwrap().with_base(base).unwrap().with_payload(payload).unwrap();
@@ -249,7 +239,7 @@ fn drift(arm: &SerialArm, python: &Path, model: &Path, step: f64, friction: &str
 /// at 4,800 Hz it is as hard as its step allows.
 #[test]
 fn a_driven_arm_moves_like_mujocos() {
-    let (Some(model), Some(python)) = (menagerie(), python()) else { return };
+    let (Some(model), Some(python)) = (menagerie(), python_with("mujoco", "MuJoCo")) else { return };
     let arm = SerialArm::from_mjcf(&model, "attachment_site").unwrap();
     let damping: Vec<_> = arm.segments().iter().map(|s| s.joint.damping).collect();
     let slippery =

@@ -59,28 +59,6 @@ fn a_thousand_coordinates_survive_a_round_trip() {
 }
 
 #[test]
-fn the_jacobian_is_the_derivative() {
-    let (port, limits, mut random_numbers) = (port(), limits(), Random(2));
-    for _ in 0..100 {
-        let c = random(&mut random_numbers, &limits);
-        let jacobian = port.tip_jacobian(&c);
-        for k in 0..4 {
-            let moved = |by: f64| {
-                let mut a = c.to_action();
-                a[k] += by;
-                port.tip(&Coordinates::from_action(a).unwrap())
-            };
-            let (h, a, b) = (1e-5, moved(-1e-5), moved(1e-5));
-            let linear = (b.translation - a.translation) / (2.0 * h);
-            let turn = b.rotation * a.rotation.inverse();
-            let angular = DVec3::new(turn.x, turn.y, turn.z) * turn.w.signum() / h;
-            assert!((linear - jacobian[k].linear).length() < 1e-9, "{k}");
-            assert!((angular - jacobian[k].angular).length() < 1e-9, "{k}");
-        }
-    }
-}
-
-#[test]
 fn rejected_parts_are_reported() {
     let (port, limits, mut random_numbers) = (port(), limits(), Random(3));
     let instrument = Instrument::grasper();

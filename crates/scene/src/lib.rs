@@ -42,4 +42,4 @@ pub use random::EpisodeRandom;
 pub use scene::{Rates, Scene, Tool};
 pub use start::Start;
 pub use task::{Gates, GraspDesignName, Safety, SafetyRules, Task, TaskName};
-pub use variation::{Distribution, Drawn, DrawnValue, Factor, Per, Specimens, Variation, VariationSet};
+pub use variation::{Distribution, Drawn, DrawnValue, Factor, Per, Specimens, Split, Variation, VariationSet};

@@ -15,8 +15,8 @@ use trocar_specimen::{Specimen, parse_toml};
 use xxhash_rust::xxh3::xxh3_64;
 
 const FORMAT: &str = "trocar-episode";
-/// Version 1 did not have what was drawn.
-const VERSION: u32 = 2;
+/// Version 1 has no drawn values; the hashes of version 2 are of the text of an arm's state.
+const VERSION: u32 = 3;
 
 /// Largest file (bytes): a million steps.
 const MOST_BYTES: u64 = 100 << 20;

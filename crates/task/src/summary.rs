@@ -83,8 +83,8 @@ pub struct Summary {
     pub grasp_at: Option<f64>,
     /// It held it at the end too.
     pub held_to_end: bool,
-    /// Greatest rise of held tissue (mm).
-    pub lift_mm: f64,
+    /// Greatest rise of held tissue (mm). `None` without any grasp.
+    pub lift_mm: Option<f64>,
     /// Slip at the top of the last grasp (mm): when its jaws were last within 5% of their greatest
     /// lift. `None` without any grasp, like the next.
     pub slip_mm: Option<f64>,
@@ -161,7 +161,7 @@ impl Summary {
             attached: held.is_some(),
             grasp_at: tasks().find(|t| t.grasped > 0.0).map(|t| t.grasp_s),
             held_to_end: rows.last().is_some_and(|c| c.task.grasped > 0.0),
-            lift_mm: most(|c| c.task.lift_mm),
+            lift_mm: held.is_some().then(|| most(|c| c.task.lift_mm)),
             slip_mm: top.map(|t| finite(t.slip_mm)),
             follow_ratio: top.map(|t| finite(t.follow)),
             held: top.is_some_and(|t| t.follow >= HELD_FOLLOW && t.slip_mm < HELD_SLIP_MM),
@@ -336,7 +336,7 @@ mod tests {
         let progress =
             crate::Tracker::new(trocar_scene::TaskName::GraspLift, &trocar_scene::Gates::default()).progress().clone();
         let summary = Summary::of(&rows, &progress, None, &["left"], 3.0);
-        assert_eq!((summary.slip_mm, summary.follow_ratio), (None, None));
+        assert_eq!((summary.lift_mm, summary.slip_mm, summary.follow_ratio), (None, None, None));
         let json = serde_json::to_value(&summary).unwrap();
         assert!(json["slip_mm"].is_null() && json["arms"][0]["rcm_median_mm"].is_null(), "{json}");
     }

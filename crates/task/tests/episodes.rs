@@ -4,9 +4,6 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 #![allow(clippy::print_stdout, reason = "what was measured, for those who ask with --nocapture")]
 
-mod common;
-
-use common::{ONE_END, resection, two_tubes};
 use std::path::Path;
 use trocar_cell::{Action, CellEvent, Setpoint};
 use trocar_scene::{Distribution, Factor, Scene, TaskName};
@@ -15,6 +12,7 @@ use trocar_task::{
     Channels, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, Stage, policy, read_channels, run,
     sweep,
 };
+use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
 fn specimen() -> Specimen {
     two_tubes(ONE_END, 3e-3)
@@ -34,7 +32,7 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
     println!("{s:?}");
     assert!(s.passed && s.end == Some(End::Passed) && s.stage == 5, "{s:?}");
     assert!(s.held_to_end && !s.diverged && s.inverted_peak == 0 && s.rcm_within, "{s:?}");
-    assert!((0.30..=0.70).contains(&s.grasp_at.unwrap()) && s.lift_mm >= 8.0 && s.lift_mm < 13.0);
+    assert!((0.30..=0.70).contains(&s.grasp_at.unwrap()) && s.lift_mm.is_some_and(|mm| (8.0..13.0).contains(&mm)));
     assert!(s.passed_at(Stage::Cut).unwrap() <= s.duration_s);
     assert!(recording.events.iter().any(|(_, e)| matches!(e, CellEvent::Cut { pieces: 1, .. })));
 

@@ -2,14 +2,12 @@
 //! nothing.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{ONE_END, resection, two_tubes};
 use std::sync::Arc;
 use trocar_cell::{Action, Setpoint};
 use trocar_scene::{Distribution, Factor, Scene, SpecimenSource, VariationSet};
 use trocar_specimen::Specimen;
 use trocar_task::{Episode, EpisodeFile, Result, SpecimenSupply, policy, run};
+use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
 /// Another tube for each seed of an anatomy.
 struct Tubes;
@@ -110,5 +108,5 @@ fn a_replay_draws_nothing() {
     let end = bytes.iter().position(|b| *b == b'\n').unwrap();
     let header = String::from_utf8(bytes[..end].to_vec()).unwrap().replace("\"version\":2", "\"version\":1");
     let said = EpisodeFile::parse(&[header.as_bytes(), &bytes[end..]].concat()).unwrap_err();
-    assert!(said.contains("version 1; trocar-episode version 2 is read"), "{said}");
+    assert!(said.contains("version 1; trocar-episode version 3 is read"), "{said}");
 }

@@ -1,18 +1,24 @@
-//! The system's allocator with a measurement of peak memory.
+//! The system's allocator with a count of allocations and a measurement of peak memory.
 
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// An allocator that counts allocated bytes of all threads.
+/// An allocator that counts allocations and allocated bytes of all threads.
 #[derive(Debug)]
 pub struct Peak {
     now: AtomicUsize,
     most: AtomicUsize,
     start: AtomicUsize,
+    count: AtomicUsize,
 }
 
 /// A test binary installs it by `#[global_allocator] static ALLOCATOR: &Peak = &PEAK;`
-pub static PEAK: Peak = Peak { now: AtomicUsize::new(0), most: AtomicUsize::new(0), start: AtomicUsize::new(0) };
+pub static PEAK: Peak = Peak {
+    now: AtomicUsize::new(0),
+    most: AtomicUsize::new(0),
+    start: AtomicUsize::new(0),
+    count: AtomicUsize::new(0),
+};
 
 impl Peak {
     /// Begins a measurement.
@@ -27,7 +33,13 @@ impl Peak {
         self.most.load(Ordering::Relaxed).saturating_sub(self.start.load(Ordering::Relaxed))
     }
 
+    /// Number of allocations so far.
+    pub fn allocations(&self) -> usize {
+        self.count.load(Ordering::Relaxed)
+    }
+
     fn grew(&self, by: usize) {
+        self.count.fetch_add(1, Ordering::Relaxed);
         let now = self.now.fetch_add(by, Ordering::Relaxed) + by;
         self.most.fetch_max(now, Ordering::Relaxed);
     }

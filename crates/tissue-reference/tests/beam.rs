@@ -2,10 +2,7 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{GRAVITY, block, nodes, tissue};
+use trocar_testing::blocks::{GRAVITY, block, nodes, tissue};
 use trocar_tissue::{BodyDescription, ConstitutiveModel, MassFloor, Material, ModelBuilder};
 use trocar_tissue_reference::{Oracle, OracleState};
 

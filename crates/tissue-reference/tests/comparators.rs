@@ -2,11 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::{DMat3, DVec3};
+use trocar_testing::blocks::{FRAME, GRAVITY, block, model, nodes, tissue};
 use trocar_tissue::{ConstitutiveModel, Divergence, Load, Material, Model, State, StepReport};
 use trocar_tissue_reference::{
     Newton, Oracle, OracleState, Scheme, SemiImplicit, Xpbd, XpbdConstraints, XpbdSweep, stable_explicit_step,

@@ -2,11 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{FRAME, GRAVITY, Judged, block, model, nodes, schedules, tissue};
 use glam::DVec3;
+use trocar_testing::blocks::{FRAME, GRAVITY, Judged, block, model, nodes, schedules, tissue};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Material, Model, ModelBuilder, SolverSettings, State, Stepper, SupportPlane,
 };

@@ -5,12 +5,9 @@
 #![cfg(all(target_arch = "x86_64", target_os = "linux"))]
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::DVec3;
 use trocar_core::Pose;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Grasp, Load, Material, Model, ModelBuilder, State, SupportPlane, ToolMotion,
 };

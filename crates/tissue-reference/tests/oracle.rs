@@ -2,13 +2,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, model, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Descent, Grasp, Material, Model, ModelBuilder, SolverSettings, Start, State,
     Stepper, SupportPlane, ToolMotion,

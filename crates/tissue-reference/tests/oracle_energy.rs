@@ -2,11 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, model, nodes, tissue};
 use trocar_tissue_reference::{Oracle, OracleState};
 
 const SUBSTEP: f64 = FRAME / 8.0;

@@ -3,11 +3,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{GRAVITY, block, nodes, tissue};
 use glam::DVec3;
+use trocar_testing::blocks::{self, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, MassFloor, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
 };
@@ -67,7 +64,7 @@ fn the_oracle_sags_as_scikit_fem() {
 fn the_default_schedule_sags_as_scikit_fem() {
     let model = hanging(ConstitutiveModel::StableNeoHookean, GRAVITY);
     let mut state = State::new(&model);
-    let mut stepper = Stepper::new(&model, SolverSettings::default(), common::FRAME, 1).unwrap();
+    let mut stepper = Stepper::new(&model, SolverSettings::default(), blocks::FRAME, 1).unwrap();
     for _ in 0..40 {
         for _ in 0..15 {
             stepper.step(&model, &mut state, &[]);

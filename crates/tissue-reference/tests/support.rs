@@ -3,12 +3,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{FRAME, GRAVITY, block, tissue};
 use glam::DVec3;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, tissue};
 use trocar_tissue::{
     BodyDescription, Material, Model, ModelBuilder, SolverSettings, State, Stepper, Support, SupportField, SupportPlane,
 };

@@ -16,11 +16,8 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{block, nodes, tissue};
 use glam::DVec3;
+use trocar_testing::blocks::{block, nodes, tissue};
 use trocar_tissue::{BodyDescription, ConstitutiveModel, MassFloor, Material, ModelBuilder};
 use trocar_tissue_reference::{Energy, Held, Oracle, OracleState};
 

@@ -2,12 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and tell their figures")]
 
-#[path = "../../tissue/tests/common/mod.rs"]
-mod common;
-
-use common::{model, nodes, tissue};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
+use trocar_testing::blocks::{model, nodes, tissue};
 use trocar_tissue::Material;
 use trocar_tissue_reference::oracle::Precision;
 use trocar_tissue_reference::{Oracle, OracleState};

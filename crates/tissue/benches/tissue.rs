@@ -3,12 +3,9 @@
 
 #![allow(clippy::unwrap_used, reason = "a benchmark stops at the first error")]
 
-#[path = "../tests/common/mod.rs"]
-mod common;
-
-use common::{FRAME, GRAVITY, appendix, nodes, tissue};
 use divan::Bencher;
 use glam::DVec3;
+use trocar_testing::blocks::{self, FRAME, GRAVITY, appendix, nodes, tissue};
 use trocar_tissue::{Cut, Isa, Model, SolverSettings, State, Stepper, sever};
 
 fn main() {
@@ -24,7 +21,7 @@ const WARM_UP: usize = 5;
 /// An appendix of 12 kPa that is held by its base.
 fn model(edge: f64) -> Model {
     let mesh = appendix(edge);
-    common::model(&mesh, tissue(12e3), nodes(&mesh, |p| p.x < 6e-3), GRAVITY)
+    blocks::model(&mesh, tissue(12e3), nodes(&mesh, |p| p.x < 6e-3), GRAVITY)
 }
 
 /// One frame (1/60 s) of an appendix that falls from its rest shape, on one thread.

@@ -11,18 +11,27 @@ use rayon::prelude::*;
 
 /// The solver of one body with its scratch memory.
 pub(crate) trait Solver: Send + Sync + Sized {
-    /// What all bodies of an island share during a solve.
-    type Shared: Send + Sync;
+    /// What the bodies of an island remember together of a search.
+    type History: Send + Sync;
 
     /// Whether bodies can touch each other.
     const COUPLES: bool;
 
-    /// Scratch memory for an island of bodies like this one.
-    fn new_shared(&self) -> Self::Shared;
+    /// An empty history for an island of bodies like this one.
+    fn new_history(&self) -> Self::History;
 
-    /// Advances the bodies of an island by a frame, and writes what happened into their reports. It
-    /// allocates nothing but longer lists of contacts.
-    fn advance(island: IslandFrame<'_, Self>);
+    /// Number of substeps in a frame.
+    fn substeps(&self) -> usize;
+
+    /// Begins a frame of an island.
+    fn begin_frame(_island: &mut IslandFrame<'_, Self>) {}
+
+    /// Advances the bodies of an island from one share (0..=1) of the frame to another, and writes
+    /// what happened into their reports. It allocates nothing but longer lists of contacts.
+    fn substep(island: &mut IslandFrame<'_, Self>, from: f64, to: f64);
+
+    /// Ends the frame: the states are those at its end.
+    fn end_frame(_island: &mut IslandFrame<'_, Self>) {}
 
     /// What the body touched in the last frame. None for a solver without contact with tools.
     fn contacts(&self) -> Option<&ContactSet> {
@@ -30,12 +39,14 @@ pub(crate) trait Solver: Send + Sync + Sized {
     }
 }
 
-/// An island on its way through a frame.
+/// Bodies that may touch each other, in a frame.
 pub(crate) struct IslandFrame<'a, S: Solver> {
     pub slots: &'a mut [BodySlot<S>],
     pub pairs: &'a mut Pairs,
-    pub shared: &'a mut S::Shared,
+    pub history: &'a mut S::History,
     pub frame: &'a Frame<'a>,
+    /// Length of a substep (s).
+    pub h: f32,
 }
 
 /// A body with its solver.

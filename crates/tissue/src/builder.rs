@@ -33,7 +33,7 @@ pub struct BodyDescription<'a> {
 /// The mass below which a node's mass is raised.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MassFloor {
-    /// Masses stay as they are.
+    /// Masses stay the same.
     None,
     /// This share (0..=1) of the body's median mass.
     MedianShare(f64),
@@ -208,7 +208,7 @@ pub(crate) struct Inherited {
     pub raised: usize,
 }
 
-/// Lays out a checked body for the sweeps. A piece of another body takes what it has `inherited`,
+/// Lays out a checked body for the sweeps. A piece of another body takes the `inherited` values,
 /// and no mass floor.
 pub(crate) fn lay_out(
     description: BodyDescription<'_>,

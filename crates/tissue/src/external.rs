@@ -85,13 +85,17 @@ impl ExternalSolver {
 }
 
 impl Solver for ExternalSolver {
-    type Shared = ();
+    type History = ();
     const COUPLES: bool = false;
 
-    fn new_shared(&self) {}
+    fn new_history(&self) {}
 
-    fn advance(island: IslandFrame<'_, Self>) {
-        for BodySlot { index, body, solver, state, report, .. } in island.slots {
+    fn substeps(&self) -> usize {
+        1
+    }
+
+    fn substep(island: &mut IslandFrame<'_, Self>, _from: f64, _to: f64) {
+        for BodySlot { index, body, solver, state, report, .. } in island.slots.iter_mut() {
             let Self { integrator, motion } = solver;
             motion.load(body, state);
             let outcome = integrator.advance(&BodyFrame { body, frame: island.frame.of(*index) }, motion);

@@ -1,19 +1,19 @@
 //! Islands: bodies that may touch each other and no others. Each is solved on its own, in parallel.
 
-use crate::body_slot::{BodySlot, IslandFrame, Solver, for_each};
+use crate::body_slot::{BodySlot, Solver};
 use crate::contact::{ContactSet, Coupling, Members, Pairs, Source};
 use crate::frame::Frame;
 use glam::DVec3;
 use std::cmp::Reverse;
 
-/// An island: how many of the slots are its bodies, and what it owns.
+/// An island: its number of slots, and the data that its bodies share.
 pub(crate) struct Island<S: Solver> {
     /// Bodies of the island; they are adjacent in the list of slots.
     bodies: usize,
     /// Where the bodies may touch each other.
-    pairs: Pairs,
-    /// What their solvers share.
-    shared: S::Shared,
+    pub pairs: Pairs,
+    /// What their solvers remember together.
+    pub history: S::History,
 }
 
 /// The islands of a frame, the largest first. Islands of earlier frames stay as spare memory.
@@ -29,8 +29,8 @@ impl<S: Solver> Islands<S> {
     /// None, with room for one for each of `slots`.
     pub fn new(slots: &[BodySlot<S>]) -> Self {
         let island = |slot: &BodySlot<S>| {
-            let shared = slot.solver.new_shared();
-            Island { bodies: 0, pairs: Pairs::default(), shared }
+            let history = slot.solver.new_history();
+            Island { bodies: 0, pairs: Pairs::default(), history }
         };
         Self { list: slots.iter().map(island).collect(), count: 0, sizes: vec![0; slots.len()] }
     }
@@ -52,16 +52,15 @@ impl<S: Solver> Islands<S> {
         }
     }
 
-    /// Solves all islands, on the threads of a pool if there is one: a free thread takes the next.
-    pub fn solve(
+    /// Calls `solve` with every island and its slots, on the threads of a pool if there is one: a
+    /// free thread takes the next island.
+    pub fn for_each(
         &mut self,
         slots: &mut [BodySlot<S>],
-        coupling: Option<&Coupling>,
-        frame: &Frame<'_>,
         pool: Option<&rayon::ThreadPool>,
+        solve: impl Fn(&mut Island<S>, &mut [BodySlot<S>]) + Sync,
     ) {
         let islands = &mut self.list[..self.count];
-        let solve = |island: &mut Island<S>, slots: &mut [BodySlot<S>]| island.solve(slots, coupling, frame);
         match pool {
             Some(pool) => pool.install(|| in_parallel(islands, slots, &solve)),
             None => in_order(islands, slots, &solve),
@@ -86,17 +85,6 @@ impl<S: Solver> Islands<S> {
 }
 
 impl<S: Solver> Island<S> {
-    /// Advances the island by a frame and measures its bodies.
-    fn solve(&mut self, slots: &mut [BodySlot<S>], coupling: Option<&Coupling>, frame: &Frame<'_>) {
-        let Self { pairs, shared, .. } = self;
-        if let Some(coupling) = coupling {
-            pairs.begin_frame(coupling, frame, slots);
-        }
-        S::advance(IslandFrame { slots, pairs, shared, frame });
-        for_each(slots, frame, |slot| slot.measure(frame));
-        press_tools(slots, pairs, frame);
-    }
-
     fn for_contact_forces(
         &self,
         slots: &[BodySlot<S>],
@@ -123,7 +111,7 @@ impl<S: Solver> Island<S> {
 }
 
 /// Adds the forces of other bodies on rigidly held nodes to the tools that hold them.
-fn press_tools<S: Solver>(slots: &mut [BodySlot<S>], pairs: &Pairs, frame: &Frame<'_>) {
+pub(crate) fn press_tools<S: Solver>(slots: &mut [BodySlot<S>], pairs: &Pairs, frame: &Frame<'_>) {
     for pair in pairs.list() {
         if let Some(push) = pair.contact.push(pair.offset(|m, vertex| slots.x(m, vertex))) {
             for (m, vertex, share) in pair.shares() {

@@ -1,4 +1,4 @@
-//! What a frame reports: speeds, volumes, and the events that end a run.
+//! The report of a frame: speeds, volumes, and the events that end a run.
 
 use crate::Body;
 use crate::state::BodyState;
@@ -56,7 +56,7 @@ impl std::fmt::Display for Divergence {
     }
 }
 
-/// What happened in one frame.
+/// The report of one frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepReport {
     /// Largest node speed at the end of the frame (m/s).
@@ -90,7 +90,7 @@ impl Default for StepReport {
     }
 }
 
-/// What was measured of a body, and where it was then.
+/// Measures of a body, and its positions then.
 pub(crate) struct Measured {
     x: Vec<Vec3A>,
     v: Vec<Vec3A>,
@@ -116,15 +116,15 @@ impl StepReport {
             iterations: self.iterations + other.iterations,
             fallbacks: self.fallbacks + other.fallbacks,
             divergence: match (self.divergence, other.divergence) {
-                // It is the reason why the state was put back.
+                // It is the reason why the state was restored.
                 (_, Some(lost @ Divergence::NonFinite { .. })) => Some(lost),
                 (first, second) => first.or(second),
             },
         }
     }
 
-    /// Fills in what is measured of a body at the end of the frame. `last` keeps it for a body that
-    /// stays where it is.
+    /// Adds the measures of a body at the end of the frame. `last` keeps them for a body that does
+    /// not move.
     pub(crate) fn measure(&mut self, index: usize, body: &Body, state: &BodyState, last: &mut Measured) {
         if last.report.divergence.is_some() || state.x != last.x || state.v != last.v {
             let mut now = Self::default();
@@ -137,7 +137,7 @@ impl StepReport {
         *self = Self { max_speed, inverted, min_volume_ratio, divergence: divergence.or(self.divergence), ..*self };
     }
 
-    /// Measures a body: speed, volumes, and what ends a run.
+    /// Measures a body: speed, volumes, and the events that end a run.
     fn measure_body(&mut self, index: usize, body: &Body, state: &BodyState) {
         let finite = state.x.iter().chain(&state.v).all(|p| p.is_finite());
         if !finite {

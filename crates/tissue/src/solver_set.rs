@@ -1,9 +1,9 @@
 //! The solvers of all bodies of a model, behind the stages of a frame.
 
-use crate::body_slot::{BodySlot, Solver};
+use crate::body_slot::{BodySlot, IslandFrame, Solver, for_each};
 use crate::contact::{ContactSet, Coupling, Reaction};
 use crate::frame::Frame;
-use crate::island::Islands;
+use crate::island::{Island, Islands, press_tools};
 use crate::report::Divergence;
 use crate::state::BodyState;
 use crate::{Body, BodyContact, Model, State, StepReport};
@@ -24,14 +24,15 @@ pub(crate) trait SolverSet: Send + Sync {
     /// Finds what may touch in the frame, and sorts the bodies into islands.
     fn build_islands(&mut self, model: &Model, state: &State, frame: &Frame<'_>);
 
-    /// Solves the islands, on the threads of a pool if there is one.
+    /// Advances the islands by a frame, substep by substep, on the threads of a pool if there is
+    /// one, and measures their bodies.
     fn solve_islands(&mut self, state: &mut State, frame: &Frame<'_>, pool: Option<&rayon::ThreadPool>);
 
-    /// Sums up the frame. If a position is not finite, all bodies are put back to where the frame
-    /// began.
+    /// Sums up the frame. If a position is not finite, all bodies return to the beginning of the
+    /// frame.
     fn end_frame(&mut self, state: &mut State) -> StepReport;
 
-    /// Calls `visit` for every body with what it did to the tools in the last frame.
+    /// Calls `visit` for every body with its forces on the tools in the last frame.
     fn for_bodies(&self, visit: &mut dyn FnMut(usize, &Reaction, Option<&ContactSet>));
 
     /// Calls `visit(body, vertex, force)` for every contact force (N) of tools and other bodies on
@@ -116,14 +117,29 @@ impl<S: Solver> SolverSet for BodySolvers<S> {
         for slot in &mut self.slots {
             std::mem::swap(&mut slot.state, &mut state.bodies[slot.index]);
         }
-        self.islands.solve(&mut self.slots, self.coupling.as_ref(), frame, pool);
+        let (coupling, slots) = (self.coupling.as_ref(), &mut self.slots[..]);
+        self.islands.for_each(slots, pool, |Island { pairs, history, .. }, slots| {
+            if let Some(coupling) = coupling {
+                pairs.begin_frame(coupling, frame, slots);
+            }
+            let substeps = slots[0].solver.substeps();
+            let (h, share) = ((frame.dt / substeps as f64) as f32, |k: usize| k as f64 / substeps as f64);
+            let mut island = IslandFrame { slots, pairs, history, frame, h };
+            S::begin_frame(&mut island);
+            for k in 0..substeps {
+                S::substep(&mut island, share(k), share(k + 1));
+            }
+            S::end_frame(&mut island);
+            for_each(island.slots, frame, |slot| slot.measure(frame));
+            press_tools(island.slots, island.pairs, frame);
+        });
     }
 
     fn end_frame(&mut self, state: &mut State) -> StepReport {
         let report = self.slots.iter().fold(StepReport::default(), |all, slot| all.with(&slot.report));
         let broken = matches!(report.divergence, Some(Divergence::NonFinite { .. }));
         for slot in &mut self.slots {
-            // The whole state is of one instant: if a body is lost, all are put back.
+            // All bodies of a state belong to one instant: if one is lost, all are restored.
             if broken {
                 slot.state.copy_from(&slot.before);
             }

@@ -30,7 +30,7 @@ impl Stepper {
     /// The results do not depend on the number of threads.
     ///
     /// # Errors
-    /// Settings or a `dt` out of range, or threads that the system does not give.
+    /// Settings or a `dt` out of range, or threads that the system refuses.
     pub fn new(model: &Model, settings: SolverSettings, dt: f64, threads: usize) -> Result<Self> {
         settings.check()?;
         let threaded_bodies = matches!(settings, SolverSettings::Descent(_));
@@ -41,7 +41,7 @@ impl Stepper {
     /// body. Bodies then pass through each other and through tools.
     ///
     /// # Errors
-    /// A `dt` out of range, or threads that the system does not give.
+    /// A `dt` out of range, or threads that the system refuses.
     pub fn with_integrator(
         model: &Model,
         make: impl Fn(&Body) -> Box<dyn Integrator> + Send + Sync + 'static,
@@ -75,9 +75,9 @@ impl Stepper {
     /// with the same bits as in a new stepper.
     ///
     /// # Errors
-    /// Threads that the system does not give; the stepper then still steps the old model.
+    /// Threads that the system refuses; the stepper then still steps the old model.
     pub fn set_model(&mut self, model: &Model) -> Result<()> {
-        // To hand a small model over to a pool would cost more than some frames do.
+        // Handing a small model to a pool costs more than a frame.
         let single_body = !self.threaded_bodies && model.bodies.len() == 1;
         let single_thread = self.threads == 1 || single_body;
         if single_thread {
@@ -149,7 +149,7 @@ impl Stepper {
         });
     }
 
-    /// Lets grasps slip and tear by what their nodes did in the last substep.
+    /// Updates slip and tearing of grasps from their nodes in the last substep.
     fn update_grasps(&mut self, state: &mut State) {
         let Self { solvers, events, .. } = self;
         solvers.for_bodies(&mut |_, _, contacts| {
@@ -171,15 +171,15 @@ impl Stepper {
         &self.forces
     }
 
-    /// What happened to grasps in the last frame.
+    /// Events of grasps in the last frame.
     pub fn events(&self) -> &[Event] {
         &self.events
     }
 
     /// Forces of tools and other bodies on nodes at the end of the last frame, which left `state`.
     ///
-    /// The same loads throughout a frame that ends there would do the same. Supports and grasps are
-    /// left out.
+    /// As loads throughout a frame that ends there, they have the same effect. Supports and grasps
+    /// are not included.
     pub fn contact_loads(&self, model: &Model, state: &State) -> Vec<Load> {
         let mut forces: Vec<(usize, u32, DVec3)> = Vec::new();
         if self.solvers.fits(model, state) {

@@ -65,7 +65,7 @@ impl Untangler {
         state.v.fill(Vec3A::ZERO);
         state.warm.falling.fill(0.0);
         if relaxes {
-            // Friction does not pull back to where the tissue was.
+            // Friction does not pull the tissue back.
             state.anchors.clear();
             state.stretches.clear();
         }

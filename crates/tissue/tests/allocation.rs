@@ -1,40 +1,17 @@
 //! Stepping allocates nothing.
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::DVec3;
-use std::alloc::{GlobalAlloc, Layout, System};
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 use trocar_core::Pose;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, tissue};
+use trocar_testing::{PEAK, Peak};
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Compliance, Grasp, Load, Material, ModelBuilder, Shape, SolverSettings,
     State, Stepper, ToolMotion,
 };
 
-/// The system's allocator, counting.
-struct Counting;
-
-static ALLOCATIONS: AtomicUsize = AtomicUsize::new(0);
-
-#[allow(unsafe_code, reason = "an allocator cannot be written without")]
-// SAFETY: every call is handed on to the system's allocator unchanged.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller's promises are handed on.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
-        // SAFETY: the pointer came from `alloc` above, that is, from the system.
-        unsafe { System.dealloc(pointer, layout) }
-    }
-}
-
 #[global_allocator]
-static ALLOCATOR: Counting = Counting;
+static ALLOCATOR: &Peak = &PEAK;
 
 /// One test at a time: all share the count.
 static ALONE: Mutex<()> = Mutex::new(());
@@ -58,9 +35,9 @@ fn stepping_bodies_that_touch_allocates_nothing() {
         let mut stepper = Stepper::new(&model, schedule, FRAME, 2).unwrap();
         // Lists grow to their greatest length.
         (0..30).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = PEAK.allocations();
         (0..FRAMES).for_each(|_| assert_eq!(stepper.step(&model, &mut state, &[]).divergence, None));
-        let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
+        let during = PEAK.allocations() - before;
         assert!(during < FRAMES / 4, "{schedule:?}: {during} allocations in {FRAMES} frames");
     }
 }
@@ -97,12 +74,12 @@ fn stepping_allocates_nothing() {
     let mut stepper = Stepper::new(&model, SolverSettings::default(), FRAME, 2).unwrap();
     let still = ToolMotion { from: Pose::IDENTITY, to: Pose::IDENTITY };
     stepper.step(&model, &mut state, &[still]);
-    let before = ALLOCATIONS.load(Ordering::Relaxed);
+    let before = PEAK.allocations();
     let load = Load { body: 0, node: mesh.vertices.len() - 1, force: DVec3::Z * 1e-3 };
     for _ in 0..FRAMES {
         stepper.step_with_loads(&model, &mut state, &[still], &[load]);
     }
-    let during = ALLOCATIONS.load(Ordering::Relaxed) - before;
+    let during = PEAK.allocations() - before;
     // The thread pool's queue takes a new block now and then, once in dozens of frames; our own
     // code would show in every frame.
     assert!(during < FRAMES / 4, "{during} allocations in {FRAMES} frames");

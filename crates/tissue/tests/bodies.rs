@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, many_sweeps, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, many_sweeps, nodes, schedules, tissue};
 use trocar_tissue::{
     Body, BodyContact, BodyDescription, Divergence, Grasp, Material, Model, ModelBuilder, SolverSettings, State,
     Stepper, ToolMotion,

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, tissue};
 use glam::DVec3;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, model, tissue};
 use trocar_tissue::{
     BodyDescription, Descent, MassFloor, Material, ModelBuilder, SolverSettings, Start, Stepper, SupportPlane,
 };

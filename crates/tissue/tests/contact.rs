@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, Collider, Material, Model, ModelBuilder, Shape, SolverSettings, State, Stepper, Support,
     SupportPlane, ToolMotion,

@@ -2,14 +2,12 @@
 //! against finite differences.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::noise;
 use glam::{DQuat, DVec3};
 use parry3d_f64::math::Vector;
 use parry3d_f64::query::PointQuery;
 use parry3d_f64::shape::{Ball, Capsule, ConvexPolyhedron, Cuboid, TriMesh, TriMeshFlags};
 use parry3d_f64::transformation::convex_hull;
+use trocar_testing::blocks::noise;
 use trocar_tissue::{Collider, Hull, ModelBuilder, Shape};
 
 const POINTS: u64 = 4000;

@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{FRAME, block, tissue};
 use glam::DVec3;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, block, tissue};
 use trocar_tissue::{BodyDescription, Model, ModelBuilder, SolverSettings, State, Stepper};
 
 /// Length of the most stretched edge over that at rest.

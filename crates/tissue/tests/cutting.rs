@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, appendix, block, nodes, tissue};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, appendix, block, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, Compliance, Cut, Grasp, MassFloor, Material, Model, ModelBuilder, Severed, SolverSettings, State,
     Stepper, sever,

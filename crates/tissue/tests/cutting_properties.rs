@@ -2,20 +2,18 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{appendix, block, noise, tissue};
 use glam::{DQuat, DVec3};
 use proptest::prelude::*;
 use std::collections::BTreeMap;
 use std::sync::LazyLock;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{self, appendix, block, noise, tissue};
 use trocar_tissue::{Cut, Model, Severed, State, sever};
 
 /// A tube with a state in which it is bent and twisted, and a block.
 static ORGANS: LazyLock<Vec<(Model, State)>> = LazyLock::new(|| {
     let deformed = |mesh: &TetMesh, bend: f64| {
-        let model = common::model(mesh, tissue(12e3), common::nodes(mesh, |p| p.x < 4e-3), DVec3::ZERO);
+        let model = blocks::model(mesh, tissue(12e3), blocks::nodes(mesh, |p| p.x < 4e-3), DVec3::ZERO);
         let mut state = State::new(&model);
         for (i, p) in mesh.vertices.iter().enumerate() {
             let x = DQuat::from_rotation_y(bend * p.x) * *p + DVec3::Z * bend * p.x * p.y;

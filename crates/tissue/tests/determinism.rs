@@ -2,11 +2,9 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
+use trocar_testing::blocks::{self, FRAME, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
     SupportField, SupportPlane, ToolMotion,
@@ -87,7 +85,7 @@ fn same_bits(schedule: SolverSettings, name: &str) -> u64 {
 
 #[test]
 fn six_hundred_frames_of_sweeps_have_the_same_bits() {
-    for (name, schedule) in [("paper", SolverSettings::PAPER), ("adaptive sweeps", common::adaptive())] {
+    for (name, schedule) in [("paper", SolverSettings::PAPER), ("adaptive sweeps", blocks::adaptive())] {
         println!("{name}: {:#018x}", same_bits(schedule, name));
     }
 }

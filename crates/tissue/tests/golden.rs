@@ -8,11 +8,9 @@
 #![cfg(all(target_arch = "x86_64", target_os = "linux"))]
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, nodes, tissue};
 use glam::DVec3;
 use trocar_core::Pose;
+use trocar_testing::blocks::{self, FRAME, GRAVITY, block, nodes, tissue};
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Compliance, ConstitutiveModel, Grasp, Load, Material, Model, ModelBuilder,
     Shape, SolverSettings, State, Stepper, SupportField, SupportPlane, ToolMotion,
@@ -30,7 +28,7 @@ fn bump(frame: usize, frames: usize) -> f64 {
 
 /// Steps `frames` frames; checks that one thread and three agree and that a saved state restores.
 fn hashes(model: &Model, start: &State, frames: usize, tools: &dyn Fn(usize) -> Vec<Pose>, loads: &[Load]) -> [u64; 3] {
-    [SolverSettings::FAST, SolverSettings::PAPER, common::adaptive()].map(|schedule| {
+    [SolverSettings::FAST, SolverSettings::PAPER, blocks::adaptive()].map(|schedule| {
         let run = |threads: usize| {
             let mut stepper = Stepper::new(model, schedule, FRAME, threads).unwrap();
             let mut state = start.clone();
@@ -171,7 +169,7 @@ fn loads_and_disturbed_states() {
 fn crushed_block() {
     let mesh = block([3, 3, 3], 2e-3);
     let material = Material { viscosity: 4.0, ..tissue(8e3) };
-    let model = common::model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
+    let model = blocks::model(&mesh, material, nodes(&mesh, |p| p.z == 0.0), GRAVITY);
     let mut state = State::new(&model);
     let held = nodes(&mesh, |p| p.z > 5e-3);
     state.grasps.push(Grasp::capture(&model, &state, 0, &held, 0, &Pose::IDENTITY));

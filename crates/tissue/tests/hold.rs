@@ -3,12 +3,10 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, model, nodes, tissue};
 use trocar_tissue::{
     Compliance, Divergence, Event, Grasp, Material, Model, SolverSettings, State, Stepper, ToolMotion,
 };

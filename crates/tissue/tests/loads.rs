@@ -1,11 +1,9 @@
 //! Forces on nodes: Newton's second law, a pulled column against its analytic length, and contact
 //! that is repeated by its own forces.
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, nodes, schedules, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
+use trocar_testing::blocks::{self, FRAME, GRAVITY, block, model, nodes, schedules, tissue};
 use trocar_tissue::{
     BodyContact, BodyDescription, Collider, Divergence, Load, Material, Model, ModelBuilder, Shape, SolverSettings,
     State, Stepper, ToolMotion,
@@ -21,7 +19,7 @@ fn a_load_accelerates() {
     let body = &model.bodies()[0];
     let loads: Vec<Load> =
         (0..body.len()).map(|node| Load { body: 0, node, force: body.mass(node) * acceleration }).collect();
-    for common::Judged { name, schedule, .. } in schedules() {
+    for blocks::Judged { name, schedule, .. } in schedules() {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
         for _ in 0..30 {
@@ -53,7 +51,7 @@ fn a_pulled_column_stretches() {
     assert!((total - 1.0).abs() < 1e-12);
     let loads: Vec<Load> =
         top.iter().map(|i| Load { body: 0, node: *i as usize, force: DVec3::Z * (pull * share(*i)) }).collect();
-    for schedule in [SolverSettings::FAST, common::many_sweeps()] {
+    for schedule in [SolverSettings::FAST, blocks::many_sweeps()] {
         let mut state = State::new(&model);
         let mut stepper = Stepper::new(&model, schedule, FRAME, 1).unwrap();
         for _ in 0..120 {

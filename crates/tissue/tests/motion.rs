@@ -1,9 +1,7 @@
 //! Motion against analytic solutions.
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::DVec3;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, model, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Descent, Material, ModelBuilder, SolverSettings, Start, State, Stepper,
     SupportPlane,

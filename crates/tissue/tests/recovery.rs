@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "helpers of tests may panic and print figures")]
 
-mod common;
-
-use common::{FRAME, block, model, nodes, noise, tissue};
 use glam::DVec3;
+use trocar_testing::blocks::{self, FRAME, block, model, nodes, noise, tissue};
 use trocar_tissue::{ConstitutiveModel, Divergence, Material, SolverSettings, State, Stepper};
 
 /// Nodes at random places inside the bounding box find back until no element is inverted. They are
@@ -57,7 +55,7 @@ fn recovers(name: &str, schedule: SolverSettings) {
 #[test]
 fn random_starts_recover_by_sweeps() {
     recovers("paper", SolverSettings::PAPER);
-    recovers("adaptive sweeps", common::adaptive());
+    recovers("adaptive sweeps", blocks::adaptive());
 }
 
 #[test]

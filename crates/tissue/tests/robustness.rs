@@ -2,12 +2,10 @@
 
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
-mod common;
-
-use common::{FRAME, GRAVITY, block, model, nodes, tissue};
 use glam::{DQuat, DVec3};
 use trocar_core::Pose;
 use trocar_geometry::TetMesh;
+use trocar_testing::blocks::{FRAME, GRAVITY, block, model, nodes, tissue};
 use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Grasp, Material, Model, ModelBuilder, SolverSettings, State, Stepper,
     ToolMotion,

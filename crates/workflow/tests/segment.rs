@@ -1,15 +1,12 @@
 //! `trocar segment`: from a recording to masks, and from these to a specimen.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "tests")]
 
-#[path = "../../recording/tests/common/mod.rs"]
-mod common;
-
-use common::{info, write};
 use std::path::{Path, PathBuf};
 use trocar_camera::Mask;
 use trocar_core::Silent;
 use trocar_reconstruct::{Settings, reconstruct};
 use trocar_recording::{InstrumentInfo, InstrumentRule, Recording, RecordingInfo};
+use trocar_testing::sphere::{self, info, write};
 use trocar_workflow::{Segment, inspect, weight_files};
 
 /// Networks with SAM's interface that select by colour; `None`, with a message, without ONNX
@@ -61,7 +58,7 @@ fn an_organ_with_points_is_found_and_reconstructed() {
     std::fs::remove_file(dir.join("masks/ball.png")).unwrap();
     let settings = Settings { sam: segment.sam, onnxruntime: segment.onnxruntime, stride: 1, ..Settings::default() };
     let specimen = reconstruct(&Recording::open(&dir).unwrap(), &settings, &Silent).unwrap().specimen;
-    let ratio = specimen.organs[0].surface.volume() / (4.0 / 3.0 * std::f64::consts::PI * common::RADIUS.powi(3));
+    let ratio = specimen.organs[0].surface.volume() / (4.0 / 3.0 * std::f64::consts::PI * sphere::RADIUS.powi(3));
     assert!((0.75..1.1).contains(&ratio), "{ratio}");
 }
 

@@ -1,4 +1,4 @@
-//! Actions: what the arms are asked for in one control period.
+//! Actions: the commands to the arms for one control period.
 
 use super::arm::{ArmModel, ArmState, Wanted};
 use super::setpoint::{NUMBERS, Setpoint, in_range};
@@ -7,7 +7,7 @@ use super::workspace::Workspace;
 use crate::{Error, Result};
 use glam::DVec3;
 
-/// What the numbers of an action are.
+/// The meaning of an action's numbers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ActionSpace {
     /// Absolute targets. Per arm in a port: two pivots (rad), insertion (m), roll (rad), jaw
@@ -28,22 +28,22 @@ impl ActionSpace {
     }
 }
 
-/// What the arms are asked for in one control period; the left arm's numbers first.
+/// The commands to the arms for one control period; the left arm's numbers first.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Action {
-    /// What the numbers are.
+    /// Their meaning.
     pub space: ActionSpace,
-    /// Five an arm.
+    /// Five for each arm.
     pub numbers: Vec<f64>,
 }
 
 impl Action {
-    /// Absolute targets, one an arm.
+    /// Absolute targets, one for each arm.
     pub fn targets(targets: &[Setpoint]) -> Self {
         Self { space: ActionSpace::Pivots, numbers: targets.iter().flat_map(|t| t.0).collect() }
     }
 
-    /// What the five numbers from `first` on ask of the arm.
+    /// The command in the five numbers from `first` on.
     ///
     /// # Errors
     /// Names the number that is not finite or out of range.
@@ -64,14 +64,14 @@ impl Action {
                 let mut tip = space.tip(&from);
                 tip.translation += DVec3::new(n[0], n[1], n[2]);
                 let reached = space.solve(&tip, &from)?;
-                // The direction follows from the place; the roll is the caller's.
+                // The direction follows from the position; the roll is the commanded one.
                 let wanted = reached.setpoint.with_roll(from.roll());
                 Ok(Wanted::Setpoint(space.clamp(&wanted), reached.rejected_rotation))
             }
         }
     }
 
-    /// Says which number is wrong whatever the arm does: its place, and what would be right.
+    /// Finds a number that is wrong in any state of the arm: its index, and what would be right.
     fn check(&self, model: &ArmModel, n: &[f64]) -> std::result::Result<(), (usize, String)> {
         if let Some(k) = n.iter().position(|a| !a.is_finite()) {
             return Err((k, format!("is {}; it must be finite", n[k])));

@@ -1,4 +1,4 @@
-//! From a scene to the arms of its cell.
+//! Builds the arms of a cell from its scene.
 
 use super::arm::{ArmModel, ArmState, ArmUnit};
 use super::drive::Drive;
@@ -16,34 +16,36 @@ use trocar_scene::{
 };
 use trocar_tissue::{Descent, SolverSettings, Start as SolverStart};
 
-/// Clearance that a tilt at the limit leaves (m).
+/// Clearance at the limit of the tilt (m).
 const MIN_CLEARANCE: f64 = 2e-5;
 
-/// Least way of the jaw's pivot into the body and of the shaft's base out of it (m).
+/// Minimum depth of the jaw's pivot in the body, and minimum height of the shaft's base outside
+/// (m).
 const MARGIN: f64 = 0.02;
 
 /// The blades' tips stay this far above the lowest tissue (m).
 const ABOVE_FLOOR: f64 = 0.001;
 
-/// Radius and length of what an instrument's mass is spread over (m): about its motor's housing.
-/// Only the moments of inertia depend on it, and they are small beside the arm's.
+/// Radius and length of the cylinder over which an instrument's mass is distributed (m): about its
+/// motor's housing. Only the moments of inertia depend on it, and they are small compared with the
+/// arm's.
 const HOUSING: [f64; 2] = [0.028, 0.09];
 
 /// Time that a grasper's and a cutter's jaws take from open to closed (s).
 const CLOSING: [f64; 2] = [0.3, 0.2];
 
-/// Kept from the end of the wrist (rad).
+/// Margin at the limits of the wrist (rad).
 const ROLL_MARGIN: f64 = 0.2;
 
-/// Tilt up to which all rolls are reached (rad): the task's.
+/// Tilt up to which all rolls must be reachable (rad): the task's.
 const LEAN: f64 = 0.35;
 
-/// Postures from which the start is searched, and steps of a way along which arms are followed.
+/// Number of postures from which the start is searched.
 const START_SEARCHES: usize = 24;
-/// Steps of that way.
+/// Steps of a path along which an arm is followed.
 const WALK_STEPS: u32 = 24;
 
-/// Shaft that tissue may touch (m): more than goes into the body.
+/// Length of the shaft that tissue can touch (m): more than enters the body.
 const MAX_TOUCHED_SHAFT: f64 = 0.2;
 
 /// The schedule of that name.
@@ -114,7 +116,7 @@ fn arm(scene: &Scene, k: usize, tool: &Tool<'_>, floor: f64) -> Result<ArmUnit> 
     Ok(ArmUnit { model, drive, state })
 }
 
-/// Where the instrument may be, as its port or the box around its start lets it.
+/// The workspace of the instrument: its port, or a box around its start.
 fn workspace(tool: &Tool<'_>, closing: f64, blades: &Blades, floor: f64) -> Result<Workspace> {
     let Some(port) = tool.port else {
         let start = DVec3::from(tool.arm.start.position_m.unwrap_or_default());
@@ -187,7 +189,7 @@ fn described(held: &trocar_scene::Instrument, closing: f64) -> Instrument {
     }
 }
 
-/// The limits of the port, and of the tissue's floor where the shaft leans as far as it may.
+/// The limits of the port, and of the floor at the largest tilt.
 fn limits(port: &Port, instrument: &Instrument, blades: &Blades, floor: f64) -> Result<Limits> {
     let mut limits = port.limits(instrument, MIN_CLEARANCE, MARGIN)?;
     let down = port.normal().dot(-DVec3::Z);
@@ -206,8 +208,7 @@ pub(super) fn start(start: &Start, port: Option<&trocar_scene::Port>, workspace:
         Workspace::Port(space) => {
             let direction = port.map_or(-DVec3::Z, |port| start.direction(port));
             let u = space.port.pose.rotation.inverse() * direction;
-            // The pivots turn the port's z first about x, then about the y that the first has
-            // turned.
+            // The pivots rotate the port's z about x, then about the rotated y.
             let pivots = [(-u.y).atan2(u.z), u.x.atan2(u.y.hypot(u.z))];
             let insertion = 1e-3 * start.insertion_mm - space.blade_length;
             Coordinates { pivots, insertion, roll, jaw: start.jaw }.into()
@@ -219,9 +220,9 @@ pub(super) fn start(start: &Start, port: Option<&trocar_scene::Port>, workspace:
     }
 }
 
-/// The rolls (rad) to which an arm gets from its start without a joint at a limit, wherever the
-/// shaft leans by up to [`LEAN`]: the wrist's range less what the shaft's turn takes of it. Where
-/// the arm does not get even at the start's roll is left out: commands there are held back.
+/// The rolls (rad) that an arm reaches from its start without a joint at a limit, for every tilt of
+/// the shaft up to [`LEAN`]: the wrist's range less the part that the tilt uses. Tilts that the arm
+/// cannot reach even at the start's roll are left out: commands there are held back.
 fn roll_of(
     arm: &SerialArm,
     port: &Port,
@@ -233,8 +234,8 @@ fn roll_of(
     let first = InverseOptions { restarts: START_SEARCHES, ..options };
     let posture = arm.inverse(&port.flange(instrument, start), &arm.home(), &first)?;
     let mut range = limits.roll;
-    // Steps towards `to`, each from the posture of the one before: the last posture, and the share
-    // of the way that was gone.
+    // Steps towards `to`, each from the posture before it. Returns the last posture and the share
+    // of the way.
     let walk = |from: &Coordinates, q: &Joints, to: &Coordinates| -> Result<(Joints, f64)> {
         let (mut q, mut share) = (*q, 0.0);
         for step in 1..=WALK_STEPS {
@@ -271,8 +272,8 @@ fn roll_of(
             }
         }
     }
-    // Where the wrist ends, not the port: the arm's reference takes another elbow than this one now
-    // and then.
+    // A limit of the wrist, not of the port: the arm's reference may choose another elbow than this
+    // search.
     let ends =
         [0, 1].map(|k| if range[k] == limits.roll[k] { range[k] } else { range[k] - ROLL_MARGIN.copysign(range[k]) });
     Ok([ends[0].min(start.roll), ends[1].max(start.roll)])

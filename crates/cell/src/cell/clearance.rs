@@ -1,5 +1,4 @@
-//! How near two instruments are to each other. They do not push each other: what would have touched
-//! is told.
+//! The clearance between two instruments. They do not push each other; a contact is reported.
 
 use glam::DVec3;
 
@@ -10,8 +9,8 @@ pub(super) struct Rod {
     pub radius: f64,
 }
 
-/// The least gap between any of two instruments' rods (m): negative where they are inside each
-/// other; infinite where one has none.
+/// The smallest gap between two instruments' rods (m): negative if they overlap; infinite if one
+/// has none.
 pub(super) fn clearance(one: &[Rod], other: &[Rod]) -> f64 {
     let gap = |a: &Rod, b: &Rod| distance(&a.ends, &b.ends) - a.radius - b.radius;
     one.iter().flat_map(|a| other.iter().map(move |b| gap(a, b))).fold(f64::INFINITY, f64::min)
@@ -24,10 +23,10 @@ fn distance([p, p_end]: &[DVec3; 2], [q, q_end]: &[DVec3; 2]) -> f64 {
     let (b, c, f) = (u.dot(v), u.dot(r), v.dot(r));
     let least = f64::MIN_POSITIVE;
     let span = a * e - b * b;
-    // Parallel segments: any share of the first will do, the clamps find the rest.
+    // Parallel segments: any share of the first is right; the clamps find the other.
     let mut s = if span > 1e-12 * a * e { ((b * f - c * e) / span).clamp(0.0, 1.0) } else { 0.0 };
     let t = (b * s + f) / e.max(least);
-    // A point instead of the second has no share to find.
+    // If the second segment is a point, it has no share.
     if !(0.0..=1.0).contains(&t) || e < least {
         s = ((b * t.clamp(0.0, 1.0) - c) / a.max(least)).clamp(0.0, 1.0);
     }

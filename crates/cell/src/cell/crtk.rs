@@ -1,5 +1,5 @@
-//! Reads and commands of one arm, in the words of the Collaborative Robotics Toolkit (CRTK).
-//! Commands are taken at once and carried out by [`Cell::advance`] or the next [`Cell::step`].
+//! Reads and commands of one arm, with the names of the Collaborative Robotics Toolkit (CRTK). The
+//! next [`Cell::step`] executes a command.
 
 use super::Cell;
 use super::arm::{ArmUnit, Wanted};
@@ -13,28 +13,24 @@ use trocar_core::Wrench;
 use trocar_robot::manipulator::JointReadings;
 
 impl Cell {
-    fn index_of(&self, arm: &str) -> Result<usize> {
+    pub(super) fn arm(&self, arm: &str) -> Result<&ArmUnit> {
+        Ok(&self.arms[self.arm_index(arm)?])
+    }
+
+    fn arm_mut(&mut self, arm: &str) -> Result<&mut ArmUnit> {
+        let k = self.arm_index(arm)?;
+        Ok(&mut self.arms[k])
+    }
+
+    /// The index of an arm in observations and actions.
+    ///
+    /// # Errors
+    /// An arm that the cell does not have.
+    pub fn arm_index(&self, arm: &str) -> Result<usize> {
         self.arms.iter().position(|s| s.model.side.name() == arm).ok_or_else(|| Error::UnknownArm {
             name: arm.chars().take(60).collect(),
             known: self.arms.iter().map(|s| s.model.side.name()).collect::<Vec<_>>().join(", "),
         })
-    }
-
-    pub(super) fn arm(&self, arm: &str) -> Result<&ArmUnit> {
-        Ok(&self.arms[self.index_of(arm)?])
-    }
-
-    fn arm_mut(&mut self, arm: &str) -> Result<&mut ArmUnit> {
-        let k = self.index_of(arm)?;
-        Ok(&mut self.arms[k])
-    }
-
-    /// The place of an arm in observations and actions.
-    ///
-    /// # Errors
-    /// An arm that the cell does not have, as all of these.
-    pub fn arm_index(&self, arm: &str) -> Result<usize> {
-        self.index_of(arm)
     }
 
     /// Measured joints.
@@ -53,8 +49,8 @@ impl Cell {
         Ok(self.arm(arm)?.drive.tip())
     }
 
-    /// What a sensor at the tool mount reads, in the mount's frame, weight and inertia of the
-    /// instrument included; tagged with what the tissue's part of it is.
+    /// The reading of a sensor at the tool mount, in the mount's frame, with the instrument's
+    /// weight and inertia; tagged with the kind of the tissue's part.
     ///
     /// # Errors
     /// An arm that the cell does not have.
@@ -72,7 +68,7 @@ impl Cell {
         Ok(TaggedForce { kind, wrench })
     }
 
-    /// The instrument with its jaws as tissue meets it.
+    /// The instrument's gripper, as it touches tissue.
     ///
     /// # Errors
     /// An arm that the cell does not have.
@@ -80,7 +76,7 @@ impl Cell {
         Ok(self.arm(arm)?.state.gripper)
     }
 
-    /// What was commanded last.
+    /// The last command.
     ///
     /// # Errors
     /// An arm that the cell does not have.
@@ -88,7 +84,7 @@ impl Cell {
         Ok(self.arm(arm)?.state.commanded)
     }
 
-    /// Where an instrument may be, and what the numbers of its arm mean there.
+    /// The workspace of an instrument, and the meaning of its arm's numbers.
     ///
     /// # Errors
     /// An arm that the cell does not have.
@@ -105,19 +101,19 @@ impl Cell {
         Ok(manipulator.arm().segments().iter().map(|s| s.joint.limits.position).collect())
     }
 
-    /// The nearest that an instrument comes to a pose of its tip frame.
+    /// The reachable pose nearest to a pose of the tip frame.
     ///
     /// # Errors
-    /// An arm that the cell does not have, a pose that is not one.
+    /// An arm that the cell does not have, or an invalid pose.
     pub fn solve(&self, arm: &str, tip: &Pose, near: &Setpoint) -> Result<Reached> {
         self.arm(arm)?.model.workspace.solve(tip, near)
     }
 
-    /// Moves the tip to a pose in the cell as near as its workspace lets it; the jaw stays as it
-    /// was commanded. The result has the rotation that was rejected.
+    /// Moves the tip to the reachable pose nearest to a pose in the cell; the jaw's command stays.
+    /// The result has the rejected rotation.
     ///
     /// # Errors
-    /// An arm that the cell does not have, a pose that is not one.
+    /// An arm that the cell does not have, or an invalid pose.
     pub fn servo_cp(&mut self, arm: &str, tip: &Pose) -> Result<Reached> {
         let unit = self.arm_mut(arm)?;
         let near = unit.state.commanded.with_jaw(unit.state.wanted.jaw());
@@ -126,11 +122,11 @@ impl Cell {
         Ok(reached)
     }
 
-    /// Moves the joints, whatever the port says to it; the jaw stays as it was commanded.
+    /// Moves the joints, without regard to the port; the jaw's command stays.
     ///
     /// # Errors
-    /// An arm that the cell does not have or that has no joints, not a number a joint, one that is
-    /// not finite. Nothing has changed then.
+    /// An arm that the cell does not have or that has no joints, a wrong count of numbers, or one
+    /// that is not finite. Nothing has changed then.
     pub fn servo_jp(&mut self, arm: &str, joints: &[f64]) -> Result<()> {
         let unit = self.arm_mut(arm)?;
         if !unit.drive.command_joints(joints)? {
@@ -140,8 +136,8 @@ impl Cell {
         Ok(())
     }
 
-    /// Moves the jaw towards an opening, 0 closed to 1. Closing, it stops where tissue pushes back
-    /// with its force.
+    /// Moves the jaw towards an opening, from 0 (closed) to 1. A closing jaw stops where tissue
+    /// pushes back with the jaw's force.
     ///
     /// # Errors
     /// An arm that the cell does not have, an opening out of range.
@@ -162,7 +158,7 @@ impl Cell {
         Ok(unit.state.held.as_ref().map(|h| (h.organ, h.s, h.hold.now(&self.world))))
     }
 
-    /// The organ between an arm's blades, if any is.
+    /// The organ between an arm's blades, if there is one.
     ///
     /// # Errors
     /// An arm that the cell does not have.

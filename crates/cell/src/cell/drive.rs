@@ -1,4 +1,4 @@
-//! What moves an instrument: the dynamics of an arm, or nothing but the command.
+//! The drive of an instrument: the dynamics of an arm, or an ideal drive.
 
 use super::setpoint::Setpoint;
 use super::workspace::Workspace;
@@ -7,7 +7,7 @@ use trocar_core::Pose;
 use trocar_core::Wrench;
 use trocar_robot::manipulator::{JointReadings, Manipulator, ManipulatorState};
 
-/// What moves an instrument.
+/// The drive of an instrument.
 #[derive(Clone, Debug)]
 pub(super) enum Drive {
     /// A controlled arm: joint torques, through a port.
@@ -16,7 +16,7 @@ pub(super) enum Drive {
     Ideal(Box<IdealDrive>),
 }
 
-/// An arm that is where it is commanded.
+/// An ideal arm: it is where it is commanded.
 #[derive(Clone, Debug)]
 pub(super) struct IdealDrive {
     workspace: Workspace,
@@ -25,41 +25,41 @@ pub(super) struct IdealDrive {
     steps: u32,
 }
 
-/// What changes of an [`IdealDrive`].
+/// The state of an [`IdealDrive`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct IdealState {
     at: Setpoint,
     to: Setpoint,
-    /// Physics steps that are left until it is there.
+    /// Physics steps until the target is reached.
     left: u32,
-    /// Changes of the first four numbers a second.
+    /// Rates of the first four numbers (1/s).
     rates: [f64; 4],
 }
 
-/// What changes of a [`Drive`]: plain data.
+/// The state of a [`Drive`]: plain data.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum DriveState {
     Dynamic(Box<ManipulatorState>),
     Ideal(IdealState),
 }
 
-/// What a command came to.
+/// The result of a command.
 pub(super) struct Sent {
     pub setpoint: Setpoint,
-    /// All of the way was commanded.
+    /// Whether the whole way was commanded.
     pub whole: bool,
 }
 
-/// What a physics step came to.
+/// The result of a physics step.
 pub(super) struct Moved {
     /// RCM deviation at its end (m).
     pub rcm_deviation: f64,
-    /// The reference kept up.
+    /// Whether the reference kept up.
     pub on_time: bool,
 }
 
 impl Drive {
-    /// An ideal drive at `start` that goes through `steps` physics steps a control period.
+    /// An ideal drive at `start`, with `steps` physics steps in a control period.
     pub fn ideal(workspace: Workspace, start: Setpoint, steps: u32) -> Self {
         Self::Ideal(Box::new(IdealDrive { workspace, state: IdealState::at_rest(start), steps }))
     }
@@ -79,7 +79,7 @@ impl Drive {
         }
     }
 
-    /// Does one physics step of `dt` (s) under `load` at the tip.
+    /// Advances by a physics step of `dt` (s) under `load` at the tip.
     pub fn step(&mut self, load: impl Fn(&Pose) -> Wrench, dt: f64) -> Result<Moved> {
         match self {
             Self::Dynamic(arm) => {
@@ -102,7 +102,7 @@ impl Drive {
         }
     }
 
-    /// Measured numbers and the rates of the first four. The jaw's is not the drive's to say.
+    /// Measured numbers, and the rates of the first four; the jaw has its own drive.
     pub fn measured(&self) -> (Setpoint, [f64; 4]) {
         match self {
             Self::Dynamic(arm) => {
@@ -113,7 +113,7 @@ impl Drive {
         }
     }
 
-    /// RCM deviation (m); 0 of an ideal arm.
+    /// RCM deviation (m); 0 for an ideal arm.
     pub fn rcm_deviation(&self) -> f64 {
         match self {
             Self::Dynamic(arm) => arm.rcm_deviation(),
@@ -137,12 +137,12 @@ impl Drive {
         }
     }
 
-    /// Measured joints; `None` of an ideal arm, which has none.
+    /// Measured joints; `None` for an ideal arm.
     pub fn joints(&self) -> Option<JointReadings> {
         self.manipulator().map(Manipulator::measured_js)
     }
 
-    /// Commands the joints. False where there are none.
+    /// Commands the joints. Returns false for an ideal arm.
     pub fn command_joints(&mut self, joints: &[f64]) -> Result<bool> {
         match self {
             Self::Dynamic(arm) => {
@@ -153,7 +153,7 @@ impl Drive {
         }
     }
 
-    /// At rest at `start`, whatever was before.
+    /// Restarts at rest at `start`.
     pub fn restart(&mut self, start: &Setpoint) -> Result<()> {
         match self {
             Self::Dynamic(arm) => Ok(arm.restart(&start.in_port())?),
@@ -164,7 +164,7 @@ impl Drive {
         }
     }
 
-    /// What changes.
+    /// The state.
     pub fn state(&self) -> DriveState {
         match self {
             Self::Dynamic(arm) => DriveState::Dynamic(Box::new(arm.state())),
@@ -172,7 +172,7 @@ impl Drive {
         }
     }
 
-    /// Puts back a state.
+    /// Restores a state.
     pub fn restore(&mut self, state: &DriveState) -> Result<()> {
         match (self, state) {
             (Self::Dynamic(arm), DriveState::Dynamic(state)) => Ok(arm.restore(state)?),
@@ -190,7 +190,7 @@ impl IdealState {
         Self { at, to: at, left: 0, rates: [0.0; 4] }
     }
 
-    /// Goes an even part of the way that is left.
+    /// Moves by an equal part of the remaining way.
     fn step(&mut self, dt: f64) {
         let before = self.at;
         if self.left > 0 {
@@ -207,13 +207,11 @@ impl IdealState {
 }
 
 impl DriveState {
-    /// Feeds every bit to a hash.
-    pub fn hash_into(&self, hash: &mut xxhash_rust::xxh3::Xxh3) {
+    /// Every number of the state.
+    pub fn numbers(&self) -> Vec<f64> {
         match self {
-            // A printed number is the shortest text that reads back as the same bits. The names of
-            // fields in the text are part of the hash: see `Debug` of the controller's memory.
-            Self::Dynamic(state) => hash.update(format!("{state:?}").as_bytes()),
-            Self::Ideal(state) => state.numbers().iter().for_each(|n| hash.update(&n.to_bits().to_le_bytes())),
+            Self::Dynamic(state) => state.numbers().collect(),
+            Self::Ideal(state) => state.numbers(),
         }
     }
 }

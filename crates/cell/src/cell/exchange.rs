@@ -1,52 +1,51 @@
-//! What tissue does to an instrument between two of its frames.
+//! The load of tissue on an instrument between two frames of tissue.
 //!
-//! Tissue is stepped 60 times a second, arms 480 times. Tissue sees the tip go from where it was
-//! measured at a frame's beginning to where it is at the end; the arm feels, over the next frame,
-//! what tissue did at that frame's end. Taken as it is, such a force is a spring that is late by a
-//! frame, and a late spring of stiffness k does work: it makes an arm swing unless the arm damps
-//! with more than about k T / 2, T being the frame (Colgate and Schenkel 1997). So the force is
-//! carried on with the tip: it changes by the stiffness seen so far, a secant as the jaw's drive
-//! has it ([`crate::Jaw`]), times the way the tip has gone since, at every step of the arm. Where
-//! the secant is right, the arm feels the spring as it is; where it is too large, the difference
-//! resists every motion and vanishes at the next frame: it damps. Where the tip rests, nothing is
-//! added.
+//! Tissue is stepped 60 times a second, arms 480 times. In a frame, the tip moves for the tissue
+//! from its place at the beginning to its place at the end. Over the next frame, the arm feels the
+//! force at that frame's end. Such a force is a spring with a delay of one frame, and a delayed
+//! spring of stiffness k does work: the arm oscillates unless its damping exceeds about k T / 2,
+//! with the frame time T (Colgate and Schenkel 1997). So the force is extrapolated with the tip: at
+//! every step of the arm it changes by the stiffness seen so far (a secant, as in [`crate::Jaw`])
+//! times the tip's motion since the frame. With the right secant, the arm feels the true spring.
+//! With a larger one, the difference resists motion and vanishes at the next frame: it damps.
+//! Nothing is added at rest.
 
 use glam::DVec3;
 use trocar_core::Wrench;
 use trocar_tissue::ToolForce;
 
-/// The most that tissue is taken to push or pull (N): beyond, a joint of the wrist would give way.
+/// Maximum load of tissue on an arm (N): a joint of the wrist would yield beyond it.
 pub const MAX_LOAD: f64 = 40.0;
 
-/// Stiffest that tissue is taken to be (N/m).
+/// Maximum assumed stiffness of tissue (N/m).
 const MAX_STIFFNESS: f64 = 2e4;
 
-/// What is left of the stiffness seen from one frame to the next.
+/// Decay of the stiffness from one frame to the next.
 const FORGETTING: f64 = 0.8;
 
-/// Least motion that gives a secant (m); with less, creep would be taken for stiffness.
+/// Minimum motion for a secant (m); below it, creep would be mistaken for stiffness.
 const LEAST_MOTION: f64 = 2e-5;
 
-/// The last frame's force on an instrument, and how it goes on.
+/// The last frame's force on an instrument, and its extrapolation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Exchange {
     /// Force (N) and torque about the tip (N m) in the cell frame at the end of the last frame.
     load: Wrench,
-    /// Where the tip was then (m).
+    /// Position of the tip then (m).
     at: DVec3,
-    /// Force gained a way gone (N/m).
+    /// Stiffness seen so far (N/m).
     stiffness: f64,
     /// The last frame's force was more than [`MAX_LOAD`].
     pub limited: bool,
 }
 
 impl Exchange {
-    /// Nothing touches a tip at `at` (m).
+    /// Without load, the tip at `at` (m).
     pub fn new(at: DVec3) -> Self {
         Self { at, ..Self::default() }
     }
 
-    /// A frame is over: the tip is at `at` (m) and its tools feel `forces`.
+    /// Ends a frame with the tip at `at` (m) and `forces` on its tools.
     pub fn end_frame(&mut self, at: DVec3, forces: &[ToolForce; 3]) {
         let mut load = Wrench::default();
         for force in forces {
@@ -73,7 +72,7 @@ impl Exchange {
         self.load.force
     }
 
-    /// What a tip that has come to `at` (m) feels.
+    /// The load on a tip that has moved to `at` (m).
     pub fn load(&self, at: DVec3) -> Wrench {
         let force = self.load.force - self.stiffness * (at - self.at);
         Wrench { force: force.clamp_length_max(MAX_LOAD), torque: self.load.torque }
@@ -91,9 +90,9 @@ impl Exchange {
 mod tests {
     use super::*;
 
-    /// A tip of `mass` (kg) with `damping` (N s/m), held at x = 0 by a spring of 3000 N/m and let
-    /// go 1 mm inside a wall of `stiffness` (N/m) that answers 60 times a second: the greatest
-    /// distance from the balance in the last of three seconds (m).
+    /// A tip of `mass` (kg) with `damping` (N s/m), held at x = 0 by a spring of 3000 N/m and
+    /// released 1 mm inside a wall of `stiffness` (N/m) that responds 60 times a second. Returns
+    /// the largest distance from equilibrium in the last of three seconds (m).
     fn swing(mass: f64, damping: f64, stiffness: f64, carried_on: bool) -> f64 {
         let (mut x, mut v, dt) = (0.001, 0.0, 1.0 / 480.0);
         let mut exchange = Exchange::new(DVec3::ZERO);

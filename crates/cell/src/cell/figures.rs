@@ -1,5 +1,4 @@
-//! What tasks measure of a cell besides its observations: what jaws carry and what is between
-//! blades.
+//! What tasks measure besides observations: tissue that jaws carry, and tissue between blades.
 
 use super::Cell;
 use crate::gripper::{BLADE_WIDTH, JAW_REGION_BEGIN};
@@ -8,7 +7,7 @@ use glam::DVec3;
 use trocar_scene::{InstrumentKind, Side};
 use trocar_tissue::State;
 
-/// Tissue that jaws hold, and how it has moved since they closed on it.
+/// Tissue that jaws hold, and its motion since they closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Carried {
     /// Body of the tissue.
@@ -19,17 +18,17 @@ pub struct Carried {
     pub jaw_lift: f64,
     /// Rise of the tissue's centroid (m).
     pub tissue_lift: f64,
-    /// Distance of that centroid in the jaws' frame from where it was (m).
+    /// Motion of that centroid in the jaws' frame (m).
     pub slip: f64,
 }
 
 impl Cell {
-    /// The arms in the order of observations and actions, with what their instruments are.
+    /// The arms in the order of observations and actions, with the kinds of their instruments.
     pub fn arms(&self) -> Vec<(Side, InstrumentKind)> {
         self.arms.iter().map(|s| (s.model.side, s.model.kind)).collect()
     }
 
-    /// What the arm at place `k` holds; None where there is no such arm or it holds nothing.
+    /// The tissue that arm `k` holds; `None` if it holds nothing or does not exist.
     pub fn carried(&self, k: usize) -> Option<Carried> {
         let arm = self.arms.get(k)?;
         let held = arm.state.held.as_ref()?;
@@ -38,8 +37,7 @@ impl Cell {
         Some(Carried { organ, s, jaw_lift: moved.jaw_lift, tissue_lift: moved.tissue_lift, slip: moved.slip })
     }
 
-    /// Organ coordinates of the nodes that the arm at place `k` holds or follows; empty where it
-    /// holds nothing.
+    /// Organ coordinates of the nodes that arm `k` holds; empty if it holds nothing.
     pub fn carried_coordinates(&self, k: usize) -> Vec<f64> {
         let held = self.arms.get(k).and_then(|arm| arm.state.held.as_ref());
         held.map_or_else(Vec::new, |held| {
@@ -48,8 +46,8 @@ impl Cell {
         })
     }
 
-    /// Tissue of body `organ` between the blades of the arm at place `k`, and its share of the
-    /// region between them; None where there is none.
+    /// Tissue of body `organ` between the blades of arm `k`, and its share of the region between
+    /// them; `None` without tissue there.
     pub fn between_blades(&self, k: usize, organ: usize) -> Option<(TissueInJaws, f64)> {
         let arm = self.arms.get(k)?;
         let tissue = arm.jaw_region().tissue_of(&self.world, organ)?;
@@ -78,8 +76,8 @@ impl Cell {
         Ok((state.contact_disabled, state.blades_disabled))
     }
 
-    /// Largest distance of a pinned node from where it was recorded (m). A state stores positions in
-    /// single precision, so the recorded ones are compared as a state stores them.
+    /// Largest distance of a pinned node from its recorded position (m). A state stores positions
+    /// in single precision, so the recorded ones are rounded in the same way.
     pub fn pin_drift(&self) -> f64 {
         let (model, state) = (&self.world.model, &self.world.state);
         let recorded = &State::new(model);

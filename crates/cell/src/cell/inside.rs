@@ -3,8 +3,8 @@
 use crate::World;
 use glam::DVec3;
 
-/// The first organ, but for `spared`, in which one of `segments` lies in part, and where (m).
-/// Elements that are pinned all round do not count: nothing feels them.
+/// The first organ except `spared` that contains a part of one of `segments`, and where (m).
+/// Elements whose nodes are all pinned do not count.
 pub(super) fn first_organ_around(
     world: &World,
     segments: &[[DVec3; 2]],
@@ -25,7 +25,7 @@ pub(super) fn first_organ_around(
         let pinned = body.pinned();
         for tet in body.tets() {
             let t = tet.map(|i| i as usize);
-            // All corners beyond one side of the box round the segments.
+            // All corners are beyond one side of the box round the segments.
             if t.iter().fold(u32::MAX, |all, i| all & sides[*i]) != 0 || t.iter().all(|i| pinned[*i]) {
                 continue;
             }
@@ -38,7 +38,7 @@ pub(super) fn first_organ_around(
     None
 }
 
-/// The middle of what of a segment lies inside a tetrahedron, if any does.
+/// The middle of the part of a segment inside a tetrahedron, if there is one.
 fn inside(corners: &[DVec3; 4], [from, to]: &[DVec3; 2]) -> Option<DVec3> {
     let (mut begin, mut end) = (0.0_f64, 1.0_f64);
     // Each face with the corner opposite to it.
@@ -73,7 +73,7 @@ mod tests {
         assert!(near(at([0.1, 0.1, 0.1], [0.1, 0.1, 0.3]), [0.1, 0.1, 0.2]), "all of it");
         assert_eq!(at([0.1, 0.1, -1.0], [0.1, 0.1, -0.01]), None, "it ends before");
         assert_eq!(at([0.5, 0.5, 0.1], [1.0, 1.0, 0.1]), None);
-        // Whichever way the corners turn.
+        // For either orientation of the corners.
         let turned = [DVec3::ZERO, DVec3::Y, DVec3::X, DVec3::Z];
         assert!(inside(&turned, &[DVec3::splat(0.2), DVec3::ONE]).is_some());
     }

@@ -1,4 +1,4 @@
-//! Where the links of the arms are, for drawing them.
+//! Poses of the arms' links, for pictures.
 
 use super::Cell;
 use crate::Result;

@@ -2,7 +2,7 @@
 //!
 //! A control period (1/30 s) is a number of tissue frames (1/60 s), each of them a number of
 //! physics steps of the arms (1/480 s); [`period`] has its stages. Instruments do not push each
-//! other: their clearance is measured, and an event says where they would have touched.
+//! other: their clearance is measured, and an event reports contact.
 
 mod action;
 mod arm;
@@ -43,9 +43,8 @@ pub use state::CellState;
 pub use workspace::{FreeSpace, PortSpace, Reached, Workspace};
 
 use crate::{Error, Result, World};
-use arm::{ArmUnit, Wanted};
+use arm::ArmUnit;
 use rules::Edges;
-use setpoint::NUMBERS;
 use std::time::Duration;
 use trocar_scene::{SafetyRules, Scene};
 use trocar_specimen::Specimen;
@@ -54,20 +53,20 @@ use trocar_tissue::ToolMotion;
 /// Frames of tissue a second (Hz).
 const FRAMES_HZ: u32 = 60;
 
-/// Wall time of the parts of what a cell has done since it was built.
+/// Wall time since the cell was built, by part.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Timing {
     /// The arms: controllers, ports, dynamics.
     pub arms: Duration,
     /// The tissue, contact included.
     pub tissue: Duration,
-    /// All of it.
+    /// Everything.
     pub all: Duration,
     /// Iterations of the tissue's solver, of all organs and substeps.
     pub iterations: usize,
 }
 
-/// What touches what in a cell: for measuring the cost of contact.
+/// Which contacts a cell has: for measuring the cost of contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ContactParts {
     /// Organs touch each other.
@@ -86,30 +85,30 @@ impl Default for ContactParts {
 pub struct Cell {
     world: World,
     arms: Vec<ArmUnit>,
-    /// Control periods that are over.
+    /// Number of completed control periods.
     periods: u64,
     control_hz: u32,
     /// Tissue frames of a control period, and physics steps of the arms in a frame.
     frames: u32,
     physics_steps: u32,
-    /// Cuts part tissue.
+    /// Whether cuts sever tissue.
     sever: bool,
     /// The safety rules that are applied.
     rules: SafetyRules,
     /// Motions of the tools in the last frame.
     motions: Vec<ToolMotion>,
     edges: Edges,
-    /// By body, frames for which it has been strained with no instrument at it.
+    /// By body: frames for which it has been strained without an instrument at it.
     waits: Vec<u32>,
-    /// The instruments are inside each other, and that was reported.
+    /// Whether the instruments overlap and that was reported.
     touch: bool,
     timing: Timing,
 }
 
 impl Cell {
     /// The cell of `scene` around `specimen`, whose tissue is stepped by `threads` threads (0: as
-    /// many as the machine has). The arms are in their start poses, the organs as they were
-    /// recorded. Results do not depend on the threads.
+    /// many as the machine has). The arms are in their start poses, the organs as recorded. Results
+    /// do not depend on the threads.
     ///
     /// # Errors
     /// Names the field of the scene, or the organ, arm or instrument that cannot be used.
@@ -117,7 +116,7 @@ impl Cell {
         Self::with_contact(scene, specimen, threads, ContactParts::default())
     }
 
-    /// The same with less contact: for measuring what contact costs.
+    /// The same with less contact: for measuring the cost of contact.
     ///
     /// # Errors
     /// As [`Cell::new`].
@@ -149,30 +148,8 @@ impl Cell {
         })
     }
 
-    /// Does one control period.
-    ///
-    /// # Errors
-    /// An action that cannot be done is refused with the number's place and name, and nothing has
-    /// changed. After an arm whose numbers are not finite any more a state has to be restored.
-    pub fn step(&mut self, action: &Action) -> Result<CellReport> {
-        let needed = NUMBERS * self.arms.len();
-        if action.numbers.len() != needed {
-            return Err(Error::Action {
-                index: action.numbers.len().min(needed),
-                name: "length".to_owned(),
-                reason: format!("is {}; {needed} numbers, {NUMBERS} an arm", action.numbers.len()),
-            });
-        }
-        let wanted = self.arms.iter().enumerate().map(|(k, arm)| action.wanted(&arm.model, &arm.state, NUMBERS * k));
-        let wanted: Vec<Wanted> = wanted.collect::<Result<_>>()?;
-        for (arm, wanted) in self.arms.iter_mut().zip(wanted) {
-            arm.state.wanted = wanted;
-        }
-        self.advance()
-    }
-
-    /// The gap between the two instruments now (m): negative where they are inside each other, for
-    /// they do not push each other.
+    /// The gap between the two instruments now (m): negative if they overlap, because they do not
+    /// push each other.
     pub fn clearance(&self) -> f64 {
         match &self.arms[..] {
             [one, other] => clearance::clearance(&one.rods(), &other.rods()),
@@ -190,13 +167,13 @@ impl Cell {
         1.0 / f64::from(self.control_hz)
     }
 
-    /// The tissue, in the cell frame: privileged, no policy sees it.
+    /// The tissue, in the cell frame: privileged, not for policies.
     pub fn world(&self) -> &World {
         &self.world
     }
 
-    /// Length of the most stretched edge of any organ now over that at rest: privileged, too. Takes
-    /// a pass over all edges.
+    /// Length of the most stretched edge of any organ over that at rest: privileged, too. It visits
+    /// all edges.
     pub fn max_stretch(&mut self) -> f64 {
         self.edges.strains(&self.world, 1.0).iter().fold(1.0, |most, s| s.stretch.max(most))
     }

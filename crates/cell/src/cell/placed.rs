@@ -1,4 +1,4 @@
-//! A specimen as a scene has it: placed in the cell frame, with the scene's materials and pins.
+//! The specimen of a scene: placed in the cell frame, with the scene's materials and pins.
 
 use crate::{Error, Result, Surroundings};
 use glam::DVec3;
@@ -8,7 +8,7 @@ use trocar_scene::{FIELD, PinEnd, PinRule, Scene, SupportKind};
 use trocar_specimen::{End, Organ, Specimen};
 use trocar_tissue::BodyContact;
 
-/// A specimen in the cell frame, and what surrounds its organs.
+/// A specimen in the cell frame, and the surroundings of its organs.
 #[derive(Clone, Debug)]
 pub struct Placed {
     /// All points in the cell frame, up along z; materials and pins are the scene's.
@@ -23,7 +23,7 @@ impl Placed {
     /// Places `specimen` as `scene` says.
     ///
     /// # Errors
-    /// Names the organ of the scene that the specimen does not have, or the field that cannot be.
+    /// Names the organ of the scene that the specimen does not have, or the invalid field.
     pub fn new(scene: &Scene, specimen: &Specimen) -> Result<Self> {
         let pose = scene.placement.pose();
         let mut placed = specimen.clone();
@@ -85,10 +85,10 @@ fn move_organ(organ: &mut Organ, pose: &Pose) {
     }
 }
 
-/// The end of `organ` that is farther from the port of the arm that grasps; found only where the
-/// rule asks for it.
+/// The end of `organ` that is farther from the port of the arm that grasps; computed only if the
+/// rule needs it.
 fn far_end(scene: &Scene, organ: &Organ, rule: Option<&PinRule>) -> Result<End> {
-    // Of an arm without a port, where it starts.
+    // For an arm without a port, its start.
     let from_port = |port: &String| scene.port(port).map(|port| port.centre_m);
     let place = scene.grasping_arm().and_then(|arm| arm.port.as_ref().map_or(arm.start.position_m, from_port));
     let (Some(PinRule::End { end: PinEnd::Far, .. }), Some(place)) = (rule, place) else { return Ok(End::Tip) };

@@ -11,23 +11,23 @@ use trocar_geometry::OrganAxis;
 use trocar_scene::{InstrumentKind, Scene, Side};
 use trocar_specimen::Specimen;
 
-/// Jaws that miss a place by less still close on it (m): on flat organs the tips of the blades
-/// reach the cell's floor first.
+/// Jaws that miss a place by less than this still close on it (m): on flat organs the tips of the
+/// blades reach the cell's floor first.
 pub const REACH_TOLERANCE: f64 = 8e-3;
 
-/// Places along the organ that are tried.
+/// Number of places along the organ that are tried.
 const PLACES: u32 = 20;
 
-/// How near an instrument comes to where the task wants it.
+/// How near an instrument comes to the place that the task wants.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct ToolReach {
     /// The arm.
     pub arm: Side,
     /// Its instrument.
     pub kind: InstrumentKind,
-    /// Organ coordinate of the place that it misses by least.
+    /// Organ coordinate of the place that it comes nearest to.
     pub at: f64,
-    /// How far the jaws stay from having it between them (mm).
+    /// Distance by which the jaws miss it (mm).
     pub missed_mm: f64,
 }
 
@@ -39,8 +39,8 @@ impl ToolReach {
 }
 
 /// How near each instrument of `scene` comes to the organ of its task in `specimen`: a grasper to
-/// where the grasp gate wants it, a cutter to between there and the base. Empty where the specimen
-/// does not have the organ.
+/// the places of the grasp gate, a cutter to places between them and the base. Empty if the
+/// specimen does not have the organ.
 ///
 /// # Errors
 /// A scene whose arms cannot be built.

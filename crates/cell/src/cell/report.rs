@@ -1,4 +1,4 @@
-//! What a step of the cell reports: the observation of each arm, of the tissue, and what happened.
+//! The report of a step of the cell: observations of arms and tissue, and events.
 
 use super::rule_counts::RuleCounts;
 use super::setpoint::Setpoint;
@@ -11,7 +11,7 @@ use trocar_robot::wrench::ForceKind;
 use trocar_scene::Side;
 use trocar_tissue::{Divergence, StepReport};
 
-/// A force with what it is, so that nobody mistakes one for the other (SPEC C8).
+/// A force with its kind.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TaggedForce {
     /// Contact, or the constraint of a latched grasp.
@@ -25,7 +25,7 @@ pub struct TaggedForce {
 pub struct ArmObservation {
     /// Which arm.
     pub side: Side,
-    /// Measured numbers, as in an action of absolute targets.
+    /// Measured numbers, in the order of an action of absolute targets.
     pub measured: Setpoint,
     /// Their rates (1/s).
     pub rates: [f64; 5],
@@ -41,19 +41,19 @@ pub struct ArmObservation {
     pub rcm_over_abort: bool,
     /// Angle between shaft and port normal (rad).
     pub tilt: f64,
-    /// What was commanded for the end of the period.
+    /// The command for the end of the period.
     pub commanded: Setpoint,
-    /// What is left of the wanted orientation: axis times angle (rad) in the cell of the turn from
-    /// the commanded to the wanted one.
+    /// The rejected part of the wanted orientation: axis times angle (rad) in the cell, from the
+    /// commanded to the wanted one.
     pub rejected_rotation: DVec3,
-    /// The command stops short of what was asked: it was too far for one period, below the cell's
-    /// floor, or against a force near the limit.
+    /// Whether the command stops short of the request: it was too far for one period, below the
+    /// cell's floor, or against a force near the limit.
     pub held_back: bool,
-    /// It was the force: the scene's `safety.force_limit_n` shortened the last command, or turned
-    /// it back.
+    /// Whether the force guard was the reason: the scene's `safety.force_limit_n` shortened or
+    /// reversed the last command.
     pub guarded: bool,
-    /// What tissue does to the instrument, about the tip, in the cell frame: while a grasp is
-    /// latched its constraint force, otherwise contact.
+    /// The wrench of tissue on the instrument, about the tip, in the cell frame: the constraint
+    /// force of a latched grasp, otherwise contact.
     pub force: TaggedForce,
     /// Contact force on shaft and blades (N), whether a grasp is latched or not.
     pub contact: DVec3,
@@ -61,13 +61,13 @@ pub struct ArmObservation {
     pub constraint: DVec3,
     /// Force with which tissue pushes the blades apart (N).
     pub jaw_force: f64,
-    /// Tissue pushed with more than an arm bears, and the arm felt only so much.
+    /// Whether the load of tissue was above the limit of the arm and was cut off there.
     pub load_limited: bool,
-    /// The jaws hold tissue.
+    /// Whether the jaws hold tissue.
     pub attached: bool,
 }
 
-/// What is measured of the tissue: privileged, no policy sees it.
+/// Measures of the tissue: privileged, not for policies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TissueObservation {
     /// Largest node speed at the end (m/s).
@@ -78,9 +78,9 @@ pub struct TissueObservation {
     pub min_volume_ratio: f64,
     /// Substeps in which held nodes could not follow the jaws.
     pub yielded_substeps: usize,
-    /// Substeps in which the solver gave a body up to sweeps.
+    /// Substeps in which the solver fell back to sweeps.
     pub fallbacks: usize,
-    /// Why the tissue's numbers are worth nothing, if they are not.
+    /// Why the tissue's numbers are invalid, if they are.
     pub divergence: Option<Divergence>,
 }
 
@@ -98,7 +98,7 @@ impl Default for TissueObservation {
 }
 
 impl TissueObservation {
-    /// Takes another frame in.
+    /// Adds a frame.
     pub(super) fn add(&mut self, report: &StepReport) {
         self.max_speed = report.max_speed;
         self.inverted = self.inverted.max(report.inverted);
@@ -109,7 +109,7 @@ impl TissueObservation {
     }
 }
 
-/// Something that happened in a control period.
+/// An event in a control period.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "event", rename_all = "kebab-case")]
 pub enum CellEvent {
@@ -134,7 +134,7 @@ pub enum CellEvent {
         /// Force with which tissue pushed the blades apart (N).
         closing_force_n: f64,
     },
-    /// Jaws opened, or what was between them is no longer.
+    /// Jaws opened, or the tissue between them is gone.
     Released {
         /// The arm.
         arm: Side,
@@ -157,14 +157,14 @@ pub enum CellEvent {
         arm: Side,
         /// Name of the organ.
         organ: String,
-        /// Pieces that the organ now is in: 1 where the scene parts nothing.
+        /// Number of pieces of the organ now; 1 in scenes that do not sever.
         pieces: usize,
-        /// The cut in figures, where the scene parts tissue.
+        /// Figures of the cut, in scenes that sever.
         #[serde(skip_serializing_if = "Option::is_none")]
         parted: Option<Box<Severance>>,
     },
-    /// The instrument had pierced, hooked or crushed tissue beyond what tissue bears. It lets go,
-    /// and its contact is disabled until it is out and the tissue has come back.
+    /// The instrument had pierced, overstretched or crushed tissue. It releases its grasp, and its
+    /// contact is disabled until it is out and the tissue has recovered.
     ContactDisabled {
         /// The arm.
         arm: Side,
@@ -175,8 +175,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// Jaws that hold tissue had strained it beyond what it bears. They keep their hold, but
-    /// contact of their blades is disabled until they let go.
+    /// Latched jaws had overstretched or crushed tissue. They keep their grasp, but contact of
+    /// their blades is disabled until they release it.
     BladesDisabled {
         /// The arm.
         arm: Side,
@@ -187,8 +187,8 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest.
         volume: f64,
     },
-    /// An organ stayed folded with no instrument at it: it was relaxed without regard to time and
-    /// forces.
+    /// An organ stayed folded without an instrument at it: it was relaxed without regard to time
+    /// and forces.
     Relaxed {
         /// Name of the organ.
         organ: String,
@@ -197,15 +197,14 @@ pub enum CellEvent {
         /// Least volume of an element over that at rest, before.
         volume: f64,
     },
-    /// Tissue pushed the instrument with more than the scene's limit; it draws back.
+    /// Tissue pushed the instrument with more than the scene's limit; the instrument retracts.
     ForceLimit {
         /// The arm.
         arm: Side,
         /// The force (N).
         force_n: f64,
     },
-    /// The instruments came into each other, which real ones would not: they do not push each other
-    /// here.
+    /// The instruments overlap. Real ones would touch; here they do not push each other.
     InstrumentsTouch {
         /// How deep (mm).
         depth_mm: f64,
@@ -217,7 +216,7 @@ pub enum CellEvent {
         /// The deviation (mm).
         deviation_mm: f64,
     },
-    /// The RCM deviation went beyond that at which the hardware stops.
+    /// The RCM deviation went beyond the limit at which the hardware stops.
     RcmAbort {
         /// The arm.
         arm: Side,
@@ -276,7 +275,7 @@ impl std::fmt::Display for CellEvent {
     }
 }
 
-/// What happens in a control period while it goes on.
+/// The record of a control period while it runs.
 #[derive(Debug, Default)]
 pub(super) struct PeriodLog {
     pub events: Vec<CellEvent>,
@@ -286,22 +285,22 @@ pub(super) struct PeriodLog {
     pub activation_step: f64,
 }
 
-/// What a control period reports.
+/// The report of a control period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellReport {
     /// Time at its end (s).
     pub time: f64,
     /// The arms, the left one first.
     pub arms: Vec<ArmObservation>,
-    /// Gap between the two instruments at its end (m): negative where they are inside each other,
-    /// for they do not push each other.
+    /// Gap between the two instruments at its end (m): negative if they overlap, because they do
+    /// not push each other.
     pub clearance: f64,
     /// The tissue.
     pub tissue: TissueObservation,
-    /// What happened, in order.
+    /// The events, in order.
     pub events: Vec<CellEvent>,
     /// How often each safety rule acted.
     pub rules: RuleCounts,
-    /// Largest motion of a node in the first frame after jaws took hold (m); 0 where none did.
+    /// Largest motion of a node in the first frame of a grasp (m); 0 without a new grasp.
     pub activation_step: f64,
 }

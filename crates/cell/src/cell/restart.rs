@@ -1,5 +1,4 @@
-//! Another start for a cell that is there already: arms elsewhere, tissue as it was saved, time
-//! zero.
+//! Restarts an existing cell: arms elsewhere, tissue as it was saved, time zero.
 
 use super::arm::ArmState;
 use super::setpoint::Setpoint;
@@ -8,20 +7,20 @@ use crate::{Error, Result};
 use trocar_scene::{Port, Start};
 
 impl Cell {
-    /// The setpoint of the arm at place `k` whose instrument stands as `start` says, as near as its
-    /// limits let it; `port` is the scene's port of that arm.
+    /// The setpoint of arm `k` for the start pose `start`, as near as the limits allow; `port` is
+    /// the scene's port of that arm.
     pub fn start_setpoint(&self, k: usize, start: &Start, port: Option<&Port>) -> Setpoint {
         let space = &self.arms[k].model.workspace;
         space.clamp(&build::start(start, port, space))
     }
 
-    /// Takes the tissue of `state`, lets go of all, puts the arms at rest at `starts`, one an arm,
-    /// and begins at time zero. The same state and starts give the same bits whatever the cell did
-    /// before.
+    /// Restores the tissue of `state` without grasps, puts the arms at rest at `starts` (one for
+    /// each arm), and sets the time to zero. The same state and starts give the same bits, whatever
+    /// the cell did before.
     ///
     /// # Errors
-    /// A state of another cell, or a start that an arm does not reach: the cell has then to be
-    /// restored or restarted.
+    /// A state of another cell, or a start out of an arm's reach. The cell then has to be restored
+    /// or restarted.
     pub fn restart(&mut self, state: &CellState, starts: &[Setpoint]) -> Result<()> {
         if starts.len() != self.arms.len() {
             let (given, here) = (starts.len(), self.arms.len());

@@ -2,21 +2,21 @@
 
 use serde::Serialize;
 
-/// How often each rule acted.
+/// Counts of the actions of each rule.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RuleCounts {
-    /// Arms and periods in which the force guard shortened a command.
+    /// Commands that the force guard shortened.
     pub guarded: usize,
     /// Instruments that had pierced an organ.
     pub pierced: usize,
-    /// Instruments that had hooked or crushed tissue beyond what it bears.
+    /// Instruments that had overstretched or crushed tissue.
     pub overstretched: usize,
-    /// Of both, how often contact of a whole instrument was disabled.
+    /// Of both: contacts of whole instruments that were disabled.
     pub disabled_contacts: usize,
-    /// Of both, how often contact of blades alone was disabled.
+    /// Of both: contacts of blades alone that were disabled.
     pub disabled_blades: usize,
     /// Instruments whose contact was enabled again.
     pub reconnected: usize,
-    /// Organs that were relaxed outside of time.
+    /// Organs that were relaxed instantly.
     pub relaxed: usize,
 }

@@ -1,5 +1,6 @@
-//! The five numbers of an arm: what it is sent to, and where it is measured to be.
+//! The five numbers of an arm: its commands and its measurements.
 
+use trocar_core::interpolate::linear;
 use trocar_robot::instrument::Coordinates;
 
 /// Numbers of an arm in an action.
@@ -38,11 +39,11 @@ impl Setpoint {
         self
     }
 
-    /// A part of the way to `to`: `share` 0 is here, 1 is there. The jaw is that of `to`.
+    /// Interpolates to `to` with `share` from 0 to 1. The jaw is that of `to`.
     #[must_use]
     pub fn towards(&self, to: &Self, share: f64) -> Self {
-        let mix = |k: usize| self.0[k] + share * (to.0[k] - self.0[k]);
-        Self([mix(0), mix(1), mix(2), mix(3), to.jaw()])
+        let part = |k: usize| linear(self.0[k], to.0[k], share);
+        Self([part(0), part(1), part(2), part(3), to.jaw()])
     }
 
     /// As coordinates in a port; meaningless for an arm without one.
@@ -58,7 +59,8 @@ impl From<Coordinates> for Setpoint {
     }
 }
 
-/// Whether a number lies in its range, up to rounding; otherwise its place and what would be right.
+/// Checks that a number is in its range, up to rounding. The error is its index and what would be
+/// right.
 pub(super) fn in_range(
     k: usize,
     value: f64,

@@ -1,8 +1,8 @@
 //! Organs come to rest before an episode begins.
 //!
-//! They settle under gravity for a time. A large soft organ swings for many seconds; the swing is
-//! then taken out by kinetic damping (Cundall 1976): everything is stopped whenever the kinetic
-//! energy has passed a peak, until nothing moves fast for a while by itself.
+//! They settle under gravity for a time. A large soft organ swings for many seconds; then kinetic
+//! damping (Cundall 1976) stops it: all velocities are set to zero whenever the kinetic energy has
+//! passed a peak, until nothing moves fast for a while.
 
 use super::Cell;
 use crate::Result;
@@ -14,7 +14,7 @@ const SETTLED_SPEED: f64 = 0.01;
 /// Longest kinetic damping (s).
 const MAX_DAMPING_S: f64 = 5.0;
 
-/// Damping ends after the organs have been slow, undisturbed, for this long (s).
+/// Damping ends after the organs have been slow for this long without it (s).
 const SLOW_S: f64 = 0.2;
 
 /// How organs came to rest.
@@ -22,7 +22,7 @@ const SLOW_S: f64 = 0.2;
 pub struct Settling {
     /// Largest node speed after the settling time, before any damping (m/s).
     pub settled_speed_m_s: f64,
-    /// They settled by themselves: that speed is below 0.01 m/s.
+    /// They settled without damping: that speed is below 0.01 m/s.
     pub settled: bool,
     /// How long kinetic damping took (s).
     pub calmed_s: f64,
@@ -31,24 +31,24 @@ pub struct Settling {
 }
 
 impl Cell {
-    /// Lets the organs settle for `seconds`, and damps what still moves then.
+    /// Lets the organs settle for `seconds`, then damps the remaining motion.
     ///
     /// # Errors
-    /// As [`Cell::advance`].
+    /// As [`Cell::step`].
     pub fn settle(&mut self, seconds: f64) -> Result<Settling> {
         let mut speed = 0.0;
         for _ in 0..(seconds / self.period()).round() as usize {
-            speed = self.advance()?.tissue.max_speed;
+            speed = self.step(None)?.tissue.max_speed;
         }
         let settled = speed < SETTLED_SPEED;
         let mut settling = Settling { settled_speed_m_s: speed, settled, calmed_s: 0.0, resting_speed_m_s: speed };
         let (mut slow_s, mut energy) = (0.0, self.world.state.kinetic_energy(&self.world.model));
         while !settled && slow_s < SLOW_S && settling.calmed_s < MAX_DAMPING_S {
-            settling.resting_speed_m_s = self.advance()?.tissue.max_speed;
+            settling.resting_speed_m_s = self.step(None)?.tissue.max_speed;
             settling.calmed_s += self.period();
             let now = self.world.state.kinetic_energy(&self.world.model);
             (slow_s, energy) = if settling.resting_speed_m_s < SETTLED_SPEED {
-                // Slow: left alone, to show that it stays so.
+                // Slow: not damped any more, to verify that it stays slow.
                 (slow_s + self.period(), now)
             } else if now < energy {
                 self.world.state.stop();

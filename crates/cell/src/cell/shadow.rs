@@ -1,23 +1,24 @@
-//! One cell does the tissue frames of another: for measuring what contact costs.
+//! One cell repeats the tissue frames of another: for measuring the cost of contact.
 
 use super::Cell;
 use std::time::{Duration, Instant};
 use trocar_tissue::{State, StepReport};
 
-/// Where all nodes of a cell are and how fast, and what is held.
+/// Positions and velocities of all nodes of a cell, and its grasps.
 #[derive(Clone, Debug)]
 pub struct Moment(State);
 
 impl Cell {
-    /// Where all nodes are and how fast, and what is held.
+    /// Positions and velocities of all nodes now, and the grasps.
     pub fn moment(&self) -> Moment {
         Moment(self.world.state.clone())
     }
 
-    /// Does the last tissue frame of `other` from the moment `before` it: from the same places and
-    /// velocities, with the same motions of the tools, under the forces that contact did to nodes
-    /// at its end. So a cell without contact moves, frame by frame, as one that has it. For cells
-    /// of one specimen, neither of them cut, with one tissue frame a control period.
+    /// Repeats the last tissue frame of `other` from the moment `before` it: with the same
+    /// positions, velocities and motions of tools, and with the contact forces on nodes at the
+    /// frame's end as loads. So a cell without contact moves, frame by frame, like one with
+    /// contact. Both cells must have the same specimen, uncut, and one tissue frame in a control
+    /// period.
     ///
     /// Returns the report and the wall time of the step.
     pub fn shadow(&mut self, other: &Self, before: &Moment) -> (StepReport, Duration) {

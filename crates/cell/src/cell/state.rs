@@ -23,7 +23,7 @@ pub struct CellState {
 }
 
 impl CellState {
-    /// Hash over every bit that the future depends on.
+    /// Hash over every bit on which later steps depend.
     pub fn hash(&self) -> u64 {
         let Self { world, arms, waits, touch, periods } = self;
         let mut hash = Xxh3::new();
@@ -32,8 +32,7 @@ impl CellState {
         waits.iter().for_each(|w| hash.update(&w.to_le_bytes()));
         hash.update(&[u8::from(*touch)]);
         for (arm, drive) in arms {
-            drive.hash_into(&mut hash);
-            for number in arm.numbers() {
+            for number in drive.numbers().into_iter().chain(arm.numbers()) {
                 hash.update(&number.to_bits().to_le_bytes());
             }
         }
@@ -42,7 +41,7 @@ impl CellState {
 }
 
 impl Cell {
-    /// The state as it is now.
+    /// The present state.
     pub fn save(&self) -> CellState {
         // Each field is named, so that one that is added is kept or left out on purpose.
         let Self {
@@ -69,8 +68,8 @@ impl Cell {
         }
     }
 
-    /// Puts back a state that this cell, or another of the same scene and specimen, gave. What
-    /// comes after is the same to the bit.
+    /// Restores a state of this cell, or of another with the same scene and specimen. The steps
+    /// after it are the same to the bit.
     ///
     /// # Errors
     /// A state of a cell with other arms or organs.
@@ -83,7 +82,7 @@ impl Cell {
         let cut = self.world.cuts > 0 || world.is_cut();
         self.world.restore(world)?;
         if cut {
-            // As many cuts are not the same cuts.
+            // The same number of cuts may be other cuts.
             self.edges = Edges::of(&self.world);
         }
         for (arm, (state, drive)) in self.arms.iter_mut().zip(arms) {
@@ -96,7 +95,7 @@ impl Cell {
         Ok(())
     }
 
-    /// Hash over every bit that the future depends on.
+    /// Hash over every bit on which later steps depend.
     pub fn hash(&self) -> u64 {
         self.save().hash()
     }

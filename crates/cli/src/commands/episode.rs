@@ -91,10 +91,10 @@ fn text(made: &EpisodeOutput) -> String {
     if let Some(said) = s.suspensions() {
         remarks += &format!("\nsuspensions of physics: {said}");
     }
-    let grasp = match (s.grasp_at, s.slip_mm) {
-        (Some(at), Some(slip)) => {
+    let grasp = match (s.grasp_at, s.lift_mm, s.slip_mm) {
+        (Some(at), Some(lift), Some(slip)) => {
             let held = if s.held_to_end { "held to the end" } else { "not held to the end" };
-            format!("grasp at s = {at:.2}, lift {:.1} mm, slip {slip:.2} mm, {held}", s.lift_mm)
+            format!("grasp at s = {at:.2}, lift {lift:.1} mm, slip {slip:.2} mm, {held}")
         }
         _ if r.task == "port-reach" => "no grasp in this task".to_owned(),
         _ => "no grasp".to_owned(),

@@ -36,26 +36,6 @@ pub struct RealSenseTopics {
     pub color_transform: Option<usize>,
 }
 
-/// Topic of the images of a stream, such as `Color_0` of sensor 1.
-pub fn image_topic(sensor: usize, stream: &str) -> String {
-    format!("/device_0/sensor_{sensor}/{stream}/image/data")
-}
-
-/// Topic of a stream's calibration.
-pub fn info_topic(sensor: usize, stream: &str) -> String {
-    format!("/device_0/sensor_{sensor}/{stream}/info/camera_info")
-}
-
-/// Topic of a sensor's depth unit.
-pub fn depth_units_topic(sensor: usize) -> String {
-    format!("/device_0/sensor_{sensor}/option/Depth Units/value")
-}
-
-/// Topic of a stream's transform from the reference stream of group 0.
-pub fn transform_topic(sensor: usize, stream: &str) -> String {
-    format!("/device_0/sensor_{sensor}/{stream}/tf/0")
-}
-
 /// The first depth and the first colour stream of a RealSense recording. `None` for other
 /// recordings, or without both streams.
 pub fn find(topics: &[Topic]) -> Option<RealSenseTopics> {

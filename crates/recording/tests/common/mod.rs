@@ -1,109 +1,136 @@
-//! A small recording of a sphere on a bed, seen from above, with a bar that moves across it.
-#![allow(dead_code)]
-#![allow(clippy::unwrap_used, reason = "test helpers")]
+//! The contents that `make_fixtures.py` writes, by the same formulas.
 
-pub mod messages;
+#![allow(dead_code, reason = "every test file uses a part")]
+#![allow(clippy::unwrap_used, reason = "a helper of tests")]
 
-use glam::DVec3;
-use std::path::Path;
-use trocar_camera::{Camera, ColorImage, DepthImage, Distortion, Mask};
-use trocar_recording::{InstrumentRule, OrganInfo, RecordingInfo, RecordingWriter};
-use trocar_specimen::{Material, Pins};
+use std::path::{Path, PathBuf};
+use trocar_recording::messages::{
+    DepthValues, Image, MessageLog, StampedImage, Topic, decode_calibration, decode_float, decode_image,
+    decode_transforms, open,
+};
 
-pub const BED: f64 = 0.30;
-pub const CENTRE: DVec3 = DVec3::new(0.004, -0.002, 0.275);
-pub const RADIUS: f64 = 0.025;
+pub const W: usize = 16;
+pub const H: usize = 12;
+pub const COLORS: usize = 4;
+pub const DEPTHS: usize = 5;
+pub const START: u64 = 1_700_000_000_000_000_000;
+const PERIOD: u64 = 33_333_333;
+pub const LOG_DELAY: u64 = 5_000_000;
 
-pub fn info() -> RecordingInfo {
-    RecordingInfo {
-        name: "sphere".into(),
-        rate_hz: Some(30.0),
-        depth_scale_m: Some(0.001),
-        up: [0.0, 0.0, -1.0],
-        depth_offset_px: [0.0; 2],
-        depth_max_m: None,
-        instruments: InstrumentRule::Masks,
-        note: String::new(),
-        source: None,
-        depth_camera: None,
-        depth_to_color: None,
-        followed: Vec::new(),
-        camera: Some(Camera {
-            width: 160,
-            height: 120,
-            fx: 200.0,
-            fy: 200.0,
-            cx: 79.5,
-            cy: 59.5,
-            distortion: Distortion::default(),
-        }),
-        organs: vec![OrganInfo {
-            name: "ball".into(),
-            polygon: vec![],
-            points: vec![],
-            points_outside: vec![],
-            base_px: None,
-            material: Material::default(),
-            pins: Pins::Band { share: 0.42 },
-        }],
+/// All fixtures.
+pub const ALL: [&str; 12] = [
+    "realsense.bag",
+    "realsense_bz2.bag",
+    "realsense_lz4.bag",
+    "compressed.bag",
+    "encodings.bag",
+    "ros1.mcap",
+    "ros2_none.mcap",
+    "ros2_zstd.mcap",
+    "ros2_lz4.mcap",
+    "ros2_big_endian_unchunked.mcap",
+    "foxglove_protobuf.mcap",
+    "foxglove_json.mcap",
+];
+
+pub fn fixture(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures").join(name)
+}
+
+pub fn log(name: &str) -> Box<dyn MessageLog> {
+    open(&fixture(name)).unwrap()
+}
+
+pub fn color_stamp(f: usize) -> u64 {
+    START + f as u64 * PERIOD
+}
+
+pub fn depth_stamp(f: usize) -> u64 {
+    color_stamp(f) + 1_000_000
+}
+
+fn grid<T>(value: impl Fn(usize, usize) -> T) -> Vec<T> {
+    (0..H).flat_map(|y| (0..W).map(move |x| (x, y))).map(|(x, y)| value(x, y)).collect()
+}
+
+pub fn color(f: usize) -> Vec<[u8; 3]> {
+    grid(|x, y| [x * 10 + f, y * 20 + f, x * y + 7 * f].map(|c| c as u8))
+}
+
+pub fn depth(f: usize) -> Vec<u16> {
+    grid(|x, y| if x + y == 0 { 0 } else { (400 + 3 * x + 5 * y + f) as u16 })
+}
+
+pub fn metres(f: usize) -> Vec<f32> {
+    depth(f).iter().map(|&d| f32::from(d) / 1000.0).collect()
+}
+
+pub fn topic(log: &dyn MessageLog, name: &str) -> usize {
+    log.topics().iter().position(|t| t.name == name).unwrap_or_else(|| panic!("no {name} in {:?}", log.topics()))
+}
+
+/// All images of a topic, in the order of their times.
+pub fn images(log: &dyn MessageLog, t: usize) -> Vec<StampedImage> {
+    let wanted: Vec<_> = (0..log.times(t).len()).map(|i| (t, i)).collect();
+    let mut found: Vec<_> = log.messages(&wanted).collect();
+    found.sort_by_key(|m| m.index);
+    found.iter().map(|m| decode_image(&log.topics()[t], m.bytes.as_ref().unwrap()).unwrap()).collect()
+}
+
+pub fn pixels(image: &StampedImage) -> &[[u8; 3]] {
+    match &image.image {
+        Image::Color(c) if (c.width, c.height) == (W, H) => &c.pixels,
+        other => panic!("{other:?}"),
     }
 }
 
-/// The truth: exact depth, colour and the sphere's mask.
-pub fn scene(camera: &Camera) -> (ColorImage, DepthImage, Mask) {
-    scene_at(camera, CENTRE)
-}
-
-/// The truth with the sphere's centre at `centre` (m).
-pub fn scene_at(camera: &Camera, centre: DVec3) -> (ColorImage, DepthImage, Mask) {
-    let (w, h) = (camera.width, camera.height);
-    let mut color = ColorImage::new(w, h, [90, 90, 100]);
-    let (mut depth, mut mask) = (DepthImage::new(w, h), Mask::new(w, h));
-    for v in 0..h {
-        for u in 0..w {
-            let ray = camera.ray(u as f64, v as f64);
-            let i = v * w + u;
-            depth.depth[i] = BED as f32;
-            // |t ray - c| = r
-            let (a, b, c) = (ray.length_squared(), ray.dot(centre), centre.length_squared() - RADIUS * RADIUS);
-            let d = b * b - a * c;
-            if d >= 0.0 {
-                depth.depth[i] = ((b - d.sqrt()) / a) as f32;
-                mask.set[i] = true;
-                color.pixels[i] = [180, 60, 50];
-            }
-        }
+pub fn units(image: &StampedImage) -> &[u16] {
+    match &image.image {
+        Image::Depth(d) if (d.width, d.height) == (W, H) => match &d.values {
+            DepthValues::Units(units) => units,
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
     }
-    (color, depth, mask)
 }
 
-/// Writes `frames` frames. The bar covers a third of the frames at each column it passes; depth
-/// under it is a hole.
-pub fn write(dir: &Path, info: &RecordingInfo, frames: usize) {
-    write_moving(dir, info, frames, |_| CENTRE);
-}
-
-/// [`write`] with the sphere's centre at `centre(frame)` (m); its mask is that of `CENTRE`.
-pub fn write_moving(dir: &Path, info: &RecordingInfo, frames: usize, centre: impl Fn(usize) -> DVec3) {
-    let camera = info.camera.unwrap();
-    let mask = scene(&camera).2;
-    let writer = RecordingWriter::create(dir, info).unwrap();
-    let w = camera.width;
-    for f in (0..frames).rev() {
-        let (mut color, mut depth, _) = scene_at(&camera, centre(f));
-        let mut instruments = Mask::new(w, color.height);
-        for v in 0..color.height {
-            for u in 0..w {
-                if (u + 7 * f) % w < 20 {
-                    let i = v * w + u;
-                    instruments.set[i] = true;
-                    color.pixels[i] = [250; 3];
-                    depth.depth[i] = if v % 2 == 0 { 0.0 } else { 0.2 };
-                }
-            }
-        }
-        writer.frame(f, &color, &depth, Some(&instruments)).unwrap();
+pub fn floats(image: &StampedImage) -> &[f32] {
+    match &image.image {
+        Image::Depth(d) if (d.width, d.height) == (W, H) => match &d.values {
+            DepthValues::Metres(metres) => metres,
+            other => panic!("{other:?}"),
+        },
+        other => panic!("{other:?}"),
     }
-    writer.organ_mask("ball", &mask).unwrap();
-    writer.finish().unwrap();
+}
+
+/// Decodes every message of a log in every way. Returns how many messages were read, and how many
+/// decoded as something.
+pub fn read_all(log: &dyn MessageLog) -> (usize, usize) {
+    let wanted: Vec<_> = (0..log.topics().len()).flat_map(|t| (0..log.times(t).len()).map(move |i| (t, i))).collect();
+    let (mut had, mut decoded) = (0, 0);
+    for message in log.messages(&wanted) {
+        let Ok(bytes) = message.bytes else { continue };
+        had += 1;
+        decoded += usize::from(decode_all(&log.topics()[message.topic], &bytes));
+    }
+    (had, decoded)
+}
+
+/// Decodes a message in every way; returns whether one of them succeeds.
+pub fn decode_all(topic: &Topic, bytes: &[u8]) -> bool {
+    let image = decode_image(topic, bytes);
+    if let Ok(StampedImage { image: Image::Depth(depth), .. }) = &image {
+        assert_eq!(depth.to_metres(0.001).depth.len(), depth.width * depth.height);
+    }
+    if let Ok(StampedImage { image: Image::Color(color), .. }) = &image {
+        assert_eq!(color.pixels.len(), color.width * color.height);
+    }
+    let any = [
+        image.is_ok(),
+        decode_calibration(topic, bytes).is_ok(),
+        decode_float(topic, bytes).is_ok(),
+        decode_transforms(topic, bytes).is_ok(),
+    ];
+    any.contains(&true)
 }

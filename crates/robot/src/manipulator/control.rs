@@ -23,7 +23,7 @@ const RESUME_ABOVE: [f64; 2] = [1.6e-4, 1e-3];
 const TASK_DAMPING: f64 = 1e-4;
 
 /// The controller's state between steps.
-#[derive(Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Memory {
     /// The last torques (N m or N).
     pub torque: Joints,
@@ -34,20 +34,17 @@ pub(super) struct Memory {
     pub paused: JointSet,
 }
 
-/// The text of a state is part of the hash of a cell, with the names of its fields: the names here
-/// are those of the first recorded episodes, so that their hashes stay valid.
-impl std::fmt::Debug for Memory {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Self { torque, correction, paused } = self;
-        let mut text = f.debug_struct("Memory");
-        text.field("torque", torque).field("correction", correction).field("asleep", paused).finish()
-    }
-}
-
 impl Memory {
     /// At rest under `torque`.
     pub fn at_rest(torque: Joints) -> Self {
         Self { torque, correction: Joints::zeros(torque.len()), paused: JointSet::default() }
+    }
+
+    /// Every number of it.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        let Self { torque, correction, paused } = self;
+        let paused = (0..torque.len()).map(|i| f64::from(u8::from(paused.contains(i))));
+        torque.iter().chain(correction.iter()).copied().chain(paused)
     }
 
     /// Updates the joints that need no correction.

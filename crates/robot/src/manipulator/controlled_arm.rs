@@ -75,6 +75,16 @@ pub struct ManipulatorState {
     pub(super) mount: [DVec3; 2],
 }
 
+impl ManipulatorState {
+    /// Every number of it, for hashes.
+    pub fn numbers(&self) -> impl Iterator<Item = f64> {
+        let Self { arm: ArmState { q, qd }, reference, memory, rim, jaw, mount: [force, torque] } = self;
+        let arm = q.iter().chain(qd.iter()).copied();
+        let mount = force.to_array().into_iter().chain(torque.to_array());
+        arm.chain(reference.numbers()).chain(memory.numbers()).chain(rim.numbers()).chain(*jaw).chain(mount)
+    }
+}
+
 /// Result of a command.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Commanded {

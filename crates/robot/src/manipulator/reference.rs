@@ -19,6 +19,7 @@ use crate::port::Port;
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use trocar_core::Pose;
+use trocar_core::interpolate::linear;
 
 /// Maximum speed and acceleration of the control points: two pivots (rad/s, rad/s2), insertion
 /// (m/s, m/s2), roll (rad/s, rad/s2). Slower commands pass unchanged.
@@ -85,6 +86,16 @@ pub(super) struct Reference {
     pub qdd: Joints,
     /// Pace of the spline's time in the last step: 1 if the arm could follow.
     pub pace: f64,
+}
+
+impl Reference {
+    /// Every number of it.
+    pub fn numbers(&self) -> Vec<f64> {
+        let Self { goal, target, previous, points: [a, b, c], phase, value, q, qd, qdd, pace } = self;
+        let goal = f64::from(u8::from(*goal == Goal::Joints));
+        let joints = [target, previous, a, b, c, value, q, qd, qdd];
+        joints.into_iter().flat_map(|joints| joints.iter().copied()).chain([goal, *phase, *pace]).collect()
+    }
 }
 
 /// The constants of a reference.
@@ -320,11 +331,10 @@ fn newton(arm: &SerialArm, q: &Joints, target: &Pose, drifts: Option<f64>) -> (J
 
 /// Coordinates at `share` of the path between two; the jaw is the target's.
 pub(super) fn between(from: &Coordinates, to: &Coordinates, share: f64) -> Coordinates {
-    let mix = |a: f64, b: f64| a + share * (b - a);
     Coordinates {
-        pivots: [mix(from.pivots[0], to.pivots[0]), mix(from.pivots[1], to.pivots[1])],
-        insertion: mix(from.insertion, to.insertion),
-        roll: mix(from.roll, to.roll),
+        pivots: [0, 1].map(|k| linear(from.pivots[k], to.pivots[k], share)),
+        insertion: linear(from.insertion, to.insertion, share),
+        roll: linear(from.roll, to.roll, share),
         jaw: coordinates::clamp_with_excess(to.jaw, [0.0, 1.0]).0,
     }
 }

@@ -31,6 +31,16 @@ pub struct RimState {
     marks: [Option<Mark>; 4],
 }
 
+impl RimState {
+    /// Every number of it.
+    pub(crate) fn numbers(&self) -> impl Iterator<Item = f64> {
+        self.marks.iter().flat_map(|mark| match mark {
+            Some(Mark { inner, angle, along }) => [1.0, f64::from(u8::from(*inner)), *angle, *along],
+            None => [0.0; 4],
+        })
+    }
+}
+
 /// A scalar force on the shaft, with its linearisation: a motion dx of the point along `direction`
 /// at speed v changes the force by -(stiffness dx + damping v).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

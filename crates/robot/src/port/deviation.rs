@@ -57,16 +57,6 @@ impl Deviation {
         let above = (below + 1).min(last);
         sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
     }
-
-    /// Number of deviations above [`RCM_THRESHOLD`].
-    pub fn above_threshold(&self) -> usize {
-        self.values.iter().filter(|v| **v > RCM_THRESHOLD).count()
-    }
-
-    /// Index of the first at or above [`RCM_ABORT`], where the hardware would have stopped.
-    pub fn aborted(&self) -> Option<usize> {
-        self.values.iter().position(|v| *v >= RCM_ABORT)
-    }
 }
 
 #[cfg(test)]
@@ -76,12 +66,11 @@ mod tests {
     #[test]
     fn statistics_match_the_values() {
         let mut d = Deviation::default();
-        assert_eq!((d.peak(), d.rms(), d.percentile(0.5), d.aborted()), (0.0, 0.0, 0.0, None));
+        assert_eq!((d.peak(), d.rms(), d.percentile(0.5)), (0.0, 0.0, 0.0));
         (0..=100).for_each(|k| d.add(f64::from(k) * 4e-5).unwrap());
         assert!((d.percentile(0.95) - 3.8e-3).abs() < 1e-12 && (d.percentile(0.5) - 2e-3).abs() < 1e-12);
-        assert_eq!((d.count(), d.above_threshold(), d.aborted()), (101, 25, None));
         d.add(5e-3).unwrap();
-        assert_eq!(d.aborted(), Some(101));
+        assert_eq!(d.count(), 102);
         assert!((d.peak() - 5e-3).abs() < 1e-15 && d.add(f64::NAN).is_err() && d.add(-1.0).is_err());
     }
 }

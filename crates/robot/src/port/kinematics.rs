@@ -65,21 +65,6 @@ impl Port {
         instrument.flange(&self.tip(coordinates))
     }
 
-    /// Twist of the tip, in the cell, at unit rate of each of the two pivots, the insertion and the
-    /// roll.
-    pub fn tip_jacobian(&self, coordinates: &Coordinates) -> [Twist; 4] {
-        let along = self.pose.rotation * Coordinates::direction(coordinates.pivots);
-        let arm = coordinates.insertion * along;
-        let about = |axis: DVec3| Twist { linear: axis.cross(arm), angular: axis };
-        let carried = DQuat::from_rotation_x(coordinates.pivots[0]) * DVec3::Y;
-        [
-            about(self.pose.rotation * DVec3::X),
-            about(self.pose.rotation * carried),
-            Twist { linear: along, angular: DVec3::ZERO },
-            Twist { linear: DVec3::ZERO, angular: along },
-        ]
-    }
-
     /// Measures an instrument whose flange is at `flange` in the cell. The roll is within +-pi;
     /// `jaw` is copied to the result.
     ///

@@ -4,6 +4,7 @@ use crate::{Error, Result};
 use glam::{DMat3, DQuat, DVec3};
 use trocar_cell::{Cell, Cluster, Reached, Setpoint, clusters, reach_into};
 use trocar_core::Pose;
+pub(super) use trocar_core::interpolate::smoothstep as eased;
 
 /// Nodes within this organ coordinate to either side tell where the organ is there.
 const SLICE: f64 = 0.04;
@@ -127,10 +128,4 @@ pub(super) fn at(cell: &Cell, arm: &str, body: usize, s: f64, point: DVec3, dept
     let (a, b) = (workspace.solve(&pose(hinge), &near)?, workspace.solve(&pose(-hinge), &near)?);
     let best = if turn(&a) <= turn(&b) { a } else { b };
     Ok(Aim { pose: best.tip, setpoint: best.setpoint, missed: best.rejected_translation.length(), s })
-}
-
-/// 0 to 1 with both ends at rest.
-pub(super) fn eased(share: f64) -> f64 {
-    let t = share.clamp(0.0, 1.0);
-    t * t * (3.0 - 2.0 * t)
 }

@@ -13,7 +13,7 @@ const MAX_STRIP_TRIANGLES: usize = 128;
 pub(crate) struct Push {
     /// The point that enters.
     pub to: u32,
-    /// Whether p leaves; else q does.
+    /// Whether p leaves, else q.
     pub drop_first: bool,
     /// The triangle of the new window, and whether it is turned over; None on the way to the next
     /// one.
@@ -212,7 +212,7 @@ mod tests {
                 check(&soup);
             }
         }
-        // More than is looked for.
+        // More than the search needs.
         assert_eq!(check(&(0..200).map(|i| [0, i + 1, i + 2]).collect::<Vec<_>>()), 600);
     }
 }

@@ -140,11 +140,12 @@ impl Tree {
         &self.corners[leaf.corners[0] as usize..leaf.corners[1] as usize]
     }
 
-    /// Whether the box of any leaf meets `place`.
-    pub fn reaches(&self, boxes: &[Aabb], place: &Aabb) -> bool {
+    /// Whether `meets` holds for the box of a leaf and of all nodes above it.
+    #[inline]
+    pub fn any(&self, boxes: &[Aabb], meets: impl Fn(&Aabb) -> bool) -> bool {
         let mut at = 0;
         while let Some(node) = self.nodes.get(at as usize) {
-            if !boxes[at as usize].meets(place) {
+            if !meets(&boxes[at as usize]) {
                 at = node.end;
             } else if node.is_leaf() {
                 return true;

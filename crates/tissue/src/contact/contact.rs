@@ -41,7 +41,7 @@ pub(crate) enum Friction {
 /// Force of a contact at a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Push {
-    /// Derivative of the energy (N): the reaction of what is touched.
+    /// Derivative of the energy (N): the reaction on the touched surface.
     pub gradient: Vec3A,
     /// Stiffness along the normal and across it (N/m).
     pub along: f32,
@@ -65,7 +65,7 @@ impl Contact {
         }
     }
 
-    /// Force at `x`, with friction's limit as it is there.
+    /// Force at `x`, with the limit of friction there.
     #[inline(always)]
     pub fn push(&self, x: Vec3A) -> Option<Push> {
         self.push_within(x, self.limit(x))

@@ -2,7 +2,7 @@
 //!
 //! They are found for every substep, from where vertices and tools are at its beginning. Only the
 //! anchors are kept, and so belong to the state: the places where friction holds a vertex, in the
-//! frame of what it touches.
+//! frame of the touched surface.
 
 use super::compliant_grasp::{self, CompliantNode};
 use super::contact::{Contact, Friction};
@@ -20,7 +20,7 @@ use trocar_core::Wrench;
 /// touch it in a frame.
 const REACH_MARGIN: f32 = 1e-3;
 
-/// The matrix stays as it is if at most so many vertices more or fewer touch, and an eighth of
+/// The matrix stays the same if at most so many vertices more or fewer touch, and an eighth of
 /// them.
 const MAX_CHANGED_CONTACTS: usize = 3;
 
@@ -35,10 +35,10 @@ pub(crate) struct ContactSet {
     contacts: Vec<Contact>,
     /// First contact of each vertex; that of the next vertex is the end.
     first: Vec<u32>,
-    /// Contacts with other bodies as they are now, and the first of each vertex: for the sweeps.
+    /// Present contacts with other bodies, and the first of each vertex: for the sweeps.
     pressed: Vec<Contact>,
     first_pressed: Vec<u32>,
-    /// Place of each contact in the frame of what is touched.
+    /// Place of each contact in the frame of the touched surface.
     places: Vec<Vec3A>,
     /// Sorted by vertex and source.
     anchors: Vec<Anchor>,
@@ -254,7 +254,8 @@ impl ContactSet {
         (self.contacts, self.places) = (contacts, places);
     }
 
-    /// A place in the frame of what is touched, converted to the body's frame at the substep's end.
+    /// A place in the frame of the touched surface, converted to the body's frame at the substep's
+    /// end.
     fn carried(&self, source: Source, body: &Body, place: Vec3A) -> Vec3A {
         match source {
             Source::Collider(c) => match &self.placed[c as usize] {

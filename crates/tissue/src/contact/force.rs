@@ -38,7 +38,7 @@ pub enum Event {
         /// The body.
         body: usize,
     },
-    /// The pull exceeded what the tissue bears: the grasp holds nothing any more. Reported once.
+    /// The pull exceeded the tissue's strength: the grasp is empty now. Reported once.
     Torn {
         /// The tool.
         tool: usize,

@@ -20,8 +20,8 @@ pub(crate) enum Source {
 pub(crate) struct Anchor {
     pub vertex: u32,
     pub source: Source,
-    /// In the frame of what is touched: the tool's, or for a support the body's (m). A tool carries
-    /// it along.
+    /// In the frame of the touched surface: the tool's, or for a support the body's (m). It moves
+    /// with a tool.
     pub place: Vec3A,
 }
 

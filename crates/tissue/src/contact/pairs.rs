@@ -1,11 +1,11 @@
 //! Contacts between the bodies of an island, and of folded tissue with itself: vertices of one at
 //! triangles of another.
 //!
-//! During a substep the plane and the nearest place on the triangle are held. A pair is a
+//! During a substep the plane and the nearest place on the triangle are fixed. A pair is a
 //! [`Contact`] of the vertex's offset from that place, which moves with the corners of the
 //! triangle. So the force has a potential of all four vertices, and acts on both bodies alike.
-//! Friction is a spring across the plane. How far it is stretched belongs to the state, and is
-//! turned with the plane.
+//! Friction is a spring across the plane. Its stretch belongs to the state and rotates with the
+//! plane.
 
 use super::contact::{Contact, Friction, Push};
 use super::coupling::Coupling;
@@ -15,8 +15,8 @@ use crate::Body;
 use crate::frame::Frame;
 use glam::Vec3A;
 
-/// Pairs that are farther apart than where they press, twice their way in a substep and this margin
-/// (m) are left out of the substep.
+/// Pairs are left out of a substep if their gap exceeds the gap of contact by more than twice their
+/// motion in the substep and this margin (m).
 const SUBSTEP_MARGIN: f32 = 3e-4;
 
 /// A vertex at a triangle.
@@ -31,7 +31,7 @@ pub(crate) struct Pair {
     pub weights: [f32; 3],
     /// The contact of the vertex's offset from that place.
     pub contact: Contact,
-    /// Limit of friction (N), held during a search.
+    /// Limit of friction (N), constant during a search.
     pub limit: f32,
     /// Force on the vertex when it was last recorded (N).
     pub recorded: Vec3A,
@@ -39,7 +39,7 @@ pub(crate) struct Pair {
     candidate: u32,
     /// The triangle's number.
     triangle: u32,
-    /// Distance at which nothing presses (m).
+    /// Distance without force (m).
     free: f32,
     /// From the triangle's frame to the vertex's (m).
     shift: Vec3A,
@@ -169,11 +169,11 @@ impl Pairs {
         &mut self.list
     }
 
-    /// Finds places and planes of a substep of `h` (s) that begins with the states as they are.
+    /// Finds places and planes of a substep of `h` (s) that begins with the present states.
     ///
     /// They are those where the vertex will be along the surface at the end: planes of where it is
     /// now would be steps in its way wherever it passes an edge. Pairs of bodies that were at rest
-    /// (`rested`) since the last substep of this frame stay as they are.
+    /// (`rested`) since the last substep of this frame do not change.
     pub fn find(&mut self, island: &(impl Members + ?Sized), h: f32, rested: impl Fn(usize) -> bool) {
         self.list.clear();
         for pair in &mut self.candidates {
@@ -232,7 +232,7 @@ impl Pairs {
         self.list.iter().filter(of).any(|pair| pair.contact.push(pair.offset(x)).is_some())
     }
 
-    /// Ends a substep with the states as they are: stretches follow what slips.
+    /// Ends a substep with the present states: stretches follow slipping contacts.
     pub fn end_substep(&mut self, island: &(impl Members + ?Sized)) {
         let x = |m: usize, vertex: u32| island.x(m, vertex);
         for pair in &self.list {
@@ -273,8 +273,8 @@ impl Pairs {
         self.roles.sort_unstable();
     }
 
-    /// Contacts of a body with the others, by vertex: each as it is for one vertex while the other
-    /// three of its pair stay where they are.
+    /// Contacts of a body with the others, by vertex: each for one vertex while the other three of
+    /// its pair are fixed.
     pub fn contacts_of(&mut self, island: &(impl Members + ?Sized), member: usize) -> &[Contact] {
         let x = |m: usize, vertex: u32| island.x(m, vertex);
         self.pressed.clear();

@@ -28,8 +28,7 @@ const FACING: f32 = 0.2;
 /// The limits of a search.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Limits {
-    /// Gap at which surfaces begin to press (m). Where they were nearer at rest, it is the gap at
-    /// rest.
+    /// Gap at which surfaces begin to press (m), or the gap at rest if that is smaller.
     pub offset: f32,
     /// Vertices deeper inside than this (m), or than this from where they were at rest if they were
     /// inside then, are left out.
@@ -62,12 +61,12 @@ pub(crate) struct Near {
     pub normal: Vec3,
     /// Signed distance along `normal` (m); negative inside.
     pub distance: f32,
-    /// Distance at which nothing presses (m): [`Limits::offset`], or the signed distance at rest
-    /// where that is less. There is force where `distance` is below it.
+    /// Distance without force (m): [`Limits::offset`], or the signed distance at rest if that is
+    /// less. There is force where `distance` is below it.
     pub free: f32,
 }
 
-/// Scratch memory, and what is known of the rest shapes.
+/// Scratch memory, and distances at rest.
 #[derive(Clone, Debug)]
 pub(crate) struct Proximity {
     limits: Limits,
@@ -78,14 +77,14 @@ pub(crate) struct Proximity {
     /// Rest positions by internal number and boxes around them, of bodies that are searched for
     /// folds.
     rest: Vec<(Vec<Vec3A>, Vec<Aabb>)>,
-    /// Where the bodies were when they were last examined, and how often they had moved by then.
+    /// Positions of the bodies at the last search, and their numbers of motions by then.
     seen: Vec<Vec<Vec3A>>,
     versions: Vec<u64>,
-    /// Of each ordered pair, what was found.
+    /// The result for each ordered pair.
     known: Vec<Known>,
 }
 
-/// What was found of a pair, and within which reach.
+/// The result for a pair, and its reach.
 #[derive(Clone, Debug, Default)]
 struct Known {
     reach: f32,
@@ -153,19 +152,8 @@ impl Proximity {
     /// Whether `reaches` holds for the middle and half the diagonal of the box around some
     /// triangles of a body and of all boxes around that.
     pub fn meets(&self, body: &Body, index: usize, reaches: &dyn Fn(Vec3A, f32) -> bool) -> bool {
-        let (nodes, boxes) = (&body.surface.tree.nodes, &self.boxes[index]);
-        let mut at = 0;
-        while let Some(node) = nodes.get(at as usize) {
-            let Aabb { low, high } = boxes[at as usize];
-            if !reaches(0.5 * (low + high), 0.5 * (high - low).length()) {
-                at = node.end;
-            } else if node.is_leaf() {
-                return true;
-            } else {
-                at += 1;
-            }
-        }
-        false
+        let meets = |b: &Aabb| reaches(0.5 * (b.low + b.high), 0.5 * (b.high - b.low).length());
+        body.surface.tree.any(&self.boxes[index], meets)
     }
 
     /// Writes into `found` every vertex whose distance from another body that it may touch is
@@ -207,9 +195,9 @@ impl Proximity {
     fn find_pair(&mut self, model: &Model, state: &[BodyState], [a, b]: [usize; 2], reach: f32, found: &mut Vec<Near>) {
         let n = model.bodies.len();
         let Limits { offset, depth, .. } = self.limits;
-        // Folds are not sought deep inside, where the tissue's own surface is.
+        // Folds are not searched for deep inside, where the tissue's own surface is.
         let depth = if a == b { depth.min(reach) } else { depth };
-        // Tissue that belongs together does so however fast it is.
+        // Neighbouring tissue stays neighbouring at any speed.
         let close = CLOSE * offset;
         let least = self.free[a * n + b].iter().copied().fold(0.0, f32::min);
         let search = reach.max(depth - least);
@@ -229,7 +217,7 @@ impl Proximity {
                 return;
             }
             let place = from.boxes[leaf as usize].moved(shift, search);
-            if !to.body.surface.tree.reaches(to.boxes, &place) {
+            if !to.body.surface.tree.any(to.boxes, |b| b.meets(&place)) {
                 return;
             }
             let around = rest_boxes.get(leaf as usize).map(|b| b.moved(Vec3A::ZERO, FOLDED * close));

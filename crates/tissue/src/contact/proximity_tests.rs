@@ -13,11 +13,7 @@ use trocar_geometry::{MeshDistance, SignedDistance, TetMesh};
 
 /// A number in 0..1 for each counter, the same on every machine.
 fn noise(k: u64) -> f64 {
-    // SplitMix64.
-    let mut z = k.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    trocar_core::unit(trocar_core::mix(k.wrapping_mul(0x9e37_79b9_7f4a_7c15)))
 }
 
 fn random(seed: u64) -> DVec3 {

@@ -170,7 +170,7 @@ fn free_name(bodies: &[Body], name: &str) -> String {
     }
 }
 
-/// Filters pieces from what the whole did not touch.
+/// Filters pieces against the bodies that the whole did not touch.
 fn filter(filtered: &mut Vec<[usize; 2]>, whole: usize, pieces: std::ops::Range<usize>) {
     let known = filtered.clone();
     for [a, b] in known.into_iter().filter(|pair| pair.contains(&whole)) {

@@ -5,7 +5,7 @@ use super::Cut;
 use glam::DVec3;
 use trocar_geometry::TetMesh;
 
-/// A piece of fewer elements does not come loose.
+/// A piece of fewer elements is not separated.
 const MIN_PIECE_ELEMENTS: usize = 4;
 
 /// Greatest number of passes over the elements; a few are enough.

@@ -98,8 +98,7 @@ impl Cut {
 /// little go with the side they share more area with: no piece of fewer than four elements comes
 /// loose. Faces between elements of different sides open if their centroid is within the cut's
 /// rectangle. A node falls into as many copies as the elements around it fall into groups that are
-/// joined by faces; the end of a crack stays joined. Elements stay as they are, so volumes are kept
-/// exactly.
+/// joined by faces; the end of a crack stays joined. Elements do not change, so volumes are exact.
 ///
 /// Copies have the position, velocity and rest position of their node, to the bit, and shares of
 /// its mass by the volumes around them: masses are kept to rounding (6e-8 each). The mass floor is
@@ -109,9 +108,10 @@ impl Cut {
 /// of each node that fell apart has its number; the others come last.
 ///
 /// What falls off becomes a body of its own at the end of the model, named `appendix.1`,
-/// `appendix.2`, ... The piece that is pinned by the most nodes, or else is the largest, stays the
-/// body it was. New bodies touch what the whole one touched, and the other pieces if the whole
-/// touched itself. A body of loose parts keeps those that the cut did not sever.
+/// `appendix.2`, ... The piece that is pinned by the most nodes, or else is the largest, remains
+/// the body. New bodies have contact with the bodies that the whole one had contact with, and with
+/// the other pieces if the whole had contact with itself. A body of loose parts keeps those that
+/// the cut did not sever.
 ///
 /// A grasp follows the nodes it holds: one that holds nodes of several pieces becomes a grasp for
 /// each, in sequence, jaw and tear force shared by the number of nodes. Of a held node's copies,

@@ -10,7 +10,7 @@ pub(super) struct Split {
     /// For each new node the old one. The first are the old nodes themselves; then copies,
     /// ascending.
     pub parent: Vec<u32>,
-    /// Faces that came apart.
+    /// Faces that opened.
     pub faces: usize,
     /// Number of nodes before.
     pub before: usize,
@@ -96,8 +96,8 @@ struct Fan {
 
 impl Fan {
     /// Groups the `elements` around `node` by the faces that join them. Elements that shared no
-    /// face around the node even before the cut go with those on their side: the cut does not take
-    /// apart what it does not meet.
+    /// face around the node before the cut join those on their side: the cut separates only what it
+    /// meets.
     fn find(&mut self, node: u32, elements: &[u32], mesh: &TetMesh, opened: &Opened) {
         for group in [&mut self.group, &mut self.whole] {
             group.clear();

@@ -152,7 +152,7 @@ pub(crate) struct RotatedStrain {
     pub volume: VolumeTerm,
 }
 
-/// Share of |m|^2 that K may take: what it takes at rest.
+/// Share of |m|^2 that K may take: its share at rest.
 const ROTATION_SHARE: f32 = 0.5;
 
 impl VertexElasticity for RotatedStrain {
@@ -202,7 +202,7 @@ fn rotation(f: Mat3A) -> Mat3A {
         let [a, b, c] = [x.x_axis, x.y_axis, x.z_axis];
         let (bc, ca, ab) = (b.cross(c), c.cross(a), a.cross(b));
         let inverse = Mat3A::from_cols(bc, ca, ab) * (1.0 / a.dot(bc).max(1e-12));
-        // Scaling speeds up what is far from a rotation only.
+        // Scaling is faster only far from a rotation.
         let size = norm(&x);
         let near = change < 0.01 || (size - 3.0).abs() < 0.3;
         let scale = if near { 1.0 } else { (norm(&inverse) / size).sqrt().sqrt() };

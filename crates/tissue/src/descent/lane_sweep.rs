@@ -306,7 +306,7 @@ impl LaneSweep<'_> {
         (0..group.count as usize).fold(0, |lanes, lane| lanes | u16::from(pressed(first + lane)) << lane)
     }
 
-    /// Adds what the plain sums lack in some lanes.
+    /// Adds the parts that the plain sums lack in some lanes.
     #[cold]
     #[inline(never)]
     fn add_rare(&self, group: &Group, rare: u16, x: &[Vec3A], memory: &mut Memory) {
@@ -324,8 +324,8 @@ impl LaneSweep<'_> {
         }
     }
 
-    /// Adds what the plain sums lack in one lane: contacts, and the barrier in elements of little
-    /// volume.
+    /// Adds the parts that the plain sums lack in one lane: contacts, and the barrier in elements
+    /// of small volume.
     fn add_rare_to(&self, local: &mut Local, group: &Group, lane: usize, x: &[Vec3A], memory: &Memory) {
         let vertex = group.first as usize + lane;
         self.substep.add_contacts(vertex, x[vertex], local);

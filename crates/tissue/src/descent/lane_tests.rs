@@ -1,4 +1,4 @@
-//! The sweep in lanes does what the sweep vertex by vertex does, with any instructions.
+//! The sweep in lanes equals the sweep vertex by vertex, with any instruction set.
 #![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
 
 use super::kernel::Kernel;

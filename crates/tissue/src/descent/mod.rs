@@ -19,7 +19,7 @@ use crate::frame::Frame;
 use crate::settings::Descent;
 pub(crate) use body_descent::BodyDescent;
 
-/// The sweeps of a body with what it touches.
+/// The sweeps of a body with its contacts.
 pub(crate) struct TouchingDescent {
     descent: BodyDescent,
     contacts: ContactSet,
@@ -33,35 +33,41 @@ impl TouchingDescent {
 }
 
 impl Solver for TouchingDescent {
-    type Shared = ();
+    type History = ();
     const COUPLES: bool = true;
 
-    fn new_shared(&self) {}
+    fn new_history(&self) {}
 
-    fn advance(island: IslandFrame<'_, Self>) {
-        let IslandFrame { slots, pairs, frame, .. } = island;
-        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
+    fn substeps(&self) -> usize {
+        self.descent.settings.substeps
+    }
+
+    fn begin_frame(island: &mut IslandFrame<'_, Self>) {
+        let frame = island.frame;
+        for BodySlot { index, body, solver, state, .. } in island.slots.iter_mut() {
             solver.descent.begin_frame(&frame.of(*index), body);
             solver.contacts.begin_frame(&frame.of(*index), body, state);
         }
-        let substeps = slots[0].solver.descent.settings.substeps;
-        let share = |k: usize| k as f64 / substeps as f64;
-        for substep in 1..=substeps {
-            pairs.find(slots, (frame.dt / substeps as f64) as f32, |_| false);
-            for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
-                let (from, to) = (share(substep - 1), share(substep));
-                solver.contacts.find(&frame.of(*index), body, from, to, |i| state.x[i]);
-            }
-            sweep_substep(slots, pairs, frame, share(substep));
-            for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
-                solver.contacts.end_substep(&frame.of(*index), body, share(substep), |i| state.x[i]);
-            }
-            pairs.end_substep(slots);
+    }
+
+    fn substep(island: &mut IslandFrame<'_, Self>, from: f64, to: f64) {
+        let IslandFrame { slots, pairs, frame, h, .. } = island;
+        pairs.find(&**slots, *h, |_| false);
+        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
+            solver.contacts.find(&frame.of(*index), body, from, to, |i| state.x[i]);
         }
-        for BodySlot { solver, state, .. } in slots.iter_mut() {
+        sweep_substep(slots, pairs, frame, to);
+        for BodySlot { index, body, solver, state, .. } in slots.iter_mut() {
+            solver.contacts.end_substep(&frame.of(*index), body, to, |i| state.x[i]);
+        }
+        pairs.end_substep(&mut **slots);
+    }
+
+    fn end_frame(island: &mut IslandFrame<'_, Self>) {
+        for BodySlot { solver, state, .. } in island.slots.iter_mut() {
             solver.contacts.end_frame(state);
         }
-        pairs.end_frame(slots);
+        island.pairs.end_frame(island.slots);
     }
 
     fn contacts(&self) -> Option<&ContactSet> {
@@ -77,7 +83,7 @@ impl Sweeps for TouchingDescent {
 
 /// A solver that can sweep.
 pub(crate) trait Sweeps: Solver {
-    /// The sweeps of the body and what it touches.
+    /// The sweeps of the body and its contacts.
     fn sweeps(&mut self) -> (&mut BodyDescent, &mut ContactSet);
 }
 

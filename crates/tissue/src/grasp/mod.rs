@@ -15,7 +15,7 @@ pub use tool_motion::ToolMotion;
 pub(crate) use tool_motion::travel;
 use trocar_core::Pose;
 
-/// How a grasp yields: its nodes hang on springs, held in the jaws by Coulomb friction.
+/// Compliance of a grasp: its nodes are on springs, held in the jaws by Coulomb friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Compliance {
     /// Stiffness of a node's spring (N/m).
@@ -31,8 +31,8 @@ pub struct Compliance {
     /// Force at the end of a frame, in any direction, at which the tissue tears out of the jaws
     /// (N).
     pub tear_force: f64,
-    /// The tools whose colliders are the blades: their friction on this body is that of the grasp,
-    /// and not counted again.
+    /// The tools whose colliders are the blades: their friction on this body is that of the grasp
+    /// and is not counted twice.
     pub blades: Option<[usize; 2]>,
 }
 
@@ -53,9 +53,9 @@ pub struct Grasp {
     pub compliance: Option<Compliance>,
     /// How far each node has slipped through the jaws, in the tool's frame (m).
     pub(crate) slid: Vec<Vec3A>,
-    /// More than half of the nodes slip.
+    /// Whether more than half of the nodes slip.
     pub(crate) slips: bool,
-    /// The tissue tore out of it: it holds nothing any more.
+    /// Whether the tissue tore out of it: it is empty then.
     pub(crate) torn: bool,
 }
 
@@ -65,7 +65,7 @@ impl Grasp {
         Self { compliance: Some(compliance), ..self }
     }
 
-    /// Whether the tissue tore out of it: it holds nothing any more.
+    /// Whether the tissue tore out of it: it is empty then.
     pub fn is_torn(&self) -> bool {
         self.torn
     }
@@ -81,7 +81,7 @@ impl Grasp {
         sum / self.nodes.len().max(1) as f64
     }
 
-    /// Whether its nodes hang on springs, and it is not torn.
+    /// Whether its nodes are on springs and it is not torn.
     pub(crate) fn is_compliant(&self) -> bool {
         self.compliance.is_some() && !self.torn
     }

@@ -1,4 +1,4 @@
-//! The stage after the solve: grasps slip and tear by what their nodes did in the last substep.
+//! The stage after the solve: slip and tearing of grasps, from their nodes in the last substep.
 
 use super::Grasp;
 use crate::Event;
@@ -6,7 +6,8 @@ use crate::contact::CompliantNode;
 use glam::DVec3;
 
 impl Grasp {
-    /// Finds whether it slips or tears, from its nodes (`held`); appends what began to `events`.
+    /// Finds whether it slips or tears, from its nodes (`held`); appends the beginnings to
+    /// `events`.
     pub(crate) fn update<'a>(&mut self, held: impl Iterator<Item = &'a CompliantNode>, events: &mut Vec<Event>) {
         let Some(compliance) = self.compliance.filter(|_| !self.torn) else { return };
         let (mut sliding, mut nodes, mut pull) = (0, 0, DVec3::ZERO);

@@ -1,5 +1,5 @@
-//! How a body moves: where it starts a substep from, and how far it goes along a direction. No step
-//! squeezes an element too far.
+//! Motion of a body: the start of a search, and steps along a direction. No step squeezes an
+//! element too far.
 
 use super::body_system::QuasiNewtonSolver;
 use super::iterate::{InitialGuess, Iterate, position};
@@ -28,7 +28,7 @@ const MAX_DROPS: usize = 5;
 const MAX_RETREATS: usize = 5;
 const RETREAT_SHARE: f32 = 0.25;
 
-/// How far held nodes came with their tools.
+/// How far held nodes followed their tools.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum ConstraintMotion {
     /// All the way.
@@ -40,7 +40,7 @@ pub(super) enum ConstraintMotion {
 }
 
 impl QuasiNewtonSolver {
-    /// Moves to where the substep starts from, and evaluates the elements there.
+    /// Moves to the start of the search, and evaluates the elements there.
     pub(super) fn start_substep(&mut self, frame: &Frame<'_>, share: f64, h: f32, body: &Body) -> InitialGuess {
         let free = self.layout.free;
         let Iterate { start, v, targets, .. } = &mut self.iterate;
@@ -79,21 +79,21 @@ impl QuasiNewtonSolver {
         }
         let Iterate { x, targets, .. } = &mut self.iterate;
         x[..free].copy_from_slice(&targets[..free]);
-        if !self.evaluate(h) {
+        if !self.elements.evaluate(self.level, &self.layout, &self.iterate, h) {
             self.elements.accept();
             return InitialGuess::Ahead;
         }
         self.restore();
-        self.evaluate(h);
+        self.elements.evaluate(self.level, &self.layout, &self.iterate, h);
         InitialGuess::Behind
     }
 
-    /// Moves held nodes with their tools from where the substep began, and the free ones as a
-    /// linear body would follow; evaluates the elements there.
+    /// Moves held nodes with their tools from the substep's beginning, and the free ones as in a
+    /// linear body; evaluates the elements there.
     ///
-    /// In a body that something holds, other forces have no part in it, because this step skips the
-    /// descent check: a crushed element presses on its nodes a thousand times harder than the
-    /// stiffness at rest explains, and would throw them out of the body. They are for searches.
+    /// In a held body, other forces are left to the search, because this step skips the descent
+    /// check: a crushed element presses on its nodes a thousand times harder than the stiffness at
+    /// rest predicts, and would throw them out of the body.
     pub(super) fn move_constraints(&mut self, h: f32) -> ConstraintMotion {
         let (free, is_free) = (self.layout.free, self.is_free());
         let Iterate { x, targets, gradient, direction, .. } = &mut self.iterate;
@@ -122,7 +122,7 @@ impl QuasiNewtonSolver {
         } else {
             let Iterate { x, base, .. } = &mut self.iterate;
             x[..free].copy_from_slice(&base[..free]);
-            self.evaluate(h);
+            self.elements.evaluate(self.level, &self.layout, &self.iterate, h);
         }
         let Iterate { x, targets, .. } = &self.iterate;
         let arrived = |i: usize| (0..3).all(|c| (x[i][c] - targets[i][c]).abs() <= ARRIVED);
@@ -133,13 +133,14 @@ impl QuasiNewtonSolver {
         }
     }
 
-    /// Goes a share of the direction from the base. Where a few elements would be squeezed too far,
-    /// their nodes go less far, and at last not at all; where many would be, or others again and
-    /// again, all nodes go less far. False if that does not help either.
+    /// Moves by a share of the direction from the base. If a few elements would be squeezed too
+    /// far, the steps of their nodes are halved and at last dropped; if many would be, or others
+    /// each time, the steps of all nodes are shortened. Returns false if that does not help either.
     pub fn apply_step(&mut self, share: f32, h: f32) -> bool {
         for _ in 0..=MAX_RETREATS {
             for round in 0..=MAX_HALVINGS + MAX_DROPS {
-                let Self { level, layout, iterate: Iterate { x, base, direction, .. }, .. } = self;
+                let Self { level, layout, elements, iterate, .. } = self;
+                let Iterate { x, base, direction, .. } = &mut *iterate;
                 dispatch!(*level, _simd => {
                     let ways = base.iter().zip(direction.iter());
                     for (x, (from, by)) in x[..layout.free].iter_mut().zip(ways) {
@@ -148,7 +149,7 @@ impl QuasiNewtonSolver {
                         }
                     }
                 });
-                if !self.evaluate(h) {
+                if !elements.evaluate(*level, layout, iterate, h) {
                     return true;
                 }
                 let mut squeezed = 0;

@@ -1,7 +1,7 @@
 //! The quasi-Newton solver of one body: its parts by purpose, and the potential of one body.
 
 use super::elements::Elements;
-use super::history::{History, Memory};
+use super::history::Memory;
 use super::iterate::{InitialGuess, Iterate, add, max_coordinate, position};
 use super::layout::Layout;
 use super::rigid_modes::RigidModes;
@@ -68,13 +68,13 @@ pub(super) struct Loads {
     pub any: bool,
 }
 
-/// What happened to a body in a substep.
+/// The progress of a body in a substep.
 pub(super) struct Progress {
-    /// Where the substep started from.
+    /// Where the search started.
     pub guess: InitialGuess,
     /// Whether a tool moves held nodes in the substep.
     pub carried: bool,
-    /// Whether a held node stays behind because an edge would be too long.
+    /// Whether a held node lags because an edge would be too long.
     pub yielded: bool,
     /// The report's count of that when the substep began.
     pub limited: usize,
@@ -82,7 +82,7 @@ pub(super) struct Progress {
     pub stepped: bool,
     /// Largest coordinate of the direction (m).
     pub longest: f32,
-    /// Largest coordinate of the way from where the body would go by itself (m).
+    /// Largest coordinate of the deviation from the body's free motion (m).
     pub gone: f32,
 }
 
@@ -120,11 +120,6 @@ impl QuasiNewtonSolver {
         }
     }
 
-    /// What bodies of an island share.
-    pub fn new_history(&self) -> History {
-        History::new(self.settings.memory)
-    }
-
     /// Begins a frame.
     pub fn begin_frame(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) {
         self.iterate.load(&self.layout, state);
@@ -156,7 +151,8 @@ impl QuasiNewtonSolver {
         }
     }
 
-    /// Factorises again if other nodes are held, press, or hang on a tool than in the factor.
+    /// Factorises again if other nodes are held, in contact, or in a compliant grasp than in the
+    /// factor.
     fn refresh_system(&mut self, frame: &Frame<'_>, body: &Body, state: &BodyState) {
         let Self { system, layout, held, touching, .. } = self;
         let stiffness = |vertex: usize| touching.contacts.stiffness(frame, body, state, vertex);
@@ -165,8 +161,8 @@ impl QuasiNewtonSolver {
         }
     }
 
-    /// Adds to the matrix the tools and supports that press where the substep began or would have
-    /// ended by itself. False if it has them all.
+    /// Adds to the matrix the tools and supports that press at the substep's beginning or at its
+    /// free end. Returns false if it has them all.
     pub fn add_contacts_to_system(&mut self, frame: &Frame<'_>, body: &Body, state: &mut BodyState) -> bool {
         let (x, targets, number) = (&self.iterate.x, &self.iterate.targets, &self.layout.number);
         let places = |vertex: u32| {
@@ -201,7 +197,7 @@ impl QuasiNewtonSolver {
         touching.contacts.end_substep(frame, body, share, |vertex| iterate.at(layout, vertex as u32));
     }
 
-    /// Begins a substep: where nodes would be without forces but gravity.
+    /// Begins a substep: predicts the positions under gravity alone.
     pub fn predict(&mut self, h: f32, gravity: Row) {
         self.iterate.start.copy_from_slice(&self.iterate.x);
         // A body in free flight falls exactly: gravity's part of its motion is uniform and
@@ -217,17 +213,9 @@ impl QuasiNewtonSolver {
         });
     }
 
-    /// Evaluates the elements where the nodes are: forces and volume ratios. Returns whether an
-    /// element has lost too much of its accepted volume.
-    pub fn evaluate(&mut self, h: f32) -> bool {
-        self.rest.evaluated = false;
-        let Self { level, elements, layout, iterate: Iterate { x, start, .. }, .. } = self;
-        dispatch!(*level, simd => elements.evaluate(simd, layout, x, start, h))
-    }
-
-    /// Turns the system with the tissue where the nodes are.
+    /// Rotates the system with the tissue.
     pub fn update_warp(&mut self) {
-        if self.rest.evaluated && std::mem::replace(&mut self.rest.warped, true) {
+        if self.elements.in_place && std::mem::replace(&mut self.rest.warped, true) {
             return;
         }
         self.system.update_warp(self.level, &self.layout, &self.iterate.x);
@@ -278,8 +266,8 @@ impl QuasiNewtonSolver {
         }
     }
 
-    /// Accepts the next gradient, with friction's limits as they are here. Within a search the
-    /// limits are held, so that there is a function to minimise.
+    /// Accepts the next gradient, with the present limits of friction. The limits are constant
+    /// within a search, so that there is a function to minimise.
     pub fn accept_gradient(&mut self) {
         let Self { iterate: Iterate { x, gradient, next_gradient, .. }, touching, layout, held, .. } = self;
         std::mem::swap(gradient, next_gradient);
@@ -363,7 +351,7 @@ impl QuasiNewtonSolver {
         self.iterate.x[..self.layout.free].iter_mut().for_each(|row| add(row, by));
     }
 
-    /// Puts the beginning of the substep back.
+    /// Restores the beginning of the substep.
     pub fn restore(&mut self) {
         self.iterate.restore(self.layout.free);
     }

@@ -1,11 +1,11 @@
 //! The coarse half of the preconditioner: bodies that nothing holds, moved as a whole.
 //!
-//! The matrix of a body does not contain its contacts with other bodies. Where tissue gives way
-//! such contacts are no stiffer than the tissue, which does no harm; but as a whole a free body
-//! would move as if nothing touched it, too far by orders of magnitude. So its six rigid motions
-//! are taken out of what the factor solves, and get a matrix of their own with the body's inertia
-//! and all contacts as they are: a two-level preconditioner (Toselli and Widlund 2005, "Domain
-//! decomposition methods", chapter 3).
+//! The matrix of a body does not contain its contacts with other bodies. Where tissue deforms, such
+//! contacts are no stiffer than the tissue, which is harmless. But a free body as a whole would
+//! move as if nothing touched it, too far by orders of magnitude. So its six rigid motions are
+//! removed from the factor's problem and get their own matrix, with the body's inertia and all
+//! present contacts: a two-level preconditioner (Toselli and Widlund 2005, "Domain decomposition
+//! methods", chapter 3).
 
 use super::body_system::QuasiNewtonSolver;
 use super::island_system::IslandSystem;
@@ -38,8 +38,8 @@ impl QuasiNewtonSolver {
 }
 
 impl IslandSystem<'_> {
-    /// Assembles the coarse half for the bodies and contacts as they are. Bodies that are alone do
-    /// without it: the history learns what little they need.
+    /// Assembles the coarse half for the present bodies and contacts. Single bodies do not need it:
+    /// the history is enough for them.
     pub fn assemble_rigid_modes(&mut self) {
         let h = self.h;
         let coupled = !self.pairs.is_empty();

@@ -1,11 +1,12 @@
 //! Evaluation of a body's elements: forces on their corners, and volume ratios.
 
+use super::iterate::Iterate;
 use super::layout::{Batch, Layout};
 use super::stress::Stress;
 use crate::Body;
 use crate::inversion_guard::{KEPT_SHARE, MIN_SQUARED_LENGTH, MIN_VOLUME_RATIO, is_squeezed};
 use crate::lanes::{LANES, Mat3L, Row, Vec3L, add, apply, cross, dot, gather, load, scale, splat, store_rows, sub};
-use fearless_simd::{Simd, SimdBase, f32x16};
+use fearless_simd::{Level, Simd, SimdBase, dispatch, f32x16};
 use std::collections::BTreeMap;
 
 /// Forces and volume ratios of the elements.
@@ -18,6 +19,8 @@ pub(super) struct Elements {
     pub trial: Vec<[f32; LANES]>,
     /// Each element's part of the dashpots along its edges (N s/m); empty without viscosity.
     dashpots: Vec<[[f32; LANES]; 6]>,
+    /// Whether the last evaluation was of a body at rest, by `evaluate_in_place`.
+    pub in_place: bool,
 }
 
 impl Elements {
@@ -29,20 +32,22 @@ impl Elements {
             ratios: vec![[1.0; LANES]; batches],
             trial: vec![[1.0; LANES]; batches],
             dashpots: if body.material.viscosity > 0.0 { dashpots(layout, body) } else { Vec::new() },
+            in_place: false,
         }
     }
 
-    /// Evaluates forces and volume ratios at `x`. The substep of `h` (s) began at `start`, which
-    /// the dashpots need. Returns whether an element has lost too much of its accepted volume.
-    #[inline(always)]
-    pub fn evaluate<S: Simd>(&mut self, simd: S, layout: &Layout, x: &[Row], start: &[Row], h: f32) -> bool {
-        if self.dashpots.is_empty() {
-            self.evaluate_with::<S, false>(simd, layout, x, start, h)
+    /// Evaluates forces and volume ratios where the nodes are, in a substep of `h` (s). Returns
+    /// whether an element has lost too much of its accepted volume.
+    pub fn evaluate(&mut self, level: Level, layout: &Layout, at: &Iterate, h: f32) -> bool {
+        self.in_place = false;
+        dispatch!(level, simd => if self.dashpots.is_empty() {
+            self.evaluate_with::<_, false>(simd, layout, &at.x, &at.start, h)
         } else {
-            self.evaluate_with::<S, true>(simd, layout, x, start, h)
-        }
+            self.evaluate_with::<_, true>(simd, layout, &at.x, &at.start, h)
+        })
     }
 
+    /// The kernel. The dashpots need where the substep began: `start`.
     #[inline(always)]
     fn evaluate_with<S: Simd, const VISCOUS: bool>(
         &mut self,
@@ -118,7 +123,7 @@ impl Elements {
     }
 }
 
-/// By how much a volume ratio is below what it must be after `before`; 0 where it is not. NaN
+/// Shortfall of a volume ratio below its minimum after the ratio `before`; 0 if there is none. NaN
 /// counts as too low.
 #[inline(always)]
 fn lack<S: Simd>(simd: S, ratio: f32x16<S>, before: f32x16<S>) -> f32x16<S> {

@@ -2,24 +2,14 @@
 //! while each keeps its own matrix.
 
 use super::body_system::QuasiNewtonSolver;
-use super::history::History;
-use crate::body_slot::{BodySlot, for_each};
-use crate::contact::Pairs;
-use crate::frame::Frame;
+use crate::body_slot::{BodySlot, IslandFrame, for_each};
 use glam::Vec3A;
 
 /// Friction that changes by this share of the largest limit has another minimum.
 const LIMIT_SHARE: f32 = 0.02;
 
 /// Bodies that may touch each other, in a frame.
-pub(super) struct IslandSystem<'a> {
-    pub slots: &'a mut [BodySlot<QuasiNewtonSolver>],
-    pub pairs: &'a mut Pairs,
-    pub history: &'a mut History,
-    pub frame: &'a Frame<'a>,
-    /// Length of a substep (s).
-    pub h: f32,
-}
+pub(super) type IslandSystem<'a> = IslandFrame<'a, QuasiNewtonSolver>;
 
 impl IslandSystem<'_> {
     /// The bodies that take part in the search.

@@ -16,7 +16,7 @@ pub(super) struct Iterate {
     pub v: Vec<Row>,
     /// Inertial predictor (m).
     pub predictor: Vec<Row>,
-    /// Where nodes go by themselves in the substep, and held ones with their tools (m).
+    /// Free motion of nodes in the substep, and motion of held ones with their tools (m).
     pub targets: Vec<Row>,
     /// Gradient of the incremental potential at the accepted positions, and at those of a trial
     /// (N).
@@ -28,14 +28,15 @@ pub(super) struct Iterate {
     pub base: Vec<Row>,
 }
 
-/// Where a substep starts from.
+/// Where the search of a substep starts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(super) enum InitialGuess {
-    /// Where it began: nothing moves.
+    /// At the substep's beginning: nothing moves.
     Still,
     /// Free nodes continued with their velocities, held ones with their tools.
     Ahead,
-    /// Where it began, though things move: elements would be squeezed too far on the way ahead.
+    /// At the substep's beginning, although nodes move: elements would be squeezed too far on the
+    /// way ahead.
     Behind,
 }
 
@@ -57,7 +58,7 @@ impl Iterate {
         }
     }
 
-    /// Takes positions and velocities over from the state.
+    /// Loads positions and velocities from the state.
     pub fn load(&mut self, layout: &Layout, state: &BodyState) {
         for (i, vertex) in layout.vertex.iter().enumerate() {
             self.x[i] = state.x[*vertex as usize].extend(0.0).to_array();
@@ -67,13 +68,13 @@ impl Iterate {
         }
     }
 
-    /// Gives positions and velocities to the state.
+    /// Stores positions and velocities in the state.
     pub fn store(&self, layout: &Layout, state: &mut BodyState) {
         for i in 0..layout.free {
             let vertex = layout.vertex[i] as usize;
             state.x[vertex] = position(&self.x[i]);
             state.v[vertex] = position(&self.v[i]);
-            // This solver does not know the sweeps' warm start: sweeps after it start afresh.
+            // This solver has no warm start for sweeps: sweeps after it start without one.
             state.warm.falling[vertex] = 0.0;
         }
         for vertex in &layout.vertex[layout.free..] {
@@ -81,7 +82,7 @@ impl Iterate {
         }
     }
 
-    /// Puts the beginning of the substep back.
+    /// Restores the beginning of the substep.
     pub fn restore(&mut self, free: usize) {
         self.x[..free].copy_from_slice(&self.start[..free]);
     }

@@ -12,7 +12,7 @@ const MAX_LINE_SEARCH_TRIALS: usize = 8;
 pub(super) enum Found {
     /// A step was taken; gradient and history are up to date.
     Step,
-    /// No step helps; positions are as they were.
+    /// No step helps; positions are unchanged.
     Nothing,
 }
 
@@ -25,12 +25,12 @@ impl IslandSystem<'_> {
         self.active().map(|body| body.next_slope()).fold(0.0, |sum, part| sum + part)
     }
 
-    /// Goes along the direction: all of it where the slope does not rise too much by it, else as
-    /// far as it takes for the slope to become small.
-    pub fn search(&mut self) -> Found {
+    /// Moves along the direction: by all of it if the slope does not rise too much, else until the
+    /// slope is small.
+    pub(super) fn search(&mut self) -> Found {
         let mut slope = self.slope();
         if slope.is_nan() || slope >= 0.0 {
-            // The history misleads: the preconditioner alone always points downhill.
+            // The history misleads; the preconditioner alone always gives a descent direction.
             self.history.clear();
             self.find_direction();
             slope = self.slope();
@@ -39,7 +39,7 @@ impl IslandSystem<'_> {
             }
         }
         self.active().for_each(|body| body.iterate.base.copy_from_slice(&body.iterate.x[..body.layout.rows]));
-        // The minimum lies between a share where the slope still falls and one where it rises.
+        // The minimum lies between a share with a negative slope and one with a positive slope.
         let held = self.is_held();
         let (mut share, mut below, mut above) = (1.0f32, (0.0f32, slope), None);
         for trial in 0..=MAX_LINE_SEARCH_TRIALS {
@@ -48,7 +48,7 @@ impl IslandSystem<'_> {
             if !self.active().all(|body| body.progress.stepped) {
                 return self.turn_back();
             }
-            // Steps of squeezed elements' nodes may have been cut.
+            // Steps of squeezed elements' nodes may have been shortened.
             slope = self.slope();
             if held && below.0 == 0.0 {
                 below.1 = slope;
@@ -80,7 +80,7 @@ impl IslandSystem<'_> {
         Found::Step
     }
 
-    /// Puts the positions before the search back.
+    /// Restores the positions before the search.
     fn turn_back(&mut self) -> Found {
         self.active().for_each(|body| {
             let (free, iterate) = (body.layout.free, &mut body.iterate);

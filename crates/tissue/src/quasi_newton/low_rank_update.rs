@@ -1,12 +1,12 @@
 //! Contacts that began or ended since the matrix was factorised, as a low-rank update of its
 //! inverse.
 //!
-//! The factor contains the stiffness of the nodes that pressed when it was made. Nodes that press
-//! since, and nodes that let go, differ from it by a stiffness on a few nodes: a matrix of low
-//! rank. By Woodbury's formula (Hager 1989, "Updating the inverse of a matrix") the inverse of the
-//! sum is that of the factor less a product of a few of its columns. A node costs three solves
-//! once, and each solve then costs three products with vectors. The stiffness is the same in all
-//! directions, so the columns are kept in the tissue's rest frame and stay valid however it turns.
+//! The factor contains the stiffness of the nodes that pressed when it was made. New and lost
+//! contacts differ from it by a stiffness on a few nodes: a matrix of low rank. By Woodbury's
+//! formula (Hager 1989, "Updating the inverse of a matrix") the inverse of the sum is that of the
+//! factor less a product of a few of its columns. A node costs three solves once, and each solve
+//! then costs three products with vectors. The stiffness is the same in all directions, so the
+//! columns are kept in the tissue's rest frame and stay valid however it turns.
 
 use super::factor::Factor;
 use fearless_simd::Simd;
@@ -132,8 +132,8 @@ impl LowRankUpdate {
                 let rest = self.matrix[i * n + j] - known;
                 self.matrix[i * n + j] = if i == j { rest } else { rest / self.matrix[j * n + j] };
             }
-            // What is taken out makes the matrix negative there, and what is added makes it
-            // positive: it is quasi-definite.
+            // Removed contacts make the matrix negative there, added ones positive: it is
+            // quasi-definite.
             let d = self.matrix[j * n + j] * f64::from(self.nodes[j / 3].1);
             if d.is_nan() || d <= 0.0 {
                 return false;

@@ -11,9 +11,9 @@
 //! Bodies that may touch each other are minimised together: one history and one line search over
 //! all of them, while each keeps its own matrix.
 //!
-//! From the frame down: this file (a frame of an island), `substep` (one minimisation), `two_loop`
-//! and `line_search` (one step of it), `body_system` and `apply_step` (one body), `system` (its
-//! matrix), `elements` and `stress` (its elements).
+//! From the substep down: this file (a substep of an island), `minimise` (its minimisation),
+//! `two_loop` and `line_search` (one step of it), `body_system` and `apply_step` (one body),
+//! `system` (its matrix), `elements` and `stress` (its elements).
 
 mod apply_step;
 mod body_system;
@@ -27,18 +27,18 @@ mod iterate;
 mod layout;
 mod line_search;
 mod low_rank_update;
+mod minimise;
 mod resting;
 mod rigid_modes;
 mod sleep;
 mod sleeping;
 mod stress;
-mod substep;
 mod system;
 mod tiles;
 mod two_loop;
 mod warp;
 
-use crate::body_slot::{BodySlot, IslandFrame, Solver, for_each};
+use crate::body_slot::{BodySlot, Solver, for_each};
 use crate::contact::ContactSet;
 use crate::descent::{BodyDescent, Sweeps, sweep_substep};
 pub(crate) use body_system::QuasiNewtonSolver;
@@ -46,24 +46,43 @@ use history::History;
 use island_system::IslandSystem;
 
 impl Solver for QuasiNewtonSolver {
-    type Shared = History;
+    type History = History;
     const COUPLES: bool = true;
 
-    fn new_shared(&self) -> History {
-        self.new_history()
+    fn new_history(&self) -> History {
+        History::new(self.settings.memory)
     }
 
-    fn advance(island: IslandFrame<'_, Self>) {
-        let IslandFrame { slots, pairs, shared: history, frame } = island;
-        let substeps = slots[0].solver.settings.substeps;
-        let h = (frame.dt / substeps as f64) as f32;
-        let mut island = IslandSystem { slots, pairs, history, frame, h };
-        island.begin_frame();
-        for substep in 1..=substeps {
-            let share = |k: usize| k as f64 / substeps as f64;
-            island.advance(share(substep - 1), share(substep));
+    fn substeps(&self) -> usize {
+        self.settings.substeps
+    }
+
+    fn begin_frame(island: &mut IslandSystem<'_>) {
+        let frame = island.frame;
+        for_each(island.slots, frame, |BodySlot { index, body, solver, state, .. }| {
+            solver.begin_frame(&frame.of(*index), body, state);
+        });
+        island.reset();
+    }
+
+    fn substep(island: &mut IslandSystem<'_>, from: f64, to: f64) {
+        island.find_contacts(from, to);
+        island.save_limited();
+        let solved =
+            island.check_systems() && island.minimise(to) || island.add_contacts_to_systems() && island.minimise(to);
+        if !solved {
+            island.restore_limited();
+            island.sweep(to);
         }
-        island.end_frame();
+        island.end_substep(to);
+    }
+
+    fn end_frame(island: &mut IslandSystem<'_>) {
+        for BodySlot { solver, state, .. } in island.slots.iter_mut() {
+            solver.touching.contacts.end_frame(state);
+            solver.iterate.store(&solver.layout, state);
+        }
+        island.pairs.end_frame(island.slots);
     }
 
     fn contacts(&self) -> Option<&ContactSet> {
@@ -78,14 +97,6 @@ impl Sweeps for QuasiNewtonSolver {
 }
 
 impl IslandSystem<'_> {
-    fn begin_frame(&mut self) {
-        let frame = self.frame;
-        for_each(self.slots, frame, |BodySlot { index, body, solver, state, .. }| {
-            solver.begin_frame(&frame.of(*index), body, state);
-        });
-        self.reset();
-    }
-
     /// Forgets the history, and evaluates the elements as they are.
     fn reset(&mut self) {
         self.history.clear();
@@ -94,17 +105,6 @@ impl IslandSystem<'_> {
             solver.sleep.active = true;
             solver.evaluate_in_place(h);
         });
-    }
-
-    /// One substep, between two shares of the frame.
-    fn advance(&mut self, from: f64, to: f64) {
-        self.find_contacts(from, to);
-        self.save_limited();
-        if !self.minimise(to) {
-            self.restore_limited();
-            self.sweep(to);
-        }
-        self.end_substep(to);
     }
 
     fn find_contacts(&mut self, from: f64, to: f64) {
@@ -116,30 +116,29 @@ impl IslandSystem<'_> {
         });
     }
 
-    /// Minimises the substep; if that fails, with the contacts of the substep in the matrices.
-    /// False if that fails too.
-    fn minimise(&mut self, to: f64) -> bool {
-        // Contacts that are not in the matrices may be too stiff for them.
+    /// Whether the matrices of all bodies can be used. Contacts that are not in them may be too
+    /// stiff for them.
+    fn check_systems(&mut self) -> bool {
         let usable = self.slots.iter().all(|slot| slot.solver.system.usable);
         if !usable {
             self.all().for_each(|body| body.clear_targets());
         }
-        usable && self.substep(to)
-            || self.add_contacts_to_systems() && {
-                self.reset();
-                self.restore_limited();
-                self.substep(to)
-            }
+        usable
     }
 
-    /// Adds the tools and supports that press where the substep began, or would have ended by
-    /// itself, to the matrices. False if they have them all.
+    /// Adds the tools and supports that press where the substep began, or would have ended without
+    /// contact, to the matrices, for another minimisation. False if they have them all.
     fn add_contacts_to_systems(&mut self) -> bool {
         let mut new = false;
         for BodySlot { index, body, solver, state, .. } in self.slots.iter_mut() {
             new |= solver.add_contacts_to_system(&self.frame.of(*index), body, state);
         }
-        new && self.slots.iter().all(|slot| slot.solver.system.usable)
+        let usable = new && self.slots.iter().all(|slot| slot.solver.system.usable);
+        if usable {
+            self.reset();
+            self.restore_limited();
+        }
+        usable
     }
 
     /// Sweeps the substep: the fallback.
@@ -165,14 +164,6 @@ impl IslandSystem<'_> {
             }
         });
         self.pairs.end_substep(self.slots);
-    }
-
-    fn end_frame(&mut self) {
-        for BodySlot { solver, state, .. } in self.slots.iter_mut() {
-            solver.touching.contacts.end_frame(state);
-            solver.iterate.store(&solver.layout, state);
-        }
-        self.pairs.end_frame(self.slots);
     }
 
     /// Remembers the reports' counts of held nodes that stay behind.

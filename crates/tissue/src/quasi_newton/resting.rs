@@ -1,4 +1,4 @@
-//! A body that stays where it is: what was found there need not be found again.
+//! A body that stays where it is: results there are reused.
 
 use super::body_system::QuasiNewtonSolver;
 use super::iterate::{Iterate, max_coordinate};
@@ -10,24 +10,25 @@ impl QuasiNewtonSolver {
     /// has not moved since it was last evaluated in place is not evaluated again.
     pub fn evaluate_in_place(&mut self, h: f32) {
         let Iterate { x, start, .. } = &self.iterate;
-        if self.rest.evaluated && *x == self.rest.x && *start == self.rest.start {
+        if self.elements.in_place && *x == self.rest.x && *start == self.rest.start {
             return;
         }
-        self.evaluate(h);
-        self.elements.accept();
-        let Self { rest, iterate, .. } = self;
+        let Self { level, elements, layout, iterate, rest, .. } = self;
+        elements.evaluate(*level, layout, iterate, h);
+        elements.accept();
         rest.x.copy_from_slice(&iterate.x);
         rest.start.copy_from_slice(&iterate.start);
-        (rest.evaluated, rest.warped) = (true, false);
+        (elements.in_place, rest.warped) = (true, false);
     }
 
-    /// Whether no node goes farther than `way` (m) by itself in a substep of `h` (s), and no tool
-    /// carries any.
+    /// Whether no node moves farther than `way` (m) freely in a substep of `h` (s), and no tool
+    /// carries one.
     pub fn is_quiet(&self, h: f32, way: f32) -> bool {
         !self.progress.carried && h * dispatch!(self.level, _simd => max_coordinate(&self.iterate.v)) <= way
     }
 
-    /// How far the gradient would move any node (m), without the history. The direction is lost.
+    /// The largest motion of a node by the gradient (m), without the history. It overwrites the
+    /// direction.
     pub fn correction(&mut self) -> f32 {
         self.iterate.direction.copy_from_slice(&self.iterate.gradient);
         self.precondition();
@@ -50,7 +51,7 @@ impl QuasiNewtonSolver {
         correction
     }
 
-    /// Leaves the body where the substep began.
+    /// Lets the body stay where the substep began.
     pub fn leave_at_rest(&mut self, h: f32) {
         self.restore();
         let Iterate { predictor, v, .. } = &mut self.iterate;
@@ -67,14 +68,14 @@ impl QuasiNewtonSolver {
         targets[..free].copy_from_slice(&x[..free]);
     }
 
-    /// Measures the direction, and how far the body went; nowhere before the `first` step.
+    /// Measures the direction and the body's motion, which is zero before the `first` step.
     pub fn measure_direction(&mut self, first: bool) {
         self.progress.longest = dispatch!(self.level, _simd => max_coordinate(&self.iterate.direction));
         self.progress.gone = if first { 0.0 } else { self.gone() };
     }
 
-    /// Largest distance of a coordinate from where the node would have gone by itself (m): the
-    /// deformation that the substep brought, without any rigid motion.
+    /// Largest distance of a coordinate from its free motion (m): the deformation in the substep,
+    /// without rigid motion.
     fn gone(&self) -> f32 {
         let Self { level, layout, held, iterate: Iterate { x, targets, .. }, .. } = self;
         dispatch!(*level, _simd => {

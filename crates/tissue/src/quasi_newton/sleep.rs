@@ -1,4 +1,4 @@
-//! Whether a body takes part in the search of its island, and what is known of it at rest.
+//! Whether a body takes part in the search of its island, and the results at rest that are reused.
 
 use super::layout::Layout;
 use crate::lanes::Row;
@@ -6,29 +6,27 @@ use crate::lanes::Row;
 /// Whether a body takes part in the search. A body at rest among others sleeps until they push it.
 #[derive(Default)]
 pub(super) struct Sleep {
-    /// It takes part.
+    /// Whether it takes part.
     pub active: bool,
-    /// It took no part when that was last decided.
+    /// Whether it took no part at the last decision.
     pub was_resting: bool,
-    /// It moved in this substep, has arrived, and sleeps until others push it.
+    /// Whether it moved in this substep, has arrived, and sleeps until others push it.
     pub asleep: bool,
-    /// Others push it differently than when it fell asleep.
+    /// Whether others push it differently than when it fell asleep.
     pub disturbed: bool,
 }
 
-/// What was found of a body where it is, and need not be found again while it stays there.
+/// Results for a body at a place, which are reused while it stays there.
 pub(super) struct RestCache {
     /// Positions, and beginning of the substep, of the last evaluation in place.
     pub x: Vec<Row>,
     pub start: Vec<Row>,
-    /// Whether nothing else was evaluated since.
-    pub evaluated: bool,
-    /// Whether the warp is that of there.
+    /// Whether the warp belongs to that place.
     pub warped: bool,
     /// Positions and gradient for which the correction was last computed.
     pub correction_x: Vec<Row>,
     pub correction_gradient: Vec<Row>,
-    /// How far that gradient would move any node (m), if the factor is still the same.
+    /// The largest motion of a node by that gradient (m), if the factor is still the same.
     pub correction: Option<f32>,
 }
 
@@ -40,7 +38,6 @@ impl RestCache {
         Self {
             x: all(),
             start: all(),
-            evaluated: false,
             warped: false,
             correction_x: rows(),
             correction_gradient: rows(),

@@ -1,8 +1,8 @@
 //! Which bodies of an island take part in the search.
 //!
-//! Most of what lies beside a body that is moved does not move, and most of what moves has arrived
-//! after a few iterations. Such bodies sleep, and are examined again when the others have arrived:
-//! a body whose correction has become too large by the pushes of others wakes.
+//! Most neighbours of a moved body do not move, and most moving bodies have arrived after a few
+//! iterations. Such bodies sleep, and are examined again when the others have arrived: a body whose
+//! correction has become too large by the pushes of others wakes.
 
 use super::island_system::IslandSystem;
 use crate::body_slot::{BodySlot, for_each};
@@ -23,8 +23,8 @@ impl IslandSystem<'_> {
     }
 
     /// Whether no step is longer than `tolerance` (m) or a share `relative` of how far its body
-    /// went. A body that hardly moves beside one that does may be as inexact as a tenth of that
-    /// allows.
+    /// went. A body that hardly moves beside a moving one may have a tenth of the moving one's
+    /// error.
     pub fn is_solved(&mut self, tolerance: f32, relative: f32) -> bool {
         let farthest = self.farthest();
         self.active().all(|body| {

@@ -63,7 +63,7 @@ impl IslandSystem<'_> {
         }
     }
 
-    /// First loop: takes out of the direction what the pairs explain, newest first.
+    /// First loop: removes from the direction the part that the pairs explain, newest first.
     fn first_loop(&mut self) {
         for age in 0..self.history.count {
             let at = self.history.at(age);
@@ -81,7 +81,7 @@ impl IslandSystem<'_> {
         }
     }
 
-    /// Second loop: puts it back, oldest first.
+    /// Second loop: adds the pairs' part again, oldest first.
     fn second_loop(&mut self) {
         for age in (0..self.history.count).rev() {
             let at = self.history.at(age);

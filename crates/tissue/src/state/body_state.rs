@@ -12,17 +12,17 @@ pub(crate) struct BodyState {
     pub x: Vec<Vec3A>,
     /// Velocities (m/s).
     pub v: Vec<Vec3A>,
-    /// Where friction holds what touches supports and tools, by vertex.
+    /// Anchors of friction on supports and tools, by vertex.
     pub anchors: Vec<Anchor>,
-    /// How far friction against other bodies is stretched, by vertex and body.
+    /// Stretch of friction's springs to other bodies, by vertex and body.
     pub stretches: Vec<Stretch>,
-    /// What the next frame puts right before it begins.
+    /// The repair before the next frame.
     pub repair: Repair,
-    /// What the solvers remember.
+    /// The solvers' warm start.
     pub warm: WarmStart,
 }
 
-/// What the solvers remember from frame to frame.
+/// The solvers' warm start: data that they keep from frame to frame.
 ///
 /// It is not physics: with another warm start the same minimum is found, to the solver's tolerance.
 /// It is part of the state because the bits of the next frame depend on it, and a restored state

@@ -1,4 +1,4 @@
-//! What changes while stepping: plain data.
+//! The part of a simulation that changes: plain data.
 
 mod body_state;
 mod motion;
@@ -49,7 +49,7 @@ impl State {
     }
 
     /// Sets the motion of a body, rounded to single precision. Friction with tools and other bodies
-    /// stays as it is.
+    /// does not change.
     pub fn set_motion(&mut self, model: &Model, body: usize, motion: &BodyMotion) {
         motion.store(&model.bodies[body], &mut self.bodies[body]);
     }
@@ -77,9 +77,9 @@ impl State {
         (0..model.bodies[body].len()).map(|node| self.position(model, body, node)).collect()
     }
 
-    /// Copies positions and velocities of all nodes from another state, and where friction holds
-    /// them on supports. Other friction and the grasps stay. Returns false, and changes nothing, if
-    /// the other state has other bodies.
+    /// Copies positions, velocities and the anchors of friction on supports from another state.
+    /// Other friction and the grasps stay. Returns false, and changes nothing, if the other state
+    /// has other bodies.
     pub fn copy_motion(&mut self, other: &Self) -> bool {
         let sizes = |state: &Self| state.bodies.iter().map(|body| body.x.len()).collect::<Vec<_>>();
         if sizes(self) != sizes(other) {

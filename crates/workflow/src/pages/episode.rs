@@ -65,8 +65,8 @@ fn cards(recording: &Recording, real_time_factor: f64) -> String {
             format!("{} grasp of the {organ} at s = {}", s.details.design, fixed(at, 2))
         });
         cards.push(Card::new("Held to the end", if s.held_to_end { "yes" } else { "no" }, at).met(s.held_to_end));
-        if let (Some(slip), Some(follow)) = (s.slip_mm, s.follow_ratio) {
-            cards.push(Card::new("Lift", mm(s.lift_mm), format!("follows {}% of the jaws", fixed(100.0 * follow, 0))));
+        if let (Some(lift), Some(slip), Some(follow)) = (s.lift_mm, s.slip_mm, s.follow_ratio) {
+            cards.push(Card::new("Lift", mm(lift), format!("follows {}% of the jaws", fixed(100.0 * follow, 0))));
             cards.push(Card::new("Slip", mm(slip), "of held tissue in the jaws"));
         }
     }

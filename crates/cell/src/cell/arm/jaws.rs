@@ -1,4 +1,4 @@
-//! What an arm's jaws and blades do to the tissue between them: take hold, let go, cut.
+//! Jaws and blades of an arm: they grasp, release and cut the tissue between them.
 
 use super::{ArmState, ArmUnit, Held};
 use crate::blades::{Tools, opening_force};
@@ -10,11 +10,10 @@ use crate::{GraspDesign, Gripper, JawForces, JawRegion, TissueInJaws, World};
 use glam::DVec3;
 use trocar_tissue::Piece;
 
-/// Jaws that press with this share of their force have closed on what is between them.
+/// Jaws that press with this share of their force have closed on tissue.
 const PRESSING: f64 = 0.95;
 
-/// Jaws are commanded to close, or to open, when the opening asked for is beyond the one they have
-/// by this much.
+/// Minimum difference between commanded and present opening that closes or opens the jaws.
 const LEAST_COMMANDED_MOTION: f64 = 0.02;
 
 impl ArmUnit {
@@ -23,7 +22,7 @@ impl ArmUnit {
         JawRegion::sized(&self.state.gripper, self.model.blades.length)
     }
 
-    /// Jaws that press take hold of what is between them; jaws that are commanded to open let go.
+    /// Jaws that press grasp the tissue between them; jaws that are commanded to open release it.
     pub fn grasp(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let (wanted, opening) = (self.state.wanted.jaw(), self.opening());
         if let Some(held) = &self.state.held {
@@ -73,7 +72,7 @@ impl ArmUnit {
     pub fn let_go(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let tool = self.model.tools.gripper;
         world.state.grasps.retain(|g| g.tool != tool);
-        // Blades without contact are in tissue that would be dragged along.
+        // Blades whose contact was disabled are inside tissue, which they would drag along.
         self.state.contact_disabled |= std::mem::take(&mut self.state.blades_disabled);
         if self.state.held.take().is_some() {
             self.state.design = self.model.design;
@@ -81,12 +80,12 @@ impl ArmUnit {
         }
     }
 
-    /// Blades that close through tissue cut it, after they were open with tissue between them all
-    /// the while: the organ, and the cutter as wide as it was open.
+    /// Blades that were open with tissue between them and close through it cut it. Returns the
+    /// organ, and the cutter as wide as it was open.
     ///
-    /// What closes past each other with edges shears: it goes through what lies between instead of
-    /// pressing it flat. So from the closing on tissue does not feel the blades, until none is left
-    /// where the open blades were and they are out of all organs. The shaft is felt all the while.
+    /// Edges that pass each other shear tissue instead of pressing it flat. So the contact of
+    /// closing blades is off until no tissue is left where the open blades were and the blades are
+    /// out of all organs. The shaft's contact stays.
     pub fn cut(&mut self, world: &World) -> Option<(usize, Gripper)> {
         let length = self.model.blades.length;
         let between = |open: &Gripper| JawRegion::sized(open, length).fullest(world).map(|(organ, _)| organ);
@@ -110,7 +109,7 @@ impl ArmUnit {
         None
     }
 
-    /// The organ that is held has been cut into `pieces`; `was` is the centroid of what is held
+    /// Follows a cut of the held organ into `pieces`; `was` is the centroid of the held nodes
     /// before (m).
     pub fn follow_cut(&mut self, world: &World, pieces: &[Piece], was: DVec3) {
         let ArmState { held, gripper, .. } = &mut self.state;
@@ -120,19 +119,19 @@ impl ArmUnit {
         }
     }
 
-    /// The tissue between the blades now, and its organ; of blades that shear, between them as wide
+    /// The tissue between the blades now, and its organ; for shearing blades, between them as wide
     /// as they were.
     pub fn tissue(&self, world: &World) -> Option<(usize, TissueInJaws)> {
         let jaw_angle = self.state.shears.unwrap_or(self.state.gripper.jaw_angle);
         JawRegion::sized(&Gripper { jaw_angle, ..self.state.gripper }, self.model.blades.length).fullest(world)
     }
 
-    /// Centroid of what is held (m); zero of nothing.
+    /// Centroid of the held tissue (m); zero if nothing is held.
     pub fn held_now(&self, world: &World) -> DVec3 {
         self.state.held.as_ref().map_or(DVec3::ZERO, |h| h.hold.now(world))
     }
 
-    /// Whether the next frame is the first of what the jaws hold.
+    /// Whether the next frame is the first of the grasp.
     pub fn is_newly_attached(&self, world: &World) -> bool {
         self.state.held.as_ref().is_some_and(|h| h.hold.is_new(world))
     }
@@ -142,7 +141,7 @@ impl ArmUnit {
         self.state.held.as_ref().map(|h| (h.organ, h.hold.tissue().1.len()))
     }
 
-    /// How far jaws and what they hold have gone since they closed.
+    /// The motion of jaws and held tissue since they closed.
     pub fn moved(&self, world: &World) -> Option<Moved> {
         self.state.held.as_ref().map(|h| h.hold.moved(world, &self.state.gripper.pose))
     }

@@ -1,4 +1,4 @@
-//! One arm of the cell: what drives it, its instrument's end in the tissue, and what it holds.
+//! One arm of the cell: its drive, its instrument in the tissue, and its grasp.
 
 mod jaws;
 mod state;
@@ -14,7 +14,7 @@ use trocar_robot::wrench::ForceKind;
 use trocar_scene::{InstrumentKind, Side};
 use trocar_tissue::Collider;
 
-/// What never changes of an arm.
+/// The constant part of an arm.
 #[derive(Clone, Debug)]
 pub(super) struct ArmModel {
     pub side: Side,
@@ -24,9 +24,10 @@ pub(super) struct ArmModel {
     pub blades: Blades,
     /// The convex parts that tissue touches.
     pub parts: Vec<Collider>,
-    /// Force against which no command pushes the instrument on (N).
+    /// Limit of the force guard (N).
     pub force_limit: f64,
-    /// RCM deviations that are reported (m): the scene's threshold, and where hardware stops.
+    /// RCM deviations that are reported (m): the scene's threshold, and the limit at which hardware
+    /// stops.
     pub rcm_limits: [f64; 2],
     /// Pull at which tissue tears out of a compliant grasp (N).
     pub tear_force: f64,
@@ -50,7 +51,7 @@ impl ArmUnit {
         self.state.gripper.jaw_angle / self.model.blades.max_angle
     }
 
-    /// Contact, or the constraint of a latched grasp.
+    /// The kind of the tissue's force: contact, or the constraint of a latched grasp.
     pub fn force_kind(&self) -> ForceKind {
         match &self.state.held {
             Some(_) if self.state.design != GraspDesign::Friction => ForceKind::Constraint,

@@ -1,4 +1,4 @@
-//! What changes of an arm besides its drive's state, as it begins and as numbers.
+//! The state of an arm without its drive's, at the start and as numbers.
 
 use super::ArmModel;
 use crate::cell::exchange::Exchange;
@@ -11,10 +11,10 @@ use trocar_core::Pose;
 use trocar_core::Wrench;
 use trocar_tissue::ToolForce;
 
-/// What an arm is asked for.
+/// The request to an arm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::cell) enum Wanted {
-    /// Absolute targets, and what is left of the orientation that was asked for.
+pub(crate) enum Wanted {
+    /// Absolute targets, and the rejected part of the requested orientation.
     Setpoint(Setpoint, DVec3),
     /// Joints, which the drive knows, and the jaw's opening.
     Joints(f64),
@@ -22,25 +22,25 @@ pub(in crate::cell) enum Wanted {
 
 /// Tissue that the jaws hold.
 #[derive(Clone, Debug)]
-pub(in crate::cell) struct Held {
+pub(crate) struct Held {
     pub organ: usize,
-    /// Organ coordinate of what is held.
+    /// Organ coordinate of the held tissue.
     pub s: f64,
     pub hold: Hold,
     /// The opening at which the jaws closed on it.
     pub opening: f64,
 }
 
-/// What changes of an arm besides its drive's state: plain data.
+/// The state of an arm without its drive's: plain data.
 #[derive(Clone, Debug)]
-pub(in crate::cell) struct ArmState {
+pub(crate) struct ArmState {
     pub wanted: Wanted,
-    /// What was commanded last.
+    /// The last command.
     pub commanded: Setpoint,
-    /// The last command stops short of what was asked.
+    /// Whether the last command stops short of the request.
     pub held_back: bool,
     pub guard: ForceGuard,
-    /// The guard has shortened the last command.
+    /// Whether the guard shortened the last command.
     pub guarded: bool,
     /// The gripper at the end of the last tissue frame.
     pub gripper: Gripper,
@@ -51,13 +51,13 @@ pub(in crate::cell) struct ArmState {
     pub exchange: Exchange,
     pub forces: [ToolForce; 3],
     pub scissors: Scissors,
-    /// A cutter's blades are closing, or have closed, through tissue: how wide they were (rad).
-    /// They shear it then and press none of it.
+    /// Angle of a cutter's blades (rad) before they began to close through tissue. Such blades
+    /// shear tissue and do not press it.
     pub shears: Option<f64>,
     pub held: Option<Held>,
-    /// Contact of the whole instrument with tissue is disabled.
+    /// Whether contact of the whole instrument is disabled.
     pub contact_disabled: bool,
-    /// Contact of the blades is disabled until they let go of what they hold.
+    /// Whether contact of the blades is disabled, until they release their grasp.
     pub blades_disabled: bool,
     /// Largest RCM deviation of the period so far (m).
     pub rcm_peak: f64,
@@ -66,7 +66,7 @@ pub(in crate::cell) struct ArmState {
 }
 
 impl Wanted {
-    /// The opening that is asked for.
+    /// The requested opening.
     pub fn jaw(&self) -> f64 {
         match self {
             Self::Setpoint(to, _) => to.jaw(),
@@ -74,7 +74,7 @@ impl Wanted {
         }
     }
 
-    /// Asks for another opening.
+    /// Requests another opening.
     pub fn set_jaw(&mut self, opening: f64) {
         match self {
             Self::Setpoint(to, _) => *to = to.with_jaw(opening),
@@ -82,7 +82,7 @@ impl Wanted {
         }
     }
 
-    /// What is left of the orientation that was asked for.
+    /// The rejected part of the requested orientation.
     pub fn rejected_rotation(&self) -> DVec3 {
         match self {
             Self::Setpoint(_, rejected) => *rejected,
@@ -92,7 +92,7 @@ impl Wanted {
 }
 
 impl ArmState {
-    /// At rest at `start`, the tip frame at `pose`, holding nothing.
+    /// At rest at `start` with the tip frame at `pose`, without a grasp.
     pub fn new(
         pose: Pose,
         model: &ArmModel,
@@ -123,8 +123,8 @@ impl ArmState {
         }
     }
 
-    /// Every number of the state, for its hash. Each field is named here, so that one that is added
-    /// and forgotten does not compile.
+    /// Every number of the state, for its hash. It destructures every field, so that a forgotten
+    /// one does not compile.
     pub fn numbers(&self) -> Vec<f64> {
         let Self {
             wanted,

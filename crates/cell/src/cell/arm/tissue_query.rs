@@ -1,4 +1,4 @@
-//! Where an arm's instrument is in the tissue: what it is near, what it has gone into.
+//! Queries about an arm's instrument and the tissue near it.
 
 use super::ArmUnit;
 use crate::World;
@@ -9,7 +9,7 @@ use trocar_core::Pose;
 use trocar_tissue::Shape;
 
 impl ArmUnit {
-    /// Whether it may have to do with the tissue's stretch.
+    /// Whether the instrument may be the cause of the tissue's strain.
     pub fn meets_tissue(&self) -> bool {
         self.state.contact_disabled || self.state.held.is_some() || self.state.forces.iter().any(|f| f.touching > 0)
     }
@@ -26,7 +26,7 @@ impl ArmUnit {
         self.state.held.as_ref().is_some_and(|held| held.organ == organ)
     }
 
-    /// Its convex parts where they are now, as far as they are round. The rest offset is the
+    /// Its capsules at their present places. The radius includes the rest offset, which is the
     /// blades' thickness.
     pub fn rods(&self) -> Vec<Rod> {
         let rods = self.frames().into_iter().flat_map(|(tool, frame)| {
@@ -42,20 +42,20 @@ impl ArmUnit {
         rods.collect()
     }
 
-    /// The instrument's tools and where they are.
+    /// The instrument's tools and their poses.
     fn frames(&self) -> [(usize, Pose); 3] {
         let [one, two] = self.model.tools.sides().map(|(tool, side)| (tool, self.state.gripper.blade(side)));
         [(self.model.tools.gripper, self.state.gripper.pose), one, two]
     }
 
-    /// The organ that a part of the instrument that tissue feels has gone into, except what the
-    /// jaws hold and what blades shear.
+    /// The organ that a part of the instrument with contact has pierced, except what the jaws hold
+    /// and the blades shear.
     pub fn pierces(&self, world: &World) -> Option<usize> {
         let felt = if self.state.shears.is_some() || self.state.blades_disabled { 1 } else { 3 };
         self.inside_organ(world, felt)
     }
 
-    /// The organ that one of the first `count` tools has gone into: the shaft, then the blades.
+    /// The organ that one of the first `count` tools is inside of: the shaft, then the blades.
     pub fn inside_organ(&self, world: &World, count: usize) -> Option<usize> {
         let Self { model, state, .. } = self;
         let spared = state.held.as_ref().map(|held| held.organ);

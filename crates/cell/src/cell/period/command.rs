@@ -1,16 +1,39 @@
-//! Stage 1: each arm gets a setpoint for the period, within its speed limits, above the floor, and
-//! no further against a force than the force guard lets it.
+//! Stage 1: the action is checked whole, and each arm gets a setpoint for the period: within its
+//! speed limits, above the floor, and no further against a force than the force guard allows.
 
-use crate::Result;
 use crate::cell::Cell;
+use crate::cell::action::Action;
 use crate::cell::arm::{ArmUnit, Wanted};
 use crate::cell::report::PeriodLog;
+use crate::cell::setpoint::NUMBERS;
+use crate::{Error, Result};
 
 impl Cell {
-    pub(super) fn command(&mut self, log: &mut PeriodLog) -> Result<()> {
+    pub(super) fn command(&mut self, action: Option<&Action>, log: &mut PeriodLog) -> Result<()> {
+        if let Some(action) = action {
+            self.request(action)?;
+        }
         for arm in &mut self.arms {
             arm.command()?;
             log.rules.guarded += usize::from(arm.state.guarded);
+        }
+        Ok(())
+    }
+
+    /// Takes over the requests of an action; an action with an error changes nothing.
+    fn request(&mut self, action: &Action) -> Result<()> {
+        let needed = NUMBERS * self.arms.len();
+        if action.numbers.len() != needed {
+            return Err(Error::Action {
+                index: action.numbers.len().min(needed),
+                name: "length".to_owned(),
+                reason: format!("is {}; {needed} numbers, {NUMBERS} an arm", action.numbers.len()),
+            });
+        }
+        let wanted = self.arms.iter().enumerate().map(|(k, arm)| action.wanted(&arm.model, &arm.state, NUMBERS * k));
+        let wanted: Vec<Wanted> = wanted.collect::<Result<_>>()?;
+        for (arm, wanted) in self.arms.iter_mut().zip(wanted) {
+            arm.state.wanted = wanted;
         }
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Stage 4: the arms get the forces of the frame, jaws take hold and let go, and blades cut.
+//! Stage 4: the arms get the forces of the frame, jaws grasp and release, and blades cut.
 
 use crate::cell::Cell;
 use crate::cell::arm::ArmUnit;
@@ -19,7 +19,7 @@ impl Cell {
         Ok(())
     }
 
-    /// The cutter of arm `k`, as wide as it is in `open`, has closed through `organ`.
+    /// Cuts: the cutter of arm `k`, as wide as it is in `open`, has closed through `organ`.
     fn cut(&mut self, k: usize, organ: usize, open: &Gripper, events: &mut Vec<CellEvent>) -> Result<()> {
         let name = self.world.model.bodies()[organ].name().to_owned();
         let arm = self.arms[k].model.side;
@@ -44,8 +44,8 @@ impl Cell {
 }
 
 impl ArmUnit {
-    /// Takes the forces of the frame, and lets the jaws take hold and let go. What a cutter closed
-    /// through: the organ, and the cutter as wide as it was open.
+    /// Takes the forces of the frame, and lets the jaws grasp and release. Returns the organ
+    /// through which a cutter has closed, and the cutter as wide as it was open.
     fn take_forces(&mut self, world: &mut World, events: &mut Vec<CellEvent>) -> Option<(usize, Gripper)> {
         let Self { model, state, .. } = self;
         state.forces = model.tools.forces(world.forces());

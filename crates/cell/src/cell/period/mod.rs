@@ -1,33 +1,39 @@
 //! The stages of a control period, one module each.
 //!
-//! Tissue is stepped 60 times a second, arms 480 times. In a tissue frame the arms go first, under
-//! the load that tissue had on them at the end of the last frame, extrapolated with the tip. Then
-//! tissue is stepped with tools that go from where the tips were at the beginning of the frame to
-//! where they are now.
+//! Tissue is stepped 60 times a second, arms 480 times. In a tissue frame the arms move first,
+//! under the tissue's load at the end of the last frame, extrapolated with the tip. Then tissue is
+//! stepped with tools that move from the tips' places at the beginning of the frame to their places
+//! now.
 
 mod command;
 mod exchange_forces;
 mod move_arms;
 mod observe;
-mod step_tissue;
+mod tissue_frame;
 
 use super::Cell;
+use super::action::Action;
 use super::report::{CellReport, PeriodLog};
-use crate::Result;
+use crate::{Result, World};
 use std::time::Instant;
 
 impl Cell {
-    /// Does one control period towards what the arms were last asked for.
+    /// Steps the cell by one control period. Without an action (`None`) the arms continue towards
+    /// their last request.
     ///
     /// # Errors
-    /// An arm whose numbers are not finite any more.
-    pub fn advance(&mut self) -> Result<CellReport> {
+    /// An action with an error is refused with the number's index and name; nothing has changed
+    /// then. If the numbers of an arm are no longer finite, a state has to be restored.
+    pub fn step<'a>(&mut self, action: impl Into<Option<&'a Action>>) -> Result<CellReport> {
         let clock = Instant::now();
         let mut log = PeriodLog::default();
-        self.command(&mut log)?;
+        self.command(action.into(), &mut log)?;
         for _ in 0..self.frames {
             self.move_arms()?;
-            let tissue = self.step_tissue(&mut log);
+            let start = self.begin_tissue_frame();
+            let World { model, state, stepper, .. } = &mut self.world;
+            let tissue = stepper.step_with_loads(model, state, &self.motions, &[]);
+            self.end_tissue_frame(start, &tissue, &mut log);
             self.exchange_forces(&mut log)?;
             self.enforce_tissue_limits(tissue.min_volume_ratio, &mut log);
         }

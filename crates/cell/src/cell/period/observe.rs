@@ -1,4 +1,4 @@
-//! Stage 6: what is measured at the end of the period.
+//! Stage 6: measurements at the end of the period.
 
 use crate::blades::{Tools, opening_force};
 use crate::cell::Cell;
@@ -10,7 +10,7 @@ use trocar_robot::wrench::ForceKind;
 use trocar_tissue::ToolForce;
 
 impl Cell {
-    /// What was measured of the arms at the end of the last period, the left one first.
+    /// The observations of the arms at the end of the last period, the left one first.
     pub fn observe(&self) -> Vec<ArmObservation> {
         self.arms.iter().map(ArmUnit::observe).collect()
     }
@@ -57,7 +57,7 @@ impl ArmUnit {
         }
     }
 
-    /// What tissue does to the instrument, of one kind, about the tip and in the cell's axes.
+    /// The wrench of tissue on the instrument, of one kind, about the tip and in the cell's axes.
     pub fn tissue_wrench(&self, kind: ForceKind) -> Wrench {
         let part = |f: &ToolForce| match kind {
             ForceKind::Constraint => f.constraint,

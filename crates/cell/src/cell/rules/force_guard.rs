@@ -1,49 +1,48 @@
 //! Rule: no command pushes an instrument harder into tissue than the scene's force limit.
 //!
 //! Controllers of real arms stop where the contact force is beyond a threshold; an FR3's is 20 N
-//! for a tip in the open ("collision behaviour" in Franka's control interface). Within a patient a
-//! stop is not enough, because what is pressed stays pressed. So the part of a command's way that
-//! goes against the force gets shorter as the force nears the limit, and beyond the limit the
-//! instrument draws back. What a step may cost is known from the stiffness seen so far, as in
-//! [`crate::Jaw`]: a fixed gain would swing on stiff tissue or creep on soft. The rest of the way
-//! is the command's.
+//! for a tip in the open ("collision behaviour" in Franka's control interface). In tissue a stop is
+//! not enough, because the pressure remains. So the part of a commanded motion against the force
+//! becomes shorter as the force nears the limit; beyond the limit the instrument retracts. The
+//! stiffness seen so far tells how far a step may go, as in [`crate::Jaw`]: a fixed gain would
+//! oscillate on stiff tissue or be slow on soft tissue. The rest of the motion is as commanded.
 
 use glam::DVec3;
 
-/// Share of the force's way to the limit that one step goes.
+/// Share of the remaining force that one step uses.
 const GAIN: f64 = 0.3;
 
-/// The limit matters from this share of it on.
+/// The guard acts from this share of the limit on.
 const FROM_SHARE: f64 = 0.5;
 
-/// Within this share of the limit it stands still.
+/// Within this share of the limit the instrument stands still.
 const DEADBAND: f64 = 0.02;
 
-/// Softest and stiffest that tissue is taken to be (N/m).
+/// Minimum and maximum assumed stiffness of tissue (N/m).
 const STIFFNESS: [f64; 2] = [2e3, 5e4];
 
-/// What is left of the stiffness from one period to the next.
+/// Decay of the stiffness from one period to the next.
 const FORGETTING: f64 = 0.98;
 
-/// Least motion that gives a secant (m).
+/// Minimum motion for a secant (m).
 const LEAST_MOTION: f64 = 2e-5;
 
-/// Fastest that it draws back (m a period).
+/// Maximum retraction (m per period).
 const RETREAT: f64 = 1e-3;
 
 /// The force guard of one arm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(in crate::cell) struct ForceGuard {
-    /// Force gained a way gone against it (N/m).
+pub(crate) struct ForceGuard {
+    /// Stiffness seen so far (N/m).
     stiffness: f64,
-    /// Force (N) and tip (m) a period ago.
+    /// Force (N) and tip position (m) a period ago.
     last: [DVec3; 2],
-    /// The force is beyond the limit, and that was reported.
+    /// Whether the force is beyond the limit and that was reported.
     reported: bool,
 }
 
 impl ForceGuard {
-    /// A period begins with the tip at `at` (m) under `force` (N).
+    /// Begins a period with the tip at `at` (m) under `force` (N).
     pub fn begin_period(&mut self, force: DVec3, at: DVec3) {
         let [was, there] = self.last;
         let (change, way) = (force - was, at - there);
@@ -54,8 +53,8 @@ impl ForceGuard {
         self.last = [force, at];
     }
 
-    /// What is left of a way (m) that is commanded for the next period where `limit` (N) must not
-    /// be passed; the same where it need not be changed.
+    /// The allowed part of a motion (m) that is commanded for the next period, so that the force
+    /// stays below `limit` (N); the same motion if it is allowed whole.
     pub fn allow(&self, way: DVec3, limit: f64) -> DVec3 {
         let [force, _] = self.last;
         let size = force.length();
@@ -66,7 +65,7 @@ impl ForceGuard {
         let room = if (limit - size).abs() < DEADBAND * limit { 0.0 } else { limit - size };
         let most = GAIN * room / self.stiffness.clamp(STIFFNESS[0], STIFFNESS[1]);
         let against = -way.dot(out);
-        // Beyond the limit `most` is negative: at least so far back.
+        // Beyond the limit `most` is negative: the minimum retraction.
         let allowed = against.min(most.max(-RETREAT));
         if allowed == against { way } else { way + (against - allowed) * out }
     }
@@ -74,14 +73,14 @@ impl ForceGuard {
     /// Whether the force has just gone beyond `limit` (N).
     pub fn newly_exceeded(&mut self, limit: f64) -> Option<f64> {
         let size = self.last[0].length();
-        // Reported once, until it is well below.
+        // Reported once, until the force is well below the limit.
         let over = size > if self.reported { 0.8 * limit } else { limit };
         let new = over && !self.reported;
         self.reported = over;
         new.then_some(size)
     }
 
-    /// The numbers of its state.
+    /// Every number of its state.
     pub fn numbers(&self) -> impl Iterator<Item = f64> + use<> {
         let Self { stiffness, last, reported } = *self;
         let vectors = last.map(|v| v.to_array());
@@ -117,7 +116,7 @@ mod tests {
             assert!(last.iter().all(|f| (f - last[0]).abs() < 0.2), "{stiffness} N/m: {last:?}");
             assert!(peak < 12.0 && last[0] > 8.0, "{stiffness} N/m: a peak of {peak} N, then {} N", last[0]);
         }
-        // What comes fast onto stiff tissue is drawn back.
+        // A fast approach to stiff tissue is retracted.
         let forces = press(2e4, 1e-3, 10.0);
         assert!(forces[299] < 11.0, "{:?}", &forces[280..]);
     }

@@ -1,24 +1,23 @@
-//! Rule: the instrument at tissue that is strained beyond what tissue bears lets go of it.
+//! Rule: an instrument releases tissue that it has overstretched or crushed.
 //!
-//! Real tissue tears at a stretch of about two; the model has no such end. So where an edge of an
-//! organ is longer than [`MAX_STRETCH`] times its rest length, or an element has less than
+//! Real tissue tears at a stretch of about two; the model does not. So if an edge of an organ is
+//! longer than [`MAX_STRETCH`] times its rest length, or an element has less than
 //! [`MIN_VOLUME_SHARE`] of its rest volume, contact of the nearest instrument is disabled until the
-//! tissue has come back. Jaws that hold by a latch keep their hold at first and only press no more;
-//! they let go beyond [`MAX_LATCHED_STRETCH`]. No figure of merit counts on what follows.
+//! tissue has recovered. Latched jaws keep their grasp at first and only stop pressing; they
+//! release it beyond [`MAX_LATCHED_STRETCH`]. No reported figure depends on the motion after that.
 //!
 //! [`MAX_STRETCH`]: super::strain::MAX_STRETCH
 //! [`MIN_VOLUME_SHARE`]: super::strain::MIN_VOLUME_SHARE
 //! [`MAX_LATCHED_STRETCH`]: super::strain::MAX_LATCHED_STRETCH
 
-use super::Scope;
+use super::scope::Scope;
 use super::strain::{MAX_LATCHED_STRETCH, MAX_WAIT_FRAMES};
 
-/// An instrument farther than this from where tissue is strained most has nothing to do with it
-/// (m).
+/// Largest distance of an instrument from the most strained tissue at which it is the cause (m).
 const NEAR: f64 = 0.03;
 
-/// The arm whose instrument tissue feels at the strained place of `organ`. What only presses comes
-/// before what holds, then the nearest.
+/// The arm whose instrument touches the strained part of `organ`: one that only presses before one
+/// that holds, then the nearest.
 pub(super) fn instrument_at(scope: &Scope<'_>, organ: usize) -> Option<usize> {
     let at = scope.strains[organ].at;
     let felt = scope.arms.iter().enumerate().filter(|(_, s)| !s.state.contact_disabled && s.meets_tissue());
@@ -27,8 +26,8 @@ pub(super) fn instrument_at(scope: &Scope<'_>, organ: usize) -> Option<usize> {
     ranked.min_by(|(_, a), (_, b)| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1))).map(|(k, _)| k)
 }
 
-/// Disables contact of arm `k` if it strains `organ` too much. What an instrument left behind that
-/// has just let go is given time to come back.
+/// Disables contact of arm `k` if it strains `organ` too much. Tissue that was just released has
+/// time to recover.
 pub(super) fn apply(scope: &mut Scope<'_>, organ: usize, k: usize) {
     let strain = scope.strains[organ];
     let left_behind = scope.arms.iter().any(|s| {

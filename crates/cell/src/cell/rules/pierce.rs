@@ -1,12 +1,12 @@
-//! Rule: an instrument that has gone through the surface of an organ is not felt.
+//! Rule: contact of an instrument that has pierced an organ is disabled.
 //!
-//! Tissue touches with the vertices of its surface. A blade that presses hard enough opens a
-//! triangle so far that it goes through between the vertices, and from within it would drag them
-//! along without end. Real tissue is pierced by then. So as soon as the axis of a convex part lies
-//! inside an organ, deeper than the part is thick, contact of the instrument is disabled. What the
-//! jaws hold may bulge round them and does not count.
+//! Contact of tissue is at the vertices of its surface. A blade that presses hard can stretch a
+//! triangle so far that it passes between the vertices; from inside it would drag them along
+//! without limit. Real tissue would be pierced. So contact of an instrument is disabled when the
+//! axis of one of its convex parts is inside an organ, deeper than the part is thick. Held tissue
+//! may bulge round the jaws and does not count.
 
-use super::Scope;
+use super::scope::Scope;
 
 pub(super) fn apply(scope: &mut Scope<'_>) {
     for k in 0..scope.arms.len() {

@@ -1,7 +1,7 @@
-//! Rule: an instrument whose contact is disabled is felt again once it is out of all organs and no
-//! organ is strained any more.
+//! Rule: contact of an instrument is enabled again when it is out of all organs and no organ is
+//! strained.
 
-use super::Scope;
+use super::scope::Scope;
 
 pub(super) fn apply(scope: &mut Scope<'_>) {
     let calm = !scope.strains.iter().any(|s| s.lasts());

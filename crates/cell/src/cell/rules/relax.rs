@@ -1,15 +1,15 @@
-//! Rule: an organ that stays folded with no instrument at it is relaxed outside of time.
+//! Rule: an organ that stays folded without an instrument at it is relaxed instantly.
 //!
-//! Tissue that snaps back may stay folded: elements that would have to turn inside out to unfold
-//! lock each other, whatever the energy. An organ that is strained beyond what tissue bears with no
-//! instrument at it, or that stays strained for [`MAX_WAIT_FRAMES`], is relaxed by
-//! [`trocar_tissue::State::relax`] without regard to time and forces.
+//! Tissue that snaps back may stay folded: elements that would have to invert to unfold lock each
+//! other. An organ without an instrument at it that is overstretched or crushed, or that stays
+//! strained for [`MAX_WAIT_FRAMES`], is relaxed by [`trocar_tissue::State::relax`], without regard
+//! to time and forces.
 
-use super::Scope;
+use super::scope::Scope;
 use super::strain::MAX_WAIT_FRAMES;
 use crate::cell::report::CellEvent;
 
-/// Relaxes `organ` if it has to be; the event of it.
+/// Relaxes `organ` if necessary; returns the event.
 pub(super) fn apply(scope: &mut Scope<'_>, organ: usize) -> Option<CellEvent> {
     let (strain, wait) = (scope.strains[organ], &mut scope.waits[organ]);
     if strain.is_too_much() || strain.lasts() && *wait >= MAX_WAIT_FRAMES {

@@ -1,4 +1,4 @@
-//! How far organs are from their rest shape, and the limits that the rules go by.
+//! The strain of organs, and the limits of the rules.
 
 use crate::World;
 use glam::DVec3;
@@ -6,59 +6,59 @@ use glam::DVec3;
 /// Stretch of an edge at which contact of the nearest instrument is disabled.
 pub(super) const MAX_STRETCH: f64 = 5.0;
 
-/// Stretch at which a latch lets go and nothing is waited for: at ten the solver reports
-/// divergence.
+/// Stretch at which latched jaws release at once: at ten the solver reports divergence.
 pub(super) const MAX_LATCHED_STRETCH: f64 = 6.5;
 
-/// Stretch of all edges below which an instrument is felt again.
+/// Contact is enabled again when every edge is below this stretch.
 const RESTED_STRETCH: f64 = 3.0;
 
-/// Share of its rest volume below which an element is crushed: less than the strongest grasps of
-/// the lifts leave. Below a thousandth the solvers make no progress.
+/// An element below this share of its rest volume is crushed. The strongest grasps of lifts leave
+/// more; below a thousandth the solvers make no progress.
 pub(super) const MIN_VOLUME_SHARE: f64 = 0.01;
 
-/// Share of its rest volume that every element needs for an instrument to be felt again.
+/// Contact is enabled again when every element is above this share of its rest volume.
 const RESTED_VOLUME_SHARE: f64 = 0.05;
 
-/// Tissue that no instrument meets is examined where an element has less than this share of its
-/// rest volume.
+/// Tissue without an instrument at it is checked if an element is below this share of its rest
+/// volume.
 pub(super) const SQUEEZED: f64 = 0.2;
 
-/// Frames for which an organ may stay strained after the last instrument has let go of it: what is
-/// elastic has come back by then.
+/// Number of frames for which an organ may stay strained after the last instrument has left it:
+/// elastic tissue has recovered by then.
 pub(super) const MAX_WAIT_FRAMES: u32 = 15;
 
-/// How far an organ is from its rest shape at worst.
+/// The worst strain of an organ.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::cell) struct Strain {
+pub(crate) struct Strain {
     /// Length of the most stretched edge over that at rest; 1 where none is stretched.
     pub stretch: f64,
-    /// Least volume of an element over that at rest; 1 where that was not asked for.
+    /// Smallest volume of an element over that at rest; 1 if it was not measured.
     pub volume: f64,
-    /// Where the worse of the two is (m).
+    /// Position of the worse of the two (m).
     pub at: DVec3,
 }
 
 impl Strain {
-    /// Beyond what tissue bears.
+    /// Whether tissue does not survive it.
     pub fn is_too_much(&self) -> bool {
         self.is_beyond(false)
     }
 
-    /// Beyond what an instrument keeps its contact at. `latched`: its latch alone holds the organ,
-    /// and its blades press on nothing. How hard that may pull is for the tearing force to say; the
-    /// stretch only ends what solvers bear.
+    /// Whether contact of the instrument has to be disabled. `latched`: only its latch holds the
+    /// organ, and its blades press on nothing. The tearing force limits the pull then; the stretch
+    /// is limited for the solver.
     pub fn is_beyond(&self, latched: bool) -> bool {
         self.stretch > if latched { MAX_LATCHED_STRETCH } else { MAX_STRETCH } || self.volume < MIN_VOLUME_SHARE
     }
 
-    /// Not as good as at rest.
+    /// Whether the organ has not recovered.
     pub fn lasts(&self) -> bool {
         self.stretch > RESTED_STRETCH || self.volume < RESTED_VOLUME_SHARE
     }
 }
 
-/// The element of a body that has least of its rest volume: how much of it, and its middle (m).
+/// The smallest share of its rest volume that an element of a body has, and the element's centroid
+/// (m).
 fn most_crushed(world: &World, body: usize, now: &[DVec3]) -> (f64, DVec3) {
     let (data, mut least) = (&world.model.bodies()[body], (1.0, DVec3::ZERO));
     for tet in data.tets() {
@@ -75,9 +75,9 @@ fn most_crushed(world: &World, body: usize, now: &[DVec3]) -> (f64, DVec3) {
 }
 
 /// The edges of all bodies with their squared rest lengths.
-pub(in crate::cell) struct Edges {
+pub(crate) struct Edges {
     bodies: Vec<Vec<([u32; 2], f64)>>,
-    /// The world's count of cuts for which they are right.
+    /// The world's number of cuts for which they are valid.
     cuts: usize,
     positions: Vec<DVec3>,
 }
@@ -100,8 +100,7 @@ impl Edges {
         Self { bodies: bodies.collect(), cuts: world.cuts, positions: Vec::new() }
     }
 
-    /// The strain of every body; `least` is the smallest share of its rest volume that any element
-    /// has.
+    /// The strain of every body; `least` is the smallest share of its rest volume of any element.
     pub fn strains(&mut self, world: &World, least: f64) -> Vec<Strain> {
         if self.cuts != world.cuts {
             *self = Self::of(world);
@@ -123,7 +122,7 @@ impl Edges {
             if least < RESTED_VOLUME_SHARE {
                 let (volume, at) = most_crushed(world, body, positions);
                 strain.volume = volume;
-                // The place of what makes the strain last.
+                // The position of the strain that lasts.
                 if strain.stretch < RESTED_STRETCH || strain.stretch < MAX_STRETCH && volume < MIN_VOLUME_SHARE {
                     strain.at = at;
                 }

@@ -7,10 +7,7 @@ use crate::GraspDesign;
 use crate::cell::arm::{ArmState, Held, Wanted};
 use crate::hold::Hold;
 use glam::DVec3;
-use tube::{ONE_END, specimen};
-
-#[path = "../../../tests/common/mod.rs"]
-mod tube;
+use trocar_testing::tube::{self, ONE_END, specimen};
 
 fn cell() -> Cell {
     let mut scene = tube::scene();
@@ -96,7 +93,7 @@ fn hash_and_restore_carry_every_field() {
     others.push(("waits", changed(&|s| s.waits.push(3))));
     others.push(("touch", changed(&|s| s.touch ^= true)));
     others.push(("periods", changed(&|s| s.periods += 1)));
-    cell.advance().unwrap();
+    cell.step(None).unwrap();
     others.push(("world and drive", cell.save()));
     for (field, other) in &others {
         let hash = other.hash();

@@ -1,4 +1,4 @@
-//! An instrument without a port: the place of its jaw's pivot and its roll, in a box.
+//! An instrument without a port: the position of its jaw's pivot in a box, and its roll.
 
 use super::super::setpoint::{NUMBERS, Setpoint, in_range};
 use super::super::speeds::{ROLL_SPEED, TIP_SPEED};
@@ -8,15 +8,15 @@ use glam::{DMat3, DQuat, DVec3};
 use std::f64::consts::{PI, TAU};
 use trocar_core::Pose;
 
-/// A free instrument goes this far from where it starts, along each axis of the cell (m).
+/// Range of a free instrument around its start, along each axis of the cell (m).
 const REACH: f64 = 0.2;
 
-/// Where an instrument without a port may be. Its shaft always points in the same direction.
+/// The workspace of an instrument without a port. Its shaft always points in the same direction.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FreeSpace {
     /// Direction of the shaft, towards the tip: a unit vector.
     pub direction: DVec3,
-    /// Least and greatest place of the jaw's pivot in the cell (m).
+    /// Lower and upper corner of the box for the jaw's pivot, in the cell (m).
     pub corners: [DVec3; 2],
     /// The tip frame's rotation at roll 0.
     rotation: DQuat,
@@ -26,7 +26,7 @@ impl FreeSpace {
     /// The box around `start` (m) for a shaft in `direction`.
     pub fn around(start: DVec3, direction: DVec3) -> Self {
         let x = direction.normalize_or(-DVec3::Z);
-        // The hinge at roll 0 is along the cell's x as far as the shaft lets it, else along its y.
+        // The hinge at roll 0 is along the cell's x if the shaft is not, else along y.
         let across = |v: DVec3| v - v.dot(x) * x;
         let z = across(if x.x.abs() < 0.9 { DVec3::X } else { DVec3::Y }).normalize();
         let rotation = DQuat::from_mat3(&DMat3::from_cols(x, z.cross(x), z)).normalize();
@@ -60,7 +60,7 @@ impl FreeSpace {
         }
         let hinge = self.rotation.inverse() * (tip.rotation * DVec3::Z);
         let roll = if hinge.y.hypot(hinge.z) > 1e-9 { (-hinge.y).atan2(hinge.z) } else { near.roll() };
-        // Of the rolls a whole turn apart the nearest one, if it is within the limits.
+        // The nearest of the equivalent rolls, if it is within the limits.
         let nearest = roll + TAU * ((near.roll() - roll) / TAU).round();
         let roll = if nearest.abs() <= PI { nearest } else { roll };
         let t = tip.translation;

@@ -1,4 +1,4 @@
-//! Where an instrument may be, and what the numbers of its arm mean there.
+//! The workspace of an instrument, and the meaning of its arm's numbers.
 
 mod free;
 mod port;
@@ -11,27 +11,27 @@ use crate::Result;
 use glam::DVec3;
 use trocar_core::Pose;
 
-/// Where an instrument may be.
+/// The workspace of an instrument.
 #[derive(Clone, Debug)]
 pub enum Workspace {
-    /// In the hole of a port: the shaft turns about its centre.
+    /// Through a port: the shaft turns about its centre.
     Port(Box<PortSpace>),
-    /// Anywhere in a box, the shaft always in the same direction.
+    /// In a box, with the shaft always in the same direction.
     Free(FreeSpace),
 }
 
-/// The nearest that an instrument comes to a wanted pose of its tip frame.
+/// The reachable pose nearest to a wanted pose of the tip frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reached {
-    /// Its numbers there.
+    /// The arm's numbers there.
     pub setpoint: Setpoint,
     /// The tip frame there, in the cell.
     pub tip: Pose,
-    /// Axis times angle (rad), in the cell, of the turn that is left to the wanted orientation.
+    /// The rejected part of the wanted orientation: axis times angle (rad), in the cell.
     pub rejected_rotation: DVec3,
-    /// What is left to the wanted place (m), in the cell.
+    /// The rejected part of the wanted position (m), in the cell.
     pub rejected_translation: DVec3,
-    /// How far the wanted roll lies outside its limits (rad), by sign.
+    /// Signed distance of the wanted roll from its limits (rad); 0 within them.
     pub roll_excess: f64,
 }
 
@@ -44,8 +44,8 @@ impl Workspace {
         }
     }
 
-    /// Least and greatest value of each number. Two pivots share a cone, so that the corners of
-    /// their box are not reached; [`clamp`](Self::clamp) brings them back.
+    /// Least and greatest value of each number. The two pivots are limited by a cone, so the
+    /// corners of their box are out of reach; [`clamp`](Self::clamp) moves them inside.
     pub fn bounds(&self) -> [[f64; 2]; NUMBERS] {
         match self {
             Self::Port(space) => space.bounds(),
@@ -53,7 +53,7 @@ impl Workspace {
         }
     }
 
-    /// Says which number of absolute targets is out of range: its place, and what would be right.
+    /// Finds a number of absolute targets that is out of range: its index, and what would be right.
     pub(super) fn check(&self, numbers: &[f64]) -> std::result::Result<(), (usize, String)> {
         match self {
             Self::Port(space) => space.check(numbers),
@@ -77,11 +77,11 @@ impl Workspace {
         }
     }
 
-    /// The nearest that the instrument comes to a wanted pose of its tip frame. Of two rolls the
-    /// one nearer to that of `near` is taken, and the jaw is that of `near`.
+    /// The reachable pose nearest to a wanted pose of the tip frame. Of two possible rolls, the one
+    /// nearer to that of `near` is chosen; the jaw is that of `near`.
     ///
     /// # Errors
-    /// A pose that is not finite or whose rotation has not length 1.
+    /// A pose that is not finite, or whose rotation is not normalized.
     pub fn solve(&self, tip: &Pose, near: &Setpoint) -> Result<Reached> {
         match self {
             Self::Port(space) => space.solve(tip, &near.in_port()),
@@ -89,8 +89,8 @@ impl Workspace {
         }
     }
 
-    /// The numbers on the way from `from` to `to` that can be commanded for the next `period` (s),
-    /// and whether that is not all of the way.
+    /// The numbers on the way from `from` to `to` that are possible in the next `period` (s), and
+    /// whether the way is longer.
     pub(super) fn paced(&self, from: &Setpoint, to: &Setpoint, period: f64) -> (Setpoint, bool) {
         match self {
             Self::Port(_) => port::paced(from, to, period),
@@ -98,8 +98,8 @@ impl Workspace {
         }
     }
 
-    /// The same place, drawn back along the shaft until the tips of the closed blades are above the
-    /// floor of the cell, and whether that was needed.
+    /// The position retracted along the shaft until the tips of the closed blades are above the
+    /// cell's floor, and whether that was needed.
     pub(super) fn above_floor(&self, at: &Setpoint) -> (Setpoint, bool) {
         match self {
             Self::Port(space) => space.above_floor(at),
@@ -115,7 +115,7 @@ impl Workspace {
         }
     }
 
-    /// The same place, `by` (m) farther back along the shaft, as far as the limits let it.
+    /// The position retracted by `by` (m) along the shaft, within the limits.
     pub fn behind(&self, at: &Setpoint, by: f64) -> Setpoint {
         match self {
             Self::Port(space) => space.behind(at, by),
@@ -123,7 +123,7 @@ impl Workspace {
         }
     }
 
-    /// The port, if there is one.
+    /// The port, if any.
     pub fn as_port(&self) -> Option<&PortSpace> {
         match self {
             Self::Port(space) => Some(space),

@@ -16,7 +16,7 @@ pub struct PortSpace {
     pub port: Port,
     /// The instrument.
     pub instrument: Instrument,
-    /// How far it may go.
+    /// Its limits.
     pub limits: Limits,
     /// The tips of the closed blades stay above this height in the cell (m).
     pub floor: f64,
@@ -33,7 +33,7 @@ impl PortSpace {
     pub(super) fn check(&self, n: &[f64]) -> std::result::Result<(), (usize, String)> {
         let tilt = Coordinates { pivots: [n[0], n[1]], ..Coordinates::default() }.tilt();
         let right = n[0].abs() < std::f64::consts::FRAC_PI_2 && n[1].abs() < std::f64::consts::FRAC_PI_2;
-        // Rounding on the way through an action must not refuse what is at the limit.
+        // An action at the limit must not be refused because of rounding.
         if !right || tilt > self.limits.tilt + 1e-9 {
             let k = usize::from(n[1].abs() > n[0].abs());
             let (is, most) = (tilt.to_degrees(), self.limits.tilt.to_degrees());
@@ -87,7 +87,7 @@ impl PortSpace {
 
 /// See [`Workspace::paced`](super::Workspace::paced). The tip goes no faster than [`TIP_SPEED`],
 /// the shaft swings no faster than [`SWING_SPEED`] and rolls no faster than [`ROLL_SPEED`]. The jaw
-/// has a drive of its own.
+/// has its own drive.
 pub(super) fn paced(from: &Setpoint, to: &Setpoint, period: f64) -> (Setpoint, bool) {
     let (from, to) = (from.in_port(), to.in_port());
     let swing = [0, 1].map(|k| to.pivots[k] - from.pivots[k]);

@@ -1,5 +1,5 @@
-//! Small scenes the tests share.
-#![allow(dead_code, clippy::unwrap_used, reason = "each test binary uses its own part; helpers of tests may panic")]
+//! Small bodies of tissue.
+#![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "helpers of tests may panic")]
 
 use glam::DVec3;
 use trocar_geometry::{LatticeMesher, SignedDistance, TetMesh};
@@ -7,7 +7,9 @@ use trocar_tissue::{
     BodyDescription, ConstitutiveModel, Descent, Material, Model, ModelBuilder, SolverSettings, Start,
 };
 
+/// Length of a frame (s).
 pub const FRAME: f64 = 1.0 / 60.0;
+/// Gravitational acceleration (m/s2).
 pub const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 
 /// The appendix's material; `viscosity` 0.
@@ -22,8 +24,11 @@ pub fn tissue(young_modulus: f64) -> Material {
 }
 
 /// A schedule to be judged.
+#[derive(Clone, Copy, Debug)]
 pub struct Judged {
+    /// Its name in messages.
     pub name: &'static str,
+    /// The schedule.
     pub schedule: SolverSettings,
     /// Whether it minimises: held to the laws that the minimum keeps. Sweeps that stop early are
     /// not at the minimum.
@@ -52,11 +57,7 @@ pub fn many_sweeps() -> SolverSettings {
 
 /// A number in 0..1 for each counter, the same on every machine.
 pub fn noise(k: u64) -> f64 {
-    // SplitMix64.
-    let mut z = k.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+    trocar_core::unit(trocar_core::mix(k.wrapping_mul(0x9e37_79b9_7f4a_7c15)))
 }
 
 /// A box of `cells` cubes of edge `edge` (m), lower corner at the origin, six tetrahedra a cube

@@ -1,4 +1,4 @@
-//! Stage 3: tissue is stepped by a frame, with the tools on their way to where the arms are now.
+//! Stage 3: a frame of tissue, in which the tools move to the arms' present places.
 
 use crate::blades::{Tools, opening_force};
 use crate::cell::Cell;
@@ -8,27 +8,37 @@ use crate::{FRAME, GraspDesign, Gripper};
 use glam::DVec3;
 use std::time::Instant;
 use trocar_core::Pose;
-use trocar_tissue::{StepReport, ToolMotion};
+use trocar_tissue::{State, StepReport, ToolMotion};
 
-/// Height at which tissue feels no instrument (m).
+/// Height of instruments without contact (m).
 const OUT_OF_CONTACT_HEIGHT: f64 = 100.0;
 
+/// The beginning of a frame of tissue.
+pub(super) struct FrameStart {
+    /// The tissue's state, if the frame is the first of a grasp.
+    state: Option<State>,
+    clock: Instant,
+}
+
 impl Cell {
-    pub(super) fn step_tissue(&mut self, log: &mut PeriodLog) -> StepReport {
+    /// Sets the motions of the tools for a frame of tissue.
+    pub(super) fn begin_tissue_frame(&mut self) -> FrameStart {
         self.motions.clear();
         for arm in &mut self.arms {
             self.motions.extend(arm.motions(FRAME));
         }
-        let before = self.arms.iter().any(|arm| arm.is_newly_attached(&self.world)).then(|| self.world.state.clone());
-        let clock = Instant::now();
-        let report = self.world.step(&self.motions);
-        self.timing.tissue += clock.elapsed();
+        let newly_attached = self.arms.iter().any(|arm| arm.is_newly_attached(&self.world));
+        FrameStart { state: newly_attached.then(|| self.world.state.clone()), clock: Instant::now() }
+    }
+
+    /// Records the frame that began at `start`.
+    pub(super) fn end_tissue_frame(&mut self, start: FrameStart, report: &StepReport, log: &mut PeriodLog) {
+        self.timing.tissue += start.clock.elapsed();
         self.timing.iterations += report.iterations;
-        log.tissue.add(&report);
-        if let Some(before) = before {
+        log.tissue.add(report);
+        if let Some(before) = start.state {
             log.activation_step = log.activation_step.max(self.world.largest_motion_since(&before));
         }
-        report
     }
 }
 
@@ -38,7 +48,7 @@ impl ArmUnit {
         let (model, state) = (&self.model, &mut self.state);
         let angle = state.gripper.jaw_angle;
         let target = state.wanted.jaw() * model.blades.max_angle;
-        // What is latched locks the jaws; friction must go on pressing.
+        // A latched grasp locks the jaws; friction must continue to press.
         let locked = state.held.is_some() && state.design != GraspDesign::Friction;
         let next_angle = if locked {
             angle
@@ -52,7 +62,7 @@ impl ArmUnit {
         let mut motions = state.gripper.motions_to(&next);
         state.jaw_rate = (next_angle - angle) / (model.blades.max_angle * dt);
         state.gripper = next;
-        // At rest, far from everything.
+        // At rest, far from tissue.
         let away = Pose { translation: OUT_OF_CONTACT_HEIGHT * DVec3::Z, ..Pose::IDENTITY };
         let away = ToolMotion { from: away, to: away };
         if state.contact_disabled {

@@ -1,4 +1,4 @@
-//! One substep of an island: start, search direction after direction, take the velocities.
+//! The minimisation of a substep: start, search direction after direction, take the velocities.
 
 use super::apply_step::ConstraintMotion;
 use super::body_system::QuasiNewtonSolver;
@@ -8,26 +8,25 @@ use super::line_search::Found;
 use crate::body_slot::{BodySlot, for_each};
 use glam::Vec3A;
 
-/// How often a minimum is sought, each time with the limits of friction found at the last.
+/// Maximum number of minimisations, each with the limits of friction found at the last one.
 const MAX_FRICTION_ROUNDS: usize = 4;
 
-/// Where no step helps any more, the positions are taken for the minimum if the correction is at
-/// most this many times the one that ends a substep: that is rounding, and not a search gone
-/// astray.
+/// If no step helps any more, the positions are accepted as the minimum if the correction is at
+/// most this many times the one that ends a substep: rounding, not a failed search.
 const MAX_ROUNDING_FACTOR: f32 = 100.0;
 
-/// The correction that ends a substep: an absolute one (m), and one over how far the body went.
+/// The correction that ends a substep: absolute (m), and relative to the body's motion.
 struct Tolerance {
     absolute: f32,
     relative: f32,
 }
 
 impl IslandSystem<'_> {
-    /// Minimises one substep, which ends when `share` of the frame is over.
+    /// Minimises the potential of a substep, which ends when `share` of the frame is over.
     ///
-    /// False if it was given up. Nothing has changed then but scratch memory, and that bodies at
-    /// rest have no velocity.
-    pub fn substep(&mut self, share: f64) -> bool {
+    /// Returns false if it failed. Then only scratch memory has changed, and bodies at rest have no
+    /// velocity.
+    pub fn minimise(&mut self, share: f64) -> bool {
         let alone = self.pairs.is_empty();
         self.start(share);
         let moved = self.all().any(|body| body.progress.guess != InitialGuess::Still);
@@ -49,7 +48,7 @@ impl IslandSystem<'_> {
         let mut rounds = 0;
         for iteration in usize::from(behind)..settings.iterations {
             if self.active().next().is_none() {
-                // Nothing moves, and nothing did.
+                // Nothing moves, and nothing has moved.
                 return true;
             }
             self.find_direction();
@@ -67,7 +66,7 @@ impl IslandSystem<'_> {
                     continue;
                 }
                 if self.active().all(|body| body.progress.longest <= at_rest) {
-                    // At rest: what is left of the velocity is noise.
+                    // At rest: the remaining velocity is noise.
                     self.active().for_each(|body| body.iterate.v.fill([0.0; 4]));
                     return true;
                 }
@@ -79,7 +78,7 @@ impl IslandSystem<'_> {
                 Found::Step => stepped = true,
                 Found::Nothing if stepped && !alone && self.wake(absolute, relative) => {}
                 Found::Nothing if stepped && (!held || self.is_solved(wide, wide_relative)) => break,
-                // Steps of an earlier substep may mislead where contacts have changed.
+                // Steps of an earlier substep may mislead if contacts have changed.
                 Found::Nothing if self.history.forget() => {}
                 Found::Nothing => {
                     self.all().for_each(|body| body.restore());
@@ -91,7 +90,7 @@ impl IslandSystem<'_> {
         true
     }
 
-    /// Predicts, moves the bodies to where the substep starts from, and evaluates them there.
+    /// Predicts, moves the bodies to the start of the search, and evaluates them there.
     fn start(&mut self, share: f64) {
         let (h, gravity) = (self.h, self.gravity());
         for member in 0..self.slots.len() {
@@ -112,8 +111,8 @@ impl IslandSystem<'_> {
     }
 
     /// The tolerance of the search, and the correction (m) below which a body that does not move is
-    /// at rest. Neither rounding of positions nor, at rest, what gravity does in a short substep is
-    /// a correction.
+    /// at rest. Rounding of positions is no correction, nor, at rest, the motion by gravity in a
+    /// short substep.
     fn tolerances(&mut self) -> (Tolerance, f32) {
         let (settings, rounding, h) = (self.slots[0].solver.settings, self.rounding(), self.h);
         let at_rest =
@@ -122,8 +121,9 @@ impl IslandSystem<'_> {
         (Tolerance { absolute, relative: settings.relative as f32 }, at_rest)
     }
 
-    /// Finds the gradient where the substep starts, and which bodies take part: a body among others
-    /// that neither moves nor would by what pushes it is left where it is.
+    /// Computes the gradient at the start of the search, and decides which bodies take part: among
+    /// several bodies, one that neither moves nor would be moved by the forces on it stays where it
+    /// is.
     fn choose_active(&mut self, alone: bool) {
         let h = self.h;
         for body in self.all() {
@@ -148,7 +148,7 @@ impl IslandSystem<'_> {
         }
     }
 
-    /// Leaves a body that no other is near where it is, if it is at rest.
+    /// Lets a single body stay where it is, if it is at rest.
     fn rest_alone(&mut self, limit: f32) {
         let h = self.h;
         if let [BodySlot { solver, .. }] = self.slots
@@ -195,8 +195,8 @@ impl IslandSystem<'_> {
         self.active().for_each(|body| body.take_velocities(h, gravity));
     }
 
-    /// Removes what is left of the sum of all forces from an island that nothing holds: to move all
-    /// of it alike changes no force within.
+    /// Removes the remaining sum of all forces from an island that nothing holds, by a translation,
+    /// which changes no internal force.
     fn keep_momentum(&mut self) {
         if self.pairs.is_empty() || !self.all().all(|body| body.sleep.active && body.flies()) {
             return;

@@ -1,17 +1,18 @@
 //! A small analytic tube as a specimen.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests may panic")]
-#![allow(dead_code, reason = "not every test uses all of it")]
+#![allow(clippy::unwrap_used, clippy::missing_panics_doc, reason = "helpers of tests may panic")]
 
 use glam::DVec3;
 use trocar_geometry::{LatticeMesher, SignedDistance, TetQuality};
-use trocar_scene::{Scene, SpecimenSource};
+use trocar_scene::{Scene, SpecimenSource, Variation};
 use trocar_specimen::{End, Material, Organ, OrganFacts, Pins, Provenance, Specimen};
 
 /// A tube along x, 60 mm long and 9 mm thick: about the appendix.
 struct Tube;
 
+/// Its radius (m).
 pub const RADIUS: f64 = 0.0045;
+/// Half its length (m).
 pub const HALF_LENGTH: f64 = 0.030;
 
 impl SignedDistance for Tube {
@@ -20,6 +21,7 @@ impl SignedDistance for Tube {
     }
 }
 
+/// Pins of one end.
 pub const ONE_END: Pins = Pins::End { end: End::Base, length: 0.15, band_length: 0.0, band_share: 0.0 };
 
 /// The tube as a specimen under a camera that looks straight down.
@@ -69,5 +71,14 @@ pub fn two_tubes(pins: Pins, edge: f64) -> Specimen {
 pub fn scene() -> Scene {
     let mut scene = Scene::new("tube-cell", SpecimenSource::phantom("phantom-a", 1));
     scene.placement.position_m = [0.0, 0.46, 0.045];
+    scene
+}
+
+/// A resection of the tube: pinned at its base, no start varied but by the scene's variation.
+pub fn resection() -> Scene {
+    let mut scene = scene();
+    scene.task.organ = "tube".to_owned();
+    scene.task.episode_s = 20.0;
+    scene.variation = Variation::starts();
     scene
 }
