@@ -13,6 +13,16 @@ use trocar_tissue::Piece;
 /// Jaws that press with this share of their force have closed on what is between them.
 const PRESSING: f64 = 0.95;
 
+/// Jaws that a command stops short of that hold by as much as tissue presses on them (N), at least
+/// this much ...
+const LEAST_GRIP: f64 = 0.02;
+
+/// ... once they have stood there for so many tissue frames (0.1 s): jaws on their way close on.
+const STANDING_FRAMES: u32 = 6;
+
+/// Openings that differ by less are the same.
+const SAME_OPENING: f64 = 1e-9;
+
 /// Jaws are commanded to close, or to open, when the opening asked for is beyond the one they have
 /// by this much.
 const LEAST_COMMANDED_MOTION: f64 = 0.02;
@@ -23,9 +33,12 @@ impl ArmUnit {
         JawRegion::sized(&self.state.gripper, self.model.blades.length)
     }
 
-    /// Jaws that press take hold of what is between them; jaws that are commanded to open let go.
+    /// Jaws that press take hold of what is between them, with all their force or with what they
+    /// have where their command stops them; jaws that are commanded to open let go.
     pub fn grasp(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
         let (wanted, opening) = (self.state.wanted.jaw(), self.opening());
+        let force = opening_force(&self.state.gripper, Tools::of(0), &self.state.forces);
+        self.count_standing(wanted, opening, force);
         if let Some(held) = &self.state.held {
             let opens = wanted > held.opening + LEAST_COMMANDED_MOTION;
             let lost =
@@ -35,14 +48,27 @@ impl ArmUnit {
             }
             return;
         }
-        let presses =
-            opening_force(&self.state.gripper, Tools::of(0), &self.state.forces) >= PRESSING * self.state.jaw.budget;
-        if wanted < opening - LEAST_COMMANDED_MOTION && presses {
-            self.take_hold(world, events);
+        let budget = self.state.jaw.budget;
+        if wanted < opening - LEAST_COMMANDED_MOTION && force >= PRESSING * budget {
+            self.take_hold(budget, world, events);
+        } else if self.state.standing >= STANDING_FRAMES {
+            self.take_hold(force.min(budget), world, events);
         }
     }
 
-    fn take_hold(&mut self, world: &mut World, events: &mut Vec<CellEvent>) {
+    /// Counts the frames for which jaws that closed on tissue have stood where they were told to.
+    fn count_standing(&mut self, wanted: f64, opening: f64, force: f64) {
+        let state = &mut self.state;
+        let there = state.held.is_none() && (wanted - opening).abs() < SAME_OPENING && force >= LEAST_GRIP;
+        state.standing = match state.standing {
+            0 => u32::from(there && state.jaw_rate < 0.0),
+            frames if there => frames + 1,
+            _ => 0,
+        };
+    }
+
+    /// Takes hold of what is between the blades, which press on it with `closing` (N).
+    fn take_hold(&mut self, closing: f64, world: &mut World, events: &mut Vec<CellEvent>) {
         let (region, opening) = (self.jaw_region(), self.opening());
         let Self { model, state, .. } = self;
         let Some((organ, tissue)) = region.fullest(world) else { return };
@@ -51,7 +77,7 @@ impl ArmUnit {
         let pose = state.gripper.pose;
         let closing_force_n = opening_force(&state.gripper, Tools::of(0), &state.forces);
         let displaced_mm = 1e3 * candidate.displaced(world, organ);
-        let forces = JawForces { closing: state.jaw.budget, tearing: model.tear_force };
+        let forces = JawForces { closing, tearing: model.tear_force };
         let grasp = state.design.grasp(world, organ, &candidate.nodes, model.tools, &pose, forces);
         let snap = grasp.as_ref().map(|g| Snap::of(world, g, &pose)).unwrap_or_default();
         let hold = Hold::new(world, organ, candidate.nodes, &pose);

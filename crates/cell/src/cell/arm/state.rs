@@ -55,6 +55,8 @@ pub(in crate::cell) struct ArmState {
     /// They shear it then and press none of it.
     pub shears: Option<f64>,
     pub held: Option<Held>,
+    /// Tissue frames for which jaws that closed on tissue have stood where they were told to.
+    pub standing: u32,
     /// Contact of the whole instrument with tissue is disabled.
     pub contact_disabled: bool,
     /// Contact of the blades is disabled until they let go of what they hold.
@@ -116,6 +118,7 @@ impl ArmState {
             scissors,
             shears: None,
             held: None,
+            standing: 0,
             contact_disabled: false,
             blades_disabled: false,
             rcm_peak: 0.0,
@@ -141,6 +144,7 @@ impl ArmState {
             scissors,
             shears,
             held,
+            standing,
             contact_disabled,
             blades_disabled,
             rcm_peak,
@@ -180,6 +184,11 @@ impl ArmState {
         if let Some(Held { organ, s, hold, opening }) = held {
             all.extend([*organ as f64, *s, *opening]);
             all.extend(hold.numbers());
+        }
+        // Only where there is something to count: hashes in episodes that were recorded before it
+        // was counted stay valid.
+        if *standing > 0 {
+            all.push(f64::from(*standing));
         }
         all
     }
