@@ -5,6 +5,7 @@ mod aim;
 mod cut_place;
 mod grip;
 mod perturbed;
+mod phase;
 mod random_actions;
 mod random_walk;
 mod script;

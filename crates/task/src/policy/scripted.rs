@@ -12,6 +12,7 @@
 use super::aim::{self, Aim, Place, eased};
 use super::cut_place::cut_place;
 use super::grip::Grip;
+use super::phase::Phase;
 use super::script::{AfterHold, CutAt, Script};
 use super::{CHUNK, Policy};
 use crate::stages::{held, lifted};
@@ -98,31 +99,6 @@ pub enum Style {
     Greedy,
 }
 
-/// What it is at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Phase {
-    Approach,
-    Enter,
-    Close,
-    Drag,
-    Release,
-    Lift,
-    /// Further up, for tissue that has not risen enough.
-    Rise,
-    Hold,
-    Lower,
-    Open,
-    Reach,
-    Engage,
-    Cut,
-    Carry,
-    Keep,
-    /// Port-reach: both arms to this target.
-    Target(usize),
-    Rest,
-    Finished,
-}
-
 /// The baseline.
 #[derive(Clone, Debug)]
 pub struct Scripted {
@@ -188,25 +164,7 @@ impl Scripted {
 
     /// Name of the phase that it is in.
     pub fn phase(&self) -> &'static str {
-        match self.phase {
-            Phase::Approach => "approach",
-            Phase::Enter => "enter",
-            Phase::Close => "close",
-            Phase::Drag => "drag",
-            Phase::Release => "release",
-            Phase::Lift | Phase::Rise => "lift",
-            Phase::Hold => "hold",
-            Phase::Lower => "lower",
-            Phase::Open => "open",
-            Phase::Reach => "reach",
-            Phase::Engage => "engage",
-            Phase::Cut => "cut",
-            Phase::Carry => "carry",
-            Phase::Keep => "keep",
-            Phase::Target(_) => "target",
-            Phase::Rest => "rest",
-            Phase::Finished => "finished",
-        }
+        self.phase.name()
     }
 
     /// Organ coordinate at which the cutter cuts: beside the grasp, towards the base. Farther on,

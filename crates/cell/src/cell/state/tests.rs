@@ -42,6 +42,7 @@ fn changes(state: &ArmState, hold: &Hold) -> Vec<(&'static str, ArmState)> {
         blades_disabled: _,
         rcm_peak: _,
         rcm_reported: _,
+        standing: _,
     } = state;
     let changed = |change: &dyn Fn(&mut ArmState)| {
         let mut other = state.clone();
