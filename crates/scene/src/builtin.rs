@@ -12,7 +12,7 @@ pub struct Builtin {
 }
 
 /// The built-in scenes.
-pub const BUILTINS: [Builtin; 3] = [
+pub const BUILTINS: [Builtin; 2] = [
     Builtin {
         name: "cell-a",
         summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
@@ -22,11 +22,6 @@ pub const BUILTINS: [Builtin; 3] = [
         name: "cell-b",
         summary: "the same cell around phantom B, another rabbit: resection of a shorter appendix",
         text: include_str!("../scenes/cell-b.toml"),
-    },
-    Builtin {
-        name: "cell-c",
-        summary: "the same cell around phantom C, a pig's liver: the gallbladder is grasped and lifted",
-        text: include_str!("../scenes/cell-c.toml"),
     },
 ];
 
