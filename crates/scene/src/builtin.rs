@@ -12,18 +12,11 @@ pub struct Builtin {
 }
 
 /// The built-in scenes.
-pub const BUILTINS: [Builtin; 2] = [
-    Builtin {
-        name: "cell-a",
-        summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
-        text: include_str!("../scenes/cell-a.toml"),
-    },
-    Builtin {
-        name: "cell-b",
-        summary: "the same cell around phantom B, another rabbit: resection of a shorter appendix",
-        text: include_str!("../scenes/cell-b.toml"),
-    },
-];
+pub const BUILTINS: [Builtin; 1] = [Builtin {
+    name: "cell-a",
+    summary: "the paper's two-arm cell around phantom A: grasper left, cutter right, resection of the appendix",
+    text: include_str!("../scenes/cell-a.toml"),
+}];
 
 impl Builtin {
     /// The built-in scene of that name.
