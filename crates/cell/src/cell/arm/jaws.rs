@@ -59,7 +59,9 @@ impl ArmUnit {
     /// Counts the frames for which jaws that closed on tissue have stood where they were told to.
     fn count_standing(&mut self, wanted: f64, opening: f64, force: f64) {
         let state = &mut self.state;
-        let there = state.held.is_none() && (wanted - opening).abs() < SAME_OPENING && force >= LEAST_GRIP;
+        // Shut blades hold nothing.
+        let stopped = wanted > 0.0 && (wanted - opening).abs() < SAME_OPENING;
+        let there = state.held.is_none() && stopped && force >= LEAST_GRIP;
         state.standing = match state.standing {
             0 => u32::from(there && state.jaw_rate < 0.0),
             frames if there => frames + 1,
