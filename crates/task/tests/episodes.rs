@@ -100,6 +100,20 @@ fn damaged(path: &Path) {
 }
 
 #[test]
+fn the_scripted_baseline_passes_on_soft_and_on_stiff_tissue() {
+    // The edges of the set `standard`, and softer than any of it.
+    for young_modulus_pa in [2e3, 3e3, 48e3] {
+        let mut scene = resection();
+        scene.organs.entry("tube".to_owned()).or_default().material.young_modulus_pa = Some(young_modulus_pa);
+        let s = record(&scene, &two_tubes(ONE_END, 2.2e-3), "scripted", 3, 0).summary;
+        println!("{young_modulus_pa} Pa: {s:?}");
+        assert!(s.passed && s.inverted_peak == 0 && s.suspensions().is_none(), "{young_modulus_pa} Pa: {s:?}");
+        let [jaw_n, all] = [s.arms[0].peak_jaw_n, 0.5];
+        assert!(young_modulus_pa > 8e3 || jaw_n < 0.5 * all, "soft tissue is held gently: {jaw_n} N");
+    }
+}
+
+#[test]
 fn a_reset_gives_the_same_bits_whatever_was_before() {
     let specimen = specimen();
     let scene = resection();

@@ -3,15 +3,19 @@
 
 mod aim;
 mod cut_place;
+mod grip;
 mod perturbed;
+mod phase;
 mod random_actions;
 mod random_walk;
+mod script;
 mod scripted;
 
 pub use perturbed::{DELAY_S, Delay, NOISE_M, NOISE_RAD, Noise, OFFSET_MM, Offset};
 pub use random_actions::RandomActions;
 pub use random_walk::RandomWalk;
-pub use scripted::{AfterHold, CutAt, Script, Scripted, Style};
+pub use script::{AfterHold, CutAt, Script};
+pub use scripted::{Scripted, Style};
 
 use crate::{Episode, Error, Result};
 use trocar_cell::Action;
