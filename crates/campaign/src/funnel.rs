@@ -27,7 +27,7 @@ pub(super) fn funnel(r: &CampaignResult) -> String {
     );
     for (n, stage) in first.stages.iter().enumerate() {
         let _ =
-            write!(svg, "<text x=\"{}\" y=\"16\" opacity=\"0.7\">{}</text>", NAMES + n * column, escape(stage.stage));
+            write!(svg, "<text x=\"{}\" y=\"16\" opacity=\"0.7\">{}</text>", NAMES + n * column, escape(&stage.stage));
     }
     for (k, policy) in r.policies.iter().enumerate() {
         let y = HEAD + k * ROW;

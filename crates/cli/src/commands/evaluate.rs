@@ -51,7 +51,7 @@ fn text(r: &CampaignResult) -> String {
     let stages = r
         .policies
         .first()
-        .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage).collect::<Vec<_>>().join(", "));
+        .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage.as_str()).collect::<Vec<_>>().join(", "));
     let header = [
         "policy",
         "passed",
