@@ -15,7 +15,11 @@ ATTACHED = 22
 
 # Pivot 1 (rad), pivot 2 (rad), insertion (m), roll (rad), jaw, and the time to get there (s).
 WAYPOINTS = [
-WAYPOINT_ROWS
+    (-0.0465, 0.3167, 0.1079, -0.4219, 1.0, 1.5),  # behind the appendix, jaws open
+    (-0.0465, 0.3167, 0.1329, -0.4219, 1.0, 1.5),  # around it
+    (-0.0465, 0.3167, 0.1329, -0.4219, 0.0, 1.0),  # closed
+    (-0.0497, 0.3366, 0.1253, -0.4209, 0.0, 1.0),  # 8 mm up
+    (-0.0497, 0.2611, 0.1225, -0.4209, 0.0, 2.0),  # 12 mm aside
 ]
 
 

@@ -280,6 +280,16 @@ impl TaskContext {
 }
 
 impl Program {
+    /// The organs that its measures and its script name.
+    pub fn organs(&self) -> impl Iterator<Item = &str> {
+        let measured = self.measures.iter().filter_map(Measure::organ);
+        let grasped = self.script.iter().filter_map(|step| match &step.action {
+            ScriptAction::Grasp(part) => Some(part.organ.as_str()),
+            ScriptAction::Move(_) | ScriptAction::Release | ScriptAction::Wait => None,
+        });
+        measured.chain(grasped)
+    }
+
     /// The gate or constant `name`, with or without its table.
     pub fn constant(&self, name: &str) -> Option<usize> {
         let is = |full: &str| full == name || full.split_once('.').is_some_and(|(_, own)| own == name);

@@ -14,7 +14,7 @@ fn with(stages: &str) -> String {
     let text = Builtin::named("cell-a").unwrap().text;
     let text = text.replace("name = \"appendix-resection\"", "name = \"mine\"");
     let constants = "[task.constants]\naside_mm = 5.0\n";
-    text.replace("[safety]\n", &format!("{constants}{stages}[safety]\n"))
+    text.replace("[safety]\n", &format!("{constants}{stages}\n[safety]\n"))
 }
 
 fn read(text: &str) -> Result<Scene, String> {
@@ -71,8 +71,8 @@ fn mistakes_are_told_with_their_column() {
             "column 20: there is no organ 'liver'; the specimen has cecum, bowel-1, bowel-2, bowel-3, stomach, appendix",
         ),
         ("attached(left) in organ.apendix", "did you mean 'appendix'?"),
-        ("aside(organ[0.6, 0.4]) > 1 mm", "column 13: the range must rise"),
-        ("gates.lift > 3 mm", "column 1: there is no channel 'gates.lift'; did you mean 'gates.lift_mm'?"),
+        ("aside(organ[0.6, 0.4]) > 1 mm", "column 7: the range must rise"),
+        ("gates.lift_mn > 3 mm", "column 1: there is no channel 'gates.lift_mn'; did you mean 'gates.lift_mm'?"),
         ("aside_mm > 3", "column 1: there is no channel 'aside_mm'; did you mean 'constants.aside_mm'?"),
         ("lasted > 0.5", "column 1: lasted is known in `progress` only"),
         ("lift_mm * lift_mm > 3", "column 11: length times length has no unit here"),

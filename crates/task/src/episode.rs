@@ -2,7 +2,7 @@
 //! scored and what happened.
 
 use crate::facts::Facts;
-use crate::measure::Subject;
+use crate::measure::{Subject, bodies_of};
 use crate::measures::Measures;
 use crate::stages::Tracker;
 use crate::start::{starts, targets};
@@ -145,6 +145,12 @@ impl Episode {
         if program.needs_organ && subject.bodies(&self.cell).is_empty() {
             let known: Vec<&str> = self.cell.world().model.bodies().iter().map(|b| b.name()).collect();
             return missing(&format!("organ '{}'; the specimen has {}", task.organ, known.join(", ")));
+        }
+        for organ in program.organs() {
+            if bodies_of(&self.cell, organ).is_empty() {
+                let known: Vec<&str> = self.cell.world().model.bodies().iter().map(|b| b.name()).collect();
+                return missing(&format!("organ '{organ}'; the specimen has {}", known.join(", ")));
+            }
         }
         if program.needs_grasper && subject.grasper.is_none() {
             return missing("a grasper");

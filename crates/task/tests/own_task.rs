@@ -22,9 +22,9 @@ fn pull_aside() -> Scene {
     (task.name, task.prompt) =
         (TaskName::new("pull-aside").unwrap(), Some("pull the {organ} with {grasper}".to_owned()));
     task.constants.insert("aside_mm".to_owned(), 3.0);
-    let aside = "attached(left) in organ.tube[0.2, 0.8] and aside(organ[0.4, 0.6]) >= constants.aside_mm";
+    let aside = "attached(left) in organ[0.2, 0.8] and aside(organ[0.4, 0.6]) >= constants.aside_mm";
     task.stages = vec![
-        stage("grasp", "attached(left) in organ.tube[0.2, 0.8]"),
+        stage("grasp", "attached(left) in organ[0.2, 0.8]"),
         Stage {
             progress: Some("clamp(aside(organ[0.4, 0.6]) / constants.aside_mm, 0, 1)".to_owned()),
             ..stage("aside", aside)
@@ -36,7 +36,7 @@ fn pull_aside() -> Scene {
         ..step(None, Some([-10.0, 0.0, 0.0]))
     };
     task.script = vec![step(Some("organ[0.4, 0.6]"), None), step(None, Some([0.0, 0.0, 5.0])), by];
-    scene.validate().unwrap();
+    scene.program().unwrap();
     scene
 }
 
@@ -70,7 +70,7 @@ fn it_is_passed_stored_swept_and_replayed() {
 
     // What the file says is enough: stages and all.
     let file = EpisodeFile::read(&folder.path().join("episode.trocar")).unwrap();
-    assert_eq!(file.scene(None).unwrap().task.stages, scene.task.stages);
+    assert!(scene.task.stages.iter().all(|stage| file.header.scene.contains(&stage.when)), "{}", file.header.scene);
     let verdict = file.verify(&scene, &two_tubes(ONE_END, 3e-3), 1, &mut || true).unwrap();
     assert!(verdict.same, "{verdict:?}");
     let mut other = scene.clone();

@@ -3,7 +3,7 @@
 use crate::cli::{TaskAction, Tasks as Arguments};
 use crate::output;
 use serde::Serialize;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use trocar_scene::{BUILTIN_TASKS, Builtin, Definition, Scene, TaskName};
 use trocar_workflow::{Error, Result};
 
@@ -84,7 +84,11 @@ fn new(name: &str, folder: &Path, json: bool) -> Result<()> {
     }
     let text = scene_text(name);
     Scene::parse(&text, name, folder)?;
-    let [scene, policy] = ["toml", "py"].map(|end| folder.join(format!("{name}.{end}")));
+    let here = folder == Path::new(".");
+    let [scene, policy] = ["toml", "py"].map(|end| -> PathBuf {
+        let file = format!("{name}.{end}");
+        if here { file.into() } else { folder.join(file) }
+    });
     if let Some(taken) = [&scene, &policy].into_iter().find(|p| p.exists()) {
         return Err(Error::Mismatch(format!("{}: the file exists; choose another name", taken.display())));
     }

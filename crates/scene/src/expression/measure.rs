@@ -47,6 +47,20 @@ pub enum Measure {
     Risen(Target),
 }
 
+impl Measure {
+    /// The organ that it is about.
+    pub fn organ(&self) -> Option<&str> {
+        match self {
+            Self::Held(_, organ) | Self::InMouth(_, organ) => Some(organ),
+            Self::Distance(_, target) | Self::Moved(target) | Self::Aside(target) | Self::Risen(target) => match target
+            {
+                Target::Part(part) => Some(&part.organ),
+                Target::Place(_) => None,
+            },
+        }
+    }
+}
+
 impl Display for Part {
     fn fmt(&self, f: &mut Formatter<'_>) -> Result {
         write!(f, "organ.{}", self.organ)?;
