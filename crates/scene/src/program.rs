@@ -303,11 +303,11 @@ fn read<T>(
     text: &str,
     meaning: &mut dyn FnMut(&Tree) -> std::result::Result<T, Mistake>,
 ) -> std::result::Result<T, TaskMistake> {
-    parse(text).and_then(|tree| meaning(&tree)).map_err(|mistake| placed(field, text, 0, mistake))
+    parse(text).and_then(|tree| meaning(&tree)).map_err(|mistake| placed(field, text, 0, &mistake))
 }
 
 /// The mistake with its column in `text`, of which the expression begins at byte `from`.
-fn placed(field: &str, text: &str, from: usize, mistake: Mistake) -> TaskMistake {
+fn placed(field: &str, text: &str, from: usize, mistake: &Mistake) -> TaskMistake {
     let at = (from + mistake.at).min(text.len());
     let column = 1 + text.char_indices().take_while(|(k, _)| *k < at).count();
     TaskMistake { field: field.to_owned(), reason: format!(", column {column}: {}", mistake.reason) }
@@ -329,7 +329,7 @@ fn script_step(
             ScriptAction::Grasp(part)
         }
         (None, Some(by), false) => {
-            if let Some(k) = by.iter().position(|x| !(x.abs() <= 200.0)) {
+            if let Some(k) = by.iter().position(|x| !(-200.0..=200.0).contains(x)) {
                 return Err(wrong(&format!(".move_mm[{k}]"), format!(" is {}; it must be in [-200, 200] mm", by[k])));
             }
             ScriptAction::Move(by)
@@ -363,7 +363,7 @@ fn names_grasp(condition: &Condition) -> bool {
 
 /// The parts of a hint.
 fn hint(field: &str, text: &str, checker: &mut Checker<'_>) -> std::result::Result<Vec<HintPart>, TaskMistake> {
-    let wrong = |at: usize, reason: &str| placed(field, text, 0, Mistake::new(at, reason));
+    let wrong = |at: usize, reason: &str| placed(field, text, 0, &Mistake::new(at, reason));
     if text.len() > MOST_HINT {
         return Err(wrong(0, &format!("has {} bytes; at most {MOST_HINT}", text.len())));
     }
@@ -385,7 +385,7 @@ fn hint(field: &str, text: &str, checker: &mut Checker<'_>) -> std::result::Resu
                 None => (inner, None),
             };
             let made = parse(number).and_then(|tree| checker.any(&tree));
-            let made = made.map_err(|mistake| placed(field, text, open + 1, mistake))?;
+            let made = made.map_err(|mistake| placed(field, text, open + 1, &mistake))?;
             parts.push(HintPart::Value(made, decimals));
         }
         from = close + 1;

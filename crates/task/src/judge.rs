@@ -49,8 +49,20 @@ impl Sight<'_> {
                 let (low, high) = (self.value(low, memory), self.value(high, memory));
                 (low..=high).contains(&self.value(number, memory))
             }
-            Condition::All(all) => all.iter().fold(true, |so_far, c| self.holds(c, memory) && so_far),
-            Condition::Any(all) => all.iter().fold(false, |so_far, c| self.holds(c, memory) || so_far),
+            Condition::All(all) => {
+                let mut holds = true;
+                for condition in all {
+                    holds &= self.holds(condition, memory);
+                }
+                holds
+            }
+            Condition::Any(all) => {
+                let mut holds = false;
+                for condition in all {
+                    holds |= self.holds(condition, memory);
+                }
+                holds
+            }
             Condition::Not(of) => !self.holds(of, memory),
             Condition::Lasts { what, seconds, timer } => {
                 let (holds, now) = (self.holds(what, memory), self.row.time_s);

@@ -73,7 +73,7 @@ fn it_is_passed_stored_swept_and_replayed() {
     assert!(scene.task.stages.iter().all(|stage| file.header.scene.contains(&stage.when)), "{}", file.header.scene);
     let verdict = file.verify(&scene, &two_tubes(ONE_END, 3e-3), 1, &mut || true).unwrap();
     assert!(verdict.same, "{verdict:?}");
-    let mut other = scene.clone();
+    let mut other = scene;
     other.task.stages[2].when = other.task.stages[2].when.replace("0.5 s", "0.6 s");
     let verdict = file.verify(&other, &two_tubes(ONE_END, 3e-3), 1, &mut || true).unwrap();
     assert!(!verdict.same && verdict.said.contains("scene"), "{verdict:?}");
