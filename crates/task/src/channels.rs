@@ -220,7 +220,8 @@ impl Channels {
         }
     }
 
-    /// Names of the numbers of a row but for what the task measures beside, in order: `time_s`, `left_*`, `right_*`, then the task's.
+    /// Names of the numbers of a row but for what the task measures beside, in order: `time_s`,
+    /// `left_*`, `right_*`, then the task's.
     pub fn names() -> Vec<String> {
         let arm = |side: &'static str| ArmChannels::NAMES.into_iter().map(move |n| format!("{side}_{n}"));
         let task = TaskChannels::NAMES.into_iter().map(str::to_owned);
