@@ -9,8 +9,7 @@ use trocar_cell::{Action, CellEvent, Setpoint};
 use trocar_scene::{Distribution, Factor, Scene, TaskName};
 use trocar_specimen::Specimen;
 use trocar_task::{
-    Channels, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, Stage, policy, read_channels, run,
-    sweep,
+    Channels, End, Episode, EpisodeFile, GateRange, Policy, Recording, STATE_SIZE, policy, read_channels, run, sweep,
 };
 use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
@@ -33,7 +32,7 @@ fn the_scripted_baseline_passes_and_its_files_tell_all_of_it() {
     assert!(s.passed && s.end == Some(End::Passed) && s.stage == 5, "{s:?}");
     assert!(s.held_to_end && !s.diverged && s.inverted_peak == 0 && s.rcm_within, "{s:?}");
     assert!((0.30..=0.70).contains(&s.grasp_at.unwrap()) && s.lift_mm.is_some_and(|mm| (8.0..13.0).contains(&mm)));
-    assert!(s.passed_at(Stage::Cut).unwrap() <= s.duration_s);
+    assert!(s.passed_at("cut").unwrap() <= s.duration_s);
     assert!(recording.events.iter().any(|(_, e)| matches!(e, CellEvent::Cut { pieces: 1, .. })));
 
     let folder = tempfile::tempdir().unwrap();
