@@ -2,11 +2,9 @@
 //! stored and swept, an abort ends it, and a replay needs nothing but the episode file.
 #![allow(clippy::unwrap_used, reason = "tests")]
 
-mod common;
-
-use common::{ONE_END, resection, two_tubes};
 use trocar_scene::{Abort, Scene, ScriptStep, Side, Stage, StageOrder, TaskName};
 use trocar_task::{End, Episode, EpisodeFile, GateRange, Recording, policy, prompt, read_channels, run, sweep};
+use trocar_testing::tube::{ONE_END, resection, two_tubes};
 
 fn stage(name: &str, when: &str) -> Stage {
     Stage { name: name.to_owned(), when: when.to_owned(), share: 1.0, ..Stage::default() }

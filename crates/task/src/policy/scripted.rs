@@ -15,7 +15,7 @@ use super::grip::Grip;
 use super::phase::Phase;
 use super::script::{AfterHold, CutAt, Script};
 use super::{CHUNK, Policy};
-use crate::stages::{held, lifted};
+use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
 use crate::{Channels, Episode, Error, Result};
 use glam::DVec3;
 use trocar_cell::{Action, Setpoint};
@@ -444,11 +444,9 @@ fn seen(episode: &Episode) -> Channels {
 
 /// Whether held tissue is up as the task wants it.
 fn is_lifted(episode: &Episode) -> bool {
-    let (row, task) = (seen(episode), &episode.scene().task);
-    match task.name {
-        TaskName::GraspLift => held(&row, &task.gates),
-        _ => lifted(&row, &task.gates),
-    }
+    let (seen, task) = (seen(episode).task, &episode.scene().task);
+    let risen = seen.grasped > 0.0 && seen.lift_mm >= task.gates.lift_mm;
+    risen && (task.name != TaskName::GraspLift || (seen.follow >= HELD_FOLLOW && seen.slip_mm < HELD_SLIP_MM))
 }
 
 /// Whether what the arm at place `k` holds hangs on nothing that is pinned.

@@ -106,7 +106,8 @@ impl Steps {
             (Phase::Approach | Phase::Enter, ScriptAction::Grasp(part)) => {
                 let body = bodies_of(cell, &part.organ).first().copied();
                 let body = body.ok_or_else(|| Error::Option(format!("the scene has no organ '{}'", part.organ)))?;
-                let open = aim::grasp(cell, name, body, Place::InRange(part.range), DEPTH, 0.0)?.setpoint.with_jaw(1.0);
+                let open =
+                    aim::grasp(cell, name, body, Place::InRange(part.range, 0.0), DEPTH, 0.0)?.setpoint.with_jaw(1.0);
                 let near = phase == Phase::Enter;
                 self.to[k] = if near { open } else { cell.workspace(name)?.behind(&open, BACK) };
                 way(&self.from[k], &self.to[k], if near { SLOW } else { FAST })?
