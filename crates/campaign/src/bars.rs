@@ -25,7 +25,7 @@ struct Bar {
 
 /// One row per policy, one column per stage.
 pub(super) fn stages(r: &CampaignResult) -> String {
-    let columns = r.policies.first().map_or_else(Vec::new, |p| p.stages.iter().map(|s| s.stage).collect());
+    let columns = r.policies.first().map_or_else(Vec::new, |p| p.stages.iter().map(|s| s.stage.as_str()).collect());
     let row = |(k, p): (usize, &crate::table::PolicyRow)| {
         let bar = |s: &crate::table::StageCount| Bar {
             passed: s.passed,

@@ -213,7 +213,7 @@ mod tests {
             assert_eq!(count, 1, "{}", factor.name());
         }
         let known = |name: &&str| *name == SPECIMEN || Factor::named(name).is_some();
-        assert!(GROUPS.iter().flat_map(|(_, members)| *members).all(|name| known(&name)));
+        assert!(GROUPS.iter().flat_map(|(_, members)| *members).all(known));
         assert!(GROUPS.iter().all(|(group, _)| Factor::named(group).is_none()));
     }
 

@@ -63,7 +63,7 @@ fn drawn(k: &EpisodeRecord) -> Vec<(String, String)> {
 pub(super) fn csv_table(records: &[EpisodeRecord]) -> Result<String> {
     let format = |e: csv::Error| Error::Format(e.to_string());
     let stages = records.first().map_or(&[][..], |k| &k.summary.progress.stages);
-    let times = stages.iter().map(|s| format!("{}_time_s", s.stage.name()));
+    let times = stages.iter().map(|s| format!("{}_time_s", s.stage));
     let drawn = records.first().map(drawn).unwrap_or_default();
     let names = drawn.iter().map(|(name, _)| format!("drawn.{name}"));
     let mut table = csv::Writer::from_writer(Vec::new());

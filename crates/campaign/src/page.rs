@@ -177,7 +177,7 @@ fn outcome(r: &CampaignResult) -> String {
             p.distinct_outcomes.to_string(),
             format!("{}, {}", p.passed, share(&p.interval)),
             fixed(p.mean_score, 2),
-            (p.ends.time_out + p.ends.finished).to_string(),
+            (p.ends.time_out + p.ends.finished + p.ends.aborted).to_string(),
             p.ends.rcm_abort.to_string(),
             p.ends.diverged.to_string(),
             p.ends.policy_error.to_string(),
@@ -260,7 +260,8 @@ pub(super) fn why(k: &EpisodeRecord) -> String {
 /// Median times at which the stages passed.
 fn stage_table(r: &CampaignResult) -> String {
     let Some(first) = r.policies.first() else { return String::new() };
-    let head: Vec<&str> = ["median time (s)"].into_iter().chain(first.stages.iter().map(|s| s.stage)).collect();
+    let head: Vec<&str> =
+        ["median time (s)"].into_iter().chain(first.stages.iter().map(|s| s.stage.as_str())).collect();
     let row = |p: &PolicyRow| {
         let times = p.stages.iter().map(|s| or_dash(s.median_s, 2));
         [p.policy.clone()].into_iter().chain(times).collect()

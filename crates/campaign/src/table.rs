@@ -47,7 +47,7 @@ impl Interval {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct StageCount {
     /// The stage.
-    pub stage: &'static str,
+    pub stage: String,
     /// Episodes that passed it.
     pub passed: usize,
     /// Their share.
@@ -70,8 +70,16 @@ pub struct EndCounts {
     pub diverged: usize,
     /// The policy failed.
     pub policy_error: usize,
+    /// What the task names as an abort came to be.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub aborted: usize,
     /// The policy had nothing left to do before all stages passed.
     pub finished: usize,
+}
+
+#[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl EndCounts {
@@ -85,6 +93,7 @@ impl EndCounts {
                 Some(End::RcmAbort { .. }) => &mut counts.rcm_abort,
                 Some(End::Diverged { .. }) => &mut counts.diverged,
                 Some(End::PolicyError { .. }) => &mut counts.policy_error,
+                Some(End::Aborted { .. }) => &mut counts.aborted,
                 Some(End::Finished) => &mut counts.finished,
             } += 1;
         }
@@ -223,9 +232,9 @@ impl CampaignResult {
     pub(super) fn of(manifest: &Manifest, by: &[By], records: &[EpisodeRecord], folder: &Path) -> Self {
         let of = |name: &str| records.iter().filter(|k| k.name == name).collect::<Vec<_>>();
         // A policy without episodes has the stages of the others.
-        let stages: Vec<&'static str> = records
+        let stages: Vec<&str> = records
             .first()
-            .map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.name()).collect());
+            .map_or_else(Vec::new, |k| k.summary.progress.stages.iter().map(|s| s.stage.as_str()).collect());
         let policies: Vec<PolicyRow> =
             manifest.policies.iter().map(|p| row(&p.name, &of(&p.name), &stages, manifest)).collect();
         let names: Vec<&str> = manifest.policies.iter().map(|p| p.name.as_str()).collect();
@@ -263,12 +272,17 @@ impl CampaignResult {
     }
 }
 
-fn row(name: &str, records: &[&EpisodeRecord], names: &[&'static str], manifest: &Manifest) -> PolicyRow {
+fn row(name: &str, records: &[&EpisodeRecord], names: &[&str], manifest: &Manifest) -> PolicyRow {
     let all = records.len();
     let stages = names.iter().enumerate().map(|(n, stage)| {
         let times: Vec<f64> = records.iter().filter_map(|k| k.summary.progress.stages.get(n)?.time_s).collect();
         let passed = records.iter().filter(|k| k.summary.progress.stages.get(n).is_some_and(|s| s.passed)).count();
-        StageCount { stage, passed, interval: Interval::wilson(passed, all), median_s: median(times) }
+        StageCount {
+            stage: (*stage).to_owned(),
+            passed,
+            interval: Interval::wilson(passed, all),
+            median_s: median(times),
+        }
     });
     let passed = records.iter().filter(|k| k.summary.passed).count();
     let attached: Vec<&&EpisodeRecord> = records.iter().filter(|k| k.summary.attached).collect();
@@ -386,6 +400,7 @@ mod tests {
             End::RcmAbort { arm: why(), deviation_mm: 6.0 },
             End::Diverged { why: why() },
             End::PolicyError { why: why() },
+            End::Aborted { name: why() },
             End::Finished,
         ];
         let json = serde_json::to_value(EndCounts::of(ends.iter().map(Some))).unwrap();

@@ -449,6 +449,8 @@ fn episodes_that_repeat_others_are_counted_and_told() {
     let file = scene(dir.path());
     let mut fixed = Scene::read(&file.display().to_string()).unwrap();
     fixed.variation = trocar_scene::Variation::default();
+    // The places of port-reach are drawn by the seed.
+    fixed.task.name = TaskName::GraspLift;
     std::fs::write(&file, fixed.to_toml().unwrap()).unwrap();
     let folder = dir.path().join("campaign");
     // The scripted controller knows no seed, the random one does.

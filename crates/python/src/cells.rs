@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use rayon::prelude::*;
 use std::path::PathBuf;
 use trocar_cell::{Action, ActionSpace};
-use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE, Stage};
+use trocar_task::{Bounds, Channels, End, Episode, EpisodeState, STATE_NAMES, STATE_SIZE};
 use trocar_workflow::{SpecimenCache, drawn_specimens};
 
 /// Numbers a cell and step in `figures`: reward, score, stages passed, how it ended (-1 while it
@@ -18,7 +18,7 @@ use trocar_workflow::{SpecimenCache, drawn_specimens};
 const FIGURES: [&str; 5] = ["reward", "score", "stage", "end", "time_s"];
 
 /// Names of the ends, by their number in `figures`.
-const ENDS: [&str; 6] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error", "finished"];
+const ENDS: [&str; 7] = ["passed", "time-out", "rcm-abort", "diverged", "policy-error", "finished", "aborted"];
 
 /// A saved episode. It stays in the process: nothing loaded from disk is trusted with so much.
 #[pyclass(frozen, module = "trocar._native")]
@@ -32,7 +32,7 @@ pub struct Cells {
     specimens: SpecimenCache,
     bounds: Bounds,
     pub(crate) pool: rayon::ThreadPool,
-    task_name: &'static str,
+    task_name: String,
     prompt: String,
     steps: usize,
     /// The process that made them. The pool's threads do not live on in a child made by `fork`, and
@@ -71,7 +71,9 @@ impl Place<'_> {
         self.figures.copy_from_slice(&[reward, progress.score(), progress.stage as f64, end, episode.time()]);
         if !self.channels.is_empty() {
             let row = episode.rows().last().copied().unwrap_or_default();
-            self.channels.copy_from_slice(&row.to_row());
+            let (channels, measures) = self.channels.split_at_mut(Channels::COUNT);
+            channels.copy_from_slice(&row.to_row());
+            measures.copy_from_slice(&row.measures[..measures.len()]);
         }
     }
 
@@ -133,7 +135,7 @@ impl Cells {
             let steps = (scene.task.episode_s * f64::from(scene.rates.control_hz)).round() as usize;
             let prompt = trocar_task::prompt(&scene);
             let eyes = Eyes::new(count, sensor_noise);
-            let (task_name, process) = (scene.task.name.name(), std::process::id());
+            let (task_name, process) = (scene.task.name.name().to_owned(), std::process::id());
             Ok(Self { episodes, eyes, specimens, bounds, pool, task_name, prompt, steps, process })
         })
     }
@@ -146,8 +148,8 @@ impl Cells {
 
     /// Name of the task.
     #[getter]
-    fn task(&self) -> &'static str {
-        self.task_name
+    fn task(&self) -> &str {
+        &self.task_name
     }
 
     /// What the task asks for, in words.
@@ -183,7 +185,8 @@ impl Cells {
     /// Names of the channels.
     #[getter]
     fn channel_names(&self) -> Vec<String> {
-        Channels::names()
+        let measures = &self.episodes[0].program().measures;
+        Channels::names().into_iter().chain(measures.iter().map(ToString::to_string)).collect()
     }
 
     /// Names of the figures.
@@ -200,8 +203,8 @@ impl Cells {
 
     /// Names of the task's stages.
     #[getter]
-    fn stage_names(&self) -> Vec<&'static str> {
-        Stage::of(self.episodes[0].scene().task.name).iter().map(|s| s.name()).collect()
+    fn stage_names(&self) -> Vec<String> {
+        self.episodes[0].program().stages.iter().map(|s| s.name.clone()).collect()
     }
 
     /// Writes what `cameras` see of the cells that `active` says: `color` has an array (cells,

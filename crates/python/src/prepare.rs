@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use trocar_campaign::DEFAULT_VARIATION;
-use trocar_scene::{BUILTINS, Scene, Split, TaskName, VariationSet};
+use trocar_scene::{BUILTIN_TASKS, BUILTINS, Scene, Split, VariationSet};
 use trocar_specimen::Specimen;
 use trocar_workflow::{SpecimenCache, read_varied};
 
@@ -38,10 +38,15 @@ pub fn varied(name: &str, variation: Option<&str>) -> PyResult<Scene> {
 pub fn scene(name: &str, variation: Option<&str>, task: Option<&str>, episode_s: Option<f64>) -> PyResult<Scene> {
     let mut scene = varied(name, variation)?;
     if let Some(task) = task {
-        let all = [TaskName::AppendixResection, TaskName::GraspLift, TaskName::PortReach];
-        scene.task.name = all.into_iter().find(|t| t.name() == task).ok_or_else(|| {
-            wrong(format!("task: '{task}' is unknown; {} are known", all.map(TaskName::name).join(", ")))
-        })?;
+        // A scene with stages of its own has one task.
+        if scene.task.name.name() != task || scene.task.stages.is_empty() {
+            let all = BUILTIN_TASKS.map(|b| b.name);
+            scene.task.name = all.into_iter().find(|t| t.name() == task).ok_or_else(|| {
+                let known: Vec<&str> = all.iter().map(|t| t.name()).collect();
+                wrong(format!("task: '{task}' is unknown; {} are known", known.join(", ")))
+            })?;
+            (scene.task.stages, scene.task.aborts, scene.task.prompt) = (Vec::new(), Vec::new(), None);
+        }
     }
     if let Some(seconds) = episode_s {
         if !(seconds > 0.0 && seconds.is_finite()) {

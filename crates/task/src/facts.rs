@@ -5,7 +5,7 @@ use crate::Channels;
 use serde::{Deserialize, Serialize};
 use trocar_cell::blades::FRICTION;
 use trocar_cell::{CellEvent, Settling, Severance};
-use trocar_scene::{GraspDesignName, Side, Task};
+use trocar_scene::{GraspDesignName, Program, Side, Task};
 
 /// Figures that channels do not have.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -71,6 +71,7 @@ pub struct Severed {
 /// What details are made of.
 pub(crate) struct Facts<'a> {
     pub task: &'a Task,
+    pub program: &'a Program,
     /// The arm with the first grasper.
     pub grasper: Option<Side>,
     pub jaw_force_n: f64,

@@ -5,7 +5,7 @@ use crate::channels::{ArmChannels, TaskChannels};
 use crate::facts::{Details, Facts};
 use crate::stages::{HELD_FOLLOW, HELD_SLIP_MM};
 use crate::why::why;
-use crate::{Channels, End, Progress, Stage};
+use crate::{Channels, End, Progress};
 use serde::{Deserialize, Serialize};
 use trocar_scene::Drawn;
 
@@ -210,8 +210,8 @@ impl Summary {
         (!all.is_empty()).then(|| all.join(", "))
     }
 
-    /// When `stage` passed (s).
-    pub fn passed_at(&self, stage: Stage) -> Option<f64> {
+    /// When the stage of that name passed (s).
+    pub fn passed_at(&self, stage: &str) -> Option<f64> {
         self.progress.stages.iter().find(|s| s.stage == stage).and_then(|s| s.time_s)
     }
 }
@@ -333,8 +333,7 @@ mod tests {
         let loaded = arm("left", &loaded);
         assert_eq!((loaded.rcm_median_mm, loaded.rcm_max_mm), (Some(0.0), Some(0.0)));
         assert_eq!((loaded.tracking_rms_mm, loaded.lag_ms, loaded.lagged_rms_mm), (None, None, None));
-        let progress =
-            crate::Tracker::new(trocar_scene::TaskName::GraspLift, &trocar_scene::Gates::default()).progress().clone();
+        let progress = Progress { stage: 0, stages: Vec::new() };
         let summary = Summary::of(&rows, &progress, None, &["left"], 3.0);
         assert_eq!((summary.lift_mm, summary.slip_mm, summary.follow_ratio), (None, None, None));
         let json = serde_json::to_value(&summary).unwrap();

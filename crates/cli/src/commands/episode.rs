@@ -66,7 +66,7 @@ pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Res
     let sweep = sweep_files(&arguments.channels, &arguments.gates, progress)?;
     output::print(json, &sweep, |s| {
         let mut header: Vec<&str> = s.gates.iter().map(String::as_str).collect();
-        header.extend(s.stages.iter().map(|stage| stage.name()));
+        header.extend(s.stages.iter().map(String::as_str));
         let row = |r: &trocar_workflow::SweepRow| {
             let values = r.values.iter().map(|v| format!("{v:.4}"));
             values.chain(r.by_stage.iter().map(ToString::to_string)).collect::<Vec<_>>()
@@ -81,8 +81,8 @@ pub fn sweep(arguments: &cli::Sweep, json: bool, progress: &dyn Progress) -> Res
 fn text(made: &EpisodeOutput) -> String {
     let (r, s) = (&made.result, &made.result.summary);
     let stages = s.progress.stages.iter().map(|p| match p.time_s {
-        Some(time) => format!("{} at {time:.2} s", p.stage.name()),
-        None => format!("{} {:.0}%", p.stage.name(), 100.0 * p.share),
+        Some(time) => format!("{} at {time:.2} s", p.stage),
+        None => format!("{} {:.0}%", p.stage, 100.0 * p.share),
     });
     let mut remarks = String::new();
     for said in [&s.why, &s.advice].into_iter().flatten() {

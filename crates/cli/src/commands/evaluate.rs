@@ -76,7 +76,7 @@ fn text(r: &CampaignResult, curves: &str) -> String {
     let stages = r
         .policies
         .first()
-        .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage).collect::<Vec<_>>().join(", "));
+        .map_or_else(String::new, |p| p.stages.iter().map(|s| s.stage.as_str()).collect::<Vec<_>>().join(", "));
     let header = [
         "policy",
         "passed",
