@@ -198,14 +198,14 @@ fn a_policy_that_fails_ends_its_episode_and_the_campaign_goes_on() {
     let folder = dir.path().join("hostile");
     let policy = format!("mine={}", server.url());
     let mut command = evaluate(&scene, &folder, &["--policy", &policy, "--episodes", "9", "--jobs", "1"]);
-    let result = json(&command.env("TROCAR_POLICY_TIMEOUT_S", "0.5").output().unwrap());
+    let result = json(&command.env("TROCAR_POLICY_TIMEOUT_S", "2").output().unwrap());
     assert_eq!(
         result["policies"][0]["ends"],
         serde_json::json!({"passed": 0, "time-out": 2, "rcm-abort": 0, "diverged": 0, "policy-error": 7, "finished": 0}),
         "{result}"
     );
     for (seed, why) in
-        [(1, "out of memory"), (2, "0.5 s"), (3, "7"), (4, "NaN"), (5, "5000"), (6, "byte"), (7, "no field 'actions'")]
+        [(1, "out of memory"), (2, "after 2 s"), (3, "7"), (4, "NaN"), (5, "5000"), (6, "byte"), (7, "no field 'actions'")]
     {
         let text = std::fs::read(folder.join(format!("episodes/mine/{seed:06}/result.json"))).unwrap();
         let episode: serde_json::Value = serde_json::from_slice(&text).unwrap();

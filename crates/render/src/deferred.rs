@@ -219,7 +219,7 @@ impl Shading<'_> {
                 added = only(simd, beside, added);
             }
             for k in 0..3 {
-                sum[k] = sum[k] + added[k];
+                sum[k] += added[k];
             }
         }
         [sum[0].into(), sum[1].into(), sum[2].into()]

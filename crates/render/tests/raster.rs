@@ -65,7 +65,7 @@ impl Pair {
                     [i - width - 1, i - width, i - width + 1, i - 1, i + 1, i + width - 1, i + width, i + width + 1];
                 let is_edge =
                     |j: &usize| traced.labels[*j] != label || (traced.depth.depth[*j] - z).abs() > 0.05 * z.abs();
-                if around.iter().any(|j| is_edge(j)) {
+                if around.iter().any(is_edge) {
                     continue;
                 }
                 found.inner += usize::from(label != 0);

@@ -41,13 +41,13 @@ impl Material {
                     let through = (splat(simd, 1.0) - there) * (splat(simd, 1.0) - again);
                     let base = both.select(come * through * (FRAC_1_PI / base_mean.max(1e-4)), zero);
                     for k in 0..3 {
-                        back[k] = back[k] + albedo[k] * base;
+                        back[k] += albedo[k] * base;
                     }
                 } else {
                     for k in 0..3 {
                         let wrap = lengths[k] / (lengths[k] + WRAP_LENGTH);
                         let share = FRAC_1_PI / ((1.0 + wrap) * (1.0 + wrap));
-                        back[k] = back[k] + albedo[k] * ((come + wrap).max(zero) * share);
+                        back[k] += albedo[k] * ((come + wrap).max(zero) * share);
                     }
                 }
                 back

@@ -90,7 +90,7 @@ impl<'a> Band<'a> {
         let mut seen = reach.simd_ge(zero);
         for plane in &self.planes {
             let height = (centre[0] * plane.x + centre[1] * plane.y) + centre[2] * plane.z;
-            seen = seen & (height + reach).simd_ge(zero);
+            seen &= (height + reach).simd_ge(zero);
         }
         seen.to_bitmask()
     }
@@ -289,7 +289,7 @@ impl<'a> Band<'a> {
         let tiles = self.view.rays.tiles();
         for row in rows[0] / TILE..=rows[1] / TILE {
             let start = (self.first_row / TILE + row) * tiles.stride;
-            let mut first = columns[0] / TILE & !(LANES - 1);
+            let mut first = (columns[0] / TILE) & !(LANES - 1);
             while first <= columns[1] / TILE {
                 let at = start + first..start + first + LANES;
                 let zero = splat(simd, 0.0);

@@ -104,6 +104,7 @@ impl Projection {
 }
 
 /// Angle between the axis and points at `z` along and `r` beside it (rad), with an error of 1e-5.
+#[allow(clippy::excessive_precision, reason = "the digits of the source")]
 #[inline(always)]
 fn angle<S: Simd>(simd: S, r: f32x8<S>, z: f32x8<S>) -> f32x8<S> {
     let along = z.abs();

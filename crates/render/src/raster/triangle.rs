@@ -142,10 +142,10 @@ impl<S: Simd> One<S> {
             let mut size = splat(simd, 0.0);
             for axis in 0..3 {
                 let (a, b) = (plane[axis] * low[axis], plane[axis] * high[axis]);
-                most = most + a.simd_gt(b).select(a, b);
+                most += a.simd_gt(b).select(a, b);
                 size = size + a.abs() + b.abs();
             }
-            met = met & (most + size * 1e-6).simd_ge(splat(simd, 0.0));
+            met &= (most + size * 1e-6).simd_ge(splat(simd, 0.0));
         }
         met.to_bitmask()
     }
